@@ -1,0 +1,51 @@
+# sagline: `make` alone lists what there is to do.
+
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+OUT ?= output
+FOUND = $(shell for p in python3 python3.13 python3.12 python3.11 python3.14; do \
+	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 && { echo $$p; break; }; done)
+PYTHON ?= $(FOUND)
+
+.DEFAULT_GOAL := help
+.PHONY: help env run test check format bench soak clean
+
+help: ## show this list
+	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{ printf "  make %-8s %s\n", $$1, $$2 }'
+	@echo "  PYTHON=... names the interpreter (Python 3.11 or newer), OUT=... the folder of make run"
+
+env: $(STAMP) ## create .venv with everything in it (again only when pyproject.toml changes)
+
+$(STAMP): pyproject.toml
+	@test -n "$(PYTHON)" || { echo "sagline needs Python 3.11 or newer and found none; install it or name it: make env PYTHON=/path/to/python3" >&2; exit 2; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "$(PYTHON) is no Python 3.11 or newer; name another: make env PYTHON=/path/to/python3" >&2; exit 2; }
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@touch $@
+
+run: env ## the main job: the article's test, its table, runs and figures in OUT (default: output)
+	$(BIN)/sagline run --out $(OUT)
+
+test: env check ## all checks, then the whole test suite with its coverage
+	$(BIN)/python -m pytest --cov
+
+check: env ## style, types and the direction of imports
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy src $(wildcard tests examples benchmarks)
+	$(BIN)/lint-imports
+
+format: env ## put the source in shape
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+bench: env ## one table of times and ratios, on one core
+	$(BIN)/python benchmarks/bench.py
+
+soak: env ## the long tests that make test leaves out
+	$(BIN)/python -m pytest -m soak
+
+clean: ## remove the environment, the folder output and every cache
+	rm -rf $(VENV) output build dist .coverage htmlcov .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	find src tests -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,1 @@
+"""Cable-driven parallel robots whose cables sag."""
