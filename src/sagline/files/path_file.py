@@ -1,0 +1,158 @@
+"""Path files: waypoints in YAML, or samples of time and pose in CSV."""
+
+from __future__ import annotations
+
+import os
+import reprlib
+from difflib import get_close_matches
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from sagline.arrays import Array, checked
+from sagline.errors import FileError, InvalidValueError
+from sagline.files.path_table import QUATERNION_TOLERANCE, path_from_table
+from sagline.files.quantity import in_si
+from sagline.files.text import parse_mapping, read_text
+from sagline.motion.path import Path
+from sagline.motion.quintic import quintic_path
+from sagline.robot.pose import Pose
+
+TIMING_UNITS = {
+    "rate": "1/s",
+    "durations": "s",
+    "speed": "m/s",
+    "acceleration": "m/s^2",
+    "angular_speed": "rad/s",
+    "angular_acceleration": "rad/s^2",
+}
+
+
+def load_path(file: str | os.PathLike[str]) -> Path:
+    """Read a path from a file of waypoints (.yaml, .yml) or of sampled poses (.csv).
+
+    A YAML file moves from rest to rest between its waypoints (see `quintic_path`); a quantity is a number in SI
+    (lengths in m, angles in rad) or a text with its unit:
+
+        rate: 100                             # samples per second, 100 if left out
+        durations: [5 s, 8 s]                 # or one for all; or limits instead:
+        # speed: 1.5 m/s                      # and acceleration, angular_speed, angular_acceleration
+        waypoints:
+          - {position: [0, 0, 1.5]}
+          - {position: [2 m, 1500 mm, 1.5], euler: {alpha: 20 deg}}        # alpha about z, beta about y, gamma about x
+          - {position: [2, 1, 1.5], quaternion: [0, 0, 0.6, 0.8]}          # x, y, z, w
+
+    A CSV file has one row for each sample, below a header `time,x,y,z`, followed by `alpha,beta,gamma`, by
+    `qx,qy,qz,qw`, or by nothing for a constant orientation. Units stand in brackets, `time [s],x [mm],...,alpha [deg]`;
+    without, they are s, m and rad. Velocity and acceleration are those of a spline (see `path_from_samples`).
+
+    Quaternions in either file have length 1 to the 1e-3 of few printed decimals, and are normalized.
+
+    Args:
+        file: The file; its suffix says which of the two it is.
+
+    Returns:
+        The path.
+
+    Raises:
+        FileError: If the file cannot be read, is cut off, or has a wrong line.
+        InvalidValueError: If a key or a value is wrong; the message names the file and the key.
+    """
+    path = FilePath(file)
+    readers = {".yaml": _path_from_yaml, ".yml": _path_from_yaml, ".csv": path_from_table}
+    reader = readers.get(path.suffix.lower())
+    if reader is None:
+        raise FileError(
+            path,
+            f"the suffix is {path.suffix or 'missing'}; allowed: {', '.join(readers)}",
+            "Give waypoints as .yaml, or time and pose as .csv.",
+        )
+    text = read_text(path)
+    try:
+        return reader(path, text)
+    except InvalidValueError as error:
+        raise InvalidValueError(f"{path}: {error.item}", error.value, error.allowed, error.next_step) from None
+
+
+class _Entry(BaseModel):
+    """A mapping of the file: no key but the listed ones."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+
+class _Euler(_Entry):
+    alpha: Any = 0.0
+    beta: Any = 0.0
+    gamma: Any = 0.0
+
+
+class _Waypoint(_Entry):
+    position: Any
+    euler: _Euler | None = None
+    quaternion: Any = None
+
+
+class _Waypoints(_Entry):
+    rate: Any = 100.0
+    durations: Any = None
+    speed: Any = None
+    acceleration: Any = None
+    angular_speed: Any = None
+    angular_acceleration: Any = None
+    waypoints: list[_Waypoint]
+
+
+def _path_from_yaml(path: FilePath, text: str) -> Path:
+    try:
+        entry = _Waypoints.model_validate(parse_mapping(text, str(path)))
+    except ValidationError as error:
+        raise _first_mistake(error) from None
+    timing: dict[str, Any] = {
+        name: in_si(getattr(entry, name), unit, name)
+        for name, unit in TIMING_UNITS.items()
+        if getattr(entry, name) is not None
+    }
+    return quintic_path([_pose(w, f"waypoints[{k}]") for k, w in enumerate(entry.waypoints)], **timing)
+
+
+def _pose(waypoint: _Waypoint, item: str) -> Pose:
+    position = _numbers(waypoint.position, 3, "m", f"{item}.position")
+    if waypoint.quaternion is None:
+        euler = waypoint.euler or _Euler()
+        angles = [in_si(angle, "rad", f"{item}.euler.{name}") for name, angle in euler]
+        return Pose.from_euler(position, *_numbers(angles, 3, "rad", f"{item}.euler"))
+    if waypoint.euler is not None:
+        raise InvalidValueError(
+            item, "given with euler and quaternion", "one of the two, or none", "Leave one of them out."
+        )
+    quaternion = _numbers(waypoint.quaternion, 4, "", f"{item}.quaternion")
+    length = float(np.linalg.norm(quaternion))
+    if abs(length - 1.0) > QUATERNION_TOLERANCE:
+        raise InvalidValueError(
+            f"the length of {item}.quaternion", f"{length:.6g}", f"1 to {QUATERNION_TOLERANCE:g}", f"Correct {item}."
+        )
+    return Pose.from_quaternion(position, quaternion / length)
+
+
+def _numbers(value: Any, count: int, unit: str, item: str) -> Array:
+    numbers = checked(in_si(value, unit, item), item, unit)
+    if numbers.shape != (count,):
+        raise InvalidValueError(item, f"of shape {numbers.shape}", f"a list of {count} numbers", f"Correct {item}.")
+    return numbers
+
+
+def _first_mistake(error: ValidationError) -> InvalidValueError:
+    """The mistake to tell first: a misspelt key explains the missing one beside it."""
+    mistakes = error.errors(include_url=False)
+    first = next((mistake for mistake in mistakes if mistake["type"] == "extra_forbidden"), mistakes[0])
+    where = first["loc"]
+    item = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in where).lstrip(".")
+    if first["type"] == "missing":
+        return InvalidValueError(item, "missing", "any value that fits", f"Add the key {where[-1]}.")
+    if first["type"] == "extra_forbidden":
+        keys = list((_Waypoints, _Waypoint, _Euler)[sum(isinstance(part, str) for part in where) - 1].model_fields)
+        near = get_close_matches(str(where[-1]), keys, n=1, cutoff=0.0)[0]
+        return InvalidValueError(item, "an unknown key", ", ".join(keys), f"Did you mean {near}?")
+    return InvalidValueError(item, reprlib.repr(first["input"]), first["msg"], f"Correct {item}.")

@@ -1,0 +1,1 @@
+"""Paths of the platform: where it is, how it moves, and when."""

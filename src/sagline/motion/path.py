@@ -1,0 +1,90 @@
+"""A path: the platform's poses, velocities and accelerations, sample by sample."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sagline.arrays import Array, checked
+from sagline.errors import InvalidValueError
+from sagline.robot.pose import Pose
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Path:
+    """The motion of the platform frame over time, in N samples; no two at the same time.
+
+    Attributes:
+        time: Time of each sample [s], shape (N,), strictly increasing.
+        pose: Poses of the platform frame, a batch of N.
+        twist: Velocity of the platform's origin [m/s], then its angular velocity [rad/s], in world axes, shape (N, 6).
+        twist_rate: Acceleration of the platform's origin [m/s^2], then its angular acceleration [rad/s^2],
+            in world axes, shape (N, 6).
+    """
+
+    time: Array
+    pose: Pose
+    twist: Array
+    twist_rate: Array
+
+    def __init__(self, time: ArrayLike, pose: Pose, twist: ArrayLike, twist_rate: ArrayLike) -> None:
+        """Check the four fields against each other.
+
+        Raises:
+            InvalidValueError: If the times do not increase, a number is not finite, or the lengths differ.
+        """
+        clock = checked_time(time)
+        samples = clock.size
+        if pose.shape != (samples,):
+            raise _length_error("pose", f"of shape {pose.shape}", samples)
+        object.__setattr__(self, "time", clock)
+        object.__setattr__(self, "pose", pose)
+        for name, value, unit in (
+            ("twist", twist, "m/s or rad/s"),
+            ("twist_rate", twist_rate, "m/s^2 or rad/s^2"),
+        ):
+            array = checked(value, name, unit, shape=(None, 6))
+            if array.shape != (samples, 6):
+                raise _length_error(name, f"of shape {array.shape}", samples)
+            object.__setattr__(self, name, array)
+
+    def __len__(self) -> int:
+        """Number of samples."""
+        return self.time.size
+
+    @property
+    def duration(self) -> float:
+        """Time from the first sample to the last [s]."""
+        return float(self.time[-1] - self.time[0])
+
+    def __reduce__(self) -> tuple[type[Path], tuple[Array, Pose, Array, Array]]:
+        """Pickle through the constructor, so that a loaded path is checked and locked too."""
+        return Path, (self.time, self.pose, self.twist, self.twist_rate)
+
+
+def checked_time(time: ArrayLike) -> Array:
+    """A locked copy of the sample times [s], strictly increasing, shape (N,) with N >= 1.
+
+    Raises:
+        InvalidValueError: If they are no such times; it names the first sample that is wrong.
+    """
+    clock = checked(time, "time", "s", shape=(None,))
+    if clock.ndim != 1 or clock.size == 0:
+        raise InvalidValueError(
+            "time", f"of shape {clock.shape}", "shape (N,), N >= 1", "Give one time for each sample."
+        )
+    late = np.flatnonzero(np.diff(clock) <= 0.0)
+    if late.size:
+        k = int(late[0]) + 1
+        raise InvalidValueError(
+            f"time[{k}]", f"{clock[k]} s", f"> {clock[k - 1]} s (the sample before)", "Sort the samples by time."
+        )
+    return clock
+
+
+def _length_error(item: str, value: str, samples: int) -> InvalidValueError:
+    return InvalidValueError(
+        item, value, f"one entry for each of the {samples} times", f"Give {item} for every sample."
+    )

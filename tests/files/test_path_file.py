@@ -1,0 +1,240 @@
+from pathlib import Path as FilePath
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from sagline.errors import FileError, InvalidValueError
+from sagline.files.path_file import load_path
+
+WAYPOINTS = """\
+rate: 50 Hz
+durations: [2 s, 500 ms, 1]
+waypoints:
+  - position: [0, 0, 1.5]
+  - position: [2 m, 1500 mm, 150 cm]
+    euler: {alpha: 20 deg, beta: -0.1, gamma: 300 mrad}
+  - position: [2, 1.5, 1.5]
+    quaternion: [0, 0, 0.6, 0.8]
+  - position: [0, 1e-3, 1.5]
+    euler: {gamma: 5e-1}
+"""
+
+
+def write(folder: FilePath, name: str, text: str) -> FilePath:
+    file = folder / name
+    file.write_text(text, encoding="utf-8")
+    return file
+
+
+def test_waypoints_with_and_without_units(tmp_path: FilePath) -> None:
+    path = load_path(write(tmp_path, "tour.yaml", WAYPOINTS))
+    assert path.duration == 3.5
+    assert len(path) == 176
+    stops = np.array([0, 100, 125, 175])
+    position = [(0.0, 0.0, 1.5), (2.0, 1.5, 1.5), (2.0, 1.5, 1.5), (0.0, 1e-3, 1.5)]
+    np.testing.assert_allclose(path.pose.position[stops], position, rtol=1e-15, atol=1e-15)
+    z, y, x = (Rotation.from_rotvec(np.eye(3)[k] * a) for k, a in ((2, np.pi / 9), (1, -0.1), (0, 0.3)))
+    expected = [Rotation.identity(), z * y * x, Rotation.from_quat([0, 0, 0.6, 0.8]), Rotation.from_rotvec([0.5, 0, 0])]
+    for k, rotation in zip(stops, expected, strict=True):
+        assert (path.pose.rotation[int(k)] * rotation.inv()).magnitude() < 1e-14
+
+
+def test_limits_with_units(tmp_path: FilePath) -> None:
+    text = """\
+speed: 2 km/hour
+acceleration: 100 cm/s^2
+angular_speed: 30 deg/s
+angular_acceleration: 10
+waypoints: [{position: [0, 0, 1]}, {position: [1, 0, 1], euler: {alpha: 3 deg}}, {position: [1, 0, 1]}]
+"""
+    path = load_path(str(write(tmp_path, "tour.yml", text)))
+    by_speed, by_angular_speed = 15 / 8 * 1.0 / (2 / 3.6), 15 / 8 * 3.0 / 30.0
+    by_angular_acceleration = np.sqrt(10 / np.sqrt(3) * np.radians(3.0) / 10.0)
+    assert path.duration == pytest.approx(by_speed + max(by_angular_speed, by_angular_acceleration), rel=1e-12)
+    assert path.time[1] == 0.01
+
+
+def test_a_quaternion_of_few_decimals(tmp_path: FilePath) -> None:
+    text = "durations: 1\nwaypoints: [{position: [0, 0, 1]}, {position: [0, 0, 1], quaternion: [0.707, 0, 0, 0.707]}]"
+    path = load_path(write(tmp_path, "tour.yaml", text))
+    np.testing.assert_allclose(path.pose.rotation[100].as_rotvec(), [np.pi / 2, 0.0, 0.0], atol=1e-15)
+
+
+CIRCLE = np.linspace(0.0, 2.0, 201)
+
+
+def circle(header: str, columns: list[np.ndarray]) -> str:
+    rows = (",".join(repr(float(value)) for value in row) for row in zip(*columns, strict=True))
+    return header + "\n" + "\n".join(rows) + "\n"
+
+
+def test_table_without_orientation(tmp_path: FilePath) -> None:
+    columns = [CIRCLE, np.cos(CIRCLE), np.sin(CIRCLE), 0.5 * CIRCLE]
+    path = load_path(write(tmp_path, "run.csv", circle("time,x,y,z", columns)))
+    np.testing.assert_array_equal(path.time, CIRCLE)
+    np.testing.assert_array_equal(path.pose.position, np.stack(columns[1:], axis=-1))
+    np.testing.assert_allclose(path.twist[:, 0], -np.sin(CIRCLE), atol=1e-6)
+    np.testing.assert_allclose(path.twist[:, 1], np.cos(CIRCLE), atol=1e-6)
+    np.testing.assert_allclose(path.twist[:, 2:], np.tile([0.5, 0.0, 0.0, 0.0], (201, 1)), atol=1e-12)
+    np.testing.assert_allclose(path.twist_rate[:, 0], -np.cos(CIRCLE), atol=2e-4)
+
+
+def test_table_with_units_angles_and_columns_in_any_order(tmp_path: FilePath) -> None:
+    header = "z [cm], alpha [deg],time [ms],beta,gamma [mrad],x [mm],y"
+    zero = np.zeros_like(CIRCLE)
+    columns: list[np.ndarray] = [100 * CIRCLE, 90 * CIRCLE, 1000 * CIRCLE, zero, zero + 500.0, 1000 * CIRCLE**2, zero]
+    path = load_path(write(tmp_path, "run.csv", circle(header, columns)))
+    np.testing.assert_allclose(path.time, CIRCLE, rtol=1e-15)
+    np.testing.assert_allclose(path.pose.position, np.stack([CIRCLE**2, zero, CIRCLE], axis=-1), rtol=1e-14)
+    # alpha turns about the world's z, whatever the constant gamma
+    np.testing.assert_allclose(path.twist[:, 3:], np.tile([0.0, 0.0, np.pi / 2], (201, 1)), atol=1e-6)
+    first = Rotation.from_rotvec([0.5, 0.0, 0.0])
+    assert (path.pose.rotation[0] * first.inv()).magnitude() < 1e-14
+    np.testing.assert_allclose(path.twist_rate[:, 0], 2.0, atol=1e-8)
+
+
+def test_table_with_quaternions_of_few_decimals(tmp_path: FilePath) -> None:
+    half = 0.35 * CIRCLE
+    zero = np.zeros_like(CIRCLE)
+    columns: list[np.ndarray] = [
+        CIRCLE,
+        zero,
+        zero,
+        zero,
+        np.round(np.sin(half), 4),
+        zero,
+        zero,
+        np.round(np.cos(half), 4),
+    ]
+    path = load_path(write(tmp_path, "run.csv", circle("time,x,y,z,qx,qy,qz,qw", columns)))
+    np.testing.assert_allclose(path.pose.rotation.as_rotvec()[:, 0], 0.7 * CIRCLE, atol=2e-4)
+    np.testing.assert_allclose(np.linalg.norm(path.pose.quaternion, axis=1), 1.0, rtol=1e-15)
+
+
+def test_table_as_a_spreadsheet_saves_it(tmp_path: FilePath) -> None:
+    text = "\ufefftime,x,y,z\r\n0,1,2,3\r\n\r\n0.5,1,2,4\r\n,,,\r\n"
+    file = tmp_path / "run.CSV"
+    file.write_bytes(text.encode())
+    path = load_path(file)
+    np.testing.assert_array_equal(path.pose.position, [(1.0, 2.0, 3.0), (1.0, 2.0, 4.0)])
+    np.testing.assert_allclose(path.twist[:, 2], 2.0, rtol=1e-15)
+
+
+def test_a_number_cut_off_in_the_last_row_is_not_guessed(tmp_path: FilePath) -> None:
+    with pytest.raises(FileError, match="line 3: 3 columns; allowed: 4"):
+        load_path(write(tmp_path, "run.csv", "time,x,y,z\n0,1,2,3\n0.5,1,2."))
+
+
+HEAD = "durations: 1\nwaypoints:\n"
+TWO = "  - position: [0, 0, 1]\n  - position: [1, 0, 1]\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "fragment"),
+    [
+        ("duration: 1\nwaypoints:\n" + TWO, "Did you mean durations?"),
+        (HEAD + "  - positon: [0, 0, 1]\n", "waypoints[0].positon is an unknown key"),
+        (
+            HEAD + TWO + "    euler: {alfa: 1}\n",
+            "waypoints[1].euler.alfa is an unknown key; allowed: alpha, beta, gamma",
+        ),
+        (HEAD + TWO + "    euler: [1, 2, 3]\n", "waypoints[1].euler is [1, 2, 3]"),
+        (HEAD + "  - euler: {alpha: 1}\n", "waypoints[0].position is missing"),
+        ("durations: 1\n", "waypoints is missing"),
+        ("durations: 1\nwaypoints: 5\n", "waypoints is 5"),
+        (HEAD + TWO + "  - [1, 2, 3]\n", "waypoints[2] is [1, 2, 3]"),
+        (HEAD + "  - position: [0, 0, 1]\n", "waypoints is of shape (1,)"),
+        ("durations: 1\nwaypoints: []\n", "waypoints is of shape (0,"),
+        (HEAD + TWO + "  - position: [0, 1]\n", "waypoints[2].position is of shape (2,)"),
+        (HEAD + TWO + "  - position: [[0, 1, 2]]\n", "waypoints[2].position is of shape (1, 3)"),
+        (HEAD + TWO + "  - position: [0, 1, [2]]\n", "waypoints[2].position"),
+        (HEAD + TWO + "  - position: [0, 5 kg, 1]\n", "waypoints[2].position[1] is '5 kg'"),
+        (HEAD + TWO + "  - position: [0, .nan, 1]\n", "waypoints[2].position[1] is nan"),
+        (HEAD + TWO + "  - position: [0, .inf, 1]\n", "waypoints[2].position[1] is inf m"),
+        (HEAD + TWO + "  - position: [0, true, 1]\n", "waypoints[2].position[1] is True"),
+        (HEAD + TWO + "    euler: {beta: 5 m}\n", "waypoints[1].euler.beta is '5 m'"),
+        (HEAD + TWO + "    quaternion: [0, 0, 0, 0]\n", "the length of waypoints[1].quaternion is 0"),
+        (HEAD + TWO + "    quaternion: [0, 0, 1]\n", "waypoints[1].quaternion is of shape (3,)"),
+        (HEAD + TWO + "    quaternion: [0, 0, 0, 1]\n    euler: {alpha: 1}\n", "waypoints[1] is given with euler and"),
+        ("durations: 0 s\nwaypoints:\n" + TWO, "durations is 0 s; allowed: > 0 s"),
+        ("durations: [1, 2]\nwaypoints:\n" + TWO, "durations is of shape (2,)"),
+        ("durations: 5 mm\nwaypoints:\n" + TWO, "durations is '5 mm'"),
+        ("durations: 1\nspeed: 1\nwaypoints:\n" + TWO, "given by durations and speed"),
+        ("waypoints:\n" + TWO, "the timing of the path is missing"),
+        ("speed: 1 m\nwaypoints:\n" + TWO, "speed is '1 m'"),
+        ("speed: -1 m/s\nwaypoints:\n" + TWO, "speed is -1 m/s; allowed: > 0 m/s"),
+        ("speed: 1\nwaypoints:\n" + TWO + "  - position: [1, 0, 1]\n", "waypoints[2] is the same as waypoints[1]"),
+        ("rate: 0\n" + HEAD + TWO, "rate is 0 1/s; allowed: > 0 1/s"),
+    ],
+)
+def test_a_wrong_waypoint_file_is_told_by_file_and_key(tmp_path: FilePath, text: str, fragment: str) -> None:
+    with pytest.raises(InvalidValueError) as caught:
+        load_path(write(tmp_path, "tour.yaml", text))
+    assert "tour.yaml: " in str(caught.value)
+    assert fragment in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "fragment"),
+    [
+        ("time,x,y\n0,1,2\n", "line 1: missing column z; found: time, x, y"),
+        ("time,x,y,z,aplha\n", "line 1: unknown column 'aplha' (did you mean alpha?)"),
+        ("\ntime (s),x,y,z\n", "line 2: unknown column 'time (s)' (did you mean time?)"),
+        ("0,1,2,3\n1,1,2,3\n", "line 1: unknown column '0'"),
+        ("time,x,y,z,x\n", "line 1: column x is there twice"),
+        ("time,x,y,z,alpha,beta\n", "line 1: missing column gamma"),
+        ("time,x,y,z,qx,qy,qz\n", "line 1: missing column qw"),
+        ("time,x,y,z,alpha,beta,gamma,qx\n", "line 1: columns qx beside alpha, beta, gamma"),
+        ("time [mm],x,y,z\n", "line 1: the unit of time is [mm]; allowed: a unit that converts to s"),
+        ("time,x,y,z,qx [m],qy,qz,qw\n", "line 1: the unit of qx is [m]; allowed: none"),
+        ("time,x,y,z\n0,1,2,3\n\n0.1,1,2\n", "line 4: 3 columns; allowed: 4"),
+        ("time,x,y,z\n0,1,2,3\n0.1,1,2,3,4\n", "line 3: 5 columns; allowed: 4"),
+        ("time,x,y,z\n0,1,2,3\n0.1,1,two,3\n", "line 3: y is two; allowed: a number"),
+        ("time,x,y,z\n0,1,2,3\n0.1,1,,3\n", "line 3: y is empty; allowed: a number"),
+        ("time,x,y,z\n0,1,2,3\n\n0.1,1,nan,3\n", "line 4: y is nan m; allowed: a finite number"),
+        ("time,x,y,z\n0,1,2,3\n0.2,1,2,3\n\n0.1,1,2,3\n", "line 5: time is 0.1 s; allowed: a time after"),
+        ("time,x,y,z\n0,1,2,3\n0,1,2,3\n", "line 3: time is 0 s"),
+        ("time,x,y,z,qx,qy,qz,qw\n0,1,2,3,0,0,0,1\n1,1,2,3,0,0,0,0\n", "line 3: the length of qx, qy, qz, qw is 0"),
+        ("time,x,y,z\n0,1,2,3\n", "number of samples 1; allowed: at least two"),
+        ('time,x,y,z\n0,1,2,"3\n', "line 2: it is no CSV"),
+        (",,,\n", "no columns; allowed: time, x, y, z"),
+        ("", "no columns; allowed: time, x, y, z"),
+    ],
+)
+def test_a_wrong_table_is_told_by_file_and_line(tmp_path: FilePath, text: str, fragment: str) -> None:
+    with pytest.raises(FileError) as caught:
+        load_path(write(tmp_path, "run.csv", text))
+    assert caught.value.path.name == "run.csv"
+    assert fragment in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["a.yaml", "a.csv"])
+def test_files_that_are_none(tmp_path: FilePath, name: str) -> None:
+    with pytest.raises(FileError, match="does not exist"):
+        load_path(tmp_path / name)
+    (tmp_path / name).write_bytes(bytes(range(256)) * 4)
+    with pytest.raises(FileError, match="not UTF-8 text"):
+        load_path(tmp_path / name)
+    (tmp_path / f"folder_{name}").mkdir()
+    with pytest.raises(FileError, match="is a folder"):
+        load_path(tmp_path / f"folder_{name}")
+
+
+@pytest.mark.parametrize(
+    ("text", "match"),
+    [
+        ("", "is empty"),
+        ("durations: 1\nwaypoints:\n  - {position: [0, 0", "line 3"),
+        ("durations: 1\ndurations: 2\nwaypoints: []\n", "line 2"),
+        ("- 1\n- 2\n", "no keys"),
+    ],
+)
+def test_text_that_is_no_waypoint_file(tmp_path: FilePath, text: str, match: str) -> None:
+    with pytest.raises(FileError, match=match):
+        load_path(write(tmp_path, "a.yaml", text))
+
+
+def test_another_suffix_is_refused(tmp_path: FilePath) -> None:
+    with pytest.raises(FileError, match=r"suffix is \.txt; allowed: \.yaml, \.yml, \.csv"):
+        load_path(write(tmp_path, "run.txt", "time,x,y,z\n0,1,2,3\n1,1,2,3\n"))
