@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from sagline.errors import FileError, InvalidValueError
+from sagline.errors import FileError
 from sagline.files.path_file import load_path
 
 WAYPOINTS = """\
@@ -169,9 +169,9 @@ TWO = "  - position: [0, 0, 1]\n  - position: [1, 0, 1]\n"
     ],
 )
 def test_a_wrong_waypoint_file_is_told_by_file_and_key(tmp_path: FilePath, text: str, fragment: str) -> None:
-    with pytest.raises(InvalidValueError) as caught:
+    with pytest.raises(FileError) as caught:
         load_path(write(tmp_path, "tour.yaml", text))
-    assert "tour.yaml: " in str(caught.value)
+    assert caught.value.path.name == "tour.yaml"
     assert fragment in str(caught.value)
 
 
@@ -211,13 +211,13 @@ def test_a_wrong_table_is_told_by_file_and_line(tmp_path: FilePath, text: str, f
 
 @pytest.mark.parametrize("name", ["a.yaml", "a.csv"])
 def test_files_that_are_none(tmp_path: FilePath, name: str) -> None:
-    with pytest.raises(FileError, match="does not exist"):
+    with pytest.raises(FileError, match=r"cannot be read.*No such file"):
         load_path(tmp_path / name)
     (tmp_path / name).write_bytes(bytes(range(256)) * 4)
     with pytest.raises(FileError, match="not UTF-8 text"):
         load_path(tmp_path / name)
     (tmp_path / f"folder_{name}").mkdir()
-    with pytest.raises(FileError, match="is a folder"):
+    with pytest.raises(FileError, match=r"cannot be read.*directory"):
         load_path(tmp_path / f"folder_{name}")
 
 

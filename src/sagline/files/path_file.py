@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import os
-import reprlib
-from difflib import get_close_matches
 from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, ValidationError
 
 from sagline.arrays import Array, checked
 from sagline.errors import FileError, InvalidValueError
 from sagline.files.path_table import QUATERNION_TOLERANCE, path_from_table
 from sagline.files.quantity import in_si
+from sagline.files.schema import Entry, validated
 from sagline.files.text import parse_mapping, read_text
 from sagline.motion.path import Path
 from sagline.motion.quintic import quintic_path
@@ -57,8 +55,7 @@ def load_path(file: str | os.PathLike[str]) -> Path:
         The path.
 
     Raises:
-        FileError: If the file cannot be read, is cut off, or has a wrong line.
-        InvalidValueError: If a key or a value is wrong; the message names the file and the key.
+        FileError: If the file cannot be read, or what it says is no path; the message names the line or the key.
     """
     path = FilePath(file)
     readers = {".yaml": _path_from_yaml, ".yml": _path_from_yaml, ".csv": path_from_table}
@@ -73,28 +70,22 @@ def load_path(file: str | os.PathLike[str]) -> Path:
     try:
         return reader(path, text)
     except InvalidValueError as error:
-        raise InvalidValueError(f"{path}: {error.item}", error.value, error.allowed, error.next_step) from None
+        raise FileError(path, f"{error.item} is {error.value}; allowed: {error.allowed}", error.next_step) from None
 
 
-class _Entry(BaseModel):
-    """A mapping of the file: no key but the listed ones."""
-
-    model_config = ConfigDict(extra="forbid", strict=True)
-
-
-class _Euler(_Entry):
+class _Euler(Entry):
     alpha: Any = 0.0
     beta: Any = 0.0
     gamma: Any = 0.0
 
 
-class _Waypoint(_Entry):
+class _Waypoint(Entry):
     position: Any
     euler: _Euler | None = None
     quaternion: Any = None
 
 
-class _Waypoints(_Entry):
+class _Waypoints(Entry):
     rate: Any = 100.0
     durations: Any = None
     speed: Any = None
@@ -105,10 +96,7 @@ class _Waypoints(_Entry):
 
 
 def _path_from_yaml(path: FilePath, text: str) -> Path:
-    try:
-        entry = _Waypoints.model_validate(parse_mapping(text, str(path)))
-    except ValidationError as error:
-        raise _first_mistake(error) from None
+    entry = validated(parse_mapping(text, path), _Waypoints, path)
     timing: dict[str, Any] = {
         name: in_si(getattr(entry, name), unit, name)
         for name, unit in TIMING_UNITS.items()
@@ -141,18 +129,3 @@ def _numbers(value: Any, count: int, unit: str, item: str) -> Array:
     if numbers.shape != (count,):
         raise InvalidValueError(item, f"of shape {numbers.shape}", f"a list of {count} numbers", f"Correct {item}.")
     return numbers
-
-
-def _first_mistake(error: ValidationError) -> InvalidValueError:
-    """The mistake to tell first: a misspelt key explains the missing one beside it."""
-    mistakes = error.errors(include_url=False)
-    first = next((mistake for mistake in mistakes if mistake["type"] == "extra_forbidden"), mistakes[0])
-    where = first["loc"]
-    item = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in where).lstrip(".")
-    if first["type"] == "missing":
-        return InvalidValueError(item, "missing", "any value that fits", f"Add the key {where[-1]}.")
-    if first["type"] == "extra_forbidden":
-        keys = list((_Waypoints, _Waypoint, _Euler)[sum(isinstance(part, str) for part in where) - 1].model_fields)
-        near = get_close_matches(str(where[-1]), keys, n=1, cutoff=0.0)[0]
-        return InvalidValueError(item, "an unknown key", ", ".join(keys), f"Did you mean {near}?")
-    return InvalidValueError(item, reprlib.repr(first["input"]), first["msg"], f"Correct {item}.")

@@ -26,7 +26,6 @@ EULER = ("alpha", "beta", "gamma")
 QUATERNION = ("qx", "qy", "qz", "qw")
 UNITS = dict(zip(PLACE + EULER + QUATERNION, ("s", "m", "m", "m", "rad", "rad", "rad", "", "", "", ""), strict=True))
 QUATERNION_TOLERANCE = 1e-3  # of a length 1, printed with three decimals; more is a mistake
-BYTE_ORDER_MARK = "\ufeff"  # spreadsheets begin their UTF-8 with it
 
 _COLUMN = re.compile(r"\s*(\w+)\s*(?:\[(.*)\])?\s*")  # name, or name [unit]
 
@@ -72,7 +71,7 @@ class _Table:
 
     @classmethod
     def read(cls, path: FilePath, text: str) -> _Table:
-        reader = csv.reader(io.StringIO(text.removeprefix(BYTE_ORDER_MARK)), strict=True)
+        reader = csv.reader(io.StringIO(text), strict=True)
         factors: dict[str, float] = {}
         numbers, lines = array("d"), array("q")
         try:
