@@ -1,0 +1,86 @@
+"""Robot files: YAML with units in, YAML in SI out."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from sagline.errors import FileError, InvalidValueError
+from sagline.files.robot_schema import RobotEntry
+from sagline.files.schema import validated
+from sagline.files.text import parse_mapping, read_text
+from sagline.robot.catalogue import preset_text, robot_names
+from sagline.robot.robot import Robot
+
+
+def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
+    """A preset by its name, or a robot file by its path.
+
+    A robot file is YAML. Its keys are the fields of `Robot`; a quantity is a number in SI or a text with its unit:
+
+        name: my robot
+        frame_anchors: [[0, 0, 3], [4000 mm, 0, 3], ...]      # one point a cable
+        platform_anchors: [[-0.1, 0, 0.1], ...]
+        cables: {linear_density: 67 g/m, youngs_modulus: 2 GPa, section_area: 22 mm^2}
+            # or axial_stiffness; radius or diameter instead of section_area; a number, or a list of one a cable
+        mass: 50 kg
+        inertia: {box: [0.3, 0.3, 0.5]}
+            # or cylinder_radius and cylinder_height (along z), Ixx ... Iyz, three numbers, or a 3 x 3 matrix
+        tension_min: 20 N
+        assumed: {tension_min: the winch's data sheet gives none}
+
+    Args:
+        name_or_path: One of `robot_names()`, or the path of a file. A path object, and a text that ends in .yaml
+            or .yml, has a folder in it or names what exists, is a path.
+
+    Raises:
+        FileError: If the file cannot be read, or says something wrong; the message names the key and the value.
+        InvalidValueError: If there is no such preset.
+    """
+    path = Path(name_or_path)
+    if isinstance(name_or_path, str) and _is_name(name_or_path, path):
+        return parse_robot(preset_text(name_or_path), f"preset {name_or_path}")
+    return parse_robot(read_text(path), path)
+
+
+def parse_robot(text: str, origin: Path | str) -> Robot:
+    """A robot from the text of a robot file.
+
+    Args:
+        text: The YAML text.
+        origin: The file or whatever else the text came from, for the messages.
+
+    Raises:
+        FileError: If the text is no robot file; the message names the line, or the key and the value.
+    """
+    entry = validated(parse_mapping(text, origin), RobotEntry, origin)
+    try:
+        return entry.robot()
+    except InvalidValueError as error:
+        raise FileError(origin, f"{error.item} is {error.value}; allowed: {error.allowed}", error.next_step) from None
+
+
+def dump_robot(robot: Robot) -> str:
+    """The text of a robot file, in SI, that `parse_robot` turns into the same robot to the last bit."""
+    data: dict[str, Any] = {"name": robot.name, "source": robot.source, "notes": robot.notes}
+    data["assumed"] = dict(robot.assumed)
+    data["cables"] = {key: getattr(robot.cables, key).tolist() for key in ("linear_density", "axial_stiffness")}
+    for key in ("mass", "gravity", "motion_pattern", "tension_limits_of"):
+        data[key] = getattr(robot, key)
+    for key in ("inertia", "center_of_mass", "tension_min", "tension_max", "frame_anchors", "platform_anchors"):
+        data[key] = getattr(robot, key).tolist()
+    for key in ("plane_normal", "platform_size", "frame_size"):
+        if (value := getattr(robot, key)) is not None:
+            data[key] = value.tolist()
+    if (box := robot.test_box) is not None:
+        data["test_box"] = {"low": box.low.tolist(), "high": box.high.tolist(), "tilt": box.tilt}
+    return yaml.safe_dump(data, sort_keys=False, default_flow_style=None, allow_unicode=True, width=120)
+
+
+def _is_name(text: str, path: Path) -> bool:
+    if text in robot_names():
+        return True
+    return path.suffix not in {".yaml", ".yml"} and path.name == text and not path.exists()

@@ -1,0 +1,180 @@
+"""What a robot file may contain: its keys and their units. Ranges and shapes are the robot's own to check."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from sagline.arrays import Array, checked
+from sagline.cables.cable import Cable
+from sagline.errors import InvalidValueError
+from sagline.files.quantity import in_si
+from sagline.files.schema import Entry
+from sagline.robot import checks
+from sagline.robot.inertia import box_inertia, cylinder_inertia
+from sagline.robot.pose_box import PoseBox
+from sagline.robot.robot import Robot
+
+_UNITS: Final = {
+    "frame_anchors": "m",
+    "platform_anchors": "m",
+    "mass": "kg",
+    "center_of_mass": "m",
+    "gravity": "m/s^2",
+    "plane_normal": "",
+    "tension_min": "N",
+    "tension_max": "N",
+    "platform_size": "m",
+    "frame_size": "m",
+    "cables.linear_density": "kg/m",
+    "cables.axial_stiffness": "N",
+    "cables.youngs_modulus": "Pa",
+    "cables.section_area": "m^2",
+    "cables.radius": "m",
+    "cables.diameter": "m",
+    "inertia.box": "m",
+    "inertia.cylinder_radius": "m",
+    "inertia.cylinder_height": "m",
+    "test_box.low": "m",
+    "test_box.high": "m",
+    "test_box.tilt": "rad",
+}  # every other key of inertia is in kg m^2
+
+
+class _RobotPart(Entry):
+    """A mapping in a robot file."""
+
+    def given(self, key: str, within: str = "") -> Any:
+        """A key's quantity in SI."""
+        item = within + key
+        return in_si(getattr(self, key), _UNITS.get(item, "kg*m^2"), item)
+
+    def only_way(self, item: str, ways: tuple[tuple[str, ...], ...], beside: tuple[str, ...]) -> tuple[str, ...]:
+        """The one of several sets of keys that is there, whole and alone but for the keys `beside` them."""
+        found = self.model_fields_set.difference(beside)
+        for way in ways:
+            if found == set(way):
+                return way
+        raise InvalidValueError(
+            item,
+            "given by " + (" and ".join(sorted(found)) or "nothing"),
+            "; or ".join(" and ".join(way) for way in ways),
+            "Give exactly one of these.",
+        )
+
+
+class _Cables(_RobotPart):
+    """Material of the cables; each value one number for all of them, or a list."""
+
+    linear_density: Any
+    axial_stiffness: Any = None
+    youngs_modulus: Any = None
+    section_area: Any = None
+    radius: Any = None
+    diameter: Any = None
+
+    def cable(self) -> Cable:
+        """The cables, from whichever way their stiffness is given."""
+        ways = (("axial_stiffness",), *(("youngs_modulus", key) for key in ("section_area", "radius", "diameter")))
+        *_, section = self.only_way("cables: stiffness", ways, beside=("linear_density",))
+        density = self.given("linear_density", "cables.")
+        width = self.given(section, "cables.")
+        if section == "axial_stiffness":
+            return Cable(density, width)
+        if section != "section_area":
+            radius = checked(width, f"cables.{section}", "m", above=0.0) * (0.5 if section == "diameter" else 1.0)
+            width = np.pi * radius**2
+        return Cable.from_material(density, self.given("youngs_modulus", "cables."), width)
+
+
+class _Inertia(_RobotPart):
+    """Inertia about the center of mass: a matrix, its diagonal, its elements, or a solid body of the robot's mass."""
+
+    matrix: Any = None
+    diagonal: Any = None
+    Ixx: Any = None
+    Iyy: Any = None
+    Izz: Any = None
+    Ixy: Any = 0.0  # an element of the matrix, not the product of inertia with its sign turned; so are the next two
+    Ixz: Any = 0.0
+    Iyz: Any = 0.0
+    box: Any = None
+    cylinder_radius: Any = None
+    cylinder_height: Any = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _accept_list(cls, data: object) -> object:
+        """A list of lists is the matrix, a list of numbers its diagonal."""
+        if not isinstance(data, list):
+            return data
+        return {"matrix" if any(isinstance(row, list) for row in data) else "diagonal": data}
+
+    def about_center(self, mass: float) -> Array:
+        """The matrix for a platform of this mass [kg], shape (3, 3)."""
+        ways = (("matrix",), ("diagonal",), ("Ixx", "Iyy", "Izz"), ("box",), ("cylinder_radius", "cylinder_height"))
+        mixed = ("Ixy", "Ixz", "Iyz") if "Ixx" in self.model_fields_set else ()
+        way = self.only_way("inertia", ways, beside=mixed)
+        values = [self.given(key, "inertia.") for key in way]
+        match way[0]:
+            case "matrix":
+                return checks.exactly(values[0], "inertia", "kg m^2", (3, 3))
+            case "diagonal":
+                return np.diag(checks.exactly(values[0], "inertia", "kg m^2", (3,)))
+            case "box":
+                return box_inertia(mass, *checks.exactly(values[0], "inertia.box", "m", (3,), above=0.0))
+            case "cylinder_radius":
+                sizes = zip(values, way, strict=True)
+                return cylinder_inertia(mass, *(checks.number(v, f"inertia.{key}", "m", above=0.0) for v, key in sizes))
+        xx, yy, zz = values
+        xy, xz, yz = (self.given(key, "inertia.") for key in ("Ixy", "Ixz", "Iyz"))
+        return checks.exactly([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], "inertia", "kg m^2", (3, 3))
+
+
+class _TestBox(_RobotPart):
+    """The box of poses in which the robot can work."""
+
+    low: Any
+    high: Any
+    tilt: Any = 0.0
+
+
+class RobotEntry(_RobotPart):
+    """A whole robot file. Keys are the robot's fields; what is left out takes the robot's own default."""
+
+    name: str
+    frame_anchors: Any
+    platform_anchors: Any
+    cables: _Cables
+    mass: Any
+    inertia: _Inertia | None = None
+    center_of_mass: Any = None
+    gravity: Any = None
+    motion_pattern: str = ""
+    plane_normal: Any = None
+    tension_min: Any = None
+    tension_max: Any = None
+    tension_limits_of: str = ""
+    platform_size: Any = None
+    frame_size: Any = None
+    test_box: _TestBox | None = None
+    source: str = ""
+    assumed: dict[str, str] = Field(default_factory=dict)
+    notes: str = ""
+
+    def robot(self) -> Robot:
+        """The robot the file describes.
+
+        Raises:
+            InvalidValueError: If a value has a wrong unit, or is none the robot accepts.
+        """
+        fields = {key: self.given(key) if key in _UNITS else getattr(self, key) for key in self.model_fields_set}
+        fields["cables"] = self.cables.cable()
+        if self.inertia is not None:
+            mass = checks.number(fields["mass"], "mass", "kg", above=0.0)
+            fields["inertia"] = self.inertia.about_center(mass)
+        if self.test_box is not None:
+            fields["test_box"] = PoseBox(*(self.test_box.given(key, "test_box.") for key in ("low", "high", "tilt")))
+        return Robot(**fields)

@@ -1,0 +1,1 @@
+"""The robot as data: geometry, cables, mass, limits, poses and the presets."""

@@ -1,0 +1,35 @@
+"""The presets: robot files that come with sagline."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from importlib.resources import files
+
+from sagline.errors import InvalidValueError
+
+_PRESETS = files("sagline.robot") / "presets"
+
+
+def robot_names() -> tuple[str, ...]:
+    """Names of the presets, in alphabetical order."""
+    return tuple(
+        sorted(entry.name.removesuffix(".yaml") for entry in _PRESETS.iterdir() if entry.name.endswith(".yaml"))
+    )
+
+
+def preset_text(name: str) -> str:
+    """Text of a preset's robot file.
+
+    Raises:
+        InvalidValueError: If there is no such preset; the message suggests the nearest.
+    """
+    names = robot_names()
+    if name not in names:
+        near = get_close_matches(name, names, n=1, cutoff=0.0)[0]
+        raise InvalidValueError(
+            "robot",
+            repr(name),
+            ", ".join(names),
+            f"Did you mean {near}? A robot file is given by its path, robot.yaml.",
+        )
+    return (_PRESETS / f"{name}.yaml").read_text(encoding="utf-8")

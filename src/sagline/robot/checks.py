@@ -1,0 +1,163 @@
+"""What a robot's numbers must satisfy beyond being numbers; each check returns what the robot stores."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sagline.arrays import Array, checked, locked
+from sagline.cables.cable import Cable
+from sagline.errors import InvalidValueError
+from sagline.robot.pattern import PLANAR, ROTATING
+from sagline.robot.unit import unit
+
+_SYMMETRY = 1e-9  # largest difference of mirrored elements, relative to the largest element
+
+
+def choice(value: Any, item: str, allowed: tuple[str, ...]) -> Any:
+    """One of a few words."""
+    if value not in allowed:
+        raise InvalidValueError(item, repr(value), ", ".join(allowed), f"Choose one of them as {item}.")
+    return value
+
+
+def number(value: Any, item: str, unit: str, *, low: float = -np.inf, above: float = -np.inf) -> float:
+    """A single finite number."""
+    return float(exactly(value, item, unit, (), low=low, above=above))
+
+
+def exactly(value: ArrayLike, item: str, unit: str, shape: tuple[int, ...], **limits: Any) -> Array:
+    """An array of exactly one shape: a robot's numbers have no batch axes."""
+    array = checked(value, item, unit, **limits)
+    if array.shape != shape:
+        raise InvalidValueError(
+            item, f"of shape {array.shape}", f"shape {shape}" if shape else "a single number", f"Reshape {item}."
+        )
+    return array
+
+
+def anchors(frame: ArrayLike, platform: ArrayLike) -> tuple[Array, Array]:
+    """Frame and platform anchors of shape (m, 3), one pair a cable, no pair twice."""
+    pair = []
+    for value, item in ((frame, "frame_anchors"), (platform, "platform_anchors")):
+        array = checked(value, item, "m", shape=(None, 3))
+        if array.ndim != 2 or len(array) == 0:
+            raise InvalidValueError(item, f"of shape {array.shape}", "shape (m, 3), m >= 1", "Give one point a cable.")
+        pair.append(array)
+    if len(pair[0]) != len(pair[1]):
+        raise InvalidValueError(
+            "platform_anchors",
+            f"{len(pair[1])} points",
+            f"as many as frame_anchors, {len(pair[0])}",
+            "Give each cable a point on the frame and one on the platform.",
+        )
+    _refuse_twins(np.hstack(pair))
+    return pair[0], pair[1]
+
+
+def _refuse_twins(ends: Array) -> None:
+    _, first, which = np.unique(ends, axis=0, return_index=True, return_inverse=True)
+    twin_of = first[which.reshape(-1)]
+    twins = np.flatnonzero(twin_of != np.arange(len(ends)))
+    if twins.size:
+        second = int(twins[0])
+        raise InvalidValueError(
+            f"cable {second}",
+            f"between the same two points as cable {int(twin_of[second])}",
+            "cables that differ in at least one end",
+            f"Remove one of them, or correct frame_anchors[{second}] or platform_anchors[{second}].",
+        )
+
+
+def cables(given: Cable, count: int) -> Cable:
+    """The cables' material, one value a cable; each weighs something."""
+    if not isinstance(given, Cable):
+        raise InvalidValueError("cables", repr(given), "a Cable", "Give Cable(linear_density, axial_stiffness).")
+    density = per_cable(given.linear_density, "cables: linear_density", count)
+    stiffness = per_cable(given.axial_stiffness, "cables: axial_stiffness", count)
+    if not density.all():
+        raise InvalidValueError(
+            f"cables: linear_density[{int(np.argmin(density))}]",
+            "0 kg/m",
+            "> 0 kg/m",
+            "Give the cable's mass per length; to leave its weight out, compute with the model Elastic or Straight.",
+        )
+    return Cable(density, stiffness)
+
+
+def inertia(given: ArrayLike | None, pattern: str) -> Array:
+    """Inertia about the center of mass, symmetric and positive definite; zero will do for a body that cannot turn."""
+    if given is None and pattern in ROTATING:
+        raise InvalidValueError(
+            "inertia",
+            "missing",
+            "a symmetric matrix of shape (3, 3)",
+            f"Motion pattern {pattern} turns; give its inertia.",
+        )
+    matrix = exactly(np.zeros((3, 3)) if given is None else given, "inertia", "kg m^2", (3, 3))
+    if pattern not in ROTATING and not matrix.any():
+        return matrix
+    skew = np.abs(matrix - matrix.T)
+    if skew.max() > _SYMMETRY * np.abs(matrix).max():
+        row, column = (int(i) for i in np.argwhere(skew == skew.max())[0])
+        raise InvalidValueError(
+            f"inertia[{row}, {column}]",
+            f"{matrix[row, column]:g} kg m^2",
+            f"the same as inertia[{column}, {row}], {matrix[column, row]:g} kg m^2",
+            "An inertia matrix is symmetric; correct one of the two.",
+        )
+    lowest = float(np.linalg.eigvalsh(matrix)[0])
+    if lowest <= 0.0:
+        raise InvalidValueError(
+            "inertia",
+            f"a matrix with the principal moment {lowest:g} kg m^2",
+            "principal moments > 0 kg m^2",
+            "Give the inertia about the center of mass, in the platform frame.",
+        )
+    return matrix
+
+
+def plane_normal(given: ArrayLike | None, pattern: str) -> Array | None:
+    """Unit normal of the plane a planar platform moves in; none for the others."""
+    if (given is None) == (pattern in PLANAR):
+        has = "not given" if given is None else "given"
+        allowed = "a vector of three numbers" if given is None else "nothing"
+        raise InvalidValueError(
+            "plane_normal", f"{has} for motion_pattern {pattern}", allowed, "Correct plane_normal or motion_pattern."
+        )
+    if given is None:
+        return None
+    normal = exactly(given, "plane_normal", "", (3,))
+    if not normal.any():
+        raise InvalidValueError("plane_normal", "the zero vector", "a direction", "Give the normal of the plane.")
+    return locked(unit(normal))
+
+
+def tension_limits(low: ArrayLike, high: ArrayLike, count: int) -> tuple[Array, Array]:
+    """Lower and upper tension limit of each cable, shape (m,)."""
+    lower = per_cable(checked(low, "tension_min", "N", low=0.0), "tension_min", count)
+    upper = per_cable(checked(high, "tension_max", "N", low=0.0, infinite=True), "tension_max", count)
+    crossed = np.flatnonzero(lower > upper)
+    if crossed.size:
+        i = int(crossed[0])
+        raise InvalidValueError(
+            f"tension_min[{i}]",
+            f"{lower[i]:g} N",
+            f"<= tension_max[{i}], {upper[i]:g} N",
+            "Lower it or raise the other.",
+        )
+    return lower, upper
+
+
+def per_cable(array: Array, item: str, count: int) -> Array:
+    """One value a cable, shape (m,), from that or from one value for all."""
+    if array.shape not in ((), (1,), (count,)):
+        raise InvalidValueError(item, f"of shape {array.shape}", f"shape () or ({count},)", "Give one value a cable.")
+    return array if array.shape == (count,) else locked(np.full(count, array))
+
+
+def size(given: ArrayLike | None, item: str) -> Array | None:
+    """Edge lengths for drawing, or None."""
+    return None if given is None else exactly(given, item, "m", (3,), above=0.0)

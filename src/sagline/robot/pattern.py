@@ -1,0 +1,43 @@
+"""Motion patterns: which of the six motions of a platform are free."""
+
+from __future__ import annotations
+
+from typing import Final, Literal, get_args
+
+import numpy as np
+
+from sagline.arrays import Array, locked
+
+MotionPattern = Literal["3R3T", "3T", "1R2T", "2T"]
+MOTION_PATTERNS: Final[tuple[str, ...]] = get_args(MotionPattern)
+PLANAR: Final = frozenset({"1R2T", "2T"})
+ROTATING: Final = frozenset({"3R3T", "1R2T"})
+
+
+def freedom_matrix(pattern: MotionPattern, plane_normal: Array | None) -> Array:
+    """Rows that pick the free motions out of (force, moment) or (velocity, angular velocity), world axes.
+
+    Args:
+        pattern: "3R3T" (all six), "3T" (a point mass), "1R2T" (a plane), "2T" (a plane without rotation).
+        plane_normal: Unit normal of the plane, shape (3,); None for the spatial patterns.
+
+    Returns:
+        Array of shape (n, 6) with orthonormal rows. A planar pattern's translations are e1 and e2 with
+        e1 x e2 = plane_normal, e1 horizontal and e2 as far up as the plane allows, then the rotation about the normal.
+    """
+    if plane_normal is None:
+        return locked(np.eye(6 if pattern == "3R3T" else 3, 6))
+    rows = np.zeros((3, 6))
+    rows[:2, :3] = _plane_axes(plane_normal)
+    rows[2, 3:] = plane_normal
+    return locked(rows if pattern == "1R2T" else rows[:2])
+
+
+def _plane_axes(normal: Array) -> Array:
+    horizontal = np.cross((0.0, 0.0, 1.0), normal)  # its length is the sine of the normal's angle to the vertical
+    length = float(np.linalg.norm(horizontal))
+    if length < 1e-6:  # a level plane: every direction is horizontal, x is as good as any
+        horizontal = np.array([1.0, 0.0, 0.0]) - normal[0] * normal
+        length = float(np.linalg.norm(horizontal))
+    first = horizontal / length
+    return np.stack([first, np.cross(normal, first)])

@@ -1,0 +1,168 @@
+"""Where the platform is: position of its origin and rotation from platform to world."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
+
+from sagline.arrays import Array, checked, locked
+from sagline.errors import InvalidValueError
+from sagline.robot.unit import unit
+
+_MATRIX_TOLERANCE = 1e-9  # largest element of Q Q^T - 1 of what still counts as a rotation
+_QUATERNION_TOLERANCE = 1e-6  # a quaternion printed with seven digits still counts as one
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pose:
+    """One pose of the platform frame, or a batch of them.
+
+    Attributes:
+        position: Position of the platform frame's origin in the world [m], shape (3,) or (N, 3).
+        quaternion: Rotation from platform to world as a unit quaternion (x, y, z, w), shape (4,) or (N, 4).
+    """
+
+    position: Array
+    quaternion: Array
+
+    def __init__(self, position: ArrayLike, rotation: Rotation | ArrayLike) -> None:
+        """Check both and broadcast one against the other.
+
+        Args:
+            position: Position of the platform frame's origin [m], shape (3,) or (N, 3).
+            rotation: scipy Rotation, or rotation matrices of shape (3, 3) or (N, 3, 3).
+
+        Raises:
+            InvalidValueError: If a number is not finite, a matrix is no rotation, or the counts differ.
+        """
+        quaternion = rotation.as_quat() if isinstance(rotation, Rotation) else _quaternion_of(rotation)
+        self._fill(checked(position, "position", "m", shape=(3,)), quaternion)
+
+    @classmethod
+    def from_euler(cls, position: ArrayLike, alpha: ArrayLike, beta: ArrayLike, gamma: ArrayLike) -> Pose:
+        """A pose from Z-Y-X Euler angles: alpha about z, then beta about the new y, then gamma about the new x.
+
+        Args:
+            position: Position of the platform frame's origin [m], shape (3,) or (N, 3).
+            alpha: Angle about z [rad], a number or shape (N,).
+            beta: Angle about y [rad], a number or shape (N,).
+            gamma: Angle about x [rad], a number or shape (N,).
+
+        Raises:
+            InvalidValueError: If a number is not finite or the counts differ.
+
+        Source:
+            The article's equation (9); scipy's 'ZYX'.
+        """
+        named = (("alpha", alpha), ("beta", beta), ("gamma", gamma))
+        halves = [0.5 * checked(angle, name, "rad") for name, angle in named]
+        try:
+            z, y, x = np.broadcast_arrays(*halves)
+        except ValueError:
+            raise _counts_differ("alpha, beta, gamma", [half.shape for half in halves]) from None
+        (sz, sy, sx), (cz, cy, cx) = (np.sin((z, y, x)), np.cos((z, y, x)))
+        parts = (
+            cz * cy * sx - sz * sy * cx,
+            cz * sy * cx + sz * cy * sx,
+            sz * cy * cx - cz * sy * sx,
+            cz * cy * cx + sz * sy * sx,
+        )
+        return cls._adopt(checked(position, "position", "m", shape=(3,)), np.stack(parts, axis=-1))
+
+    @classmethod
+    def from_quaternion(cls, position: ArrayLike, quaternion: ArrayLike) -> Pose:
+        """A pose from a unit quaternion (x, y, z, w), scalar last.
+
+        Args:
+            position: Position of the platform frame's origin [m], shape (3,) or (N, 3).
+            quaternion: Of length 1 to 1e-6 (what is left is normalized away), shape (4,) or (N, 4).
+
+        Raises:
+            InvalidValueError: If a number is not finite, a length is not 1, or the counts differ.
+        """
+        given = checked(quaternion, "quaternion", "", shape=(4,))
+        length = np.linalg.norm(given, axis=-1)
+        _refuse(np.abs(length - 1.0) > _QUATERNION_TOLERANCE, "quaternion", "length", length, "length 1 to 1e-6")
+        return cls._adopt(checked(position, "position", "m", shape=(3,)), given)
+
+    @classmethod
+    def _adopt(cls, position: Array, quaternion: Array) -> Pose:
+        """A pose around arrays of our own making: no copy, no check but that their counts agree."""
+        pose = object.__new__(cls)
+        pose._fill(position, quaternion)
+        return pose
+
+    def _fill(self, position: Array, quaternion: Array) -> None:
+        shapes = [position.shape[:-1], quaternion.shape[:-1]]
+        try:
+            shape = np.broadcast_shapes(*shapes)
+        except ValueError:
+            raise _counts_differ("position and rotation", shapes) from None
+        if len(shape) > 1:
+            raise InvalidValueError(
+                "pose", f"a batch of shape {shape}", "one pose, or a batch of shape (N,)", "Flatten the leading axes."
+            )
+        for name, array in (("position", position), ("quaternion", unit(quaternion))):
+            whole = np.ascontiguousarray(np.broadcast_to(array, (*shape, array.shape[-1])))
+            object.__setattr__(self, name, locked(whole))
+
+    @property
+    def rotation(self) -> Rotation:
+        """Rotation from platform to world, as scipy has it."""
+        return Rotation.from_quat(self.quaternion)
+
+    @property
+    def matrix(self) -> Array:
+        """Rotation matrix from platform to world, shape (..., 3, 3)."""
+        matrix: Array = locked(self.rotation.as_matrix())
+        return matrix
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """() for a single pose, (N,) for a batch."""
+        return self.position.shape[:-1]
+
+    def __len__(self) -> int:
+        """Number of poses in a batch."""
+        if not self.shape:
+            raise TypeError("a single pose has no length")
+        return len(self.position)
+
+    def __getitem__(self, index: int | slice | NDArray[Any]) -> Pose:
+        """One pose of a batch, or a part of the batch; slices share the batch's memory where they can."""
+        if not self.shape:
+            raise TypeError("a single pose cannot be indexed")
+        return Pose._adopt(self.position[index], self.quaternion[index])
+
+    def __reduce__(self) -> tuple[Any, tuple[Array, Array]]:
+        """Pickle through a constructor, so that a loaded pose is checked and locked too."""
+        return Pose.from_quaternion, (self.position, self.quaternion)
+
+
+def _quaternion_of(rotation: ArrayLike) -> Array:
+    matrix = checked(rotation, "rotation", "", shape=(3, 3))
+    excess = np.abs(matrix @ np.swapaxes(matrix, -1, -2) - np.eye(3)).max(axis=(-1, -2))
+    _refuse(excess > _MATRIX_TOLERANCE, "rotation", "largest element of Q Q^T - 1", excess, "an orthonormal matrix")
+    determinant = np.linalg.det(matrix)
+    _refuse(determinant < 0.0, "rotation", "determinant", determinant, "determinant +1, a rotation without mirror")
+    quaternion: Array = Rotation.from_matrix(matrix).as_quat()
+    return quaternion
+
+
+def _refuse(wrong: NDArray[np.bool_], item: str, measure: str, values: Array, allowed: str) -> None:
+    if not wrong.any():
+        return
+    index = tuple(int(i) for i in np.argwhere(wrong)[0])
+    where = item if not index else f"{item} {index[0]}"
+    raise InvalidValueError(
+        f"{where}: {measure}", f"{values[index]:.12g}", allowed, "Build it with scipy's Rotation, which checks itself."
+    )
+
+
+def _counts_differ(item: str, shapes: list[tuple[int, ...]]) -> InvalidValueError:
+    counts = " and ".join(str(shape) for shape in shapes)
+    return InvalidValueError(item, f"of batch shapes {counts}", "the same count, or a single one", "Give one for each.")

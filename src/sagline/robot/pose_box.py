@@ -1,0 +1,50 @@
+"""A box of poses in which a robot can work."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sagline.arrays import Array, checked
+from sagline.errors import InvalidValueError
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PoseBox:
+    """Positions of the platform origin in a box, tilted about any axis by up to an angle.
+
+    Attributes:
+        low: Lowest position of the platform origin [m], shape (3,).
+        high: Highest position of the platform origin [m], shape (3,), not below low.
+        tilt: Largest angle of rotation [rad], >= 0.
+    """
+
+    low: Array
+    high: Array
+    tilt: float
+
+    def __init__(self, low: ArrayLike, high: ArrayLike, tilt: float = 0.0) -> None:
+        """Check the three.
+
+        Raises:
+            InvalidValueError: If a number is not finite, a corner has not three numbers, or high is below low.
+        """
+        low = checked(low, "test_box: low", "m", shape=(3,))
+        high = checked(high, "test_box: high", "m", shape=(3,))
+        for item, corner in (("test_box: low", low), ("test_box: high", high)):
+            if corner.ndim != 1:
+                raise InvalidValueError(item, f"of shape {corner.shape}", "shape (3,)", "Give one x, y, z.")
+        if (low > high).any():
+            axis = int(np.argmax(low > high))
+            raise InvalidValueError(
+                f"test_box: high[{axis}]", f"{high[axis]:g} m", f">= low, {low[axis]:g} m", "Exchange low and high."
+            )
+        object.__setattr__(self, "low", low)
+        object.__setattr__(self, "high", high)
+        object.__setattr__(self, "tilt", float(checked(tilt, "test_box: tilt", "rad", shape=(), low=0.0)))
+
+    def __reduce__(self) -> tuple[type[PoseBox], tuple[Array, Array, float]]:
+        """Pickle through the constructor."""
+        return PoseBox, (self.low, self.high, self.tilt)

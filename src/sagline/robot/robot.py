@@ -1,0 +1,159 @@
+"""The robot: where its cables are fixed, what they are made of, and what they carry."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from types import MappingProxyType
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sagline.arrays import Array
+from sagline.cables.cable import Cable
+from sagline.robot import checks
+from sagline.robot.pattern import MOTION_PATTERNS, MotionPattern, freedom_matrix
+from sagline.robot.pose_box import PoseBox
+
+TensionLimitsOf = Literal["chord", "frame_end"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Robot:
+    """A cable-driven parallel robot. Cable i runs from frame_anchors[i] to platform_anchors[i].
+
+    Attributes:
+        name: What the robot is called.
+        frame_anchors: Frame ends of the cables in the world [m], z up, shape (m, 3).
+        platform_anchors: Platform ends of the cables in the platform frame [m], shape (m, 3).
+        cables: Material of the cables, fields of shape (m,).
+        mass: Mass of the platform [kg], > 0.
+        inertia: Inertia about the center of mass in the platform frame [kg m^2], shape (3, 3), positive definite;
+            zero where the motion pattern has no rotation and none was given.
+        center_of_mass: Center of mass in the platform frame [m], shape (3,).
+        gravity: Gravitational acceleration along -z [m/s^2], >= 0.
+        motion_pattern: "3R3T", "3T" (point mass), "1R2T" (planar) or "2T" (planar without rotation).
+        plane_normal: Unit normal of the plane of a planar pattern, world axes, shape (3,); None for the others.
+        tension_min: Lower tension limits [N], shape (m,), >= 0.
+        tension_max: Upper tension limits [N], shape (m,), may be infinite.
+        tension_limits_of: The tension that is limited, "chord" or "frame_end".
+        platform_size: Edges of the platform, for drawing [m], shape (3,), or None.
+        frame_size: Edges of the frame, for drawing [m], shape (3,), or None.
+        test_box: Poses of which nearly all are wrench-feasible, or None.
+        source: Where the numbers were read.
+        assumed: Field name -> why; the fields whose values the source does not give.
+        notes: What else a user should know.
+    """
+
+    name: str
+    frame_anchors: Array
+    platform_anchors: Array
+    cables: Cable
+    mass: float
+    inertia: Array
+    center_of_mass: Array
+    gravity: float
+    motion_pattern: MotionPattern
+    plane_normal: Array | None
+    tension_min: Array
+    tension_max: Array
+    tension_limits_of: TensionLimitsOf
+    platform_size: Array | None
+    frame_size: Array | None
+    test_box: PoseBox | None
+    source: str
+    assumed: Mapping[str, str]
+    notes: str
+
+    def __init__(
+        self,
+        name: str,
+        frame_anchors: ArrayLike,
+        platform_anchors: ArrayLike,
+        cables: Cable,
+        mass: float,
+        inertia: ArrayLike | None = None,
+        *,
+        center_of_mass: ArrayLike = (0.0, 0.0, 0.0),
+        gravity: float = 9.81,
+        motion_pattern: MotionPattern = "3R3T",
+        plane_normal: ArrayLike | None = None,
+        tension_min: ArrayLike = 0.0,
+        tension_max: ArrayLike = np.inf,
+        tension_limits_of: TensionLimitsOf = "chord",
+        platform_size: ArrayLike | None = None,
+        frame_size: ArrayLike | None = None,
+        test_box: PoseBox | None = None,
+        source: str = "",
+        assumed: Mapping[str, str] = MappingProxyType({}),
+        notes: str = "",
+    ) -> None:
+        """Check every field once; values for all cables at once are spread over the cables.
+
+        The plane normal may have any length but zero. The inertia may be left out where the platform cannot turn.
+
+        Raises:
+            InvalidValueError: If a field is wrong; the message names it, with its index.
+        """
+        frame, platform = checks.anchors(frame_anchors, platform_anchors)
+        checks.choice(motion_pattern, "motion_pattern", MOTION_PATTERNS)
+        lower, upper = checks.tension_limits(tension_min, tension_max, len(frame))
+        values = {
+            "name": name,
+            "frame_anchors": frame,
+            "platform_anchors": platform,
+            "cables": checks.cables(cables, len(frame)),
+            "mass": checks.number(mass, "mass", "kg", above=0.0),
+            "inertia": checks.inertia(inertia, motion_pattern),
+            "center_of_mass": checks.exactly(center_of_mass, "center_of_mass", "m", (3,)),
+            "gravity": checks.number(gravity, "gravity", "m/s^2", low=0.0),
+            "motion_pattern": motion_pattern,
+            "plane_normal": checks.plane_normal(plane_normal, motion_pattern),
+            "tension_min": lower,
+            "tension_max": upper,
+            "tension_limits_of": checks.choice(tension_limits_of, "tension_limits_of", get_args(TensionLimitsOf)),
+            "platform_size": checks.size(platform_size, "platform_size"),
+            "frame_size": checks.size(frame_size, "frame_size"),
+            "test_box": test_box,
+            "source": source,
+            "assumed": _known_fields(assumed),
+            "notes": notes,
+        }
+        for field, value in values.items():
+            object.__setattr__(self, field, value)
+
+    @property
+    def cable_count(self) -> int:
+        """Number of cables m."""
+        return len(self.frame_anchors)
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Number of free motions n of the platform: 6, 3, 3 or 2."""
+        return len(self.freedom)
+
+    @property
+    def freedom(self) -> Array:
+        """Rows that pick the free motions out of a wrench or twist in world axes, shape (n, 6), orthonormal."""
+        return freedom_matrix(self.motion_pattern, self.plane_normal)
+
+    def replace(self, **changes: Any) -> Robot:
+        """A robot with some fields changed, checked like a new one (dataclasses.replace)."""
+        return replace(self, **changes)
+
+    def __reduce__(self) -> tuple[Any, tuple[dict[str, Any]]]:
+        """Pickle through the constructor, so that a loaded robot is checked and locked too."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        return _from_fields, ({**values, "assumed": dict(self.assumed)},)
+
+
+def _from_fields(values: dict[str, Any]) -> Robot:
+    return Robot(**values)
+
+
+def _known_fields(assumed: Mapping[str, str]) -> Mapping[str, str]:
+    names = Robot.__slots__
+    for field in assumed:
+        checks.choice(field, "assumed: field", names)
+    return MappingProxyType({str(field): str(why) for field, why in assumed.items()})

@@ -1,0 +1,197 @@
+import re
+from dataclasses import fields
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sagline.cables.cable import Cable
+from sagline.errors import FileError, InvalidValueError
+from sagline.files.robot_file import dump_robot, load_robot, parse_robot
+from sagline.robot.catalogue import robot_names
+from sagline.robot.pose_box import PoseBox
+from sagline.robot.robot import Robot
+
+TEXT = """
+name: pendulum
+frame_anchors: [[0, 0, 3000 mm], [4 m, 0, 3], [0, 4, 3]]
+platform_anchors: [[0, 0, 0], [10 cm, 0, 0], [0, 0.1, 0]]
+cables: {linear_density: 67 g/m, youngs_modulus: 2 GPa, section_area: 22 mm^2}
+mass: 500 g
+inertia: {box: [30 cm, 0.3, 0.5]}
+tension_min: 20
+tension_max: [1 kN, 2 kN, .inf]
+assumed: {mass: a guess}
+"""
+
+
+def edited(**changes):
+    data = {**yaml.safe_load(TEXT), **changes}
+    return yaml.safe_dump({key: value for key, value in data.items() if value is not ...})
+
+
+def arrays_of(robot):
+    values = {field.name: getattr(robot, field.name) for field in fields(robot)}
+    cables, box = values.pop("cables"), values.pop("test_box")
+    values |= {"density": cables.linear_density, "stiffness": cables.axial_stiffness}
+    return values if box is None else values | {"low": box.low, "high": box.high, "tilt": box.tilt}
+
+
+def assert_same(robot, other):
+    mine, yours = arrays_of(robot), arrays_of(other)
+    assert mine.keys() == yours.keys()
+    for name, value in mine.items():
+        if isinstance(value, np.ndarray):
+            assert value.shape == yours[name].shape, name
+            assert value.tobytes() == yours[name].tobytes(), name
+        else:
+            assert value == yours[name], name
+
+
+def test_units_become_si():
+    robot = parse_robot(TEXT, "robot.yaml")
+    np.testing.assert_array_equal(robot.frame_anchors, [[0, 0, 3], [4, 0, 3], [0, 4, 3]])
+    np.testing.assert_allclose(robot.platform_anchors, [[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0]], rtol=1e-15)
+    np.testing.assert_allclose(robot.cables.linear_density, 0.067, rtol=1e-15)
+    np.testing.assert_allclose(robot.cables.axial_stiffness, 44e3, rtol=1e-15)
+    np.testing.assert_array_equal(robot.tension_max, [1000, 2000, np.inf])
+    np.testing.assert_allclose(np.diag(robot.inertia), 0.5 / 12 * np.array([0.34, 0.34, 0.18]), rtol=1e-15)
+    assert (robot.mass, dict(robot.assumed), robot.gravity) == (0.5, {"mass": "a guess"}, 9.81)
+
+
+@pytest.mark.parametrize(
+    ("section", "area"),
+    [({"section_area": 3e-6}, 3e-6), ({"radius": "2 mm"}, 4e-6 * np.pi), ({"diameter": "2 mm"}, 1e-6 * np.pi)],
+)
+def test_ways_to_give_the_stiffness(section, area):
+    cables = {"linear_density": [0.1, 0.2, 0.3], "youngs_modulus": "1 GPa", **section}
+    robot = parse_robot(edited(cables=cables), "robot.yaml")
+    np.testing.assert_array_equal(robot.cables.linear_density, [0.1, 0.2, 0.3])
+    np.testing.assert_allclose(robot.cables.axial_stiffness, 1e9 * area, rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("inertia", "expected"),
+    [
+        ([1, 2, "2.5 kg m^2"], np.diag([1, 2, 2.5])),
+        ([[1, 0.1, 0], [0.1, 2, 0], [0, 0, 2.5]], [[1, 0.1, 0], [0.1, 2, 0], [0, 0, 2.5]]),
+        ({"Ixx": 1, "Iyy": 2, "Izz": 2.5, "Ixy": 0.1, "Iyz": -0.2}, [[1, 0.1, 0], [0.1, 2, -0.2], [0, -0.2, 2.5]]),
+        ({"cylinder_radius": "2 m", "cylinder_height": 6}, np.diag([2.0, 2.0, 1.0])),  # of 0.5 kg
+    ],
+)
+def test_ways_to_give_the_inertia(inertia, expected):
+    np.testing.assert_allclose(parse_robot(edited(inertia=inertia), "robot.yaml").inertia, expected, rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"frame_anchor": [[0, 0, 0]], "frame_anchors": ...}, "frame_anchor is an unknown key.*mean frame_anchors"),
+        ({"cables": {"linear_densty": 1}}, "cables.linear_densty is an unknown key.*mean linear_density"),
+        ({"mass": ...}, "mass is missing. Add the key mass"),
+        ({"mass": "3 m"}, "mass is '3 m'; allowed: a number in kg, or text with a unit"),
+        ({"mass": "-3 kg"}, "mass is -3 kg; allowed: > 0 kg"),
+        ({"mass": float("nan")}, "mass is nan"),
+        ({"mass": [1, 2]}, "mass is of shape \\(2,\\)"),
+        ({"frame_anchors": [[0, 0, "3 kg"], [4, 0, 3], [0, 4, 3]]}, "frame_anchors\\[0\\]\\[2\\] is '3 kg'"),
+        ({"frame_anchors": [[0, 0, 3], [4, 0, 3]]}, "platform_anchors is 3 points"),
+        ({"frame_anchors": [[0, 0], [4, 0, 3]]}, "frame_anchors"),
+        ({"frame_anchors": [[0, 0, 3]] * 3, "platform_anchors": [[0, 0, 0]] * 3}, "cable 1 is between the same"),
+        ({"cables": 5}, "cables is 5; allowed: keys linear_density"),
+        ({"cables": {"linear_density": 0, "axial_stiffness": 1}}, "linear_density\\[0\\] is 0 kg/m; allowed: > 0"),
+        ({"cables": {"linear_density": -1, "axial_stiffness": 1}}, "linear_density is -1 kg/m"),
+        ({"cables": {"linear_density": 1, "axial_stiffness": 0}}, "axial_stiffness is 0 N; allowed: > 0 N"),
+        ({"cables": {"linear_density": 1, "axial_stiffness": "5 Pa"}}, "cables.axial_stiffness is '5 Pa'"),
+        ({"cables": {"linear_density": 1}}, "cables: stiffness is given by nothing; allowed: axial_stiffness; or"),
+        ({"cables": {"linear_density": 1, "youngs_modulus": 1, "radius": -1}}, "cables.radius is -1 m"),
+        ({"inertia": {"box": [1, 1, 1], "Ixx": 1}}, "inertia is given by Ixx and box; allowed: matrix; or"),
+        ({"inertia": {"box": [1, 0, 1]}}, "inertia.box\\[1\\] is 0 m"),
+        ({"inertia": ...}, "inertia is missing"),
+        ({"tension_min": "2 kN"}, "tension_min\\[0\\] is 2000 N; allowed: <= tension_max\\[0\\], 1000 N"),
+        ({"motion_pattern": 3}, "motion_pattern is 3; allowed: a valid string"),
+        ({"assumed": {"masss": "x"}}, "assumed: field is 'masss'"),
+        ({"test_box": {"low": [0, 0, 0], "high": [1, 1, "1 kg"]}}, "test_box.high\\[2\\] is '1 kg'"),
+    ],
+)
+def test_a_wrong_value_is_named_with_its_file(changes, message):
+    with pytest.raises(FileError, match=f"^robot.yaml: .*{message}"):
+        parse_robot(edited(**changes), "robot.yaml")
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "is empty"),
+        (b"name: x\nframe_anchors: [[0, 0, 3], [0,", "is not complete YAML \\(line 2"),
+        (b"name: a\nname: b\n", "line 2: key name is given twice"),
+        (b"- 1\n- 2\n", "has no keys at its top level"),
+        (b"\x89HDF\r\n\x1a\n\xff\xfe", "is not UTF-8 text"),
+        (b"name: a\0b\n", "holds zero bytes"),
+        (b"name: \x01\n", "is not YAML"),
+        (b"[" * 1000, "is not YAML"),
+        (b"name: 2020-99-99\n", "is not YAML"),
+        (TEXT[: TEXT.index("mass: 500")].encode(), "mass is missing"),
+    ],
+)
+def test_a_broken_file_gets_one_clear_message(tmp_path, content, message):
+    path = tmp_path / "robot.yaml"
+    path.write_bytes(content)
+    with pytest.raises(FileError, match=f"^{re.escape(str(path))}: .*{message}"):
+        load_robot(path)
+
+
+def test_what_is_no_file(tmp_path):
+    with pytest.raises(FileError, match=r"missing\.yaml: cannot be read \(No such file"):
+        load_robot(tmp_path / "missing.yaml")
+    with pytest.raises(FileError, match=r"cannot be read \(Is a directory\)"):
+        load_robot(tmp_path)
+    with pytest.raises(InvalidValueError, match="Did you mean article-mixed"):
+        load_robot("article-mixd")
+
+
+def test_a_file_in_the_current_folder_goes_by_its_name(tmp_path, monkeypatch):
+    (tmp_path / "pendulum").write_text(TEXT, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    assert load_robot("pendulum").mass == 0.5
+    assert load_robot("./pendulum").mass == 0.5
+
+
+@pytest.mark.parametrize("name", robot_names())
+def test_presets_survive_the_dump_bit_for_bit(name):
+    robot = load_robot(name)
+    assert_same(parse_robot(dump_robot(robot), "dump"), robot)
+
+
+NUMBER = st.floats(-1e9, 1e9)
+POSITIVE = st.floats(1e-12, 1e12)
+
+
+@settings(max_examples=40)
+@given(
+    st.lists(NUMBER, min_size=12, max_size=12, unique=True),
+    st.lists(POSITIVE, min_size=6, max_size=6),
+    st.text(st.characters(codec="utf-8", exclude_categories=("Cc", "Cs", "Cn"))),
+    st.booleans(),
+)
+def test_any_robot_survives_the_dump_bit_for_bit(points, positive, text, planar):
+    robot = Robot(
+        text,
+        np.reshape(points[:6], (2, 3)),
+        np.reshape(points[6:], (2, 3)),
+        Cable(positive[:2], positive[2:4]),
+        positive[4],
+        motion_pattern="2T" if planar else "3T",
+        plane_normal=points[:3] if planar else None,
+        center_of_mass=points[3:6],
+        gravity=positive[5],
+        tension_max=[np.inf, positive[5]],
+        tension_limits_of="frame_end",
+        platform_size=positive[:3],
+        test_box=PoseBox(np.minimum(points[:3], points[3:6]), np.maximum(points[:3], points[3:6]), positive[0]),
+        source=text,
+        notes=text,
+        assumed={"mass": text},
+    )
+    assert_same(parse_robot(dump_robot(robot), "dump"), robot)

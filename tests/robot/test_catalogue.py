@@ -1,0 +1,144 @@
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+from scipy.spatial.transform import Rotation
+
+from sagline.errors import InvalidValueError
+from sagline.files.robot_file import load_robot
+from sagline.robot.catalogue import preset_text, robot_names
+
+PUBLISHED = {
+    # name: mass, density, stiffness, tension limits, a frame anchor, a platform anchor, the fields that are ours
+    "caroca": (150.0, 0.14, 1.5e6, (50, 10000), (7, [3.5, 2, 3.5]), (7, [-0.6, 0.3, -0.2])),
+    "cogiro": (91.058, 0.065, 7e5, (100, 5000), (4, [7.2398, 5.3759, 5.4093]), (6, [0.5021, 0.275, -0.0007])),
+    "cogiro-2014": (91.058, 0.065, 7e5, (100, 5000), (7, [7.161, -5.27, 5.497]), (1, [-0.51, 0.351, 0.998])),
+    "copacabana": (
+        15.0,
+        0.0035,
+        1e5,
+        (5, 720),
+        (5, [0.741559, 2.575853, -0.498823]),
+        (0, [-0.177276, 0.197409, -0.500304]),
+    ),
+    "expo2015-lucia": (
+        130.0,
+        0.198,
+        272470.3308,  # 1.77 GPa times the section of radius 7 mm; the source's 272 kN
+        (50, 5000),
+        (0, [2.026688, -6.930677, 7.081188]),
+        (7, [0.682028, 0.439835, 0.272427]),
+    ),
+    "falcon-7": (0.3, 0.0005, 2e4, (2, 200), (1, [0.725, 0, 1.25]), (6, [0, -0.05, 0])),
+    "fast": (30091.8, 8.0, 1.7e8, (120000, 1200000), (0, [259.8076, 150, 270]), (5, [3.25, -5.6292, 0])),
+    "ipanema-1": (10.0, 0.0035, 1e5, (5, 720), (6, [2, -1.5, 0]), (2, [0.06, -0.06, 0])),
+    "ipanema-2": (60.0, 0.0225, 5e5, (50, 3000), (3, [-3.993982, -2.914584, 4.718823]), (4, [-0.848, 0.1, 0.45])),
+    "ipanema-3": (30.0, 0.0225, 5e5, (100, 3000), (2, [8.224, -5.492, 3.25]), (6, [0.095, -0.745, 0.26])),
+}
+ARTICLE = {
+    # name: frame, density, E A from Table 1
+    "article-mixed": ([15, 11, 6], 0.067, 2e9 * 22e-6),
+    "article-prototype": ([3, 6, 3], 0.09, 3.5e9 * 4e-6),
+    "article-suspended": ([15, 11, 6], 0.067, 2e9 * 22e-6),
+}
+
+
+def test_thirteen_presets():
+    assert list(robot_names()) == sorted([*PUBLISHED, *ARTICLE])
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_published_numbers(name):
+    mass, density, stiffness, limits, (i, frame), (j, platform) = PUBLISHED[name]
+    robot = load_robot(name)
+    assert (robot.name, robot.mass) == (name, mass)
+    np.testing.assert_array_equal(robot.cables.linear_density, density)
+    np.testing.assert_allclose(robot.cables.axial_stiffness, stiffness, rtol=1e-7)
+    np.testing.assert_array_equal(robot.tension_min, limits[0])
+    np.testing.assert_array_equal(robot.tension_max, limits[1])
+    np.testing.assert_array_equal(robot.frame_anchors[i], frame)
+    np.testing.assert_array_equal(robot.platform_anchors[j], platform)
+    assert robot.source
+
+
+def test_inertia_of_the_measured_robots():
+    cogiro = [[36.598, -0.453, 3.012], [-0.453, 35.982, -1.539], [3.012, -1.539, 25.439]]
+    np.testing.assert_array_equal(load_robot("cogiro").inertia, cogiro)
+    np.testing.assert_array_equal(load_robot("cogiro").center_of_mass, [-0.034, -0.013, 0.264])
+    np.testing.assert_array_equal(load_robot("ipanema-3").inertia, np.diag([5.226154, 0.637352, 4.723802]))
+    # m/12 (b^2 + c^2) of 60 kg, 1.5 x 0.25 x 0.5 m
+    np.testing.assert_allclose(np.diag(load_robot("ipanema-2").inertia), [1.5625, 12.5, 11.5625], rtol=1e-15)
+
+
+@pytest.mark.parametrize("name", ARTICLE)
+def test_article_robots_are_those_of_table_1(name):
+    frame, density, stiffness = ARTICLE[name]
+    robot = load_robot(name)
+    assert robot.mass == 50.0
+    np.testing.assert_array_equal(robot.cables.linear_density, density)
+    np.testing.assert_allclose(robot.cables.axial_stiffness, stiffness, rtol=1e-15)
+    np.testing.assert_array_equal(np.ptp(robot.frame_anchors, axis=0)[:2], frame[:2])
+    np.testing.assert_array_equal(robot.frame_size, frame)
+    np.testing.assert_array_equal(np.ptp(robot.platform_anchors, axis=0), [0.3, 0.3, 0.5])
+    np.testing.assert_allclose(np.diag(robot.inertia), 50 / 12 * np.array([0.34, 0.34, 0.18]), rtol=1e-15)
+    assert {"frame_anchors", "platform_anchors", "inertia", "tension_min", "tension_max"} <= set(robot.assumed)
+    assert not {"mass", "cables", "platform_size", "frame_size"} & set(robot.assumed)
+
+
+def test_suspended_cables_cross_to_the_neighboring_corners():
+    robot = load_robot("article-suspended")
+    np.testing.assert_array_equal(robot.frame_anchors[:, 2], 6.0)
+    for frame, platform in zip(robot.frame_anchors, robot.platform_anchors, strict=True):
+        turn = frame[0] * platform[1] - frame[1] * platform[0]  # > 0: the platform corner lies counter-clockwise
+        assert np.sign(turn) == np.sign(platform[2])
+
+
+def test_mixed_cables_run_straight_down_and_up():
+    robot = load_robot("article-mixed")
+    np.testing.assert_array_equal(np.sign(robot.frame_anchors[:, :2]), np.sign(robot.platform_anchors[:, :2]))
+    np.testing.assert_array_equal(robot.platform_anchors[:, 2], np.where(robot.frame_anchors[:, 2] == 6, -0.25, 0.25))
+
+
+def wrench_feasible(robot, position, rotation):
+    """A linear program over chord tensions, half of each cable's weight hung on the platform."""
+    arm = (robot.platform_anchors - robot.center_of_mass) @ rotation.T
+    chord = position + robot.platform_anchors @ rotation.T - robot.frame_anchors
+    length = np.linalg.norm(chord, axis=1)
+    pull = -chord / length[:, None]
+    hung = np.zeros_like(chord)
+    hung[:, 2] = robot.gravity * robot.cables.linear_density * length / 2
+    needed = np.concatenate([hung.sum(axis=0), np.cross(arm, hung).sum(axis=0)])
+    needed[2] += robot.mass * robot.gravity
+    scale = robot.mass * robot.gravity
+    found = linprog(
+        np.zeros(robot.cable_count),
+        A_eq=np.vstack([pull.T, np.cross(arm, pull).T]),
+        b_eq=needed / scale,
+        bounds=np.column_stack([robot.tension_min, robot.tension_max]) / scale,
+    )
+    assert found.status in (0, 2)
+    return found.status == 0
+
+
+@pytest.mark.parametrize("name", sorted([*PUBLISHED, *ARTICLE]))
+def test_box_is_feasible(name):
+    robot, rng = load_robot(name), np.random.default_rng(11)
+    box = robot.test_box
+    count = 60
+    axes = rng.normal(size=(count, 3))
+    axes /= np.linalg.norm(axes, axis=1)[:, None]
+    turns = Rotation.from_rotvec(axes * rng.uniform(0, box.tilt, size=(count, 1))).as_matrix()
+    positions = rng.uniform(box.low, box.high, size=(count, 3))
+    feasible = [wrench_feasible(robot, *pose) for pose in zip(positions, turns, strict=True)]
+    assert np.mean(feasible) >= 0.9  # 95 % of all poses, and of 60 of them at least 90 %
+
+
+@pytest.mark.parametrize("name", ["article-mixed", "article-suspended"])
+@pytest.mark.parametrize("x", [-5.0, 0.0, 5.0])
+@pytest.mark.parametrize("y", [-3.5, 0.0, 3.5])
+def test_the_articles_path_is_feasible(name, x, y):
+    assert wrench_feasible(load_robot(name), np.array([x, y, 1.5]), np.eye(3))
+
+
+def test_an_unknown_preset_suggests_the_nearest():
+    with pytest.raises(InvalidValueError, match=r"robot is 'cogirro'; allowed: .*Did you mean cogiro\?"):
+        preset_text("cogirro")

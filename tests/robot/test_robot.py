@@ -1,0 +1,146 @@
+import pickle
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sagline.cables.cable import Cable
+from sagline.errors import InvalidValueError
+from sagline.robot.inertia import box_inertia, cylinder_inertia
+from sagline.robot.pose_box import PoseBox
+from sagline.robot.robot import Robot
+
+CORNERS = np.array([[2.0, 0, 3], [0, 2, 3], [-2, -2, 3]])
+FIELDS = {
+    "name": "tripod",
+    "frame_anchors": CORNERS,
+    "platform_anchors": np.zeros((3, 3)),
+    "cables": Cable(0.05, 1e5),
+    "mass": 4.0,
+    "inertia": np.diag([1.0, 2.0, 2.5]),
+}
+
+
+def tripod(**changes):
+    return Robot(**{**FIELDS, **changes})
+
+
+def test_values_for_all_cables_are_spread_over_the_cables():
+    robot = tripod(tension_min=5.0, tension_max=[10.0, np.inf, 30.0])
+    np.testing.assert_array_equal(robot.cables.linear_density, [0.05, 0.05, 0.05])
+    np.testing.assert_array_equal(robot.cables.axial_stiffness, [1e5, 1e5, 1e5])
+    np.testing.assert_array_equal(robot.tension_min, [5, 5, 5])
+    np.testing.assert_array_equal(robot.tension_max, [10, np.inf, 30])
+    np.testing.assert_array_equal(robot.center_of_mass, [0, 0, 0])
+    assert (robot.cable_count, robot.gravity, robot.tension_limits_of) == (3, 9.81, "chord")
+
+
+def test_freedom_by_hand():
+    np.testing.assert_array_equal(tripod().freedom, np.eye(6))
+    np.testing.assert_array_equal(tripod(motion_pattern="3T").freedom, np.eye(6)[:3])
+    # the plane of x and z: its normal is -y, since x cross z = -y
+    planar = tripod(motion_pattern="1R2T", plane_normal=[0, -3, 0])
+    np.testing.assert_array_equal(planar.plane_normal, [0, -1, 0])
+    np.testing.assert_array_equal(planar.freedom, [[1, 0, 0, 0, 0, 0], [0, 0, 1, 0, 0, 0], [0, 0, 0, 0, -1, 0]])
+    level = tripod(motion_pattern="2T", plane_normal=[0, 0, 1])
+    np.testing.assert_array_equal(level.freedom, [[1, 0, 0, 0, 0, 0], [0, 1, 0, 0, 0, 0]])
+    patterns = {"3R3T": None, "3T": None, "1R2T": [1, 0, 0], "2T": [1, 0, 0]}
+    found = [tripod(motion_pattern=p, plane_normal=n).degrees_of_freedom for p, n in patterns.items()]
+    assert found == [6, 3, 3, 2]
+
+
+@given(st.lists(st.floats(-1, 1), min_size=3, max_size=3).filter(lambda v: np.linalg.norm(v) > 1e-3))
+def test_planar_axes_are_right_handed_about_the_normal(normal):
+    rows = tripod(motion_pattern="1R2T", plane_normal=normal).freedom
+    np.testing.assert_allclose(rows @ rows.T, np.eye(3), atol=1e-12)
+    np.testing.assert_allclose(np.cross(rows[0, :3], rows[1, :3]), normal / np.linalg.norm(normal), atol=1e-12)
+    assert rows[1, 2] >= -1e-12 or rows[2, 5] < 0  # up, unless a level plane is seen from below
+
+
+def test_inertia_of_simple_bodies():
+    # 12 kg: one twelfth of the mass is 1, so that the edges can be read off
+    np.testing.assert_array_equal(box_inertia(12.0, 1.0, 2.0, 3.0), np.diag([13.0, 10.0, 5.0]))
+    np.testing.assert_array_equal(cylinder_inertia(12.0, 2.0, 3.0), np.diag([21.0, 21.0, 24.0]))
+
+
+def test_box_inertia_is_the_integral_over_its_volume():
+    edges, mass, count = np.array([0.3, 0.4, 0.5]), 50.0, 200
+    axis = (np.arange(count) + 0.5) / count - 0.5  # midpoint rule, error of order 1/count^2
+    second = edges**2 * np.mean(axis**2) * mass
+    np.testing.assert_allclose(np.diag(box_inertia(mass, *edges)), second.sum() - second, rtol=1e-4)
+
+
+def test_a_body_that_cannot_turn_needs_no_inertia():
+    np.testing.assert_array_equal(tripod(motion_pattern="3T", inertia=None).inertia, np.zeros((3, 3)))
+
+
+def test_replace_checks_again_and_leaves_the_original():
+    robot = tripod()
+    heavier = robot.replace(mass=9.0)
+    assert (heavier.mass, robot.mass) == (9.0, 4.0)
+    np.testing.assert_array_equal(heavier.frame_anchors, CORNERS)
+    with pytest.raises(InvalidValueError, match="mass is -1 kg; allowed: > 0 kg"):
+        robot.replace(mass=-1.0)
+
+
+def test_pickling_and_locks():
+    robot = tripod(assumed={"mass": "a guess"}, test_box=PoseBox([0, 0, 1], [1, 1, 2], 0.1))
+    copy = pickle.loads(pickle.dumps(robot))
+    np.testing.assert_array_equal(copy.inertia, robot.inertia)
+    np.testing.assert_array_equal(copy.test_box.high, [1, 1, 2])
+    assert (dict(copy.assumed), copy.test_box.tilt) == ({"mass": "a guess"}, 0.1)
+    with pytest.raises(ValueError, match="read-only"):
+        copy.frame_anchors[0, 0] = 1.0
+    with pytest.raises(TypeError):
+        copy.assumed["mass"] = "certain"
+
+
+SKEW = np.diag([1.0, 2.0, 2.5])
+SKEW[0, 1] = 0.1
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"frame_anchors": np.where(CORNERS == -2, np.nan, CORNERS)}, "frame_anchors\\[2, 0\\] is nan m"),
+        ({"frame_anchors": CORNERS[:2]}, "platform_anchors is 3 points; allowed: as many as frame_anchors, 2"),
+        ({"frame_anchors": np.zeros((0, 3)), "platform_anchors": np.zeros((0, 3))}, "frame_anchors is of shape"),
+        ({"frame_anchors": np.zeros(3)}, "frame_anchors is of shape \\(3,\\)"),
+        ({"frame_anchors": CORNERS[[0, 1, 0]]}, "cable 2 is between the same two points as cable 0"),
+        ({"mass": 0.0}, "mass is 0 kg; allowed: > 0 kg"),
+        ({"mass": [1.0, 2.0]}, "mass is of shape \\(2,\\); allowed: a single number"),
+        ({"inertia": None}, "inertia is missing"),
+        ({"inertia": SKEW}, "inertia\\[0, 1\\] is 0.1 kg m\\^2; allowed: the same as inertia\\[1, 0\\], 0 kg"),
+        ({"inertia": np.diag([1.0, -2.0, 1.0])}, "principal moment -2 kg m\\^2"),
+        ({"inertia": np.zeros((3, 3))}, "principal moment 0 kg m\\^2"),
+        ({"gravity": -9.81}, "gravity is -9.81 m/s\\^2; allowed: >= 0"),
+        ({"tension_min": [1, 5, 1], "tension_max": [2, 3, 2]}, "tension_min\\[1\\] is 5 N; allowed: <= tension_max"),
+        ({"tension_min": -1.0}, "tension_min is -1 N"),
+        ({"tension_max": np.nan}, "tension_max is nan N"),
+        ({"tension_max": [1.0, 2.0]}, "tension_max is of shape \\(2,\\)"),
+        ({"cables": Cable([0.1, 0.0, 0.1], 1e5)}, "cables: linear_density\\[1\\] is 0 kg/m"),
+        ({"cables": Cable([0.1, 0.1], 1e5)}, "cables: linear_density is of shape \\(2,\\)"),
+        ({"cables": 0.1}, "cables is 0.1; allowed: a Cable"),
+        ({"motion_pattern": "6D"}, "motion_pattern is '6D'; allowed: 3R3T, 3T, 1R2T, 2T"),
+        ({"tension_limits_of": "winch"}, "allowed: chord, frame_end"),
+        ({"motion_pattern": "2T"}, "plane_normal is not given for motion_pattern 2T"),
+        ({"plane_normal": [0, 0, 1]}, "plane_normal is given for motion_pattern 3R3T"),
+        ({"motion_pattern": "2T", "plane_normal": [0, 0, 0]}, "plane_normal is the zero vector"),
+        ({"platform_size": [0.1, 0.0, 0.1]}, "platform_size\\[1\\] is 0 m"),
+        ({"assumed": {"weight": "?"}}, "assumed: field is 'weight'"),
+    ],
+)
+def test_a_wrong_field_is_named(changes, message):
+    with pytest.raises(InvalidValueError, match=message):
+        tripod(**changes)
+
+
+def test_two_cables_may_share_one_end():
+    robot = tripod(frame_anchors=CORNERS[[0, 0, 1]], platform_anchors=[[0, 0, 0], [0, 0, 1], [0, 0, 0]])
+    assert robot.cable_count == 3
+
+
+def test_a_crossed_box_is_refused():
+    with pytest.raises(InvalidValueError, match="test_box: high\\[2\\] is 0 m; allowed: >= low, 1 m"):
+        PoseBox([0, 0, 1], [1, 1, 0])
