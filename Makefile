@@ -33,7 +33,7 @@ test: env check ## all checks, then the whole test suite with its coverage
 check: env ## style, types and the direction of imports
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy src $(wildcard examples benchmarks)
+	$(BIN)/mypy src $(wildcard tests examples benchmarks)
 	$(BIN)/lint-imports
 
 format: env ## put the source in shape

@@ -4,6 +4,7 @@ import sys
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import ArrayLike
 
 from sagline.errors import InvalidValueError
 from sagline.files.quantity import in_si
@@ -31,16 +32,16 @@ from sagline.files.quantity import in_si
         (float("inf"), "N", float("inf")),
     ],
 )
-def test_quantities_in_si(value, unit, expected):
+def test_quantities_in_si(value: object, unit: str, expected: ArrayLike) -> None:
     assert in_si(value, unit, "x") == pytest.approx(expected, rel=1e-15)
 
 
-def test_lists_keep_their_nesting():
+def test_lists_keep_their_nesting() -> None:
     assert in_si([[1, "1 mm"], ["2 km"]], "m", "x") == [[1.0, 0.001], [2000.0]]
 
 
 @given(st.floats(allow_nan=False))
-def test_plain_numbers_pass_bit_for_bit(number):
+def test_plain_numbers_pass_bit_for_bit(number: float) -> None:
     assert in_si(number, "kg", "x") == number
     assert in_si(repr(number), "kg", "x") == number
 
@@ -67,12 +68,12 @@ def test_plain_numbers_pass_bit_for_bit(number):
         ("5 __import__('os')", "m", "x is "),
     ],
 )
-def test_what_is_no_quantity_is_named(value, unit, message):
+def test_what_is_no_quantity_is_named(value: object, unit: str, message: str) -> None:
     with pytest.raises(InvalidValueError, match=message):
         in_si(value, unit, "x")
 
 
-def test_plain_numbers_do_not_load_pint():
+def test_plain_numbers_do_not_load_pint() -> None:
     code = """
 import sys
 from sagline.files.quantity import in_si

@@ -1,5 +1,7 @@
 import re
 from dataclasses import fields
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,19 +29,19 @@ assumed: {mass: a guess}
 """
 
 
-def edited(**changes):
+def edited(**changes: Any) -> str:
     data = {**yaml.safe_load(TEXT), **changes}
     return yaml.safe_dump({key: value for key, value in data.items() if value is not ...})
 
 
-def arrays_of(robot):
+def arrays_of(robot: Robot) -> dict[str, Any]:
     values = {field.name: getattr(robot, field.name) for field in fields(robot)}
     cables, box = values.pop("cables"), values.pop("test_box")
     values |= {"density": cables.linear_density, "stiffness": cables.axial_stiffness}
     return values if box is None else values | {"low": box.low, "high": box.high, "tilt": box.tilt}
 
 
-def assert_same(robot, other):
+def assert_same(robot: Robot, other: Robot) -> None:
     mine, yours = arrays_of(robot), arrays_of(other)
     assert mine.keys() == yours.keys()
     for name, value in mine.items():
@@ -50,10 +52,10 @@ def assert_same(robot, other):
             assert value == yours[name], name
 
 
-def test_units_become_si():
+def test_units_become_si() -> None:
     robot = parse_robot(TEXT, "robot.yaml")
     np.testing.assert_array_equal(robot.frame_anchors, [[0, 0, 3], [4, 0, 3], [0, 4, 3]])
-    np.testing.assert_allclose(robot.platform_anchors, [[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0]], rtol=1e-15)
+    np.testing.assert_allclose(robot.platform_anchors, [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0]], rtol=1e-15)
     np.testing.assert_allclose(robot.cables.linear_density, 0.067, rtol=1e-15)
     np.testing.assert_allclose(robot.cables.axial_stiffness, 44e3, rtol=1e-15)
     np.testing.assert_array_equal(robot.tension_max, [1000, 2000, np.inf])
@@ -65,7 +67,7 @@ def test_units_become_si():
     ("section", "area"),
     [({"section_area": 3e-6}, 3e-6), ({"radius": "2 mm"}, 4e-6 * np.pi), ({"diameter": "2 mm"}, 1e-6 * np.pi)],
 )
-def test_ways_to_give_the_stiffness(section, area):
+def test_ways_to_give_the_stiffness(section: dict[str, object], area: float) -> None:
     cables = {"linear_density": [0.1, 0.2, 0.3], "youngs_modulus": "1 GPa", **section}
     robot = parse_robot(edited(cables=cables), "robot.yaml")
     np.testing.assert_array_equal(robot.cables.linear_density, [0.1, 0.2, 0.3])
@@ -81,8 +83,10 @@ def test_ways_to_give_the_stiffness(section, area):
         ({"cylinder_radius": "2 m", "cylinder_height": 6}, np.diag([2.0, 2.0, 1.0])),  # of 0.5 kg
     ],
 )
-def test_ways_to_give_the_inertia(inertia, expected):
-    np.testing.assert_allclose(parse_robot(edited(inertia=inertia), "robot.yaml").inertia, expected, rtol=1e-15)
+def test_ways_to_give_the_inertia(inertia: object, expected: object) -> None:
+    np.testing.assert_allclose(
+        parse_robot(edited(inertia=inertia), "robot.yaml").inertia, np.array(expected), rtol=1e-15
+    )
 
 
 @pytest.mark.parametrize(
@@ -115,7 +119,7 @@ def test_ways_to_give_the_inertia(inertia, expected):
         ({"test_box": {"low": [0, 0, 0], "high": [1, 1, "1 kg"]}}, "test_box.high\\[2\\] is '1 kg'"),
     ],
 )
-def test_a_wrong_value_is_named_with_its_file(changes, message):
+def test_a_wrong_value_is_named_with_its_file(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(FileError, match=f"^robot.yaml: .*{message}"):
         parse_robot(edited(**changes), "robot.yaml")
 
@@ -135,14 +139,14 @@ def test_a_wrong_value_is_named_with_its_file(changes, message):
         (TEXT[: TEXT.index("mass: 500")].encode(), "mass is missing"),
     ],
 )
-def test_a_broken_file_gets_one_clear_message(tmp_path, content, message):
+def test_a_broken_file_gets_one_clear_message(tmp_path: Path, content: bytes, message: str) -> None:
     path = tmp_path / "robot.yaml"
     path.write_bytes(content)
     with pytest.raises(FileError, match=f"^{re.escape(str(path))}: .*{message}"):
         load_robot(path)
 
 
-def test_what_is_no_file(tmp_path):
+def test_what_is_no_file(tmp_path: Path) -> None:
     with pytest.raises(FileError, match=r"missing\.yaml: cannot be read \(No such file"):
         load_robot(tmp_path / "missing.yaml")
     with pytest.raises(FileError, match=r"cannot be read \(Is a directory\)"):
@@ -151,7 +155,7 @@ def test_what_is_no_file(tmp_path):
         load_robot("article-mixd")
 
 
-def test_a_file_in_the_current_folder_goes_by_its_name(tmp_path, monkeypatch):
+def test_a_file_in_the_current_folder_goes_by_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "pendulum").write_text(TEXT, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     assert load_robot("pendulum").mass == 0.5
@@ -159,7 +163,7 @@ def test_a_file_in_the_current_folder_goes_by_its_name(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("name", robot_names())
-def test_presets_survive_the_dump_bit_for_bit(name):
+def test_presets_survive_the_dump_bit_for_bit(name: str) -> None:
     robot = load_robot(name)
     assert_same(parse_robot(dump_robot(robot), "dump"), robot)
 
@@ -175,7 +179,9 @@ POSITIVE = st.floats(1e-12, 1e12)
     st.text(st.characters(codec="utf-8", exclude_categories=("Cc", "Cs", "Cn"))),
     st.booleans(),
 )
-def test_any_robot_survives_the_dump_bit_for_bit(points, positive, text, planar):
+def test_any_robot_survives_the_dump_bit_for_bit(
+    points: list[float], positive: list[float], text: str, planar: bool
+) -> None:
     robot = Robot(
         text,
         np.reshape(points[:6], (2, 3)),

@@ -3,9 +3,11 @@ import pytest
 from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
+from sagline.arrays import Array
 from sagline.errors import InvalidValueError
 from sagline.files.robot_file import load_robot
 from sagline.robot.catalogue import preset_text, robot_names
+from sagline.robot.robot import Robot
 
 PUBLISHED = {
     # name: mass, density, stiffness, tension limits, a frame anchor, a platform anchor, the fields that are ours
@@ -42,12 +44,12 @@ ARTICLE = {
 }
 
 
-def test_thirteen_presets():
+def test_thirteen_presets() -> None:
     assert list(robot_names()) == sorted([*PUBLISHED, *ARTICLE])
 
 
 @pytest.mark.parametrize("name", PUBLISHED)
-def test_published_numbers(name):
+def test_published_numbers(name: str) -> None:
     mass, density, stiffness, limits, (i, frame), (j, platform) = PUBLISHED[name]
     robot = load_robot(name)
     assert (robot.name, robot.mass) == (name, mass)
@@ -60,7 +62,7 @@ def test_published_numbers(name):
     assert robot.source
 
 
-def test_inertia_of_the_measured_robots():
+def test_inertia_of_the_measured_robots() -> None:
     cogiro = [[36.598, -0.453, 3.012], [-0.453, 35.982, -1.539], [3.012, -1.539, 25.439]]
     np.testing.assert_array_equal(load_robot("cogiro").inertia, cogiro)
     np.testing.assert_array_equal(load_robot("cogiro").center_of_mass, [-0.034, -0.013, 0.264])
@@ -70,7 +72,7 @@ def test_inertia_of_the_measured_robots():
 
 
 @pytest.mark.parametrize("name", ARTICLE)
-def test_article_robots_are_those_of_table_1(name):
+def test_article_robots_are_those_of_table_1(name: str) -> None:
     frame, density, stiffness = ARTICLE[name]
     robot = load_robot(name)
     assert robot.mass == 50.0
@@ -84,7 +86,7 @@ def test_article_robots_are_those_of_table_1(name):
     assert not {"mass", "cables", "platform_size", "frame_size"} & set(robot.assumed)
 
 
-def test_suspended_cables_cross_to_the_neighboring_corners():
+def test_suspended_cables_cross_to_the_neighboring_corners() -> None:
     robot = load_robot("article-suspended")
     np.testing.assert_array_equal(robot.frame_anchors[:, 2], 6.0)
     for frame, platform in zip(robot.frame_anchors, robot.platform_anchors, strict=True):
@@ -92,13 +94,13 @@ def test_suspended_cables_cross_to_the_neighboring_corners():
         assert np.sign(turn) == np.sign(platform[2])
 
 
-def test_mixed_cables_run_straight_down_and_up():
+def test_mixed_cables_run_straight_down_and_up() -> None:
     robot = load_robot("article-mixed")
     np.testing.assert_array_equal(np.sign(robot.frame_anchors[:, :2]), np.sign(robot.platform_anchors[:, :2]))
     np.testing.assert_array_equal(robot.platform_anchors[:, 2], np.where(robot.frame_anchors[:, 2] == 6, -0.25, 0.25))
 
 
-def wrench_feasible(robot, position, rotation):
+def wrench_feasible(robot: Robot, position: Array, rotation: Array) -> bool:
     """A linear program over chord tensions, half of each cable's weight hung on the platform."""
     arm = (robot.platform_anchors - robot.center_of_mass) @ rotation.T
     chord = position + robot.platform_anchors @ rotation.T - robot.frame_anchors
@@ -116,17 +118,19 @@ def wrench_feasible(robot, position, rotation):
         bounds=np.column_stack([robot.tension_min, robot.tension_max]) / scale,
     )
     assert found.status in (0, 2)
-    return found.status == 0
+    return bool(found.status == 0)
 
 
 @pytest.mark.parametrize("name", sorted([*PUBLISHED, *ARTICLE]))
-def test_box_is_feasible(name):
+def test_box_is_feasible(name: str) -> None:
     robot, rng = load_robot(name), np.random.default_rng(11)
     box = robot.test_box
+    assert box is not None
     count = 60
     axes = rng.normal(size=(count, 3))
     axes /= np.linalg.norm(axes, axis=1)[:, None]
-    turns = Rotation.from_rotvec(axes * rng.uniform(0, box.tilt, size=(count, 1))).as_matrix()
+    angles = rng.uniform(0, box.tilt, size=(count, 1))
+    turns = Rotation.from_rotvec(axes * angles).as_matrix()
     positions = rng.uniform(box.low, box.high, size=(count, 3))
     feasible = [wrench_feasible(robot, *pose) for pose in zip(positions, turns, strict=True)]
     assert np.mean(feasible) >= 0.9  # 95 % of all poses, and of 60 of them at least 90 %
@@ -135,10 +139,10 @@ def test_box_is_feasible(name):
 @pytest.mark.parametrize("name", ["article-mixed", "article-suspended"])
 @pytest.mark.parametrize("x", [-5.0, 0.0, 5.0])
 @pytest.mark.parametrize("y", [-3.5, 0.0, 3.5])
-def test_the_articles_path_is_feasible(name, x, y):
+def test_the_articles_path_is_feasible(name: str, x: float, y: float) -> None:
     assert wrench_feasible(load_robot(name), np.array([x, y, 1.5]), np.eye(3))
 
 
-def test_an_unknown_preset_suggests_the_nearest():
+def test_an_unknown_preset_suggests_the_nearest() -> None:
     with pytest.raises(InvalidValueError, match=r"robot is 'cogirro'; allowed: .*Did you mean cogiro\?"):
         preset_text("cogirro")

@@ -7,13 +7,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from sagline.arrays import Array
 from sagline.errors import InvalidValueError
 from sagline.robot.pose import Pose
 
 ANGLE = st.floats(-7.0, 7.0)
 
 
-def euler_matrix(alpha, beta, gamma):
+def euler_matrix(alpha: float, beta: float, gamma: float) -> Array:
     """The article's (9), multiplied out by hand."""
     (sa, sb, sg), (ca, cb, cg) = np.sin((alpha, beta, gamma)), np.cos((alpha, beta, gamma))
     return np.array(
@@ -26,20 +27,20 @@ def euler_matrix(alpha, beta, gamma):
 
 
 @given(ANGLE, ANGLE, ANGLE)
-def test_euler_angles_turn_about_z_then_y_then_x(alpha, beta, gamma):
+def test_euler_angles_turn_about_z_then_y_then_x(alpha: float, beta: float, gamma: float) -> None:
     pose = Pose.from_euler([1.0, 2.0, 3.0], alpha, beta, gamma)
     np.testing.assert_allclose(pose.matrix, euler_matrix(alpha, beta, gamma), atol=2e-15)
     np.testing.assert_allclose(Rotation.from_euler("ZYX", [alpha, beta, gamma]).as_matrix(), pose.matrix, atol=2e-15)
 
 
-def test_a_quarter_turn_about_z_takes_x_to_y():
+def test_a_quarter_turn_about_z_takes_x_to_y() -> None:
     pose = Pose([0, 0, 0], [[0, -1, 0], [1, 0, 0], [0, 0, 1]])
     np.testing.assert_allclose(np.abs(pose.quaternion), [0, 0, np.sqrt(0.5), np.sqrt(0.5)], atol=1e-16)
     np.testing.assert_allclose(pose.rotation.apply([1, 0, 0]), [0, 1, 0], atol=1e-16)
     assert pose.shape == ()
 
 
-def test_one_rotation_serves_many_positions():
+def test_one_rotation_serves_many_positions() -> None:
     positions = np.arange(12.0).reshape(4, 3)
     poses = Pose(positions, Rotation.from_euler("z", 0.3))
     assert len(poses) == 4
@@ -48,7 +49,7 @@ def test_one_rotation_serves_many_positions():
     assert poses.quaternion.flags.c_contiguous
 
 
-def test_a_batch_gives_its_poses_by_index_slice_and_iteration():
+def test_a_batch_gives_its_poses_by_index_slice_and_iteration() -> None:
     poses = Pose.from_euler(np.arange(9.0).reshape(3, 3), [0.1, 0.2, 0.3], 0.0, 0.0)
     np.testing.assert_array_equal(poses[1].position, [3, 4, 5])
     np.testing.assert_allclose(poses[1].quaternion, [0, 0, np.sin(0.1), np.cos(0.1)], rtol=1e-15)
@@ -61,7 +62,7 @@ def test_a_batch_gives_its_poses_by_index_slice_and_iteration():
         len(poses[0])
 
 
-def test_the_callers_array_is_copied_and_ours_is_locked():
+def test_the_callers_array_is_copied_and_ours_is_locked() -> None:
     position = np.zeros((2, 3))
     poses = Pose(position, Rotation.identity())
     position[0, 0] = 5.0
@@ -72,7 +73,7 @@ def test_the_callers_array_is_copied_and_ours_is_locked():
 
 
 @given(st.integers(0, 2**32 - 1))
-def test_pickling_keeps_every_bit_and_the_lock(seed):
+def test_pickling_keeps_every_bit_and_the_lock(seed: int) -> None:
     rng = np.random.default_rng(seed)
     poses = Pose.from_euler(rng.normal(size=(20, 3)), *rng.uniform(-3, 3, size=(3, 20)))
     copy = pickle.loads(pickle.dumps(poses))
@@ -81,7 +82,7 @@ def test_pickling_keeps_every_bit_and_the_lock(seed):
     assert not copy.quaternion.flags.writeable
 
 
-def test_a_printed_quaternion_is_normalized():
+def test_a_printed_quaternion_is_normalized() -> None:
     pose = Pose.from_quaternion([0, 0, 0], [0.0, 0.0, 0.7071068, 0.7071068])
     np.testing.assert_allclose(pose.quaternion, [0, 0, np.sqrt(0.5), np.sqrt(0.5)], rtol=2e-16)
 
@@ -97,17 +98,17 @@ def test_a_printed_quaternion_is_normalized():
         (np.zeros(4), "rotation is of shape \\(4,\\)"),
     ],
 )
-def test_what_is_no_rotation_is_refused(matrix, message):
+def test_what_is_no_rotation_is_refused(matrix: Array, message: str) -> None:
     with pytest.raises(InvalidValueError, match=message):
         Pose(np.zeros(3), matrix)
 
 
-def test_a_matrix_good_to_the_tolerance_passes():
+def test_a_matrix_good_to_the_tolerance_passes() -> None:
     pose = Pose([0, 0, 0], np.diag([1.0, 1.0, 1.0 + 2e-10]))
     np.testing.assert_allclose(pose.matrix, np.eye(3), atol=1e-15)
 
 
-def test_other_wrong_values_are_named():
+def test_other_wrong_values_are_named() -> None:
     with pytest.raises(InvalidValueError, match="quaternion 1: length is 2;"):
         Pose.from_quaternion(np.zeros(3), [[0, 0, 0, 1], [0, 0, 0, 2]])
     with pytest.raises(InvalidValueError, match="position and rotation is of batch shapes \\(2,\\) and \\(3,\\)"):
@@ -115,12 +116,12 @@ def test_other_wrong_values_are_named():
     with pytest.raises(InvalidValueError, match="alpha, beta, gamma is of batch shapes"):
         Pose.from_euler(np.zeros(3), [0, 0], [0, 0, 0], 0)
     with pytest.raises(InvalidValueError, match="position\\[1, 2\\] is inf m"):
-        Pose([[0, 0, 0], [0, 0, np.inf]], Rotation.identity())
+        Pose([[0.0, 0.0, 0.0], [0.0, 0.0, np.inf]], Rotation.identity())
     with pytest.raises(InvalidValueError, match="a batch of shape \\(2, 2\\)"):
         Pose(np.zeros((2, 2, 3)), Rotation.identity())
 
 
-def test_a_million_poses_take_no_python_loop():
+def test_a_million_poses_take_no_python_loop() -> None:
     rng = np.random.default_rng(5)
     position, angles = rng.normal(size=(10**6, 3)), rng.uniform(-1, 1, size=(3, 10**6))
     start = time.perf_counter()

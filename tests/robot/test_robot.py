@@ -1,4 +1,5 @@
 import pickle
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,11 +23,11 @@ FIELDS = {
 }
 
 
-def tripod(**changes):
+def tripod(**changes: Any) -> Robot:
     return Robot(**{**FIELDS, **changes})
 
 
-def test_values_for_all_cables_are_spread_over_the_cables():
+def test_values_for_all_cables_are_spread_over_the_cables() -> None:
     robot = tripod(tension_min=5.0, tension_max=[10.0, np.inf, 30.0])
     np.testing.assert_array_equal(robot.cables.linear_density, [0.05, 0.05, 0.05])
     np.testing.assert_array_equal(robot.cables.axial_stiffness, [1e5, 1e5, 1e5])
@@ -36,7 +37,7 @@ def test_values_for_all_cables_are_spread_over_the_cables():
     assert (robot.cable_count, robot.gravity, robot.tension_limits_of) == (3, 9.81, "chord")
 
 
-def test_freedom_by_hand():
+def test_freedom_by_hand() -> None:
     np.testing.assert_array_equal(tripod().freedom, np.eye(6))
     np.testing.assert_array_equal(tripod(motion_pattern="3T").freedom, np.eye(6)[:3])
     # the plane of x and z: its normal is -y, since x cross z = -y
@@ -51,31 +52,33 @@ def test_freedom_by_hand():
 
 
 @given(st.lists(st.floats(-1, 1), min_size=3, max_size=3).filter(lambda v: np.linalg.norm(v) > 1e-3))
-def test_planar_axes_are_right_handed_about_the_normal(normal):
+def test_planar_axes_are_right_handed_about_the_normal(normal: list[float]) -> None:
     rows = tripod(motion_pattern="1R2T", plane_normal=normal).freedom
     np.testing.assert_allclose(rows @ rows.T, np.eye(3), atol=1e-12)
-    np.testing.assert_allclose(np.cross(rows[0, :3], rows[1, :3]), normal / np.linalg.norm(normal), atol=1e-12)
+    np.testing.assert_allclose(
+        np.cross(rows[0, :3], rows[1, :3]), np.array(normal) / np.linalg.norm(normal), atol=1e-12
+    )
     assert rows[1, 2] >= -1e-12 or rows[2, 5] < 0  # up, unless a level plane is seen from below
 
 
-def test_inertia_of_simple_bodies():
+def test_inertia_of_simple_bodies() -> None:
     # 12 kg: one twelfth of the mass is 1, so that the edges can be read off
     np.testing.assert_array_equal(box_inertia(12.0, 1.0, 2.0, 3.0), np.diag([13.0, 10.0, 5.0]))
     np.testing.assert_array_equal(cylinder_inertia(12.0, 2.0, 3.0), np.diag([21.0, 21.0, 24.0]))
 
 
-def test_box_inertia_is_the_integral_over_its_volume():
+def test_box_inertia_is_the_integral_over_its_volume() -> None:
     edges, mass, count = np.array([0.3, 0.4, 0.5]), 50.0, 200
     axis = (np.arange(count) + 0.5) / count - 0.5  # midpoint rule, error of order 1/count^2
     second = edges**2 * np.mean(axis**2) * mass
     np.testing.assert_allclose(np.diag(box_inertia(mass, *edges)), second.sum() - second, rtol=1e-4)
 
 
-def test_a_body_that_cannot_turn_needs_no_inertia():
+def test_a_body_that_cannot_turn_needs_no_inertia() -> None:
     np.testing.assert_array_equal(tripod(motion_pattern="3T", inertia=None).inertia, np.zeros((3, 3)))
 
 
-def test_replace_checks_again_and_leaves_the_original():
+def test_replace_checks_again_and_leaves_the_original() -> None:
     robot = tripod()
     heavier = robot.replace(mass=9.0)
     assert (heavier.mass, robot.mass) == (9.0, 4.0)
@@ -84,7 +87,7 @@ def test_replace_checks_again_and_leaves_the_original():
         robot.replace(mass=-1.0)
 
 
-def test_pickling_and_locks():
+def test_pickling_and_locks() -> None:
     robot = tripod(assumed={"mass": "a guess"}, test_box=PoseBox([0, 0, 1], [1, 1, 2], 0.1))
     copy = pickle.loads(pickle.dumps(robot))
     np.testing.assert_array_equal(copy.inertia, robot.inertia)
@@ -131,16 +134,16 @@ SKEW[0, 1] = 0.1
         ({"assumed": {"weight": "?"}}, "assumed: field is 'weight'"),
     ],
 )
-def test_a_wrong_field_is_named(changes, message):
+def test_a_wrong_field_is_named(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(InvalidValueError, match=message):
         tripod(**changes)
 
 
-def test_two_cables_may_share_one_end():
+def test_two_cables_may_share_one_end() -> None:
     robot = tripod(frame_anchors=CORNERS[[0, 0, 1]], platform_anchors=[[0, 0, 0], [0, 0, 1], [0, 0, 0]])
     assert robot.cable_count == 3
 
 
-def test_a_crossed_box_is_refused():
+def test_a_crossed_box_is_refused() -> None:
     with pytest.raises(InvalidValueError, match="test_box: high\\[2\\] is 0 m; allowed: >= low, 1 m"):
         PoseBox([0, 0, 1], [1, 1, 0])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -137,6 +138,10 @@ class Pose:
         if not self.shape:
             raise TypeError("a single pose cannot be indexed")
         return Pose._adopt(self.position[index], self.quaternion[index])
+
+    def __iter__(self) -> Iterator[Pose]:
+        """The poses of a batch, one by one."""
+        return (self[i] for i in range(len(self)))
 
     def __reduce__(self) -> tuple[Any, tuple[Array, Array]]:
         """Pickle through a constructor, so that a loaded pose is checked and locked too."""

@@ -1,0 +1,28 @@
+"""A robot at rest, or in quasi-static motion: where its platform is and what its cables carry."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sagline.arrays import Array
+from sagline.cables.state import CableState
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Equilibrium:
+    """The one type that stiffness, modes, the viewer and the files take.
+
+    Attributes:
+        robot: The robot.
+        pose: Pose of the platform, single or a batch of N.
+        wrench: External plus inertial wrench on the platform about its center of mass, world axes, without
+            gravity: force [N], moment [N m], shape (6,) or (N, 6).
+        cables: State of the cables, fields of shape (m,) or (N, m).
+    """
+
+    robot: Robot
+    pose: Pose
+    wrench: Array
+    cables: CableState
