@@ -1,0 +1,40 @@
+"""The article's empirical cable."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from sagline.arrays import checked
+from sagline.cables.model import CableModel
+from sagline.kernels import codes
+
+
+@dataclass(frozen=True, slots=True)
+class Empirical(CableModel):
+    """The article's closed form: T_z = tan(phi) T_x + k_h rho D, and L of T_x by its equation (48).
+
+    Valid while the lowest point of the cable lies outside the span, T_x > w D/(2 |tan phi|); below that the
+    answer stands but its status says BELOW_VALIDITY. From a length, (48) is solved on its decreasing branch.
+
+    Attributes:
+        k_h: Intercept constant [m/s^2]; the published 4.845 in magnitude (exactly g/2 for a shallow cable).
+        k_p: Sag constant [m^2/s^4]; the published 4.385 (exactly g^2/24 for a shallow cable).
+
+    Source:
+        Gia Luan & Truong Thinh 2020, equations (21), (27), (28), (45), (48); docs/model.md, section 3.
+    """
+
+    code: ClassVar[int] = codes.EMPIRICAL
+    k_h: float = 4.845
+    k_p: float = 4.385
+
+    def __post_init__(self) -> None:
+        """Check the constants."""
+        checked(self.k_h, "k_h", "m/s^2")
+        checked(self.k_p, "k_p", "m^2/s^4", low=0.0)
+
+    @property
+    def parameters(self) -> tuple[float, float]:
+        """k_h and k_p."""
+        return self.k_h, self.k_p

@@ -1,0 +1,58 @@
+"""From anchors and pose to each cable's span, rise and azimuth: the only place where they are computed."""
+
+from __future__ import annotations
+
+import math
+
+from sagline.arrays import Array
+from sagline.kernels import tables
+from sagline.kernels.jit import kernel
+
+# docs/model.md, section 1. Rows of a geometry array, each of m values.
+SPAN, RISE, CHORD, SINE, COSINE = 0, 1, 2, 3, 4  # x_B, z_B, D, sin phi, cos phi
+AZIMUTH_X, AZIMUTH_Y = 5, 6  # horizontal unit vector from frame end to platform end: cos theta, sin theta
+LEVER_X, LEVER_Y, LEVER_Z = 7, 8, 9  # r, from the center of mass to the platform end, world axes
+GEOMETRY_ROWS = 10
+
+
+@kernel
+def rotation_matrix(pose: Array, rotation: Array) -> None:
+    """Fill the 3 x 3 rotation platform -> world of a pose row."""
+    x, y, z, w = pose[3], pose[4], pose[5], pose[6]
+    rotation[0, 0] = 1.0 - 2.0 * (y * y + z * z)
+    rotation[0, 1] = 2.0 * (x * y - z * w)
+    rotation[0, 2] = 2.0 * (x * z + y * w)
+    rotation[1, 0] = 2.0 * (x * y + z * w)
+    rotation[1, 1] = 1.0 - 2.0 * (x * x + z * z)
+    rotation[1, 2] = 2.0 * (y * z - x * w)
+    rotation[2, 0] = 2.0 * (x * z - y * w)
+    rotation[2, 1] = 2.0 * (y * z + x * w)
+    rotation[2, 2] = 1.0 - 2.0 * (x * x + y * y)
+
+
+@kernel
+def cable_geometry(cables: Array, body: Array, pose: Array, rotation: Array, geometry: Array) -> None:
+    """Fill the geometry rows (GEOMETRY_ROWS, m) of one pose; a vertical cable gets azimuth 0."""
+    rotation_matrix(pose, rotation)
+    for i in range(cables.shape[0]):
+        bx = cables[i, tables.PLATFORM_X]
+        by = cables[i, tables.PLATFORM_Y]
+        bz = cables[i, tables.PLATFORM_Z]
+        dx = pose[0] + rotation[0, 0] * bx + rotation[0, 1] * by + rotation[0, 2] * bz - cables[i, tables.FRAME_X]
+        dy = pose[1] + rotation[1, 0] * bx + rotation[1, 1] * by + rotation[1, 2] * bz - cables[i, tables.FRAME_Y]
+        dz = pose[2] + rotation[2, 0] * bx + rotation[2, 1] * by + rotation[2, 2] * bz - cables[i, tables.FRAME_Z]
+        span = math.sqrt(dx * dx + dy * dy)
+        chord = math.sqrt(span * span + dz * dz)
+        geometry[SPAN, i] = span
+        geometry[RISE, i] = dz
+        geometry[CHORD, i] = chord
+        geometry[SINE, i] = dz / chord
+        geometry[COSINE, i] = span / chord
+        geometry[AZIMUTH_X, i] = dx / span if span > 0.0 else 1.0
+        geometry[AZIMUTH_Y, i] = dy / span if span > 0.0 else 0.0
+        bx -= body[tables.CENTER_X]
+        by -= body[tables.CENTER_Y]
+        bz -= body[tables.CENTER_Z]
+        geometry[LEVER_X, i] = rotation[0, 0] * bx + rotation[0, 1] * by + rotation[0, 2] * bz
+        geometry[LEVER_Y, i] = rotation[1, 0] * bx + rotation[1, 1] * by + rotation[1, 2] * bz
+        geometry[LEVER_Z, i] = rotation[2, 0] * bx + rotation[2, 1] * by + rotation[2, 2] * bz

@@ -1,0 +1,57 @@
+"""How a kernel is compiled, and where the machine code is kept.
+
+numba does not notice that a function called from another file was edited and would go on
+running stale machine code. The cache folder is therefore named by a hash of all kernel sources.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
+
+import numba
+from platformdirs import user_cache_path
+
+F = TypeVar("F", bound=Callable[..., object])
+
+
+def cache_folder() -> Path:
+    """Folder of the compiled kernels: below NUMBA_CACHE_DIR if set, else below the user's cache folder."""
+    digest = hashlib.sha256()
+    for source in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(source.name.encode() + b"\0" + source.read_bytes())
+    chosen = os.environ.get("NUMBA_CACHE_DIR")
+    base = Path(chosen) if chosen else user_cache_path("sagline")
+    return base / f"kernels-{digest.hexdigest()[:16]}"
+
+
+FOLDER = cache_folder()
+
+
+def kernel(function: F) -> F:
+    """Compile on first call, keep the machine code on disk; a division by zero gives inf or NaN as in NumPy."""
+    return _compiled(function, forceinline=False)
+
+
+def formula(function: F) -> F:
+    """A kernel that is always inlined into its callers, so that their loops over it vectorize."""
+    return _compiled(function, forceinline=True)
+
+
+def _compiled(function: F, *, forceinline: bool) -> F:
+    # numba reads its cache folder while it decorates: set for that moment only, other users of numba keep theirs.
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(FOLDER)
+    try:
+        compiled: F = numba.njit(cache=True, error_model="numpy", forceinline=forceinline)(function)
+    finally:
+        numba.config.CACHE_DIR = before
+    return compiled
+
+
+def is_cold() -> bool:
+    """Whether nothing is compiled yet, so that the first call will take a minute rather than a moment."""
+    return not any(FOLDER.glob("**/*.nbi"))

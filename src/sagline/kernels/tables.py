@@ -1,0 +1,28 @@
+"""Columns of the arrays in which a robot enters the kernels.
+
+A robot is two arrays with a leading axis of 1 (the same robot at every pose) or N (one a pose):
+`cable_table` (1 or N, m, 10) and `body_table` (1 or N, 5). A pose is a row of seven.
+"""
+
+from __future__ import annotations
+
+# cable_table
+FRAME_X, FRAME_Y, FRAME_Z = 0, 1, 2  # frame anchor, world axes [m]
+PLATFORM_X, PLATFORM_Y, PLATFORM_Z = 3, 4, 5  # platform anchor, platform frame [m]
+DENSITY = 6  # [kg/m]
+STIFFNESS = 7  # [N]
+TENSION_MIN, TENSION_MAX = 8, 9  # [N]
+CABLE_COLUMNS = 10
+
+# body_table
+MASS = 0  # [kg]
+GRAVITY = 1  # [m/s^2], downward
+CENTER_X, CENTER_Y, CENTER_Z = 2, 3, 4  # center of mass, platform frame [m]
+BODY_COLUMNS = 5
+
+# pose row: position of the platform origin [m], unit quaternion, scalar last
+POSE_COLUMNS = 7
+
+# rows of the result of one pose, each of m values
+SPAN, RISE, LENGTH, HORIZONTAL, VERTICAL, TENSION = 0, 1, 2, 3, 4, 5
+RESULT_ROWS = 6

@@ -1,0 +1,180 @@
+"""Inverse kinematics: from a motion of the platform to tensions and unstrained lengths."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sagline.arrays import Array, Codes, locked
+from sagline.cables.catenary import Catenary
+from sagline.cables.model import CableModel
+from sagline.cables.state import CableState
+from sagline.errors import CableGeometryError, InvalidValueError
+from sagline.kernels import codes, tables
+from sagline.kernels.inverse import FORCE_RESIDUAL, MOMENT_RESIDUAL, POSE_NUMBERS, SHORTFALL, inverse_poses
+from sagline.kinematics.plan import Plan
+from sagline.motion.path import Path
+from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.statics.tables import body_table, cable_table, pose_rows
+from sagline.statics.wrench import external_wrench, inertial_wrench
+from sagline.tension.closest import Closest
+from sagline.tension.method import TensionMethod
+
+LIMITS_OF = {"chord": codes.LIMITS_OF_CHORD, "frame_end": codes.LIMITS_OF_FRAME_END}
+MOST_REDUNDANT = 2
+
+_CATENARY = Catenary()
+_CLOSEST = Closest()
+
+
+def inverse(
+    robot: Robot,
+    motion: Path | Pose,
+    model: CableModel = _CATENARY,
+    tension: TensionMethod = _CLOSEST,
+    wrench: ArrayLike | None = None,
+    previous: Plan | None = None,
+) -> Plan:
+    """Tensions that balance the platform within their limits, and the unstrained lengths that produce them.
+
+    Args:
+        robot: The robot, with m cables and n degrees of freedom, n <= m <= n + 2.
+        motion: A path of N samples, whose inertia is included; or a pose or batch of N poses at rest.
+        model: Cable model; the default is exact.
+        tension: How the load is shared among redundant cables. `Closest` carries its reference along a
+            path only; in a batch of poses each stands alone.
+        wrench: External wrench on the platform about its center of mass in world axes, without gravity and
+            inertia: force [N], then moment [N m], shape (6,) or (N, 6). None for none.
+        previous: A plan that this one continues: `Closest` starts from its last feasible tensions.
+
+    Returns:
+        Plan with fields of shape (m,) for a single pose, (N, m) otherwise. A pose without an answer is not
+        feasible there, says why, and holds NaN.
+
+    Raises:
+        InvalidValueError: If the robot has fewer cables than degrees of freedom or too many, or an argument is
+            of the wrong shape.
+        CableGeometryError: If a cable has no length at some pose.
+
+    Source:
+        Gia Luan & Truong Thinh 2020, figure 16; made exact in docs/model.md, section 5.
+    """
+    check_redundancy(robot)
+    pose = motion.pose if isinstance(motion, Path) else motion
+    rows = pose_rows(pose)
+    count = len(rows)
+    load = external_wrench(wrench, count if pose.shape else None)
+    if isinstance(motion, Path):
+        load = locked(inertial_wrench(robot, pose, motion.twist, motion.twist_rate) + load)
+    reference = _reference(robot, previous)
+    found = _Answers.empty(count, robot.cable_count)
+    method = tension if isinstance(motion, Path) or previous is not None else tension.alone
+    inverse_poses(
+        *kernel_options(robot, model, method),
+        robot.freedom,
+        body_table(robot),
+        cable_table(robot),
+        rows,
+        np.atleast_2d(load),
+        reference,
+        *found,
+    )
+    _refuse_missing_chords(found.pose_status, found.results)
+    cables = CableState(
+        model=model,
+        cable=robot.cables,
+        gravity=robot.gravity,
+        span=found.row(tables.SPAN, pose),
+        rise=found.row(tables.RISE, pose),
+        unstrained_length=found.row(tables.LENGTH, pose),
+        horizontal_tension=found.row(tables.HORIZONTAL, pose),
+        vertical_force=found.row(tables.VERTICAL, pose),
+        chord_tension=found.row(tables.TENSION, pose),
+        status=locked(found.cable_status.reshape(*pose.shape, -1)),
+    )
+    whole = locked(np.ascontiguousarray(np.broadcast_to(load, (*pose.shape, 6))))
+    return Plan(
+        state=Equilibrium(robot, pose, whole, cables),
+        path=motion if isinstance(motion, Path) else None,
+        tension=tension,
+        status=locked(found.pose_status.reshape(pose.shape)),
+        shortfall=locked(found.numbers[:, SHORTFALL].reshape(pose.shape)),
+        wrench_residual=locked(found.numbers[:, [FORCE_RESIDUAL, MOMENT_RESIDUAL]].reshape(*pose.shape, 2)),
+        blocking=locked(found.blocking.reshape(*pose.shape, -1)),
+    )
+
+
+def kernel_options(robot: Robot, model: CableModel, tension: TensionMethod) -> tuple[int, float, float, int, int, int, float]:
+    """Model, method and limits as the kernel's leading codes and parameters."""
+    limits_of = LIMITS_OF[robot.tension_limits_of]
+    return model.code, *model.parameters, tension.code, tension.variable_code, limits_of, tension.validity
+
+
+def check_redundancy(robot: Robot) -> None:
+    """Refuse a robot whose tensions the inverse cannot determine.
+
+    Raises:
+        InvalidValueError: If it has fewer cables than degrees of freedom, or more than two redundant ones.
+    """
+    n, m = robot.degrees_of_freedom, robot.cable_count
+    if n <= m <= n + MOST_REDUNDANT:
+        return
+    step = "Add cables, or choose a motion pattern with fewer freedoms." if m < n else "Leave out some cables."
+    raise InvalidValueError(
+        f"{robot.name}: number of cables", m, f"{n} to {n + MOST_REDUNDANT} for {robot.motion_pattern}", step
+    )
+
+
+class _Answers(NamedTuple):
+    """What the kernel fills, in its order."""
+
+    results: Array
+    cable_status: Codes
+    numbers: Array
+    pose_status: Codes
+    blocking: NDArray[np.bool_]
+
+    @classmethod
+    def empty(cls, count: int, cables: int) -> _Answers:
+        return cls(
+            np.empty((tables.RESULT_ROWS, count, cables)),
+            np.empty((count, cables), dtype=np.int8),
+            np.empty((count, POSE_NUMBERS)),
+            np.empty(count, dtype=np.int8),
+            np.empty((count, cables), dtype=np.bool_),
+        )
+
+    def row(self, row: int, pose: Pose) -> Array:
+        return locked(self.results[row].reshape(*pose.shape, -1))
+
+
+def _reference(robot: Robot, previous: Plan | None) -> Array:
+    """Chord tensions to start from (m,): the last feasible ones of a plan, or NaN."""
+    nothing = np.full(robot.cable_count, np.nan)
+    if previous is None:
+        return nothing
+    tensions = np.atleast_2d(previous.chord_tension)
+    if tensions.shape[1] != robot.cable_count:
+        raise InvalidValueError(
+            "previous", f"a plan of {tensions.shape[1]} cables", f"{robot.cable_count} cables", "Continue a plan of this robot."
+        )
+    feasible = np.flatnonzero(np.atleast_1d(previous.feasible))
+    return tensions[feasible[-1]].copy() if feasible.size else nothing
+
+
+def _refuse_missing_chords(status: Codes, results: Array) -> None:
+    lost = np.flatnonzero(status == codes.POSE_NO_CHORD)
+    if not lost.size:
+        return
+    pose = int(lost[0])
+    cable = int(np.argmin(np.hypot(results[tables.SPAN, pose], results[tables.RISE, pose])))
+    raise CableGeometryError(
+        f"pose {pose}, cable {cable}: distance between its ends",
+        "0 m",
+        "> 1e-9 m",
+        "Move the platform away from the anchor, or the anchor away from the path.",
+    )

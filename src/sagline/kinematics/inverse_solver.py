@@ -1,0 +1,147 @@
+"""Inverse kinematics one pose at a time, for a control loop."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sagline.arrays import Array, Codes, checked
+from sagline.cables.catenary import Catenary
+from sagline.cables.model import CableModel
+from sagline.kernels import tables
+from sagline.kernels.inverse import POSE_NUMBERS, SHORTFALL, inverse_poses
+from sagline.kinematics.inverse import check_redundancy, kernel_options
+from sagline.kinematics.status import PoseStatus
+from sagline.robot.robot import Robot
+from sagline.statics.tables import body_table, cable_table
+from sagline.tension.closest import Closest
+from sagline.tension.method import TensionMethod
+
+
+class InverseStep(NamedTuple):
+    """Answer for one pose; NaN where the status is not SOLVED.
+
+    Attributes:
+        unstrained_length: L [m], shape (m,).
+        chord_tension: tau [N], shape (m,).
+        horizontal_tension: T_x [N], shape (m,).
+        vertical_force: T_z on the cable at its platform end [N], shape (m,).
+        status: Why there is no answer, or SOLVED.
+        shortfall: Smallest change of the force that would make the pose feasible [N].
+    """
+
+    unstrained_length: Array
+    chord_tension: Array
+    horizontal_tension: Array
+    vertical_force: Array
+    status: PoseStatus
+    shortfall: float
+
+
+class InverseSolver:
+    """Solves one pose after another without setting anything up again.
+
+    It owns its working memory and, for `Closest`, the last feasible tensions: `reset` forgets them. One solver
+    serves one control loop; it is not to be shared between threads.
+    """
+
+    def __init__(self, robot: Robot, model: CableModel | None = None, tension: TensionMethod | None = None) -> None:
+        """Prepare the robot's arrays and compile the kernel.
+
+        Args:
+            robot: The robot, with n <= m <= n + 2 cables.
+            model: Cable model; the default is the exact one.
+            tension: How the load is shared; the default is `Closest`, to the step before.
+
+        Raises:
+            InvalidValueError: If the robot has too few or too many cables.
+        """
+        check_redundancy(robot)
+        m = robot.cable_count
+        options = kernel_options(robot, model or Catenary(), tension or Closest())
+        self._pose = np.zeros((1, tables.POSE_COLUMNS))
+        self._pose[0, 6] = 1.0
+        self._wrench = np.zeros((1, 6))
+        self._reference = np.full(m, np.nan)
+        self._results = np.empty((tables.RESULT_ROWS, 1, m))
+        self._cable_status: Codes = np.empty((1, m), dtype=np.int8)
+        self._numbers = np.empty((1, POSE_NUMBERS))
+        self._pose_status: Codes = np.empty(1, dtype=np.int8)
+        self._arguments = (
+            *options,
+            robot.freedom,
+            body_table(robot),
+            cable_table(robot),
+            *(_read_only(array) for array in (self._pose, self._wrench)),
+            self._reference,
+            self._results,
+            self._cable_status,
+            self._numbers,
+            self._pose_status,
+            np.empty((1, m), dtype=np.bool_),
+        )
+        self._solve()
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the last tensions: the next step starts from the minimum norm."""
+        self._reference.fill(np.nan)
+
+    def step(self, position: ArrayLike, quaternion: ArrayLike, wrench: ArrayLike | None = None) -> InverseStep:
+        """Solve one pose.
+
+        Args:
+            position: Of the platform origin [m], shape (3,).
+            quaternion: Rotation platform -> world, unit, scalar last, shape (4,).
+            wrench: External plus inertial, about the center of mass, world axes [N, N m], shape (6,); None for none.
+
+        Returns:
+            A fresh result whose arrays belong to the caller.
+
+        Raises:
+            InvalidValueError: If an argument is not finite or of the wrong shape.
+        """
+        position = checked(position, "position", "m", shape=(3,))
+        quaternion = checked(quaternion, "quaternion", "", shape=(4,))
+        load = None if wrench is None else checked(wrench, "wrench", "N or N m", shape=(6,))
+        lengths = np.empty(self._reference.size)
+        status = self.step_into(position, quaternion, lengths, load)
+        return InverseStep(
+            lengths,
+            self._results[tables.TENSION, 0].copy(),
+            self._results[tables.HORIZONTAL, 0].copy(),
+            self._results[tables.VERTICAL, 0].copy(),
+            status,
+            float(self._numbers[0, SHORTFALL]),
+        )
+
+    def step_into(self, position: Array, quaternion: Array, out: Array, wrench: Array | None = None) -> PoseStatus:
+        """Solve one pose into the caller's memory: no allocation, no check of the arguments.
+
+        Args:
+            position: Of the platform origin [m], shape (3,).
+            quaternion: Rotation platform -> world, unit, scalar last, shape (4,).
+            out: Filled with the unstrained lengths [m], shape (m,); NaN where there is no answer.
+            wrench: External plus inertial, about the center of mass, world axes [N, N m], shape (6,); None for none.
+
+        Returns:
+            The status of the pose.
+        """
+        self._pose[0, :3] = position
+        self._pose[0, 3:] = quaternion
+        self._wrench[0] = 0.0 if wrench is None else wrench
+        self._solve()
+        out[:] = self._results[tables.LENGTH, 0]
+        return PoseStatus(self._pose_status[0])
+
+    def _solve(self) -> None:
+        inverse_poses(*self._arguments)
+
+
+def _read_only(array: Array) -> Array:
+    """A locked view of memory that its owner goes on writing: kernels are compiled for read-only inputs."""
+    view = array.view()
+    view.flags.writeable = False
+    return view

@@ -1,0 +1,115 @@
+"""The plan: for a motion of the platform, the tensions to hold and the lengths to wind."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sagline.arrays import Array, Codes
+from sagline.kinematics.status import PoseStatus
+from sagline.motion.path import Path
+from sagline.robot.equilibrium import Equilibrium
+
+if TYPE_CHECKING:
+    from sagline.tension.method import TensionMethod
+
+
+class Gap(NamedTuple):
+    """A run of consecutive poses without an answer.
+
+    Attributes:
+        first: Index of its first pose.
+        last: Index of its last pose.
+        status: Why its first pose has no answer.
+        shortfall: Largest shortfall in it [N]; infinite where no change of the force alone would do.
+        cables: Indices of the cables that stand against the wrench somewhere in it.
+    """
+
+    first: int
+    last: int
+    status: PoseStatus
+    shortfall: float
+    cables: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plan:
+    """Result of `inverse`: a single pose with fields of shape (m,), or N poses with fields of shape (N, m).
+
+    Attributes:
+        state: Robot, poses, wrench and cables; NaN forces and lengths where a pose has no answer.
+        path: The path that was followed, or None for poses alone.
+        tension: How the load was shared.
+        status: Codes of `PoseStatus`, shape () or (N,).
+        shortfall: Smallest change of the force on the platform that would make the pose feasible [N], shape () or
+            (N,): 0 where it is feasible, infinite where no force alone would do, NaN where that is not the reason.
+        wrench_residual: Norms of the unbalanced force [N] and moment [N m] in the platform's free motions,
+            shape (2,) or (N, 2).
+        blocking: Cables whose limits stand against the needed wrench, shape (m,) or (N, m).
+    """
+
+    state: Equilibrium
+    path: Path | None
+    tension: TensionMethod
+    status: Codes
+    shortfall: Array
+    wrench_residual: Array
+    blocking: NDArray[np.bool_]
+
+    @property
+    def feasible(self) -> NDArray[np.bool_]:
+        """Whether each pose has an answer, shape () or (N,)."""
+        return np.asarray(self.status == PoseStatus.SOLVED)
+
+    @property
+    def unstrained_length(self) -> Array:
+        """L: lengths to wind [m]."""
+        return self.state.cables.unstrained_length
+
+    @property
+    def horizontal_tension(self) -> Array:
+        """T_x [N]."""
+        return self.state.cables.horizontal_tension
+
+    @property
+    def vertical_force(self) -> Array:
+        """T_z on the cable at its platform end [N]."""
+        return self.state.cables.vertical_force
+
+    @property
+    def chord_tension(self) -> Array:
+        """Tau = T_x/cos phi [N]."""
+        return self.state.cables.chord_tension
+
+    @property
+    def gaps(self) -> tuple[Gap, ...]:
+        """The runs of consecutive poses without an answer, in order; a single pose counts as a batch of one."""
+        lost = ~np.atleast_1d(self.feasible)
+        edges = np.flatnonzero(np.diff(np.concatenate(([False], lost, [False])).astype(np.int8)))
+        return tuple(self._gap(int(first), int(end) - 1) for first, end in edges.reshape(-1, 2))
+
+    def _gap(self, first: int, last: int) -> Gap:
+        part = slice(first, last + 1)
+        shortfall = np.atleast_1d(self.shortfall)[part]
+        cables = np.flatnonzero(np.atleast_2d(self.blocking)[part].any(axis=0))
+        return Gap(
+            first=first,
+            last=last,
+            status=PoseStatus(np.atleast_1d(self.status)[first]),
+            shortfall=float(np.nanmax(shortfall)) if not np.all(np.isnan(shortfall)) else float("nan"),
+            cables=tuple(int(i) for i in cables),
+        )
+
+    def save(self, file: FilePath | str) -> None:
+        """Write the plan to a NetCDF file, whole or not at all, with units and the robot inside.
+
+        Raises:
+            FileError: If the file cannot be written.
+        """
+        from sagline.files.plan_file import save_plan  # the one call outward: a plan knows how to leave
+
+        save_plan(self, file)

@@ -1,0 +1,36 @@
+"""How the calculation of one pose ended, and what to do about it."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+from sagline.kernels import codes
+
+
+class PoseStatus(IntEnum):
+    """Status of one pose of a plan; `text` says what it means and what to do."""
+
+    SOLVED = codes.POSE_SOLVED
+    INFEASIBLE = codes.POSE_INFEASIBLE
+    SINGULAR = codes.POSE_SINGULAR
+    TOO_SLACK = codes.POSE_TOO_SLACK
+    NOT_CONVERGED = codes.POSE_NOT_CONVERGED
+    NO_CHORD = codes.POSE_NO_CHORD
+
+    @property
+    def text(self) -> str:
+        """One sentence for a person."""
+        return _TEXTS[self]
+
+
+_TEXTS = {
+    PoseStatus.SOLVED: "solved",
+    PoseStatus.INFEASIBLE: (
+        "no tensions within the limits balance the platform; move it, widen the limits of the blocking cables, "
+        "or change the load by the shortfall"
+    ),
+    PoseStatus.SINGULAR: "the structure matrix has lost rank: some motion no cable resists; move the platform",
+    PoseStatus.TOO_SLACK: "a cable would carry less than a thousandth of its own weight; raise tension_min",
+    PoseStatus.NOT_CONVERGED: "the tensions did not settle; please report this robot and pose",
+    PoseStatus.NO_CHORD: "both ends of a cable coincide; move the platform away from the anchor",
+}

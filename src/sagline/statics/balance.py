@@ -1,0 +1,90 @@
+"""The balance of the platform as matrices: ours in chord tensions, and the article's in horizontal ones."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sagline.arrays import Array, locked
+from sagline.kernels import geometry as rows
+from sagline.kernels.geometry import cable_geometry
+from sagline.kernels.statics import structure_matrix as fill_structure_matrix
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.statics.tables import body_table, cable_table, pose_rows
+
+
+class ArticleBalance(NamedTuple):
+    """The article's system H t_x + b = [F; tau], force and moment about the center of mass without gravity.
+
+    Attributes:
+        h: The matrix H of (50), shape (..., 6, m).
+        b: The vector b of (51), the platform's weight included once, shape (..., 6).
+    """
+
+    h: Array
+    b: Array
+
+
+def _geometry(robot: Robot, pose: Pose) -> Array:
+    """Geometry rows of every pose, shape (N, GEOMETRY_ROWS, m)."""
+    cables, body, poses = cable_table(robot)[0], body_table(robot)[0], pose_rows(pose)
+    out = np.empty((len(poses), rows.GEOMETRY_ROWS, robot.cable_count))
+    rotation = np.empty((3, 3))
+    for row, geometry in zip(poses, out, strict=True):
+        cable_geometry(cables, body, row, rotation, geometry)
+    return out
+
+
+def structure_matrix(robot: Robot, pose: Pose) -> Array:
+    """J: the wrench of unit chord tensions, about the center of mass, in world axes.
+
+    Args:
+        robot: The robot.
+        pose: One pose or a batch of N.
+
+    Returns:
+        Columns (u_i; r_i x u_i) along the platform's free motions, shape (n, m) or (N, n, m).
+
+    Source:
+        docs/model.md, section 1.
+    """
+    geometry = _geometry(robot, pose)
+    out = np.empty((len(geometry), 6, robot.cable_count))
+    for row, matrix in zip(geometry, out, strict=True):
+        fill_structure_matrix(row, matrix)
+    return locked((robot.freedom @ out).reshape(*pose.shape, robot.degrees_of_freedom, robot.cable_count))
+
+
+def article_balance(robot: Robot, pose: Pose, k_h: float = 4.845) -> ArticleBalance:
+    """The article's own H and b, in the horizontal tensions t_x, for comparison.
+
+    Written from its equations with the levers b_i = B_i - P from the center of mass and the sign of b_pi
+    corrected (erratum 1) and gravity counted once (erratum 2); infinite under an anchor (erratum 8).
+
+    Args:
+        robot: The robot.
+        pose: One pose or a batch of N.
+        k_h: The intercept constant of (28).
+
+    Source:
+        Gia Luan & Truong Thinh 2020, equations (26), (27), (50), (51).
+    """
+    geometry = np.moveaxis(_geometry(robot, pose), 1, 0)
+    cosine, sine = geometry[rows.AZIMUTH_X], geometry[rows.AZIMUTH_Y]
+    bx, by, bz = geometry[rows.LEVER_X], geometry[rows.LEVER_Y], geometry[rows.LEVER_Z]
+    slope = geometry[rows.RISE] / geometry[rows.SPAN]
+    pull = k_h * robot.cables.linear_density * geometry[rows.CHORD]
+    h = -np.stack(
+        (cosine, sine, slope, by * slope - bz * sine, bz * cosine - bx * slope, bx * sine - by * cosine), axis=-2
+    )
+    zero = np.zeros(len(pull))
+    weight = robot.mass * robot.gravity
+    b = -np.stack(
+        (zero, zero, pull.sum(-1) + weight, (by * pull).sum(-1), -(bx * pull).sum(-1), zero), axis=-1
+    )
+    return ArticleBalance(
+        locked(h.reshape(*pose.shape, 6, robot.cable_count)), locked(b.reshape(*pose.shape, 6))
+    )
+

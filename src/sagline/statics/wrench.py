@@ -1,0 +1,56 @@
+"""Wrenches on the platform: about its center of mass, in world axes, force then moment."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sagline.arrays import Array, checked, locked
+from sagline.errors import InvalidValueError
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+
+
+def inertial_wrench(robot: Robot, pose: Pose, twist: Array, twist_rate: Array) -> Array:
+    """The d'Alembert wrench of a motion: what the platform's inertia does to it.
+
+    Args:
+        robot: Gives mass, center of mass and inertia.
+        pose: A batch of N poses.
+        twist: Velocity of the platform origin [m/s] and angular velocity [rad/s], world axes, shape (N, 6).
+        twist_rate: Their rates [m/s^2, rad/s^2], shape (N, 6).
+
+    Returns:
+        Force -M p_c'' [N] and moment -(Gamma w' + w x Gamma w) [N m] about the center of mass, shape (N, 6).
+
+    Source:
+        Newton and Euler; docs/model.md, section 4. With the angular velocity itself, not Euler-angle rates.
+    """
+    spin, spin_rate = twist[:, 3:], twist_rate[:, 3:]
+    wrench = np.empty((len(twist), 6))
+    wrench[:, :3] = twist_rate[:, :3]
+    wrench[:, 3:] = 0.0
+    if np.any(spin) or np.any(spin_rate):
+        rotation = pose.matrix
+        lever = rotation @ robot.center_of_mass
+        wrench[:, :3] += np.cross(spin_rate, lever) + np.cross(spin, np.cross(spin, lever))
+        inertia = rotation @ robot.inertia @ np.swapaxes(rotation, 1, 2)
+        momentum = np.einsum("nij,nj->ni", inertia, spin)
+        wrench[:, 3:] = -np.einsum("nij,nj->ni", inertia, spin_rate) - np.cross(spin, momentum)
+    wrench[:, :3] *= -robot.mass
+    return locked(wrench)
+
+
+def external_wrench(wrench: ArrayLike | None, count: int | None) -> Array:
+    """The caller's wrench, checked: zeros for None, shape (6,) for all poses or (N, 6).
+
+    Raises:
+        InvalidValueError: If it is no wrench, or its count is not that of the poses (None: a single pose).
+    """
+    if wrench is None:
+        return locked(np.zeros(6))
+    array = checked(wrench, "wrench", "N or N m", shape=(6,))
+    if array.ndim == 1 or array.shape == (count, 6):
+        return array
+    allowed = "shape (6,)" if count is None else f"shape (6,) or ({count}, 6)"
+    raise InvalidValueError("wrench", f"of shape {array.shape}", allowed, "Give one wrench, or one a pose.")
