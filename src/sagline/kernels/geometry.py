@@ -6,7 +6,7 @@ import math
 
 from sagline.arrays import Array
 from sagline.kernels import tables
-from sagline.kernels.jit import kernel
+from sagline.kernels.jit import formula
 
 # docs/model.md, section 1. Rows of a geometry array, each of m values.
 SPAN, RISE, CHORD, SINE, COSINE = 0, 1, 2, 3, 4  # x_B, z_B, D, sin phi, cos phi
@@ -15,7 +15,7 @@ LEVER_X, LEVER_Y, LEVER_Z = 7, 8, 9  # r, from the center of mass to the platfor
 GEOMETRY_ROWS = 10
 
 
-@kernel
+@formula
 def rotation_matrix(pose: Array, rotation: Array) -> None:
     """Fill the 3 x 3 rotation platform -> world of a pose row."""
     x, y, z, w = pose[3], pose[4], pose[5], pose[6]
@@ -30,7 +30,7 @@ def rotation_matrix(pose: Array, rotation: Array) -> None:
     rotation[2, 2] = 1.0 - 2.0 * (x * x + y * y)
 
 
-@kernel
+@formula
 def cable_geometry(cables: Array, body: Array, pose: Array, rotation: Array, geometry: Array) -> None:
     """Fill the geometry rows (GEOMETRY_ROWS, m) of one pose; a vertical cable gets azimuth 0."""
     rotation_matrix(pose, rotation)

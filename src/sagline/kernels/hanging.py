@@ -1,4 +1,4 @@
-"""All cables of one pose at once: lengths and pulls at given chord tensions, and limits as chord tensions."""
+"""All cables of one pose at once: ratios and pulls at given chord tensions, and limits as chord tensions."""
 
 from __future__ import annotations
 
@@ -6,52 +6,72 @@ import math
 
 from sagline.arrays import Array, Codes
 from sagline.kernels import geometry as g
-from sagline.kernels import tables
-from sagline.kernels.catenary import is_ordinary, ordinary_length_ratio, ordinary_pull_ratio
+from sagline.kernels import tables as t
+from sagline.kernels.catenary import (
+    is_ordinary,
+    ordinary_length_ratio,
+    ordinary_length_ratio_near,
+    ordinary_pull_ratio,
+)
 from sagline.kernels.codes import CABLE_SOLVED, CATENARY, ELASTIC, STRAIGHT
-from sagline.kernels.jit import kernel
+from sagline.kernels.jit import formula, kernel
 from sagline.kernels.models import from_tension
 
+NEAR = 1e-3  # relative change of tension within which one Newton step from the last ratio is exact
 LIMIT_STEPS = 30
 LIMIT_PRECISION = 1e-13  # relative
 
 
-@kernel
+@formula
 def hang_cables(
-    code: int,
-    k_h: float,
-    k_p: float,
-    gravity: float,
-    cables: Array,
-    geometry: Array,
-    tensions: Array,
-    lengths: Array,
-    pulls: Array,
-    statuses: Codes,
-) -> None:
-    """Fill unstrained lengths, pulls T_z - tau sin phi and statuses (m,) of one pose's cables.
+    code: int, k_h: float, k_p: float, gravity: float, geometry: Array, work: Array, statuses: Codes, near: bool
+) -> int:
+    """Fill SLACKNESS, STRAIN, RATIO and PULL of work, and the statuses (m,), at one pose's chord tensions TAU.
 
     Ordinary catenaries go through loops without branches, which vectorize; the others follow one by one.
+
+    Args:
+        code: Cable model.
+        k_h: The empirical model's constant.
+        k_p: The empirical model's constant.
+        gravity: [m/s^2].
+        geometry: Rows of `cable_geometry`.
+        work: Rows of one pose's cables.
+        statuses: Filled.
+        near: Whether RATIO holds the answer at tensions less than NEAR away.
+
+    Returns:
+        The gravest status.
     """
-    m = tensions.shape[0]
-    if code == CATENARY:
-        for i in range(m):
-            half_weight = 0.5 * gravity * cables[i, tables.DENSITY] * geometry[g.CHORD, i] / tensions[i]
-            lengths[i] = ordinary_length_ratio(
-                half_weight, geometry[g.SINE, i], geometry[g.COSINE, i], tensions[i] / cables[i, tables.STIFFNESS]
-            )
-        for i in range(m):
-            half_weight = 0.5 * gravity * cables[i, tables.DENSITY] * geometry[g.CHORD, i] / tensions[i]
-            pulls[i] = tensions[i] * ordinary_pull_ratio(
-                half_weight, geometry[g.SINE, i], tensions[i] / cables[i, tables.STIFFNESS], lengths[i]
-            )
+    m = work.shape[1]
     for i in range(m):
-        half_weight = 0.5 * gravity * cables[i, tables.DENSITY] * geometry[g.CHORD, i] / tensions[i]
-        if code == CATENARY and is_ordinary(half_weight, tensions[i] / cables[i, tables.STIFFNESS]):
-            lengths[i] *= geometry[g.CHORD, i]
-            statuses[i] = CABLE_SOLVED
+        work[t.SLACKNESS, i] = work[t.HALF_WEIGHT, i] / work[t.TAU, i]
+    for i in range(m):
+        work[t.STRAIN, i] = work[t.TAU, i] / work[t.STIFFNESS_ROW, i]
+    if code == CATENARY:
+        if near:
+            for i in range(m):
+                work[t.RATIO, i] = ordinary_length_ratio_near(
+                    work[t.SLACKNESS, i],
+                    geometry[g.SINE, i],
+                    geometry[g.COSINE, i],
+                    work[t.STRAIN, i],
+                    work[t.RATIO, i],
+                )
         else:
-            lengths[i], pulls[i], statuses[i] = from_tension(
+            for i in range(m):
+                work[t.RATIO, i] = ordinary_length_ratio(
+                    work[t.SLACKNESS, i], geometry[g.SINE, i], geometry[g.COSINE, i], work[t.STRAIN, i]
+                )
+        for i in range(m):
+            work[t.PULL, i] = work[t.TAU, i] * ordinary_pull_ratio(
+                work[t.SLACKNESS, i], geometry[g.SINE, i], work[t.STRAIN, i], work[t.RATIO, i]
+            )
+    gravest = CABLE_SOLVED
+    for i in range(m):
+        statuses[i] = CABLE_SOLVED
+        if code != CATENARY or not is_ordinary(work[t.SLACKNESS, i], work[t.STRAIN, i]):
+            length, pull, status = from_tension(
                 code,
                 k_h,
                 k_p,
@@ -59,10 +79,15 @@ def hang_cables(
                 geometry[g.CHORD, i],
                 geometry[g.SINE, i],
                 geometry[g.COSINE, i],
-                cables[i, tables.DENSITY],
-                cables[i, tables.STIFFNESS],
-                tensions[i],
+                work[t.DENSITY_ROW, i],
+                work[t.STIFFNESS_ROW, i],
+                work[t.TAU, i],
             )
+            work[t.RATIO, i] = length / geometry[g.CHORD, i]
+            work[t.PULL, i] = pull
+            statuses[i] = status
+            gravest = max(gravest, status)
+    return gravest
 
 
 @kernel
@@ -92,9 +117,7 @@ def chord_tension_at_frame_end(
     if tension <= 1.01 * across or tau <= 0.0:
         return max(tau, 0.0)
     for _ in range(LIMIT_STEPS):
-        length, pull, _status = from_tension(
-            code, k_h, k_p, gravity, chord, sine, cosine, density, stiffness, tau
-        )
+        length, pull, _status = from_tension(code, k_h, k_p, gravity, chord, sine, cosine, density, stiffness, tau)
         value = math.hypot(tau * cosine, tau * sine + pull - weight * length)
         step = (value - tension) * value / (tau - along)
         new = tau - step

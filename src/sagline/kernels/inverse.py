@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from sagline.arrays import Array, Codes, Flags
+from sagline.arrays import Array, Codes, Flags, Indices
 from sagline.kernels import geometry as g
 from sagline.kernels import tables
 from sagline.kernels.codes import (
@@ -28,17 +28,17 @@ from sagline.kernels.codes import (
     POSE_TOO_SLACK,
 )
 from sagline.kernels.geometry import cable_geometry
-from sagline.kernels.hanging import chord_tension_at_frame_end, hang_cables
-from sagline.kernels.jit import kernel
+from sagline.kernels.hanging import NEAR, chord_tension_at_frame_end, hang_cables
+from sagline.kernels.jit import formula, kernel
 from sagline.kernels.models import pull_of_shallow
-from sagline.kernels.null_space import factorize, minimum_norm
+from sagline.kernels.null_space import factorize, minimum_norm, orthogonal_factor, pseudo_inverse
 from sagline.kernels.polygon import SPARE_CORNERS
-from sagline.kernels.sharing import nearest_tensions
+from sagline.kernels.sharing import share_nearest
 from sagline.kernels.shortfall import wrench_shortfall
-from sagline.kernels.statics import needed_wrench, restrict_rows, restrict_vector, structure_matrix
+from sagline.kernels.statics import needed_wrench, restrict_needed, restrict_rows, structure_matrix
 
 ROUNDS = 30
-SETTLED = 1e-11  # [N]; pulls that change by less, or by 1e-15 of the largest tension, have settled
+SETTLED = 1e-10  # [N]; pulls that change by less, or by 1e-15 of the largest tension, have settled
 SHORTEST_CHORD = 1e-9  # [m]
 
 # columns of the numbers that describe one pose's solution
@@ -46,75 +46,209 @@ SHORTFALL, FORCE_RESIDUAL, MOMENT_RESIDUAL = 0, 1, 2
 POSE_NUMBERS = 3
 
 
-@kernel
-def chord_limits(
+@formula
+def place_cables(
     code: int,
     k_h: float,
     k_p: float,
-    gravity: float,
     limits_of: int,
     validity: float,
-    cables: Array,
+    gravity: float,
+    robot: Array,
     geometry: Array,
-    low: Array,
-    high: Array,
-) -> None:
-    """Fill the limits of the chord tensions (m,) at one pose.
+    work: Array,
+) -> bool:
+    """Fill material, first pulls and limits of the chord tensions at one pose; False where a cable has no chord.
 
     validity: the article's T_adj of (54) [N], T_x > w D/(2 |tan phi|) + T_adj; NaN leaves the bound out.
     """
-    for i in range(low.shape[0]):
-        low[i] = cables[i, tables.TENSION_MIN]
-        high[i] = cables[i, tables.TENSION_MAX]
-        chord = geometry[g.CHORD, i]
-        sine = geometry[g.SINE, i]
-        cosine = geometry[g.COSINE, i]
-        density = cables[i, tables.DENSITY]
-        stiffness = cables[i, tables.STIFFNESS]
+    for i in range(robot.shape[0]):
+        chord, sine, cosine = geometry[g.CHORD, i], geometry[g.SINE, i], geometry[g.COSINE, i]
+        density, stiffness = robot[i, tables.DENSITY], robot[i, tables.STIFFNESS]
+        low, high = robot[i, tables.TENSION_MIN], robot[i, tables.TENSION_MAX]
+        if not chord >= SHORTEST_CHORD:
+            return False
+        work[tables.DENSITY_ROW, i] = density
+        work[tables.STIFFNESS_ROW, i] = stiffness
+        work[tables.HALF_WEIGHT, i] = 0.5 * density * gravity * chord
+        work[tables.PULL, i] = pull_of_shallow(code, k_h, chord, density, gravity)
         if limits_of == LIMITS_OF_FRAME_END:
-            low[i] = chord_tension_at_frame_end(
-                code, k_h, k_p, gravity, chord, sine, cosine, density, stiffness, low[i]
-            )
-            high[i] = chord_tension_at_frame_end(
-                code, k_h, k_p, gravity, chord, sine, cosine, density, stiffness, high[i]
-            )
+            low = chord_tension_at_frame_end(code, k_h, k_p, gravity, chord, sine, cosine, density, stiffness, low)
+            high = chord_tension_at_frame_end(code, k_h, k_p, gravity, chord, sine, cosine, density, stiffness, high)
         if not math.isnan(validity):
-            bound = 0.5 * density * gravity * chord / abs(sine) + validity / cosine
-            low[i] = max(low[i], bound)
+            low = max(low, work[tables.HALF_WEIGHT, i] / abs(sine) + validity / cosine)
+        work[tables.CHORD_LOW, i] = low
+        work[tables.CHORD_HIGH, i] = high
+    return True
 
 
-@kernel
-def is_rotation(motion: Array) -> bool:
-    """Whether a free motion (6,) of the platform turns it; the others, which come first, are translations."""
-    return motion[3] * motion[3] + motion[4] * motion[4] + motion[5] * motion[5] > 0.5
+@formula
+def scale_tensions(variable: int, geometry: Array, work: Array) -> None:
+    """Fill SCALE, LOW and HIGH: the variable in which the load is shared, and its limits."""
+    for i in range(work.shape[1]):
+        scale = geometry[g.COSINE, i] if variable == HORIZONTAL_TENSION else 1.0
+        high = work[tables.CHORD_HIGH, i]
+        work[tables.SCALE, i] = scale
+        work[tables.LOW, i] = work[tables.CHORD_LOW, i] * scale
+        work[tables.HIGH, i] = high * scale if high < math.inf else math.inf
 
 
-@kernel
-def balance_residual(freedom: Array, matrix: Array, needed: Array, tensions: Array, numbers: Array) -> None:
+@formula
+def factor_balance(
+    freedom: Array,
+    geometry: Array,
+    work: Array,
+    full: Array,
+    matrix: Array,
+    reduced: Array,
+    balance: Array,
+    q: Array,
+    inverse: Array,
+    null: Array,
+) -> bool:
+    """Fill the structure matrix, its pseudo-inverse and null space in the sharing's variable; False if rank is lost."""
+    n, m = matrix.shape
+    structure_matrix(geometry, full)
+    restrict_rows(freedom, full, matrix)
+    for i in range(m):
+        back = 1.0 / work[tables.SCALE, i]
+        for k in range(n):
+            reduced[k, i] = matrix[k, i] * back
+    if not factorize(reduced, balance):
+        return False
+    orthogonal_factor(reduced, balance, q)
+    pseudo_inverse(reduced, balance, q, inverse)
+    for k in range(m - n):
+        for i in range(m):
+            null[k, i] = q[i, n + k]
+    return True
+
+
+@formula
+def refer(method: int, previous: Array, work: Array, null: Array, reference: Array) -> None:
+    """Fill the point of the null space that the shared tensions shall be nearest to, (r,)."""
+    for k in range(null.shape[0]):
+        total = 0.0
+        if method == CLOSEST and not math.isnan(previous[0]):
+            for i in range(null.shape[1]):
+                total += null[k, i] * previous[i] * work[tables.SCALE, i]
+        reference[k] = total
+
+
+@formula
+def settle(
+    code: int,
+    k_h: float,
+    k_p: float,
+    freedom: Array,
+    body: Array,
+    wrench: Array,
+    geometry: Array,
+    work: Array,
+    balance: Array,
+    inverse: Array,
+    null: Array,
+    reference: Array,
+    corners: Array,
+    labels: Indices,
+    statuses: Codes,
+) -> int:
+    """Share the load and hang the cables until their pulls stand still; returns the pose's status."""
+    m = work.shape[1]
+    near = False
+    for _ in range(ROUNDS):
+        needed_wrench(geometry, body, wrench, work, balance)
+        restrict_needed(freedom, balance)
+        minimum_norm(inverse, balance, work)
+        if not share_nearest(work, null, reference, corners, labels):
+            return POSE_INFEASIBLE
+        largest = 0.0
+        moved = 0.0
+        for i in range(m):
+            new = work[tables.SHARED, i] / work[tables.SCALE, i]
+            moved = max(moved, abs(new - work[tables.TAU, i]) / new)
+            largest = max(largest, new)
+            work[tables.TAU, i] = new
+            work[tables.LAST_PULL, i] = work[tables.PULL, i]
+        gravity = body[tables.GRAVITY]
+        gravest = hang_cables(code, k_h, k_p, gravity, geometry, work, statuses, near and moved < NEAR)
+        if gravest == CABLE_TOO_SLACK:
+            return POSE_TOO_SLACK
+        if gravest == CABLE_NOT_CONVERGED:
+            return POSE_NOT_CONVERGED
+        near = True
+        change = 0.0
+        for i in range(m):
+            change = max(change, abs(work[tables.PULL, i] - work[tables.LAST_PULL, i]))
+        if code != CATENARY or change <= SETTLED + 1e-15 * largest:
+            return POSE_SOLVED
+    return POSE_NOT_CONVERGED
+
+
+@formula
+def is_rotation(freedom: Array, k: int) -> bool:
+    """Whether free motion k of the platform turns it; the others, which come first, are translations."""
+    return freedom[k, 3] * freedom[k, 3] + freedom[k, 4] * freedom[k, 4] + freedom[k, 5] * freedom[k, 5] > 0.5
+
+
+@formula
+def measure_balance(
+    freedom: Array,
+    body: Array,
+    wrench: Array,
+    geometry: Array,
+    work: Array,
+    matrix: Array,
+    balance: Array,
+    numbers: Array,
+    p: int,
+) -> None:
     """Fill the norms of the unbalanced force [N] and moment [N m] along the platform's free motions."""
-    n = matrix.shape[0]
+    needed_wrench(geometry, body, wrench, work, balance)
+    restrict_needed(freedom, balance)
     force = 0.0
     moment = 0.0
-    for k in range(n):
-        total = -needed[k]
-        for i in range(tensions.shape[0]):
-            total += matrix[k, i] * tensions[i]
-        if is_rotation(freedom[k]):
+    for k in range(matrix.shape[0]):
+        total = -balance[tables.RIGHT, k]
+        for i in range(matrix.shape[1]):
+            total += matrix[k, i] * work[tables.TAU, i]
+        if is_rotation(freedom, k):
             moment += total * total
         else:
             force += total * total
-    numbers[FORCE_RESIDUAL] = math.sqrt(force)
-    numbers[MOMENT_RESIDUAL] = math.sqrt(moment)
+    numbers[p, FORCE_RESIDUAL] = math.sqrt(force)
+    numbers[p, MOMENT_RESIDUAL] = math.sqrt(moment)
 
 
 @kernel
-def forget(result: Array, numbers: Array) -> None:
-    """No plausible numbers where there is no answer: span and rise stay, the rest is NaN."""
-    for row in range(tables.LENGTH, tables.RESULT_ROWS):
-        for i in range(result.shape[1]):
-            result[row, i] = math.nan
-    numbers[FORCE_RESIDUAL] = math.nan
-    numbers[MOMENT_RESIDUAL] = math.nan
+def explain(freedom: Array, work: Array, matrix: Array, balance: Array, blocking: Flags) -> float:
+    """Shortfall [N] of an infeasible pose, and the cables that block it."""
+    n = freedom.shape[0]
+    translations = 0
+    for k in range(n):
+        translations += 0 if is_rotation(freedom, k) else 1
+    return wrench_shortfall(
+        matrix,
+        balance[tables.RIGHT, :n],
+        work[tables.CHORD_LOW],
+        work[tables.CHORD_HIGH],
+        translations,
+        balance[tables.FARKAS, :n],
+        blocking,
+    )
+
+
+@formula
+def store(solved: bool, work: Array, geometry: Array, results: Array, p: int) -> None:
+    """Write one pose's answer; no plausible numbers where there is none: span and rise stay, the rest is NaN."""
+    for i in range(geometry.shape[1]):
+        tension = work[tables.TAU, i] if solved else math.nan
+        results[tables.SPAN, p, i] = geometry[g.SPAN, i]
+        results[tables.RISE, p, i] = geometry[g.RISE, i]
+        results[tables.LENGTH, p, i] = work[tables.RATIO, i] * geometry[g.CHORD, i] if solved else math.nan
+        results[tables.HORIZONTAL, p, i] = tension * geometry[g.COSINE, i]
+        results[tables.VERTICAL, p, i] = tension * geometry[g.SINE, i] + work[tables.PULL, i]
+        results[tables.TENSION, p, i] = tension
 
 
 @kernel
@@ -148,7 +282,7 @@ def inverse_poses(
         variable: In which variable, CHORD_TENSION or HORIZONTAL_TENSION.
         limits_of: Which quantity the limits name.
         validity: T_adj of the article's bound (54) [N], or NaN for none.
-        freedom: Rows of the structure matrix that count, (n, 6).
+        freedom: Rows of the structure matrix that count, translations first, (n, 6).
         bodies: body_table, (1 or N, BODY_COLUMNS).
         robots: cable_table, (1 or N, m, CABLE_COLUMNS).
         poses: Rows (N, POSE_COLUMNS).
@@ -162,103 +296,45 @@ def inverse_poses(
     """
     count, m = statuses.shape
     n = freedom.shape[0]
-    r = m - n
-    translations = 0
-    for k in range(n):
-        translations += 0 if is_rotation(freedom[k]) else 1
     rotation = np.empty((3, 3))
     geometry = np.empty((g.GEOMETRY_ROWS, m))
+    work = np.empty((tables.WORK_ROWS, m))
+    balance = np.empty((tables.BALANCE_ROWS, 6))
     full = np.empty((6, m))
     matrix = np.empty((n, m))
-    scaled = np.empty((n, m))
-    triangle = np.empty((n, n))
-    basis = np.empty((m, m))
-    order = np.empty(n, dtype=np.int64)
-    null = np.empty((m, r))
-    needed = np.empty(6)
-    right = np.empty(n)
-    farkas = np.empty(n)
-    reference = np.empty(r)
+    reduced = np.empty((n, m))
+    q = np.empty((m + 1, m))
+    inverse = np.empty((n, m))
+    null = np.empty((m - n, m))
+    reference = np.empty(m - n)
     corners = np.empty((2 * m + SPARE_CORNERS, 2))
     labels = np.empty(2 * m + SPARE_CORNERS, dtype=np.int64)
-    low, high, start, shared, tensions, lengths, pulls, new_pulls, scale, result_low, result_high = np.empty((11, m))
     for p in range(count):
-        cables = robots[min(p, robots.shape[0] - 1)]
+        robot = robots[min(p, robots.shape[0] - 1)]
         body = bodies[min(p, bodies.shape[0] - 1)]
         wrench = wrenches[min(p, wrenches.shape[0] - 1)]
-        gravity = body[tables.GRAVITY]
-        result = results[:, p]
-        cable_geometry(cables, body, poses[p], rotation, geometry)
-        shortest = math.inf
-        for i in range(m):
-            result[tables.SPAN, i] = geometry[g.SPAN, i]
-            result[tables.RISE, i] = geometry[g.RISE, i]
-            shortest = min(shortest, geometry[g.CHORD, i])
-            blocking[p, i] = False
-            statuses[p, i] = 0
-            pulls[i] = pull_of_shallow(code, k_h, geometry[g.CHORD, i], cables[i, tables.DENSITY], gravity)
+        statuses[p, :] = 0
+        blocking[p, :] = False
         numbers[p, SHORTFALL] = 0.0
-        if shortest < SHORTEST_CHORD:
-            pose_statuses[p] = POSE_NO_CHORD
-            forget(result, numbers[p])
-            continue
-        structure_matrix(geometry, full)
-        restrict_rows(freedom, full, matrix)
-        chord_limits(code, k_h, k_p, gravity, limits_of, validity, cables, geometry, low, high)
-        for i in range(m):
-            scale[i] = geometry[g.COSINE, i] if variable == HORIZONTAL_TENSION else 1.0
-            result_low[i] = low[i] * scale[i]
-            result_high[i] = high[i] * scale[i] if high[i] < math.inf else math.inf
-            for k in range(n):
-                scaled[k, i] = matrix[k, i] / scale[i]
-        if not factorize(scaled, triangle, basis, order):
-            pose_statuses[p] = POSE_SINGULAR
-            forget(result, numbers[p])
-            continue
-        for k in range(r):
-            reference[k] = 0.0
-            for i in range(m):
-                null[i, k] = basis[i, n + k]
-                if method == CLOSEST and not math.isnan(previous[i]):
-                    reference[k] += null[i, k] * previous[i] * scale[i]
-        pose_statuses[p] = POSE_NOT_CONVERGED
-        for _ in range(ROUNDS):
-            needed_wrench(geometry, body, wrench, pulls, needed)
-            restrict_vector(freedom, needed, right)
-            minimum_norm(triangle, basis, order, right, start)
-            if not nearest_tensions(start, null, result_low, result_high, reference, corners, labels, shared):
-                pose_statuses[p] = POSE_INFEASIBLE
-                break
-            largest = 0.0
-            for i in range(m):
-                tensions[i] = shared[i] / scale[i]
-                largest = max(largest, tensions[i])
-            hang_cables(code, k_h, k_p, gravity, cables, geometry, tensions, lengths, new_pulls, statuses[p])
-            change = 0.0
-            worst = 0
-            for i in range(m):
-                worst = max(worst, statuses[p, i])
-                change = max(change, abs(new_pulls[i] - pulls[i]))
-                pulls[i] = new_pulls[i]
-            if worst == CABLE_TOO_SLACK:
-                pose_statuses[p] = POSE_TOO_SLACK
-                break
-            if worst == CABLE_NOT_CONVERGED:
-                break
-            if code != CATENARY or change <= SETTLED + 1e-15 * largest:
-                pose_statuses[p] = POSE_SOLVED
-                break
-        if pose_statuses[p] == POSE_INFEASIBLE:
-            numbers[p, SHORTFALL] = wrench_shortfall(matrix, right, low, high, translations, farkas, blocking[p])
-        if pose_statuses[p] != POSE_SOLVED:
-            forget(result, numbers[p])
-            continue
-        needed_wrench(geometry, body, wrench, pulls, needed)
-        restrict_vector(freedom, needed, right)
-        balance_residual(freedom, matrix, right, tensions, numbers[p])
-        for i in range(m):
-            result[tables.LENGTH, i] = lengths[i]
-            result[tables.HORIZONTAL, i] = tensions[i] * geometry[g.COSINE, i]
-            result[tables.VERTICAL, i] = tensions[i] * geometry[g.SINE, i] + pulls[i]
-            result[tables.TENSION, i] = tensions[i]
-            previous[i] = tensions[i]
+        numbers[p, FORCE_RESIDUAL] = math.nan
+        numbers[p, MOMENT_RESIDUAL] = math.nan
+        cable_geometry(robot, body, poses[p], rotation, geometry)
+        status = POSE_NO_CHORD
+        if place_cables(code, k_h, k_p, limits_of, validity, body[tables.GRAVITY], robot, geometry, work):
+            status = POSE_SINGULAR
+            scale_tensions(variable, geometry, work)
+            if factor_balance(freedom, geometry, work, full, matrix, reduced, balance, q, inverse, null):
+                refer(method, previous, work, null, reference)
+                status = settle(
+                    code, k_h, k_p, freedom, body, wrench, geometry, work, balance,
+                    inverse, null, reference, corners, labels, statuses[p],
+                )  # fmt: skip
+        if status == POSE_SOLVED:
+            measure_balance(freedom, body, wrench, geometry, work, matrix, balance, numbers, p)
+            previous[:] = work[tables.TAU]
+        elif status == POSE_INFEASIBLE:
+            numbers[p, SHORTFALL] = explain(freedom, work, matrix, balance, blocking[p])
+        else:
+            numbers[p, SHORTFALL] = math.nan
+        pose_statuses[p] = status
+        store(status == POSE_SOLVED, work, geometry, results, p)

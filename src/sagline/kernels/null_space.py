@@ -1,106 +1,96 @@
-"""Minimum-norm solution and null space of an underdetermined system, by Householder QR of its transpose."""
+"""Minimum-norm solution and null space of an underdetermined system, by Householder QR of its transpose.
+
+For a matrix (n, m), n <= m, matrix.T = Q R: the first n columns of the orthogonal Q give the
+minimum-norm solutions, the others span the null space. Sums that do not depend on each other run side by
+side: the loops are small and would otherwise wait for themselves.
+"""
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from sagline.arrays import Array
-from sagline.kernels.jit import kernel
+from sagline.kernels.jit import formula
+from sagline.kernels.tables import FACTORS, HEADS, RIGHT, START
 
-RANK = 1e-9  # a diagonal entry below this share of the first says that rank is lost
+RANK = 1e-9  # a diagonal entry of R below this share of its row says that rank is lost
 
 
-@kernel
-def factorize(matrix: Array, triangle: Array, basis: Array, order: Array) -> bool:
-    """QR with row pivoting of matrix (n, m), n <= m: matrix[order].T = basis[:, :n] triangle.
+@formula
+def factorize(reduced: Array, balance: Array) -> bool:
+    """QR in place; returns whether the matrix (n, m) has full rank.
 
-    Fills triangle (n, n, upper), the orthogonal basis (m, m), whose last m - n columns span the null
-    space, and order (n,). Returns whether the matrix has full rank.
+    Row k of reduced then holds column k of R before its diagonal and the k-th reflection's vector from there
+    on; row HEADS of balance is the diagonal of R, row FACTORS the reflections' 2/|v|^2.
     """
-    n, m = matrix.shape
-    work = np.empty((m, n))
+    n, m = reduced.shape
     for k in range(n):
-        order[k] = k
-        for i in range(m):
-            work[i, k] = matrix[k, i]
-    for i in range(m):
-        for j in range(m):
-            basis[i, j] = 1.0 if i == j else 0.0
-    vector = np.empty(m)
-    for k in range(n):
-        pivot(work, order, k)
+        before = 0.0
+        for i in range(k):
+            before += reduced[k, i] * reduced[k, i]
         square = 0.0
         for i in range(k, m):
-            square += work[i, k] * work[i, k]
-        norm = math.sqrt(square)
-        if norm <= RANK * abs(work[0, 0]) or norm == 0.0:
+            square += reduced[k, i] * reduced[k, i]
+        if not square > RANK * RANK * (before + square):
             return False
-        head = -math.copysign(norm, work[k, k])
-        for i in range(k, m):
-            vector[i] = work[i, k]
-        vector[k] -= head
-        factor = 1.0 / (norm * (norm + abs(work[k, k])))  # 2/|v|^2
-        reflect(work, vector, factor, k, k, n)
-        # basis = H_1 H_2 ... : each reflection acts from the right
-        for i in range(m):
+        norm = math.sqrt(square)
+        first = reduced[k, k]
+        head = -math.copysign(norm, first)
+        factor = 1.0 / (norm * (norm + abs(first)))
+        balance[HEADS, k] = head
+        balance[FACTORS, k] = factor
+        reduced[k, k] = first - head
+        for j in range(k + 1, n):
             total = 0.0
-            for j in range(k, m):
-                total += basis[i, j] * vector[j]
+            for i in range(k, m):
+                total += reduced[k, i] * reduced[j, i]
             total *= factor
-            for j in range(k, m):
-                basis[i, j] -= total * vector[j]
-    for k in range(n):
-        for j in range(n):
-            triangle[k, j] = work[k, j] if j >= k else 0.0
+            for i in range(k, m):
+                reduced[j, i] -= total * reduced[k, i]
     return True
 
 
-@kernel
-def pivot(work: Array, order: Array, k: int) -> None:
-    """Bring the remaining column of largest norm to place k."""
-    m, n = work.shape
-    best = k
-    largest = -1.0
-    for j in range(k, n):
-        square = 0.0
-        for i in range(k, m):
-            square += work[i, j] * work[i, j]
-        if square > 1.0000001 * largest:
-            largest = square
-            best = j
-    if best != k:
-        for i in range(m):
-            work[i, k], work[i, best] = work[i, best], work[i, k]
-        order[k], order[best] = order[best], order[k]
-
-
-@kernel
-def reflect(work: Array, vector: Array, factor: float, start: int, first: int, last: int) -> None:
-    """Apply I - factor v v^T from the left to columns first..last-1; v is zero before start."""
-    for j in range(first, last):
-        total = 0.0
-        for i in range(start, work.shape[0]):
-            total += vector[i] * work[i, j]
-        total *= factor
-        for i in range(start, work.shape[0]):
-            work[i, j] -= total * vector[i]
-
-
-@kernel
-def minimum_norm(triangle: Array, basis: Array, order: Array, right: Array, solution: Array) -> None:
-    """Fill the shortest solution (m,) of matrix t = right."""
-    n = triangle.shape[0]
-    m = basis.shape[0]
-    forward = np.empty(n)
-    for k in range(n):
-        total = right[order[k]]
-        for j in range(k):
-            total -= triangle[j, k] * forward[j]
-        forward[k] = total / triangle[k, k]
+@formula
+def orthogonal_factor(reduced: Array, balance: Array, q: Array) -> None:
+    """Fill Q (m, m) from its reflections; a row m of q is working space."""
+    n, m = reduced.shape
     for i in range(m):
-        total = 0.0
-        for k in range(n):
-            total += basis[i, k] * forward[k]
-        solution[i] = total
+        for j in range(m):
+            q[i, j] = 0.0
+        q[i, i] = 1.0
+    for k in range(n - 1, -1, -1):
+        for j in range(m):
+            q[m, j] = 0.0
+        for i in range(k, m):
+            for j in range(m):
+                q[m, j] += reduced[k, i] * q[i, j]
+        for i in range(k, m):
+            share = balance[FACTORS, k] * reduced[k, i]
+            for j in range(m):
+                q[i, j] -= share * q[m, j]
+
+
+@formula
+def pseudo_inverse(reduced: Array, balance: Array, q: Array, inverse: Array) -> None:
+    """Fill the transposed pseudo-inverse (n, m): the minimum-norm solution is right . inverse."""
+    n, m = reduced.shape
+    for k in range(n - 1, -1, -1):
+        for i in range(m):
+            inverse[k, i] = q[i, k]
+        for j in range(k + 1, n):
+            for i in range(m):
+                inverse[k, i] -= reduced[j, k] * inverse[j, i]
+        head = 1.0 / balance[HEADS, k]
+        for i in range(m):
+            inverse[k, i] *= head
+
+
+@formula
+def minimum_norm(inverse: Array, balance: Array, work: Array) -> None:
+    """Fill row START of work with the shortest solution of matrix t = RIGHT of balance."""
+    n, m = inverse.shape
+    for i in range(m):
+        work[START, i] = 0.0
+    for k in range(n):
+        for i in range(m):
+            work[START, i] += balance[RIGHT, k] * inverse[k, i]

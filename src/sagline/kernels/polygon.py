@@ -11,6 +11,7 @@ import math
 
 from sagline.arrays import Array, Indices
 from sagline.kernels.jit import kernel
+from sagline.kernels.tables import HIGH, LOW, START
 
 TOLERANCE = 1e-12  # of the largest tension at hand: a limit passed by less counts as met
 FLAT = 1e-12  # a null-space row shorter than this does not move the cable's tension
@@ -18,27 +19,29 @@ SPARE_CORNERS = 6  # beyond two a cable: the box and the corner in the making
 
 
 @kernel
-def largest_tension(start: Array, low: Array, high: Array) -> float:
+def largest_tension(work: Array) -> float:
     """The largest finite number at hand [N], by which tolerances are measured."""
     largest = 0.0
-    for i in range(start.shape[0]):
-        largest = max(largest, abs(start[i]), abs(low[i]))
-        if high[i] < math.inf:
-            largest = max(largest, abs(high[i]))
+    for i in range(work.shape[1]):
+        largest = max(largest, abs(work[START, i]), abs(work[LOW, i]))
+        if work[HIGH, i] < math.inf:
+            largest = max(largest, abs(work[HIGH, i]))
     return largest
 
 
 @kernel
-def box_radius(largest: float, high: Array) -> float:
+def box_radius(largest: float, work: Array) -> float:
     """Radius [N] that holds the whole polygon where limits are finite, and the near part of it elsewhere."""
-    for i in range(high.shape[0]):
-        if high[i] == math.inf:
+    for i in range(work.shape[1]):
+        if work[HIGH, i] == math.inf:
             return 1e4 * largest
-    return 2.0 * high.shape[0] * largest
+    return 2.0 * work.shape[1] * largest
 
 
 @kernel
-def cut(corners: Array, labels: Indices, count: int, gx: float, gy: float, offset: float, label: int, slack: float) -> int:
+def cut(
+    corners: Array, labels: Indices, count: int, gx: float, gy: float, offset: float, label: int, slack: float
+) -> int:
     """Keep the part of the polygon where gx x + gy y + offset >= 0; returns the number of corners left.
 
     Works in place. A half-plane cuts a convex polygon at most twice, where it enters and where it leaves.
@@ -115,16 +118,14 @@ def splice(
 
 
 @kernel
-def feasible_polygon(
-    start: Array, null: Array, low: Array, high: Array, corners: Array, labels: Indices
-) -> int:
+def feasible_polygon(work: Array, null: Array, corners: Array, labels: Indices) -> int:
     """Fill the corners (2m + SPARE_CORNERS, 2) and side labels of the feasible polygon; returns how many, 0 if empty.
 
-    start: the minimum-norm tensions t0 (m,); null: orthonormal basis N (m, 2).
+    work: rows START (minimum-norm tensions t0), LOW and HIGH; null: orthonormal basis, one vector a row, (2, m).
     """
-    m = start.shape[0]
-    largest = largest_tension(start, low, high)
-    radius = box_radius(largest, high)
+    m = work.shape[1]
+    largest = largest_tension(work)
+    radius = box_radius(largest, work)
     slack = TOLERANCE * largest
     for k in range(4):
         corners[k, 0] = radius if k == 0 or k == 3 else -radius
@@ -132,15 +133,17 @@ def feasible_polygon(
         labels[k] = 2 * m + k
     count = 4
     for i in range(m):
-        gx = null[i, 0]
-        gy = null[i, 1]
+        gx = null[0, i]
+        gy = null[1, i]
+        above = work[START, i] - work[LOW, i]
+        below = work[HIGH, i] - work[START, i]
         if abs(gx) + abs(gy) < FLAT:
-            if start[i] < low[i] - slack or start[i] > high[i] + slack:
+            if above < -slack or below < -slack:
                 return 0
             continue
-        count = cut(corners, labels, count, gx, gy, start[i] - low[i], 2 * i, slack)
-        if count > 0 and high[i] < math.inf:
-            count = cut(corners, labels, count, -gx, -gy, high[i] - start[i], 2 * i + 1, slack)
+        count = cut(corners, labels, count, gx, gy, above, 2 * i, slack)
+        if count > 0 and below < math.inf:
+            count = cut(corners, labels, count, -gx, -gy, below, 2 * i + 1, slack)
         if count == 0:
             return 0
     return count

@@ -25,7 +25,9 @@ def stretching_tension(tension: float, sine: float, cosine: float, pull: float) 
 
 
 @kernel
-def shallow_length_ratio(tension: float, sine: float, cosine: float, pull: float, sag: float, stiffness: float) -> float:
+def shallow_length_ratio(
+    tension: float, sine: float, cosine: float, pull: float, sag: float, stiffness: float
+) -> float:
     """L/D; sag = k (rho D cos phi)^2 [N^2], pull = b [N] where the stretch includes it."""
     return (1.0 + sag / (tension * tension)) / (1.0 + stretching_tension(tension, sine, cosine, pull) / stiffness)
 

@@ -92,9 +92,7 @@ def sags(
     for i in range(sag_out.shape[0]):
         weight = density[i] * gravity
         if code == CATENARY and weight > 0.0:
-            sag_out[i] = catenary_sag(
-                span[i], rise[i], length[i], horizontal[i], vertical[i], weight, stiffness[i]
-            )
+            sag_out[i] = catenary_sag(span[i], rise[i], length[i], horizontal[i], vertical[i], weight, stiffness[i])
         else:
             sag_out[i] = shallow_drop(0.5, code, span[i], rise[i], vertical[i], tension[i])
 

@@ -10,20 +10,21 @@ from __future__ import annotations
 import math
 
 from sagline.arrays import Array, Indices
-from sagline.kernels.jit import kernel
+from sagline.kernels.jit import formula, kernel
 from sagline.kernels.polygon import TOLERANCE, feasible_polygon, largest_tension, nearest_point
+from sagline.kernels.tables import HIGH, LOW, SHARED, START
 
 
 @kernel
-def feasible_interval(start: Array, null: Array, low: Array, high: Array) -> tuple[float, float]:
+def feasible_interval(work: Array, null: Array) -> tuple[float, float]:
     """Ends of the feasible interval of one redundant cable; the first exceeds the second where it is empty."""
-    slack = TOLERANCE * largest_tension(start, low, high)
+    slack = TOLERANCE * largest_tension(work)
     first = -math.inf
     last = math.inf
-    for i in range(start.shape[0]):
-        row = null[i, 0]
-        below = low[i] - start[i]
-        above = high[i] - start[i]
+    for i in range(work.shape[1]):
+        row = null[0, i]
+        below = work[LOW, i] - work[START, i]
+        above = work[HIGH, i] - work[START, i]
         if abs(row) < TOLERANCE:
             if below > slack or above < -slack:
                 return 1.0, 0.0
@@ -38,59 +39,55 @@ def feasible_interval(start: Array, null: Array, low: Array, high: Array) -> tup
     return first, last
 
 
-@kernel
-def within_limits(tensions: Array, low: Array, high: Array, slack: float) -> bool:
-    """Whether every tension keeps its limits, up to a slack."""
-    for i in range(tensions.shape[0]):
-        if not low[i] - slack <= tensions[i] <= high[i] + slack:
+@formula
+def within_limits(work: Array, slack: float) -> bool:
+    """Whether every shared tension keeps its limits, up to a slack."""
+    for i in range(work.shape[1]):
+        if not work[LOW, i] - slack <= work[SHARED, i] <= work[HIGH, i] + slack:
             return False
     return True
 
 
-@kernel
-def nearest_tensions(
-    start: Array,
-    null: Array,
-    low: Array,
-    high: Array,
-    reference: Array,
-    corners: Array,
-    labels: Indices,
-    tensions: Array,
-) -> bool:
-    """Fill the feasible tensions (m,) nearest to a reference (r,) in the null space; False where there are none.
+@formula
+def share_nearest(work: Array, null: Array, reference: Array, corners: Array, labels: Indices) -> bool:
+    """Fill the feasible tensions nearest to a reference in the null space; False where there are none.
 
     Args:
-        start: Minimum-norm tensions t0, (m,).
-        null: Orthonormal null-space basis N, (m, r), r <= 2.
-        low: Lower limits, (m,).
-        high: Upper limits, (m,); may be infinite.
+        work: Rows START (minimum-norm tensions t0), LOW and HIGH (may be infinite); SHARED is filled.
+        null: Orthonormal null-space basis, one vector a row, (r, m), r <= 2.
         reference: lambda_ref = N^T (t_ref - t0), (r,).
         corners: Working space of `feasible_polygon`.
         labels: Working space of `feasible_polygon`.
-        tensions: Result.
     """
-    m, r = null.shape
+    r, m = null.shape
     for i in range(m):
-        tensions[i] = start[i]
-        for k in range(r):
-            tensions[i] += null[i, k] * reference[k]
-    if within_limits(tensions, low, high, 0.0):
+        work[SHARED, i] = work[START, i]
+    for k in range(r):
+        for i in range(m):
+            work[SHARED, i] += null[k, i] * reference[k]
+    if within_limits(work, 0.0):
         return True
     if r == 0:
-        return within_limits(tensions, low, high, TOLERANCE * largest_tension(start, low, high))
+        return within_limits(work, TOLERANCE * largest_tension(work))
+    return share_at_limits(work, null, reference, corners, labels)
+
+
+@kernel
+def share_at_limits(work: Array, null: Array, reference: Array, corners: Array, labels: Indices) -> bool:
+    """The same where the reference itself is not feasible: its projection onto the interval or polygon."""
+    r, m = null.shape
     if r == 1:
-        first, last = feasible_interval(start, null, low, high)
+        first, last = feasible_interval(work, null)
         if first > last:
             return False
         share = min(max(reference[0], first), last)
         for i in range(m):
-            tensions[i] = start[i] + null[i, 0] * share
+            work[SHARED, i] = work[START, i] + null[0, i] * share
         return True
-    count = feasible_polygon(start, null, low, high, corners, labels)
+    count = feasible_polygon(work, null, corners, labels)
     if count == 0:
         return False
     x, y = nearest_point(corners, count, reference[0], reference[1])
     for i in range(m):
-        tensions[i] = start[i] + null[i, 0] * x + null[i, 1] * y
+        work[SHARED, i] = work[START, i] + null[0, i] * x + null[1, i] * y
     return True

@@ -78,7 +78,9 @@ def slopes(matrix: Array, right: Array, tensions: Array, residual: Array, gradie
 
 
 @kernel
-def bounded_least_squares(matrix: Array, right: Array, low: Array, high: Array, tensions: Array, residual: Array) -> bool:
+def bounded_least_squares(
+    matrix: Array, right: Array, low: Array, high: Array, tensions: Array, residual: Array
+) -> bool:
     """Fill the t within its limits that comes nearest to matrix t = right, and the residual; False if it gave up.
 
     Source:

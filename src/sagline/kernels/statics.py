@@ -5,10 +5,10 @@ from __future__ import annotations
 from sagline.arrays import Array
 from sagline.kernels import geometry as g
 from sagline.kernels import tables
-from sagline.kernels.jit import kernel
+from sagline.kernels.jit import formula
 
 
-@kernel
+@formula
 def structure_matrix(geometry: Array, matrix: Array) -> None:
     """Fill J (6, m): columns (u; r x u), u the unit vector from platform end to frame end."""
     for i in range(geometry.shape[1]):
@@ -24,23 +24,30 @@ def structure_matrix(geometry: Array, matrix: Array) -> None:
         matrix[5, i] = rx * y - ry * x
 
 
-@kernel
-def needed_wrench(geometry: Array, body: Array, wrench: Array, pulls: Array, needed: Array) -> None:
-    """Fill the wrench (6,) that the chord tensions must supply: J tau = needed.
+@formula
+def needed_wrench(geometry: Array, body: Array, wrench: Array, work: Array, balance: Array) -> None:
+    """Fill row NEEDED of balance with the wrench (6,) that the chord tensions must supply: J tau = needed.
 
     It balances the platform's weight (counted here, once), the given wrench (external plus inertial,
     about the center of mass) and the cables' pulls T_z - tau sin phi, which hang on the platform ends.
     """
-    for k in range(6):
-        needed[k] = -wrench[k]
-    needed[2] += body[tables.MASS] * body[tables.GRAVITY]
+    fz = body[tables.MASS] * body[tables.GRAVITY] - wrench[2]
+    mx = -wrench[3]
+    my = -wrench[4]
     for i in range(geometry.shape[1]):
-        needed[2] += pulls[i]
-        needed[3] += geometry[g.LEVER_Y, i] * pulls[i]
-        needed[4] -= geometry[g.LEVER_X, i] * pulls[i]
+        pull = work[tables.PULL, i]
+        fz += pull
+        mx += geometry[g.LEVER_Y, i] * pull
+        my -= geometry[g.LEVER_X, i] * pull
+    balance[tables.NEEDED, 0] = -wrench[0]
+    balance[tables.NEEDED, 1] = -wrench[1]
+    balance[tables.NEEDED, 2] = fz
+    balance[tables.NEEDED, 3] = mx
+    balance[tables.NEEDED, 4] = my
+    balance[tables.NEEDED, 5] = -wrench[5]
 
 
-@kernel
+@formula
 def restrict_rows(freedom: Array, full: Array, restricted: Array) -> None:
     """Rows of the structure matrix along the platform's free motions: freedom (n, 6) times J (6, m)."""
     n = freedom.shape[0]
@@ -55,15 +62,15 @@ def restrict_rows(freedom: Array, full: Array, restricted: Array) -> None:
                 restricted[k, i] = total
 
 
-@kernel
-def restrict_vector(freedom: Array, full: Array, restricted: Array) -> None:
-    """Components (n,) of a wrench (6,) along the platform's free motions."""
+@formula
+def restrict_needed(freedom: Array, balance: Array) -> None:
+    """Fill row RIGHT of balance with the needed wrench's components along the platform's free motions."""
     n = freedom.shape[0]
     for k in range(n):
         if n == 6:
-            restricted[k] = full[k]
+            balance[tables.RIGHT, k] = balance[tables.NEEDED, k]
         else:
             total = 0.0
             for j in range(6):
-                total += freedom[k, j] * full[j]
-            restricted[k] = total
+                total += freedom[k, j] * balance[tables.NEEDED, j]
+            balance[tables.RIGHT, k] = total
