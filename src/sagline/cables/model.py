@@ -59,7 +59,7 @@ class CableModel:
         """
         tension = checked(chord_tension, "chord_tension", "N", low=0.0)
         problem = _problem(cable, span, rise, tension, gravity)
-        length, horizontal, vertical, status = _outputs(problem.count)
+        length, horizontal, vertical, status = _outputs(problem.size)
         batch.batch_from_tension(
             self.code, *self.parameters, problem.gravity, *problem.operands, length, horizontal, vertical, status
         )
@@ -91,7 +91,7 @@ class CableModel:
         """
         length = checked(unstrained_length, "unstrained_length", "m", above=0.0)
         problem = _problem(cable, span, rise, length, gravity)
-        tension, horizontal, vertical, status = _outputs(problem.count)
+        tension, horizontal, vertical, status = _outputs(problem.size)
         batch.batch_from_length(
             self.code, *self.parameters, problem.gravity, *problem.operands, tension, horizontal, vertical, status
         )
@@ -123,7 +123,7 @@ class _Problem(NamedTuple):
     operands: tuple[Array, Array, Array, Array, Array]
 
     @property
-    def count(self) -> int:
+    def size(self) -> int:
         return math.prod(self.shape)
 
     def state(
@@ -167,9 +167,12 @@ def _problem(cable: Cable, span: ArrayLike, rise: ArrayLike, given: Array, gravi
             "shapes that broadcast",
             "Give one value for each cable, or one for all.",
         ) from None
-    if not np.all((span != 0.0) | (rise != 0.0)):
+    if (span.size == 0 or span.min() == 0.0) and not np.all((span != 0.0) | (rise != 0.0)):
         raise CableGeometryError(
-            "span and rise", "both 0 m", "two different ends", "Move one end: a cable between equal points has no chord."
+            "span and rise",
+            "both 0 m",
+            "two different ends",
+            "Move one end: a cable between equal points has no chord.",
         )
     fields = (span, rise, cable.linear_density, cable.axial_stiffness, given)
     a, b, c, d, e = (_flat(field, shape) for field in fields)

@@ -97,8 +97,13 @@ class CableState:
         shape.shape_points(self.model.code, self.gravity, *self._columns(), out)
         return locked(out.reshape(*self.shape, count, 2))
 
-    def _columns(self) -> tuple[Array, ...]:
-        fields = (
+    def _columns(self) -> tuple[Array, Array, Array, Array, Array, Array, Array, Array]:
+        flat = (kernel_input(field, self.shape).reshape(-1) for field in self._fields())
+        span, rise, density, stiffness, length, horizontal, vertical, tension = flat
+        return span, rise, density, stiffness, length, horizontal, vertical, tension
+
+    def _fields(self) -> tuple[Array, ...]:
+        return (
             self.span,
             self.rise,
             self.cable.linear_density,
@@ -108,4 +113,3 @@ class CableState:
             self.vertical_force,
             self.chord_tension,
         )
-        return tuple(kernel_input(field, self.shape).reshape(-1) for field in fields)

@@ -31,7 +31,9 @@ SMALL_HALLEY_STEP = 1e-6
 
 
 @kernel
-def catenary_end(horizontal: float, vertical: float, length: float, weight: float, stiffness: float):  # type: ignore[no-untyped-def]
+def catenary_end(
+    horizontal: float, vertical: float, length: float, weight: float, stiffness: float
+) -> tuple[float, float]:
     """P1: position (x, z) of the platform end from the force on it and the unstrained length."""
     vertical_a = vertical - weight * length
     tension_a = math.hypot(horizontal, vertical_a)
@@ -98,7 +100,7 @@ def ordinary_length_ratio_near(half_weight: float, sine: float, cosine: float, s
 
 
 @kernel
-def length_ratio(half_weight: float, sine: float, cosine: float, strain: float):  # type: ignore[no-untyped-def]
+def length_ratio(half_weight: float, sine: float, cosine: float, strain: float) -> tuple[float, int]:
     """P3 anywhere: L/D and a status, by Newton steps kept inside a bracket."""
     if is_ordinary(half_weight, strain):
         return ordinary_length_ratio(half_weight, sine, cosine, strain), CABLE_SOLVED
@@ -201,7 +203,7 @@ def parameter_start(xi: float, zeta: float, kappa: float, excess: float) -> floa
 
 
 @formula
-def catenary_parameter(xi: float, zeta: float, kappa: float, excess: float):  # type: ignore[no-untyped-def]
+def catenary_parameter(xi: float, zeta: float, kappa: float, excess: float) -> tuple[float, int]:
     """P2: the h of a cable with span/L = xi > 0, rise/L = zeta, kappa = wL/(2EA) and (D^2 - L^2)/L^2, and a status."""
     xi2 = xi * xi
     zeta2 = zeta * zeta
@@ -242,7 +244,7 @@ def catenary_parameter(xi: float, zeta: float, kappa: float, excess: float):  # 
 
 
 @formula
-def vertical_from_length(rise: float, length: float, weight: float, stiffness: float):  # type: ignore[no-untyped-def]
+def vertical_from_length(rise: float, length: float, weight: float, stiffness: float) -> tuple[float, float, int]:
     """P2 on a vertical chord, in closed form: vertical force, chord tension and a status."""
     height = abs(rise)
     kappa = 0.5 * weight * length / stiffness
@@ -258,7 +260,9 @@ def vertical_from_length(rise: float, length: float, weight: float, stiffness: f
 
 
 @kernel
-def catenary_from_length(span: float, rise: float, length: float, weight: float, stiffness: float):  # type: ignore[no-untyped-def]
+def catenary_from_length(
+    span: float, rise: float, length: float, weight: float, stiffness: float
+) -> tuple[float, float, float, int]:
     """P2: horizontal and vertical force on the platform end, chord tension and a status; weight > 0."""
     if span == 0.0:
         vertical, tension, status = vertical_from_length(rise, length, weight, stiffness)

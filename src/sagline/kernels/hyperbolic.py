@@ -15,7 +15,7 @@ POLYNOMIAL_LIMIT = 4.0  # of h^2
 
 @formula
 def sinhc_polynomial(y: float) -> float:
-    """sinh(h)/h for y = h^2 <= 4."""
+    """The ratio sinh(h)/h for y = h^2 <= 4."""
     q = y * y
     r = q * q
     a = 1.0 + r * (1 / 362880 + r * (1 / 355687428096000))
@@ -27,7 +27,7 @@ def sinhc_polynomial(y: float) -> float:
 
 @formula
 def cosh_polynomial(y: float) -> float:
-    """cosh(h) for y = h^2 <= 4."""
+    """Hyperbolic cosine of h for y = h^2 <= 4."""
     q = y * y
     r = q * q
     a = 1.0 + r * (1 / 40320 + r * (1 / 20922789888000 + r * (1 / 620448401733239439360000)))
@@ -39,7 +39,7 @@ def cosh_polynomial(y: float) -> float:
 
 @formula
 def sinh_excess_polynomial(y: float) -> float:
-    """(sinh(h) - h)/h^3 for y = h^2 <= 4."""
+    """The ratio (sinh(h) - h)/h^3 for y = h^2 <= 4."""
     q = y * y
     r = q * q
     a = 1 / 6 + r * (1 / 39916800 + r * (1 / 121645100408832000))
@@ -51,7 +51,7 @@ def sinh_excess_polynomial(y: float) -> float:
 
 @formula
 def sinhc(h: float) -> float:
-    """sinh(h)/h for any h below 700."""
+    """The ratio sinh(h)/h for any h below 700."""
     y = h * h
     if y <= POLYNOMIAL_LIMIT:
         return sinhc_polynomial(y)
@@ -60,7 +60,7 @@ def sinhc(h: float) -> float:
 
 @formula
 def cosh(h: float) -> float:
-    """cosh(h) for any h below 700."""
+    """Hyperbolic cosine of any h below 700."""
     y = h * h
     if y <= POLYNOMIAL_LIMIT:
         return cosh_polynomial(y)
@@ -69,7 +69,7 @@ def cosh(h: float) -> float:
 
 @formula
 def sinh_excess(h: float) -> float:
-    """sinh(h) - h, to full relative precision, for any h below 700."""
+    """The difference sinh(h) - h, to full relative precision, for any h below 700."""
     y = h * h
     if y <= POLYNOMIAL_LIMIT:
         return h * y * sinh_excess_polynomial(y)
@@ -78,7 +78,7 @@ def sinh_excess(h: float) -> float:
 
 @formula
 def atanhc(u: float) -> float:
-    """atanh(u)/u for 0 <= u <= 0.5."""
+    """The ratio atanh(u)/u for 0 <= u <= 0.5."""
     y = u * u
     if y < 0.01:  # ten terms: below 1e-20
         s = 1 / 21

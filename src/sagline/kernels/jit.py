@@ -10,9 +10,9 @@ import hashlib
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
+from typing import TypeVar, cast
 
-import numba
+from numba import config, njit
 from platformdirs import user_cache_path
 
 F = TypeVar("F", bound=Callable[..., object])
@@ -43,13 +43,13 @@ def formula(function: F) -> F:
 
 def _compiled(function: F, *, forceinline: bool) -> F:
     # numba reads its cache folder while it decorates: set for that moment only, other users of numba keep theirs.
-    before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(FOLDER)
+    before = getattr(config, "CACHE_DIR")  # noqa: B009 - set by numba at run time, unknown to type checkers
+    setattr(config, "CACHE_DIR", str(FOLDER))  # noqa: B010
     try:
-        compiled: F = numba.njit(cache=True, error_model="numpy", forceinline=forceinline)(function)
+        decorate = njit(cache=True, error_model="numpy", forceinline=forceinline)
+        return cast("F", decorate(function))
     finally:
-        numba.config.CACHE_DIR = before
-    return compiled
+        setattr(config, "CACHE_DIR", before)  # noqa: B010
 
 
 def is_cold() -> bool:

@@ -33,14 +33,14 @@ def pull_of_shallow(code: int, k_h: float, chord: float, density: float, gravity
 
 @kernel
 def sag_of_shallow(code: int, k_p: float, chord: float, cosine: float, density: float, gravity: float) -> float:
-    """k (rho D cos phi)^2 [N^2] of the shallow models."""
+    """The product k (rho D cos phi)^2 [N^2] of the shallow models."""
     line = density * chord * cosine
     k = k_p if code == EMPIRICAL else gravity * gravity / 24.0
     return k * line * line
 
 
 @kernel
-def from_tension(  # type: ignore[no-untyped-def]
+def from_tension(
     code: int,
     k_h: float,
     k_p: float,
@@ -51,7 +51,7 @@ def from_tension(  # type: ignore[no-untyped-def]
     density: float,
     stiffness: float,
     tension: float,
-):
+) -> tuple[float, float, int]:
     """Unstrained length [m], pull T_z - tau sin phi [N] and status of a cable at a chord tension."""
     if code == STRAIGHT:
         return chord, 0.0, CABLE_SOLVED
@@ -73,7 +73,7 @@ def from_tension(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def from_length(  # type: ignore[no-untyped-def]
+def from_length(
     code: int,
     k_h: float,
     k_p: float,
@@ -83,7 +83,7 @@ def from_length(  # type: ignore[no-untyped-def]
     density: float,
     stiffness: float,
     length: float,
-):
+) -> tuple[float, float, float, int]:
     """Horizontal and vertical force on the platform end [N], chord tension [N] and status of a cable of a length."""
     if code == STRAIGHT:
         return math.nan, math.nan, math.nan, CABLE_NO_TENSION

@@ -33,7 +33,9 @@ def shallow_length_ratio(
 
 
 @kernel
-def shallow_tension(chord: float, sine: float, cosine: float, pull: float, sag: float, stiffness: float, length: float):  # type: ignore[no-untyped-def]
+def shallow_tension(
+    chord: float, sine: float, cosine: float, pull: float, sag: float, stiffness: float, length: float
+) -> tuple[float, bool]:
     """Chord tension at which the shallow cable has the given length, and whether it was found.
 
     Newton from above on the cubic of the parabolic model, then on the model's own length, bracketed.

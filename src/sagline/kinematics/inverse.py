@@ -108,7 +108,9 @@ def inverse(
     )
 
 
-def kernel_options(robot: Robot, model: CableModel, tension: TensionMethod) -> tuple[int, float, float, int, int, int, float]:
+def kernel_options(
+    robot: Robot, model: CableModel, tension: TensionMethod
+) -> tuple[int, float, float, int, int, int, float]:
     """Model, method and limits as the kernel's leading codes and parameters."""
     limits_of = LIMITS_OF[robot.tension_limits_of]
     return model.code, *model.parameters, tension.code, tension.variable_code, limits_of, tension.validity
@@ -160,7 +162,10 @@ def _reference(robot: Robot, previous: Plan | None) -> Array:
     tensions = np.atleast_2d(previous.chord_tension)
     if tensions.shape[1] != robot.cable_count:
         raise InvalidValueError(
-            "previous", f"a plan of {tensions.shape[1]} cables", f"{robot.cable_count} cables", "Continue a plan of this robot."
+            "previous",
+            f"a plan of {tensions.shape[1]} cables",
+            f"{robot.cable_count} cables",
+            "Continue a plan of this robot.",
         )
     feasible = np.flatnonzero(np.atleast_1d(previous.feasible))
     return tensions[feasible[-1]].copy() if feasible.size else nothing

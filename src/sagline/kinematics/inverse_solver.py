@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from functools import partial
+from math import isfinite
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array, Codes, checked
+from sagline.arrays import Array, Codes, checked, locked
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
+from sagline.errors import InvalidValueError
 from sagline.kernels import tables
 from sagline.kernels.inverse import POSE_NUMBERS, SHORTFALL, inverse_poses
 from sagline.kinematics.inverse import check_redundancy, kernel_options
@@ -18,6 +21,8 @@ from sagline.robot.robot import Robot
 from sagline.statics.tables import body_table, cable_table
 from sagline.tension.closest import Closest
 from sagline.tension.method import TensionMethod
+
+QUATERNION_TOLERANCE = 2e-6  # of the squared length: as `Pose.from_quaternion`
 
 
 class InverseStep(NamedTuple):
@@ -66,18 +71,20 @@ class InverseSolver:
         self._wrench = np.zeros((1, 6))
         self._reference = np.full(m, np.nan)
         self._results = np.empty((tables.RESULT_ROWS, 1, m))
-        self._cable_status: Codes = np.empty((1, m), dtype=np.int8)
         self._numbers = np.empty((1, POSE_NUMBERS))
         self._pose_status: Codes = np.empty(1, dtype=np.int8)
-        self._arguments = (
+        # the views are read-only: kernels are compiled for read-only inputs, and writing goes through the owner
+        self._solve = partial(
+            inverse_poses,
             *options,
             robot.freedom,
             body_table(robot),
             cable_table(robot),
-            *(_read_only(array) for array in (self._pose, self._wrench)),
+            locked(self._pose.view()),
+            locked(self._wrench.view()),
             self._reference,
             self._results,
-            self._cable_status,
+            np.empty((1, m), dtype=np.int8),
             self._numbers,
             self._pose_status,
             np.empty((1, m), dtype=np.bool_),
@@ -103,8 +110,7 @@ class InverseSolver:
         Raises:
             InvalidValueError: If an argument is not finite or of the wrong shape.
         """
-        position = checked(position, "position", "m", shape=(3,))
-        quaternion = checked(quaternion, "quaternion", "", shape=(4,))
+        _check_pose(position, quaternion)
         load = None if wrench is None else checked(wrench, "wrench", "N or N m", shape=(6,))
         lengths = np.empty(self._reference.size)
         status = self.step_into(position, quaternion, lengths, load)
@@ -117,7 +123,9 @@ class InverseSolver:
             float(self._numbers[0, SHORTFALL]),
         )
 
-    def step_into(self, position: Array, quaternion: Array, out: Array, wrench: Array | None = None) -> PoseStatus:
+    def step_into(
+        self, position: ArrayLike, quaternion: ArrayLike, out: Array, wrench: ArrayLike | None = None
+    ) -> PoseStatus:
         """Solve one pose into the caller's memory: no allocation, no check of the arguments.
 
         Args:
@@ -136,12 +144,18 @@ class InverseSolver:
         out[:] = self._results[tables.LENGTH, 0]
         return PoseStatus(self._pose_status[0])
 
-    def _solve(self) -> None:
-        inverse_poses(*self._arguments)
 
-
-def _read_only(array: Array) -> Array:
-    """A locked view of memory that its owner goes on writing: kernels are compiled for read-only inputs."""
-    view = array.view()
-    view.flags.writeable = False
-    return view
+def _check_pose(position: ArrayLike, quaternion: ArrayLike) -> None:
+    """Refuse what is no pose; plain floats first, because a control loop has no time for arrays."""
+    try:
+        x, y, z = position  # type: ignore[misc, union-attr] # whatever does not unpack is refused below
+        a, b, c, d = quaternion  # type: ignore[misc, union-attr]
+        if isfinite(x + y + z) and abs(a * a + b * b + c * c + d * d - 1.0) < QUATERNION_TOLERANCE:
+            return
+    except (TypeError, ValueError):
+        pass  # of the wrong shape or kind: named below
+    checked(position, "position", "m", shape=(3,))
+    norm = float(np.linalg.norm(checked(quaternion, "quaternion", "", shape=(4,))))
+    raise InvalidValueError(
+        "quaternion", f"of length {norm:.12g}", "length 1 to 1e-6", "Normalize it; scalar last: (x, y, z, w)."
+    )

@@ -81,10 +81,5 @@ def article_balance(robot: Robot, pose: Pose, k_h: float = 4.845) -> ArticleBala
     )
     zero = np.zeros(len(pull))
     weight = robot.mass * robot.gravity
-    b = -np.stack(
-        (zero, zero, pull.sum(-1) + weight, (by * pull).sum(-1), -(bx * pull).sum(-1), zero), axis=-1
-    )
-    return ArticleBalance(
-        locked(h.reshape(*pose.shape, 6, robot.cable_count)), locked(b.reshape(*pose.shape, 6))
-    )
-
+    b = -np.stack((zero, zero, pull.sum(-1) + weight, (by * pull).sum(-1), -(bx * pull).sum(-1), zero), axis=-1)
+    return ArticleBalance(locked(h.reshape(*pose.shape, 6, robot.cable_count)), locked(b.reshape(*pose.shape, 6)))
