@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from math import isfinite
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,6 +22,7 @@ from sagline.statics.tables import body_table, cable_table
 from sagline.tension.closest import Closest
 from sagline.tension.method import TensionMethod
 
+_STATUSES = tuple(PoseStatus)  # by code; a lookup costs a tenth of a conversion
 QUATERNION_TOLERANCE = 2e-6  # of the squared length: as `Pose.from_quaternion`
 
 
@@ -142,20 +143,20 @@ class InverseSolver:
         self._wrench[0] = 0.0 if wrench is None else wrench
         self._solve()
         out[:] = self._results[tables.LENGTH, 0]
-        return PoseStatus(self._pose_status[0])
+        return _STATUSES[self._pose_status[0]]
 
 
-def _check_pose(position: ArrayLike, quaternion: ArrayLike) -> None:
+def _check_pose(position: Any, quaternion: Any) -> None:
     """Refuse what is no pose; plain floats first, because a control loop has no time for arrays."""
     try:
-        x, y, z = position  # type: ignore[misc, union-attr] # whatever does not unpack is refused below
-        a, b, c, d = quaternion  # type: ignore[misc, union-attr]
+        x, y, z = position
+        a, b, c, d = quaternion
         if isfinite(x + y + z) and abs(a * a + b * b + c * c + d * d - 1.0) < QUATERNION_TOLERANCE:
             return
     except (TypeError, ValueError):
-        pass  # of the wrong shape or kind: named below
+        next_step = "Give the platform's position and a unit quaternion, scalar last."
+    else:
+        next_step = "Normalize it; scalar last: (x, y, z, w)."
     checked(position, "position", "m", shape=(3,))
     norm = float(np.linalg.norm(checked(quaternion, "quaternion", "", shape=(4,))))
-    raise InvalidValueError(
-        "quaternion", f"of length {norm:.12g}", "length 1 to 1e-6", "Normalize it; scalar last: (x, y, z, w)."
-    )
+    raise InvalidValueError("quaternion", f"of length {norm:.12g}", "length 1 to 1e-6", next_step)
