@@ -143,7 +143,8 @@ class InverseSolver:
         self._wrench[0] = 0.0 if wrench is None else wrench
         self._solve()
         out[:] = self._results[tables.LENGTH, 0]
-        return _STATUSES[self._pose_status[0]]
+        status: PoseStatus = _STATUSES[self._pose_status[0]]
+        return status
 
 
 def _check_pose(position: Any, quaternion: Any) -> None:
