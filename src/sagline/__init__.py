@@ -14,6 +14,9 @@ from sagline.cables.state import CableState
 from sagline.cables.status import CableStatus
 from sagline.cables.straight import Straight
 from sagline.errors import CableGeometryError, FileError, InvalidValueError, SaglineError
+from sagline.kinematics.forward import forward
+from sagline.kinematics.forward_solution import ForwardSolution
+from sagline.kinematics.forward_status import ForwardStatus
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.inverse_solver import InverseSolver, InverseStep
 from sagline.kinematics.plan import Gap, Plan

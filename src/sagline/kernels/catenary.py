@@ -31,6 +31,19 @@ SMALL_HALLEY_STEP = 1e-6
 
 
 @kernel
+def slack_series(horizontal: float, vertical_a: float, vertical: float, tension_a: float, tension_b: float) -> float:
+    """atanh(u)/u of P1 where u = (T_zB - T_zA)/(T_A + T_B) may be close to 1; infinite for a fold."""
+    total = tension_a + tension_b
+    u = (vertical - vertical_a) / total
+    # total (1 - u) from sums of positive terms, not by subtraction
+    square = horizontal * horizontal
+    rest = square / (tension_b + abs(vertical)) + square / (tension_a + abs(vertical_a))
+    if vertical * vertical_a > 0.0:
+        rest += 2.0 * min(abs(vertical), abs(vertical_a))
+    return 0.5 * math.log((1.0 + u) * total / rest) / u if rest > 0.0 else math.inf
+
+
+@kernel
 def catenary_end(
     horizontal: float, vertical: float, length: float, weight: float, stiffness: float
 ) -> tuple[float, float]:
@@ -42,16 +55,8 @@ def catenary_end(
     if total == 0.0:
         return 0.0, 0.0
     u = weight * length / total
-    if u <= 0.5:
-        series = atanhc(u)
-    else:
-        # total - wL from sums of positive terms, not by subtraction
-        square = horizontal * horizontal
-        rest = square / (tension_b + abs(vertical)) + square / (tension_a + abs(vertical_a))
-        if vertical * vertical_a > 0.0:
-            rest += 2.0 * min(abs(vertical), abs(vertical_a))
-        series = 0.5 * math.log((1.0 + u) * total / rest) / u if rest > 0.0 else 0.0
-    x = horizontal * length * (1.0 / stiffness + 2.0 / total * series)
+    series = atanhc(u) if u <= 0.5 else slack_series(horizontal, vertical_a, vertical, tension_a, tension_b)
+    x = horizontal * length * (1.0 / stiffness + 2.0 / total * series) if horizontal != 0.0 else 0.0
     z = (vertical - 0.5 * weight * length) * length * (1.0 / stiffness + 2.0 / total)
     return x, z
 

@@ -36,3 +36,13 @@ POSE_SINGULAR = 2  # the structure matrix has lost rank
 POSE_TOO_SLACK = 3  # a cable's chord tension is too small for its weight
 POSE_NOT_CONVERGED = 4
 POSE_NO_CHORD = 5  # both ends of a cable coincide
+
+# How the forward calculation of one sample ended.
+FORWARD_SOLVED = 0
+FORWARD_LOOSE = 1  # stable, but fewer cables pull than the platform has freedoms
+FORWARD_OVERSTRETCHED = 2  # a cable is stretched beyond all reason: the lengths are too short to meet
+FORWARD_UNSTABLE = 3  # an equilibrium, but no minimum of the energy
+FORWARD_SINGULAR = 4  # an equilibrium that some motion leaves without resistance
+FORWARD_NOT_CONVERGED = 5
+FORWARD_NO_LENGTHS = 6  # all lengths NaN: a pose without a plan
+FORWARD_FITTED = 7  # straight cables: the pose whose lengths fit best

@@ -93,3 +93,26 @@ def atanhc(u: float) -> float:
         s = s * y + 1 / 3
         return s * y + 1.0
     return math.atanh(u) / u
+
+
+@formula
+def atanhc_excess(u: float) -> float:
+    """atanh(u)/u - 1, to full relative precision for u <= 0.25 and to 1e-14 above, for 0 <= u < 1."""
+    y = u * u
+    if y <= 0.0625:  # fourteen terms: below 1e-18
+        s = 1 / 29
+        s = s * y + 1 / 27
+        s = s * y + 1 / 25
+        s = s * y + 1 / 23
+        s = s * y + 1 / 21
+        s = s * y + 1 / 19
+        s = s * y + 1 / 17
+        s = s * y + 1 / 15
+        s = s * y + 1 / 13
+        s = s * y + 1 / 11
+        s = s * y + 1 / 9
+        s = s * y + 1 / 7
+        s = s * y + 1 / 5
+        s = s * y + 1 / 3
+        return s * y
+    return math.atanh(u) / u - 1.0
