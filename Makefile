@@ -41,7 +41,7 @@ format: env ## put the source in shape
 	$(BIN)/ruff format .
 
 bench: env ## one table of times and ratios, on one core
-	$(BIN)/python benchmarks/bench.py
+	$(BIN)/python -m benchmarks.bench
 
 soak: env ## the long tests that make test leaves out
 	$(BIN)/python -m pytest -m soak

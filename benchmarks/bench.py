@@ -1,0 +1,142 @@
+"""`make bench`: one table of times, ratios and residuals; one core, peers in the same run."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+
+import sagline as sl
+from benchmarks.formula import algebraic, as_printed
+from benchmarks.measure import (
+    Row,
+    best_of_calls,
+    best_seconds,
+    one_core,
+    process_peak_memory,
+    process_seconds,
+    show,
+)
+from sagline.arrays import locked
+from sagline.kernels.batch import batch_from_length, batch_from_tension
+from tests.cables.reference import load_reference
+
+CABLES = 1_000_000
+POSES = 100_000
+CABLE = sl.Cable(0.067, 44e3)
+
+
+def accuracy_of_cables() -> Iterator[Row]:
+    """Worst relative error on the 630 cables at 90 digits."""
+    table = load_reference()
+    state = sl.Catenary().from_length(table.cable, table.span, table.rise, table.p2_length)
+    miss = np.hypot(state.horizontal_tension - table.p2_horizontal, state.vertical_force - table.p2_vertical)
+    force = miss / table.largest_tension(table.p2_horizontal, table.p2_vertical, table.p2_length)
+    rows = table.span > 0
+    cable = sl.Cable(table.cable.linear_density[rows], table.cable.axial_stiffness[rows])
+    tension = table.p3_horizontal[rows] * np.hypot(table.span, table.rise)[rows] / table.span[rows]
+    state = sl.Catenary().from_tension(cable, table.span[rows], table.rise[rows], tension)
+    length = np.abs(state.unstrained_length / table.p3_length[rows] - 1)
+    yield Row("catenary from tension, worst relative error, 90-digit reference", "4e-15", f"{length.max():.1e}")
+    yield Row("catenary from length, the same", "4e-15", f"{force.max():.1e}")
+
+
+def speed_of_cables() -> Iterator[Row]:
+    """A batch of ordinary cables: the public call, the bare kernel, and the article's formula."""
+    rng = np.random.default_rng(0)
+    span, rise = locked(rng.uniform(1, 15, CABLES)), locked(rng.uniform(-6, 6, CABLES))
+    tension = locked(rng.uniform(20, 400, CABLES))
+    model = sl.Catenary()
+    state = model.from_tension(CABLE, span, rise, tension)
+    horizontal, length = state.horizontal_tension, state.unstrained_length
+    out, work = np.empty(CABLES), np.empty((3, CABLES))
+    codes = np.empty(CABLES, dtype=np.int8)
+    rho, ea = CABLE.linear_density.reshape(1), CABLE.axial_stiffness.reshape(1)
+
+    def kernel_of(batch: Callable[..., None], given: sl.Cable) -> Callable[[], None]:
+        return lambda: batch(model.code, 0.0, 0.0, 9.81, span, rise, rho, ea, given, *work, codes)
+
+    to_ns = 1e9 / CABLES
+    printed = best_seconds(lambda: as_printed(span, rise, horizontal, 0.067, 44e3, out)) * to_ns
+    plain = best_seconds(lambda: algebraic(span, rise, horizontal, 0.067, 44e3, out)) * to_ns
+    for name, reach, batch, given, call in (
+        ("tension", 60, batch_from_tension, tension, lambda: model.from_tension(CABLE, span, rise, tension)),
+        ("length", 250, batch_from_length, length, lambda: model.from_length(CABLE, span, rise, length)),
+    ):
+        public = best_seconds(call) * to_ns
+        bare = best_seconds(kernel_of(batch, given)) * to_ns
+        yield Row(
+            f"catenary from {name}, 10^6 cables",
+            f"<= {reach} ns a cable",
+            f"{public:.0f} ns; the kernel alone {bare:.0f} ns, "
+            f"{bare / printed:.1f} x the formula as printed, {bare / plain:.1f} x algebraic",
+        )
+    yield Row("the article's formula (48), 10^6 cables", "", f"as printed {printed:.0f} ns, algebraic {plain:.1f} ns")
+
+
+def inverse_kinematics() -> Iterator[Row]:
+    """The article's suspended robot on random poses, and one pose at a time."""
+    robot = sl.load_robot("article-suspended")
+    rng = np.random.default_rng(1)
+    position = rng.uniform((-5, -3.5, 1), (5, 3.5, 4), (POSES, 3))
+    pose = sl.Pose.from_euler(position, *rng.uniform(-0.05, 0.05, (3, POSES)))
+    times = {
+        model: best_seconds(lambda model=model: sl.inverse(robot, pose, model=model), 5) * 1e6 / POSES
+        for model in (sl.Catenary(), sl.Empirical(), sl.Elastic())
+    }
+    exact, empirical, elastic = times.values()
+    yield Row(
+        "inverse, 8 cables, exact, 10^5 poses",
+        "<= 5 us a pose, <= 4 x empirical",
+        f"{exact:.1f} us; {exact / empirical:.1f} x empirical ({empirical:.1f} us), elastic {elastic:.1f} us",
+    )
+    plan = sl.inverse(robot, pose)
+    where = np.flatnonzero(plan.feasible)[:10_000]
+    residual = float(np.nanmax(plan.wrench_residual))
+    found = sl.forward(robot, plan.unstrained_length[where], start=pose[where], wrench=plan.state.wrench[where])
+    miss = float(np.max(np.linalg.norm(found.pose.position - position[where], axis=1)))
+    yield Row("wrench residual of these exact plans", "1e-8 N", f"{residual:.1e} N")
+    yield Row("position after the exact forward solve, 10^4 of them", "1e-9 m", f"{miss:.1e} m")
+    solver = sl.InverseSolver(robot)
+    place, turn, lengths = np.array([1.0, 2.0, 1.5]), np.array([0.0, 0.0, 0.0, 1.0]), np.empty(8)
+    step = best_of_calls(lambda: solver.step(place, turn)) * 1e6
+    into = best_of_calls(lambda: solver.step_into(place, turn, lengths)) * 1e6
+    yield Row("InverseSolver.step; .step_into", "<= 20 us; <= 10 us", f"{step:.1f} us; {into:.1f} us")
+
+
+def whole_processes() -> Iterator[Row]:
+    """Memory of a long plan, and what a user waits for."""
+    memory = process_peak_memory(
+        "import numpy as np, sagline as sl\n"
+        "path = sl.article_path(rate=1_000_000 / 60)\n"
+        "plan = sl.inverse(sl.load_robot('article-suspended'), path)\n"
+        "assert len(path) >= 1_000_000 and plan.feasible.all()"
+    )
+    yield Row("peak memory of a 10^6-pose plan", "<= 1.5 GB", f"{memory:.2f} GB")
+    imported = process_seconds([sys.executable, "-c", "import sagline"])
+    command = str(Path(sys.executable).parent / "sagline")
+    out = ["--no-figures", "--out", "output/bench"]
+    tracked = process_seconds([command, "track", "article-suspended", *out])
+    yield Row(
+        "import sagline; sagline track, 6,001 poses, no figures, warm",
+        "<= 1.2 s; <= 3 s",
+        f"{imported:.2f} s; {tracked:.2f} s",
+    )
+
+
+def main() -> None:
+    """Measure and print."""
+    one_core()
+    console = Console()
+    rows: list[Row] = []
+    for part in (accuracy_of_cables, speed_of_cables, inverse_kinematics, whole_processes):
+        Console(stderr=True).print(f"[dim]{part.__doc__}[/dim]")
+        rows.extend(part())
+    show("From a path to lengths", rows, console)
+
+
+if __name__ == "__main__":
+    main()
