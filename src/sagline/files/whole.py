@@ -51,9 +51,9 @@ def check_folder(folder: os.PathLike[str] | str) -> None:
     path = Path(folder).absolute()
     nearest = next(place for place in (path, *path.parents) if place.exists())
     if not nearest.is_dir():
-        raise FileError(folder, f"cannot be written ({nearest} is a file, not a folder)", "Name another folder.")
+        raise FileError(path, f"cannot be written ({nearest} is a file, not a folder)", "Name another folder.")
     if not os.access(nearest, os.W_OK | os.X_OK):
-        raise FileError(folder, f"cannot be written (no permission in {nearest})", "Name another folder.")
+        raise FileError(path, f"cannot be written (no permission in {nearest})", "Name another folder.")
 
 
 def made_folder(folder: os.PathLike[str] | str) -> Path:
