@@ -84,7 +84,7 @@ def load_plan(file: os.PathLike[str] | str) -> Plan:
 
 
 def _dataset(plan: Plan) -> Dataset:
-    from xarray import Dataset
+    from xarray import Coordinates, Dataset
 
     rows = ("pose",) * len(plan.state.pose.shape)
 
@@ -97,7 +97,8 @@ def _dataset(plan: Plan) -> Dataset:
     coordinates["cable"] = ("cable", np.arange(plan.state.robot.cable_count), {"long_name": "cable, counted from 0"})
     if plan.path is not None:
         coordinates["time"] = variable(TIME)
-    return Dataset({quantity.name: variable(quantity) for quantity in quantities}, coordinates, _attributes(plan))
+    labels = Coordinates(coordinates, indexes={})  # whoever reads the file builds what indexes they need
+    return Dataset({quantity.name: variable(quantity) for quantity in quantities}, labels, _attributes(plan))
 
 
 def _attributes(plan: Plan) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """Figures a person would put in a paper: every function draws on the Axes it is given, or makes a figure of its own.
 
 No global state: `matplotlib.pyplot` is neither used nor needed. In a notebook a returned figure shows itself; of an
-Axes it is `ax.figure` that does.
+Axes it is `ax.figure` that does. `save` writes either to a file.
 """
 
 from sagline.plot.courses import lengths, overview, tensions

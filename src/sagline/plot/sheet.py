@@ -6,7 +6,7 @@ import os
 from io import BytesIO
 from itertools import pairwise
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import matplotlib
 import numpy as np
@@ -87,16 +87,17 @@ def shade(ax: Axes, clock: Array, spans: Iterable[tuple[int, int]], label: str) 
         ax.axvspan(edges[first], edges[last + 1], color=GAP_COLOR, alpha=0.5, linewidth=0.0, label=name, zorder=0.5)
 
 
-def save(figure: Figure, file: os.PathLike[str] | str) -> None:
+def save(drawing: Figure | Axes, file: os.PathLike[str] | str) -> None:
     """Write a figure to a file, whole or not at all; the suffix (.png, .svg, .pdf) says how.
 
     Args:
-        figure: The figure, `ax.figure` of an Axes.
+        drawing: A figure, or Axes: then the whole figure they are in.
         file: The file; one that exists is replaced.
 
     Raises:
         FileError: If the file cannot be written, or its suffix is none that matplotlib knows.
     """
+    figure = drawing if isinstance(drawing, Figure) else cast(Figure, drawing.get_figure(root=True))
     path = FilePath(file)
     kind = path.suffix.lstrip(".").lower()
     known = figure.canvas.get_supported_filetypes()
