@@ -9,7 +9,7 @@ from sagline.cables.catenary import Catenary
 from sagline.cables.empirical import Empirical
 from sagline.cli.results import tell, write_figures, write_plans
 from sagline.cli.study import Run, run_along
-from sagline.cli.terminal import note, working
+from sagline.cli.terminal import show, working
 from sagline.files.robot_file import load_robot
 from sagline.files.whole import check_folder
 from sagline.motion.planar import article_path
@@ -42,10 +42,7 @@ def run_article(folder: Path, *, as_json: bool) -> int:
         files = write_plans(runs, folder)
         files += write_figures(_figures(*(run for run in runs if _is_empirical(run))), folder)
     if not as_json:
-        note(
-            "",
-            f"The article's path, {len(path):,} poses in {path.duration:g} s; least norm of the horizontal tensions.",
-        )
+        show(f"The article's path, {len(path):,} poses in {path.duration:g} s; least norm of the horizontal tensions.")
     return tell(runs, files, folder, as_json=as_json)
 
 

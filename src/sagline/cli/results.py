@@ -45,7 +45,7 @@ def tell(runs: Sequence[Run], files: Sequence[Path], folder: Path, *, as_json: b
         show_json({"runs": [_record(run) for run in runs], "files": list(files)})
     else:
         show(summary_table(runs))
-        note("", f"{len(files)} files in {folder.resolve()}: {_listed(files)}")
+        show(f"In {folder.resolve()}: {_listed(files)}")
     return max((_complaints(run) for run in runs), default=0)
 
 
@@ -67,8 +67,8 @@ def _complaints(run: Run) -> int:
     if gaps:
         note("", "The file keeps the feasible part and marks the rest. Move the path, or widen the tension limits.")
     if run.lost:
-        what = f"{run.lost} of the planned poses are not held in a stable equilibrium by lengths of this cable model"
-        note(f"{name}: ", f"{what}; choose --model catenary", style="bold red")
+        what = f"{run.lost} of the planned poses are no stable equilibria: there the platform would leave its path"
+        note(f"{name}: ", f"{what}; move it, or raise the tensions", style="bold red")
     return OUTSIDE if gaps or run.lost else 0
 
 
@@ -82,7 +82,7 @@ def _record(run: Run) -> dict[str, Any]:
         "tension_variable": plan.tension.variable,
         "poses": plan.status.size,
         **summary(run)._asdict(),
-        "poses_not_held": run.lost,
+        "poses_not_stable": run.lost,
         "gaps": [
             {
                 "from_s": None if clock is None else clock[gap.first],

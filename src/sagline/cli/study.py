@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sagline.arrays import Array
+from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.kinematics.confirm import Confirmation, confirm
 from sagline.kinematics.inverse import inverse
@@ -15,6 +16,8 @@ from sagline.kinematics.plan import Gap, Plan
 from sagline.motion.path import Path
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
+
+SAME_PLACE = 1e-6  # m: far above rounding, far below any second equilibrium
 
 
 class Run(NamedTuple):
@@ -41,8 +44,11 @@ class Run(NamedTuple):
 
     @property
     def lost(self) -> int:
-        """Number of planned poses whose lengths do not hold the platform in a stable equilibrium."""
-        return int(np.sum(self.plan.feasible & ~self.confirmation.held))
+        """Number of planned poses in which the platform would not stay: its equilibrium there is none, or unstable."""
+        stays = self.confirmation.held
+        if isinstance(self.plan.state.cables.model, Catenary):  # planned exactly: it rests elsewhere only if it left
+            stays = stays & (np.linalg.norm(self.confirmation.position_error, axis=-1) < SAME_PLACE)
+        return int(np.sum(self.plan.feasible & ~stays))
 
 
 class Summary(NamedTuple):

@@ -24,7 +24,7 @@ ROWS = {  # of a summary: what a person reads, and how its number is written
     "feasible_share_percent": ("feasible poses [%]", ".4g"),
     "inverse_us_per_pose": ("inverse kinematics [µs a pose]", ".2f"),
 }
-HEAD = 10  # characters of a column's head: four runs fit 80
+NARROW, WIDE = 10, 30  # characters of a column's head: four narrow ones fit a line of 80
 
 
 def plain_table(title: str = "") -> Table:
@@ -37,7 +37,7 @@ def summary_table(runs: Sequence[Run]) -> Table:
     table = plain_table()
     table.add_column("", no_wrap=True)
     for run in runs:
-        name = fill(run.plan.state.robot.name, HEAD)
+        name = fill(run.plan.state.robot.name, NARROW if len(runs) > 2 else WIDE)
         table.add_column(Text(f"{name}\n{type(run.plan.state.cables.model).__name__}"), justify="right", no_wrap=True)
     numbers: list[Summary] = [summary(run) for run in runs]
     for field, (label, form) in ROWS.items():
@@ -47,4 +47,4 @@ def summary_table(runs: Sequence[Run]) -> Table:
 
 def written(number: float, form: str) -> str:
     """A number with a true minus sign, or a dash where there is none."""
-    return "–" if isnan(number) else format(number, form).replace("-", "−")
+    return "–" if isnan(number) else format(number, f"z{form}").replace("-", "−")  # z: no minus zero

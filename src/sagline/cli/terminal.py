@@ -17,8 +17,8 @@ from sagline.errors import SaglineError
 
 OUTSIDE, BAD_INPUT, INTERRUPTED = 1, 2, 130
 
-_out = Console(highlight=False)
-_err = Console(stderr=True, highlight=False)
+_out = Console(highlight=False, markup=False)
+_err = Console(stderr=True, highlight=False, markup=False)
 
 
 @contextmanager
@@ -58,8 +58,8 @@ def note(head: str, text: str, style: str = "") -> None:
 
 
 def show(what: RenderableType) -> None:
-    """Part of the result, for a person."""
-    _out.print(what)
+    """Part of the result, for a person; plain text keeps its lines, so that paths in it can be copied."""
+    _out.print(what, soft_wrap=isinstance(what, str))
 
 
 def show_json(what: Any) -> None:

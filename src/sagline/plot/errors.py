@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from sagline.kinematics.confirm import Confirmation
 
+LEAST = 1e-3  # mm: rounding errors are drawn as the flat line that they are
 STYLES = ("-", (0, (4.0, 1.6)), (0, (1.0, 1.2)))
 
 
@@ -62,5 +63,7 @@ def _draw(ax: Axes, confirmation: Confirmation) -> None:
         ax.plot(clock, course, color=color, linestyle=style, linewidth=1.2, label=f"${name}$")
     shade(ax, clock, [(gap.first, gap.last) for gap in plan.gaps], INFEASIBLE)
     dressed(ax, "pose" if plan.path is None else "time [s]", "position error [mm]")
+    low, high = ax.get_ylim()
+    ax.set_ylim(min(low, -LEAST), max(high, LEAST))
     if clock.size > 1:
         ax.set_xlim(clock[0], clock[-1])
