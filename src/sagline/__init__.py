@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from importlib import import_module
+from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from sagline.cables.cable import Cable
@@ -14,6 +16,7 @@ from sagline.cables.state import CableState
 from sagline.cables.status import CableStatus
 from sagline.cables.straight import Straight
 from sagline.errors import CableGeometryError, FileError, InvalidValueError, SaglineError
+from sagline.kinematics.confirm import Confirmation, confirm
 from sagline.kinematics.forward import forward
 from sagline.kinematics.forward_solution import ForwardSolution
 from sagline.kinematics.forward_status import ForwardStatus
@@ -28,9 +31,92 @@ from sagline.motion.sampled import path_from_samples
 from sagline.robot.catalogue import robot_names
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
+from sagline.robot.pose_box import PoseBox
 from sagline.robot.robot import Robot
 from sagline.statics.balance import ArticleBalance, article_balance, structure_matrix
 from sagline.statics.wrench import inertial_wrench
 from sagline.tension.closest import Closest
 from sagline.tension.method import TensionMethod
 from sagline.tension.minimum_norm import MinimumNorm
+
+if TYPE_CHECKING:
+    from sagline import plot
+    from sagline.files.path_file import load_path
+    from sagline.files.plan_file import load_plan, save_plan
+    from sagline.files.robot_file import dump_robot, load_robot
+
+__version__ = version("sagline")
+
+__all__ = [
+    "ArticleBalance",
+    "Cable",
+    "CableGeometryError",
+    "CableModel",
+    "CableState",
+    "CableStatus",
+    "Catenary",
+    "Closest",
+    "Confirmation",
+    "Elastic",
+    "Empirical",
+    "Equilibrium",
+    "FileError",
+    "ForwardSolution",
+    "ForwardStatus",
+    "Gap",
+    "InvalidValueError",
+    "InverseSolver",
+    "InverseStep",
+    "MinimumNorm",
+    "Parabolic",
+    "Path",
+    "Plan",
+    "Pose",
+    "PoseBox",
+    "PoseStatus",
+    "Robot",
+    "SaglineError",
+    "Straight",
+    "TensionMethod",
+    "__version__",
+    "article_balance",
+    "article_path",
+    "confirm",
+    "dump_robot",
+    "forward",
+    "inertial_wrench",
+    "inverse",
+    "load_path",
+    "load_plan",
+    "load_robot",
+    "path_from_samples",
+    "plot",
+    "quintic_path",
+    "robot_names",
+    "save_plan",
+    "structure_matrix",
+]
+
+# The outer ring loads on first use: it brings xarray, matplotlib, pint and pydantic with it.
+_LAZY = {
+    "dump_robot": "sagline.files.robot_file",
+    "load_path": "sagline.files.path_file",
+    "load_plan": "sagline.files.plan_file",
+    "load_robot": "sagline.files.robot_file",
+    "plot": "sagline.plot",
+    "save_plan": "sagline.files.plan_file",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Load a part of the outer ring the first time it is asked for, and keep it."""
+    if name not in _LAZY:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    module = import_module(_LAZY[name])
+    value = module if name == "plot" else getattr(module, name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

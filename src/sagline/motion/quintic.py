@@ -8,7 +8,6 @@ from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
 from sagline.arrays import Array, checked
 from sagline.errors import InvalidValueError
@@ -101,6 +100,8 @@ class _Segments:
 
     @classmethod
     def between(cls, stops: Pose) -> _Segments:
+        from scipy.spatial.transform import Rotation  # takes a third of the time that sagline takes to load
+
         first, second = stops.rotation[:-1], stops.rotation[1:]
         turn = (second * first.inv()).as_rotvec()
         angle = np.linalg.norm(turn, axis=1, keepdims=True)

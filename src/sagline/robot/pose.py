@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
 from sagline.arrays import Array, checked, locked
 from sagline.errors import InvalidValueError
 from sagline.robot.unit import unit
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 _MATRIX_TOLERANCE = 1e-9  # largest element of Q Q^T - 1 of what still counts as a rotation
 _QUATERNION_TOLERANCE = 1e-6  # a quaternion printed with seven digits still counts as one
@@ -40,7 +42,7 @@ class Pose:
         Raises:
             InvalidValueError: If a number is not finite, a matrix is no rotation, or the counts differ.
         """
-        quaternion = rotation.as_quat() if isinstance(rotation, Rotation) else _quaternion_of(rotation)
+        quaternion = rotation.as_quat() if hasattr(rotation, "as_quat") else _quaternion_of(rotation)
         self._fill(checked(position, "position", "m", shape=(3,)), quaternion)
 
     @classmethod
@@ -114,6 +116,8 @@ class Pose:
     @property
     def rotation(self) -> Rotation:
         """Rotation from platform to world, as scipy has it."""
+        from scipy.spatial.transform import Rotation  # takes a third of the time that sagline takes to load
+
         return Rotation.from_quat(self.quaternion)
 
     @property
@@ -154,6 +158,8 @@ def _quaternion_of(rotation: ArrayLike) -> Array:
     _refuse(excess > _MATRIX_TOLERANCE, "rotation", "largest element of Q Q^T - 1", excess, "an orthonormal matrix")
     determinant = np.linalg.det(matrix)
     _refuse(determinant < 0.0, "rotation", "determinant", determinant, "determinant +1, a rotation without mirror")
+    from scipy.spatial.transform import Rotation
+
     quaternion: Array = Rotation.from_matrix(matrix).as_quat()
     return quaternion
 

@@ -1,0 +1,137 @@
+"""The command `sagline`: its subcommands, their options, and help that teaches by example."""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from sagline.cli.choices import Model, Tension, Variable, robot_completions
+from sagline.cli.terminal import reported
+
+app = typer.Typer(
+    no_args_is_help=True,
+    rich_markup_mode="markdown",
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+RobotArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="ROBOT",
+        help="A preset (see `sagline robots`) or a robot file, robot.yaml.",
+        autocompletion=robot_completions,
+    ),
+]
+OutOption = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the files; created if missing.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print the numbers as JSON and nothing else on stdout.")]
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"sagline {version('sagline')}")
+        raise typer.Exit
+
+
+@app.callback(
+    epilog="Exit codes: 0 fine; 1 the path cannot be followed everywhere; 2 bad input, nothing written; 130 Ctrl-C."
+)
+def sagline(
+    show_version: Annotated[
+        bool, typer.Option("--version", help="Print the version.", callback=_print_version, is_eager=True)
+    ] = False,
+) -> None:
+    """Cable robots whose cables sag: from a robot and a path to proven cable lengths.
+
+    Start here:
+
+    ```
+    sagline run                          the article's test, with its figures
+    sagline robots                       the robots that come with it
+    sagline show ipanema-1               all values of one of them
+    sagline track cogiro my_path.yaml    a robot along a path of your own
+    ```
+    """
+
+
+@app.command()
+def track(
+    robot: RobotArgument,
+    path: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="PATH", help="Waypoints in .yaml, or time and pose in .csv. Default: the article's path."
+        ),
+    ] = None,
+    model: Annotated[Model, typer.Option(help="Cable model the lengths are planned with.")] = Model.CATENARY,
+    tension: Annotated[Tension, typer.Option(help="How the load is shared among redundant cables.")] = Tension.CLOSEST,
+    variable: Annotated[Variable, typer.Option(help="The tension in which it is shared.")] = Variable.CHORD,
+    out: OutOption = Path("output"),
+    figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw figures, as PNG and SVG.")] = True,
+    as_json: JsonOption = False,
+) -> None:
+    """Plan a robot's cable lengths along a path, and prove them with the exact cable.
+
+    The lengths of the chosen model are wound onto exact catenaries; the position error is where the platform then
+    really rests, less where it was planned. The plan is written to DIR/ROBOT-MODEL.nc.
+
+    For example:
+
+    ```
+    sagline track article-suspended
+    sagline track my_robot.yaml my_path.yaml --model empirical --out results
+    sagline track cogiro my_samples.csv --no-figures --json
+    ```
+    """
+    with reported():
+        from sagline.cli.track import track as run
+
+        code = run(robot, path, model, tension, variable, out, figures=figures, as_json=as_json)
+    raise typer.Exit(code)
+
+
+@app.command()
+def run(out: OutOption = Path("output"), as_json: JsonOption = False) -> None:
+    """Run the article's test: both simulated robots, its empirical model and the exact one, figures 18 to 22.
+
+    Tensions are the least norm of the horizontal tensions T_x, as the article's figures show them.
+    """
+    with reported():
+        from sagline.cli.article import run_article
+
+        code = run_article(out, as_json=as_json)
+    raise typer.Exit(code)
+
+
+@app.command()
+def robots(as_json: JsonOption = False) -> None:
+    """List the robots that come with sagline."""
+    with reported():
+        from sagline.cli.robots import list_robots
+
+        list_robots(as_json=as_json)
+
+
+@app.command()
+def show(robot: RobotArgument, as_json: JsonOption = False) -> None:
+    """Show every value of a robot with its unit; what its source does not give is marked, with the reason.
+
+    For example:
+
+    ```
+    sagline show ipanema-1
+    sagline show my_robot.yaml --json
+    ```
+    """
+    with reported():
+        from sagline.cli.robots import show_robot
+
+        show_robot(robot, as_json=as_json)
+
+
+def app_entry() -> None:
+    """Run the command; what the shell starts."""
+    app(prog_name="sagline")

@@ -1,0 +1,115 @@
+"""One run of a robot along a path: planned, confirmed, and summed up in a few numbers."""
+
+from __future__ import annotations
+
+from time import perf_counter
+from typing import NamedTuple
+
+import numpy as np
+
+from sagline.arrays import Array
+from sagline.cables.catenary import Catenary
+from sagline.cables.model import CableModel
+from sagline.kinematics.confirm import Confirmation, confirm
+from sagline.kinematics.inverse import inverse
+from sagline.kinematics.plan import Gap, Plan
+from sagline.motion.path import Path
+from sagline.robot.robot import Robot
+from sagline.tension.method import TensionMethod
+
+SAME_PLACE = 1e-6  # m: far above rounding, far below any second equilibrium
+
+
+class Run(NamedTuple):
+    """A confirmed plan along a path.
+
+    Attributes:
+        confirmation: The plan, and where its lengths really lead.
+        seconds: Time the inverse kinematics took, compiled [s].
+    """
+
+    confirmation: Confirmation
+    seconds: float
+
+    @property
+    def plan(self) -> Plan:
+        """The plan."""
+        return self.confirmation.plan
+
+    @property
+    def name(self) -> str:
+        """Robot and model, as files are named: letters, digits, dots and hyphens."""
+        words = f"{self.plan.state.robot.name} {type(self.plan.state.cables.model).__name__.lower()}"
+        return "-".join("".join(c if c.isalnum() or c in "._-" else " " for c in words).split()).lstrip(".-")
+
+    @property
+    def lost(self) -> int:
+        """Number of planned poses in which the platform would not stay: its equilibrium there is none, or unstable."""
+        stays = self.confirmation.held
+        if isinstance(self.plan.state.cables.model, Catenary):  # planned exactly: it rests elsewhere only if it left
+            stays = stays & (np.linalg.norm(self.confirmation.position_error, axis=-1) < SAME_PLACE)
+        return int(np.sum(self.plan.feasible & ~stays))
+
+
+class Summary(NamedTuple):
+    """The numbers of one run; over its feasible poses, NaN if there are none. Units are in the names."""
+
+    position_error_max_mm: float
+    position_error_mean_mm: float
+    chord_tension_min_n: float
+    chord_tension_max_n: float
+    unstrained_length_min_m: float
+    unstrained_length_max_m: float
+    adjusting_length_min_mm: float
+    adjusting_length_max_mm: float
+    feasible_share_percent: float
+    inverse_us_per_pose: float
+
+
+def run_along(robot: Robot, path: Path, model: CableModel, tension: TensionMethod) -> Run:
+    """Plan a path, and confirm the plan with exact cables.
+
+    Raises:
+        InvalidValueError: If the robot's tensions cannot be determined.
+        CableGeometryError: If a cable has no length at some pose.
+    """
+    inverse(robot, path.pose[:1], model, tension)  # loads the compiled kernels, so that the work alone is timed
+    start = perf_counter()
+    plan = inverse(robot, path, model, tension)
+    seconds = perf_counter() - start
+    return Run(confirm(plan), seconds)
+
+
+def summary(run: Run) -> Summary:
+    """The run in numbers."""
+    plan, cables = run.plan, run.plan.state.cables
+    error = 1e3 * np.linalg.norm(run.confirmation.position_error, axis=-1)
+    largest, mean = (
+        float(f(error[~np.isnan(error)])) if not np.isnan(error).all() else np.nan for f in (np.max, np.mean)
+    )
+    return Summary(
+        largest,
+        mean,
+        *_range(cables.chord_tension),
+        *_range(cables.unstrained_length),
+        *_range(1e3 * cables.adjusting_length),
+        100.0 * float(np.mean(plan.feasible)),
+        1e6 * run.seconds / plan.status.size,
+    )
+
+
+def gap_text(gap: Gap, plan: Plan) -> str:
+    """When a path leaves the feasible region, by how much, and which cables stand against it."""
+    assert plan.path is not None
+    when = f"from {plan.path.time[gap.first]:g} s to {plan.path.time[gap.last]:g} s"
+    if np.isnan(gap.shortfall):
+        return f"{when}: {gap.status.text}"
+    cables = ", ".join(map(str, gap.cables))
+    if np.isinf(gap.shortfall):
+        return f"{when}: no change of the force alone would do; limits of cables {cables}"
+    return f"{when}: short by up to {gap.shortfall:.3g} N; limits of cables {cables}"
+
+
+def _range(values: Array) -> tuple[float, float]:
+    finite = values[~np.isnan(values)]
+    return (float(finite.min()), float(finite.max())) if finite.size else (np.nan, np.nan)

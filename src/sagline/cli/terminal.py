@@ -1,0 +1,83 @@
+"""What the commands say and how they end: results on stdout, everything else on stderr, an exit code that tells."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+import typer
+from rich.console import Console, RenderableType
+from rich.text import Text
+
+from sagline.errors import SaglineError
+
+OUTSIDE, BAD_INPUT, INTERRUPTED = 1, 2, 130
+
+_out = Console(highlight=False, markup=False)
+_err = Console(stderr=True, highlight=False, markup=False)
+
+
+@contextmanager
+def reported() -> Iterator[None]:
+    """Turn what goes wrong inside into one message and an exit code.
+
+    Raises:
+        typer.Exit: With BAD_INPUT for an error that sagline raised on purpose, INTERRUPTED for Ctrl-C.
+    """
+    try:
+        yield
+    except SaglineError as error:
+        note("Error: ", str(error), style="bold red")
+        raise typer.Exit(BAD_INPUT) from None
+    except KeyboardInterrupt:
+        note("", "Interrupted. What has been written is whole.")
+        raise typer.Exit(INTERRUPTED) from None
+
+
+@contextmanager
+def working(what: str) -> Iterator[None]:
+    """Say what is being done while it is done, where a person watches; and the first time that it compiles."""
+    from sagline.kernels.jit import is_cold
+
+    if is_cold():
+        note("First run: ", "compiling the numerical core, about a minute; later runs start at once.", style="bold")
+    if not _err.is_terminal:
+        yield
+        return
+    with _err.status(f"{what} ..."):
+        yield
+
+
+def note(head: str, text: str, style: str = "") -> None:
+    """A message beside the result, on stderr; paths in it are not broken into lines."""
+    _err.print(Text(head, style=style) + Text(text, style="default"), soft_wrap=True)
+
+
+def show(what: RenderableType) -> None:
+    """Part of the result, for a person; plain text keeps its lines, so that paths in it can be copied."""
+    _out.print(what, soft_wrap=isinstance(what, str))
+
+
+def show_json(what: Any) -> None:
+    """The result, for a program: one JSON document; null stands for what is not finite."""
+    typer.echo(json.dumps(_plain(what), indent=2, ensure_ascii=False, allow_nan=False))
+
+
+def _plain(what: Any) -> Any:
+    match what:
+        case dict():
+            return {str(key): _plain(value) for key, value in what.items()}
+        case list() | tuple():
+            return [_plain(value) for value in what]
+        case np.ndarray() | np.generic():
+            return _plain(what.tolist())
+        case float():
+            return what if math.isfinite(what) else None
+        case str() | int() | None:
+            return what
+        case _:
+            return str(what)

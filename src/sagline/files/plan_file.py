@@ -1,0 +1,190 @@
+"""Plans in NetCDF: every number with its unit, and the robot, the model and the version inside."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import fields
+from importlib.metadata import version
+from pathlib import Path as FilePath
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from sagline.arrays import locked
+from sagline.cables.catenary import Catenary
+from sagline.cables.elastic import Elastic
+from sagline.cables.empirical import Empirical
+from sagline.cables.model import CableModel
+from sagline.cables.parabolic import Parabolic
+from sagline.cables.state import CableState
+from sagline.cables.straight import Straight
+from sagline.errors import FileError, InvalidValueError
+from sagline.files.plan_layout import MOTION, PARTS, QUANTITIES, TIME, Quantity
+from sagline.files.robot_file import dump_robot, parse_robot
+from sagline.files.whole import written_whole
+from sagline.kinematics.plan import Plan
+from sagline.motion.path import Path
+from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.tension.closest import Closest
+from sagline.tension.method import TensionMethod
+from sagline.tension.minimum_norm import MinimumNorm
+
+if TYPE_CHECKING:
+    from xarray import Dataset
+
+FORMAT = 1  # raised whenever an older sagline could misread the file
+MODELS = {model.__name__: model for model in (Straight, Elastic, Empirical, Parabolic, Catenary)}
+METHODS = {method.__name__: method for method in (Closest, MinimumNorm)}
+STATE_ARRAYS = ("span", "rise", "unstrained_length", "horizontal_tension", "vertical_force", "chord_tension")
+
+Choice = TypeVar("Choice", CableModel, TensionMethod)
+
+
+def save_plan(plan: Plan, file: os.PathLike[str] | str) -> None:
+    """Write a plan to a NetCDF file, whole or not at all.
+
+    Dimensions are pose (absent for a single pose) and cable; a path's times are a coordinate of pose. Poses without
+    an answer are kept, with their status, shortfall and blocking cables, and NaN lengths and forces.
+
+    Args:
+        plan: The plan.
+        file: The file, "run.nc" for instance; one that exists is replaced.
+
+    Raises:
+        FileError: If the file cannot be written; what was there before is untouched.
+    """
+    data = _dataset(plan)
+    with written_whole(file) as partial:
+        # _FillValue None: numbers are stored as they are, and NaN needs no second meaning
+        encoding = {str(name): {"_FillValue": None} for name in data.variables}
+        data.to_netcdf(partial, engine="h5netcdf", encoding=encoding)
+
+
+def load_plan(file: os.PathLike[str] | str) -> Plan:
+    """Read a plan that `save_plan` wrote: the same plan to the last bit.
+
+    Args:
+        file: The NetCDF file.
+
+    Raises:
+        FileError: If the file is missing, cut off, no NetCDF file, no plan, or of a newer format.
+    """
+    path = FilePath(file)
+    data = _opened(path)
+    _check_format(path, data.attrs)
+    try:
+        return _plan(path, data, parse_robot(data.attrs["robot"], f"{path}, robot"))
+    except KeyError as error:
+        raise FileError(path, f"has no {error.args[0]}", "Write it again; it is incomplete or was edited.") from None
+    except InvalidValueError as error:
+        raise FileError(path, f"{error.item} is {error.value}; allowed: {error.allowed}", error.next_step) from None
+
+
+def _dataset(plan: Plan) -> Dataset:
+    from xarray import Coordinates, Dataset
+
+    rows = ("pose",) * len(plan.state.pose.shape)
+
+    def variable(quantity: Quantity) -> tuple[tuple[str, ...], Any, dict[str, Any]]:
+        return (*rows, *quantity.parts), quantity.of(plan), quantity.attributes
+
+    quantities = QUANTITIES if plan.path is None else QUANTITIES + MOTION
+    used = {part for quantity in quantities for part in quantity.parts} & PARTS.keys()
+    coordinates: dict[str, Any] = {part: (part, list(PARTS[part])) for part in sorted(used)}
+    coordinates["cable"] = ("cable", np.arange(plan.state.robot.cable_count), {"long_name": "cable, counted from 0"})
+    if plan.path is not None:
+        coordinates["time"] = variable(TIME)
+    labels = Coordinates(coordinates, indexes={})  # whoever reads the file builds what indexes they need
+    return Dataset({quantity.name: variable(quantity) for quantity in quantities}, labels, _attributes(plan))
+
+
+def _attributes(plan: Plan) -> dict[str, Any]:
+    return {
+        "title": f"Cable lengths and tensions of {plan.state.robot.name}",
+        "source": f"sagline {version('sagline')}",
+        "sagline_format": FORMAT,
+        **_written("model", plan.state.cables.model),
+        **_written("tension", plan.tension),
+        "robot": dump_robot(plan.state.robot),
+    }
+
+
+def _written(key: str, choice: CableModel | TensionMethod) -> dict[str, Any]:
+    """A model or method as attributes: its name, and each of its options that is set."""
+    options = {f"{key}_{field.name}": getattr(choice, field.name) for field in fields(choice)}
+    return {key: type(choice).__name__, **{name: value for name, value in options.items() if value is not None}}
+
+
+def _read(path: FilePath, data: Dataset, key: str, choices: Mapping[str, type[Choice]]) -> Choice:
+    """The model or method that `_written` wrote."""
+    name = data.attrs[key]
+    if name not in choices:
+        raise FileError(path, f"{key} is {name!r}; allowed: {', '.join(choices)}", "Read it with a newer sagline.")
+    choice = choices[name]
+    given = {field.name: data.attrs.get(f"{key}_{field.name}") for field in fields(choice)}
+    return choice(**{option: _plain(value) for option, value in given.items() if value is not None})
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _opened(path: FilePath) -> Dataset:
+    """The whole file, in memory."""
+    from xarray import load_dataset
+
+    try:
+        path.open("rb").close()
+        return load_dataset(path, engine="h5netcdf", decode_times=False, mask_and_scale=False)
+    except FileNotFoundError:
+        raise FileError(path, "does not exist", "Check its name.") from None
+    except (IsADirectoryError, PermissionError) as error:
+        raise FileError(path, f"cannot be read ({error.strerror})", "Check its name and its permissions.") from None
+    except (OSError, RuntimeError, ValueError, KeyError) as error:  # h5py has no error of its own for a damaged file
+        reason = str(error).splitlines()[0]
+        raise FileError(
+            path, f"is no complete NetCDF file ({reason})", "Write it again; it may have been cut off."
+        ) from None
+
+
+def _check_format(path: FilePath, attributes: Mapping[str, Any]) -> None:
+    found = attributes.get("sagline_format")
+    if found is None:
+        raise FileError(
+            path, "is no plan of sagline, it names no sagline_format", "Check that this is the file you mean."
+        )
+    if found > FORMAT:
+        raise FileError(
+            path,
+            f"is of format {found}, written by {attributes.get('source')}; this is sagline {version('sagline')}, "
+            f"which reads up to {FORMAT}",
+            "Install a newer sagline.",
+        )
+
+
+def _plan(path: FilePath, data: Dataset, robot: Robot) -> Plan:
+    def values(name: str) -> Any:
+        return locked(np.asarray(data[name].values, order="C"))
+
+    if data.sizes["cable"] != robot.cable_count:
+        raise FileError(path, f"has {data.sizes['cable']} cables, its robot {robot.cable_count}", "Write it again.")
+    pose = Pose.from_quaternion(values("position"), values("quaternion"))
+    cables = CableState(
+        model=_read(path, data, "model", MODELS),
+        cable=robot.cables,
+        gravity=robot.gravity,
+        **{name: values(name) for name in STATE_ARRAYS},
+        status=values("cable_status"),
+    )
+    return Plan(
+        state=Equilibrium(robot, pose, values("wrench"), cables),
+        path=Path(values("time"), pose, values("twist"), values("twist_rate")) if "time" in data.coords else None,
+        tension=_read(path, data, "tension", METHODS),
+        status=values("pose_status"),
+        shortfall=values("shortfall"),
+        wrench_residual=values("wrench_residual"),
+        blocking=values("blocking"),
+    )

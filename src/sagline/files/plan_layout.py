@@ -1,0 +1,112 @@
+"""What stands in a plan's file: each variable, where the plan keeps it, its dimensions and its unit."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from operator import attrgetter
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from sagline.cables.status import CableStatus
+from sagline.kinematics.plan import Plan
+from sagline.kinematics.status import PoseStatus
+
+# labels along the dimensions beside pose and cable
+PARTS = {
+    "axis": ("x", "y", "z"),
+    "quaternion_part": ("x", "y", "z", "w"),
+    "wrench_part": ("force x", "force y", "force z", "moment x", "moment y", "moment z"),
+    "twist_part": ("linear x", "linear y", "linear z", "angular x", "angular y", "angular z"),
+    "residual_part": ("force", "moment"),
+}
+
+
+class Quantity(NamedTuple):
+    """One variable of the file.
+
+    Attributes:
+        name: Its name in the file.
+        place: Where a plan has it, as a dotted attribute.
+        parts: Its dimensions after pose.
+        unit: Unit as the file states it; "" for a plain number.
+        long_name: What it is, in a reader's words.
+        codes: The status it holds codes of, if any.
+    """
+
+    name: str
+    place: str
+    parts: tuple[str, ...]
+    unit: str
+    long_name: str
+    codes: type[IntEnum] | None = None
+
+    def of(self, plan: Plan) -> Any:
+        """The plan's values."""
+        return attrgetter(self.place)(plan)
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """Attributes of the variable; status codes are explained as the CF conventions want it."""
+        found: dict[str, Any] = {"long_name": self.long_name}
+        if self.unit:
+            found["units"] = self.unit
+        if self.codes is not None:
+            found["flag_values"] = np.array([code.value for code in self.codes], dtype=np.int8)
+            found["flag_meanings"] = " ".join(code.name.lower() for code in self.codes)
+        return found
+
+
+QUANTITIES = (
+    Quantity("unstrained_length", "state.cables.unstrained_length", ("cable",), "m", "unstrained length L to wind"),
+    Quantity("chord_tension", "state.cables.chord_tension", ("cable",), "N", "tension along the chord, T_x / cos phi"),
+    Quantity("horizontal_tension", "state.cables.horizontal_tension", ("cable",), "N", "horizontal tension T_x"),
+    Quantity(
+        "vertical_force",
+        "state.cables.vertical_force",
+        ("cable",),
+        "N",
+        "vertical force T_z on the cable at its platform end, up positive",
+    ),
+    Quantity("span", "state.cables.span", ("cable",), "m", "horizontal distance from frame end to platform end"),
+    Quantity("rise", "state.cables.rise", ("cable",), "m", "height of the platform end above the frame end"),
+    Quantity("cable_status", "state.cables.status", ("cable",), "", "how each cable's calculation ended", CableStatus),
+    Quantity("pose_status", "status", (), "", "how each pose's calculation ended", PoseStatus),
+    Quantity("shortfall", "shortfall", (), "N", "smallest change of the force that would make the pose feasible"),
+    Quantity(
+        "wrench_residual",
+        "wrench_residual",
+        ("residual_part",),
+        "N, N m",
+        "norms of the unbalanced force and moment in the free motions",
+    ),
+    Quantity("blocking", "blocking", ("cable",), "", "whether the cable's limits stand against the needed wrench"),
+    Quantity(
+        "wrench",
+        "state.wrench",
+        ("wrench_part",),
+        "N, N m",
+        "external and inertial wrench about the center of mass in world axes, without gravity",
+    ),
+    Quantity("position", "state.pose.position", ("axis",), "m", "position of the platform origin in the world"),
+    Quantity(
+        "quaternion",
+        "state.pose.quaternion",
+        ("quaternion_part",),
+        "1",
+        "rotation from platform to world, scalar last",
+    ),
+)
+
+# of a path only
+TIME = Quantity("time", "path.time", (), "s", "time from the start of the path")
+MOTION = (
+    Quantity("twist", "path.twist", ("twist_part",), "m/s, rad/s", "velocity of the platform origin, angular velocity"),
+    Quantity(
+        "twist_rate",
+        "path.twist_rate",
+        ("twist_part",),
+        "m/s^2, rad/s^2",
+        "acceleration of the platform origin, angular acceleration",
+    ),
+)

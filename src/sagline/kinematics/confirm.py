@@ -1,0 +1,75 @@
+"""The proof of a plan: where the platform really goes when the planned lengths are wound."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sagline.arrays import Array, Codes, Flags, locked
+from sagline.kinematics.forward import forward
+from sagline.kinematics.forward_status import ForwardStatus
+from sagline.kinematics.plan import Plan
+from sagline.robot.pose import Pose
+
+BLOCK = 1 << 14  # poses solved at once: half a second, after which an interrupt is heard, and little memory
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Confirmation:
+    """A plan, and the exact equilibrium that its lengths lead to.
+
+    Attributes:
+        plan: The plan, of any cable model.
+        pose: Where the platform rests on exact cables of the planned lengths; NaN where the plan has no answer.
+        status: Codes of `ForwardStatus`, shape () or (N,).
+        wrench_residual: Norms of the unbalanced force [N] and moment [N m] there, shape (2,) or (N, 2).
+    """
+
+    plan: Plan
+    pose: Pose
+    status: Codes
+    wrench_residual: Array
+
+    @property
+    def held(self) -> Flags:
+        """Whether the cables hold the platform in a stable equilibrium, shape () or (N,)."""
+        return np.asarray(self.status == ForwardStatus.SOLVED)
+
+    @property
+    def position_error(self) -> Array:
+        """Where the platform origin is less where it was planned [m], world axes, shape (3,) or (N, 3)."""
+        return locked(self.pose.position - self.plan.state.pose.position)
+
+    @property
+    def rotation_error(self) -> Array:
+        """Angle between the platform's orientation and the planned one [rad], shape () or (N,)."""
+        planned, real = self.plan.state.pose.quaternion, self.pose.quaternion
+        # from sine and cosine of half the angle: precise for the smallest angles, as the cosine alone is not
+        sine = 0.5 * np.linalg.norm(real - planned, axis=-1) * np.linalg.norm(real + planned, axis=-1)
+        cosine = np.abs(np.einsum("...i,...i->...", real, planned))
+        return locked(np.asarray(2.0 * np.arctan2(sine, cosine)))
+
+
+def confirm(plan: Plan) -> Confirmation:
+    """Wind a plan's lengths onto exact catenaries and find where the platform rests.
+
+    Inertia and external wrench are the plan's; the search starts from the planned poses.
+
+    Args:
+        plan: A plan of any cable model: the errors are that model's. Those of the exact one are of rounding alone.
+
+    Returns:
+        The plan with the poses found.
+    """
+    state, lengths = plan.state, plan.unstrained_length
+    if not state.pose.shape:
+        found = forward(state.robot, lengths, start=state.pose, wrench=state.wrench)
+        return Confirmation(plan, found.pose, found.status, found.wrench_residual)
+    blocks = []
+    for first in range(0, len(lengths), BLOCK):
+        part = slice(first, first + BLOCK)
+        found = forward(state.robot, lengths[part], start=state.pose[part], wrench=state.wrench[part])
+        blocks.append((found.pose.position, found.pose.quaternion, found.status, found.wrench_residual))
+    position, quaternion, status, residual = (locked(np.concatenate(parts)) for parts in zip(*blocks, strict=True))
+    return Confirmation(plan, Pose._adopt(position, quaternion), status, residual)

@@ -1,0 +1,13 @@
+"""Figures a person would put in a paper: every function draws on the Axes it is given, or makes a figure of its own.
+
+No global state: `matplotlib.pyplot` is neither used nor needed. In a notebook a returned figure shows itself; of an
+Axes it is `ax.figure` that does. `save` writes either to a file.
+"""
+
+from sagline.plot.courses import lengths, overview, tensions
+from sagline.plot.errors import error, errors
+from sagline.plot.motion import path, velocity
+from sagline.plot.robot import robot
+from sagline.plot.sheet import save
+
+__all__ = ["error", "errors", "lengths", "overview", "path", "robot", "save", "tensions", "velocity"]

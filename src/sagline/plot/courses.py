@@ -1,0 +1,131 @@
+"""What the cables do along a plan: lengths, tensions, and all of it on one page."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
+
+from sagline.errors import InvalidValueError
+from sagline.plot.sheet import COLORS, TICK, axes_or_new, dressed, legend_outside, shade, sheet
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from sagline.arrays import Array
+    from sagline.kinematics.plan import Plan
+
+TENSIONS = {
+    "chord_tension": r"chord tension $\tau$ [N]",
+    "horizontal_tension": r"horizontal tension $T_x$ [N]",
+    "vertical_force": r"vertical force $T_z$ [N]",
+    "frame_end_tension": r"tension at the frame end $T_A$ [N]",
+    "platform_end_tension": r"tension at the platform end $T_B$ [N]",
+}
+LENGTHS = {
+    "unstrained_length": (r"unstrained length $L$ [m]", 1.0),
+    "adjusting_length": (r"adjusting length $d = L - D$ [mm]", 1e3),
+}
+INFEASIBLE = "infeasible"
+
+Entry = TypeVar("Entry")
+
+
+def tensions(plan: Plan, quantity: str = "chord_tension", ax: Axes | None = None) -> Axes:
+    """Tensions of all cables over time.
+
+    Args:
+        plan: The plan; over the number of the pose where it follows no path.
+        quantity: One of "chord_tension", "horizontal_tension", "vertical_force", "frame_end_tension" and
+            "platform_end_tension", as `CableState` has them [N].
+        ax: Axes to draw on; None for a new figure.
+
+    Returns:
+        The axes.
+
+    Raises:
+        InvalidValueError: If there is no such quantity.
+    """
+    ax = axes_or_new(ax)
+    _tensions(ax, plan, quantity)
+    legend_outside(ax)
+    return ax
+
+
+def lengths(plan: Plan, quantity: str = "unstrained_length", ax: Axes | None = None) -> Axes:
+    """Lengths of all cables over time.
+
+    Args:
+        plan: The plan; over the number of the pose where it follows no path.
+        quantity: "unstrained_length", L [m], or "adjusting_length", d = L - D [mm].
+        ax: Axes to draw on; None for a new figure.
+
+    Returns:
+        The axes.
+
+    Raises:
+        InvalidValueError: If there is no such quantity.
+    """
+    ax = axes_or_new(ax)
+    _lengths(ax, plan, quantity)
+    legend_outside(ax)
+    return ax
+
+
+def overview(plan: Plan) -> Figure:
+    """Lengths, adjusting lengths, horizontal tensions and vertical forces of all cables: the article's figure 20.
+
+    Args:
+        plan: The plan; over the number of the pose where it follows no path.
+
+    Returns:
+        A figure of four panels.
+    """
+    figure = sheet(height=5.0)
+    panels = figure.subplots(2, 2, sharex=True)
+    _lengths(panels[0, 0], plan, "unstrained_length")
+    _lengths(panels[0, 1], plan, "adjusting_length")
+    _tensions(panels[1, 0], plan, "horizontal_tension")
+    _tensions(panels[1, 1], plan, "vertical_force")
+    for ax in panels[0]:
+        ax.set_xlabel("")
+    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside right center", fontsize=TICK, frameon=False)
+    return figure
+
+
+def clock_of(plan: Plan) -> Array:
+    """What a plan runs along: its path's times [s], or the numbers of its poses."""
+    return np.arange(plan.status.size, dtype=np.float64) if plan.path is None else plan.path.time
+
+
+def _lengths(ax: Axes, plan: Plan, quantity: str) -> None:
+    label, scale = _known(quantity, LENGTHS)
+    _cables(ax, plan, scale * getattr(plan.state.cables, quantity), label)
+
+
+def _tensions(ax: Axes, plan: Plan, quantity: str) -> None:
+    _cables(ax, plan, getattr(plan.state.cables, quantity), _known(quantity, TENSIONS))
+
+
+def _known(quantity: str, table: Mapping[str, Entry]) -> Entry:
+    if quantity not in table:
+        raise InvalidValueError("quantity", repr(quantity), ", ".join(table), "Name one of them.")
+    return table[quantity]
+
+
+def _cables(ax: Axes, plan: Plan, values: Array, label: str) -> None:
+    """One line a cable; neighbors, which most robots pair at a winch post, share a color."""
+    courses = np.atleast_2d(values)
+    clock = clock_of(plan)
+    marker = "o" if len(courses) == 1 else None
+    for i, course in enumerate(courses.T):
+        color = COLORS[i // 2 % len(COLORS)]
+        style = "-" if i % 2 == 0 else (0, (4.0, 1.6))
+        ax.plot(clock, course, color=color, linestyle=style, linewidth=1.1, marker=marker, label=f"cable {i}")
+    shade(ax, clock, [(gap.first, gap.last) for gap in plan.gaps], INFEASIBLE)
+    dressed(ax, "pose" if plan.path is None else "time [s]", label)
+    if len(clock) > 1:
+        ax.set_xlim(clock[0], clock[-1])

@@ -1,0 +1,69 @@
+"""How far the platform ends up from where it was planned: the article's figure 22."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sagline.plot.courses import INFEASIBLE, clock_of
+from sagline.plot.sheet import COLORS, TICK, axes_or_new, dressed, legend_outside, shade, sheet
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from sagline.kinematics.confirm import Confirmation
+
+LEAST = 1e-3  # mm: rounding errors are drawn as the flat line that they are
+STYLES = ("-", (0, (4.0, 1.6)), (0, (1.0, 1.2)))
+
+
+def error(confirmation: Confirmation, ax: Axes | None = None) -> Axes:
+    """Position error along x, y and z over time: where the platform really is, less where it was planned.
+
+    Args:
+        confirmation: A plan and what its lengths lead to.
+        ax: Axes to draw on; None for a new figure.
+
+    Returns:
+        The axes.
+    """
+    ax = axes_or_new(ax, height=2.6)
+    _draw(ax, confirmation)
+    legend_outside(ax)
+    return ax
+
+
+def errors(*confirmations: Confirmation) -> Figure:
+    """Position errors of several plans side by side, on one scale: the article's figure 22.
+
+    Args:
+        confirmations: Plans and what their lengths lead to.
+
+    Returns:
+        A figure of one panel each, titled with the robot.
+    """
+    figure = sheet(height=2.8)
+    panels = figure.subplots(1, len(confirmations), sharey=True, squeeze=False)[0]
+    for ax, confirmation in zip(panels, confirmations, strict=True):
+        _draw(ax, confirmation)
+        ax.set_title(confirmation.plan.state.robot.name, fontsize=TICK)
+        ax.label_outer()
+    handles = {label: line for ax in panels for line, label in zip(*ax.get_legend_handles_labels(), strict=True)}
+    figure.legend(handles.values(), handles.keys(), loc="outside right upper", fontsize=TICK, frameon=False)
+    return figure
+
+
+def _draw(ax: Axes, confirmation: Confirmation) -> None:
+    plan = confirmation.plan
+    clock = clock_of(plan)
+    courses = 1e3 * np.atleast_2d(confirmation.position_error)
+    for name, course, color, style in zip("xyz", courses.T, COLORS[:3], STYLES, strict=True):
+        ax.plot(clock, course, color=color, linestyle=style, linewidth=1.2, label=f"${name}$")
+    shade(ax, clock, [(gap.first, gap.last) for gap in plan.gaps], INFEASIBLE)
+    dressed(ax, "pose" if plan.path is None else "time [s]", "position error [mm]")
+    low, high = ax.get_ylim()
+    ax.set_ylim(min(low, -LEAST), max(high, LEAST))
+    if clock.size > 1:
+        ax.set_xlim(clock[0], clock[-1])

@@ -1,0 +1,109 @@
+"""The sheet a figure is drawn on, its look, and the way it gets into a file."""
+
+from __future__ import annotations
+
+import os
+from io import BytesIO
+from itertools import pairwise
+from pathlib import Path as FilePath
+from typing import TYPE_CHECKING, cast
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+
+from sagline.errors import FileError
+from sagline.files.whole import written_whole
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from matplotlib.axes import Axes
+
+    from sagline.arrays import Array
+
+# Okabe and Ito 2008, "Color universal design", without the two that are too pale for a line on white
+BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"
+COLORS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
+GAP_COLOR = "#BBBBBB"
+WIDTH = 7.0  # in, of a page with margins
+LABEL, TICK = 9.0, 8.0  # pt
+RESOLUTION = 200  # dots an inch
+
+
+class Sheet(Figure):
+    """A figure without pyplot that a notebook can show."""
+
+    def _repr_png_(self) -> bytes:
+        buffer = BytesIO()
+        self.savefig(buffer, format="png", dpi=100)
+        return buffer.getvalue()
+
+
+def sheet(height: float, width: float = WIDTH) -> Sheet:
+    """An empty figure [in] that leaves room for what stands outside its axes."""
+    return Sheet(figsize=(width, height), layout="constrained")
+
+
+def axes_or_new(ax: Axes | None, height: float = 3.0, width: float = WIDTH) -> Axes:
+    """The caller's Axes, or the only ones of a new figure."""
+    return sheet(height, width).add_subplot() if ax is None else ax
+
+
+def dressed(ax: Axes, x: str, y: str) -> None:
+    """Labels, a light grid, and no more lines around it than needed."""
+    ax.set_xlabel(x, fontsize=LABEL)
+    ax.set_ylabel(y, fontsize=LABEL)
+    ax.tick_params(labelsize=TICK, length=3.0, width=0.6)
+    ax.grid(color="0.9", linewidth=0.6)
+    ax.set_axisbelow(True)
+    ax.spines[["top", "right"]].set_visible(False)
+    ax.spines[["left", "bottom"]].set_linewidth(0.6)
+
+
+def legend_outside(ax: Axes, title: str = "") -> None:
+    """The legend of the axes, to the right of them."""
+    ax.legend(
+        loc="upper left",
+        bbox_to_anchor=(1.01, 1.0),
+        borderaxespad=0.0,
+        fontsize=TICK,
+        title=title or None,
+        title_fontsize=TICK,
+        frameon=False,
+        handlelength=2.4,
+    )
+
+
+def shade(ax: Axes, clock: Array, spans: Iterable[tuple[int, int]], label: str) -> None:
+    """Shade the spans of samples (first, last), each up to halfway to its neighbors."""
+    if clock.size > 1:
+        middles = [0.5 * (before + after) for before, after in pairwise(clock)]
+        edges = np.array([clock[0], *middles, clock[-1]])
+    else:
+        edges = clock[0] + np.array([-0.5, 0.5])
+    for k, (first, last) in enumerate(spans):
+        name = label if k == 0 else "_"
+        ax.axvspan(edges[first], edges[last + 1], color=GAP_COLOR, alpha=0.5, linewidth=0.0, label=name, zorder=0.5)
+
+
+def save(drawing: Figure | Axes, file: os.PathLike[str] | str) -> None:
+    """Write a figure to a file, whole or not at all; the suffix (.png, .svg, .pdf) says how.
+
+    Args:
+        drawing: A figure, or Axes: then the whole figure they are in.
+        file: The file; one that exists is replaced.
+
+    Raises:
+        FileError: If the file cannot be written, or its suffix is none that matplotlib knows.
+    """
+    figure = drawing if isinstance(drawing, Figure) else cast(Figure, drawing.get_figure(root=True))
+    path = FilePath(file)
+    kind = path.suffix.lstrip(".").lower()
+    known = figure.canvas.get_supported_filetypes()
+    if kind not in known:
+        raise FileError(path, f"the suffix is {path.suffix or 'missing'}", f"Choose one of {', '.join(sorted(known))}.")
+    # the same figure gives the same bytes: no date, no random names
+    metadata = {"Date": None} if kind == "svg" else None
+    with written_whole(path) as partial, matplotlib.rc_context({"svg.hashsalt": "sagline"}):
+        figure.savefig(partial, format=kind, dpi=RESOLUTION, metadata=metadata)
