@@ -38,6 +38,7 @@ from sagline.statics.wrench import inertial_wrench
 from sagline.tension.closest import Closest
 from sagline.tension.method import TensionMethod
 from sagline.tension.minimum_norm import MinimumNorm
+from sagline.tension.polygon import Side, TensionPolygon, tension_polygon
 
 if TYPE_CHECKING:
     from sagline import plot
@@ -76,8 +77,10 @@ __all__ = [
     "PoseStatus",
     "Robot",
     "SaglineError",
+    "Side",
     "Straight",
     "TensionMethod",
+    "TensionPolygon",
     "__version__",
     "article_balance",
     "article_path",
@@ -95,6 +98,7 @@ __all__ = [
     "robot_names",
     "save_plan",
     "structure_matrix",
+    "tension_polygon",
 ]
 
 # The outer ring loads on first use: it brings xarray, matplotlib, pint and pydantic with it.

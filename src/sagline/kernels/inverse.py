@@ -32,8 +32,8 @@ from sagline.kernels.hanging import NEAR, chord_tension_at_frame_end, hang_cable
 from sagline.kernels.jit import formula, kernel
 from sagline.kernels.models import pull_of_shallow
 from sagline.kernels.null_space import factorize, minimum_norm, orthogonal_factor, pseudo_inverse
-from sagline.kernels.polygon import SPARE_CORNERS
-from sagline.kernels.sharing import share_nearest
+from sagline.kernels.polygon import SPARE_CORNERS, feasible_polygon
+from sagline.kernels.sharing import feasible_interval, share_nearest
 from sagline.kernels.shortfall import wrench_shortfall
 from sagline.kernels.statics import needed_wrench, restrict_needed, restrict_rows, structure_matrix
 
@@ -338,3 +338,57 @@ def inverse_poses(
             numbers[p, SHORTFALL] = math.nan
         pose_statuses[p] = status
         store(status == POSE_SOLVED, work, geometry, results, p)
+
+
+@kernel
+def polygon_of_pose(
+    code: int,
+    k_h: float,
+    k_p: float,
+    method: int,
+    variable: int,
+    limits_of: int,
+    validity: float,
+    freedom: Array,
+    body: Array,
+    robot: Array,
+    pose: Array,
+    wrench: Array,
+    work: Array,
+    null: Array,
+    corners: Array,
+    labels: Indices,
+) -> tuple[int, int]:
+    """The feasible set of one pose with the pulls of its shared tensions: status and number of corners.
+
+    Fills work (WORK_ROWS, m), the null space (r, m) and, for r = 2, corners and labels as `feasible_polygon`; for
+    r = 1 corners[0, 0] and corners[1, 0] are the ends of the interval (infinite where it has none).
+    """
+    r, m = null.shape
+    n = freedom.shape[0]
+    rotation = np.empty((3, 3))
+    geometry = np.empty((g.GEOMETRY_ROWS, m))
+    balance = np.empty((tables.BALANCE_ROWS, 6))
+    full = np.empty((6, m))
+    matrix = np.empty((n, m))
+    reduced = np.empty((n, m))
+    q = np.empty((m + 1, m))
+    inverse = np.empty((n, m))
+    reference = np.zeros(r)
+    statuses = np.empty(m, dtype=np.int8)
+    cable_geometry(robot, body, pose, rotation, geometry)
+    if not place_cables(code, k_h, k_p, limits_of, validity, body[tables.GRAVITY], robot, geometry, work):
+        return POSE_NO_CHORD, 0
+    scale_tensions(variable, geometry, work)
+    if not factor_balance(freedom, geometry, work, full, matrix, reduced, balance, q, inverse, null):
+        return POSE_SINGULAR, 0
+    status = settle(
+        code, k_h, k_p, freedom, body, wrench, geometry, work, balance,
+        inverse, null, reference, corners, labels, statuses,
+    )  # fmt: skip
+    if status != POSE_SOLVED or r == 0:
+        return status, 1 if status == POSE_SOLVED else 0
+    if r == 1:
+        corners[0, 0], corners[1, 0] = feasible_interval(work, null)
+        return status, 2
+    return status, feasible_polygon(work, null, corners, labels)

@@ -23,9 +23,7 @@ from sagline.statics.tables import body_table, cable_table, pose_rows
 from sagline.statics.wrench import external_wrench, inertial_wrench
 from sagline.tension.closest import Closest
 from sagline.tension.method import TensionMethod
-
-LIMITS_OF = {"chord": codes.LIMITS_OF_CHORD, "frame_end": codes.LIMITS_OF_FRAME_END}
-MOST_REDUNDANT = 2
+from sagline.tension.options import check_redundancy, kernel_options
 
 _CATENARY = Catenary()
 _CLOSEST = Closest()
@@ -105,29 +103,6 @@ def inverse(
         shortfall=locked(found.numbers[:, SHORTFALL].reshape(pose.shape)),
         wrench_residual=locked(found.numbers[:, [FORCE_RESIDUAL, MOMENT_RESIDUAL]].reshape(*pose.shape, 2)),
         blocking=locked(found.blocking.reshape(*pose.shape, -1)),
-    )
-
-
-def kernel_options(
-    robot: Robot, model: CableModel, tension: TensionMethod
-) -> tuple[int, float, float, int, int, int, float]:
-    """Model, method and limits as the kernel's leading codes and parameters."""
-    limits_of = LIMITS_OF[robot.tension_limits_of]
-    return model.code, *model.parameters, tension.code, tension.variable_code, limits_of, tension.validity
-
-
-def check_redundancy(robot: Robot) -> None:
-    """Refuse a robot whose tensions the inverse cannot determine.
-
-    Raises:
-        InvalidValueError: If it has fewer cables than degrees of freedom, or more than two redundant ones.
-    """
-    n, m = robot.degrees_of_freedom, robot.cable_count
-    if n <= m <= n + MOST_REDUNDANT:
-        return
-    step = "Add cables, or choose a motion pattern with fewer freedoms." if m < n else "Leave out some cables."
-    raise InvalidValueError(
-        f"{robot.name}: number of cables", m, f"{n} to {n + MOST_REDUNDANT} for {robot.motion_pattern}", step
     )
 
 

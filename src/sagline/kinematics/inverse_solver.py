@@ -15,12 +15,12 @@ from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
 from sagline.kernels import tables
 from sagline.kernels.inverse import POSE_NUMBERS, SHORTFALL, inverse_poses
-from sagline.kinematics.inverse import check_redundancy, kernel_options
 from sagline.kinematics.status import PoseStatus
 from sagline.robot.robot import Robot
 from sagline.statics.tables import body_table, cable_table
 from sagline.tension.closest import Closest
 from sagline.tension.method import TensionMethod
+from sagline.tension.options import check_redundancy, kernel_options
 
 _STATUSES = tuple(PoseStatus)  # by code; a lookup costs a tenth of a conversion
 QUATERNION_TOLERANCE = 2e-6  # of the squared length: as `Pose.from_quaternion`
