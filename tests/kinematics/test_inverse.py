@@ -1,0 +1,268 @@
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from sagline.cables.cable import Cable
+from sagline.cables.catenary import Catenary
+from sagline.cables.elastic import Elastic
+from sagline.cables.empirical import Empirical
+from sagline.cables.model import CableModel
+from sagline.cables.parabolic import Parabolic
+from sagline.cables.status import CableStatus
+from sagline.cables.straight import Straight
+from sagline.errors import CableGeometryError, InvalidValueError
+from sagline.files.robot_file import load_robot
+from sagline.kinematics.inverse import inverse
+from sagline.kinematics.inverse_solver import InverseSolver
+from sagline.kinematics.status import PoseStatus
+from sagline.motion.planar import article_path
+from sagline.motion.quintic import quintic_path
+from sagline.robot.catalogue import robot_names
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.statics.balance import article_balance, structure_matrix
+from sagline.tension.closest import Closest
+from sagline.tension.minimum_norm import MinimumNorm
+from tests.tension.reference import nearest, needed, random_poses, structure, unbalanced
+
+MODELS = (Straight(), Elastic(), Empirical(), Parabolic(), Catenary())
+LEVEL = np.eye(3)
+
+
+def planar(**changes: object) -> Robot:
+    """Four cables to one point of a level plane, across which no weight acts; limits 3.8 to 25 N."""
+    side = 0.315
+    fields = {
+        "name": "planar",
+        "frame_anchors": [[-side, -side, 0], [side, -side, 0], [side, side, 0], [-side, side, 0]],
+        "platform_anchors": np.zeros((4, 3)),
+        "cables": Cable(1e-3, 1e5),
+        "mass": 1.0,
+        "motion_pattern": "2T",
+        "plane_normal": [0, 0, 1],
+        "tension_min": 3.8,
+        "tension_max": 25.0,
+    }
+    return Robot(**{**fields, **changes})
+
+
+@pytest.mark.parametrize("name", robot_names())
+@pytest.mark.parametrize("model", MODELS, ids=lambda model: type(model).__name__)
+def test_cables_balance_weight_and_wrench(name: str, model: CableModel) -> None:
+    robot, rng = load_robot(name), np.random.default_rng(1)
+    poses = random_poses(robot, 200, rng)
+    load = rng.normal(size=(200, 6)) * 0.02 * robot.mass * robot.gravity
+    load[:, 3:] *= np.ptp(robot.platform_anchors, axis=0).max()
+    plan = inverse(robot, poses, model=model, tension=MinimumNorm(), wrench=load)
+    assert plan.feasible.sum() > 100
+    scale = max(1.0, 1e-6 * robot.tension_max.max())  # forces of FAST: meganewtons
+    left = np.abs(unbalanced(plan)[plan.feasible])
+    assert left.max() <= 1e-8 * scale
+    assert plan.wrench_residual[plan.feasible].max() <= 1e-8 * scale
+    tensions = plan.chord_tension[plan.feasible]
+    slack = 1e-12 * robot.tension_max
+    assert (tensions >= robot.tension_min - slack).all()
+    assert (tensions <= robot.tension_max + slack).all()
+
+
+def test_kernel_balance_is_written_out_and_article_balance_is_it_too() -> None:
+    robot = load_robot("article-mixed").replace(center_of_mass=[0.02, -0.01, 0.05])
+    poses = random_poses(robot, 30, np.random.default_rng(2))
+    matrices, article = structure_matrix(robot, poses), article_balance(robot, poses)
+    plan = inverse(robot, poses, model=Empirical(), tension=MinimumNorm())
+    assert plan.feasible.all()
+    for i, pose in enumerate(poses):
+        np.testing.assert_allclose(matrices[i], structure(robot, pose), atol=1e-14)
+        # the article's system holds for our horizontal tensions: H t_x + b = 0 without inertia
+        left = article.h[i] @ plan.horizontal_tension[i] + article.b[i]
+        np.testing.assert_allclose(left, 0.0, atol=1e-9)
+        cosine = plan.state.cables.span[i] / plan.state.cables.chord[i]
+        np.testing.assert_allclose(article.h[i] * cosine, matrices[i], atol=1e-13)
+
+
+@pytest.mark.parametrize("variable", ["chord", "horizontal"])
+@pytest.mark.parametrize("name", ["article-suspended", "article-mixed", "falcon-7", "cogiro", "ipanema-3"])
+def test_minimum_norm_and_closest_are_those_of_a_quadratic_program(name: str, variable: str) -> None:
+    robot, rng = load_robot(name), np.random.default_rng(3)
+    poses = random_poses(robot, 40, rng)
+    path = quintic_path(poses.position[:5], durations=[20.0] * 4, rate=5)
+    weight = np.zeros(6)
+    at_limits = 0
+    for motion, method in ((poses, MinimumNorm(variable)), (path, Closest(variable))):
+        plan = inverse(robot, motion, model=Elastic(), tension=method)
+        before = None
+        for i in np.flatnonzero(plan.feasible):
+            pose = plan.state.pose[int(i)]
+            cosine = plan.state.cables.span[i] / plan.state.cables.chord[i]
+            scale = cosine if variable == "horizontal" else np.ones(robot.cable_count)
+            load = plan.state.wrench[i] if plan.state.wrench.ndim == 2 else weight
+            target = np.zeros(robot.cable_count) if before is None or motion is poses else before
+            best = nearest(
+                structure(robot, pose) / scale,
+                needed(robot, load),
+                robot.tension_min * scale,
+                robot.tension_max * scale,
+                target,
+                np.ones(robot.cable_count),
+            )
+            found = plan.chord_tension[i] * scale
+            at_limits += int((np.abs(plan.chord_tension[i] - robot.tension_min) < 1e-9).any())
+            np.testing.assert_allclose(found, best, atol=1e-6 * found.max())
+            before = found
+    assert at_limits > 0 or name in ("article-suspended", "cogiro")  # whose limits are far in the box
+
+
+def test_closest_depends_on_the_path_and_minimum_norm_does_not() -> None:
+    robot, path = load_robot("article-mixed"), article_path(rate=10)
+    closest, least = inverse(robot, path), inverse(robot, path, tension=MinimumNorm())
+    np.testing.assert_array_equal(path.pose.position[0], path.pose.position[-1])
+    np.testing.assert_allclose(least.chord_tension[0], least.chord_tension[-1], rtol=1e-9)
+    np.testing.assert_allclose(closest.chord_tension[0], least.chord_tension[0], rtol=1e-12)
+    assert np.abs(closest.chord_tension[0] - closest.chord_tension[-1]).max() > 1.0
+
+
+def test_a_batch_of_poses_stands_alone_and_previous_continues() -> None:
+    robot, path = load_robot("article-suspended"), article_path(rate=10)
+    alone = inverse(robot, path.pose)
+    np.testing.assert_array_equal(alone.chord_tension, inverse(robot, path.pose, tension=MinimumNorm()).chord_tension)
+    whole = inverse(robot, path.pose, previous=inverse(robot, path.pose[0]))
+    first = inverse(robot, path.pose[:300])
+    carried = inverse(robot, path.pose[:300], previous=inverse(robot, path.pose[0]))
+    rest = inverse(robot, path.pose[300:], previous=carried)
+    np.testing.assert_array_equal(rest.chord_tension, whole.chord_tension[300:])
+    assert np.abs(rest.chord_tension - alone.chord_tension[300:]).max() > 1e-3
+    assert np.abs(carried.chord_tension - first.chord_tension).max() > 1e-3
+
+
+@pytest.mark.parametrize("variable", ["chord", "horizontal"])
+@pytest.mark.parametrize("model", MODELS, ids=lambda model: type(model).__name__)
+def test_limits_at_the_frame_end_are_met_exactly(model: CableModel, variable: str) -> None:
+    robot = load_robot("article-mixed").replace(tension_limits_of="frame_end")
+    poses = random_poses(robot, 100, np.random.default_rng(4))
+    plan = inverse(robot, poses, model=model, tension=MinimumNorm(variable))
+    tension = plan.state.cables.frame_end_tension[plan.feasible]
+    assert tension.min() == pytest.approx(25.0, abs=1e-9)
+    assert (np.abs(tension - 25.0) < 1e-9).sum() > 50
+    assert tension.max() <= 2000.0 + 1e-9
+
+
+def test_article_bound_keeps_the_lowest_point_outside_the_span() -> None:
+    robot, margin = load_robot("article-suspended").replace(tension_min=0.0), 3.0
+    poses = random_poses(robot, 100, np.random.default_rng(5))
+    plain = inverse(robot, poses, model=Empirical(), tension=MinimumNorm("horizontal"))
+    bound = inverse(robot, poses, model=Empirical(), tension=MinimumNorm("horizontal", lowest_point_margin=margin))
+    state = bound.state.cables
+    weight = robot.cables.linear_density * robot.gravity
+    least = 0.5 * weight * state.chord * state.span / np.abs(state.rise) + margin
+    gap = (bound.horizontal_tension - least)[bound.feasible]
+    assert gap.min() == pytest.approx(0.0, abs=1e-9)
+    assert (plain.horizontal_tension - least)[plain.feasible].min() < -1.0
+    assert not (state.status[bound.feasible] == CableStatus.BELOW_VALIDITY).any()
+
+
+def test_infeasible_poses_keep_nothing_but_the_reason() -> None:
+    robot = load_robot("article-suspended")
+    path = quintic_path([(0, 0, 1.5), (7.4, 0, 1.5), (0, 0, 1.5), (7.45, 0, 1.5)], durations=[5, 5, 5], rate=20)
+    plan = inverse(robot, path)
+    lost = ~plan.feasible
+    assert 10 < lost.sum() < len(lost) - 10
+    assert np.isnan(plan.chord_tension[lost]).all()
+    assert np.isnan(plan.unstrained_length[lost]).all()
+    assert (plan.shortfall[lost] > 0).all()
+    assert (plan.shortfall[~lost] == 0).all()
+    assert len(plan.gaps) == 2
+    covered = np.concatenate([np.arange(gap.first, gap.last + 1) for gap in plan.gaps])
+    np.testing.assert_array_equal(covered, np.flatnonzero(lost))
+    for gap in plan.gaps:
+        assert gap.status is PoseStatus.INFEASIBLE
+        assert gap.shortfall == plan.shortfall[gap.first : gap.last + 1].max()
+        assert gap.cables
+    after = plan.gaps[0].last + 1  # the last feasible set is the reference after the gap
+    same = inverse(robot, plan.state.pose[after], previous=inverse(robot, path.pose[: plan.gaps[0].first]))
+    assert same.feasible
+    before = plan.chord_tension[plan.gaps[0].first - 1]
+    alone = inverse(robot, plan.state.pose[after], tension=MinimumNorm())
+    there = np.linalg.norm(plan.chord_tension[after] - before)
+    assert there <= np.linalg.norm(alone.chord_tension - before) + 0.5
+
+
+def test_known_answer_of_a_planar_robot() -> None:
+    pull = np.array([-4.955131227, 0.055732486])
+    plan = inverse(planar(), Pose([0.08, 0.045, 0.0], LEVEL), tension=MinimumNorm(), wrench=[*-pull, 0, 0, 0, 0])
+    np.testing.assert_allclose(plan.chord_tension, [5.209314465, 3.8, 3.8, 6.876421727], atol=2e-9)
+
+
+def test_equal_limits_leave_one_answer() -> None:
+    robot = planar(tension_min=10.0, tension_max=10.0)
+    centered = inverse(robot, Pose(np.zeros(3), LEVEL), tension=MinimumNorm())
+    np.testing.assert_allclose(centered.chord_tension, 10.0, rtol=1e-12)
+    assert not inverse(robot, Pose([0.01, 0.0, 0.0], LEVEL), tension=MinimumNorm()).feasible
+
+
+def test_no_upper_limit() -> None:
+    robot = load_robot("article-mixed").replace(tension_max=np.inf)
+    limited = load_robot("article-mixed")
+    poses = random_poses(robot, 50, np.random.default_rng(6))
+    found, same = (inverse(r, poses, tension=MinimumNorm()) for r in (robot, limited))
+    np.testing.assert_allclose(found.chord_tension, same.chord_tension, rtol=1e-9)
+
+
+def test_solver_repeats_inverse() -> None:
+    robot, path = load_robot("article-suspended"), article_path(rate=5)
+    plan = inverse(robot, path.pose, previous=inverse(robot, path.pose[0]))
+    solver = InverseSolver(robot)
+    out = np.empty(8)
+    solver.step(path.pose.position[0], path.pose.quaternion[0])
+    for i, (position, quaternion) in enumerate(zip(path.pose.position, path.pose.quaternion, strict=True)):
+        step = solver.step(position, quaternion)
+        np.testing.assert_array_equal(step.unstrained_length, plan.unstrained_length[i])
+        np.testing.assert_array_equal(step.chord_tension, plan.chord_tension[i])
+        np.testing.assert_array_equal(step.vertical_force, plan.vertical_force[i])
+    assert solver.step_into(position, quaternion, out) is PoseStatus.SOLVED
+    np.testing.assert_allclose(out, plan.unstrained_length[-1], rtol=1e-12)
+    lost = solver.step([7.45, 0.0, 1.5], [0.0, 0.0, 0.0, 1.0])
+    assert lost.status is PoseStatus.INFEASIBLE
+    assert np.isnan(lost.unstrained_length).all()
+    assert lost.shortfall > 0
+    solver.reset()
+    fresh = solver.step(path.pose.position[7], path.pose.quaternion[7])
+    np.testing.assert_array_equal(fresh.chord_tension, inverse(robot, path.pose[7]).chord_tension)
+
+
+def test_singular_pose() -> None:
+    # all cables meet the axis through the center of mass: no cable resists turning about it
+    corners = np.array([[3.0, 3, 3], [-3, 3, 3], [-3, -3, 3], [3, -3, 3]])
+    frame = np.concatenate((corners, corners * [1, 1, -1]))
+    ends = np.repeat([[0.0, 0, 0.2], [0, 0, -0.2]], 4, axis=0)
+    robot = Robot("spinning", frame, ends, Cable(0.01, 1e5), 5.0, np.eye(3), tension_min=1.0, tension_max=1e3)
+    plan = inverse(robot, Pose([0.1, 0.0, 0.0], LEVEL))
+    assert plan.status == PoseStatus.SINGULAR
+    assert np.isnan(plan.chord_tension).all()
+    assert np.isnan(plan.shortfall)
+
+
+def test_bad_input() -> None:
+    robot = load_robot("article-suspended")
+    pose = Pose([0, 0, 1.5], LEVEL)
+    with pytest.raises(InvalidValueError, match=r"wrench is of shape"):
+        inverse(robot, pose, wrench=np.zeros((2, 6)))
+    with pytest.raises(InvalidValueError, match=r"wrench\[2\] is nan"):
+        inverse(robot, pose, wrench=[0, 0, np.nan, 0, 0, 0])
+    with pytest.raises(InvalidValueError, match=r"position\[1\] is nan"):
+        InverseSolver(robot).step([0, np.nan, 0], [0, 0, 0, 1])
+    with pytest.raises(InvalidValueError, match="number of cables is 4; allowed: 6"):
+        few = robot.replace(
+            frame_anchors=robot.frame_anchors[:4],
+            platform_anchors=robot.platform_anchors[:4],
+            cables=Cable(0.067, 44e3),
+            tension_min=25.0,
+            tension_max=2000.0,
+        )
+        inverse(few, pose)
+    with pytest.raises(InvalidValueError, match="previous is a plan of 7 cables"):
+        seven = load_robot("falcon-7")
+        inverse(robot, pose, previous=inverse(seven, Pose(seven.test_box.low, LEVEL)))
+    with pytest.raises(InvalidValueError, match="variable is 'sum'"):
+        MinimumNorm("sum")  # type: ignore[arg-type]
+    with pytest.raises(CableGeometryError, match="cable 0: distance between its ends is 0 m"):
+        inverse(robot, Pose(robot.frame_anchors[0] - robot.platform_anchors[0], Rotation.identity()))
