@@ -35,10 +35,20 @@ from sagline.robot.pose_box import PoseBox
 from sagline.robot.robot import Robot
 from sagline.statics.balance import ArticleBalance, article_balance, structure_matrix
 from sagline.statics.wrench import inertial_wrench
+from sagline.tension.analytic_center import AnalyticCenter
+from sagline.tension.centroid import Centroid
+from sagline.tension.closed_form import ClosedForm
 from sagline.tension.closest import Closest
+from sagline.tension.improved_closed_form import ImprovedClosedForm
+from sagline.tension.lowest_maximum import LowestMaximum
+from sagline.tension.lowest_sum import LowestSum
 from sagline.tension.method import TensionMethod
 from sagline.tension.minimum_norm import MinimumNorm
+from sagline.tension.p_norm import PNorm
 from sagline.tension.polygon import Side, TensionPolygon, tension_polygon
+from sagline.tension.polygon_walk import PolygonWalk
+from sagline.tension.puncture import Puncture
+from sagline.tension.quadratic_program import QuadraticProgram
 
 if TYPE_CHECKING:
     from sagline import plot
@@ -49,6 +59,7 @@ if TYPE_CHECKING:
 __version__ = version("sagline")
 
 __all__ = [
+    "AnalyticCenter",
     "ArticleBalance",
     "Cable",
     "CableGeometryError",
@@ -56,6 +67,8 @@ __all__ = [
     "CableState",
     "CableStatus",
     "Catenary",
+    "Centroid",
+    "ClosedForm",
     "Closest",
     "Confirmation",
     "Elastic",
@@ -65,16 +78,23 @@ __all__ = [
     "ForwardSolution",
     "ForwardStatus",
     "Gap",
+    "ImprovedClosedForm",
     "InvalidValueError",
     "InverseSolver",
     "InverseStep",
+    "LowestMaximum",
+    "LowestSum",
     "MinimumNorm",
+    "PNorm",
     "Parabolic",
     "Path",
     "Plan",
+    "PolygonWalk",
     "Pose",
     "PoseBox",
     "PoseStatus",
+    "Puncture",
+    "QuadraticProgram",
     "Robot",
     "SaglineError",
     "Side",

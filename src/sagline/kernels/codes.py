@@ -20,10 +20,21 @@ CABLE_NOT_CONVERGED = 5
 # Ways of sharing the load among redundant cables.
 MINIMUM_NORM = 0
 CLOSEST = 1
+QUADRATIC_PROGRAM = 2  # up to here: the feasible point nearest to a target
+LOWEST_SUM = 3
+LOWEST_MAXIMUM = 4
+P_NORM = 5
+CENTROID = 6
+ANALYTIC_CENTER = 7
+CLOSED_FORM = 8
+IMPROVED_CLOSED_FORM = 9
+PUNCTURE = 10
+POLYGON_WALK = 11
 
 # The variable in which the load is shared.
 CHORD_TENSION = 0
 HORIZONTAL_TENSION = 1
+FRAME_END_TENSION = 2
 
 # The quantity that a robot's tension limits name.
 LIMITS_OF_CHORD = 0
@@ -36,6 +47,8 @@ POSE_SINGULAR = 2  # the structure matrix has lost rank
 POSE_TOO_SLACK = 3  # a cable's chord tension is too small for its weight
 POSE_NOT_CONVERGED = 4
 POSE_NO_CHORD = 5  # both ends of a cable coincide
+POSE_NOT_COVERED = 6  # feasible, but not by the chosen way of sharing
+POSE_UNBOUNDED = 7  # the feasible set has no end, and the chosen way of sharing needs one
 
 # How the forward calculation of one sample ended.
 FORWARD_SOLVED = 0

@@ -91,6 +91,26 @@ def hang_cables(
 
 
 @kernel
+def frame_end_tension(
+    code: int,
+    k_h: float,
+    k_p: float,
+    gravity: float,
+    chord: float,
+    sine: float,
+    cosine: float,
+    density: float,
+    stiffness: float,
+    tau: float,
+) -> float:
+    """Tension at the frame end of a cable at a chord tension [N]."""
+    if code == STRAIGHT or code == ELASTIC:
+        return tau
+    length, pull, _status = from_tension(code, k_h, k_p, gravity, chord, sine, cosine, density, stiffness, tau)
+    return math.hypot(tau * cosine, tau * sine + pull - density * gravity * length)
+
+
+@kernel
 def chord_tension_at_frame_end(
     code: int,
     k_h: float,
@@ -117,8 +137,7 @@ def chord_tension_at_frame_end(
     if tension <= 1.01 * across or tau <= 0.0:
         return max(tau, 0.0)
     for _ in range(LIMIT_STEPS):
-        length, pull, _status = from_tension(code, k_h, k_p, gravity, chord, sine, cosine, density, stiffness, tau)
-        value = math.hypot(tau * cosine, tau * sine + pull - weight * length)
+        value = frame_end_tension(code, k_h, k_p, gravity, chord, sine, cosine, density, stiffness, tau)
         step = (value - tension) * value / (tau - along)
         new = tau - step
         tau = new if new > 0.5 * tau else 0.5 * tau

@@ -18,6 +18,7 @@ from sagline.kernels.codes import (
     CABLE_TOO_SLACK,
     CATENARY,
     CLOSEST,
+    FRAME_END_TENSION,
     HORIZONTAL_TENSION,
     LIMITS_OF_FRAME_END,
     POSE_INFEASIBLE,
@@ -26,20 +27,24 @@ from sagline.kernels.codes import (
     POSE_SINGULAR,
     POSE_SOLVED,
     POSE_TOO_SLACK,
+    QUADRATIC_PROGRAM,
 )
 from sagline.kernels.geometry import cable_geometry
-from sagline.kernels.hanging import NEAR, chord_tension_at_frame_end, hang_cables
+from sagline.kernels.hanging import NEAR, chord_tension_at_frame_end, frame_end_tension, hang_cables
 from sagline.kernels.jit import formula, kernel
 from sagline.kernels.models import pull_of_shallow
 from sagline.kernels.null_space import factorize, minimum_norm, orthogonal_factor, pseudo_inverse
 from sagline.kernels.polygon import SPARE_CORNERS, feasible_polygon
-from sagline.kernels.sharing import feasible_interval, share_nearest
+from sagline.kernels.proof import prove_empty
+from sagline.kernels.sharing import feasible_interval, share_load
 from sagline.kernels.shortfall import wrench_shortfall
 from sagline.kernels.statics import needed_wrench, restrict_needed, restrict_rows, structure_matrix
 
 ROUNDS = 30
 SETTLED = 1e-10  # [N]; pulls that change by less, or by 1e-15 of the largest tension, have settled
 SHORTEST_CHORD = 1e-9  # [m]
+STILL = 1e-9  # relative change of tension at which a sharing in frame-end tensions stands still
+SLOPE_STEP = 1e-4  # relative step of the central difference of the frame-end tension
 
 # columns of the numbers that describe one pose's solution
 SHORTFALL, FORCE_RESIDUAL, MOMENT_RESIDUAL = 0, 1, 2
@@ -83,14 +88,29 @@ def place_cables(
 
 
 @formula
-def scale_tensions(variable: int, geometry: Array, work: Array) -> None:
-    """Fill SCALE, LOW and HIGH: the variable in which the load is shared, and its limits."""
+def scale_tensions(variable: int, preference: Array, geometry: Array, work: Array) -> None:
+    """Fill SCALE, OFFSET, LOW and HIGH: the variable in which the load is shared, and its limits.
+
+    The frame-end tension starts as tau - wD/2 sin phi, its first order.
+    """
     for i in range(work.shape[1]):
-        scale = geometry[g.COSINE, i] if variable == HORIZONTAL_TENSION else 1.0
-        high = work[tables.CHORD_HIGH, i]
-        work[tables.SCALE, i] = scale
-        work[tables.LOW, i] = work[tables.CHORD_LOW, i] * scale
-        work[tables.HIGH, i] = high * scale if high < math.inf else math.inf
+        scale = preference[tables.ROOT_WEIGHT, i]
+        offset = 0.0
+        if variable == HORIZONTAL_TENSION:
+            scale *= geometry[g.COSINE, i]
+        elif variable == FRAME_END_TENSION:
+            offset = -work[tables.HALF_WEIGHT, i] * geometry[g.SINE, i]
+        work[tables.OFFSET, i] = offset
+        limit_variable(scale, work, i)
+
+
+@formula
+def limit_variable(scale: float, work: Array, i: int) -> None:
+    """Fill SCALE, LOW and HIGH of one cable."""
+    high = work[tables.CHORD_HIGH, i]
+    work[tables.SCALE, i] = scale
+    work[tables.LOW, i] = work[tables.CHORD_LOW, i] * scale
+    work[tables.HIGH, i] = high * scale if high < math.inf else math.inf
 
 
 @formula
@@ -125,14 +145,93 @@ def factor_balance(
 
 
 @formula
-def refer(method: int, previous: Array, work: Array, null: Array, reference: Array) -> None:
+def refer(
+    method: int, variable: int, preference: Array, previous: Array, work: Array, null: Array, reference: Array
+) -> None:
     """Fill the point of the null space that the shared tensions shall be nearest to, (r,)."""
     for k in range(null.shape[0]):
-        total = 0.0
-        if method == CLOSEST and not math.isnan(previous[0]):
-            for i in range(null.shape[1]):
-                total += null[k, i] * previous[i] * work[tables.SCALE, i]
-        reference[k] = total
+        reference[k] = 0.0
+    from_before = method == CLOSEST and not math.isnan(previous[0])
+    if not (from_before or method == QUADRATIC_PROGRAM or variable == FRAME_END_TENSION):
+        return
+    for k in range(null.shape[0]):
+        for i in range(null.shape[1]):
+            goal = preference[tables.GOAL, i]
+            if from_before:
+                goal = previous[i]
+            reference[k] += null[k, i] * preference[tables.ROOT_WEIGHT, i] * (goal - work[tables.OFFSET, i])
+
+
+@kernel
+def relinearize(
+    code: int,
+    k_h: float,
+    k_p: float,
+    method: int,
+    freedom: Array,
+    preference: Array,
+    previous: Array,
+    gravity: float,
+    geometry: Array,
+    work: Array,
+    full: Array,
+    matrix: Array,
+    reduced: Array,
+    balance: Array,
+    q: Array,
+    inverse: Array,
+    null: Array,
+    reference: Array,
+) -> bool:
+    """Set the balance up again, in frame-end tensions as they run near the present chord tensions; False: rank lost."""
+    for i in range(work.shape[1]):
+        tau = work[tables.TAU, i]
+        ends = np.empty(3)
+        for k in range(3):
+            ends[k] = frame_end_tension(
+                code,
+                k_h,
+                k_p,
+                gravity,
+                geometry[g.CHORD, i],
+                geometry[g.SINE, i],
+                geometry[g.COSINE, i],
+                work[tables.DENSITY_ROW, i],
+                work[tables.STIFFNESS_ROW, i],
+                tau * (1.0 + (k - 1) * SLOPE_STEP),
+            )
+        slope = (ends[2] - ends[0]) / (2.0 * SLOPE_STEP * tau)
+        work[tables.OFFSET, i] = ends[1] - slope * tau
+        limit_variable(slope * preference[tables.ROOT_WEIGHT, i], work, i)
+    if not factor_balance(freedom, geometry, work, full, matrix, reduced, balance, q, inverse, null):
+        return False
+    refer(method, FRAME_END_TENSION, preference, previous, work, null, reference)
+    return True
+
+
+@formula
+def remember(
+    code: int, k_h: float, k_p: float, variable: int, gravity: float, geometry: Array, work: Array, previous: Array
+) -> None:
+    """Keep the tensions, in the variable they were shared in, for the pose that follows."""
+    for i in range(previous.size):
+        tau = work[tables.TAU, i]
+        previous[i] = tau
+        if variable == HORIZONTAL_TENSION:
+            previous[i] = tau * geometry[g.COSINE, i]
+        elif variable == FRAME_END_TENSION:
+            previous[i] = frame_end_tension(
+                code,
+                k_h,
+                k_p,
+                gravity,
+                geometry[g.CHORD, i],
+                geometry[g.SINE, i],
+                geometry[g.COSINE, i],
+                work[tables.DENSITY_ROW, i],
+                work[tables.STIFFNESS_ROW, i],
+                tau,
+            )
 
 
 @formula
@@ -140,12 +239,21 @@ def settle(
     code: int,
     k_h: float,
     k_p: float,
+    method: int,
+    parameter: float,
+    variable: int,
     freedom: Array,
+    preference: Array,
+    previous: Array,
     body: Array,
     wrench: Array,
     geometry: Array,
     work: Array,
+    full: Array,
+    matrix: Array,
+    reduced: Array,
     balance: Array,
+    q: Array,
     inverse: Array,
     null: Array,
     reference: Array,
@@ -160,8 +268,9 @@ def settle(
         needed_wrench(geometry, body, wrench, work, balance)
         restrict_needed(freedom, balance)
         minimum_norm(inverse, balance, work)
-        if not share_nearest(work, null, reference, corners, labels):
-            return POSE_INFEASIBLE
+        status = share_load(method, parameter, work, null, reference, corners, labels)
+        if status != POSE_SOLVED:
+            return status
         largest = 0.0
         moved = 0.0
         for i in range(m):
@@ -176,12 +285,18 @@ def settle(
             return POSE_TOO_SLACK
         if gravest == CABLE_NOT_CONVERGED:
             return POSE_NOT_CONVERGED
-        near = True
         change = 0.0
         for i in range(m):
             change = max(change, abs(work[tables.PULL, i] - work[tables.LAST_PULL, i]))
-        if code != CATENARY or change <= SETTLED + 1e-15 * largest:
+        stands = code != CATENARY or change <= SETTLED + 1e-15 * largest
+        if stands and (variable != FRAME_END_TENSION or (near and moved <= STILL)):
             return POSE_SOLVED
+        near = True
+        if variable == FRAME_END_TENSION and not relinearize(
+            code, k_h, k_p, method, freedom, preference, previous, gravity,
+            geometry, work, full, matrix, reduced, balance, q, inverse, null, reference,
+        ):  # fmt: skip
+            return POSE_SINGULAR
     return POSE_NOT_CONVERGED
 
 
@@ -221,20 +336,17 @@ def measure_balance(
 
 
 @kernel
-def explain(freedom: Array, work: Array, matrix: Array, balance: Array, blocking: Flags) -> float:
-    """Shortfall [N] of an infeasible pose, and the cables that block it."""
+def explain(
+    freedom: Array, work: Array, matrix: Array, balance: Array, inverse: Array, null: Array, blocking: Flags
+) -> float:
+    """Shortfall [N] of an infeasible pose; fills its proof and the cables that block it."""
     n = freedom.shape[0]
     translations = 0
     for k in range(n):
         translations += 0 if is_rotation(freedom, k) else 1
+    prove_empty(work, inverse, null, translations, balance, blocking)
     return wrench_shortfall(
-        matrix,
-        balance[tables.RIGHT, :n],
-        work[tables.CHORD_LOW],
-        work[tables.CHORD_HIGH],
-        translations,
-        balance[tables.FARKAS, :n],
-        blocking,
+        matrix, balance[tables.RIGHT, :n], work[tables.CHORD_LOW], work[tables.CHORD_HIGH], translations
     )
 
 
@@ -257,9 +369,11 @@ def inverse_poses(
     k_h: float,
     k_p: float,
     method: int,
+    parameter: float,
     variable: int,
     limits_of: int,
     validity: float,
+    preference: Array,
     freedom: Array,
     bodies: Array,
     robots: Array,
@@ -269,6 +383,7 @@ def inverse_poses(
     results: Array,
     statuses: Codes,
     numbers: Array,
+    proofs: Array,
     pose_statuses: Codes,
     blocking: Flags,
 ) -> None:
@@ -279,18 +394,23 @@ def inverse_poses(
         k_h: The empirical model's constant.
         k_p: The empirical model's constant.
         method: How the load is shared.
-        variable: In which variable, CHORD_TENSION or HORIZONTAL_TENSION.
+        parameter: The method's exponent, or which optimum.
+        variable: In which variable, CHORD_TENSION, HORIZONTAL_TENSION or FRAME_END_TENSION.
         limits_of: Which quantity the limits name.
         validity: T_adj of the article's bound (54) [N], or NaN for none.
+        preference: Root weights and goals of the cables, (PREFERENCE_ROWS, m); ones and zeros but for a
+            QUADRATIC_PROGRAM.
         freedom: Rows of the structure matrix that count, translations first, (n, 6).
         bodies: body_table, (1 or N, BODY_COLUMNS).
         robots: cable_table, (1 or N, m, CABLE_COLUMNS).
         poses: Rows (N, POSE_COLUMNS).
         wrenches: External plus inertial, about the center of mass, (1 or N, 6).
-        previous: Chord tensions (m,) to stay close to, NaN for the minimum norm; the last feasible ones on return.
+        previous: Tensions in the variable (m,) to stay close to, NaN for the minimum norm; the last feasible ones on
+            return.
         results: Filled: span, rise, length, T_x, T_z, tau, (RESULT_ROWS, N, m).
         statuses: Filled: status of each cable, (N, m).
         numbers: Filled: shortfall and residuals, (N, POSE_NUMBERS).
+        proofs: Filled: Farkas vector of an infeasible pose and the wrench J tau must supply, (N, 2, n).
         pose_statuses: Filled, (N,).
         blocking: Filled: whether a cable stands against the needed wrench, (N, m).
     """
@@ -313,6 +433,7 @@ def inverse_poses(
         robot = robots[min(p, robots.shape[0] - 1)]
         body = bodies[min(p, bodies.shape[0] - 1)]
         wrench = wrenches[min(p, wrenches.shape[0] - 1)]
+        gravity = body[tables.GRAVITY]
         statuses[p, :] = 0
         blocking[p, :] = False
         numbers[p, SHORTFALL] = 0.0
@@ -320,22 +441,27 @@ def inverse_poses(
         numbers[p, MOMENT_RESIDUAL] = math.nan
         cable_geometry(robot, body, poses[p], rotation, geometry)
         status = POSE_NO_CHORD
-        if place_cables(code, k_h, k_p, limits_of, validity, body[tables.GRAVITY], robot, geometry, work):
+        if place_cables(code, k_h, k_p, limits_of, validity, gravity, robot, geometry, work):
             status = POSE_SINGULAR
-            scale_tensions(variable, geometry, work)
+            scale_tensions(variable, preference, geometry, work)
             if factor_balance(freedom, geometry, work, full, matrix, reduced, balance, q, inverse, null):
-                refer(method, previous, work, null, reference)
+                refer(method, variable, preference, previous, work, null, reference)
                 status = settle(
-                    code, k_h, k_p, freedom, body, wrench, geometry, work, balance,
-                    inverse, null, reference, corners, labels, statuses[p],
+                    code, k_h, k_p, method, parameter, variable, freedom, preference, previous, body, wrench, geometry,
+                    work, full, matrix, reduced, balance, q, inverse, null, reference, corners, labels, statuses[p],
                 )  # fmt: skip
         if status == POSE_SOLVED:
             measure_balance(freedom, body, wrench, geometry, work, matrix, balance, numbers, p)
-            previous[:] = work[tables.TAU]
+            remember(code, k_h, k_p, variable, gravity, geometry, work, previous)
         elif status == POSE_INFEASIBLE:
-            numbers[p, SHORTFALL] = explain(freedom, work, matrix, balance, blocking[p])
+            numbers[p, SHORTFALL] = explain(freedom, work, matrix, balance, inverse, null, blocking[p])
         else:
             numbers[p, SHORTFALL] = math.nan
+        for k in range(n):
+            proofs[p, 0, k] = balance[tables.FARKAS, k] if status == POSE_INFEASIBLE else math.nan
+            proofs[p, 1, k] = (
+                balance[tables.RIGHT, k] if status != POSE_NO_CHORD and status != POSE_SINGULAR else math.nan
+            )
         pose_statuses[p] = status
         store(status == POSE_SOLVED, work, geometry, results, p)
 
@@ -346,9 +472,11 @@ def polygon_of_pose(
     k_h: float,
     k_p: float,
     method: int,
+    parameter: float,
     variable: int,
     limits_of: int,
     validity: float,
+    preference: Array,
     freedom: Array,
     body: Array,
     robot: Array,
@@ -374,17 +502,19 @@ def polygon_of_pose(
     reduced = np.empty((n, m))
     q = np.empty((m + 1, m))
     inverse = np.empty((n, m))
-    reference = np.zeros(r)
+    reference = np.empty(r)
+    previous = np.full(m, math.nan)
     statuses = np.empty(m, dtype=np.int8)
     cable_geometry(robot, body, pose, rotation, geometry)
     if not place_cables(code, k_h, k_p, limits_of, validity, body[tables.GRAVITY], robot, geometry, work):
         return POSE_NO_CHORD, 0
-    scale_tensions(variable, geometry, work)
+    scale_tensions(variable, preference, geometry, work)
     if not factor_balance(freedom, geometry, work, full, matrix, reduced, balance, q, inverse, null):
         return POSE_SINGULAR, 0
+    refer(method, variable, preference, previous, work, null, reference)
     status = settle(
-        code, k_h, k_p, freedom, body, wrench, geometry, work, balance,
-        inverse, null, reference, corners, labels, statuses,
+        code, k_h, k_p, method, parameter, variable, freedom, preference, previous, body, wrench, geometry,
+        work, full, matrix, reduced, balance, q, inverse, null, reference, corners, labels, statuses,
     )  # fmt: skip
     if status != POSE_SOLVED or r == 0:
         return status, 1 if status == POSE_SOLVED else 0

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from sagline.arrays import Array, Indices
-from sagline.kernels.jit import kernel
+from sagline.kernels.jit import formula, kernel
 from sagline.kernels.tables import HIGH, LOW, START
 
 TOLERANCE = 1e-12  # of the largest tension at hand: a limit passed by less counts as met
@@ -149,6 +149,18 @@ def feasible_polygon(work: Array, null: Array, corners: Array, labels: Indices) 
     return count
 
 
+@formula
+def nearest_on_side(ax: float, ay: float, bx: float, by: float, x: float, y: float) -> tuple[float, float]:
+    """The point of the side from a to b that is nearest to a given one."""
+    ex = bx - ax
+    ey = by - ay
+    square = ex * ex + ey * ey
+    share = 0.0
+    if square > 0.0:
+        share = min(max(((x - ax) * ex + (y - ay) * ey) / square, 0.0), 1.0)
+    return ax + share * ex, ay + share * ey
+
+
 @kernel
 def nearest_point(corners: Array, count: int, x: float, y: float) -> tuple[float, float]:
     """Projection of a point outside a convex polygon onto it."""
@@ -157,16 +169,7 @@ def nearest_point(corners: Array, count: int, x: float, y: float) -> tuple[float
     best_y = y
     for k in range(count):
         following = k + 1 if k + 1 < count else 0
-        ax = corners[k, 0]
-        ay = corners[k, 1]
-        ex = corners[following, 0] - ax
-        ey = corners[following, 1] - ay
-        square = ex * ex + ey * ey
-        share = 0.0
-        if square > 0.0:
-            share = min(max(((x - ax) * ex + (y - ay) * ey) / square, 0.0), 1.0)
-        px = ax + share * ex
-        py = ay + share * ey
+        px, py = nearest_on_side(corners[k, 0], corners[k, 1], corners[following, 0], corners[following, 1], x, y)
         distance = (px - x) * (px - x) + (py - y) * (py - y)
         if distance < best:
             best = distance

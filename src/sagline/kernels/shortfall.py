@@ -1,9 +1,7 @@
-"""Why no tensions will do: the nearest wrench that is feasible, by bounded least squares.
+"""By how much no tensions will do: the nearest wrench that is feasible, by bounded least squares.
 
-The tensions within their limits whose wrench comes nearest to the needed one leave a residual. That residual
-y is itself a Farkas vector: y . (needed - J t) > 0 for every t within the limits, so it proves the verdict,
-and the cables with y . J_i != 0 are the ones that block. Moments weigh far more than forces, so what
-remains is the smallest change of the force that makes the pose feasible.
+The tensions within their limits whose wrench comes nearest to the needed one leave a residual. Moments weigh
+far more than forces, so what remains is the smallest change of the force that makes the pose feasible.
 """
 
 from __future__ import annotations
@@ -12,7 +10,7 @@ import math
 
 import numpy as np
 
-from sagline.arrays import Array, Codes, Flags
+from sagline.arrays import Array, Codes
 from sagline.kernels.jit import kernel
 
 MOMENT_WEIGHT = 1e4  # per typical lever arm; the moment's residual is this squared smaller than the force's
@@ -136,14 +134,8 @@ def bounded_least_squares(
 
 
 @kernel
-def wrench_shortfall(
-    matrix: Array, needed: Array, low: Array, high: Array, translations: int, farkas: Array, blocking: Flags
-) -> float:
-    """Smallest change of the needed force [N] that limits allow; infinite where no force alone would do.
-
-    Fills farkas (n,), scaled so that its force part has length 1 (its moment part, where no force would do),
-    and blocking (m,), whether a cable stands against the wrench.
-    """
+def wrench_shortfall(matrix: Array, needed: Array, low: Array, high: Array, translations: int) -> float:
+    """Smallest change of the needed force [N] that limits allow; infinite where no force alone would do."""
     n, m = matrix.shape
     lever = 0.0
     for i in range(m):
@@ -159,8 +151,6 @@ def wrench_shortfall(
     tensions = np.empty(m)
     residual = np.empty(n)
     if not bounded_least_squares(scaled, right, low, high, tensions, residual):
-        for k in range(n):
-            farkas[k] = math.nan
         return math.nan
     force = 0.0
     moment = 0.0
@@ -169,18 +159,4 @@ def wrench_shortfall(
             force += residual[k] * residual[k]
         else:
             moment += residual[k] * residual[k]
-            residual[k] *= weight
-    force = math.sqrt(force)
-    moment = math.sqrt(moment)
-    possible = moment <= 0.01 * force
-    scale = force if possible else moment * weight
-    for k in range(n):
-        farkas[k] = residual[k] / scale
-    for i in range(m):
-        total = 0.0
-        length = 0.0
-        for k in range(n):
-            total += farkas[k] * matrix[k, i]
-            length += matrix[k, i] * matrix[k, i]
-        blocking[i] = abs(total) > 1e-9 * math.sqrt(length)
-    return force if possible else math.inf
+    return math.sqrt(force) if moment <= 1e-4 * force else math.inf

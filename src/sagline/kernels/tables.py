@@ -34,9 +34,14 @@ CHORD_LOW, CHORD_HIGH = 3, 4  # limits of the chord tension [N]
 SCALE, LOW, HIGH, START, SHARED = 5, 6, 7, 8, 9
 TAU, SLACKNESS, STRAIN, RATIO = 10, 11, 12, 13  # chord tension [N], X = wD/(2 tau), e = tau/EA, L/D
 PULL, LAST_PULL = 14, 15  # T_z - tau sin phi [N], now and in the round before
-WORK_ROWS = 16
+OFFSET = 16  # the sharing's variable is SCALE tau + OFFSET before weighting; zero but for the frame-end tension [N]
+WORK_ROWS = 17
+
+# rows of the preferences among cables
+ROOT_WEIGHT, GOAL = 0, 1  # square root of a cable's weight; tension to be near [N]
+PREFERENCE_ROWS = 2
 
 # rows of the working array of one pose's balance, each of six values of which n count
-NEEDED, RIGHT, FARKAS = 0, 1, 2  # wrench to supply, its components along the free motions, proof of an empty set
+NEEDED, RIGHT, FARKAS = 0, 1, 2  # wrench to supply; along the free motions: its components, proof of an empty set
 HEADS, FACTORS = 3, 4  # diagonal of R and 2/|v|^2 of the reflections
 BALANCE_ROWS = 5

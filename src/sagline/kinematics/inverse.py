@@ -22,8 +22,8 @@ from sagline.robot.robot import Robot
 from sagline.statics.tables import body_table, cable_table, pose_rows
 from sagline.statics.wrench import external_wrench, inertial_wrench
 from sagline.tension.closest import Closest
-from sagline.tension.method import TensionMethod
-from sagline.tension.options import check_redundancy, kernel_options
+from sagline.tension.method import TensionMethod, Variable
+from sagline.tension.options import kernel_options
 
 _CATENARY = Catenary()
 _CLOSEST = Closest()
@@ -40,7 +40,7 @@ def inverse(
     """Tensions that balance the platform within their limits, and the unstrained lengths that produce them.
 
     Args:
-        robot: The robot, with m cables and n degrees of freedom, n <= m <= n + 2.
+        robot: The robot, with m cables and n degrees of freedom, m >= n.
         motion: A path of N samples, whose inertia is included; or a pose or batch of N poses at rest.
         model: Cable model; the default is exact.
         tension: How the load is shared among redundant cables. `Closest` carries its reference along a
@@ -54,25 +54,25 @@ def inverse(
         feasible there, says why, and holds NaN.
 
     Raises:
-        InvalidValueError: If the robot has fewer cables than degrees of freedom or too many, or an argument is
-            of the wrong shape.
+        InvalidValueError: If the robot has fewer cables than degrees of freedom, the method cannot share among
+            its cables, or an argument is of the wrong shape.
         CableGeometryError: If a cable has no length at some pose.
 
     Source:
         Gia Luan & Truong Thinh 2020, figure 16; made exact in docs/model.md, section 5.
     """
-    check_redundancy(robot)
+    method = tension if isinstance(motion, Path) or previous is not None else tension.alone
+    options = kernel_options(robot, model, method)
     pose = motion.pose if isinstance(motion, Path) else motion
     rows = pose_rows(pose)
     count = len(rows)
     load = external_wrench(wrench, count if pose.shape else None)
     if isinstance(motion, Path):
         load = locked(inertial_wrench(robot, pose, motion.twist, motion.twist_rate) + load)
-    reference = _reference(robot, previous)
-    found = _Answers.empty(count, robot.cable_count)
-    method = tension if isinstance(motion, Path) or previous is not None else tension.alone
+    reference = _reference(robot, previous, tension.variable)
+    found = _Answers.empty(count, robot.cable_count, robot.degrees_of_freedom)
     inverse_poses(
-        *kernel_options(robot, model, method),
+        *options,
         robot.freedom,
         body_table(robot),
         cable_table(robot),
@@ -103,6 +103,8 @@ def inverse(
         shortfall=locked(found.numbers[:, SHORTFALL].reshape(pose.shape)),
         wrench_residual=locked(found.numbers[:, [FORCE_RESIDUAL, MOMENT_RESIDUAL]].reshape(*pose.shape, 2)),
         blocking=locked(found.blocking.reshape(*pose.shape, -1)),
+        farkas=locked((found.proofs[:, 0] @ robot.freedom).reshape(*pose.shape, 6)),
+        needed=locked((found.proofs[:, 1] @ robot.freedom).reshape(*pose.shape, 6)),
     )
 
 
@@ -112,15 +114,17 @@ class _Answers(NamedTuple):
     results: Array
     cable_status: Codes
     numbers: Array
+    proofs: Array
     pose_status: Codes
     blocking: NDArray[np.bool_]
 
     @classmethod
-    def empty(cls, count: int, cables: int) -> _Answers:
+    def empty(cls, count: int, cables: int, freedoms: int) -> _Answers:
         return cls(
             np.empty((tables.RESULT_ROWS, count, cables)),
             np.empty((count, cables), dtype=np.int8),
             np.empty((count, POSE_NUMBERS)),
+            np.empty((count, 2, freedoms)),
             np.empty(count, dtype=np.int8),
             np.empty((count, cables), dtype=np.bool_),
         )
@@ -129,21 +133,28 @@ class _Answers(NamedTuple):
         return locked(self.results[row].reshape(*pose.shape, -1))
 
 
-def _reference(robot: Robot, previous: Plan | None) -> Array:
-    """Chord tensions to start from (m,): the last feasible ones of a plan, or NaN."""
-    nothing = np.full(robot.cable_count, np.nan)
+def _reference(robot: Robot, previous: Plan | None, variable: Variable) -> Array:
+    """Tensions to start from, in the sharing's variable (m,): the last feasible ones of a plan, or NaN."""
     if previous is None:
-        return nothing
-    tensions = np.atleast_2d(previous.chord_tension)
-    if tensions.shape[1] != robot.cable_count:
+        return np.full(robot.cable_count, np.nan)
+    cables = previous.state.cables
+    if cables.shape[-1] != robot.cable_count:
         raise InvalidValueError(
             "previous",
-            f"a plan of {tensions.shape[1]} cables",
+            f"a plan of {cables.shape[-1]} cables",
             f"{robot.cable_count} cables",
             "Continue a plan of this robot.",
         )
+    tensions = {
+        "chord": cables.chord_tension,
+        "horizontal": cables.horizontal_tension,
+        "frame_end": cables.frame_end_tension,
+    }[variable]
     feasible = np.flatnonzero(np.atleast_1d(previous.feasible))
-    return tensions[feasible[-1]].copy() if feasible.size else nothing
+    if not feasible.size:
+        return np.full(robot.cable_count, np.nan)
+    last: Array = np.atleast_2d(tensions)[feasible[-1]].copy()
+    return last
 
 
 def _refuse_missing_chords(status: Codes, results: Array) -> None:

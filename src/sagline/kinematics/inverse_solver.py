@@ -20,7 +20,7 @@ from sagline.robot.robot import Robot
 from sagline.statics.tables import body_table, cable_table
 from sagline.tension.closest import Closest
 from sagline.tension.method import TensionMethod
-from sagline.tension.options import check_redundancy, kernel_options
+from sagline.tension.options import kernel_options
 
 _STATUSES = tuple(PoseStatus)  # by code; a lookup costs a tenth of a conversion
 QUATERNION_TOLERANCE = 2e-6  # of the squared length: as `Pose.from_quaternion`
@@ -57,14 +57,13 @@ class InverseSolver:
         """Prepare the robot's arrays and compile the kernel.
 
         Args:
-            robot: The robot, with n <= m <= n + 2 cables.
+            robot: The robot, with at least as many cables as degrees of freedom.
             model: Cable model; the default is the exact one.
             tension: How the load is shared; the default is `Closest`, to the step before.
 
         Raises:
-            InvalidValueError: If the robot has too few or too many cables.
+            InvalidValueError: If the robot has too few cables, or the method cannot share among them.
         """
-        check_redundancy(robot)
         m = robot.cable_count
         options = kernel_options(robot, model or Catenary(), tension or Closest())
         self._pose = np.zeros((1, tables.POSE_COLUMNS))
@@ -87,6 +86,7 @@ class InverseSolver:
             self._results,
             np.empty((1, m), dtype=np.int8),
             self._numbers,
+            np.empty((1, 2, robot.degrees_of_freedom)),
             self._pose_status,
             np.empty((1, m), dtype=np.bool_),
         )

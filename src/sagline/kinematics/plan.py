@@ -49,7 +49,14 @@ class Plan:
             (N,): 0 where it is feasible, infinite where no force alone would do, NaN where that is not the reason.
         wrench_residual: Norms of the unbalanced force [N] and moment [N m] in the platform's free motions,
             shape (2,) or (N, 2).
-        blocking: Cables whose limits stand against the needed wrench, shape (m,) or (N, m).
+        blocking: Cables whose limits stand against the needed wrench, at most one more than are redundant, shape (m,)
+            or (N, m).
+        farkas: Proof of each infeasible pose, shape (6,) or (N, 6), NaN elsewhere: with y = farkas and the structure
+            matrix J, y . J tau < y . needed for all chord tensions tau within their limits. Its force part has length
+            1, so that the gap is in newtons. NaN also where the limits contradict by no more than rounding. None for
+            a plan that was read from a file.
+        needed: The wrench J tau that the chord tensions must supply, shape (6,) or (N, 6): weight, given wrench and
+            the cables' pulls T_z - tau sin phi of the last linearization; to that the proof refers. None as above.
     """
 
     state: Equilibrium
@@ -59,6 +66,8 @@ class Plan:
     shortfall: Array
     wrench_residual: Array
     blocking: NDArray[np.bool_]
+    farkas: Array | None = None
+    needed: Array | None = None
 
     @property
     def feasible(self) -> NDArray[np.bool_]:

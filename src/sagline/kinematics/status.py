@@ -16,6 +16,8 @@ class PoseStatus(IntEnum):
     TOO_SLACK = codes.POSE_TOO_SLACK
     NOT_CONVERGED = codes.POSE_NOT_CONVERGED
     NO_CHORD = codes.POSE_NO_CHORD
+    NOT_COVERED = codes.POSE_NOT_COVERED
+    UNBOUNDED = codes.POSE_UNBOUNDED
 
     @property
     def text(self) -> str:
@@ -33,4 +35,11 @@ _TEXTS = {
     PoseStatus.TOO_SLACK: "a cable would carry less than a thousandth of its own weight; raise tension_min",
     PoseStatus.NOT_CONVERGED: "the tensions did not settle; please report this robot and pose",
     PoseStatus.NO_CHORD: "both ends of a cable coincide; move the platform away from the anchor",
+    PoseStatus.NOT_COVERED: (
+        "there are tensions within the limits, but the chosen way of sharing does not find them; "
+        "choose MinimumNorm or AnalyticCenter"
+    ),
+    PoseStatus.UNBOUNDED: (
+        "the feasible tensions have no upper end, and so no middle; give tension_max, or choose MinimumNorm"
+    ),
 }

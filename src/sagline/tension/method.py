@@ -5,12 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Literal, get_args
 
-from sagline.arrays import checked
-from sagline.errors import InvalidValueError
-from sagline.kernels import codes
+import numpy as np
 
-Variable = Literal["chord", "horizontal"]
-_VARIABLES = {"chord": codes.CHORD_TENSION, "horizontal": codes.HORIZONTAL_TENSION}
+from sagline.arrays import Array, checked, locked
+from sagline.errors import InvalidValueError
+from sagline.kernels import codes, tables
+
+Variable = Literal["chord", "horizontal", "frame_end"]
+VARIABLES = {
+    "chord": codes.CHORD_TENSION,
+    "horizontal": codes.HORIZONTAL_TENSION,
+    "frame_end": codes.FRAME_END_TENSION,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,20 +25,25 @@ class TensionMethod:
 
     Attributes:
         code: Which choice the kernels make (`sagline.kernels.codes`).
-        variable: The tension in which the choice is made: "chord" (default) or "horizontal", the article's T_x.
-            Their minimum-norm answers differ.
+        needs_upper_limits: Whether every cable must have a finite upper limit.
+        most_redundant: Largest number of redundant cables it can share among; None for any.
+        variable: The tension in which the choice is made: "chord" (default), "horizontal", the article's T_x, or
+            "frame_end", where a winch's load cell sits. Their minimum-norm answers differ. A vertical cable has no
+            horizontal tension: under an anchor such a choice finds the pose singular.
         lowest_point_margin: The article's T_adj of (54) [N]: bounds T_x below by w D/(2 |tan phi|) + T_adj, which
             keeps the lowest point of each cable outside its span. None (default) leaves the bound out.
     """
 
     code: ClassVar[int]
+    needs_upper_limits: ClassVar[bool] = False
+    most_redundant: ClassVar[int | None] = None
     variable: Variable = "chord"
     lowest_point_margin: float | None = None
 
     def __post_init__(self) -> None:
         """Check the options."""
-        if self.variable not in _VARIABLES:
-            allowed = " or ".join(get_args(Variable))
+        if self.variable not in VARIABLES:
+            allowed = ", ".join(get_args(Variable))
             raise InvalidValueError("variable", repr(self.variable), allowed, "Name the tension to share the load in.")
         if self.lowest_point_margin is not None:
             checked(self.lowest_point_margin, "lowest_point_margin", "N", low=0.0)
@@ -43,9 +54,20 @@ class TensionMethod:
         return self
 
     @property
+    def parameter(self) -> float:
+        """The one number some methods have: an exponent, or which optimum."""
+        return 0.0
+
+    def preference(self, cables: int) -> Array:
+        """Root weights and goals [N] of the cables as kernels know them, shape (PREFERENCE_ROWS, m)."""
+        rows = np.zeros((tables.PREFERENCE_ROWS, cables))
+        rows[tables.ROOT_WEIGHT] = 1.0
+        return locked(rows)
+
+    @property
     def variable_code(self) -> int:
         """The variable as kernels know it."""
-        return _VARIABLES[self.variable]
+        return VARIABLES[self.variable]
 
     @property
     def validity(self) -> float:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from sagline.arrays import Array
 from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
 from sagline.kernels import codes
@@ -9,27 +12,47 @@ from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 
 LIMITS_OF = {"chord": codes.LIMITS_OF_CHORD, "frame_end": codes.LIMITS_OF_FRAME_END}
-MOST_REDUNDANT = 2
 
 
 def kernel_options(
     robot: Robot, model: CableModel, tension: TensionMethod
-) -> tuple[int, float, float, int, int, int, float]:
-    """Model, method and limits as the kernels' leading codes and parameters."""
-    limits_of = LIMITS_OF[robot.tension_limits_of]
-    return model.code, *model.parameters, tension.code, tension.variable_code, limits_of, tension.validity
-
-
-def check_redundancy(robot: Robot) -> None:
-    """Refuse a robot whose tensions cannot be determined.
+) -> tuple[int, float, float, int, float, int, int, float, Array]:
+    """Model, method and limits as the kernels' leading codes and parameters.
 
     Raises:
-        InvalidValueError: If it has fewer cables than degrees of freedom, or more than two redundant ones.
+        InvalidValueError: If the robot's tensions cannot be determined, or not by this method.
+    """
+    check_sharing(robot, tension)
+    return (
+        model.code,
+        *model.parameters,
+        tension.code,
+        tension.parameter,
+        tension.variable_code,
+        LIMITS_OF[robot.tension_limits_of],
+        tension.validity,
+        tension.preference(robot.cable_count),
+    )
+
+
+def check_sharing(robot: Robot, tension: TensionMethod) -> None:
+    """Refuse a robot among whose cables a method cannot share the load.
+
+    Raises:
+        InvalidValueError: If it has fewer cables than degrees of freedom, more redundant ones than the method can
+            share among, or no upper limits where the method needs them.
     """
     n, m = robot.degrees_of_freedom, robot.cable_count
-    if n <= m <= n + MOST_REDUNDANT:
-        return
-    step = "Add cables, or choose a motion pattern with fewer freedoms." if m < n else "Leave out some cables."
-    raise InvalidValueError(
-        f"{robot.name}: number of cables", m, f"{n} to {n + MOST_REDUNDANT} for {robot.motion_pattern}", step
-    )
+    item = f"{robot.name}: number of cables"
+    if m < n:
+        step = "Add cables, or choose a motion pattern with fewer freedoms."
+        raise InvalidValueError(item, m, f">= {n} for {robot.motion_pattern}", step)
+    name = type(tension).__name__
+    most = tension.most_redundant
+    if most is not None and m > n + most:
+        step = "Choose AnalyticCenter or MinimumNorm, which share among any number."
+        raise InvalidValueError(item, m, f"{n} to {n + most} for {robot.motion_pattern} with {name}", step)
+    unlimited = np.isinf(robot.tension_max)
+    if tension.needs_upper_limits and unlimited.any():
+        step = f"{name} needs an upper limit of every cable: give one, or choose MinimumNorm."
+        raise InvalidValueError(f"{robot.name}: tension_max[{int(np.argmax(unlimited))}]", "infinite", "finite", step)

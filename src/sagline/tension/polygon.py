@@ -21,7 +21,7 @@ from sagline.statics.tables import body_table, cable_table, pose_rows
 from sagline.statics.wrench import external_wrench
 from sagline.tension.method import Variable
 from sagline.tension.minimum_norm import MinimumNorm
-from sagline.tension.options import check_redundancy, kernel_options
+from sagline.tension.options import kernel_options
 
 MERGED = 1e-10  # of the largest tension: corners closer than this are one
 
@@ -57,7 +57,9 @@ class TensionPolygon:
         bounded: Whether every side is a limit.
         basis: Orthonormal basis of the null space, shape (r, m).
         origin: The minimum-norm tensions of the balance without limits [N], shape (m,).
-        scale: The sharing's variable over the chord tension, shape (m,): 1, or cos phi for the horizontal tension.
+        scale: The sharing's variable is scale times the chord tension plus offset, shape (m,): 1, or cos phi for the
+            horizontal tension, or the slope of the frame-end tension.
+        offset: Zero but for the frame-end tension [N], shape (m,).
     """
 
     vertices: Array
@@ -67,6 +69,7 @@ class TensionPolygon:
     basis: Array
     origin: Array
     scale: Array
+    offset: Array
 
 
 def tension_polygon(
@@ -83,7 +86,7 @@ def tension_polygon(
         pose: One pose.
         model: Cable model.
         wrench: External and inertial wrench about the center of mass, world axes [N, N m], shape (6,); None for none.
-        variable: The tension the polygon is drawn in, "chord" or "horizontal", the article's.
+        variable: The tension the polygon is drawn in: "chord", "horizontal" (the article's) or "frame_end".
 
     Returns:
         The polygon, with no vertices where the pose is not feasible.
@@ -95,7 +98,14 @@ def tension_polygon(
     Source:
         Gia Luan & Truong Thinh 2020, (53)-(55); Gouttefarde et al. 2015; docs/model.md, section 5.
     """
-    check_redundancy(robot)
+    options = kernel_options(robot, model, MinimumNorm(variable))
+    if robot.cable_count > robot.degrees_of_freedom + 2:
+        raise InvalidValueError(
+            f"{robot.name}: number of cables",
+            robot.cable_count,
+            f"<= {robot.degrees_of_freedom + 2}",
+            "More than two redundant cables span no polygon.",
+        )
     if pose.shape:
         raise InvalidValueError("pose", f"a batch of shape {pose.shape}", "one pose", "Draw one pose at a time.")
     m, r = robot.cable_count, robot.cable_count - robot.degrees_of_freedom
@@ -104,7 +114,7 @@ def tension_polygon(
     corners = np.empty((2 * m + SPARE_CORNERS, 2))
     labels = np.full(2 * m + SPARE_CORNERS, -1, dtype=np.int64)
     status, count = polygon_of_pose(
-        *kernel_options(robot, model, MinimumNorm(variable)),
+        *options,
         robot.freedom,
         body_table(robot)[0],
         cable_table(robot)[0],
@@ -118,15 +128,17 @@ def tension_polygon(
     if status not in (codes.POSE_SOLVED, codes.POSE_INFEASIBLE):
         raise InvalidValueError("pose", "one without a balance", "one that `inverse` can solve", _next_step(status))
     origin, low, high = work[tables.START], work[tables.LOW], work[tables.HIGH]
+    offset = work[tables.OFFSET]
     vertices, sides = _sides_of(count, null, origin, low, high, corners, labels)
     return TensionPolygon(
         vertices=locked(vertices),
-        tensions=locked(_tensions(vertices, null, origin)),
+        tensions=locked(_tensions(vertices, null, origin + offset)),
         sides=sides,
         bounded=None not in sides,
         basis=locked(null),
-        origin=locked(origin.copy()),
+        origin=locked(origin + offset),
         scale=locked(work[tables.SCALE].copy()),
+        offset=locked(work[tables.OFFSET].copy()),
     )
 
 
