@@ -23,6 +23,7 @@ from sagline.kinematics.forward_status import ForwardStatus
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.inverse_solver import InverseSolver, InverseStep
 from sagline.kinematics.plan import Gap, Plan
+from sagline.kinematics.polygon import tension_polygon
 from sagline.kinematics.status import PoseStatus
 from sagline.motion.path import Path
 from sagline.motion.planar import article_path
@@ -36,19 +37,22 @@ from sagline.robot.robot import Robot
 from sagline.statics.balance import ArticleBalance, article_balance, structure_matrix
 from sagline.statics.wrench import inertial_wrench
 from sagline.tension.analytic_center import AnalyticCenter
+from sagline.tension.broken import without_cables
 from sagline.tension.centroid import Centroid
 from sagline.tension.closed_form import ClosedForm
 from sagline.tension.closest import Closest
 from sagline.tension.improved_closed_form import ImprovedClosedForm
 from sagline.tension.lowest_maximum import LowestMaximum
 from sagline.tension.lowest_sum import LowestSum
+from sagline.tension.margin import capacity_margin, limit_margin
 from sagline.tension.method import TensionMethod
 from sagline.tension.minimum_norm import MinimumNorm
 from sagline.tension.p_norm import PNorm
-from sagline.tension.polygon import Side, TensionPolygon, tension_polygon
+from sagline.tension.polygon import Side, TensionPolygon
 from sagline.tension.polygon_walk import PolygonWalk
 from sagline.tension.puncture import Puncture
 from sagline.tension.quadratic_program import QuadraticProgram
+from sagline.tension.singular import unresisted_motion
 
 if TYPE_CHECKING:
     from sagline import plot
@@ -104,11 +108,13 @@ __all__ = [
     "__version__",
     "article_balance",
     "article_path",
+    "capacity_margin",
     "confirm",
     "dump_robot",
     "forward",
     "inertial_wrench",
     "inverse",
+    "limit_margin",
     "load_path",
     "load_plan",
     "load_robot",
@@ -119,6 +125,8 @@ __all__ = [
     "save_plan",
     "structure_matrix",
     "tension_polygon",
+    "unresisted_motion",
+    "without_cables",
 ]
 
 # The outer ring loads on first use: it brings xarray, matplotlib, pint and pydantic with it.

@@ -21,29 +21,14 @@ from sagline.robot.catalogue import robot_names
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.balance import article_balance, structure_matrix
+from sagline.tension.broken import without_cables
 from sagline.tension.closest import Closest
+from sagline.tension.method import Variable
 from sagline.tension.minimum_norm import MinimumNorm
-from tests.tension.reference import nearest, needed, random_poses, structure, unbalanced
+from tests.tension.reference import nearest, needed, planar, random_poses, structure, unbalanced
 
 MODELS = (Straight(), Elastic(), Empirical(), Parabolic(), Catenary())
 LEVEL = np.eye(3)
-
-
-def planar(**changes: object) -> Robot:
-    """Four cables to one point of a level plane, across which no weight acts; limits 3.8 to 25 N."""
-    side = 0.315
-    fields = {
-        "name": "planar",
-        "frame_anchors": [[-side, -side, 0], [side, -side, 0], [side, side, 0], [-side, side, 0]],
-        "platform_anchors": np.zeros((4, 3)),
-        "cables": Cable(1e-3, 1e5),
-        "mass": 1.0,
-        "motion_pattern": "2T",
-        "plane_normal": [0, 0, 1],
-        "tension_min": 3.8,
-        "tension_max": 25.0,
-    }
-    return Robot(**{**fields, **changes})
 
 
 @pytest.mark.parametrize("name", robot_names())
@@ -70,8 +55,9 @@ def test_kernel_balance_is_written_out_and_article_balance_is_it_too() -> None:
     poses = random_poses(robot, 30, np.random.default_rng(2))
     matrices, article = structure_matrix(robot, poses), article_balance(robot, poses)
     plan = inverse(robot, poses, model=Empirical(), tension=MinimumNorm())
-    assert plan.feasible.all()
-    for i, pose in enumerate(poses):
+    assert plan.feasible.sum() > 20
+    for i in np.flatnonzero(plan.feasible):
+        pose = poses[int(i)]
         np.testing.assert_allclose(matrices[i], structure(robot, pose), atol=1e-14)
         # the article's system holds for our horizontal tensions: H t_x + b = 0 without inertia
         left = article.h[i] @ plan.horizontal_tension[i] + article.b[i]
@@ -82,7 +68,7 @@ def test_kernel_balance_is_written_out_and_article_balance_is_it_too() -> None:
 
 @pytest.mark.parametrize("variable", ["chord", "horizontal"])
 @pytest.mark.parametrize("name", ["article-suspended", "article-mixed", "falcon-7", "cogiro", "ipanema-3"])
-def test_minimum_norm_and_closest_are_those_of_a_quadratic_program(name: str, variable: str) -> None:
+def test_minimum_norm_and_closest_are_those_of_a_quadratic_program(name: str, variable: Variable) -> None:
     robot, rng = load_robot(name), np.random.default_rng(3)
     poses = random_poses(robot, 40, rng)
     path = quintic_path(poses.position[:5], durations=[20.0] * 4, rate=5)
@@ -136,7 +122,7 @@ def test_a_batch_of_poses_stands_alone_and_previous_continues() -> None:
 
 @pytest.mark.parametrize("variable", ["chord", "horizontal"])
 @pytest.mark.parametrize("model", MODELS, ids=lambda model: type(model).__name__)
-def test_limits_at_the_frame_end_are_met_exactly(model: CableModel, variable: str) -> None:
+def test_limits_at_the_frame_end_are_met_exactly(model: CableModel, variable: Variable) -> None:
     robot = load_robot("article-mixed").replace(tension_limits_of="frame_end")
     poses = random_poses(robot, 100, np.random.default_rng(4))
     plan = inverse(robot, poses, model=model, tension=MinimumNorm(variable))
@@ -147,7 +133,7 @@ def test_limits_at_the_frame_end_are_met_exactly(model: CableModel, variable: st
 
 
 def test_article_bound_keeps_the_lowest_point_outside_the_span() -> None:
-    robot, margin = load_robot("article-suspended").replace(tension_min=0.0), 3.0
+    robot, margin = load_robot("article-mixed").replace(tension_min=0.0), 3.0
     poses = random_poses(robot, 100, np.random.default_rng(5))
     plain = inverse(robot, poses, model=Empirical(), tension=MinimumNorm("horizontal"))
     bound = inverse(robot, poses, model=Empirical(), tension=MinimumNorm("horizontal", lowest_point_margin=margin))
@@ -155,6 +141,7 @@ def test_article_bound_keeps_the_lowest_point_outside_the_span() -> None:
     weight = robot.cables.linear_density * robot.gravity
     least = 0.5 * weight * state.chord * state.span / np.abs(state.rise) + margin
     gap = (bound.horizontal_tension - least)[bound.feasible]
+    assert bound.feasible.sum() > 10
     assert gap.min() == pytest.approx(0.0, abs=1e-9)
     assert (plain.horizontal_tension - least)[plain.feasible].min() < -1.0
     assert not (state.status[bound.feasible] == CableStatus.BELOW_VALIDITY).any()
@@ -177,13 +164,12 @@ def test_infeasible_poses_keep_nothing_but_the_reason() -> None:
         assert gap.status is PoseStatus.INFEASIBLE
         assert gap.shortfall == plan.shortfall[gap.first : gap.last + 1].max()
         assert gap.cables
-    after = plan.gaps[0].last + 1  # the last feasible set is the reference after the gap
-    same = inverse(robot, plan.state.pose[after], previous=inverse(robot, path.pose[: plan.gaps[0].first]))
-    assert same.feasible
-    before = plan.chord_tension[plan.gaps[0].first - 1]
-    alone = inverse(robot, plan.state.pose[after], tension=MinimumNorm())
-    there = np.linalg.norm(plan.chord_tension[after] - before)
-    assert there <= np.linalg.norm(alone.chord_tension - before) + 0.5
+    after, before = plan.gaps[0].last + 1, plan.gaps[0].first - 1
+    # the last feasible set is the reference after the gap: a solver that never saw the gap agrees
+    solver = InverseSolver(robot)
+    for i in (*range(before + 1), after):
+        step = solver.step(path.pose.position[i], path.pose.quaternion[i], plan.state.wrench[i])
+    np.testing.assert_allclose(step.chord_tension, plan.chord_tension[after], rtol=1e-9)
 
 
 def test_known_answer_of_a_planar_robot() -> None:
@@ -204,7 +190,10 @@ def test_no_upper_limit() -> None:
     limited = load_robot("article-mixed")
     poses = random_poses(robot, 50, np.random.default_rng(6))
     found, same = (inverse(r, poses, tension=MinimumNorm()) for r in (robot, limited))
-    np.testing.assert_allclose(found.chord_tension, same.chord_tension, rtol=1e-9)
+    both = found.feasible & same.feasible
+    assert both.sum() > 20
+    np.testing.assert_allclose(found.chord_tension[both], same.chord_tension[both], rtol=1e-9)
+    assert (found.feasible | ~same.feasible).all()
 
 
 def test_solver_repeats_inverse() -> None:
@@ -250,19 +239,28 @@ def test_bad_input() -> None:
         inverse(robot, pose, wrench=[0, 0, np.nan, 0, 0, 0])
     with pytest.raises(InvalidValueError, match=r"position\[1\] is nan"):
         InverseSolver(robot).step([0, np.nan, 0], [0, 0, 0, 1])
-    with pytest.raises(InvalidValueError, match="number of cables is 4; allowed: 6"):
-        few = robot.replace(
-            frame_anchors=robot.frame_anchors[:4],
-            platform_anchors=robot.platform_anchors[:4],
-            cables=Cable(0.067, 44e3),
-            tension_min=25.0,
-            tension_max=2000.0,
-        )
+    few = without_cables(robot, 0, 1, 2, 3)
+    with pytest.raises(InvalidValueError, match="number of cables is 4; allowed: >= 6"):
         inverse(few, pose)
+    other = inverse(load_robot("falcon-7"), Pose([-0.25, 0, 0.75], LEVEL))
     with pytest.raises(InvalidValueError, match="previous is a plan of 7 cables"):
-        seven = load_robot("falcon-7")
-        inverse(robot, pose, previous=inverse(seven, Pose(seven.test_box.low, LEVEL)))
+        inverse(robot, pose, previous=other)
     with pytest.raises(InvalidValueError, match="variable is 'sum'"):
         MinimumNorm("sum")  # type: ignore[arg-type]
     with pytest.raises(CableGeometryError, match="cable 0: distance between its ends is 0 m"):
         inverse(robot, Pose(robot.frame_anchors[0] - robot.platform_anchors[0], Rotation.identity()))
+
+
+def test_empirical_model_below_its_range_is_told_and_not_changed() -> None:
+    robot = load_robot("article-mixed").replace(tension_min=1.0)
+    poses = random_poses(robot, 50, np.random.default_rng(8))
+    plan = inverse(robot, poses, model=Empirical(), tension=MinimumNorm())
+    cables = plan.state.cables
+    weight = robot.cables.linear_density * 4.845 * cables.chord
+    below = cables.chord_tension * np.abs(cables.rise) / cables.chord <= weight
+    below[~plan.feasible] = False
+    told = [f"cable {i}: at {count} of 50 poses" for i, count in enumerate(below.sum(axis=0)) if count]
+    assert told
+    assert [text.split(" its tension")[0] for text in plan.warnings] == told
+    assert np.nanmin(plan.chord_tension) == pytest.approx(1.0)
+    assert inverse(robot, poses, tension=MinimumNorm()).warnings == ()

@@ -1,12 +1,13 @@
 """The balance and its sharing written out in NumPy and handed to other programs: the tests' independent reference."""
 
-from collections.abc import Iterator
+from typing import Any
 
 import daqp
 import numpy as np
 from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
+from sagline.cables.cable import Cable
 from sagline.files.robot_file import load_robot
 from sagline.kinematics.plan import Plan
 from sagline.robot.catalogue import robot_names
@@ -25,8 +26,8 @@ def random_poses(robot: Robot, count: int, rng: np.random.Generator, stretch: fl
     return Pose(middle + half * rng.uniform(-1, 1, (count, 3)), Rotation.from_rotvec(turns))
 
 
-def presets() -> Iterator[Robot]:
-    yield from map(load_robot, robot_names())
+def presets() -> list[Robot]:
+    return [load_robot(name) for name in robot_names()]
 
 
 def structure(robot: Robot, pose: Pose) -> np.ndarray:
@@ -35,7 +36,17 @@ def structure(robot: Robot, pose: Pose) -> np.ndarray:
     lever = (robot.platform_anchors - robot.center_of_mass) @ turn.T
     rope = robot.frame_anchors - (pose.position + robot.platform_anchors @ turn.T)
     unit = rope / np.linalg.norm(rope, axis=1, keepdims=True)
-    return np.concatenate((unit.T, np.cross(lever, unit).T))
+    return np.asarray(np.concatenate((unit.T, np.cross(lever, unit).T)))
+
+
+def structures(robot: Robot, poses: Pose) -> np.ndarray:
+    """J (N, 6, m) of a batch."""
+    turn = poses.rotation.as_matrix()
+    lever = (robot.platform_anchors - robot.center_of_mass) @ np.swapaxes(turn, 1, 2)
+    rope = robot.frame_anchors - (poses.position[:, None] + robot.platform_anchors @ np.swapaxes(turn, 1, 2))
+    unit = rope / np.linalg.norm(rope, axis=2, keepdims=True)
+    both = np.concatenate((np.swapaxes(unit, 1, 2), np.swapaxes(np.cross(lever, unit), 1, 2)), axis=1)
+    return np.asarray(both)
 
 
 def needed(robot: Robot, wrench: np.ndarray) -> np.ndarray:
@@ -63,7 +74,14 @@ def is_feasible(matrix: np.ndarray, right: np.ndarray, low: np.ndarray, high: np
     """The verdict of a linear program."""
     bounds = np.column_stack((low, np.where(np.isfinite(high), high, np.inf)))
     scale = np.abs(right).max()
-    found = linprog(np.zeros(len(low)), A_eq=matrix, b_eq=right / scale, bounds=bounds / scale, method="highs")
+    found = linprog(
+        np.zeros(len(low)),
+        A_eq=matrix,
+        b_eq=right / scale,
+        bounds=bounds / scale,
+        method="highs-ds",
+        options={"presolve": False, "primal_feasibility_tolerance": 1e-10},
+    )
     assert found.status in (0, 2), found.message
     return bool(found.status == 0)
 
@@ -82,3 +100,20 @@ def nearest(
     )
     assert flag == 1
     return np.asarray(x)
+
+
+def planar(**changes: Any) -> Robot:
+    """Four cables to one point of a level plane, across which no weight acts; limits 3.8 to 25 N."""
+    side = 0.315
+    fields: dict[str, Any] = {
+        "name": "planar",
+        "frame_anchors": [[-side, -side, 0], [side, -side, 0], [side, side, 0], [-side, side, 0]],
+        "platform_anchors": np.zeros((4, 3)),
+        "cables": Cable(1e-3, 1e5),
+        "mass": 1.0,
+        "motion_pattern": "2T",
+        "plane_normal": [0, 0, 1],
+        "tension_min": 3.8,
+        "tension_max": 25.0,
+    }
+    return Robot(**{**fields, **changes})

@@ -28,16 +28,14 @@ from sagline.motion.path import Path
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.tension.closest import Closest
 from sagline.tension.method import TensionMethod
-from sagline.tension.minimum_norm import MinimumNorm
+from sagline.tension.methods import METHODS
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
 FORMAT = 1  # raised whenever an older sagline could misread the file
 MODELS = {model.__name__: model for model in (Straight, Elastic, Empirical, Parabolic, Catenary)}
-METHODS = {method.__name__: method for method in (Closest, MinimumNorm)}
 STATE_ARRAYS = ("span", "rise", "unstrained_length", "horizontal_tension", "vertical_force", "chord_tension")
 
 Choice = TypeVar("Choice", CableModel, TensionMethod)

@@ -32,6 +32,7 @@ from sagline.kernels.codes import (
 from sagline.kernels.geometry import cable_geometry
 from sagline.kernels.hanging import NEAR, chord_tension_at_frame_end, frame_end_tension, hang_cables
 from sagline.kernels.jit import formula, kernel
+from sagline.kernels.margin import capacity_margin
 from sagline.kernels.models import pull_of_shallow
 from sagline.kernels.null_space import factorize, minimum_norm, orthogonal_factor, pseudo_inverse
 from sagline.kernels.polygon import SPARE_CORNERS, feasible_polygon
@@ -163,6 +164,32 @@ def refer(
 
 
 @kernel
+def linearize_ends(
+    code: int, k_h: float, k_p: float, preference: Array, gravity: float, geometry: Array, work: Array
+) -> None:
+    """Fill SCALE, OFFSET, LOW and HIGH of the frame-end tensions as they run near the present chord tensions."""
+    ends = np.empty(3)
+    for i in range(work.shape[1]):
+        tau = work[tables.TAU, i]
+        for k in range(3):
+            ends[k] = frame_end_tension(
+                code,
+                k_h,
+                k_p,
+                gravity,
+                geometry[g.CHORD, i],
+                geometry[g.SINE, i],
+                geometry[g.COSINE, i],
+                work[tables.DENSITY_ROW, i],
+                work[tables.STIFFNESS_ROW, i],
+                tau * (1.0 + (k - 1) * SLOPE_STEP),
+            )
+        slope = (ends[2] - ends[0]) / (2.0 * SLOPE_STEP * tau)
+        work[tables.OFFSET, i] = ends[1] - slope * tau
+        limit_variable(slope * preference[tables.ROOT_WEIGHT, i], work, i)
+
+
+@kernel
 def relinearize(
     code: int,
     k_h: float,
@@ -184,25 +211,7 @@ def relinearize(
     reference: Array,
 ) -> bool:
     """Set the balance up again, in frame-end tensions as they run near the present chord tensions; False: rank lost."""
-    for i in range(work.shape[1]):
-        tau = work[tables.TAU, i]
-        ends = np.empty(3)
-        for k in range(3):
-            ends[k] = frame_end_tension(
-                code,
-                k_h,
-                k_p,
-                gravity,
-                geometry[g.CHORD, i],
-                geometry[g.SINE, i],
-                geometry[g.COSINE, i],
-                work[tables.DENSITY_ROW, i],
-                work[tables.STIFFNESS_ROW, i],
-                tau * (1.0 + (k - 1) * SLOPE_STEP),
-            )
-        slope = (ends[2] - ends[0]) / (2.0 * SLOPE_STEP * tau)
-        work[tables.OFFSET, i] = ends[1] - slope * tau
-        limit_variable(slope * preference[tables.ROOT_WEIGHT, i], work, i)
+    linearize_ends(code, k_h, k_p, preference, gravity, geometry, work)
     if not factor_balance(freedom, geometry, work, full, matrix, reduced, balance, q, inverse, null):
         return False
     refer(method, FRAME_END_TENSION, preference, previous, work, null, reference)
@@ -482,19 +491,24 @@ def polygon_of_pose(
     robot: Array,
     pose: Array,
     wrench: Array,
+    tensions: Array,
+    pulls: Array,
     work: Array,
     null: Array,
     corners: Array,
     labels: Indices,
-) -> tuple[int, int]:
-    """The feasible set of one pose with the pulls of its shared tensions: status and number of corners.
+) -> int:
+    """The feasible set of one pose with the pulls that its cables have at given chord tensions; number of corners.
+
+    Where these are NaN, the pulls are those of the first order.
 
     Fills work (WORK_ROWS, m), the null space (r, m) and, for r = 2, corners and labels as `feasible_polygon`; for
-    r = 1 corners[0, 0] and corners[1, 0] are the ends of the interval (infinite where it has none).
+    r = 1 corners[0, 0] and corners[1, 0] are the ends of the interval (infinite where it has none); for r = 0
+    nothing more.
     """
     r, m = null.shape
     n = freedom.shape[0]
-    rotation = np.empty((3, 3))
+    gravity = body[tables.GRAVITY]
     geometry = np.empty((g.GEOMETRY_ROWS, m))
     balance = np.empty((tables.BALANCE_ROWS, 6))
     full = np.empty((6, m))
@@ -502,23 +516,66 @@ def polygon_of_pose(
     reduced = np.empty((n, m))
     q = np.empty((m + 1, m))
     inverse = np.empty((n, m))
-    reference = np.empty(r)
-    previous = np.full(m, math.nan)
-    statuses = np.empty(m, dtype=np.int8)
-    cable_geometry(robot, body, pose, rotation, geometry)
-    if not place_cables(code, k_h, k_p, limits_of, validity, body[tables.GRAVITY], robot, geometry, work):
-        return POSE_NO_CHORD, 0
+    cable_geometry(robot, body, pose, np.empty((3, 3)), geometry)
+    place_cables(code, k_h, k_p, limits_of, validity, gravity, robot, geometry, work)
+    known = not math.isnan(tensions[0])
+    if known:
+        work[tables.TAU] = tensions
+        work[tables.PULL] = pulls
     scale_tensions(variable, preference, geometry, work)
-    if not factor_balance(freedom, geometry, work, full, matrix, reduced, balance, q, inverse, null):
-        return POSE_SINGULAR, 0
-    refer(method, variable, preference, previous, work, null, reference)
-    status = settle(
-        code, k_h, k_p, method, parameter, variable, freedom, preference, previous, body, wrench, geometry,
-        work, full, matrix, reduced, balance, q, inverse, null, reference, corners, labels, statuses,
-    )  # fmt: skip
-    if status != POSE_SOLVED or r == 0:
-        return status, 1 if status == POSE_SOLVED else 0
+    if known and variable == FRAME_END_TENSION:
+        linearize_ends(code, k_h, k_p, preference, gravity, geometry, work)
+    factor_balance(freedom, geometry, work, full, matrix, reduced, balance, q, inverse, null)
+    needed_wrench(geometry, body, wrench, work, balance)
+    restrict_needed(freedom, balance)
+    minimum_norm(inverse, balance, work)
+    if r == 0:
+        return 1
     if r == 1:
         corners[0, 0], corners[1, 0] = feasible_interval(work, null)
-        return status, 2
-    return status, feasible_polygon(work, null, corners, labels)
+        return 2
+    return feasible_polygon(work, null, corners, labels)
+
+
+@kernel
+def margins_of_poses(
+    code: int,
+    k_h: float,
+    k_p: float,
+    limits_of: int,
+    validity: float,
+    freedom: Array,
+    bodies: Array,
+    robots: Array,
+    poses: Array,
+    wrenches: Array,
+    pulls: Array,
+    margins: Array,
+) -> None:
+    """Fill the capacity margins [N] (N,) of poses whose cables have given pulls (N, m); NaN where they have none."""
+    count, m = pulls.shape
+    n = freedom.shape[0]
+    geometry = np.empty((g.GEOMETRY_ROWS, m))
+    work = np.empty((tables.WORK_ROWS, m))
+    balance = np.empty((tables.BALANCE_ROWS, 6))
+    full = np.empty((6, m))
+    matrix = np.empty((n, m))
+    translations = 0
+    for k in range(n):
+        translations += 0 if is_rotation(freedom, k) else 1
+    for p in range(count):
+        margins[p] = math.nan
+        robot = robots[min(p, robots.shape[0] - 1)]
+        body = bodies[min(p, bodies.shape[0] - 1)]
+        wrench = wrenches[min(p, wrenches.shape[0] - 1)]
+        cable_geometry(robot, body, poses[p], np.empty((3, 3)), geometry)
+        placed = place_cables(code, k_h, k_p, limits_of, validity, body[tables.GRAVITY], robot, geometry, work)
+        if placed and not math.isnan(pulls[p, 0]):
+            work[tables.PULL] = pulls[p]
+            needed_wrench(geometry, body, wrench, work, balance)
+            restrict_needed(freedom, balance)
+            structure_matrix(geometry, full)
+            restrict_rows(freedom, full, matrix)
+            margins[p] = capacity_margin(
+                matrix, balance[tables.RIGHT, :n], work[tables.CHORD_LOW], work[tables.CHORD_HIGH], translations
+            )

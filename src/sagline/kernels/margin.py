@@ -19,6 +19,7 @@ import numpy as np
 from sagline.arrays import Array, Indices
 from sagline.kernels.jit import kernel
 
+MOST_FACES = 1 << 40  # more than there can be
 RANK = 1e-10  # a pivot below this share of the largest entry says that columns are parallel
 
 
@@ -98,7 +99,7 @@ def capacity_margin(matrix: Array, needed: Array, low: Array, high: Array, trans
     """Largest force [N] in any direction that can be added to the needed wrench; negative where it is not feasible.
 
     Args:
-        matrix: Structure matrix along the free motions, translations first, moments over a typical lever arm, (n, m).
+        matrix: Structure matrix along the free motions, translations first, (n, m).
         needed: Wrench to supply, in the same rows, (n,).
         low: Least tensions (m,).
         high: Largest tensions (m,), may be infinite.
@@ -110,7 +111,7 @@ def capacity_margin(matrix: Array, needed: Array, low: Array, high: Array, trans
     order = np.empty(n, dtype=np.int64)
     normal = np.empty(n)
     least = math.inf
-    for _ in range(1 << 40):
+    for _ in range(MOST_FACES):
         if normal_of(matrix, chosen, rows, order, normal):
             force = 0.0
             along = 0.0

@@ -16,6 +16,7 @@ from sagline.kernels.tables import HIGH, LOW, OFFSET, START
 
 STEPS = 200
 HALVINGS = 40
+CLOSE = 1e-2  # of the largest tension: a step shorter than this lets the exponent grow
 STILL = 1e-12  # of the largest tension: a step shorter than this ends the search
 
 
@@ -122,7 +123,7 @@ def project_on_rows(work: Array, null: Array, curve: Array, target: Array, point
 def lowest_p_norm(work: Array, null: Array, p: float, corners: Array, count: int, point: Array) -> bool:
     """Move a feasible point (r,), best that of least 2-norm, to the feasible one of least p-norm.
 
-    The exponent doubles from 2 with each step until it is p, so that Newton starts near. corners and count are those
+    The exponent doubles from 4 as the steps become short until it is p, so that Newton starts near. corners and count are those
     of the feasible polygon or interval, for r <= 2.
 
     Returns:
@@ -164,7 +165,9 @@ def lowest_p_norm(work: Array, null: Array, p: float, corners: Array, count: int
             share *= 0.5
         for k in range(r):
             point[k] = trial[k]
-        if exponent == p and length <= STILL * largest:
+        still = length <= STILL * largest or exponent * gain <= 1e-16 * scale * scale * before
+        if exponent == p and still:
             return True
-        exponent = min(2.0 * exponent, p)
+        if length <= CLOSE * largest:
+            exponent = min(2.0 * exponent, p)
     return False

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sagline.arrays import Array, Codes
+from sagline.cables.status import CableStatus
 from sagline.kinematics.status import PoseStatus
 from sagline.motion.path import Path
 from sagline.robot.equilibrium import Equilibrium
@@ -100,6 +101,20 @@ class Plan:
         lost = ~np.atleast_1d(self.feasible)
         edges = np.flatnonzero(np.diff(np.concatenate(([False], lost, [False])).astype(np.int8)))
         return tuple(self._gap(int(first), int(end) - 1) for first, end in edges.reshape(-1, 2))
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What stands, but is to be taken with care: cables whose tension leaves the empirical model's range."""
+        below = (
+            np.atleast_2d(self.state.cables.status == CableStatus.BELOW_VALIDITY)
+            & np.atleast_1d(self.feasible)[:, None]
+        )
+        return tuple(
+            f"cable {cable}: at {count} of {len(below)} poses its tension is below w D/(2 |sin phi|), where the empirical "
+            "model's lowest point enters the span; raise tension_min, set lowest_point_margin, or use Catenary()"
+            for cable, count in enumerate(below.sum(axis=0))
+            if count
+        )
 
     def _gap(self, first: int, last: int) -> Gap:
         part = slice(first, last + 1)

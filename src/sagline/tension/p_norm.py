@@ -10,7 +10,7 @@ from sagline.errors import InvalidValueError
 from sagline.kernels import codes
 from sagline.tension.method import TensionMethod
 
-LARGEST = 64.0  # beyond, the powers of small tensions leave nothing for Newton's method to see
+LARGEST = 32.0  # beyond, the powers of small tensions leave nothing for Newton's method to see
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +21,7 @@ class PNorm(TensionMethod):
     with p from 4 to 8, to spare the most loaded cable on a moving platform.
 
     Attributes:
-        p: Exponent, 2 to 64.
+        p: Exponent, 2 to 32.
 
     Source:
         Verhoeven 2004, "Analysis of the workspace of tendon-based Stewart platforms", ch. 5; Gosselin & Grenier 2011.

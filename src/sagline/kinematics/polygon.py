@@ -1,0 +1,142 @@
+"""The polygon of feasible tensions of one pose."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sagline.arrays import Array, Indices, locked
+from sagline.cables.catenary import Catenary
+from sagline.cables.model import CableModel
+from sagline.errors import InvalidValueError
+from sagline.kernels import tables
+from sagline.kernels.inverse import polygon_of_pose
+from sagline.kernels.polygon import SPARE_CORNERS
+from sagline.kinematics.inverse import inverse
+from sagline.kinematics.plan import Plan
+from sagline.kinematics.status import PoseStatus
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.statics.tables import body_table, cable_table, pose_rows
+from sagline.tension.centroid import Centroid
+from sagline.tension.method import Variable
+from sagline.tension.minimum_norm import MinimumNorm
+from sagline.tension.options import check_sharing, kernel_options
+from sagline.tension.polygon import Side, TensionPolygon
+
+MERGED = 1e-10  # of the largest tension: corners closer than this are one
+
+_CATENARY = Catenary()
+
+
+def tension_polygon(
+    robot: Robot,
+    pose: Pose,
+    model: CableModel = _CATENARY,
+    wrench: ArrayLike | None = None,
+    variable: Variable = "chord",
+) -> TensionPolygon:
+    """The feasible tensions of one pose.
+
+    Args:
+        robot: The robot, with at most two redundant cables.
+        pose: One pose.
+        model: Cable model.
+        wrench: External and inertial wrench about the center of mass, world axes [N, N m], shape (6,); None for none.
+        variable: The tension the polygon is drawn in: "chord", "horizontal" (the article's) or "frame_end".
+
+    Returns:
+        The polygon, with no vertices where the pose is not feasible.
+
+    Raises:
+        InvalidValueError: If there is not one pose, the structure matrix has lost rank, a cable is too slack, or
+            the robot has too few or too many cables.
+
+    Source:
+        Gia Luan & Truong Thinh 2020, (53)-(55); Gouttefarde et al. 2015; docs/model.md, section 5.
+    """
+    check_sharing(robot, Centroid())
+    if pose.shape:
+        raise InvalidValueError("pose", f"a batch of shape {pose.shape}", "one pose", "Draw one pose at a time.")
+    plan = inverse(robot, pose, model, MinimumNorm(variable), wrench)
+    if plan.status not in (PoseStatus.SOLVED, PoseStatus.INFEASIBLE):
+        raise InvalidValueError(
+            "pose", "one without a balance", "one that `inverse` can solve", PoseStatus(int(plan.status)).text
+        )
+    m, r = robot.cable_count, robot.cable_count - robot.degrees_of_freedom
+    work = np.full((tables.WORK_ROWS, m), np.nan)
+    null = np.empty((r, m))
+    corners = np.empty((2 * m + SPARE_CORNERS, 2))
+    labels = np.full(2 * m + SPARE_CORNERS, -1, dtype=np.int64)
+    count = polygon_of_pose(
+        *kernel_options(robot, model, MinimumNorm(variable)),
+        robot.freedom,
+        body_table(robot)[0],
+        cable_table(robot)[0],
+        pose_rows(pose)[0],
+        plan.state.wrench,
+        plan.chord_tension,
+        _pulls(plan),
+        work,
+        null,
+        corners,
+        labels,
+    )
+    origin, offset = work[tables.START], work[tables.OFFSET]
+    vertices, sides = _sides_of(count if plan.feasible else 0, null, work, corners, labels)
+    return TensionPolygon(
+        vertices=locked(vertices),
+        tensions=locked(_tensions(vertices, null, origin + offset)),
+        sides=sides,
+        bounded=None not in sides,
+        basis=locked(null),
+        origin=locked(origin + offset),
+        scale=locked(work[tables.SCALE].copy()),
+        offset=locked(offset.copy()),
+    )
+
+
+def _pulls(plan: Plan) -> Array:
+    """T_z - tau sin phi of the cables [N], as kernels take it."""
+    cables = plan.state.cables
+    return locked(cables.vertical_force - cables.chord_tension * cables.rise / cables.chord)
+
+
+def _sides_of(
+    count: int, null: Array, work: Array, corners: Array, labels: Indices
+) -> tuple[Array, tuple[Side | None, ...]]:
+    """Vertices (h, r) and what the sides are."""
+    r, m = null.shape
+    origin, low, high = work[tables.START], work[tables.LOW], work[tables.HIGH]
+    if r == 0 or count == 0:
+        return np.zeros((count, r)), ()
+    if r == 1:
+        ends = corners[:2, :1].copy()
+        return ends, tuple(_limit_at(end, null[0], origin, low, high) for end in ends[:, 0])
+    corners, labels = corners[:count], labels[:count]
+    lengths = np.hypot(*(np.roll(corners, -1, axis=0) - corners).T)
+    sizes = np.concatenate((np.abs(origin), low, high[np.isfinite(high)]))
+    kept = lengths > MERGED * sizes.max()
+    if not kept.any():
+        kept[0] = True
+    sides = tuple(Side(int(k) // 2, ("min", "max")[k % 2]) if k < 2 * m else None for k in labels[kept])
+    return corners[kept], sides
+
+
+def _limit_at(end: float, row: Array, origin: Array, low: Array, high: Array) -> Side | None:
+    """The limit that ends an interval there."""
+    if not np.isfinite(end):
+        return None
+    there = origin + row * end
+    gaps = np.where(np.abs(row) > MERGED, np.minimum(np.abs(there - low), np.abs(there - high)), np.inf)
+    cable = int(np.argmin(gaps))
+    return Side(cable, "min" if abs(there[cable] - low[cable]) <= abs(there[cable] - high[cable]) else "max")
+
+
+def _tensions(vertices: Array, null: Array, origin: Array) -> Array:
+    """Tensions at the vertices; a cable that the null space does not move keeps its tension at an infinite end."""
+    with np.errstate(invalid="ignore"):
+        steps = vertices[:, :, None] * null
+    moved = np.where(null == 0.0, 0.0, steps)
+    tensions: Array = origin + moved.sum(axis=1)
+    return tensions

@@ -1,0 +1,36 @@
+"""A robot some of whose cables are broken, or left out on purpose."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sagline.cables.cable import Cable
+from sagline.errors import InvalidValueError
+from sagline.robot.robot import Robot
+
+
+def without_cables(robot: Robot, *cables: int) -> Robot:
+    """The robot that is left when cables break: what they weighed on the platform is left out too.
+
+    Args:
+        robot: The whole robot.
+        cables: Indices of the broken cables, 0 to m - 1.
+
+    Returns:
+        A robot with the other cables, in their order; everything else unchanged.
+
+    Raises:
+        InvalidValueError: If an index names no cable.
+    """
+    kept = np.ones(robot.cable_count, dtype=bool)
+    for cable in cables:
+        if not 0 <= cable < robot.cable_count:
+            raise InvalidValueError("cable", cable, f"0 to {robot.cable_count - 1}", "Number cables from 0.")
+        kept[cable] = False
+    return robot.replace(
+        frame_anchors=robot.frame_anchors[kept],
+        platform_anchors=robot.platform_anchors[kept],
+        cables=Cable(robot.cables.linear_density[kept], robot.cables.axial_stiffness[kept]),
+        tension_min=robot.tension_min[kept],
+        tension_max=robot.tension_max[kept],
+    )

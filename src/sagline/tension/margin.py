@@ -1,0 +1,62 @@
+"""How far a pose is from failing: in tension, and in load."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sagline.arrays import Array, locked
+from sagline.kernels.inverse import margins_of_poses
+from sagline.robot.equilibrium import Equilibrium
+from sagline.statics.tables import body_table, cable_table, pose_rows
+from sagline.tension.options import LIMITS_OF
+
+
+def limit_margin(state: Equilibrium) -> Array:
+    """Distance of each pose's tensions to their nearest limit.
+
+    Args:
+        state: Robot and cables, `plan.state` for instance.
+
+    Returns:
+        Smallest distance [N] of the quantity that the robot's limits name, shape () or (N,): 0 where a cable is at its
+        limit, NaN where there are no tensions. It depends on how the load is shared.
+    """
+    robot, cables = state.robot, state.cables
+    tension = cables.frame_end_tension if robot.tension_limits_of == "frame_end" else cables.chord_tension
+    gap: Array = np.minimum(tension - robot.tension_min, robot.tension_max - tension).min(axis=-1)
+    return gap
+
+
+def capacity_margin(state: Equilibrium) -> Array:
+    """Extra load that each pose can take, whatever its direction, before no tensions within the limits balance it.
+
+    The moment stays as it is. Exact for weightless cables; with sag the pulls stay those of the state. Grows with the
+    binomial of m over n - 1: 56 faces for eight cables, some microseconds a pose.
+
+    Args:
+        state: Robot, poses, wrench and cables, `plan.state` for instance.
+
+    Returns:
+        Force [N], shape () or (N,), whatever the way of sharing; infinite where no force alone can make the pose fail,
+        NaN where there are no tensions.
+
+    Source:
+        Bouchard, Gosselin & Moore 2010; Guay, Cardou, Cruz-Ruiz & Caro 2014.
+    """
+    robot, cables, rows = state.robot, state.cables, pose_rows(state.pose)
+    pulls = np.atleast_2d(cables.vertical_force - cables.chord_tension * cables.rise / cables.chord)
+    margins = np.empty(len(rows))
+    margins_of_poses(
+        cables.model.code,
+        *cables.model.parameters,
+        LIMITS_OF[robot.tension_limits_of],
+        np.nan,
+        robot.freedom,
+        body_table(robot),
+        cable_table(robot),
+        rows,
+        np.atleast_2d(state.wrench),
+        locked(np.ascontiguousarray(pulls)),
+        margins,
+    )
+    return margins.reshape(state.pose.shape)

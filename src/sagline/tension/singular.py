@@ -1,0 +1,67 @@
+"""Singular poses: the motion of the platform that no cable resists."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sagline.arrays import Array, locked
+from sagline.errors import InvalidValueError
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.statics.balance import structure_matrix
+
+
+class UnresistedMotion(NamedTuple):
+    """The motion that the cables of a pose resist least.
+
+    Attributes:
+        twist: Velocity of the center of mass and angular velocity, world axes, shape (6,); its angular part has length
+            1, or its linear part where it does not turn.
+        resistance: How fast the fastest cable changes its length in this motion, over the same of the motion it resists
+            most; at a singular pose 0 but for rounding.
+        text: The motion in words.
+    """
+
+    twist: Array
+    resistance: float
+    text: str
+
+
+def unresisted_motion(robot: Robot, pose: Pose) -> UnresistedMotion:
+    """The motion of the platform that changes the cables' lengths least, at a singular pose not at all.
+
+    Args:
+        robot: The robot.
+        pose: One pose.
+
+    Raises:
+        InvalidValueError: If there is not one pose.
+    """
+    if pose.shape:
+        raise InvalidValueError("pose", f"a batch of shape {pose.shape}", "one pose", "Ask for one pose at a time.")
+    lever = float(np.linalg.norm(robot.platform_anchors - robot.center_of_mass, axis=1).max()) or 1.0
+    units = np.where(np.linalg.norm(robot.freedom[:, 3:], axis=1) > 0.5, 1.0 / lever, 1.0)
+    left, values, _right = np.linalg.svd(units[:, None] * structure_matrix(robot, pose))
+    twist = robot.freedom.T @ (units * left[:, -1])
+    linear, angular = np.linalg.norm(twist[:3]), np.linalg.norm(twist[3:])
+    turns = angular * lever > 1e-6 * linear
+    twist = twist / (angular if turns else linear)
+    resistance = float(values[-1] / values[0]) if len(values) == robot.degrees_of_freedom else 0.0
+    return UnresistedMotion(locked(twist), resistance, _in_words(robot, pose, twist, turns=bool(turns)))
+
+
+def _in_words(robot: Robot, pose: Pose, twist: Array, *, turns: bool) -> str:
+    if not turns:
+        return f"translation along {_vector(twist[:3])}"
+    axis = twist[3:]
+    center = pose.position + pose.matrix @ robot.center_of_mass
+    through = center + np.cross(axis, twist[:3])
+    pitch = float(axis @ twist[:3])
+    slide = f", sliding {pitch:.3g} m a radian along it" if abs(pitch) > 1e-6 else ""
+    return f"rotation about the axis {_vector(axis)} through {_vector(through)} m{slide}"
+
+
+def _vector(values: Array) -> str:
+    return "(" + ", ".join(f"{value + 0.0:.3g}" for value in np.round(values, 9)) + ")"

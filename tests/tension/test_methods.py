@@ -1,0 +1,365 @@
+"""Every way of sharing, on linear (weightless) balances, against independent programs and brute force."""
+
+import pickle
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog, minimize
+
+from sagline.cables.cable import Cable
+from sagline.cables.catenary import Catenary
+from sagline.cables.elastic import Elastic
+from sagline.errors import InvalidValueError
+from sagline.files.robot_file import load_robot
+from sagline.kinematics.inverse import inverse
+from sagline.kinematics.polygon import tension_polygon
+from sagline.kinematics.status import PoseStatus
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.tension.analytic_center import AnalyticCenter
+from sagline.tension.broken import without_cables
+from sagline.tension.centroid import Centroid
+from sagline.tension.closed_form import ClosedForm
+from sagline.tension.closest import Closest
+from sagline.tension.improved_closed_form import ImprovedClosedForm
+from sagline.tension.lowest_maximum import LowestMaximum
+from sagline.tension.lowest_sum import LowestSum
+from sagline.tension.method import TensionMethod
+from sagline.tension.minimum_norm import MinimumNorm
+from sagline.tension.p_norm import PNorm
+from sagline.tension.polygon_walk import PolygonWalk
+from sagline.tension.puncture import Puncture
+from sagline.tension.quadratic_program import QuadraticProgram
+from tests.tension.reference import nearest, needed, planar, random_poses, structure
+
+CLOSED = (ClosedForm(), ImprovedClosedForm(), Puncture())
+WALKS = (PolygonWalk(), PolygonWalk(optimum="1-norm"), PolygonWalk(optimum="centroid"))
+ANY_NUMBER = (
+    MinimumNorm(),
+    Closest(),
+    QuadraticProgram(weights=3.0, target=200.0),
+    LowestSum(),
+    LowestMaximum(),
+    PNorm(),
+    AnalyticCenter(),
+)
+ALL = (*ANY_NUMBER, Centroid(), *CLOSED, *WALKS)
+
+
+def many_cables(cables: int, seed: int) -> Robot:
+    """A platform between cables that come from all over a sphere."""
+    rng = np.random.default_rng(seed)
+    ways = rng.normal(size=(cables, 3))
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    ends = rng.normal(size=(cables, 3)) * 0.3
+    return Robot("many", ways * 5, ends, Cable(0.02, 1e5), 20.0, np.eye(3), tension_min=10.0, tension_max=800.0)
+
+
+MANY = [(many_cables(m, seed), m) for m, seed in ((9, 1), (10, 2), (12, 3), (16, 4), (24, 5))]
+
+
+@pytest.mark.parametrize("method", ALL, ids=str)
+@pytest.mark.parametrize("name", ["article-mixed", "cogiro", "falcon-7", "fast"])
+def test_balance_and_limits(method: TensionMethod, name: str) -> None:
+    robot, rng = load_robot(name), np.random.default_rng(1)
+    if isinstance(method, PolygonWalk) and robot.cable_count != 8:
+        pytest.skip("the walk is for n + 2 cables")
+    poses = random_poses(robot, 300, rng, stretch=1.2)
+    plan, least = inverse(robot, poses, tension=method), inverse(robot, poses, tension=MinimumNorm())
+    found = plan.feasible
+    assert plan.wrench_residual[found].max() <= 1e-8 * max(1.0, 1e-6 * robot.tension_max.max())
+    slack = 2e-10 * robot.tension_max
+    assert (plan.chord_tension[found] >= robot.tension_min - slack).all()
+    assert (plan.chord_tension[found] <= robot.tension_max + slack).all()
+    np.testing.assert_array_equal(plan.status == PoseStatus.INFEASIBLE, least.status == PoseStatus.INFEASIBLE)
+    if method not in CLOSED:
+        np.testing.assert_array_equal(found, least.feasible)
+
+
+@pytest.mark.parametrize("robot", [robot for robot, _ in MANY], ids=[f"{m} cables" for _, m in MANY])
+def test_many_cables_agree_with_other_programs(robot: Robot) -> None:
+    poses = random_poses(robot.replace(test_box=_box()), 15, np.random.default_rng(7))
+    rng = np.random.default_rng(8)
+    load = rng.normal(size=(15, 6)) * [80, 80, 80, 20, 20, 20]
+    weights, target = rng.uniform(0.5, 2, robot.cable_count), rng.uniform(0, 200, robot.cable_count)
+    plans = {
+        method: inverse(robot, poses, model=Elastic(), tension=method, wrench=load)
+        for method in (*ANY_NUMBER, QuadraticProgram(weights=weights, target=target))
+    }
+    ones = np.ones(robot.cable_count)
+    solved = 0
+    for i, pose in enumerate(poses):
+        matrix, right = structure(robot, pose), needed(robot, load[i])
+        bounds = np.column_stack((robot.tension_min, robot.tension_max))
+        verdict = linprog(ones, A_eq=matrix, b_eq=right, bounds=bounds)
+        for method, plan in plans.items():
+            assert bool(plan.feasible[i]) == (verdict.status == 0), method
+        if verdict.status != 0:
+            continue
+        solved += 1
+        found = {type(method): plan.chord_tension[i] for method, plan in plans.items()}
+        for tensions in found.values():
+            np.testing.assert_allclose(matrix @ tensions, right, atol=1e-8)
+        assert found[LowestSum].sum() == pytest.approx(verdict.fun, rel=1e-9)
+        assert found[LowestMaximum].max() == pytest.approx(_lowest_maximum(robot, matrix, right), rel=1e-9)
+        limits = (matrix, right, robot.tension_min, robot.tension_max)
+        np.testing.assert_allclose(found[MinimumNorm], nearest(*limits, 0 * ones, ones), atol=1e-5)
+        np.testing.assert_allclose(found[QuadraticProgram], nearest(*limits, target, weights), atol=1e-5)
+        _check_stationary(robot, matrix, found[AnalyticCenter], _barrier_slope(robot, found[AnalyticCenter]))
+        _check_p_norm(robot, matrix, found[PNorm], 4.0)
+    assert solved >= 5
+
+
+def _box() -> object:
+    from sagline.robot.pose_box import PoseBox
+
+    return PoseBox([-0.5] * 3, [0.5] * 3, 0.2)
+
+
+def _lowest_maximum(robot: Robot, matrix: np.ndarray, right: np.ndarray) -> float:
+    m = robot.cable_count
+    found = linprog(
+        np.append(np.zeros(m), 1.0),
+        A_ub=np.column_stack((np.eye(m), -np.ones(m))),
+        b_ub=np.zeros(m),
+        A_eq=np.column_stack((matrix, np.zeros(len(matrix)))),
+        b_eq=right,
+        bounds=[*zip(robot.tension_min, robot.tension_max, strict=True), (0, None)],
+    )
+    assert found.status == 0
+    return float(found.fun)
+
+
+def _null(matrix: np.ndarray) -> np.ndarray:
+    return np.asarray(np.linalg.svd(matrix)[2][len(matrix) :])
+
+
+def _barrier_slope(robot: Robot, tensions: np.ndarray) -> np.ndarray:
+    return np.asarray(1 / (robot.tension_max - tensions) - 1 / (tensions - robot.tension_min))
+
+
+def _check_stationary(robot: Robot, matrix: np.ndarray, tensions: np.ndarray, slope: np.ndarray) -> None:
+    """No motion in the null space lowers the objective."""
+    assert np.abs(_null(matrix) @ slope).max() < 1e-7 * np.abs(slope).max()
+
+
+def _check_p_norm(robot: Robot, matrix: np.ndarray, tensions: np.ndarray, p: float) -> None:
+    """Karush-Kuhn-Tucker: the slope is J^T y plus what cables at their limits hold against."""
+    slope = (tensions / tensions.max()) ** (p - 1)
+    at_low = tensions <= robot.tension_min + 1e-7
+    at_high = tensions >= robot.tension_max - 1e-7
+    free = ~(at_low | at_high)
+    y = np.linalg.lstsq(matrix.T[free], slope[free], rcond=None)[0]
+    rest = slope - matrix.T @ y
+    assert np.abs(rest[free]).max() < 1e-6
+    if np.linalg.matrix_rank(matrix[:, free]) == len(matrix):
+        assert (rest[at_low] > -1e-6).all()
+        assert (rest[at_high] < 1e-6).all()
+
+
+@pytest.mark.parametrize("name", ["article-mixed", "article-suspended", "ipanema-1", "falcon-7"])
+def test_few_cables_agree_with_other_programs(name: str) -> None:
+    robot = load_robot(name)
+    poses = random_poses(robot, 40, np.random.default_rng(9))
+    methods = (LowestSum(), LowestMaximum(), PNorm(p=4.0), PNorm(p=16.0), AnalyticCenter(), PNorm(p=2.0), MinimumNorm())
+    plans = [inverse(robot, poses, model=Elastic(), tension=method).chord_tension for method in methods]
+    feasible = np.isfinite(plans[0][:, 0])
+    assert feasible.sum() > 20
+    for i in np.flatnonzero(feasible):
+        matrix, right = structure(robot, poses[int(i)]), needed(robot, np.zeros(6))
+        bounds = np.column_stack((robot.tension_min, robot.tension_max))
+        lowest = linprog(np.ones(robot.cable_count), A_eq=matrix, b_eq=right, bounds=bounds)
+        assert plans[0][i].sum() == pytest.approx(lowest.fun, rel=1e-9)
+        assert plans[1][i].max() == pytest.approx(_lowest_maximum(robot, matrix, right), rel=1e-8)
+        _check_p_norm(robot, matrix, plans[2][i], 4.0)
+        _check_p_norm(robot, matrix, plans[3][i], 16.0)
+        _check_stationary(robot, matrix, plans[4][i], _barrier_slope(robot, plans[4][i]))
+        np.testing.assert_allclose(plans[5][i], plans[6][i], rtol=1e-8)
+
+
+def test_lowest_maximum_breaks_ties_by_norm() -> None:
+    robot = planar()
+    pull = np.array([4.0, 1.0])
+    pose = Pose([0.05, -0.02, 0.0], np.eye(3))
+    found = inverse(robot, pose, tension=LowestMaximum(), wrench=[*-pull, 0, 0, 0, 0]).chord_tension
+    matrix = robot.freedom @ structure(robot, pose)
+    top = found.max()
+    best = nearest(matrix, pull, robot.tension_min, np.full(4, top + 1e-9), np.zeros(4), np.ones(4))
+    np.testing.assert_allclose(found, best, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["article-mixed", "article-suspended", "cogiro", "ipanema-1"])
+def test_walk_and_cut_give_the_same(name: str) -> None:
+    robot = load_robot(name)
+    poses = random_poses(robot, 500, np.random.default_rng(10), stretch=1.2)
+    same = (LowestSum(), MinimumNorm(), Centroid())
+    for optimum, other in zip(("1-norm", "2-norm", "centroid"), same, strict=True):
+        walked = inverse(robot, poses, model=Elastic(), tension=PolygonWalk(optimum=optimum))  # type: ignore[arg-type]
+        cut = inverse(robot, poses, model=Elastic(), tension=other)
+        np.testing.assert_array_equal(walked.status, cut.status)
+        assert 50 < walked.feasible.sum() < 500 or name != "article-mixed"
+        np.testing.assert_allclose(walked.chord_tension, cut.chord_tension, rtol=1e-7, atol=1e-7)
+
+
+def test_centroid_by_sampling() -> None:
+    robot, rng = load_robot("article-mixed"), np.random.default_rng(11)
+    pose = random_poses(robot, 1, rng)[0]
+    polygon = tension_polygon(robot, pose, model=Elastic())
+    low, high = polygon.vertices.min(axis=0), polygon.vertices.max(axis=0)
+    points = rng.uniform(low, high, (400_000, 2))
+    tensions = polygon.origin + points @ polygon.basis
+    inside = ((tensions >= robot.tension_min) & (tensions <= robot.tension_max)).all(axis=1)
+    found = polygon.coordinates(inverse(robot, pose, model=Elastic(), tension=Centroid()).chord_tension)
+    spread = (high - low) / np.sqrt(inside.sum())
+    assert (np.abs(points[inside].mean(axis=0) - found) < 3 * spread).all()
+
+
+def test_closed_forms_written_out() -> None:
+    robot = load_robot("article-mixed")
+    poses = random_poses(robot, 200, np.random.default_rng(12))
+    plans = [inverse(robot, poses, model=Elastic(), tension=method) for method in CLOSED]
+    middle = (robot.tension_min + robot.tension_max) / 2
+    held = 0
+    for i, pose in enumerate(poses):
+        matrix, right = structure(robot, pose), needed(robot, np.zeros(6))
+        simple = middle + np.linalg.pinv(matrix) @ (right - matrix @ middle)
+        improved = _improved(matrix, right, robot.tension_min, robot.tension_max)
+        if (simple >= robot.tension_min).all() and (simple <= robot.tension_max).all():
+            np.testing.assert_allclose(plans[0].chord_tension[i], simple, rtol=1e-9)
+        else:
+            assert plans[0].status[i] in (PoseStatus.NOT_COVERED, PoseStatus.INFEASIBLE)
+        if improved is None:
+            assert plans[1].status[i] in (PoseStatus.NOT_COVERED, PoseStatus.INFEASIBLE)
+            continue
+        held += int(np.abs(improved - simple).max() > 1.0)
+        np.testing.assert_allclose(plans[1].chord_tension[i], improved, rtol=1e-8)
+        least = np.linalg.pinv(matrix) @ right  # the puncture lies on the way from here to there
+        way, there = improved - least, plans[2].chord_tension[i] - least
+        share = way @ there / (way @ way)
+        np.testing.assert_allclose(there, share * way, atol=1e-7)
+        outside = least + (share - 1e-6) * way
+        assert share < 1e-9 or (outside < robot.tension_min).any() or (outside > robot.tension_max).any()
+    assert held > 20
+
+
+def _improved(matrix: np.ndarray, right: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray | None:
+    """Pott's algorithm, as he states it: hold the worst cable, take it out of the problem, solve again."""
+    free, tensions = np.ones(len(low), dtype=bool), np.zeros(len(low))
+    for _ in range(matrix.shape[1] - matrix.shape[0] + 1):
+        middle = ((low + high) / 2)[free]
+        part = matrix[:, free]
+        rest = right - matrix[:, ~free] @ tensions[~free]
+        tensions[free] = middle + np.linalg.pinv(part) @ (rest - part @ middle)
+        miss = np.maximum(low - tensions, tensions - high)
+        if miss.max() <= 1e-9:
+            return tensions
+        worst = int(miss.argmax())
+        tensions[worst] = low[worst] if tensions[worst] < low[worst] else high[worst]
+        free[worst] = False
+        if free.sum() < len(right):
+            return None
+    return None
+
+
+@pytest.mark.parametrize("method", [MinimumNorm("frame_end"), PNorm("frame_end", p=4.0), LowestMaximum("frame_end")])
+def test_frame_end_tensions_are_what_is_least(method: TensionMethod) -> None:
+    # SLSQP, on the exact cables: no other tensions of the pose have a smaller objective at the frame end
+    robot = load_robot("cogiro").replace(tension_limits_of="frame_end")
+    exponent = {MinimumNorm: 2.0, PNorm: 4.0, LowestMaximum: np.inf}[type(method)]
+    for pose in random_poses(robot, 3, np.random.default_rng(13)):
+        plan = inverse(robot, pose, tension=method)
+        best = np.linalg.norm(plan.state.cables.frame_end_tension, exponent)
+        polygon = tension_polygon(robot, pose, variable="chord")
+        for vertex in polygon.vertices:
+            way = vertex - polygon.coordinates(plan.chord_tension)
+            for share in (1e-2, 0.1):
+                goal = polygon.origin + (polygon.coordinates(plan.chord_tension) + share * way) @ polygon.basis
+                other = inverse(robot, pose, tension=QuadraticProgram(target=np.maximum(goal, 0.0)))
+                end = other.state.cables.frame_end_tension
+                assert np.linalg.norm(end, exponent) >= best * (1 - 1e-9)
+
+
+def test_variables_differ() -> None:
+    robot = load_robot("cogiro")
+    pose = random_poses(robot, 1, np.random.default_rng(14))[0]
+    found = [inverse(robot, pose, tension=MinimumNorm(v)).chord_tension for v in ("chord", "horizontal", "frame_end")]
+    assert np.abs(found[0] - found[1]).max() > 1.0
+    assert 1e-3 < np.abs(found[0] - found[2]).max() < 50.0
+
+
+def test_broken_cable() -> None:
+    robot = load_robot("article-mixed")
+    pose = Pose([0.0, 0.0, 3.0], np.eye(3))
+    left = without_cables(robot, 5)
+    plan = inverse(left, pose, tension=Centroid())
+    assert plan.feasible
+    matrix = np.delete(structure(robot, pose), 5, axis=1)
+    np.testing.assert_allclose(structure(left, pose), matrix)
+    alone = inverse(left, pose, model=Elastic(), tension=Centroid())
+    np.testing.assert_allclose(matrix @ alone.chord_tension, needed(robot, np.zeros(6)), atol=1e-8)
+    with pytest.raises(InvalidValueError, match="cable is 8; allowed: 0 to 7"):
+        without_cables(robot, 8)
+
+
+def test_unlimited_cables() -> None:
+    robot = planar(tension_max=np.inf)
+    pose = Pose([0.1, 0.0, 0.0], np.eye(3))
+    for centered in (Centroid(), AnalyticCenter()):
+        plan = inverse(robot, pose, tension=centered)
+        assert plan.status == PoseStatus.UNBOUNDED
+        assert np.isnan(plan.chord_tension).all()
+    for method in CLOSED:
+        with pytest.raises(InvalidValueError, match=r"tension_max\[0\] is infinite"):
+            inverse(robot, pose, tension=method)
+    limited = inverse(planar(tension_max=1e4), pose, tension=LowestSum())
+    np.testing.assert_allclose(inverse(robot, pose, tension=LowestSum()).chord_tension, limited.chord_tension)
+
+
+def test_options_are_checked() -> None:
+    with pytest.raises(InvalidValueError, match=r"p is 1\.5"):
+        PNorm(p=1.5)
+    with pytest.raises(InvalidValueError, match="p is 100"):
+        PNorm(p=100.0)
+    with pytest.raises(InvalidValueError, match="optimum is 'best'"):
+        PolygonWalk(optimum="best")  # type: ignore[arg-type]
+    with pytest.raises(InvalidValueError, match="weights"):
+        QuadraticProgram(weights=[1.0, 0.0])
+    with pytest.raises(InvalidValueError, match=r"target is of shape \(3,\)"):
+        inverse(load_robot("cogiro"), Pose([0, 0, 2.0], np.eye(3)), tension=QuadraticProgram(target=[1.0, 2.0, 3.0]))
+    with pytest.raises(InvalidValueError, match="number of cables is 9; allowed: 6 to 8"):
+        inverse(MANY[0][0], Pose(np.zeros(3), np.eye(3)), tension=Centroid())
+    again = pickle.loads(pickle.dumps(QuadraticProgram(weights=2.0, target=[3.0, 4.0])))
+    np.testing.assert_array_equal(again.target, [3.0, 4.0])
+
+
+def test_p_norm_between_norm_and_maximum() -> None:
+    robot = load_robot("article-mixed")
+    poses = random_poses(robot, 300, np.random.default_rng(15))
+    plans = [inverse(robot, poses, model=Catenary(), tension=PNorm(p=p)) for p in (2.0, 4.0, 8.0, 16.0, 32.0)]
+    top = np.array([plan.chord_tension.max(axis=1) for plan in plans])
+    least = inverse(robot, poses, tension=LowestMaximum()).chord_tension.max(axis=1)
+    found = plans[0].feasible
+    assert all((plan.feasible == found).all() for plan in plans)
+    assert (np.diff(top[:, found], axis=0) < 1e-6 * top[0, found]).all()
+    assert (top[-1, found] >= least[found] - 1e-6 * least[found]).all()
+    # the p-norm of m numbers is at most m^(1/p) times their largest
+    assert (top[-1, found] <= 8 ** (1 / 32) * least[found] * (1 + 1e-6)).all()
+
+
+def test_slsqp_agrees_with_p_norm() -> None:
+    robot = load_robot("ipanema-1")
+    pose = random_poses(robot, 1, np.random.default_rng(16))[0]
+    polygon = tension_polygon(robot, pose, model=Elastic())
+    found = inverse(robot, pose, model=Elastic(), tension=PNorm(p=6.0)).chord_tension
+    scale = found.max()
+
+    def size(point: np.ndarray) -> float:
+        return float((((polygon.origin + point @ polygon.basis) / scale) ** 6).sum())
+
+    def gaps(point: np.ndarray) -> np.ndarray:
+        tensions = polygon.origin + point @ polygon.basis
+        return np.concatenate((tensions - robot.tension_min, robot.tension_max - tensions)) / scale
+
+    start = polygon.vertices.mean(axis=0)
+    best = minimize(size, start, method="SLSQP", constraints={"type": "ineq", "fun": gaps}, options={"ftol": 1e-15})
+    assert size(polygon.coordinates(found)) <= best.fun * (1 + 1e-9)

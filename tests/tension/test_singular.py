@@ -1,0 +1,46 @@
+import numpy as np
+import pytest
+
+from sagline.cables.cable import Cable
+from sagline.errors import InvalidValueError
+from sagline.kinematics.inverse import inverse
+from sagline.kinematics.status import PoseStatus
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.tension.singular import unresisted_motion
+from tests.tension.reference import planar
+
+
+def spinning(axis_z: tuple[float, float]) -> Robot:
+    """All cables meet one vertical axis of the platform: none resists turning about it."""
+    corners = np.array([[3.0, 3, 3], [-3, 3, 3], [-3, -3, 3], [3, -3, 3]])
+    frame = np.concatenate((corners, corners * [1, 1, -1]))
+    ends = np.repeat([[0.1, 0, axis_z[0]], [0.1, 0, axis_z[1]]], 4, axis=0)
+    return Robot("spinning", frame, ends, Cable(0.01, 1e5), 5.0, np.eye(3), tension_min=1.0, tension_max=1e3)
+
+
+def test_rotation_no_cable_resists() -> None:
+    robot, pose = spinning((0.2, -0.2)), Pose([0.3, 0.0, 0.0], np.eye(3))
+    assert inverse(robot, pose).status == PoseStatus.SINGULAR
+    motion = unresisted_motion(robot, pose)
+    assert motion.resistance < 1e-15
+    np.testing.assert_allclose(np.abs(motion.twist[3:]), [0, 0, 1], atol=1e-12)
+    # the axis runs through (0.4, 0), the center of mass (0.3, 0) turns about it
+    np.testing.assert_allclose(motion.twist[:3], np.cross(motion.twist[3:], [-0.1, 0, 0]), atol=1e-12)
+    assert motion.text.startswith("rotation about the axis (0, 0, ")
+    assert "through (0.4, 0, 0) m" in motion.text
+
+
+def test_translation_no_cable_resists() -> None:
+    # cables in a line cannot hold a point across it
+    robot = planar(frame_anchors=[[-1, 0, 0], [1, 0, 0], [2, 0, 0], [-2, 0, 0]])
+    pose = Pose(np.zeros(3), np.eye(3))
+    assert inverse(robot, pose).status == PoseStatus.SINGULAR
+    motion = unresisted_motion(robot, pose)
+    np.testing.assert_allclose(np.abs(motion.twist), [0, 1, 0, 0, 0, 0], atol=1e-12)
+    assert motion.text in ("translation along (0, 1, 0)", "translation along (0, -1, 0)")
+
+
+def test_one_pose_at_a_time() -> None:
+    with pytest.raises(InvalidValueError, match="one pose"):
+        unresisted_motion(planar(), Pose(np.zeros((2, 3)), np.broadcast_to(np.eye(3), (2, 3, 3))))
