@@ -51,7 +51,7 @@ def structures(robot: Robot, poses: Pose) -> np.ndarray:
 
 def needed(robot: Robot, wrench: np.ndarray) -> np.ndarray:
     """What weightless cables must supply (6,)."""
-    return np.array([0, 0, robot.mass * robot.gravity, 0, 0, 0]) - wrench
+    return np.asarray(np.array([0, 0, robot.mass * robot.gravity, 0, 0, 0]) - wrench)
 
 
 def unbalanced(plan: Plan) -> np.ndarray:

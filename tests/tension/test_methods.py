@@ -47,12 +47,19 @@ ALL = (*ANY_NUMBER, Centroid(), *CLOSED, *WALKS)
 
 
 def many_cables(cables: int, seed: int) -> Robot:
-    """A platform between cables that come from all over a sphere."""
-    rng = np.random.default_rng(seed)
-    ways = rng.normal(size=(cables, 3))
-    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
-    ends = rng.normal(size=(cables, 3)) * 0.3
-    return Robot("many", ways * 5, ends, Cable(0.02, 1e5), 20.0, np.eye(3), tension_min=10.0, tension_max=800.0)
+    """The article's mixed robot with more cables from its walls."""
+    mixed, rng = load_robot("article-mixed"), np.random.default_rng(seed)
+    more = rng.uniform(-1, 1, (cables - 8, 3)) * [7.5, 5.5, 3.0] + [0, 0, 3]
+    side = rng.integers(0, 2, cables - 8)
+    more[np.arange(cables - 8), side] = np.sign(more[np.arange(cables - 8), side]) * np.array([7.5, 5.5])[side]
+    return mixed.replace(
+        name="many",
+        frame_anchors=np.concatenate((mixed.frame_anchors, more)),
+        platform_anchors=np.concatenate((mixed.platform_anchors, rng.uniform(-0.2, 0.2, (cables - 8, 3)))),
+        cables=Cable(0.067, 44e3),
+        tension_min=25.0,
+        tension_max=2000.0,
+    )
 
 
 MANY = [(many_cables(m, seed), m) for m, seed in ((9, 1), (10, 2), (12, 3), (16, 4), (24, 5))]
@@ -78,7 +85,7 @@ def test_balance_and_limits(method: TensionMethod, name: str) -> None:
 
 @pytest.mark.parametrize("robot", [robot for robot, _ in MANY], ids=[f"{m} cables" for _, m in MANY])
 def test_many_cables_agree_with_other_programs(robot: Robot) -> None:
-    poses = random_poses(robot.replace(test_box=_box()), 15, np.random.default_rng(7))
+    poses = random_poses(robot, 15, np.random.default_rng(7), stretch=1.1)
     rng = np.random.default_rng(8)
     load = rng.normal(size=(15, 6)) * [80, 80, 80, 20, 20, 20]
     weights, target = rng.uniform(0.5, 2, robot.cable_count), rng.uniform(0, 200, robot.cable_count)
@@ -108,12 +115,6 @@ def test_many_cables_agree_with_other_programs(robot: Robot) -> None:
         _check_stationary(robot, matrix, found[AnalyticCenter], _barrier_slope(robot, found[AnalyticCenter]))
         _check_p_norm(robot, matrix, found[PNorm], 4.0)
     assert solved >= 5
-
-
-def _box() -> object:
-    from sagline.robot.pose_box import PoseBox
-
-    return PoseBox([-0.5] * 3, [0.5] * 3, 0.2)
 
 
 def _lowest_maximum(robot: Robot, matrix: np.ndarray, right: np.ndarray) -> float:
@@ -203,7 +204,7 @@ def test_walk_and_cut_give_the_same(name: str) -> None:
 
 def test_centroid_by_sampling() -> None:
     robot, rng = load_robot("article-mixed"), np.random.default_rng(11)
-    pose = random_poses(robot, 1, rng)[0]
+    pose = Pose([1.0, -0.5, 2.5], np.eye(3))
     polygon = tension_polygon(robot, pose, model=Elastic())
     low, high = polygon.vertices.min(axis=0), polygon.vertices.max(axis=0)
     points = rng.uniform(low, high, (400_000, 2))
@@ -289,10 +290,11 @@ def test_variables_differ() -> None:
 
 def test_broken_cable() -> None:
     robot = load_robot("article-mixed")
-    pose = Pose([0.0, 0.0, 3.0], np.eye(3))
     left = without_cables(robot, 5)
-    plan = inverse(left, pose, tension=Centroid())
-    assert plan.feasible
+    poses = random_poses(robot, 50, np.random.default_rng(3))
+    feasible = np.flatnonzero(inverse(left, poses, tension=Centroid()).feasible)
+    assert 5 < len(feasible) < 45
+    pose = poses[int(feasible[0])]
     matrix = np.delete(structure(robot, pose), 5, axis=1)
     np.testing.assert_allclose(structure(left, pose), matrix)
     alone = inverse(left, pose, model=Elastic(), tension=Centroid())
@@ -336,14 +338,18 @@ def test_p_norm_between_norm_and_maximum() -> None:
     robot = load_robot("article-mixed")
     poses = random_poses(robot, 300, np.random.default_rng(15))
     plans = [inverse(robot, poses, model=Catenary(), tension=PNorm(p=p)) for p in (2.0, 4.0, 8.0, 16.0, 32.0)]
-    top = np.array([plan.chord_tension.max(axis=1) for plan in plans])
-    least = inverse(robot, poses, tension=LowestMaximum()).chord_tension.max(axis=1)
     found = plans[0].feasible
     assert all((plan.feasible == found).all() for plan in plans)
-    assert (np.diff(top[:, found], axis=0) < 1e-6 * top[0, found]).all()
-    assert (top[-1, found] >= least[found] - 1e-6 * least[found]).all()
-    # the p-norm of m numbers is at most m^(1/p) times their largest
-    assert (top[-1, found] <= 8 ** (1 / 32) * least[found] * (1 + 1e-6)).all()
+    norms = [2, 4, 8, 16, 32]
+    sizes = np.array([[np.linalg.norm(plan.chord_tension[found], q, axis=1) for plan in plans] for q in norms])
+    for k in range(len(norms)):  # in its own norm no other is smaller, up to what the pulls differ
+        assert (sizes[k, k] <= sizes[k].min(axis=0) * (1 + 1e-5)).all()
+    least = inverse(robot, poses, tension=LowestMaximum()).chord_tension[found].max(axis=1)
+    top = plans[-1].chord_tension[found].max(axis=1)
+    assert (top >= least * (1 - 1e-5)).all()
+    assert (
+        top <= 8 ** (1 / 32) * least * (1 + 1e-5)
+    ).all()  # a p-norm of m numbers is at most m^(1/p) of their largest
 
 
 def test_slsqp_agrees_with_p_norm() -> None:
@@ -358,7 +364,8 @@ def test_slsqp_agrees_with_p_norm() -> None:
 
     def gaps(point: np.ndarray) -> np.ndarray:
         tensions = polygon.origin + point @ polygon.basis
-        return np.concatenate((tensions - robot.tension_min, robot.tension_max - tensions)) / scale
+        gap = np.concatenate((tensions - robot.tension_min, robot.tension_max - tensions))
+        return np.asarray(gap / scale)
 
     start = polygon.vertices.mean(axis=0)
     best = minimize(size, start, method="SLSQP", constraints={"type": "ineq", "fun": gaps}, options={"ftol": 1e-15})

@@ -38,19 +38,29 @@ class Variable(StrEnum):
 
     CHORD = "chord"
     HORIZONTAL = "horizontal"
+    FRAME_END = "frame_end"
 
 
 class Tension(StrEnum):
-    """Ways of sharing the load."""
+    """Ways of sharing the load, with their default options."""
 
     CLOSEST = "closest"
     MINIMUM_NORM = "minimum-norm"
+    LOWEST_SUM = "lowest-sum"
+    LOWEST_MAXIMUM = "lowest-maximum"
+    P_NORM = "p-norm"
+    CENTROID = "centroid"
+    ANALYTIC_CENTER = "analytic-center"
+    CLOSED_FORM = "closed-form"
+    IMPROVED_CLOSED_FORM = "improved-closed-form"
+    PUNCTURE = "puncture"
+    POLYGON_WALK = "polygon-walk"
 
     def build(self, variable: Variable) -> TensionMethod:
         """The method, in that tension."""
-        import sagline as sl
+        from sagline.tension.methods import METHODS
 
-        return (sl.Closest if self is Tension.CLOSEST else sl.MinimumNorm)(variable.value)
+        return METHODS[self.value.title().replace("-", "")](variable.value)
 
 
 def robot_completions(incomplete: str) -> list[str]:

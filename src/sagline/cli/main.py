@@ -107,6 +107,38 @@ def run(out: OutOption = Path("output"), as_json: JsonOption = False) -> None:
 
 
 @app.command()
+def tension(
+    robot: RobotArgument,
+    pose: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,Y,Z[,A,B,C]",
+            help="Position [m] and angles about z, y, x [degrees]. Default: the middle of the robot's test box.",
+        ),
+    ] = None,
+    model: Annotated[Model, typer.Option(help="Cable model.")] = Model.CATENARY,
+    variable: Annotated[Variable, typer.Option(help="The tension in which the load is shared.")] = Variable.CHORD,
+    out: OutOption = Path("output"),
+    figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the polygon, as PNG and SVG.")] = True,
+    as_json: JsonOption = False,
+) -> None:
+    """Share the load of one pose in every way, and draw the polygon of feasible tensions with all of them in it.
+
+    For example:
+
+    ```
+    sagline tension article-mixed --pose 1,0.5,2.5
+    sagline tension cogiro --pose 0,0,2,10,0,0 --variable frame_end --no-figures
+    ```
+    """
+    with reported():
+        from sagline.cli.tension import tension as run
+
+        code = run(robot, pose, model, variable, out, figures=figures, as_json=as_json)
+    raise typer.Exit(code)
+
+
+@app.command()
 def robots(as_json: JsonOption = False) -> None:
     """List the robots that come with sagline."""
     with reported():

@@ -42,6 +42,7 @@ from sagline.kernels.shortfall import wrench_shortfall
 from sagline.kernels.statics import needed_wrench, restrict_needed, restrict_rows, structure_matrix
 
 ROUNDS = 30
+FREE_ROUNDS = 8  # then a choice that jumps with the last digits of the pulls is held where it is
 SETTLED = 1e-10  # [N]; pulls that change by less, or by 1e-15 of the largest tension, have settled
 SHORTEST_CHORD = 1e-9  # [m]
 STILL = 1e-9  # relative change of tension at which a sharing in frame-end tensions stands still
@@ -243,6 +244,15 @@ def remember(
             )
 
 
+@kernel
+def keep_near(work: Array, null: Array, reference: Array) -> None:
+    """Let the point to be near to be that of the tensions just shared."""
+    for k in range(null.shape[0]):
+        reference[k] = 0.0
+        for i in range(null.shape[1]):
+            reference[k] += null[k, i] * work[tables.SHARED, i]
+
+
 @formula
 def settle(
     code: int,
@@ -273,11 +283,15 @@ def settle(
     """Share the load and hang the cables until their pulls stand still; returns the pose's status."""
     m = work.shape[1]
     near = False
-    for _ in range(ROUNDS):
+    way = method
+    for k in range(ROUNDS):
+        if k >= FREE_ROUNDS and method > CLOSEST:
+            way = CLOSEST
+            keep_near(work, null, reference)
         needed_wrench(geometry, body, wrench, work, balance)
         restrict_needed(freedom, balance)
         minimum_norm(inverse, balance, work)
-        status = share_load(method, parameter, work, null, reference, corners, labels)
+        status = share_load(way, parameter, work, null, reference, corners, labels)
         if status != POSE_SOLVED:
             return status
         largest = 0.0

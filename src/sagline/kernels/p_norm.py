@@ -160,7 +160,8 @@ def lowest_p_norm(work: Array, null: Array, p: float, corners: Array, count: int
             for k in range(r):
                 trial[k] = point[k] + share * (target[k] - point[k])
             after = size_of(work, null, trial, exponent, scale)
-            if after <= before - 1e-4 * share * exponent * gain / (scale * scale) + 1e-15 * before:
+            least_gain = 1e-4 * share * exponent * gain / (scale * scale)
+            if after <= before - least_gain + 1e-15 * before:
                 break
             share *= 0.5
         for k in range(r):

@@ -306,7 +306,7 @@ def share_lowest_maximum(work: Array, null: Array, reference: Array, corners: Ar
     before = np.empty(m)
     for i in range(m):
         before[i] = work[HIGH, i]
-        work[HIGH, i] = max(min(before[i], point[r] - work[OFFSET, i] + TIED * largest), work[LOW, i])
+        work[HIGH, i] = max(min(before[i], point[r] - work[OFFSET, i] + 4.0 * TOLERANCE * largest), work[LOW, i])
     status = share_at_limits(work, null, reference, corners, labels)
     for i in range(m):
         work[HIGH, i] = before[i]

@@ -13,7 +13,7 @@ import numpy as np
 from sagline.arrays import Array, Codes
 from sagline.kernels.jit import kernel
 
-MOMENT_WEIGHT = 1e4  # per typical lever arm; the moment's residual is this squared smaller than the force's
+MOMENT_WEIGHT = 1e5  # per typical lever arm; the moment's residual is this squared smaller than the force's
 STEPS = 200
 AT_LOW, AT_HIGH, FREE = 0, 1, 2
 

@@ -7,7 +7,8 @@ Axes it is `ax.figure` that does. `save` writes either to a file.
 from sagline.plot.courses import lengths, overview, tensions
 from sagline.plot.errors import error, errors
 from sagline.plot.motion import path, velocity
+from sagline.plot.polygon import polygon
 from sagline.plot.robot import robot
 from sagline.plot.sheet import save
 
-__all__ = ["error", "errors", "lengths", "overview", "path", "robot", "save", "tensions", "velocity"]
+__all__ = ["error", "errors", "lengths", "overview", "path", "polygon", "robot", "save", "tensions", "velocity"]
