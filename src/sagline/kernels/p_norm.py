@@ -123,8 +123,8 @@ def project_on_rows(work: Array, null: Array, curve: Array, target: Array, point
 def lowest_p_norm(work: Array, null: Array, p: float, corners: Array, count: int, point: Array) -> bool:
     """Move a feasible point (r,), best that of least 2-norm, to the feasible one of least p-norm.
 
-    The exponent doubles from 4 as the steps become short until it is p, so that Newton starts near. corners and count are those
-    of the feasible polygon or interval, for r <= 2.
+    The exponent doubles from 4 as the steps become short until it is p, so that Newton starts near. corners and count
+    are those of the feasible polygon or interval, for r <= 2.
 
     Returns:
         Whether it was found.

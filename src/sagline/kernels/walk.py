@@ -24,12 +24,15 @@ PARALLEL = 1e-12
 
 
 @kernel
-def limit_line(work: Array, null: Array, line: int) -> tuple[float, float, float]:
-    """Limit 2i or 2i + 1 as gx x + gy y + offset >= 0."""
-    i = line // 2
-    if line % 2 == 0:
-        return null[0, i], null[1, i], work[START, i] - work[LOW, i]
-    return -null[0, i], -null[1, i], work[HIGH, i] - work[START, i]
+def limit_lines(work: Array, null: Array, lines: Array) -> None:
+    """Fill the limits 2i and 2i + 1 as rows gx, gy, offset of gx x + gy y + offset >= 0, (2m, 3)."""
+    for i in range(null.shape[1]):
+        lines[2 * i, 0] = null[0, i]
+        lines[2 * i, 1] = null[1, i]
+        lines[2 * i, 2] = work[START, i] - work[LOW, i]
+        lines[2 * i + 1, 0] = -null[0, i]
+        lines[2 * i + 1, 1] = -null[1, i]
+        lines[2 * i + 1, 2] = work[HIGH, i] - work[START, i]
 
 
 @kernel
@@ -55,22 +58,22 @@ def walk_polygon(work: Array, null: Array, corners: Array, labels: Indices) -> i
     """
     m = null.shape[1]
     slack = TOLERANCE * largest_tension(work)
+    lines = np.empty((2 * m, 3))
+    limit_lines(work, null, lines)
     met = np.zeros(2 * m, dtype=np.bool_)
     a, b = most_independent(null)
     line = 2 * a
-    gx, gy, offset = limit_line(work, null, line)
-    hx, hy, shift = limit_line(work, null, 2 * b)
     # the parallelogram's corner from which line a runs counter-clockwise: inside on its left
-    cross = gx * hy - gy * hx
+    other = 2 * b
+    cross = lines[line, 0] * lines[other, 1] - lines[line, 1] * lines[other, 0]
     if cross > 0.0:
-        hx, hy, shift = -hx, -hy, work[HIGH, b] - work[START, b]
+        other += 1
         cross = -cross
-    x = (-offset * hy + shift * gy) / cross
-    y = (-shift * gx + offset * hx) / cross
+    x = (-lines[line, 2] * lines[other, 1] + lines[other, 2] * lines[line, 1]) / cross
+    y = (-lines[other, 2] * lines[line, 0] + lines[line, 2] * lines[other, 0]) / cross
     for k in range(2 * m):
-        gx, gy, offset = limit_line(work, null, k)
-        met[k] = gx * x + gy * y + offset >= -slack
-        if abs(gx) + abs(gy) < PARALLEL and offset < -slack:
+        met[k] = lines[k, 0] * x + lines[k, 1] * y + lines[k, 2] >= -slack
+        if abs(lines[k, 0]) + abs(lines[k, 1]) < PARALLEL and lines[k, 2] < -slack:
             return 0
     for k in range(2):
         met[2 * a + k] = met[2 * b + k] = True
@@ -79,16 +82,14 @@ def walk_polygon(work: Array, null: Array, corners: Array, labels: Indices) -> i
     for _ in range(16 * m * m):
         corners[count, 0], corners[count, 1], labels[count] = x, y, line
         count += 1
-        gx, gy, offset = limit_line(work, null, line)
-        way_x, way_y = gy, -gx  # inside, along (gx, gy), lies to the left of the way
+        way_x = lines[line, 1]  # inside lies to the left of the way
+        way_y = -lines[line, 0]
         nearest = math.inf
         turn = -1
         for k in range(2 * m):
-            hx, hy, shift = limit_line(work, null, k)
-            speed = hx * way_x + hy * way_y
-            here = hx * x + hy * y + shift
+            speed = lines[k, 0] * way_x + lines[k, 1] * way_y
             if k // 2 != line // 2 and abs(speed) > PARALLEL:
-                distance = -here / speed
+                distance = -(lines[k, 0] * x + lines[k, 1] * y + lines[k, 2]) / speed
                 if met[k] and speed < 0.0 and max(distance, 0.0) < nearest:
                     nearest, turn = max(distance, 0.0), k
                 elif not met[k] and speed > 0.0 and distance <= nearest and distance > 0.0:
@@ -108,8 +109,7 @@ def walk_polygon(work: Array, null: Array, corners: Array, labels: Indices) -> i
                 return -1
         else:
             for k in range(2 * m):
-                hx, hy, shift = limit_line(work, null, k)
-                met[k] = met[k] or hx * x + hy * y + shift >= -slack
+                met[k] = met[k] or lines[k, 0] * x + lines[k, 1] * y + lines[k, 2] >= -slack
             met[turn] = True
             # its border ends here, where the walk goes on: it will be the last side to be passed
             first_line = line

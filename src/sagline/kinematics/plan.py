@@ -111,7 +111,8 @@ class Plan:
         )
         return tuple(
             f"cable {cable}: at {count} of {len(below)} poses its tension is below w D/(2 |sin phi|), where the "
-            "empirical model's lowest point enters the span; raise tension_min, set lowest_point_margin, or use Catenary()"
+            "empirical model's lowest point enters the span; raise tension_min, set lowest_point_margin, or use "
+            "Catenary()"
             for cable, count in enumerate(below.sum(axis=0))
             if count
         )
