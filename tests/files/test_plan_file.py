@@ -19,6 +19,21 @@ def a_plan() -> sl.Plan:
     return sl.inverse(SUSPENDED, OUTSIDE, sl.Empirical(k_p=4.1), sl.Closest("horizontal", 0.1))
 
 
+@pytest.fixture(scope="module")
+def content(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    file = tmp_path_factory.mktemp("plan") / "run.nc"
+    a_plan().save(file)
+    return file.read_bytes()
+
+
+@pytest.fixture
+def saved(tmp_path: FilePath, content: bytes) -> FilePath:
+    """A plan's file, to be spoilt."""
+    file = tmp_path / "run.nc"
+    file.write_bytes(content)
+    return file
+
+
 def assert_same(plan: sl.Plan, other: sl.Plan) -> None:
     for quantity in QUANTITIES + (() if plan.path is None else (TIME, *MOTION)):
         mine, theirs = np.asarray(quantity.of(plan)), np.asarray(quantity.of(other))
@@ -50,14 +65,15 @@ def test_a_plan_comes_back_to_the_last_bit(
     assert_same(plan, sl.load_plan(str(tmp_path / "run.nc")))
 
 
-def test_what_a_reader_finds(tmp_path: FilePath) -> None:
+def test_what_a_reader_finds(saved: FilePath) -> None:
     plan = a_plan()
-    sl.save_plan(plan, tmp_path / "run.nc")
-    with xr.open_dataset(tmp_path / "run.nc", engine="h5netcdf") as data:
+    with xr.open_dataset(saved, engine="h5netcdf") as data:
         assert dict(data.sizes) | {"pose": 41, "cable": 8} == dict(data.sizes)
         np.testing.assert_array_equal(data["time"], OUTSIDE.time)
         np.testing.assert_array_equal(data["unstrained_length"], plan.unstrained_length)
-        assert {name: data[name].attrs.get("units") for name in ("time", "unstrained_length", "shortfall", "twist")} == {
+        assert {
+            name: data[name].attrs.get("units") for name in ("time", "unstrained_length", "shortfall", "twist")
+        } == {
             "time": "s",
             "unstrained_length": "m",
             "shortfall": "N",
@@ -73,9 +89,8 @@ def test_what_a_reader_finds(tmp_path: FilePath) -> None:
         assert "name: article-suspended" in data.attrs["robot"]
 
 
-def test_infeasible_poses_are_kept_and_marked(tmp_path: FilePath) -> None:
-    a_plan().save(tmp_path / "run.nc")
-    loaded = sl.load_plan(tmp_path / "run.nc")
+def test_infeasible_poses_are_kept_and_marked(saved: FilePath) -> None:
+    loaded = sl.load_plan(saved)
     (gap,) = loaded.gaps
     assert (gap.first, gap.last, gap.status) == (37, 40, sl.PoseStatus.INFEASIBLE)
     assert gap.shortfall == pytest.approx(np.max(a_plan().shortfall), rel=0.0)
@@ -96,11 +111,9 @@ def test_a_disk_that_fills_up_leaves_nothing(tmp_path: FilePath) -> None:
     assert [entry.name for entry in tmp_path.iterdir()] == ["other.nc"]
 
 
-def test_files_that_are_no_plan(tmp_path: FilePath) -> None:
-    whole = tmp_path / "run.nc"
-    a_plan().save(whole)
+def test_files_that_are_no_plan(tmp_path: FilePath, saved: FilePath) -> None:
     half, text, other = tmp_path / "half.nc", tmp_path / "text.nc", tmp_path / "other.nc"
-    half.write_bytes(whole.read_bytes()[:20_000])
+    half.write_bytes(saved.read_bytes()[:20_000])
     text.write_text("time,x,y,z\n")
     xr.Dataset({"a": ("b", [1.0, 2.0])}).to_netcdf(other, engine="h5netcdf")
     reasons = {
@@ -125,26 +138,23 @@ def test_files_that_are_no_plan(tmp_path: FilePath) -> None:
         ("robot", "name: x", "run.nc, robot: .* is missing"),
     ],
 )
-def test_edited_attributes(tmp_path: FilePath, attribute: str, value: object, reason: str) -> None:
-    a_plan().save(tmp_path / "run.nc")
-    with h5py.File(tmp_path / "run.nc", "r+") as file:
+def test_edited_attributes(saved: FilePath, attribute: str, value: object, reason: str) -> None:
+    with h5py.File(saved, "r+") as file:
         file.attrs[attribute] = value
     with pytest.raises(FileError, match=reason):
-        sl.load_plan(tmp_path / "run.nc")
+        sl.load_plan(saved)
 
 
 @pytest.mark.parametrize("name", ["unstrained_length", "shortfall", "twist"])
-def test_a_missing_variable(tmp_path: FilePath, name: str) -> None:
-    a_plan().save(tmp_path / "run.nc")
-    with h5py.File(tmp_path / "run.nc", "r+") as file:
+def test_a_missing_variable(saved: FilePath, name: str) -> None:
+    with h5py.File(saved, "r+") as file:
         del file[name]
     with pytest.raises(FileError, match=f"has no .*{name}.*Write it again"):
-        sl.load_plan(tmp_path / "run.nc")
+        sl.load_plan(saved)
 
 
-def test_another_robot_in_the_file(tmp_path: FilePath) -> None:
-    a_plan().save(tmp_path / "run.nc")
-    with h5py.File(tmp_path / "run.nc", "r+") as file:
+def test_another_robot_in_the_file(saved: FilePath) -> None:
+    with h5py.File(saved, "r+") as file:
         file.attrs["robot"] = dump_robot(sl.load_robot("falcon-7"))
     with pytest.raises(FileError, match="has 8 cables, its robot 7"):
-        sl.load_plan(tmp_path / "run.nc")
+        sl.load_plan(saved)

@@ -20,9 +20,14 @@ def test_a_file_appears_when_it_is_complete(tmp_path: Path) -> None:
 def test_trouble_keeps_what_was_there(tmp_path: Path, trouble: BaseException | type[BaseException]) -> None:
     file = tmp_path / "run.nc"
     file.write_bytes(b"before")
-    with pytest.raises((KeyboardInterrupt, ValueError, FileError)), written_whole(file) as partial:
-        partial.write_bytes(b"half")
-        raise trouble
+
+    def write() -> None:
+        with written_whole(file) as partial:
+            partial.write_bytes(b"half")
+            raise trouble
+
+    with pytest.raises((KeyboardInterrupt, ValueError, FileError)):
+        write()
     assert file.read_bytes() == b"before"
     assert [entry.name for entry in tmp_path.iterdir()] == ["run.nc"]
 
