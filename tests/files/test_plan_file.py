@@ -1,4 +1,5 @@
 import resource
+from operator import attrgetter
 from pathlib import Path as FilePath
 
 import h5py
@@ -8,7 +9,6 @@ import xarray as xr
 
 import sagline as sl
 from sagline.errors import FileError
-from sagline.files.plan_layout import MOTION, QUANTITIES, TIME
 from sagline.files.robot_file import dump_robot
 
 SUSPENDED = sl.load_robot("article-suspended")
@@ -34,11 +34,23 @@ def saved(tmp_path: FilePath, content: bytes) -> FilePath:
     return file
 
 
+PLACES = (
+    *(
+        f"state.cables.{name}"
+        for name in ("unstrained_length", "chord_tension", "horizontal_tension", "vertical_force")
+    ),
+    *(f"state.cables.{name}" for name in ("span", "rise", "status")),
+    *("state.pose.position", "state.pose.quaternion", "state.wrench"),
+    *("status", "shortfall", "wrench_residual", "blocking"),
+)
+PATH_PLACES = ("path.time", "path.twist", "path.twist_rate", "path.pose.position", "path.pose.quaternion")
+
+
 def assert_same(plan: sl.Plan, other: sl.Plan) -> None:
-    for quantity in QUANTITIES + (() if plan.path is None else (TIME, *MOTION)):
-        mine, theirs = np.asarray(quantity.of(plan)), np.asarray(quantity.of(other))
-        assert (mine.dtype, mine.shape) == (theirs.dtype, theirs.shape), quantity.name
-        assert mine.tobytes() == theirs.tobytes(), quantity.name
+    for place in PLACES + (() if plan.path is None else PATH_PLACES):
+        mine, theirs = (np.asarray(attrgetter(place)(p)) for p in (plan, other))
+        assert (mine.dtype, mine.shape) == (theirs.dtype, theirs.shape), place
+        assert mine.tobytes() == theirs.tobytes(), place
         assert not theirs.flags.writeable
     assert plan.tension == other.tension
     assert plan.state.cables.model == other.state.cables.model

@@ -8,6 +8,7 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
+from matplotlib.text import Annotation
 
 import sagline as sl
 from sagline import plot
@@ -20,6 +21,12 @@ PLAN = sl.inverse(SUSPENDED, PATH)
 
 def courses(ax: Axes) -> np.ndarray:
     return np.array([line.get_ydata() for line in ax.get_lines()])
+
+
+def legend(ax: Axes) -> list[str]:
+    found = ax.get_legend()
+    assert found is not None
+    return [text.get_text() for text in found.get_texts()]
 
 
 @pytest.mark.parametrize(
@@ -37,7 +44,7 @@ def test_tensions(quantity: str, label: str) -> None:
     np.testing.assert_array_equal(courses(ax), getattr(PLAN.state.cables, quantity).T)
     np.testing.assert_array_equal(ax.get_lines()[0].get_xdata(), PATH.time)
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("time [s]", label)
-    assert [text.get_text() for text in ax.get_legend().get_texts()] == [f"cable {i}" for i in range(8)]
+    assert legend(ax) == [f"cable {i}" for i in range(8)]
 
 
 def test_lengths_in_metres_and_adjusting_lengths_in_millimetres() -> None:
@@ -78,7 +85,7 @@ def test_infeasible_spans_are_shaded_up_to_halfway_to_the_feasible_samples() -> 
     ax = plot.tensions(plan)
     spans = [p.get_extents().transformed(ax.transData.inverted()) for p in ax.patches if isinstance(p, Rectangle)]
     np.testing.assert_allclose([(s.x0, s.x1) for s in spans], [(1.5, 4.5), (5.5, 6.0)], rtol=1e-12)
-    assert [text.get_text() for text in ax.get_legend().get_texts()].count("infeasible") == 1
+    assert legend(ax).count("infeasible") == 1
 
 
 def test_poses_without_time_and_a_single_pose() -> None:
@@ -93,7 +100,7 @@ def test_poses_without_time_and_a_single_pose() -> None:
 def test_path_from_above_with_arrows_along_the_motion() -> None:
     ax = plot.path(PATH)
     np.testing.assert_array_equal(ax.get_lines()[0].get_xydata(), PATH.pose.position[:, :2])
-    arrows = [np.subtract(text.xy, text.xyann) for text in ax.texts]
+    arrows = [np.subtract(text.xy, text.xyann) for text in ax.texts if isinstance(text, Annotation)]
     directions = [arrow / np.linalg.norm(arrow) for arrow in arrows]
     c, s = 5.0 / np.hypot(5.0, 3.5), 3.5 / np.hypot(5.0, 3.5)
     expected = [(c, s), (-1, 0), (0, -1), (1, 0), (0, 1), (-c, -s)]  # the article's path, move by move
