@@ -22,7 +22,8 @@ class ForwardSolution:
         stiffness_min: Smallest stiffness of the platform against its free motions [N/m], shape () or (N,). A rotation
             counts by the arc it makes at the root mean square distance of the platform ends from the center of mass.
         energy: Potential energy of cables, weight and given force [J], shape () or (N,); frame ends and the origin
-            of the world are at zero. NaN for models without one.
+            of the world are at zero. The shallow models have none: NaN. Straight cables: what they minimize
+            instead, half the sum of squared length errors [m^2].
         wrench_residual: Norms of the unbalanced force [N] and moment [N m] in the platform's free motions,
             shape (2,) or (N, 2).
         iterations: Newton steps taken, shape () or (N,).
