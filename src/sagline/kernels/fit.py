@@ -24,6 +24,7 @@ from sagline.kernels.platform import Problem, Space, moved_pose, new_space
 FIT_STEPS = 200
 FIRST_DAMPING = 1e-3  # of the largest diagonal element
 SMALL_STEP = 1e-14  # in the units of the scale
+NOTHING = 1e-13  # share of the cost whose gain ends a fit
 
 
 @kernel
@@ -88,9 +89,12 @@ def fit_pose(problem: Problem, pose: Array, space: Space):  # type: ignore[no-un
         if new < cost:
             for k in range(pose.shape[0]):
                 pose[k] = space.trial[k]
+            gain = cost - new
             cost = new
             damping = 0.1 * damping if damping > 1e-14 * largest else 0.0
             normal_equations(problem, space)
+            if gain <= NOTHING * cost:
+                return cost, iteration + 1, True
         elif length <= 1e-7:  # squares of errors are rounded off at the root of the last digit
             misfit(problem, pose, space)
             return cost, iteration + 1, True

@@ -11,6 +11,7 @@ from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
 from sagline.kinematics.forward_rows import solve_rows
 from sagline.kinematics.forward_solution import ForwardSolution
+from sagline.kinematics.measured import MeasuredTension, corrected
 from sagline.kinematics.start import search
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
@@ -26,6 +27,7 @@ def forward(
     start: Pose | None = None,
     model: CableModel = _CATENARY,
     wrench: ArrayLike | None = None,
+    tension_measured: MeasuredTension | None = None,
 ) -> ForwardSolution:
     """The pose in which the platform rests on cables of given unstrained lengths.
 
@@ -40,6 +42,8 @@ def forward(
         model: Cable model; the default is exact.
         wrench: External plus inertial wrench on the platform about its center of mass in world axes, without
             gravity: force [N], then moment [N m], shape (6,) or (N, 6). None for none.
+        tension_measured: Readings of load cells: then lengths count as measured too, both are corrected within their
+            deviations to fit each other, and the answer carries the covariance of the pose.
 
     Returns:
         ForwardSolution, single or with a leading axis N.
@@ -60,7 +64,8 @@ def forward(
     else:
         chained = bool(shape) and not start.shape
         found = solve_rows(robot, model, samples, start_rows(start, lengths), loads, chained=chained)
-    return found.solution(robot, model, load, shape)
+    solution = found.solution(robot, model, load, shape)
+    return solution if tension_measured is None else corrected(solution, tension_measured)
 
 
 def checked_lengths(robot: Robot, lengths: ArrayLike) -> Array:

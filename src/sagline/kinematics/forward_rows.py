@@ -36,6 +36,16 @@ class Found(NamedTuple):
         self.numbers[samples] = other.numbers[which]
         self.pose_status[samples] = other.pose_status[which]
 
+    def part(self, samples: Indices) -> Found:
+        """The answers of some samples."""
+        return Found(
+            self.poses[samples],
+            self.results[:, samples],
+            self.cable_status[samples],
+            self.numbers[samples],
+            self.pose_status[samples],
+        )
+
     @classmethod
     def empty(cls, count: int, cables: int) -> Found:
         """Room for a batch."""

@@ -27,6 +27,8 @@ class ForwardSolution:
         wrench_residual: Norms of the unbalanced force [N] and moment [N m] in the platform's free motions,
             shape (2,) or (N, 2).
         iterations: Newton steps taken, shape () or (N,).
+        covariance: Of the pose found from measured tensions: displacement of the center of mass [m] and rotation
+            vector [rad], world axes, shape (6, 6) or (N, 6, 6). None where no tensions were measured.
     """
 
     state: Equilibrium
@@ -35,6 +37,7 @@ class ForwardSolution:
     energy: Array
     wrench_residual: Array
     iterations: Indices
+    covariance: Array | None = None
 
     @property
     def pose(self) -> Pose:

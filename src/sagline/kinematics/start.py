@@ -38,10 +38,10 @@ def search(robot: Robot, model: CableModel, lengths: Array, wrenches: Array) -> 
     open_samples = np.arange(len(lengths))
     for round_, rotation in enumerate(start_rotations(robot)):
         loads = wrenches if len(wrenches) == 1 else locked(wrenches[open_samples])
-        answer = from_rotation(robot, model, locked(lengths[open_samples]), loads, rotation)
+        answer = from_rotations(robot, model, locked(lengths[open_samples]), loads, rotation)
         better = np.ones(len(open_samples), dtype=np.bool_)
         if round_:
-            better = _is_better(_rank(robot, answer), _rank(robot, _part(found, open_samples)))
+            better = _is_better(_rank(robot, answer), _rank(robot, found.part(open_samples)))
         found.keep(open_samples[better], answer, np.flatnonzero(better))
         settled = _is_plausible(robot, answer)
         open_samples = open_samples[~settled]
@@ -50,12 +50,12 @@ def search(robot: Robot, model: CableModel, lengths: Array, wrenches: Array) -> 
     return found
 
 
-def from_rotation(robot: Robot, model: CableModel, lengths: Array, wrenches: Array, rotation: Rotation) -> Found:
-    """Start in the middle of the frame with one rotation: first the position alone, then every motion."""
+def from_rotations(robot: Robot, model: CableModel, lengths: Array, wrenches: Array, rotation: Rotation) -> Found:
+    """Start in the middle of the frame, with one rotation or one a sample: first the position alone, then all motions."""
     starts = pose_rows(Pose(middle(robot, rotation), rotation))
-    freedom = robot.freedom
     if robot.motion_pattern not in ROTATING:
         return solve_rows(robot, model, lengths, starts, wrenches)
+    freedom = robot.freedom
     translations = locked(freedom[~freedom[:, 3:].any(axis=1)])
     placed = solve_rows(robot, model, lengths, starts, wrenches, freedom=translations)
     return solve_rows(robot, model, lengths, locked(placed.poses), wrenches)
@@ -104,12 +104,3 @@ def _is_better(new: Array, old: Array) -> Flags:
     first = np.argmax(new != old, axis=1)[:, None]
     return np.asarray(np.take_along_axis(new, first, 1) < np.take_along_axis(old, first, 1))[:, 0]
 
-
-def _part(found: Found, samples: Indices) -> Found:
-    return Found(
-        found.poses[samples],
-        found.results[:, samples],
-        found.cable_status[samples],
-        found.numbers[samples],
-        found.pose_status[samples],
-    )
