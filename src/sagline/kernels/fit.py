@@ -65,7 +65,7 @@ def normal_equations(problem: Problem, space: Space) -> None:
 
 @kernel
 def fit_pose(problem: Problem, pose: Array, space: Space):  # type: ignore[no-untyped-def]
-    """Move pose to a least-squares fit; returns half the sum of squares [m^2], the steps tried, and whether it is one."""
+    """Move pose to a least-squares fit; returns half the sum of squares [m^2], steps tried, and whether it is a fit."""
     cost = misfit(problem, pose, space)
     normal_equations(problem, space)
     largest = 0.0

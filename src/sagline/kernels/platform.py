@@ -15,11 +15,10 @@ from sagline.arrays import Array, Codes
 from sagline.kernels import geometry as g
 from sagline.kernels import tables
 from sagline.kernels.energy import cable_energy
+from sagline.kernels.forces import FORCE_ROWS, cable_forces
 from sagline.kernels.geometry import cable_geometry
 from sagline.kernels.jit import formula, kernel
-from sagline.kernels.models import from_length
 from sagline.kernels.stiffness import cable_stiffness
-
 
 Triple = tuple[float, float, float]
 
@@ -56,6 +55,7 @@ class Space(NamedTuple):
     rotation: Array  # (3, 3)
     geometry: Array  # (GEOMETRY_ROWS, m)
     result: Array  # (RESULT_ROWS, m)
+    memory: Array  # (FORCE_ROWS, m)
     statuses: Codes  # (m,)
     gradient: Array  # (6,)
     stiffness: Array  # (6, 6)
@@ -75,6 +75,7 @@ def new_space(m: int, n: int) -> Space:
         np.empty((3, 3)),
         np.empty((g.GEOMETRY_ROWS, m)),
         np.empty((tables.RESULT_ROWS, m)),
+        np.full((FORCE_ROWS, m), np.nan),
         np.empty(m, dtype=np.int8),
         np.empty(6),
         np.empty((6, 6)),
@@ -98,32 +99,29 @@ def unbalance(problem: Problem, pose: Array, space: Space) -> float:
     geometry, result, gradient = space.geometry, space.result, space.gradient
     cable_geometry(cables, body, pose, space.rotation, geometry)
     gravity = body[tables.GRAVITY]
+    cable_forces(
+        problem.code,
+        problem.k_h,
+        problem.k_p,
+        gravity,
+        cables,
+        problem.lengths,
+        geometry,
+        space.memory,
+        result,
+        space.statuses,
+    )
     weight = body[tables.MASS] * gravity
     for k in range(6):
         gradient[k] = -wrench[k]
     gradient[2] += weight
     scale: float = weight + abs(wrench[0]) + abs(wrench[1]) + abs(wrench[2])
     for i in range(cables.shape[0]):
-        span = geometry[g.SPAN, i]
-        rise = geometry[g.RISE, i]
-        horizontal, z, tension, status = from_length(
-            problem.code,
-            problem.k_h,
-            problem.k_p,
-            gravity,
-            span,
-            rise,
-            cables[i, tables.DENSITY],
-            cables[i, tables.STIFFNESS],
-            problem.lengths[i],
-        )
-        result[tables.SPAN, i] = span
-        result[tables.RISE, i] = rise
+        result[tables.SPAN, i] = geometry[g.SPAN, i]
+        result[tables.RISE, i] = geometry[g.RISE, i]
         result[tables.LENGTH, i] = problem.lengths[i]
-        result[tables.HORIZONTAL, i] = horizontal
-        result[tables.VERTICAL, i] = z
-        result[tables.TENSION, i] = tension
-        space.statuses[i] = status
+        horizontal = result[tables.HORIZONTAL, i]
+        z = result[tables.VERTICAL, i]
         x = horizontal * geometry[g.AZIMUTH_X, i]
         y = horizontal * geometry[g.AZIMUTH_Y, i]
         rx, ry, rz = geometry[g.LEVER_X, i], geometry[g.LEVER_Y, i], geometry[g.LEVER_Z, i]

@@ -91,8 +91,10 @@ def elastic_force_slopes(span: float, rise: float, length: float, tension: float
 
 @kernel
 def describe_state(problem: Problem, pose: Array, matrix: Array, blocks: Array, slopes: Array, levers: Array) -> None:
-    """Fill the platform's stiffness (6, 6) and, for every cable, in world axes: stiffness of its platform end
-    (m, 3, 3), dT by its three data (3, m, 3), and the lever of its end (m, 3)."""
+    """Fill the platform's stiffness (6, 6) and what every cable does, in world axes.
+
+    blocks: stiffness of its platform end (m, 3, 3); slopes: dT by its three data (3, m, 3); levers of its end (m, 3).
+    """
     m = problem.cables.shape[0]
     space = new_space(m, problem.freedom.shape[0])
     unbalance(problem, pose, space)
@@ -148,7 +150,7 @@ def describe_states(
     slopes: Array,
     levers: Array,
 ) -> None:
-    """`describe_state` for every sample: fills (N, 6, 6), (N, m, 3, 3), (N, 3, m, 3), (N, m, 3); NaN without lengths."""
+    """`describe_state` of N samples: (N, 6, 6), (N, m, 3, 3), (N, 3, m, 3), (N, m, 3); NaN without lengths."""
     scale = np.ones(freedom.shape[0])  # no unit is needed here
     for p in range(lengths.shape[0]):
         if code == STRAIGHT or math.isnan(lengths[p, 0]):

@@ -16,14 +16,14 @@ from sagline.kernels import forward as kernel
 from sagline.kinematics.forward import checked_lengths
 from sagline.kinematics.forward_rows import Found
 from sagline.kinematics.forward_solution import ForwardSolution
-from sagline.kinematics.forward_status import ForwardStatus
+from sagline.kinematics.forward_status import STABLE, ForwardStatus
 from sagline.kinematics.start import from_rotations, start_rotations
 from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.robot import Robot
 from sagline.statics.wrench import external_wrench
 
 _SAME = 1e-6  # relative to the mean length, and in radians: closer poses are one
-_KEPT = (ForwardStatus.SOLVED, ForwardStatus.LOOSE, ForwardStatus.OVERSTRETCHED, ForwardStatus.FITTED)
+_KEPT = (*STABLE, ForwardStatus.FITTED)
 _CATENARY = Catenary()
 
 
@@ -113,7 +113,9 @@ def _distinct(found: Found, length: float) -> tuple[Indices, Indices]:
     chosen: list[int] = []
     counts: list[int] = []
     for index in kept:
-        same = [k for k, other in enumerate(chosen) if _distance(found.poses[index], found.poses[other], length) < _SAME]
+        same = [
+            k for k, other in enumerate(chosen) if _distance(found.poses[index], found.poses[other], length) < _SAME
+        ]
         if same:
             counts[same[0]] += 1
         else:

@@ -64,8 +64,10 @@ def forward(
     else:
         chained = bool(shape) and not start.shape
         found = solve_rows(robot, model, samples, start_rows(start, lengths), loads, chained=chained)
-    solution = found.solution(robot, model, load, shape)
-    return solution if tension_measured is None else corrected(solution, tension_measured)
+    covariance = None
+    if tension_measured is not None:
+        covariance = corrected(robot, model, found, loads, tension_measured)
+    return found.solution(robot, model, load, shape, covariance)
 
 
 def checked_lengths(robot: Robot, lengths: ArrayLike) -> Array:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, Codes, Indices, locked
+from sagline.arrays import Array, Codes, Flags, Indices, locked
 from sagline.cables.model import CableModel
 from sagline.cables.state import CableState
 from sagline.kernels import codes, tables
 from sagline.kernels import forward as kernel
 from sagline.kernels.fit import fit_poses
 from sagline.kinematics.forward_solution import ForwardSolution
+from sagline.kinematics.forward_status import STABLE
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
@@ -57,7 +58,19 @@ class Found(NamedTuple):
             np.empty(count, dtype=np.int8),
         )
 
-    def solution(self, robot: Robot, model: CableModel, load: Array, shape: tuple[int, ...]) -> ForwardSolution:
+    @property
+    def stable(self) -> Flags:
+        """Whether each sample is a stable equilibrium, (N,)."""
+        return np.isin(self.pose_status, STABLE)
+
+    def solution(
+        self,
+        robot: Robot,
+        model: CableModel,
+        load: Array,
+        shape: tuple[int, ...],
+        covariance: Array | None = None,
+    ) -> ForwardSolution:
         """The batch in the caller's shape, () or (N,)."""
         wide = (*shape, robot.cable_count)
         pose = Pose._adopt(self.poses[:, :3].reshape(*shape, 3), self.poses[:, 3:].reshape(*shape, 4))
@@ -82,6 +95,7 @@ class Found(NamedTuple):
             energy=locked(self.numbers[:, kernel.ENERGY].reshape(shape)),
             wrench_residual=locked(residuals.reshape(*shape, 2)),
             iterations=locked(self.numbers[:, kernel.ITERATIONS].astype(np.int64).reshape(shape)),
+            covariance=None if covariance is None else locked(covariance.reshape(*shape, 6, 6)),
         )
 
 
@@ -109,7 +123,7 @@ def solve_rows(
     found = Found.empty(*lengths.shape)
     allowed = robot.freedom if freedom is None else freedom
     given = (allowed, body_table(robot), cable_table(robot), lengths, starts, wrenches)
-    filled = (found.poses, found.results, found.cable_status, found.numbers, found.pose_status)
+    filled: tuple[Any, ...] = found
     if model.code == codes.STRAIGHT:
         fit_poses(chained, *given, *filled)
     else:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sagline.arrays import Array, Codes, Flags, Indices
-from sagline.kinematics.forward_status import ForwardStatus
+from sagline.kinematics.forward_status import STABLE, ForwardStatus
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 
@@ -52,8 +52,7 @@ class ForwardSolution:
     @property
     def stable(self) -> Flags:
         """Whether each sample is a stable equilibrium, however it is held, shape () or (N,)."""
-        held = (ForwardStatus.SOLVED, ForwardStatus.LOOSE, ForwardStatus.OVERSTRETCHED)
-        return np.isin(self.status, held)
+        return np.isin(self.status, STABLE)
 
     @property
     def slack(self) -> Flags:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,13 +13,11 @@ from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
 from sagline.kernels import codes, tables
 from sagline.kernels.forward import FORCE_RESIDUAL, FORWARD_NUMBERS, MOMENT_RESIDUAL, STIFFNESS_MIN, forward_poses
-from sagline.kinematics.forward_status import ForwardStatus
+from sagline.kinematics.forward_status import STABLE, ForwardStatus
 from sagline.kinematics.start import search
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.tables import body_table, cable_table, pose_rows
-
-_GOOD = (ForwardStatus.SOLVED, ForwardStatus.LOOSE, ForwardStatus.OVERSTRETCHED)
 
 
 class ForwardStep(NamedTuple):
@@ -65,7 +63,9 @@ class ForwardSolver:
         self._robot = robot
         self._model = model or Catenary()
         if self._model.code == codes.STRAIGHT:
-            raise InvalidValueError("model", "Straight()", "a model with forces", "Use forward() to fit straight cables.")
+            raise InvalidValueError(
+                "model", "Straight()", "a model with forces", "Use forward() to fit straight cables."
+            )
         m = robot.cable_count
         self._lengths = np.ones((1, m))
         self._start = np.zeros((1, tables.POSE_COLUMNS))
@@ -74,7 +74,7 @@ class ForwardSolver:
         self._results = np.empty((tables.RESULT_ROWS, 1, m))
         self._numbers = np.empty((1, FORWARD_NUMBERS))
         self._status: Codes = np.empty(1, dtype=np.int8)
-        self._arguments = (
+        self._arguments: tuple[Any, ...] = (
             self._model.code,
             *self._model.parameters,
             False,
@@ -154,7 +154,7 @@ class ForwardSolver:
             self._start[:] = found.poses
         forward_poses(*self._arguments)
         status = ForwardStatus(self._status[0])
-        if status in _GOOD:
+        if status in STABLE:
             self._start[0] = self._pose[0]
             self._lost = False
         position[:] = self._pose[0, :3]

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sagline.arrays import Array, checked, locked
+from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
-from sagline.kernels import codes
-from sagline.kinematics.forward_rows import solve_rows
-from sagline.kinematics.forward_solution import ForwardSolution
+from sagline.kernels import codes, tables
+from sagline.kinematics.forward_rows import Found, solve_rows
 from sagline.robot.equilibrium import Equilibrium
-from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
 from sagline.statics.stiffness import cable_slopes, stiffness
-from sagline.statics.tables import pose_rows
 
-_STEPS = 50
-_SETTLED = 1e-9  # standard deviations of a length
+_STEPS = 100
+_HALVINGS = 20
+_SETTLED = 1e-8  # of the sum of squares: a step that promises less is within 1e-4 standard deviations of the best
+_TINY = 1e-300
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,9 +37,7 @@ class MeasuredTension:
     tension_deviation: Array
     length_deviation: Array
 
-    def __init__(
-        self, frame_end_tension: ArrayLike, tension_deviation: ArrayLike, length_deviation: ArrayLike
-    ) -> None:
+    def __init__(self, frame_end_tension: ArrayLike, tension_deviation: ArrayLike, length_deviation: ArrayLike) -> None:
         """Check the three.
 
         Raises:
@@ -53,90 +53,102 @@ class MeasuredTension:
             object.__setattr__(self, name, checked(value, name, unit, above=0.0))
 
 
-def corrected(solution: ForwardSolution, measured: MeasuredTension) -> ForwardSolution:
-    """The equilibrium whose lengths and frame-end tensions fit both measurements best, and the pose's covariance.
+def corrected(robot: Robot, model: CableModel, found: Found, loads: Array, measured: MeasuredTension) -> Array:
+    """Replace equilibria at measured lengths by those that fit lengths and tensions best; their poses' covariance.
 
     Every sample by itself: Gauss-Newton in the lengths, L_true, that minimize
     sum ((L_true - L)/sigma_L)^2 + sum ((T_A - reading)/sigma_T)^2 while the platform stays in equilibrium.
 
     Args:
-        solution: The equilibrium at the measured lengths, where the search begins.
+        robot: The robot.
+        model: Cable model with forces.
+        found: Equilibria at the measured lengths (N samples), where the search begins; changed in place.
+        loads: External plus inertial wrenches (1 or N, 6).
         measured: The readings and the deviations.
+
+    Returns:
+        Covariance of displacement of the center of mass and rotation vector, (N, 6, 6); NaN without an answer.
     """
-    state = solution.state
-    shape = state.cables.unstrained_length.shape
-    for name, value in (
-        ("frame_end_tension", measured.frame_end_tension),
-        ("tension_deviation", measured.tension_deviation),
-        ("length_deviation", measured.length_deviation),
-    ):
-        _check_fits(name, value.shape, shape)
-    readings = np.atleast_2d(np.broadcast_to(measured.frame_end_tension, shape))
+    lengths = found.results[tables.LENGTH]
+    readings = _fitting("frame_end_tension", measured.frame_end_tension, lengths.shape)
     deviations = (
-        np.broadcast_to(measured.tension_deviation, shape[-1:]),
-        np.broadcast_to(measured.length_deviation, shape[-1:]),
+        _fitting("tension_deviation", measured.tension_deviation, lengths.shape[1:]),
+        _fitting("length_deviation", measured.length_deviation, lengths.shape[1:]),
     )
-    answers = [_fitted(_sample(solution, i), readings[i], *deviations) for i in range(len(readings))]
-    return _stacked(answers) if state.pose.shape else answers[0]
+    covariance = np.full((len(lengths), 6, 6), np.nan)
+    for i in range(len(lengths)):
+        sample = np.array([i])
+        fit = _Fit(robot, model, lengths[i].copy(), locked(loads[i % len(loads)].copy()), readings[i], *deviations)
+        answer = found.part(sample)
+        if answer.stable[0]:
+            answer, covariance[i] = fit.best(answer)
+            found.keep(sample, answer, np.array([0]))
+    return locked(covariance)
 
 
-def _check_fits(name: str, given: tuple[int, ...], shape: tuple[int, ...]) -> None:
+def _fitting(name: str, value: Array, shape: tuple[int, ...]) -> Array:
     try:
-        fits = np.broadcast_shapes(given, shape) == shape
+        return np.broadcast_to(value, shape)
     except ValueError:
-        fits = False
-    if not fits:
-        raise InvalidValueError(name, f"of shape {given}", f"a shape that broadcasts to {shape}", f"Reshape {name}.")
+        raise InvalidValueError(
+            name, f"of shape {value.shape}", f"a shape that broadcasts to {shape}", f"Reshape {name}."
+        ) from None
 
 
-def _fitted(solution: ForwardSolution, readings: Array, tension_deviation: Array, length_deviation: Array) -> ForwardSolution:
-    """One sample: damped Gauss-Newton from the solution at the measured lengths."""
-    measured = solution.state.cables.unstrained_length
-    m = len(measured)
-    if not solution.stable:
-        return replace(solution, covariance=locked(np.full((6, 6), np.nan)))
-    weighted = ~np.isnan(readings)
+class _Fit(NamedTuple):
+    """One sample to fit."""
 
-    def residuals(now: ForwardSolution) -> Array:
-        cables = now.state.cables
-        misread = (cables.frame_end_tension - readings) / tension_deviation
-        return np.concatenate(((cables.unstrained_length - measured) / length_deviation, misread[weighted]))
+    robot: Robot
+    model: CableModel
+    lengths: Array
+    load: Array
+    readings: Array
+    tension_deviation: Array
+    length_deviation: Array
 
-    converged = False
-    for _ in range(_STEPS):
-        by_length = stiffness(solution.state).length_sensitivity
-        tensions_by_length = frame_end_slopes(solution.state, by_length) / tension_deviation[:, None]
-        matrix = np.concatenate((np.eye(m) / length_deviation[:, None], tensions_by_length[weighted]))
-        now = residuals(solution)
-        inverse = np.linalg.inv(matrix.T @ matrix)
-        step = -inverse @ (matrix.T @ now)
-        converged = bool(np.all(np.abs(step) <= _SETTLED * length_deviation))
-        covariance = by_length @ inverse @ by_length.T
-        if converged:
-            break
-        moved = _moved(solution, step, float(now @ now), residuals)
-        if moved is None:
-            break
-        solution = moved
-    status = solution.status if converged else np.full((), codes.FORWARD_NOT_CONVERGED, dtype=np.int8)
-    return replace(solution, status=locked(np.array(status)), covariance=locked(covariance))
+    def best(self, found: Found) -> tuple[Found, Array]:
+        """The best fit and the covariance of its pose, from the equilibrium at the measured lengths."""
+        known = ~np.isnan(self.readings)
+        covariance = np.full((6, 6), np.nan)
+        for _ in range(_STEPS):
+            state = found.solution(self.robot, self.model, self.load, ()).state
+            by_length = stiffness(state).length_sensitivity
+            misread = frame_end_slopes(state, by_length) / self.tension_deviation[:, None]
+            matrix = np.concatenate((np.diag(1.0 / self.length_deviation), misread[known]))
+            inverse = np.linalg.inv(matrix.T @ matrix)
+            downhill = -matrix.T @ self.misfit(found)
+            step = inverse @ downhill
+            covariance = by_length @ inverse @ by_length.T
+            if step @ downhill <= _SETTLED:
+                return found, covariance
+            moved = self.moved(found, step)
+            if moved is None:
+                break
+            found = moved
+        found.pose_status[:] = codes.FORWARD_NOT_CONVERGED
+        return found, covariance
 
+    def misfit(self, found: Found) -> Array:
+        """What lengths and tensions miss of their readings, in standard deviations."""
+        cables = found.solution(self.robot, self.model, self.load, ()).state.cables
+        tensions = (cables.frame_end_tension - self.readings) / self.tension_deviation
+        lengths = (cables.unstrained_length - self.lengths) / self.length_deviation
+        return np.concatenate((lengths, tensions[~np.isnan(tensions)]))
 
-def _moved(solution, step, cost, residuals):  # type: ignore[no-untyped-def]
-    """The solution after a step, halved until the fit is no worse; None if no part of it helps."""
-    state = solution.state
-    lengths = state.cables.unstrained_length
-    load = np.atleast_2d(state.wrench)
-    for _ in range(20):
-        tried = lengths + step
-        if (tried > 0.0).all():
-            found = solve_rows(state.robot, state.cables.model, locked(tried[None]), pose_rows(state.pose), locked(load))
-            new = found.solution(state.robot, state.cables.model, state.wrench, ())
-            misfit = residuals(new)
-            if new.stable and misfit @ misfit <= cost * (1.0 + 1e-12):
-                return new
-        step = 0.5 * step
-    return None
+    def moved(self, found: Found, step: Array) -> Found | None:
+        """The equilibrium after a step, halved until the fit is better; None if no part of it helps."""
+        lengths = found.results[tables.LENGTH]
+        now = self.misfit(found)
+        for _ in range(_HALVINGS):
+            if (lengths + step > 0.0).all():
+                new = solve_rows(
+                    self.robot, self.model, locked(lengths + step), locked(found.poses.view()), self.load[None]
+                )
+                misfit = self.misfit(new)
+                if new.stable[0] and misfit @ misfit < now @ now:
+                    return new
+            step = 0.5 * step
+        return None
 
 
 def frame_end_slopes(state: Equilibrium, motion_by_length: Array) -> Array:
@@ -144,68 +156,15 @@ def frame_end_slopes(state: Equilibrium, motion_by_length: Array) -> Array:
     robot, cables = state.robot, state.cables
     slopes = cable_slopes(state)
     # the platform end moves by dp + dphi x r
-    ends = motion_by_length[None, :3] + np.cross(
-        motion_by_length[3:].T[None], slopes.levers[:, None], axis=-1
-    ).transpose(0, 2, 1)
-    forces = slopes.blocks @ ends
+    turned = np.cross(motion_by_length[3:].T[None], slopes.levers[:, None], axis=-1)
+    forces = slopes.blocks @ (motion_by_length[None, :3] + turned.transpose(0, 2, 1))
     index = np.arange(robot.cable_count)
     forces[index, :, index] += slopes.by_length
-    weight = robot.cables.linear_density * robot.gravity * (not cables.model.weightless)
-    forces[index, 2, index] -= weight
+    if not cables.model.weightless:
+        forces[index, 2, index] -= robot.cables.linear_density * robot.gravity
     reach = state.pose.position + robot.platform_anchors @ state.pose.matrix.T - robot.frame_anchors
-    with np.errstate(invalid="ignore"):  # a vertical cable pulls nowhere sideways
-        level = np.where(cables.span[:, None] > 0.0, reach[:, :2] / cables.span[:, None], 0.0)
+    level = reach[:, :2] / np.maximum(cables.span, _TINY)[:, None]  # a vertical cable pulls nowhere sideways
     pull = np.column_stack((level * cables.horizontal_tension[:, None], cables.vertical_force - cables.cable_weight))
-    tension = np.linalg.norm(pull, axis=1)
-    with np.errstate(invalid="ignore", divide="ignore"):  # a cable without force has no direction
-        direction = np.where(tension[:, None] > 0.0, pull / tension[:, None], 0.0)
+    direction = pull / np.maximum(np.linalg.norm(pull, axis=1), _TINY)[:, None]  # and one without force, nowhere
     slope: Array = np.einsum("ik,ikj->ij", direction, forces)
     return slope
-
-
-def _sample(solution: ForwardSolution, index: int) -> ForwardSolution:
-    """One sample of a batch, as a single solution."""
-    state = solution.state
-    if not state.pose.shape:
-        return solution
-    cables = state.cables
-    one = replace(
-        cables, **{name: locked(np.array(getattr(cables, name)[index])) for name in _CABLE_ARRAYS}
-    )
-    return ForwardSolution(
-        Equilibrium(state.robot, state.pose[index], locked(np.array(state.wrench[index])), one),
-        *(locked(np.array(getattr(solution, name)[index])) for name in _ARRAYS),
-    )
-
-
-def _stacked(answers: list[ForwardSolution]) -> ForwardSolution:
-    """Single solutions as one batch."""
-    first = answers[0].state
-    cables = replace(
-        first.cables,
-        **{name: _stack([getattr(a.state.cables, name) for a in answers]) for name in _CABLE_ARRAYS},
-    )
-    pose = Pose._adopt(
-        np.stack([a.pose.position for a in answers]), np.stack([a.pose.quaternion for a in answers])
-    )
-    wrench = _stack([a.state.wrench for a in answers])
-    return ForwardSolution(
-        Equilibrium(first.robot, pose, wrench, cables),
-        *(_stack([getattr(a, name) for a in answers]) for name in (*_ARRAYS, "covariance")),
-    )
-
-
-def _stack(arrays: list[NDArray[np.generic]]) -> NDArray[np.generic]:
-    return locked(np.stack(arrays))
-
-
-_ARRAYS = ("status", "stiffness_min", "energy", "wrench_residual", "iterations")
-_CABLE_ARRAYS = (
-    "span",
-    "rise",
-    "unstrained_length",
-    "horizontal_tension",
-    "vertical_force",
-    "chord_tension",
-    "status",
-)

@@ -51,7 +51,7 @@ def search(robot: Robot, model: CableModel, lengths: Array, wrenches: Array) -> 
 
 
 def from_rotations(robot: Robot, model: CableModel, lengths: Array, wrenches: Array, rotation: Rotation) -> Found:
-    """Start in the middle of the frame, with one rotation or one a sample: first the position alone, then all motions."""
+    """From the middle of the frame with one rotation, or one a sample: first the position alone, then all motions."""
     starts = pose_rows(Pose(middle(robot, rotation), rotation))
     if robot.motion_pattern not in ROTATING:
         return solve_rows(robot, model, lengths, starts, wrenches)
@@ -103,4 +103,3 @@ def _rank(robot: Robot, found: Found) -> Array:
 def _is_better(new: Array, old: Array) -> Flags:
     first = np.argmax(new != old, axis=1)[:, None]
     return np.asarray(np.take_along_axis(new, first, 1) < np.take_along_axis(old, first, 1))[:, 0]
-

@@ -114,10 +114,10 @@ def modes(state: Equilibrium) -> Modes:
     lower = np.linalg.cholesky(freedom @ _mass_matrix(state) @ freedom.T)
     inverse = np.linalg.inv(lower)
     scaled = inverse @ (0.5 * (matrix + np.swapaxes(matrix, -1, -2))) @ np.swapaxes(inverse, -1, -2)
-    absent = np.isnan(scaled).any(axis=(-1, -2), keepdims=True)
+    absent = np.asarray(np.isnan(scaled).any(axis=(-1, -2), keepdims=True))
     squares, vectors = np.linalg.eigh(np.where(absent, 0.0, scaled))
     shape = freedom.T @ np.swapaxes(inverse, -1, -2) @ vectors
-    held = (squares > 0.0) & ~absent[..., 0]
+    held = np.asarray((squares > 0.0) & ~absent[..., 0])
     frequency = np.where(held, np.sqrt(np.where(held, squares, 0.0)) / (2.0 * np.pi), np.nan)
     return Modes(state, locked(frequency), locked(np.where(absent, np.nan, shape)))
 
@@ -149,7 +149,9 @@ def cable_slopes(state: Equilibrium) -> CableSlopes:
     return CableSlopes(
         matrices.reshape(*shape, 6, 6),
         blocks.reshape(*shape, m, 3, 3),
-        *(slopes[:, which].reshape(*shape, m, 3) for which in (BY_LENGTH, BY_DENSITY, BY_STIFFNESS)),
+        slopes[:, BY_LENGTH].reshape(*shape, m, 3),
+        slopes[:, BY_DENSITY].reshape(*shape, m, 3),
+        slopes[:, BY_STIFFNESS].reshape(*shape, m, 3),
         levers.reshape(*shape, m, 3),
     )
 
