@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
 from sagline.arrays import Array, Indices, locked
 from sagline.cables.catenary import Catenary
@@ -17,7 +16,7 @@ from sagline.kinematics.forward import checked_lengths
 from sagline.kinematics.forward_rows import Found
 from sagline.kinematics.forward_solution import ForwardSolution
 from sagline.kinematics.forward_status import STABLE, ForwardStatus
-from sagline.kinematics.start import from_rotations, start_rotations
+from sagline.kinematics.start import from_orientations, start_quaternions
 from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.robot import Robot
 from sagline.statics.wrench import external_wrench
@@ -86,25 +85,28 @@ def equilibria(
     if starts < 1:
         raise InvalidValueError("starts", starts, ">= 1", "Ask for one start at least.")
     load = external_wrench(wrench, None)
-    rotations = _rotations(robot, starts, seed)
-    samples = locked(np.repeat(lengths[None], len(rotations), axis=0))
-    found = from_rotations(robot, model, samples, locked(load[None].copy()), rotations)
+    quaternions = _quaternions(robot, starts, seed)
+    samples = locked(np.repeat(lengths[None], len(quaternions), axis=0))
+    found = from_orientations(robot, model, samples, locked(load[None].copy()), quaternions)
     chosen, reached = _distinct(found, float(lengths.mean()))
     shape = (len(chosen),)
-    return Equilibria(found.part(chosen).solution(robot, model, load, shape), locked(reached), len(rotations))
+    return Equilibria(found.part(chosen).solution(robot, model, load, shape), locked(reached), len(quaternions))
 
 
-def _rotations(robot: Robot, count: int, seed: int) -> Rotation:
-    """Level and tilted starts first, then orientations evenly at random, as far as the robot can turn."""
-    known = Rotation.concatenate(start_rotations(robot))
+def _quaternions(robot: Robot, count: int, seed: int) -> Array:
+    """Level and tilted starts first, then orientations evenly at random, as far as the robot can turn, (K, 4)."""
+    known = start_quaternions(robot)
     if robot.motion_pattern not in ROTATING or count <= len(known):
         return known[:count]
     generator = np.random.default_rng(seed)
     rest = count - len(known)
     if robot.motion_pattern in PLANAR:
-        angles = generator.uniform(-np.pi, np.pi, (rest, 1))
-        return Rotation.concatenate([known, Rotation.from_rotvec(angles * robot.freedom[2, 3:])])
-    return Rotation.concatenate([known, Rotation.from_quat(generator.normal(size=(rest, 4)))])
+        half = generator.uniform(-0.5 * np.pi, 0.5 * np.pi, (rest, 1))
+        drawn = np.hstack((np.sin(half) * robot.freedom[2, 3:], np.cos(half)))
+    else:
+        drawn = generator.normal(size=(rest, 4))
+        drawn /= np.linalg.norm(drawn, axis=1, keepdims=True)
+    return np.vstack((known, drawn))
 
 
 def _distinct(found: Found, length: float) -> tuple[Indices, Indices]:

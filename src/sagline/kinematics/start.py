@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from sagline.arrays import Array, Flags, Indices, locked
 from sagline.cables.model import CableModel
@@ -36,9 +35,9 @@ def search(robot: Robot, model: CableModel, lengths: Array, wrenches: Array) -> 
     """
     found = Found.empty(*lengths.shape)
     open_samples = np.arange(len(lengths))
-    for round_, rotation in enumerate(start_rotations(robot)):
+    for round_, quaternion in enumerate(start_quaternions(robot)):
         loads = wrenches if len(wrenches) == 1 else locked(wrenches[open_samples])
-        answer = from_rotations(robot, model, locked(lengths[open_samples]), loads, rotation)
+        answer = from_orientations(robot, model, locked(lengths[open_samples]), loads, quaternion)
         better = np.ones(len(open_samples), dtype=np.bool_)
         if round_:
             better = _is_better(_rank(robot, answer), _rank(robot, found.part(open_samples)))
@@ -50,9 +49,12 @@ def search(robot: Robot, model: CableModel, lengths: Array, wrenches: Array) -> 
     return found
 
 
-def from_rotations(robot: Robot, model: CableModel, lengths: Array, wrenches: Array, rotation: Rotation) -> Found:
-    """From the middle of the frame with one rotation, or one a sample: first the position alone, then all motions."""
-    starts = pose_rows(Pose(middle(robot, rotation), rotation))
+def from_orientations(robot: Robot, model: CableModel, lengths: Array, wrenches: Array, quaternion: Array) -> Found:
+    """From the middle of the frame, with one orientation or one a sample: first the position alone, then all motions.
+
+    Quaternions (x, y, z, w) of shape (4,) or (N, 4).
+    """
+    starts = pose_rows(Pose.from_quaternion(middle(robot, quaternion), quaternion))
     if robot.motion_pattern not in ROTATING:
         return solve_rows(robot, model, lengths, starts, wrenches)
     freedom = robot.freedom
@@ -61,19 +63,23 @@ def from_rotations(robot: Robot, model: CableModel, lengths: Array, wrenches: Ar
     return solve_rows(robot, model, lengths, locked(placed.poses), wrenches)
 
 
-def middle(robot: Robot, rotation: Rotation) -> Array:
+def middle(robot: Robot, quaternion: Array) -> Array:
     """Position at which the middle of the platform ends is in the middle of the frame ends."""
-    position: Array = robot.frame_anchors.mean(axis=0) - rotation.apply(robot.platform_anchors.mean(axis=0))
+    ends = robot.platform_anchors.mean(axis=0)
+    vector, scalar = quaternion[..., :3], quaternion[..., 3:]
+    turn = 2.0 * np.cross(vector, ends)
+    position: Array = robot.frame_anchors.mean(axis=0) - (ends + scalar * turn + np.cross(vector, turn))
     return position
 
 
-def start_rotations(robot: Robot) -> list[Rotation]:
-    """Level first, then tilted about each axis that the robot can turn about, one way and the other."""
-    if robot.motion_pattern not in ROTATING:
-        return [Rotation.identity()]
-    axes = robot.freedom[2:, 3:] if robot.motion_pattern in PLANAR else np.eye(3)
-    angles = [sign * np.radians(tilt) for tilt in _TILTS for sign in (1.0, -1.0)]
-    return [Rotation.identity()] + [Rotation.from_rotvec(angle * axis) for angle in angles for axis in axes]
+def start_quaternions(robot: Robot) -> Array:
+    """Level first, then tilted about each axis that the robot can turn about, one way and the other, (K, 4)."""
+    rows = [np.array([0.0, 0.0, 0.0, 1.0])]
+    if robot.motion_pattern in ROTATING:
+        axes = robot.freedom[2:, 3:] if robot.motion_pattern in PLANAR else np.eye(3)
+        halves = [0.5 * sign * np.radians(tilt) for tilt in _TILTS for sign in (1.0, -1.0)]
+        rows += [np.append(np.sin(half) * axis, np.cos(half)) for half in halves for axis in axes]
+    return np.array(rows)
 
 
 def outside_limits(robot: Robot, found: Found) -> Indices:
