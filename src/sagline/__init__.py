@@ -17,11 +17,14 @@ from sagline.cables.status import CableStatus
 from sagline.cables.straight import Straight
 from sagline.errors import CableGeometryError, FileError, InvalidValueError, SaglineError
 from sagline.kinematics.confirm import Confirmation, confirm
+from sagline.kinematics.equilibria import Equilibria, equilibria
 from sagline.kinematics.forward import forward
 from sagline.kinematics.forward_solution import ForwardSolution
+from sagline.kinematics.forward_solver import ForwardSolver, ForwardStep
 from sagline.kinematics.forward_status import ForwardStatus
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.inverse_solver import InverseSolver, InverseStep
+from sagline.kinematics.measured import MeasuredTension
 from sagline.kinematics.plan import Gap, Plan
 from sagline.kinematics.status import PoseStatus
 from sagline.motion.path import Path
@@ -34,6 +37,7 @@ from sagline.robot.pose import Pose
 from sagline.robot.pose_box import PoseBox
 from sagline.robot.robot import Robot
 from sagline.statics.balance import ArticleBalance, article_balance, structure_matrix
+from sagline.statics.stiffness import Modes, Stiffness, modes, stiffness
 from sagline.statics.wrench import inertial_wrench
 from sagline.tension.closest import Closest
 from sagline.tension.method import TensionMethod
@@ -59,15 +63,20 @@ __all__ = [
     "Confirmation",
     "Elastic",
     "Empirical",
+    "Equilibria",
     "Equilibrium",
     "FileError",
     "ForwardSolution",
+    "ForwardSolver",
     "ForwardStatus",
+    "ForwardStep",
     "Gap",
     "InvalidValueError",
     "InverseSolver",
     "InverseStep",
+    "MeasuredTension",
     "MinimumNorm",
+    "Modes",
     "Parabolic",
     "Path",
     "Plan",
@@ -76,6 +85,7 @@ __all__ = [
     "PoseStatus",
     "Robot",
     "SaglineError",
+    "Stiffness",
     "Straight",
     "TensionMethod",
     "__version__",
@@ -83,17 +93,20 @@ __all__ = [
     "article_path",
     "confirm",
     "dump_robot",
+    "equilibria",
     "forward",
     "inertial_wrench",
     "inverse",
     "load_path",
     "load_plan",
     "load_robot",
+    "modes",
     "path_from_samples",
     "plot",
     "quintic_path",
     "robot_names",
     "save_plan",
+    "stiffness",
     "structure_matrix",
 ]
 
