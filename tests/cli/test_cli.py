@@ -241,6 +241,14 @@ def test_ctrl_c_during_a_long_run_leaves_nothing_half_done(folder: FilePath) -> 
     assert not [name for name in left if name.endswith(".part")]
 
 
+def test_a_cold_start_says_that_it_compiles(monkeypatch: pytest.MonkeyPatch) -> None:
+    answers = iter([True, False])  # after the first stage the kernels are there
+    monkeypatch.setattr("sagline.kernels.jit.is_cold", lambda: next(answers))
+    result = sagline("track", "article-suspended", "inside.yaml", "--no-figures", "--json")
+    assert result.stderr == "First run: compiling the numerical core, about a minute; later runs start at once.\n"
+    assert json.loads(result.stdout)["runs"][0]["poses"] == 101
+
+
 def test_completion_offers_presets_and_files() -> None:
     from sagline.cli.choices import robot_completions
 
