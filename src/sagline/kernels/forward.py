@@ -310,6 +310,8 @@ def forward_poses(
             continue
         for k in range(tables.POSE_COLUMNS):
             pose[k] = last[k] if chained else starts[min(p, starts.shape[0] - 1), k]
+        if not chained:  # an answer must not depend on the sample before
+            space.memory[:] = math.nan
         fill_scales(freedom, cables, body, lengths[p], scale, arc)
         problem = Problem(code, k_h, k_p, freedom, cables, body, lengths[p], wrench, scale)
         energy_problem = Problem(energy_code, 0.0, 0.0, freedom, cables, body, lengths[p], wrench, scale)

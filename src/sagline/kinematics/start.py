@@ -15,6 +15,7 @@ from sagline.robot.robot import Robot
 from sagline.statics.tables import pose_rows
 
 _TILTS = (25.0, 60.0)  # degrees, tried where the level platform leads nowhere
+_BELOW = 0.1  # of the mean length
 _LIMIT_SLACK = 0.01  # a measured tension may miss its limit by this share
 _POOR = np.array([0, 1, 2, 3, 4, 5, 6, 0])  # how little each status is worth; fitted is as good as solved
 
@@ -54,7 +55,10 @@ def from_orientations(robot: Robot, model: CableModel, lengths: Array, wrenches:
 
     Quaternions (x, y, z, w) of shape (4,) or (N, 4).
     """
-    starts = pose_rows(Pose.from_quaternion(middle(robot, quaternion), quaternion))
+    # below the middle, because the two ends of a single cable must not coincide
+    depth = _BELOW * np.nan_to_num(lengths.mean(axis=1, keepdims=True), nan=1.0)
+    below = depth * (robot.freedom[:, 2] @ robot.freedom[:, :3])
+    starts = pose_rows(Pose.from_quaternion(middle(robot, quaternion) - below, quaternion))
     if robot.motion_pattern not in ROTATING:
         return solve_rows(robot, model, lengths, starts, wrenches)
     freedom = robot.freedom

@@ -13,6 +13,8 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.robot import Robot
 from sagline.statics.tables import body_table, cable_table, pose_rows
 
+_SINGULAR = 1e-14  # determinant, at diagonal elements of 1
+
 
 class CableSlopes(NamedTuple):
     """How every cable's force on its platform end changes, world axes.
@@ -168,10 +170,14 @@ def _compliance(robot: Robot, matrix: Array) -> Array:
 
 
 def _inverse(matrix: Array) -> Array:
-    scale = np.sqrt(np.abs(np.einsum("...ii->...i", matrix)))
-    balanced = matrix / (scale[..., :, None] * scale[..., None, :] + np.finfo(np.float64).tiny)
-    lost = ~(np.abs(np.linalg.det(balanced)) > 1e-14)[..., None, None]
-    inverse: Array = np.linalg.inv(np.where(lost, np.eye(matrix.shape[-1]), matrix))
+    """Inverse of each matrix; NaN where it is singular or NaN."""
+    unit = np.eye(matrix.shape[-1])
+    known = np.where(np.isnan(matrix).any(axis=(-1, -2), keepdims=True), 0.0, matrix)
+    diagonal = np.abs(np.einsum("...ii->...i", known))
+    scale = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
+    balanced = known / (scale[..., :, None] * scale[..., None, :])  # newtons and newton meters alike
+    lost = np.abs(np.linalg.det(balanced))[..., None, None] < _SINGULAR
+    inverse: Array = np.linalg.inv(np.where(lost, unit, known))
     return np.where(lost, np.nan, inverse)
 
 
