@@ -53,9 +53,12 @@ def test_exact_readings_correct_wrong_lengths() -> None:
 
 
 def test_bad_input() -> None:
+    lengths = PLAN.unstrained_length[:2]
     with pytest.raises(sl.InvalidValueError, match="tension_deviation"):
         sl.MeasuredTension(TENSIONS, 0.0, 0.003)
     with pytest.raises(sl.InvalidValueError, match="frame_end_tension"):
         sl.MeasuredTension([-1.0] * 8, 5.0, 0.003)
     with pytest.raises(sl.InvalidValueError, match="frame_end_tension"):
-        sl.forward(COGIRO, PLAN.unstrained_length, tension_measured=sl.MeasuredTension([100.0] * 7, 5.0, 0.003))
+        sl.forward(COGIRO, lengths, tension_measured=sl.MeasuredTension([100.0] * 7, 5.0, 0.003))
+    with pytest.raises(sl.InvalidValueError, match="Straight"):
+        sl.forward(COGIRO, lengths, model=sl.Straight(), tension_measured=sl.MeasuredTension([100.0] * 8, 5.0, 0.003))
