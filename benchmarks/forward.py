@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 import sagline as sl
 from benchmarks.measure import Row, best_of_calls, best_seconds, one_core, show
-from sagline.arrays import Array
+from sagline.arrays import Array, Flags
 from tests.kinematics.feasible import angle_error, feasible_plan, motion_between, moved, position_error
 
 BOX_POSES = 10_000
@@ -41,12 +41,12 @@ def plan_of(robot: sl.Robot, feasible: int, seed: int) -> sl.Plan:
     return sl.inverse(robot, plan.state.pose[keep], tension=sl.MinimumNorm())
 
 
-def right(found: sl.ForwardSolution, pose: sl.Pose) -> Array:
+def right(found: sl.ForwardSolution, pose: sl.Pose) -> Flags:
     """Whether the original pose was found, sample by sample."""
     return np.asarray((position_error(found, pose) < SAME) & (angle_error(found, pose) < SAME))
 
 
-def percent(flags: Array) -> str:
+def percent(flags: Flags) -> str:
     """Share of true flags."""
     return f"{100.0 * np.mean(flags):.2f} %"
 
@@ -77,7 +77,7 @@ def without_start(share: float) -> Iterator[Row]:
         yield Row(
             f"{name}, {count} poses, no start: an equilibrium; the right one",
             "100 %; ≥ 99.5 %",
-            f"{percent(found.stable)}; {percent(right(found, pose))} (straight cables within 0.1 m: {100 * near:.0f} %)",
+            f"{percent(found.stable)}; {percent(right(found, pose))} (straight within 0.1 m: {100 * near:.0f} %)",
         )
         back = sl.forward(robot, plan.unstrained_length, start=pose)
         worst_shift = max(worst_shift, float(position_error(back, pose).max()))
@@ -145,20 +145,14 @@ def derivatives(share: float) -> Iterator[Row]:
         error = np.linalg.norm(analytic - numeric, axis=-1) / np.linalg.norm(numeric, axis=-1)
         return float(error.max())
 
-    compliance = max(
-        worst(
-            found.compliance[..., k],
-            slope(lambda h, k=k: sl.forward(robot, lengths, start=pose, wrench=h * np.eye(6)[k]), 10.0),
-        )
-        for k in range(6)
-    )
-    by_length = max(
-        worst(
-            found.length_sensitivity[..., i],
-            slope(lambda h, i=i: sl.forward(robot, lengths + h * np.eye(8)[i], start=pose), 2e-4),
-        )
-        for i in range(8)
-    )
+    def pushed(k: int) -> Callable[[float], sl.ForwardSolution]:
+        return lambda h: sl.forward(robot, lengths, start=pose, wrench=h * np.eye(6)[k])
+
+    def wound(i: int) -> Callable[[float], sl.ForwardSolution]:
+        return lambda h: sl.forward(robot, lengths + h * np.eye(8)[i], start=pose)
+
+    compliance = max(worst(found.compliance[..., k], slope(pushed(k), 10.0)) for k in range(6))
+    by_length = max(worst(found.length_sensitivity[..., i], slope(wound(i), 2e-4)) for i in range(8))
     yield Row("compliance against central differences, relative", "1e-7", f"{compliance:.1e}")
     yield Row("sensitivity to lengths against central differences, relative", "1e-7", f"{by_length:.1e}")
 

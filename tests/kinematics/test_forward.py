@@ -167,6 +167,8 @@ def test_rows_without_lengths_are_left_out() -> None:
         found = sl.forward(SUSPENDED, plan.unstrained_length, start)
         assert found.status.tolist() == [Status.SOLVED, Status.NO_LENGTHS, Status.SOLVED]
         assert np.isnan(found.pose.position[1]).all()
+        assert np.isnan(found.pose.matrix[1]).all()
+        assert np.isnan(sl.modes(found.state).frequency).all(axis=1).tolist() == [False, True, False]
         assert np.abs(found.pose.position - pose.position)[[0, 2]].max() < 1e-9
 
 
@@ -190,6 +192,8 @@ def test_a_wrong_count_of_starts_or_wrenches_is_refused() -> None:
     lengths = np.full((3, 8), 5.0)
     with pytest.raises(sl.InvalidValueError, match="2 poses"):
         sl.forward(COGIRO, lengths, box_poses(COGIRO, 2, seed=0))
+    with pytest.raises(sl.InvalidValueError, match="one pose, for one sample"):
+        sl.forward(COGIRO, lengths[0], box_poses(COGIRO, 2, seed=0))
     with pytest.raises(sl.InvalidValueError, match="wrench"):
         sl.forward(COGIRO, lengths, wrench=np.zeros((2, 6)))
 

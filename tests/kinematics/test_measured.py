@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 import sagline as sl
+from sagline.arrays import Array
+from sagline.kinematics.measured import frame_end_slopes
 from tests.kinematics.feasible import feasible_plan, motion_between, position_error
 
 COGIRO = sl.load_robot("cogiro")
@@ -52,10 +54,32 @@ def test_exact_readings_correct_wrong_lengths() -> None:
     assert found.state.cables.unstrained_length[3] == pytest.approx(PLAN.unstrained_length[0, 3], abs=1e-5)
 
 
+def test_the_slopes_of_the_frame_end_tensions_are_those_of_the_forward_solution() -> None:
+    lengths, pose = PLAN.unstrained_length[0], PLAN.state.pose[0]
+    state = sl.forward(COGIRO, lengths, pose).state
+    found = frame_end_slopes(state, sl.stiffness(state).length_sensitivity)
+
+    def tensions(change: Array) -> Array:
+        return sl.forward(COGIRO, lengths + change, pose).state.cables.frame_end_tension
+
+    def central(step: Array) -> Array:
+        slope: Array = (tensions(step) - tensions(-step)) / (2.0 * np.abs(step).max())
+        return slope
+
+    for j in range(8):
+        step = 2e-4 * np.eye(8)[j]
+        expected = (4.0 * central(0.5 * step) - central(step)) / 3.0
+        # the weight of new cable is 1e-5 of these slopes
+        np.testing.assert_allclose(found[:, j], expected, atol=1e-7 * np.abs(expected).max())
+
+
 def test_bad_input() -> None:
+    lengths = PLAN.unstrained_length[:2]
     with pytest.raises(sl.InvalidValueError, match="tension_deviation"):
         sl.MeasuredTension(TENSIONS, 0.0, 0.003)
     with pytest.raises(sl.InvalidValueError, match="frame_end_tension"):
         sl.MeasuredTension([-1.0] * 8, 5.0, 0.003)
     with pytest.raises(sl.InvalidValueError, match="frame_end_tension"):
-        sl.forward(COGIRO, PLAN.unstrained_length, tension_measured=sl.MeasuredTension([100.0] * 7, 5.0, 0.003))
+        sl.forward(COGIRO, lengths, tension_measured=sl.MeasuredTension([100.0] * 7, 5.0, 0.003))
+    with pytest.raises(sl.InvalidValueError, match="Straight"):
+        sl.forward(COGIRO, lengths, model=sl.Straight(), tension_measured=sl.MeasuredTension([100.0] * 8, 5.0, 0.003))

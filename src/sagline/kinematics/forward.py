@@ -111,8 +111,6 @@ def start_rows(start: Pose, lengths: Array) -> Array:
         InvalidValueError: If the counts of poses and samples differ.
     """
     if start.shape and start.shape != lengths.shape[:-1]:
-        samples = len(lengths) if lengths.ndim == 2 else 1
-        raise InvalidValueError(
-            "start", f"{len(start)} poses", f"one pose, or {samples}", "Give one start a sample, or a single one."
-        )
+        allowed = f"one pose, or {len(lengths)}" if lengths.ndim == 2 else "one pose, for one sample"
+        raise InvalidValueError("start", f"{len(start)} poses", allowed, "Give one start a sample, or a single one.")
     return pose_rows(start)

@@ -68,7 +68,12 @@ def corrected(robot: Robot, model: CableModel, found: Found, loads: Array, measu
 
     Returns:
         Covariance of displacement of the center of mass and rotation vector, (N, 6, 6); NaN without an answer.
+
+    Raises:
+        InvalidValueError: If the model knows no forces, or a measurement is of the wrong shape.
     """
+    if model.code == codes.STRAIGHT:
+        raise InvalidValueError("model", "Straight()", "a model with forces", "Use Catenary() with measured tensions.")
     lengths = found.results[tables.LENGTH]
     readings = _fitting("frame_end_tension", measured.frame_end_tension, lengths.shape)
     deviations = (
