@@ -109,7 +109,7 @@ def verdicts() -> Iterator[Row]:
 
 
 def continuity() -> Iterator[Row]:
-    """Largest change of tension over change of position on lines through four robots' boxes; it grows where one jumps."""
+    """Largest slope of a tension on lines through four robots' boxes; with smaller steps it grows where one jumps."""
     for name, method in METHODS.items():
         figures = [max(_steepest(robot, method, count) for robot in LINES) for count in (2001, 20001)]
         yield Row(

@@ -17,11 +17,14 @@ from sagline.cables.status import CableStatus
 from sagline.cables.straight import Straight
 from sagline.errors import CableGeometryError, FileError, InvalidValueError, SaglineError
 from sagline.kinematics.confirm import Confirmation, confirm
+from sagline.kinematics.equilibria import Equilibria, equilibria
 from sagline.kinematics.forward import forward
 from sagline.kinematics.forward_solution import ForwardSolution
+from sagline.kinematics.forward_solver import ForwardSolver, ForwardStep
 from sagline.kinematics.forward_status import ForwardStatus
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.inverse_solver import InverseSolver, InverseStep
+from sagline.kinematics.measured import MeasuredTension
 from sagline.kinematics.plan import Gap, Plan
 from sagline.kinematics.polygon import tension_polygon
 from sagline.kinematics.status import PoseStatus
@@ -35,6 +38,7 @@ from sagline.robot.pose import Pose
 from sagline.robot.pose_box import PoseBox
 from sagline.robot.robot import Robot
 from sagline.statics.balance import ArticleBalance, article_balance, structure_matrix
+from sagline.statics.stiffness import Modes, Stiffness, modes, stiffness
 from sagline.statics.wrench import inertial_wrench
 from sagline.tension.analytic_center import AnalyticCenter
 from sagline.tension.broken import without_cables
@@ -77,10 +81,13 @@ __all__ = [
     "Confirmation",
     "Elastic",
     "Empirical",
+    "Equilibria",
     "Equilibrium",
     "FileError",
     "ForwardSolution",
+    "ForwardSolver",
     "ForwardStatus",
+    "ForwardStep",
     "Gap",
     "ImprovedClosedForm",
     "InvalidValueError",
@@ -88,7 +95,9 @@ __all__ = [
     "InverseStep",
     "LowestMaximum",
     "LowestSum",
+    "MeasuredTension",
     "MinimumNorm",
+    "Modes",
     "PNorm",
     "Parabolic",
     "Path",
@@ -102,6 +111,7 @@ __all__ = [
     "Robot",
     "SaglineError",
     "Side",
+    "Stiffness",
     "Straight",
     "TensionMethod",
     "TensionPolygon",
@@ -111,6 +121,7 @@ __all__ = [
     "capacity_margin",
     "confirm",
     "dump_robot",
+    "equilibria",
     "forward",
     "inertial_wrench",
     "inverse",
@@ -118,11 +129,13 @@ __all__ = [
     "load_path",
     "load_plan",
     "load_robot",
+    "modes",
     "path_from_samples",
     "plot",
     "quintic_path",
     "robot_names",
     "save_plan",
+    "stiffness",
     "structure_matrix",
     "tension_polygon",
     "unresisted_motion",

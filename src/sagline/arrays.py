@@ -6,7 +6,7 @@ comes through here.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -48,15 +48,13 @@ def checked(
         infinite: Whether infinities may pass (NaN never does).
 
     Returns:
-        Array of float64, C-contiguous, write-locked, with memory of its own.
+        Array of float64, C-contiguous, write-locked, with memory of its own; an array that already is
+        all this down to its memory, such as a result of ours, is taken as it is.
 
     Raises:
         InvalidValueError: If the value is no number, has the wrong shape, or is out of range.
     """
-    try:
-        array = np.array(value, dtype=np.float64, order="C")
-    except (TypeError, ValueError) as error:
-        raise InvalidValueError(item, repr(value), "numbers", f"Give {item} as plain numbers ({error}).") from None
+    array = value if _is_immutable(value) else _copied(value, item)
     if shape is not None:
         _check_shape(array, item, shape)
     if _is_within(array, low=low, above=above):
@@ -69,6 +67,25 @@ def kernel_input(value: ArrayLike, shape: tuple[int, ...]) -> Array:
     """Broadcast to a shape and lay out as kernels expect; copies only where it must."""
     array = np.asarray(np.broadcast_to(np.asarray(value, dtype=np.float64), shape), order="C")
     return array if not array.flags.writeable else locked(array.view())
+
+
+def _is_immutable(value: ArrayLike) -> TypeGuard[Array]:
+    """Whether a value is an array as ours, and so is whatever holds its memory."""
+    if not (isinstance(value, np.ndarray) and value.dtype == np.float64 and value.flags.c_contiguous):
+        return False
+    holder: object = value
+    while isinstance(holder, np.ndarray):
+        if holder.flags.writeable:
+            return False
+        holder = holder.base
+    return holder is None
+
+
+def _copied(value: ArrayLike, item: str) -> Array:
+    try:
+        return np.array(value, dtype=np.float64, order="C")
+    except (TypeError, ValueError) as error:
+        raise InvalidValueError(item, repr(value), "numbers", f"Give {item} as plain numbers ({error}).") from None
 
 
 def _is_within(array: Array, *, low: float, above: float) -> bool:

@@ -104,10 +104,11 @@ def gap_text(gap: Gap, plan: Plan) -> str:
     when = f"from {plan.path.time[gap.first]:g} s to {plan.path.time[gap.last]:g} s"
     if np.isnan(gap.shortfall):
         return f"{when}: {gap.status.text}"
-    cables = ", ".join(map(str, gap.cables))
+    count = plan.state.robot.cable_count
+    cables = "all cables" if len(gap.cables) == count else f"cables {', '.join(map(str, gap.cables))}"
     if np.isinf(gap.shortfall):
-        return f"{when}: no change of the force alone would do; limits of cables {cables}"
-    return f"{when}: short by up to {gap.shortfall:.3g} N; limits of cables {cables}"
+        return f"{when}: no change of the force alone would do; limits of {cables}"
+    return f"{when}: short by up to {gap.shortfall:.3g} N; limits of {cables}"
 
 
 def _range(values: Array) -> tuple[float, float]:

@@ -54,7 +54,7 @@ def working(what: str) -> Iterator[None]:
 
 def note(head: str, text: str, style: str = "") -> None:
     """A message beside the result, on stderr; paths in it are not broken into lines."""
-    _err.print(Text(head, style=style) + Text(text, style="default"), soft_wrap=True)
+    _err.print(Text.assemble((head, style), text), soft_wrap=True)
 
 
 def show(what: RenderableType) -> None:

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
 FORMAT = 1  # raised whenever an older sagline could misread the file
 MODELS = {model.__name__: model for model in (Straight, Elastic, Empirical, Parabolic, Catenary)}
+HEADERS = 1 << 18  # bytes, more than all names, attributes and the robot take
 STATE_ARRAYS = ("span", "rise", "unstrained_length", "horizontal_tension", "vertical_force", "chord_tension")
 
 Choice = TypeVar("Choice", CableModel, TensionMethod)
@@ -55,7 +56,7 @@ def save_plan(plan: Plan, file: os.PathLike[str] | str) -> None:
         FileError: If the file cannot be written; what was there before is untouched.
     """
     data = _dataset(plan)
-    with written_whole(file) as partial:
+    with written_whole(file, size=data.nbytes + HEADERS) as partial:
         # _FillValue None: numbers are stored as they are, and NaN needs no second meaning
         encoding = {str(name): {"_FillValue": None} for name in data.variables}
         data.to_netcdf(partial, engine="h5netcdf", encoding=encoding)

@@ -11,7 +11,7 @@ from sagline.errors import FileError
 
 
 @contextmanager
-def written_whole(file: os.PathLike[str] | str) -> Iterator[Path]:
+def written_whole(file: os.PathLike[str] | str, size: int = 0) -> Iterator[Path]:
     """A place to write to that becomes the file only when the block ends well.
 
     The block writes to a new file beside the real one. When it ends, that file is flushed to the disk and takes the
@@ -19,6 +19,7 @@ def written_whole(file: os.PathLike[str] | str) -> Iterator[Path]:
 
     Args:
         file: The file to be.
+        size: Bytes it will have or more; that they fit is found out before the block begins.
 
     Yields:
         Path of the file to write; it exists and is empty.
@@ -31,7 +32,7 @@ def written_whole(file: os.PathLike[str] | str) -> Iterator[Path]:
     try:
         if target.is_dir():
             raise FileError(target, "is a folder", "Give the name of a file in it.")
-        partial.open("wb").close()
+        _reserve(partial, size)
         yield partial
         _flush(partial)
         partial.replace(target)
@@ -68,6 +69,14 @@ def made_folder(folder: os.PathLike[str] | str) -> Path:
     except OSError as error:
         raise FileError(path, f"cannot be created ({_reason(error)})", "Name another folder.") from None
     return path
+
+
+def _reserve(file: Path, size: int) -> None:
+    """Create an empty file, after the disk has shown that it holds so many bytes: HDF5 crashes on a full one."""
+    with file.open("wb") as handle:
+        if size and hasattr(os, "posix_fallocate"):
+            os.posix_fallocate(handle.fileno(), 0, size)
+            handle.truncate(0)
 
 
 def _flush(file: Path) -> None:

@@ -82,42 +82,92 @@ def solve_general(matrix: Array, right: Array) -> bool:
 
 
 @kernel
-def rotate_away(matrix: Array, p: int, q: int) -> None:
-    """One Jacobi rotation that makes the elements (p, q) and (q, p) zero."""
+def tridiagonalize(matrix: Array, diagonal: Array, beside: Array, vector: Array, product: Array) -> None:
+    """Householder: fill diagonal (n,) and beside (n,), last entry 0, of a similar matrix; matrix is destroyed."""
     n = matrix.shape[0]
-    half = 0.5 * (matrix[q, q] - matrix[p, p]) / matrix[p, q]
-    t = math.copysign(1.0, half) / (abs(half) + math.sqrt(half * half + 1.0))
-    c = 1.0 / math.sqrt(t * t + 1.0)
-    s = t * c
+    for k in range(n - 2):
+        square = 0.0
+        for i in range(k + 1, n):
+            vector[i] = matrix[i, k]
+            square += vector[i] * vector[i]
+        rest = square - vector[k + 1] * vector[k + 1]
+        if rest == 0.0:
+            beside[k] = vector[k + 1]
+            continue
+        head = -math.copysign(math.sqrt(square), vector[k + 1])
+        beside[k] = head
+        vector[k + 1] -= head
+        factor = 2.0 / (rest + vector[k + 1] * vector[k + 1])
+        along = 0.0
+        for i in range(k + 1, n):
+            total = 0.0
+            for j in range(k + 1, n):
+                total += matrix[i, j] * vector[j]
+            product[i] = factor * total
+            along += product[i] * vector[i]
+        for i in range(k + 1, n):
+            product[i] -= 0.5 * factor * along * vector[i]
+        for i in range(k + 1, n):
+            for j in range(k + 1, n):
+                matrix[i, j] -= vector[i] * product[j] + product[i] * vector[j]
     for k in range(n):
-        a, b = matrix[k, p], matrix[k, q]
-        matrix[k, p] = c * a - s * b
-        matrix[k, q] = s * a + c * b
-    for k in range(n):
-        a, b = matrix[p, k], matrix[q, k]
-        matrix[p, k] = c * a - s * b
-        matrix[q, k] = s * a + c * b
+        diagonal[k] = matrix[k, k]
+    if n > 1:
+        beside[n - 2] = matrix[n - 1, n - 2]
+    beside[n - 1] = 0.0
 
 
 @kernel
-def extreme_eigenvalues(matrix: Array):  # type: ignore[no-untyped-def]
-    """Smallest and largest eigenvalue of a symmetric matrix, which is destroyed."""
+def implicit_shift(diagonal: Array, beside: Array, first: int, last: int) -> None:
+    """One QL step with Wilkinson's shift on rows first..last of a tridiagonal matrix (EISPACK's imtql1)."""
+    g = 0.5 * (diagonal[first + 1] - diagonal[first]) / beside[first]
+    r = math.sqrt(g * g + 1.0)
+    g = diagonal[last] - diagonal[first] + beside[first] / (g + math.copysign(r, g))
+    s = 1.0
+    c = 1.0
+    p = 0.0
+    for k in range(last - first):
+        i = last - 1 - k
+        f = s * beside[i]
+        b = c * beside[i]
+        r = math.sqrt(f * f + g * g)
+        beside[i + 1] = r
+        if r == 0.0:
+            diagonal[i + 1] -= p
+            beside[last] = 0.0
+            return
+        s = f / r
+        c = g / r
+        g = diagonal[i + 1] - p
+        r = (diagonal[i] - g) * s + 2.0 * c * b
+        p = s * r
+        diagonal[i + 1] = g + p
+        g = c * r - b
+    diagonal[first] -= p
+    beside[first] = g
+    beside[last] = 0.0
+
+
+@kernel
+def extreme_eigenvalues(matrix: Array, diagonal: Array, beside: Array, vector: Array, product: Array):  # type: ignore[no-untyped-def]
+    """Smallest and largest eigenvalue of a symmetric matrix (n, n), which is destroyed; the rest is room, (n,) each."""
     n = matrix.shape[0]
-    for _ in range(SWEEPS):
-        largest = 0.0
-        for p in range(n):
-            for q in range(p + 1, n):
-                share = abs(matrix[p, q]) / math.sqrt(abs(matrix[p, p] * matrix[q, q]) + 1e-300)
-                if share > 1e-9:
-                    rotate_away(matrix, p, q)
-                    largest = max(largest, share)
-        if largest <= 1e-9:
-            break
-    low = matrix[0, 0]
-    high = matrix[0, 0]
+    tridiagonalize(matrix, diagonal, beside, vector, product)
+    for first in range(n):
+        for _ in range(SWEEPS):
+            last = first
+            for k in range(first, n - 1):
+                if abs(beside[k]) <= 1e-16 * (abs(diagonal[k]) + abs(diagonal[k + 1])):
+                    break
+                last = k + 1
+            if last == first:
+                break
+            implicit_shift(diagonal, beside, first, last)
+    low = diagonal[0]
+    high = diagonal[0]
     for k in range(1, n):
-        low = min(low, matrix[k, k])
-        high = max(high, matrix[k, k])
+        low = min(low, diagonal[k])
+        high = max(high, diagonal[k])
     return low, high
 
 

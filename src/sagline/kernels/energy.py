@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from sagline.kernels.codes import CATENARY
+from sagline.kernels.codes import CATENARY, ELASTIC
 from sagline.kernels.jit import kernel
 from sagline.kernels.stiffness import series_excess
 
@@ -56,4 +56,6 @@ def cable_energy(
     weight = density * gravity
     if code == CATENARY and weight > 0.0:
         return catenary_energy(span, rise, length, horizontal, vertical, weight, stiffness)
-    return elastic_energy(math.sqrt(span * span + rise * rise), length, tension, stiffness)
+    if code in (CATENARY, ELASTIC) or weight == 0.0:
+        return elastic_energy(math.sqrt(span * span + rise * rise), length, tension, stiffness)
+    return math.nan

@@ -43,10 +43,10 @@ SHORTENINGS = 10
 UNIT_SHARE = 0.2  # of the mean length: the displacement that counts as much as a rotation by 1 rad
 FIRST_RADIUS = 0.5  # of the trust region, in these units
 LARGEST_RADIUS = 1.0
-NEAR = 1e-4  # a full Newton step shorter than this leaves the rest to the polish
+NEAR = 3e-3  # a full Newton step shorter than this leaves the rest to the polish
 NOISE = 4e-15  # of the sum of an energy's parts: what rounding leaves of it
 BALANCED = 1e-9  # of the sum of tensions and weight: an unbalance that counts as none
-EXACT = 4e-17  # of the same: nothing left to gain
+LAST_DIGIT = 1e-15  # a step, in these units, that rounding hides
 FLAT = 1e-9  # of the largest stiffness: smaller ones are none
 OVERSTRETCHED = 0.1  # strain that no cable survives
 
@@ -56,12 +56,19 @@ FORWARD_NUMBERS = 5
 
 
 @kernel
-def descend(problem: Problem, pose: Array, space: Space) -> int:
-    """Move pose downhill until a full Newton step is short; returns the number of steps tried."""
+def descend(problem: Problem, pose: Array, space: Space):  # type: ignore[no-untyped-def]
+    """Move pose downhill until a full Newton step is short; a start in balance stays where it is, stable or not.
+
+    Returns the number of steps tried, and the sum of tensions that `unbalance` gave at the pose; 0 where the last
+    pose tried was another.
+    """
     scale, wrench = problem.scale, problem.wrench
     part, step, motion, matrix, trial = space.part, space.step, space.motion, space.matrix, space.trial
     radius = FIRST_RADIUS
-    unbalance(problem, pose, space)
+    tensions = unbalance(problem, pose, space)
+    project(problem.freedom, space.gradient, scale, part)
+    if norm(part) <= BALANCED * tensions * norm(scale):
+        return 0, tensions
     energy, size = platform_energy(problem, pose, space)
     fresh = True
     for iteration in range(DESCENT_STEPS):
@@ -79,7 +86,7 @@ def descend(problem: Problem, pose: Array, space: Space) -> int:
                 promised -= 0.5 * step[j] * matrix[j, k] * step[k]
         spread(problem.freedom, step, scale, motion)
         moved_pose(problem.body, pose, motion, trial)
-        unbalance(problem, trial, space)
+        tensions = unbalance(problem, trial, space)
         new_energy, new_size = platform_energy(problem, trial, space)
         gain = energy - new_energy
         for k in range(3):  # the work of a given moment along the motion
@@ -89,32 +96,36 @@ def descend(problem: Problem, pose: Array, space: Space) -> int:
         if not fresh:
             radius = 0.3 * min(length, radius)
             if not radius > 1e-14:
-                return iteration + 1
+                return iteration + 1, 0.0
             continue
         for k in range(pose.shape[0]):
             pose[k] = trial[k]
         energy = new_energy
         size = new_size
         if shift == 0.0 and (length <= NEAR or promised <= noise):
-            return iteration + 1
+            return iteration + 1, tensions
         if gain >= 0.6 * promised and length >= 0.7 * radius:
             radius = min(2.0 * radius, LARGEST_RADIUS)
         elif gain < 0.3 * promised:
             radius = 0.5 * length
-    return DESCENT_STEPS
+    return DESCENT_STEPS, 0.0
 
 
 @kernel
-def improve(problem: Problem, pose: Array, space: Space, best: float, good: float) -> float:
-    """One Newton step on the wrench balance, shortened until the unbalance is below best.
+def improve(problem: Problem, pose: Array, space: Space, best: float, good: float):  # type: ignore[no-untyped-def]
+    """One Newton step on the wrench balance, shortened until the unbalance is below best; needs the stiffness.
 
-    Returns the new unbalance; best and an unchanged pose where no step is better. Close to balance (good) only
-    the full step is tried: what it cannot improve is rounding.
+    Returns the new unbalance and the length of the step; length 0 and an unchanged pose where no step is better.
+    Close to balance (good) only the full step is tried: what it cannot improve is rounding.
     """
     motion, trial, part = space.motion, space.trial, space.part
     restricted(problem.freedom, space.stiffness, problem.scale, space.matrix)
+    project(problem.freedom, space.gradient, problem.scale, part)
     if not solve_general(space.matrix, part):
-        return best
+        return best, 0.0
+    length = norm(part)
+    if length <= LAST_DIGIT:
+        return best, 0.0
     spread(problem.freedom, part, problem.scale, motion)
     for k in range(6):
         motion[k] = -motion[k]
@@ -126,33 +137,32 @@ def improve(problem: Problem, pose: Array, space: Space, best: float, good: floa
         if new < best:
             for k in range(pose.shape[0]):
                 pose[k] = trial[k]
-            return new
+            return new, length
         if best <= good:
-            return best
+            break
         for k in range(6):
             motion[k] *= 0.25
-    return best
+        length *= 0.25
+    unbalance(problem, pose, space)
+    return best, 0.0
 
 
 @kernel
-def polish(problem: Problem, pose: Array, space: Space) -> int:
+def polish(problem: Problem, pose: Array, space: Space, size: float) -> int:
     """Newton on the wrench balance while it gets better, to the last digit; returns the number of steps.
 
-    On return everything in space is that of the pose.
+    Before and on return space is that of the pose; the stiffness may be that of a pose a rounding error away.
     """
-    size = unbalance(problem, pose, space) * norm(problem.scale)
     project(problem.freedom, space.gradient, problem.scale, space.part)
     best = norm(space.part)
+    before = 0.0
     for iteration in range(POLISH_STEPS):
         platform_stiffness(problem, space)
-        if best <= EXACT * size:
-            return iteration
-        new = improve(problem, pose, space, best, BALANCED * size)
-        if not new < best:
-            unbalance(problem, pose, space)
-            platform_stiffness(problem, space)
+        best, length = improve(problem, pose, space, best, BALANCED * size)
+        # each step is as long as the error before it: the next would be about length^3/before^2
+        if length == 0.0 or length * length * length <= LAST_DIGIT * before * before:
             return iteration + 1
-        best = new
+        before = length
     platform_stiffness(problem, space)
     return POLISH_STEPS
 
@@ -227,15 +237,16 @@ def fill_scales(freedom: Array, cables: Array, body: Array, lengths: Array, scal
 @kernel
 def solve_pose(problem: Problem, energy_problem: Problem, pose: Array, arc: Array, space: Space, numbers: Array) -> int:
     """Move pose to the equilibrium and fill the numbers; returns the status."""
-    steps = descend(energy_problem, pose, space)
-    steps += polish(problem, pose, space)
-    size = unbalance(problem, pose, space)
+    steps, size = descend(energy_problem, pose, space)
+    if size == 0.0 or problem.code != energy_problem.code:
+        size = unbalance(problem, pose, space)
+    steps += polish(problem, pose, space, size * norm(problem.scale))
     numbers[ENERGY] = platform_energy(problem, pose, space)[0]
     numbers[ITERATIONS] = steps
     fill_residuals(problem, space, numbers)
     restricted(problem.freedom, space.stiffness, arc, space.matrix)
     make_symmetric(space.matrix)
-    low, high = extreme_eigenvalues(space.matrix)
+    low, high = extreme_eigenvalues(space.matrix, space.part, space.work, space.step, space.motion)
     numbers[STIFFNESS_MIN] = low
     return verdict(problem, space, size, low, high)
 
@@ -299,6 +310,8 @@ def forward_poses(
             continue
         for k in range(tables.POSE_COLUMNS):
             pose[k] = last[k] if chained else starts[min(p, starts.shape[0] - 1), k]
+        if not chained:  # an answer must not depend on the sample before
+            space.memory[:] = math.nan
         fill_scales(freedom, cables, body, lengths[p], scale, arc)
         problem = Problem(code, k_h, k_p, freedom, cables, body, lengths[p], wrench, scale)
         energy_problem = Problem(energy_code, 0.0, 0.0, freedom, cables, body, lengths[p], wrench, scale)

@@ -99,20 +99,12 @@ def atanhc(u: float) -> float:
 def atanhc_excess(u: float) -> float:
     """atanh(u)/u - 1, to full relative precision for u <= 0.25 and to 1e-14 above, for 0 <= u < 1."""
     y = u * u
-    if y <= 0.0625:  # fourteen terms: below 1e-18
-        s = 1 / 29
-        s = s * y + 1 / 27
-        s = s * y + 1 / 25
-        s = s * y + 1 / 23
-        s = s * y + 1 / 21
-        s = s * y + 1 / 19
-        s = s * y + 1 / 17
-        s = s * y + 1 / 15
-        s = s * y + 1 / 13
-        s = s * y + 1 / 11
-        s = s * y + 1 / 9
-        s = s * y + 1 / 7
-        s = s * y + 1 / 5
-        s = s * y + 1 / 3
-        return s * y
+    if y <= 0.0625:  # sixteen terms: below 1e-19
+        q = y * y
+        r = q * q
+        a = 1 / 3 + r * (1 / 11 + r * (1 / 19 + r * (1 / 27)))
+        b = 1 / 5 + r * (1 / 13 + r * (1 / 21 + r * (1 / 29)))
+        c = 1 / 7 + r * (1 / 15 + r * (1 / 23 + r * (1 / 31)))
+        d = 1 / 9 + r * (1 / 17 + r * (1 / 25 + r * (1 / 33)))
+        return y * ((a + y * b) + q * (c + y * d))
     return math.atanh(u) / u - 1.0

@@ -15,10 +15,12 @@ from sagline.arrays import Array, Codes
 from sagline.kernels import geometry as g
 from sagline.kernels import tables
 from sagline.kernels.energy import cable_energy
+from sagline.kernels.forces import FORCE_ROWS, cable_forces
 from sagline.kernels.geometry import cable_geometry
-from sagline.kernels.jit import kernel
-from sagline.kernels.models import from_length
+from sagline.kernels.jit import formula, kernel
 from sagline.kernels.stiffness import cable_stiffness
+
+Triple = tuple[float, float, float]
 
 
 class Problem(NamedTuple):
@@ -53,9 +55,9 @@ class Space(NamedTuple):
     rotation: Array  # (3, 3)
     geometry: Array  # (GEOMETRY_ROWS, m)
     result: Array  # (RESULT_ROWS, m)
+    memory: Array  # (FORCE_ROWS, m)
     statuses: Codes  # (m,)
     gradient: Array  # (6,)
-    block: Array  # (3, 3)
     stiffness: Array  # (6, 6)
     matrix: Array  # (n, n)
     factor: Array  # (n, n)
@@ -73,9 +75,9 @@ def new_space(m: int, n: int) -> Space:
         np.empty((3, 3)),
         np.empty((g.GEOMETRY_ROWS, m)),
         np.empty((tables.RESULT_ROWS, m)),
+        np.full((FORCE_ROWS, m), np.nan),
         np.empty(m, dtype=np.int8),
         np.empty(6),
-        np.empty((3, 3)),
         np.empty((6, 6)),
         np.empty((n, n)),
         np.empty((n, n)),
@@ -97,32 +99,29 @@ def unbalance(problem: Problem, pose: Array, space: Space) -> float:
     geometry, result, gradient = space.geometry, space.result, space.gradient
     cable_geometry(cables, body, pose, space.rotation, geometry)
     gravity = body[tables.GRAVITY]
+    cable_forces(
+        problem.code,
+        problem.k_h,
+        problem.k_p,
+        gravity,
+        cables,
+        problem.lengths,
+        geometry,
+        space.memory,
+        result,
+        space.statuses,
+    )
     weight = body[tables.MASS] * gravity
     for k in range(6):
         gradient[k] = -wrench[k]
     gradient[2] += weight
     scale: float = weight + abs(wrench[0]) + abs(wrench[1]) + abs(wrench[2])
     for i in range(cables.shape[0]):
-        span = geometry[g.SPAN, i]
-        rise = geometry[g.RISE, i]
-        horizontal, z, tension, status = from_length(
-            problem.code,
-            problem.k_h,
-            problem.k_p,
-            gravity,
-            span,
-            rise,
-            cables[i, tables.DENSITY],
-            cables[i, tables.STIFFNESS],
-            problem.lengths[i],
-        )
-        result[tables.SPAN, i] = span
-        result[tables.RISE, i] = rise
+        result[tables.SPAN, i] = geometry[g.SPAN, i]
+        result[tables.RISE, i] = geometry[g.RISE, i]
         result[tables.LENGTH, i] = problem.lengths[i]
-        result[tables.HORIZONTAL, i] = horizontal
-        result[tables.VERTICAL, i] = z
-        result[tables.TENSION, i] = tension
-        space.statuses[i] = status
+        horizontal = result[tables.HORIZONTAL, i]
+        z = result[tables.VERTICAL, i]
         x = horizontal * geometry[g.AZIMUTH_X, i]
         y = horizontal * geometry[g.AZIMUTH_Y, i]
         rx, ry, rz = geometry[g.LEVER_X, i], geometry[g.LEVER_Y, i], geometry[g.LEVER_Z, i]
@@ -173,9 +172,9 @@ def platform_energy(problem: Problem, pose: Array, space: Space):  # type: ignor
 
 
 @kernel
-def cable_matrix(problem: Problem, space: Space, i: int) -> None:
-    """Fill the stiffness (3, 3) of cable i against displacements of its platform end, world axes, as block."""
-    cables, geometry, result, block = problem.cables, space.geometry, space.result, space.block
+def end_stiffness(problem: Problem, space: Space, i: int):  # type: ignore[no-untyped-def]
+    """Stiffness of cable i against displacements of its platform end in world axes, row by row: nine numbers [N/m]."""
+    cables, geometry, result = problem.cables, space.geometry, space.result
     tension = result[tables.TENSION, i]
     xx, xz, zx, zz = cable_stiffness(
         problem.code,
@@ -193,15 +192,23 @@ def cable_matrix(problem: Problem, space: Space, i: int) -> None:
     )
     across = tension / geometry[g.CHORD, i]
     c, s = geometry[g.AZIMUTH_X, i], geometry[g.AZIMUTH_Y, i]
-    block[0, 0] = xx * c * c + across * s * s
-    block[0, 1] = (xx - across) * c * s
-    block[1, 0] = block[0, 1]
-    block[1, 1] = xx * s * s + across * c * c
-    block[0, 2] = xz * c
-    block[1, 2] = xz * s
-    block[2, 0] = zx * c
-    block[2, 1] = zx * s
-    block[2, 2] = zz
+    mixed = (xx - across) * c * s
+    return (
+        (xx * c * c + across * s * s, mixed, xz * c),
+        (mixed, xx * s * s + across * c * c, xz * s),
+        (zx * c, zx * s, zz),
+    )
+
+
+@formula
+def add_column(stiffness: Array, j: int, r: Triple, a: float, b: float, c: float) -> None:
+    """Add to column j what the change (a, b, c) of a cable's force at lever r does to the platform."""
+    stiffness[0, j] += a
+    stiffness[1, j] += b
+    stiffness[2, j] += c
+    stiffness[3, j] += r[1] * c - r[2] * b
+    stiffness[4, j] += r[2] * a - r[0] * c
+    stiffness[5, j] += r[0] * b - r[1] * a
 
 
 @kernel
@@ -210,63 +217,34 @@ def platform_stiffness(problem: Problem, space: Space) -> None:
 
     Its skew part is half the moment of the cables' forces: zero in an equilibrium without a given moment.
     """
-    geometry, result, block, stiffness = space.geometry, space.result, space.block, space.stiffness
+    geometry, result, stiffness = space.geometry, space.result, space.stiffness
     for j in range(6):
         for k in range(6):
             stiffness[j, k] = 0.0
     for i in range(geometry.shape[1]):
-        cable_matrix(problem, space, i)
-        rx, ry, rz = geometry[g.LEVER_X, i], geometry[g.LEVER_Y, i], geometry[g.LEVER_Z, i]
+        (kxx, kxy, kxz), (kyx, kyy, kyz), (kzx, kzy, kzz) = end_stiffness(problem, space, i)
+        x, y, z = geometry[g.LEVER_X, i], geometry[g.LEVER_Y, i], geometry[g.LEVER_Z, i]
+        r = (x, y, z)
+        add_column(stiffness, 0, r, kxx, kyx, kzx)
+        add_column(stiffness, 1, r, kxy, kyy, kzy)
+        add_column(stiffness, 2, r, kxz, kyz, kzz)
+        # a rotation about an axis e moves the platform end by e x r
+        add_column(stiffness, 3, r, kxz * y - kxy * z, kyz * y - kyy * z, kzz * y - kzy * z)
+        add_column(stiffness, 4, r, kxx * z - kxz * x, kyx * z - kyz * x, kzx * z - kzz * x)
+        add_column(stiffness, 5, r, kxy * x - kxx * y, kyy * x - kyx * y, kzy * x - kzx * y)
+        # the force keeps its direction while r turns: r T^T - (r.T) 1
         tx = result[tables.HORIZONTAL, i] * geometry[g.AZIMUTH_X, i]
         ty = result[tables.HORIZONTAL, i] * geometry[g.AZIMUTH_Y, i]
         tz = result[tables.VERTICAL, i]
-        for j in range(3):
-            a, b, c = block[0, j], block[1, j], block[2, j]
-            stiffness[0, j] += a
-            stiffness[1, j] += b
-            stiffness[2, j] += c
-            stiffness[3, j] += ry * c - rz * b
-            stiffness[4, j] += rz * a - rx * c
-            stiffness[5, j] += rx * b - ry * a
-        for j in range(3):  # the platform end moves by the rotation's j-th axis times r
-            if j == 0:
-                dy, dz = -rz, ry
-                a, b, c = (
-                    block[0, 1] * dy + block[0, 2] * dz,
-                    block[1, 1] * dy + block[1, 2] * dz,
-                    block[2, 1] * dy + block[2, 2] * dz,
-                )
-            elif j == 1:
-                dx, dz = rz, -rx
-                a, b, c = (
-                    block[0, 0] * dx + block[0, 2] * dz,
-                    block[1, 0] * dx + block[1, 2] * dz,
-                    block[2, 0] * dx + block[2, 2] * dz,
-                )
-            else:
-                dx, dy = -ry, rx
-                a, b, c = (
-                    block[0, 0] * dx + block[0, 1] * dy,
-                    block[1, 0] * dx + block[1, 1] * dy,
-                    block[2, 0] * dx + block[2, 1] * dy,
-                )
-            stiffness[0, 3 + j] += a
-            stiffness[1, 3 + j] += b
-            stiffness[2, 3 + j] += c
-            stiffness[3, 3 + j] += ry * c - rz * b
-            stiffness[4, 3 + j] += rz * a - rx * c
-            stiffness[5, 3 + j] += rx * b - ry * a
-        # the force keeps its direction while r turns: r T^T - (r.T) 1
-        dot = rx * tx + ry * ty + rz * tz
-        stiffness[3, 3] += rx * tx - dot
-        stiffness[3, 4] += rx * ty
-        stiffness[3, 5] += rx * tz
-        stiffness[4, 3] += ry * tx
-        stiffness[4, 4] += ry * ty - dot
-        stiffness[4, 5] += ry * tz
-        stiffness[5, 3] += rz * tx
-        stiffness[5, 4] += rz * ty
-        stiffness[5, 5] += rz * tz - dot
+        stiffness[3, 3] -= y * ty + z * tz
+        stiffness[3, 4] += x * ty
+        stiffness[3, 5] += x * tz
+        stiffness[4, 3] += y * tx
+        stiffness[4, 4] -= x * tx + z * tz
+        stiffness[4, 5] += y * tz
+        stiffness[5, 3] += z * tx
+        stiffness[5, 4] += z * ty
+        stiffness[5, 5] -= x * tx + y * ty
 
 
 @kernel
@@ -293,7 +271,7 @@ def moved_pose(body: Array, pose: Array, motion: Array, moved: Array) -> None:
 
 
 @kernel
-def turned(pose: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
+def turned(pose: Array, x: float, y: float, z: float) -> Triple:
     """A vector of the platform frame in world axes."""
     qx, qy, qz, qw = pose[3], pose[4], pose[5], pose[6]
     tx = 2.0 * (qy * z - qz * y)

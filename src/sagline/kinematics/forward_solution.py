@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sagline.arrays import Array, Codes, Flags, Indices
-from sagline.kinematics.forward_status import ForwardStatus
+from sagline.kinematics.forward_status import STABLE, ForwardStatus
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 
@@ -22,10 +22,13 @@ class ForwardSolution:
         stiffness_min: Smallest stiffness of the platform against its free motions [N/m], shape () or (N,). A rotation
             counts by the arc it makes at the root mean square distance of the platform ends from the center of mass.
         energy: Potential energy of cables, weight and given force [J], shape () or (N,); frame ends and the origin
-            of the world are at zero. NaN for models without one.
+            of the world are at zero. The shallow models have none: NaN. Straight cables: what they minimize
+            instead, half the sum of squared length errors [m^2].
         wrench_residual: Norms of the unbalanced force [N] and moment [N m] in the platform's free motions,
             shape (2,) or (N, 2).
         iterations: Newton steps taken, shape () or (N,).
+        covariance: Of the pose found from measured tensions: displacement of the center of mass [m] and rotation
+            vector [rad], world axes, shape (6, 6) or (N, 6, 6). None where no tensions were measured.
     """
 
     state: Equilibrium
@@ -34,6 +37,7 @@ class ForwardSolution:
     energy: Array
     wrench_residual: Array
     iterations: Indices
+    covariance: Array | None = None
 
     @property
     def pose(self) -> Pose:
@@ -48,8 +52,7 @@ class ForwardSolution:
     @property
     def stable(self) -> Flags:
         """Whether each sample is a stable equilibrium, however it is held, shape () or (N,)."""
-        held = (ForwardStatus.SOLVED, ForwardStatus.LOOSE, ForwardStatus.OVERSTRETCHED)
-        return np.isin(self.status, held)
+        return np.isin(self.status, STABLE)
 
     @property
     def slack(self) -> Flags:

@@ -48,3 +48,6 @@ _TEXTS = {
         "straight cables know no forces: this is the pose whose lengths fit best; see cables.closure_residual"
     ),
 }
+
+# Equilibria that the platform does not leave by itself.
+STABLE = (ForwardStatus.SOLVED, ForwardStatus.LOOSE, ForwardStatus.OVERSTRETCHED)

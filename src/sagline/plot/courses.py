@@ -107,7 +107,8 @@ def _lengths(ax: Axes, plan: Plan, quantity: str) -> None:
 
 
 def _tensions(ax: Axes, plan: Plan, quantity: str) -> None:
-    _cables(ax, plan, getattr(plan.state.cables, quantity), _known(quantity, TENSIONS))
+    label = _known(quantity, TENSIONS)
+    _cables(ax, plan, getattr(plan.state.cables, quantity), label)
 
 
 def _known(quantity: str, table: Mapping[str, Entry]) -> Entry:

@@ -122,9 +122,14 @@ class Pose:
 
     @property
     def matrix(self) -> Array:
-        """Rotation matrix from platform to world, shape (..., 3, 3)."""
-        matrix: Array = locked(self.rotation.as_matrix())
-        return matrix
+        """Rotation matrix from platform to world, shape (..., 3, 3); NaN for a pose that was not found."""
+        x, y, z, w = np.moveaxis(self.quaternion, -1, 0)
+        rows = (
+            (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)),
+            (2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)),
+            (2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)),
+        )
+        return locked(np.stack([np.stack(row, axis=-1) for row in rows], axis=-2))
 
     @property
     def shape(self) -> tuple[int, ...]:

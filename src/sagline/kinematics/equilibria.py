@@ -1,0 +1,135 @@
+"""All stable equilibria that a search finds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sagline.arrays import Array, Indices, locked
+from sagline.cables.catenary import Catenary
+from sagline.cables.model import CableModel
+from sagline.errors import InvalidValueError
+from sagline.kernels import forward as kernel
+from sagline.kinematics.forward import checked_lengths
+from sagline.kinematics.forward_rows import Found
+from sagline.kinematics.forward_solution import ForwardSolution
+from sagline.kinematics.forward_status import STABLE, ForwardStatus
+from sagline.kinematics.start import from_orientations, start_quaternions
+from sagline.robot.pattern import PLANAR, ROTATING
+from sagline.robot.robot import Robot
+from sagline.statics.wrench import external_wrench
+
+_SAME = 1e-6  # relative to the mean length, and in radians: closer poses are one
+_KEPT = (*STABLE, ForwardStatus.FITTED)
+_CATENARY = Catenary()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Equilibria:
+    """Result of `equilibria`: K stable equilibria, the lowest energy first.
+
+    Attributes:
+        solutions: The equilibria, a batch of K.
+        reached: How many starts ended in each, shape (K,): a share of the orientations, not a probability.
+        starts: How many starts were tried; those that reached none of the K ended unstable or not at all.
+    """
+
+    solutions: ForwardSolution
+    reached: Indices
+    starts: int
+
+    def __len__(self) -> int:
+        """K, the number of equilibria."""
+        return len(self.reached)
+
+
+def equilibria(
+    robot: Robot,
+    unstrained_length: ArrayLike,
+    model: CableModel = _CATENARY,
+    wrench: ArrayLike | None = None,
+    starts: int = 300,
+    seed: int = 0,
+) -> Equilibria:
+    """Stable equilibria of a robot at given lengths, as far as a thorough search finds them.
+
+    For a held orientation the energy is convex in the position, so only orientations need to be searched: starts
+    are spread evenly at random over all of them, each placed by its own unique equilibrium of the position. A robot
+    that does not turn has exactly one equilibrium. For others this is no proof: what no start reached is not listed.
+
+    Args:
+        robot: The robot, with m cables.
+        unstrained_length: L [m], > 0, shape (m,).
+        model: Cable model. The shallow ones have no energy: theirs are sorted by the number of starts. For straight
+            cables: the local least-squares fits, sorted by misfit.
+        wrench: External plus inertial wrench about the center of mass, world axes [N, N m], shape (6,); None for none.
+        starts: How many orientations to start from, >= 1.
+        seed: Of the random orientations.
+
+    Returns:
+        Equilibria.
+
+    Raises:
+        InvalidValueError: If a length is wrong (the message names the cable), or starts is below 1.
+
+    Source:
+        docs/model.md, section 6.
+    """
+    lengths = checked_lengths(robot, unstrained_length)
+    if lengths.ndim != 1 or np.isnan(lengths).any():
+        raise InvalidValueError(
+            "unstrained_length", f"of shape {lengths.shape}", f"({robot.cable_count},), no NaN", "Give one sample."
+        )
+    if starts < 1:
+        raise InvalidValueError("starts", starts, ">= 1", "Ask for one start at least.")
+    load = external_wrench(wrench, None)
+    quaternions = _quaternions(robot, starts, seed)
+    samples = locked(np.repeat(lengths[None], len(quaternions), axis=0))
+    found = from_orientations(robot, model, samples, locked(load[None].copy()), quaternions)
+    chosen, reached = _distinct(found, float(lengths.mean()))
+    shape = (len(chosen),)
+    return Equilibria(found.part(chosen).solution(robot, model, load, shape), locked(reached), len(quaternions))
+
+
+def _quaternions(robot: Robot, count: int, seed: int) -> Array:
+    """Level and tilted starts first, then orientations evenly at random, as far as the robot can turn, (K, 4)."""
+    known = start_quaternions(robot)
+    if robot.motion_pattern not in ROTATING or count <= len(known):
+        return known[:count]
+    generator = np.random.default_rng(seed)
+    rest = count - len(known)
+    if robot.motion_pattern in PLANAR:
+        half = generator.uniform(-0.5 * np.pi, 0.5 * np.pi, (rest, 1))
+        drawn = np.hstack((np.sin(half) * robot.freedom[2, 3:], np.cos(half)))
+    else:
+        drawn = generator.normal(size=(rest, 4))
+        drawn /= np.linalg.norm(drawn, axis=1, keepdims=True)
+    return np.vstack((known, drawn))
+
+
+def _distinct(found: Found, length: float) -> tuple[Indices, Indices]:
+    """One index for each distinct stable equilibrium, lowest energy first, and how many starts reached it."""
+    kept = np.flatnonzero(np.isin(found.pose_status, _KEPT))
+    chosen: list[int] = []
+    counts: list[int] = []
+    for index in kept:
+        same = [
+            k for k, other in enumerate(chosen) if _distance(found.poses[index], found.poses[other], length) < _SAME
+        ]
+        if same:
+            counts[same[0]] += 1
+        else:
+            chosen.append(int(index))
+            counts.append(1)
+    energy = np.nan_to_num(found.numbers[chosen, kernel.ENERGY], nan=0.0)
+    order = np.lexsort((-np.array(counts, dtype=np.int64), energy))
+    return np.array(chosen, dtype=np.int64)[order], np.array(counts, dtype=np.int64)[order]
+
+
+def _distance(row: Array, other: Array, length: float) -> float:
+    """How far two pose rows are apart: the larger of displacement over length and angle."""
+    shift = float(np.linalg.norm(row[:3] - other[:3])) / length
+    sign = np.copysign(1.0, row[3:] @ other[3:])
+    return max(shift, 2.0 * float(np.linalg.norm(row[3:] - sign * other[3:])))

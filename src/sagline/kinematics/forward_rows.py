@@ -1,0 +1,131 @@
+"""Forward kinematics in rows: robot, lengths and starts as the kernels take them, and their answers back."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from sagline.arrays import Array, Codes, Flags, Indices, locked
+from sagline.cables.model import CableModel
+from sagline.cables.state import CableState
+from sagline.kernels import codes, tables
+from sagline.kernels import forward as kernel
+from sagline.kernels.fit import fit_poses
+from sagline.kinematics.forward_solution import ForwardSolution
+from sagline.kinematics.forward_status import STABLE
+from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.statics.tables import body_table, cable_table
+
+
+class Found(NamedTuple):
+    """What the kernel fills, in its order."""
+
+    poses: Array
+    results: Array
+    cable_status: Codes
+    numbers: Array
+    pose_status: Codes
+
+    def keep(self, samples: Indices, other: Found, which: Indices) -> None:
+        """Replace the answers of some samples by some of another's."""
+        self.poses[samples] = other.poses[which]
+        self.results[:, samples] = other.results[:, which]
+        self.cable_status[samples] = other.cable_status[which]
+        self.numbers[samples] = other.numbers[which]
+        self.pose_status[samples] = other.pose_status[which]
+
+    def part(self, samples: Indices) -> Found:
+        """The answers of some samples."""
+        return Found(
+            self.poses[samples],
+            self.results[:, samples],
+            self.cable_status[samples],
+            self.numbers[samples],
+            self.pose_status[samples],
+        )
+
+    @classmethod
+    def empty(cls, count: int, cables: int) -> Found:
+        """Room for a batch."""
+        return cls(
+            np.empty((count, tables.POSE_COLUMNS)),
+            np.empty((tables.RESULT_ROWS, count, cables)),
+            np.empty((count, cables), dtype=np.int8),
+            np.empty((count, kernel.FORWARD_NUMBERS)),
+            np.empty(count, dtype=np.int8),
+        )
+
+    @property
+    def stable(self) -> Flags:
+        """Whether each sample is a stable equilibrium, (N,)."""
+        return np.isin(self.pose_status, STABLE)
+
+    def solution(
+        self,
+        robot: Robot,
+        model: CableModel,
+        load: Array,
+        shape: tuple[int, ...],
+        covariance: Array | None = None,
+    ) -> ForwardSolution:
+        """The batch in the caller's shape, () or (N,)."""
+        wide = (*shape, robot.cable_count)
+        pose = Pose._adopt(self.poses[:, :3].reshape(*shape, 3), self.poses[:, 3:].reshape(*shape, 4))
+        cables = CableState(
+            model=model,
+            cable=robot.cables,
+            gravity=robot.gravity,
+            span=locked(self.results[tables.SPAN].reshape(wide)),
+            rise=locked(self.results[tables.RISE].reshape(wide)),
+            unstrained_length=locked(self.results[tables.LENGTH].reshape(wide)),
+            horizontal_tension=locked(self.results[tables.HORIZONTAL].reshape(wide)),
+            vertical_force=locked(self.results[tables.VERTICAL].reshape(wide)),
+            chord_tension=locked(self.results[tables.TENSION].reshape(wide)),
+            status=locked(self.cable_status.reshape(wide)),
+        )
+        whole = locked(np.ascontiguousarray(np.broadcast_to(load, (*shape, 6))))
+        residuals = self.numbers[:, [kernel.FORCE_RESIDUAL, kernel.MOMENT_RESIDUAL]]
+        return ForwardSolution(
+            state=Equilibrium(robot, pose, whole, cables),
+            status=locked(self.pose_status.reshape(shape)),
+            stiffness_min=locked(self.numbers[:, kernel.STIFFNESS_MIN].reshape(shape)),
+            energy=locked(self.numbers[:, kernel.ENERGY].reshape(shape)),
+            wrench_residual=locked(residuals.reshape(*shape, 2)),
+            iterations=locked(self.numbers[:, kernel.ITERATIONS].astype(np.int64).reshape(shape)),
+            covariance=None if covariance is None else locked(covariance.reshape(*shape, 6, 6)),
+        )
+
+
+def solve_rows(
+    robot: Robot,
+    model: CableModel,
+    lengths: Array,
+    starts: Array,
+    wrenches: Array,
+    *,
+    chained: bool = False,
+    freedom: Array | None = None,
+) -> Found:
+    """Run the kernel over samples.
+
+    Args:
+        robot: The robot.
+        model: Cable model; straight cables are fitted.
+        lengths: Unstrained lengths (N, m).
+        starts: Pose rows (1 or N, POSE_COLUMNS).
+        wrenches: External plus inertial (1 or N, 6).
+        chained: Whether each sample starts where the last one ended.
+        freedom: Motions to allow (n, 6); None for those of the robot.
+    """
+    found = Found.empty(*lengths.shape)
+    allowed = robot.freedom if freedom is None else freedom
+    given = (allowed, body_table(robot), cable_table(robot), lengths, starts, wrenches)
+    filled: tuple[Any, ...] = found
+    if model.code == codes.STRAIGHT:
+        fit_poses(chained, *given, *filled)
+    else:
+        kernel.forward_poses(model.code, *model.parameters, chained, *given, *filled)
+    return found

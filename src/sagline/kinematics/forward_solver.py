@@ -1,0 +1,162 @@
+"""Forward kinematics one sample at a time, for a control loop."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sagline.arrays import Array, Codes, checked, locked
+from sagline.cables.catenary import Catenary
+from sagline.cables.model import CableModel
+from sagline.errors import InvalidValueError
+from sagline.kernels import codes, tables
+from sagline.kernels.forward import FORCE_RESIDUAL, FORWARD_NUMBERS, MOMENT_RESIDUAL, STIFFNESS_MIN, forward_poses
+from sagline.kinematics.forward_status import STABLE, ForwardStatus
+from sagline.kinematics.start import search
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.statics.tables import body_table, cable_table, pose_rows
+
+
+class ForwardStep(NamedTuple):
+    """Answer for one sample.
+
+    Attributes:
+        position: Of the platform origin [m], shape (3,).
+        quaternion: Rotation platform -> world, scalar last, shape (4,).
+        chord_tension: tau of the cables [N], shape (m,).
+        status: What kind of equilibrium it is, or why there is none.
+        stiffness_min: Smallest stiffness [N/m], as in `ForwardSolution`.
+        force_residual: Norm of the unbalanced force [N].
+        moment_residual: Norm of the unbalanced moment [N m].
+    """
+
+    position: Array
+    quaternion: Array
+    chord_tension: Array
+    status: ForwardStatus
+    stiffness_min: float
+    force_residual: float
+    moment_residual: float
+
+
+class ForwardSolver:
+    """Solves one sample after another, each from the last stable equilibrium.
+
+    It owns its working memory and remembers that equilibrium: `reset` forgets it. One solver serves one control loop;
+    it is not to be shared between threads.
+    """
+
+    def __init__(self, robot: Robot, model: CableModel | None = None, start: Pose | None = None) -> None:
+        """Prepare the robot's arrays and compile the kernel.
+
+        Args:
+            robot: The robot.
+            model: Cable model with forces; the default is the exact one.
+            start: Where the first step begins; None: it searches, which takes some hundred microseconds.
+
+        Raises:
+            InvalidValueError: If the model is Straight, which has no forces, or start is a batch.
+        """
+        self._robot = robot
+        self._model = model or Catenary()
+        if self._model.code == codes.STRAIGHT:
+            raise InvalidValueError(
+                "model", "Straight()", "a model with forces", "Use forward() to fit straight cables."
+            )
+        m = robot.cable_count
+        self._lengths = np.ones((1, m))
+        self._start = np.zeros((1, tables.POSE_COLUMNS))
+        self._wrench = np.zeros((1, 6))
+        self._pose = np.empty((1, tables.POSE_COLUMNS))
+        self._results = np.empty((tables.RESULT_ROWS, 1, m))
+        self._numbers = np.empty((1, FORWARD_NUMBERS))
+        self._status: Codes = np.empty(1, dtype=np.int8)
+        self._arguments: tuple[Any, ...] = (
+            self._model.code,
+            *self._model.parameters,
+            False,
+            robot.freedom,
+            body_table(robot),
+            cable_table(robot),
+            *(locked(array.view()) for array in (self._lengths, self._start, self._wrench)),
+            self._pose,
+            self._results,
+            np.empty((1, m), dtype=np.int8),
+            self._numbers,
+            self._status,
+        )
+        self._start[0, 6] = 1.0
+        self._lengths[0] = np.nan  # compiles, solves nothing
+        forward_poses(*self._arguments)
+        self.reset(start)
+
+    def reset(self, start: Pose | None = None) -> None:
+        """Forget the last pose: the next step begins at a start, or searches.
+
+        Raises:
+            InvalidValueError: If start is a batch.
+        """
+        if start is not None and start.shape:
+            raise InvalidValueError("start", f"a batch of {len(start)} poses", "one pose", "Give one of them.")
+        self._lost = start is None
+        if start is not None:
+            self._start[:] = pose_rows(start)
+
+    def step(self, unstrained_length: ArrayLike, wrench: ArrayLike | None = None) -> ForwardStep:
+        """Solve one sample.
+
+        Args:
+            unstrained_length: L [m], > 0, shape (m,).
+            wrench: External plus inertial, about the center of mass, world axes [N, N m], shape (6,); None for none.
+
+        Returns:
+            A fresh result whose arrays belong to the caller.
+
+        Raises:
+            InvalidValueError: If a length is not positive (the message names its index), or a shape is wrong.
+        """
+        lengths = checked(unstrained_length, "unstrained_length", "m", shape=self._lengths.shape[1:], above=0.0)
+        load = None if wrench is None else checked(wrench, "wrench", "N or N m", shape=(6,))
+        position, quaternion = np.empty(3), np.empty(4)
+        status = self.step_into(lengths, position, quaternion, load)
+        numbers = self._numbers[0]
+        return ForwardStep(
+            position,
+            quaternion,
+            self._results[tables.TENSION, 0].copy(),
+            status,
+            float(numbers[STIFFNESS_MIN]),
+            float(numbers[FORCE_RESIDUAL]),
+            float(numbers[MOMENT_RESIDUAL]),
+        )
+
+    def step_into(
+        self, unstrained_length: Array, position: Array, quaternion: Array, wrench: Array | None = None
+    ) -> ForwardStatus:
+        """Solve one sample into the caller's memory: no allocation once a pose is known, no check of the arguments.
+
+        Args:
+            unstrained_length: L [m], shape (m,).
+            position: Filled with the position of the platform origin [m], shape (3,).
+            quaternion: Filled with the rotation platform -> world, scalar last, shape (4,).
+            wrench: External plus inertial, about the center of mass, world axes [N, N m], shape (6,); None for none.
+
+        Returns:
+            The status of the sample.
+        """
+        self._lengths[0] = unstrained_length
+        self._wrench[0] = 0.0 if wrench is None else wrench
+        if self._lost:
+            found = search(self._robot, self._model, locked(self._lengths.copy()), locked(self._wrench.copy()))
+            self._start[:] = found.poses
+        forward_poses(*self._arguments)
+        status = ForwardStatus(self._status[0])
+        if status in STABLE:
+            self._start[0] = self._pose[0]
+            self._lost = False
+        position[:] = self._pose[0, :3]
+        quaternion[:] = self._pose[0, 3:]
+        return status

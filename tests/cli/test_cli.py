@@ -1,0 +1,256 @@
+"""The command: what it prints, what it writes, and how it ends."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import sagline as sl
+from sagline.cli.main import app
+
+OUTSIDE = "durations: 5\nrate: 20\nwaypoints: [{position: [0, 0, 1.5]}, {position: [7.2, 3, 1.5]}]\n"
+INSIDE = "durations: 5\nrate: 20\nwaypoints: [{position: [0, 0, 1.5]}, {position: [4, 3, 1.5]}]\n"
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch) -> FilePath:
+    """Every test runs in a folder of its own, on a terminal 80 characters wide."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "80")
+    (tmp_path / "outside.yaml").write_text(OUTSIDE)
+    (tmp_path / "inside.yaml").write_text(INSIDE)
+    return tmp_path
+
+
+def sagline(*words: str) -> Any:
+    return CliRunner().invoke(app, words)
+
+
+def numbers(*words: str) -> Any:
+    return json.loads(sagline(*words, "--json").stdout)
+
+
+def spawned(*words: str) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "sagline.cli", *words]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def test_track_says_and_writes_what_the_library_finds(folder: FilePath) -> None:
+    result = sagline("track", "article-suspended", "inside.yaml", "--model", "empirical", "--no-figures", "--json")
+    assert result.exit_code == 0
+    (run,) = json.loads(result.stdout)["runs"]
+    robot, path = sl.load_robot("article-suspended"), sl.load_path("inside.yaml")
+    plan = sl.inverse(robot, path, model=sl.Empirical())
+    proof = sl.confirm(plan)
+    error = 1e3 * np.linalg.norm(proof.position_error, axis=1)
+    expected = {
+        "position_error_max_mm": error.max(),
+        "position_error_mean_mm": error.mean(),
+        "chord_tension_min_n": plan.chord_tension.min(),
+        "chord_tension_max_n": plan.chord_tension.max(),
+        "unstrained_length_min_m": plan.unstrained_length.min(),
+        "unstrained_length_max_m": plan.unstrained_length.max(),
+        "adjusting_length_min_mm": 1e3 * plan.state.cables.adjusting_length.min(),
+        "adjusting_length_max_mm": 1e3 * plan.state.cables.adjusting_length.max(),
+        "feasible_share_percent": 100.0,
+    }
+    assert {name: run[name] for name in expected} == pytest.approx(expected, rel=1e-12)
+    assert (run["robot"], run["model"], run["poses"], run["gaps"]) == ("article-suspended", "Empirical", 101, [])
+    assert os.listdir("output") == ["article-suspended-empirical.nc"]
+    loaded = sl.load_plan("output/article-suspended-empirical.nc")
+    np.testing.assert_array_equal(loaded.unstrained_length, plan.unstrained_length)
+
+
+def test_options_reach_the_solver() -> None:
+    words = ("track", "article-mixed", "inside.yaml", "--no-figures")
+    (run,) = numbers(*words, "--tension", "minimum-norm", "--variable", "horizontal", "--model", "parabolic")["runs"]
+    assert (run["model"], run["tension"], run["tension_variable"]) == ("Parabolic", "MinimumNorm", "horizontal")
+    plan = sl.inverse(
+        sl.load_robot("article-mixed"), sl.load_path("inside.yaml"), sl.Parabolic(), sl.MinimumNorm("horizontal")
+    )
+    assert run["chord_tension_max_n"] == pytest.approx(plan.chord_tension.max(), rel=1e-12)
+
+
+def test_the_table_fits_and_names_its_units() -> None:
+    result = sagline("track", "article-suspended", "inside.yaml", "--no-figures")
+    assert "position error, largest [mm]" in result.stdout
+    assert "chord tension, smallest [N]" in result.stdout
+    assert re.search(r"feasible poses \[%\] +100 *$", result.stdout, re.MULTILINE)
+    assert max(len(line) for line in result.stdout.splitlines() if not line.startswith("In ")) <= 80
+    assert "\x1b" not in result.stdout  # no colors into a pipe
+
+
+def test_figures_are_drawn_unless_declined() -> None:
+    assert sagline("track", "article-suspended", "inside.yaml", "--out", "a").exit_code == 0
+    names = [f"{what}.{kind}" for what in ("cables", "error", "path", "velocity") for kind in ("png", "svg")]
+    assert sorted(os.listdir("a")) == sorted(
+        ["article-suspended-catenary.nc", *(f"article-suspended-catenary-{name}" for name in names)]
+    )
+
+
+def test_a_path_that_leaves_the_feasible_region() -> None:
+    result = sagline("track", "article-suspended", "outside.yaml", "--no-figures", "--json")
+    assert result.exit_code == 1
+    (gap,) = json.loads(result.stdout)["runs"][0]["gaps"]
+    plan = sl.load_plan("output/article-suspended-catenary.nc")
+    assert plan.path is not None
+    outside = np.flatnonzero(~plan.feasible)
+    assert (gap["from_s"], gap["to_s"]) == (plan.path.time[outside[0]], plan.path.time[outside[-1]])
+    assert gap["shortfall_n"] == plan.shortfall.max() > 50.0
+    message = f"from {gap['from_s']:g} s to {gap['to_s']:g} s: short by up to {gap['shortfall_n']:.3g} N"
+    assert message in result.stderr
+    assert "The file keeps the feasible part and marks the rest." in result.stderr
+    assert np.isfinite(plan.unstrained_length[: outside[0]]).all()
+
+
+def test_a_plan_that_the_platform_would_leave() -> None:
+    # near its post the mixed robot's equilibrium turns unstable before the tensions run out: stiffness falls to zero
+    (FilePath("corner.yaml")).write_text(
+        "durations: 5\nwaypoints: [{position: [0, 0, 1.5]}, {position: [6.34, 4.43, 5.02]}]"
+    )
+    result = sagline("track", "article-mixed", "corner.yaml", "--no-figures", "--json")
+    assert result.exit_code == 1
+    (run,) = json.loads(result.stdout)["runs"]
+    assert run["gaps"] == []
+    assert run["poses_not_stable"] > 0
+    assert f"{run['poses_not_stable']} of the planned poses are no stable equilibria" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["article-suspnded"], "Did you mean article-suspended?"),
+        (["missing.yaml"], "missing.yaml: cannot be read (No such file or directory)"),
+        (["cogiro", "missing.csv"], "missing.csv: cannot be read (No such file or directory)"),
+        (["cogiro", "path.txt"], "Give waypoints as .yaml, or time and pose as .csv."),
+        (["cogiro", "inside.yaml", "--out", "inside.yaml/out"], "inside.yaml is a file, not a folder"),
+        (["cogiro", "anchor.yaml"], "pose 40, cable 0: distance between its ends is 0 m"),
+        (["cogiro", "--model", "rope"], "'rope' is not one of 'catenary'"),
+        (["cogiro", "--rate", "5"], "No such option"),
+        ([], "Missing argument 'ROBOT'"),
+    ],
+)
+def test_bad_input_ends_with_2_and_writes_nothing(folder: FilePath, words: list[str], message: str) -> None:
+    robot = sl.load_robot("cogiro")
+    end = (robot.frame_anchors[0] - robot.platform_anchors[0]).tolist()
+    (folder / "anchor.yaml").write_text(
+        f"durations: 2\nrate: 20\nwaypoints: [{{position: [0, 0, 1]}}, {{position: {end}}}]"
+    )
+    before = sorted(os.listdir())
+    result = sagline("track", *words)
+    assert result.exit_code == 2
+    assert message in result.stderr
+    assert result.stdout == ""
+    assert sorted(os.listdir()) == before
+
+
+def test_robots_lists_all_presets() -> None:
+    result = sagline("robots")
+    assert result.exit_code == 0
+    assert [
+        name for name in sl.robot_names() if re.search(rf"^{name} +\d cables", result.stdout, re.MULTILINE)
+    ] == list(sl.robot_names())
+    assert "15 × 11 × 6 m" in result.stdout
+    falcon = next(robot for robot in numbers("robots") if robot["name"] == "falcon-7")
+    assert (falcon["cables"], falcon["mass_kg"], falcon["motion_pattern"]) == (7, 0.3, "3R3T")
+    np.testing.assert_allclose(falcon["size_m"], [1.45, 1.45, 0.0])
+
+
+@pytest.mark.parametrize("name", sl.robot_names())
+def test_show_holds_every_value(name: str) -> None:
+    robot, shown = sl.load_robot(name), numbers("show", name)
+    for field in ("frame_anchors", "platform_anchors", "inertia", "center_of_mass", "tension_min", "tension_max"):
+        np.testing.assert_array_equal(shown[field]["value"], getattr(robot, field))
+    np.testing.assert_array_equal(shown["axial_stiffness"]["value"], robot.cables.axial_stiffness)
+    assert (shown["mass"], shown["mass"]["unit"]) == ({**shown["mass"], "value": robot.mass}, "kg")
+    told = {field for field in shown if isinstance(shown[field], dict) and "assumed" in shown[field]}
+    assert told == set(robot.assumed) - {"cables"} | (
+        {"linear_density", "axial_stiffness"} if "cables" in robot.assumed else set()
+    )
+    text = " ".join(sagline("show", name).stdout.split())
+    assert " ".join(robot.source.split()) in text
+    for field, why in robot.assumed.items():
+        assert f"{field}: {' '.join(why.split())}" in text
+
+
+def test_show_marks_what_is_assumed() -> None:
+    text = sagline("show", "article-mixed").stdout
+    assert re.search(r"^ inertia \* +diagonal \(1\.4167, 1\.4167, 0\.75\) +kg m² *$", text, re.MULTILINE)
+    assert re.search(r"^ mass +50 +kg *$", text, re.MULTILINE)
+    assert re.search(r"^ +0 +\(7\.5, 5\.5, 6\) +\(0\.15, 0\.15, -0\.25\) *$", text, re.MULTILINE)
+
+
+def test_unlimited_tensions_are_no_number_in_json(folder: FilePath) -> None:
+    robot = sl.load_robot("falcon-7").replace(tension_max=np.inf)
+    (folder / "free.yaml").write_text(sl.dump_robot(robot))
+    assert numbers("show", "free.yaml")["tension_max"]["value"] == [None] * 7
+
+
+def test_run_makes_the_articles_test(folder: FilePath) -> None:
+    result = sagline("run", "--json")
+    assert result.exit_code == 0
+    runs = {(run["robot"], run["model"]): run for run in json.loads(result.stdout)["runs"]}
+    largest = {key: run["position_error_max_mm"] for key, run in runs.items()}
+    assert largest["article-suspended", "Catenary"] < 1e-6
+    assert largest["article-mixed", "Catenary"] < 1e-6
+    # the article's "about +-6 mm" with its own, unpublished anchors; on ours, as found with this path
+    assert largest["article-suspended", "Empirical"] == pytest.approx(1.71, abs=0.01)
+    assert largest["article-mixed", "Empirical"] == pytest.approx(1.13, abs=0.01)
+    plans = {name: sl.load_plan(f"output/article-{name}-empirical.nc") for name in ("suspended", "mixed")}
+    ratio = plans["mixed"].horizontal_tension.max() / plans["suspended"].horizontal_tension.max()
+    assert ratio == pytest.approx(2.1, abs=0.05)  # the article: "approximated as twice"
+    figures = ("18-path", "19-velocity", "20-suspended", "21-mixed", "22-error")
+    names = {f"figure-{figure}.{kind}" for figure in figures for kind in ("png", "svg")}
+    assert names <= set(os.listdir("output"))
+
+
+def test_version_and_help() -> None:
+    assert sagline("--version").stdout == f"sagline {sl.__version__}\n"
+    assert "sagline track cogiro my_path.yaml" in sagline("--help").stdout
+    assert "my_robot.yaml my_path.yaml --model empirical" in sagline("track", "-h").stdout
+    assert "130 Ctrl-C" in " ".join(sagline("--help").stdout.split())
+
+
+def test_exit_codes_of_the_real_command() -> None:
+    track = ("track", "article-suspended", "outside.yaml", "--no-figures", "--out", "o")
+    for words, code in ((("--version",), 0), (track, 1), (("show", "nothing"), 2)):
+        process = spawned(*words)
+        _, errors = process.communicate(timeout=120)
+        assert process.returncode == code, errors
+        assert "Traceback" not in errors
+
+
+def test_ctrl_c_during_a_long_run_leaves_nothing_half_done(folder: FilePath) -> None:
+    (folder / "long.yaml").write_text(INSIDE.replace("rate: 20", "rate: 40000"))
+    process = spawned("track", "article-suspended", "long.yaml", "--out", "out")
+    time.sleep(3.0)  # a second of loading, then 200,000 poses and figures of them
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=120)
+    assert process.returncode == 130
+    assert errors.endswith("Interrupted. What has been written is whole.\n")
+    left = os.listdir("out") if FilePath("out").exists() else []
+    assert not [name for name in left if name.endswith(".part")]
+
+
+def test_a_cold_start_says_that_it_compiles(monkeypatch: pytest.MonkeyPatch) -> None:
+    answers = iter([True, False])  # after the first stage the kernels are there
+    monkeypatch.setattr("sagline.kernels.jit.is_cold", lambda: next(answers))
+    result = sagline("track", "article-suspended", "inside.yaml", "--no-figures", "--json")
+    assert result.stderr == "First run: compiling the numerical core, about a minute; later runs start at once.\n"
+    assert json.loads(result.stdout)["runs"][0]["poses"] == 101
+
+
+def test_completion_offers_presets_and_files() -> None:
+    from sagline.cli.choices import robot_completions
+
+    assert robot_completions("article-m") == ["article-mixed"]
+    assert robot_completions("in") == ["inside.yaml"]

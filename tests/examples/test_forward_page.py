@@ -1,0 +1,31 @@
+"""The snippets of docs/forward.md run as they stand, one after another."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sagline as sl
+
+PAGE = Path(__file__).parents[2] / "docs" / "forward.md"
+
+
+def test_snippets_run_and_say_what_the_page_says(capsys: pytest.CaptureFixture[str]) -> None:
+    names: dict[str, Any] = {}
+    for snippet in re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), flags=re.DOTALL):
+        exec(compile(snippet, str(PAGE), "exec"), names)
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "solved: a stable equilibrium"
+    assert lines[1] == "[ 1.  -0.5  2. ]"
+    assert names["step"].status == sl.ForwardStatus.SOLVED
+    assert len(names["all_of_them"]) >= 2
+    assert -0.01 < names["drop"][2] < -1e-4
+    np.testing.assert_allclose(names["measured"].pose.position, (1.0, -0.5, 2.0), atol=1e-9)
+    assert sl.forward(names["camera"], [21.0, 24.0, 29.5, 27.0]).status == sl.ForwardStatus.SOLVED
+
+
+def test_every_status_is_on_the_page() -> None:
+    text = PAGE.read_text(encoding="utf-8")
+    assert [status.name for status in sl.ForwardStatus if f"| {status.name} |" not in text] == []

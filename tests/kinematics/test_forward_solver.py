@@ -1,0 +1,59 @@
+"""The solver of a control loop answers what `forward` answers."""
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from tests.kinematics.feasible import box_poses, feasible_plan
+
+COGIRO = sl.load_robot("cogiro")
+
+
+def test_steps_equal_the_batch() -> None:
+    plan = feasible_plan(COGIRO, 1, seed=1)
+    lengths = plan.unstrained_length[0] + 0.002 * np.arange(30)[:, None] * np.linspace(-1, 1, 8)
+    batch = sl.forward(COGIRO, lengths, plan.state.pose[0])
+    solver = sl.ForwardSolver(COGIRO)  # without a start: the first step searches
+    position, quaternion = np.empty(3), np.empty(4)
+    for i, row in enumerate(lengths):
+        step = solver.step(row)
+        np.testing.assert_allclose(step.position, batch.pose.position[i], atol=1e-10)
+        np.testing.assert_allclose(step.chord_tension, batch.state.cables.chord_tension[i], rtol=1e-7)
+        assert step.status == batch.status[i]
+        assert max(step.force_residual, step.moment_residual) < 1e-8
+        assert solver.step_into(row, position, quaternion) == step.status
+        np.testing.assert_allclose(position, step.position, atol=1e-12)
+        np.testing.assert_allclose(quaternion, step.quaternion, atol=1e-12)
+
+
+def test_results_belong_to_the_caller_and_the_wrench_counts() -> None:
+    plan = feasible_plan(COGIRO, 1, seed=2)
+    solver = sl.ForwardSolver(COGIRO, start=plan.state.pose[0])
+    first = solver.step(plan.unstrained_length[0])
+    kept = first.position.copy()
+    second = solver.step(plan.unstrained_length[0], wrench=(0, 0, -200.0, 0, 0, 0))
+    assert second.position[2] < kept[2] - 1e-3
+    np.testing.assert_array_equal(first.position, kept)
+    np.testing.assert_allclose(solver.step(plan.unstrained_length[0]).position, kept, atol=1e-12)
+
+
+def test_a_lost_step_does_not_lose_the_pose() -> None:
+    plan = feasible_plan(COGIRO, 1, seed=3)
+    solver = sl.ForwardSolver(COGIRO, start=plan.state.pose[0])
+    lengths = plan.unstrained_length[0].copy()
+    position, quaternion = np.empty(3), np.empty(4)
+    assert solver.step_into(np.full(8, np.nan), position, quaternion) == sl.ForwardStatus.NO_LENGTHS
+    assert np.isnan(position).all()
+    np.testing.assert_allclose(solver.step(lengths).position, plan.state.pose.position[0], atol=1e-9)
+
+
+def test_bad_input() -> None:
+    solver = sl.ForwardSolver(COGIRO)
+    with pytest.raises(sl.InvalidValueError, match=r"unstrained_length\[2\]"):
+        solver.step([5.0, 5.0, -1.0, 5.0, 5.0, 5.0, 5.0, 5.0])
+    with pytest.raises(sl.InvalidValueError, match="shape"):
+        solver.step([5.0] * 7)
+    with pytest.raises(sl.InvalidValueError, match="one pose"):
+        solver.reset(box_poses(COGIRO, 2, seed=0))
+    with pytest.raises(sl.InvalidValueError, match="Straight"):
+        sl.ForwardSolver(COGIRO, sl.Straight())

@@ -1,0 +1,186 @@
+"""Figures hold the numbers they claim to show, in the units on their axes."""
+
+from io import BytesIO
+from pathlib import Path as FilePath
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from matplotlib.text import Annotation
+
+import sagline as sl
+from sagline import plot
+from sagline.errors import FileError, InvalidValueError
+
+SUSPENDED = sl.load_robot("article-suspended")
+PATH = sl.article_path(rate=5.0)
+PLAN = sl.inverse(SUSPENDED, PATH)
+
+
+def courses(ax: Axes) -> np.ndarray:
+    return np.array([line.get_ydata() for line in ax.get_lines()])
+
+
+def legend(ax: Axes) -> list[str]:
+    found = ax.get_legend()
+    assert found is not None
+    return [text.get_text() for text in found.get_texts()]
+
+
+@pytest.mark.parametrize(
+    ("quantity", "label"),
+    [
+        ("chord_tension", r"chord tension $\tau$ [N]"),
+        ("horizontal_tension", "horizontal tension $T_x$ [N]"),
+        ("vertical_force", "vertical force $T_z$ [N]"),
+        ("frame_end_tension", "tension at the frame end $T_A$ [N]"),
+        ("platform_end_tension", "tension at the platform end $T_B$ [N]"),
+    ],
+)
+def test_tensions(quantity: str, label: str) -> None:
+    ax = plot.tensions(PLAN, quantity)
+    np.testing.assert_array_equal(courses(ax), getattr(PLAN.state.cables, quantity).T)
+    np.testing.assert_array_equal(ax.get_lines()[0].get_xdata(), PATH.time)
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("time [s]", label)
+    assert legend(ax) == [f"cable {i}" for i in range(8)]
+
+
+def test_lengths_in_metres_and_adjusting_lengths_in_millimetres() -> None:
+    np.testing.assert_array_equal(courses(plot.lengths(PLAN)), PLAN.unstrained_length.T)
+    ax = plot.lengths(PLAN, "adjusting_length")
+    chord = np.hypot(PLAN.state.cables.span, PLAN.state.cables.rise)
+    np.testing.assert_allclose(courses(ax), 1e3 * (PLAN.unstrained_length - chord).T, rtol=1e-12, atol=1e-11)
+    assert ax.get_ylabel().endswith("[mm]")
+
+
+def test_an_unknown_quantity_is_named() -> None:
+    with pytest.raises(InvalidValueError, match="quantity is 'span'; allowed: unstrained_length, adjusting_length"):
+        plot.lengths(PLAN, "span")
+    with pytest.raises(InvalidValueError, match="quantity is 'tau'; allowed: chord_tension"):
+        plot.tensions(PLAN, "tau")
+
+
+def test_every_cable_looks_different() -> None:
+    looks = {(line.get_color(), str(line.get_linestyle())) for line in plot.tensions(PLAN).get_lines()}
+    assert len(looks) == 8
+
+
+def test_overview_shows_the_four_quantities() -> None:
+    cables = PLAN.state.cables
+    shown = (PLAN.unstrained_length, 1e3 * cables.adjusting_length, PLAN.horizontal_tension, PLAN.vertical_force)
+    axes = plot.overview(PLAN).axes
+    for ax, values in zip(axes, shown, strict=True):
+        np.testing.assert_array_equal(courses(ax), values.T)
+
+
+def test_infeasible_spans_are_shaded_up_to_halfway_to_the_feasible_samples() -> None:
+    times = np.array([0.0, 1.0, 2.0, 4.0, 5.0, 6.0])
+    x = np.array([0.0, 0.0, 7.3, 7.3, 0.0, 7.3])  # outside at the third, fourth and last sample
+    still = np.zeros((6, 6))
+    places = sl.Pose.from_euler(np.stack((x, 0.0 * x, 0.0 * x + 1.5), axis=1), 0.0, 0.0, 0.0)
+    plan = sl.inverse(SUSPENDED, sl.Path(times, places, still, still))
+    assert list(plan.feasible) == [True, True, False, False, True, False]
+    ax = plot.tensions(plan)
+    spans = [p.get_extents().transformed(ax.transData.inverted()) for p in ax.patches if isinstance(p, Rectangle)]
+    np.testing.assert_allclose([(s.x0, s.x1) for s in spans], [(1.5, 4.5), (5.5, 6.0)], rtol=1e-12)
+    assert legend(ax).count("infeasible") == 1
+
+
+def test_poses_without_time_and_a_single_pose() -> None:
+    poses = sl.inverse(SUSPENDED, PATH.pose[::50])
+    ax = plot.tensions(poses)
+    assert ax.get_xlabel() == "pose"
+    np.testing.assert_array_equal(ax.get_lines()[3].get_xdata(), np.arange(7))
+    single = sl.inverse(SUSPENDED, PATH.pose[0])
+    np.testing.assert_array_equal(courses(plot.lengths(single))[:, 0], single.unstrained_length)
+
+
+def test_path_from_above_with_arrows_along_the_motion() -> None:
+    ax = plot.path(PATH)
+    np.testing.assert_array_equal(ax.get_lines()[0].get_xydata(), PATH.pose.position[:, :2])
+    arrows = [np.subtract(text.xy, text.xyann) for text in ax.texts if isinstance(text, Annotation)]
+    directions = [arrow / np.linalg.norm(arrow) for arrow in arrows]
+    c, s = 5.0 / np.hypot(5.0, 3.5), 3.5 / np.hypot(5.0, 3.5)
+    expected = [(c, s), (-1, 0), (0, -1), (1, 0), (0, 1), (-c, -s)]  # the article's path, move by move
+    np.testing.assert_allclose(directions, expected, atol=1e-6)
+    assert ax.get_title(loc="right") == "$z$ = 1.5 m"
+
+
+def test_velocity() -> None:
+    ax = plot.velocity(PATH)
+    np.testing.assert_array_equal(courses(ax), PATH.twist[:, :3].T)
+    assert ax.get_ylabel() == "velocity [m/s]"
+
+
+def test_errors_are_in_millimetres_on_one_scale() -> None:
+    straight, exact = (sl.confirm(sl.inverse(SUSPENDED, PATH, model=m)) for m in (sl.Straight(), sl.Catenary()))
+    left, right = plot.errors(straight, exact).axes
+    np.testing.assert_array_equal(courses(left), 1e3 * straight.position_error.T)
+    assert left.get_ylim() == right.get_ylim()
+    assert left.get_ylabel() == "position error [mm]"
+    alone = plot.error(exact)
+    low, high = alone.get_ylim()
+    assert (low, high) == (-1e-3, 1e-3)  # rounding is not blown up to fill the figure
+
+
+def test_the_robot_hangs_between_its_anchors() -> None:
+    pose = sl.Pose.from_euler((1.0, 2.0, 1.7), 0.3, 0.0, 0.0)
+    ax = plot.robot(SUSPENDED, pose)
+    cables = [np.array(line.get_data_3d()).T for line in ax.get_lines()[:8]]
+    ends = pose.position + SUSPENDED.platform_anchors @ pose.matrix.T
+    np.testing.assert_allclose([c[0] for c in cables], SUSPENDED.frame_anchors, atol=1e-12)
+    np.testing.assert_allclose([c[-1] for c in cables], ends, atol=1e-9)
+    plan = sl.inverse(SUSPENDED, pose)
+    for cable, sag in zip(cables, plan.state.cables.sag, strict=True):
+        share = np.linalg.norm((cable - cable[0])[:, :2], axis=1) / np.linalg.norm((cable[-1] - cable[0])[:2])
+        drop = cable[0, 2] + share * (cable[-1, 2] - cable[0, 2]) - cable[:, 2]
+        assert drop.max() == pytest.approx(sag, rel=2e-3)  # of 50 points one is near the lowest
+
+
+def test_a_robot_that_nothing_holds_says_so() -> None:
+    ax = plot.robot(SUSPENDED, sl.Pose.from_euler((0.0, 0.0, 7.0), 0.0, 0.0, 0.0))
+    assert ax.get_title() == "article-suspended: no tensions within the limits carry it here"
+    assert ax.get_lines()[0].get_linestyle() == "--"
+
+
+def test_a_robot_needs_one_pose() -> None:
+    with pytest.raises(InvalidValueError, match="pose is missing; allowed: a single pose"):
+        plot.robot(SUSPENDED.replace(test_box=None))
+    with pytest.raises(InvalidValueError, match="pose is a batch of 301"):
+        plot.robot(SUSPENDED, PATH.pose)
+
+
+def test_axes_of_the_caller_are_used() -> None:
+    figure = Figure()
+    ax = figure.add_subplot()
+    for draw in (plot.tensions, plot.lengths):
+        assert draw(PLAN, ax=ax) is ax
+    assert plot.velocity(PATH, ax) is ax
+    space = figure.add_subplot(projection="3d")
+    assert plot.robot(SUSPENDED, ax=space) is space
+
+
+@pytest.mark.parametrize(("suffix", "start"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")])
+def test_figures_are_saved_the_same_each_time(tmp_path: FilePath, suffix: str, start: bytes) -> None:
+    for name in ("a", "b"):
+        plot.save(plot.velocity(PATH), tmp_path / f"{name}.{suffix}")
+    content = (tmp_path / f"a.{suffix}").read_bytes()
+    assert content.startswith(start)
+    if suffix != "pdf":
+        assert content == (tmp_path / f"b.{suffix}").read_bytes()
+
+
+def test_a_suffix_that_no_figure_has(tmp_path: FilePath) -> None:
+    with pytest.raises(FileError, match=r"a\.xyz: the suffix is \.xyz\. Choose one of .*png"):
+        plot.save(plot.overview(PLAN), tmp_path / "a.xyz")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_notebook_shows_the_figure() -> None:
+    from PIL import Image
+
+    figure = plot.overview(PLAN)
+    image = Image.open(BytesIO(figure._repr_png_()))  # type: ignore[attr-defined]
+    assert image.size == (700, 500)

@@ -1,0 +1,131 @@
+"""Stiffness, sensitivities and modes against differences of an independent balance, SciPy and a pendulum."""
+
+import numpy as np
+import pytest
+import scipy.linalg
+from scipy.spatial.transform import Rotation
+
+import sagline as sl
+from sagline.arrays import Array
+from tests.kinematics.feasible import center, feasible_plan, motion_between, unbalance
+
+MODELS = [sl.Catenary(), sl.Elastic(), sl.Parabolic(), sl.Empirical()]
+COGIRO = sl.load_robot("cogiro")
+WRENCH = np.array([20.0, -15.0, 10.0, 8.0, -6.0, 12.0])
+
+
+def richardson(at, h: float) -> Array:  # type: ignore[no-untyped-def]
+    """Derivative of at(h) at 0 from central differences at h and h/2."""
+    coarse = (at(h) - at(-h)) / (2 * h)
+    fine = (at(0.5 * h) - at(-0.5 * h)) / h
+    slope: Array = (4.0 * fine - coarse) / 3.0
+    return slope
+
+
+@pytest.mark.parametrize("model", MODELS, ids=lambda m: type(m).__name__)
+def test_the_matrix_is_minus_the_slope_of_the_wrench(model: sl.CableModel) -> None:
+    plan = feasible_plan(COGIRO, 3, seed=1, model=model)
+    found = sl.forward(COGIRO, plan.unstrained_length, plan.state.pose, model, wrench=WRENCH)
+    matrices = sl.stiffness(found.state).matrix
+    for pose, lengths, matrix in zip(found.pose, found.state.cables.unstrained_length, matrices, strict=True):
+
+        def wrench(motion: Array, pose: sl.Pose = pose, lengths: Array = lengths) -> Array:
+            turned = Rotation.from_rotvec(motion[3:]) * Rotation.from_quat(pose.quaternion.copy())
+            position = center(pose, COGIRO) + motion[:3] - turned.apply(COGIRO.center_of_mass.copy())
+            return unbalance(COGIRO, model, lengths.copy(), position, turned, WRENCH)
+
+        columns = [-richardson(lambda h, one=one, of=wrench: of(h * one), 5e-5) for one in np.eye(6)]
+        np.testing.assert_allclose(matrix, np.transpose(columns), rtol=1e-7, atol=1e-7 * np.abs(matrix).max())
+
+
+def test_it_is_symmetric_without_a_given_moment_and_skew_by_half_of_it() -> None:
+    plan = feasible_plan(COGIRO, 2, seed=2)
+    free = sl.stiffness(plan.state).matrix
+    np.testing.assert_allclose(free, np.swapaxes(free, 1, 2), atol=1e-8)
+    loaded = sl.inverse(COGIRO, plan.state.pose[0], wrench=WRENCH, tension=sl.MinimumNorm())
+    skew = sl.stiffness(loaded.state).matrix
+    skew = 0.5 * (skew - skew.T)
+    x, y, z = -0.5 * WRENCH[3:]
+    np.testing.assert_allclose(skew[3:, 3:], [[0, -z, y], [z, 0, -x], [-y, x, 0]], atol=1e-8)
+    np.testing.assert_allclose(skew[:3], 0.0, atol=1e-8)
+
+
+@pytest.mark.parametrize("model", MODELS, ids=lambda m: type(m).__name__)
+def test_sensitivities_are_the_slopes_of_the_forward_solution(model: sl.CableModel) -> None:
+    plan = feasible_plan(COGIRO, 2, seed=3, model=model)
+    lengths, pose = plan.unstrained_length, plan.state.pose
+    found = sl.stiffness(plan.state)
+    density, axial = COGIRO.cables.linear_density, COGIRO.cables.axial_stiffness
+
+    def solve(robot: sl.Robot = COGIRO, change: Array | float = 0.0, wrench: Array | None = None) -> sl.ForwardSolution:
+        return sl.forward(robot, lengths + change, pose, model, wrench)
+
+    rest = solve()
+
+    def compare(slope: Array, expected: Array) -> None:
+        np.testing.assert_allclose(slope, expected, rtol=1e-7, atol=1e-7 * np.abs(expected).max() + 1e-13)
+
+    for i in (0, 3):
+        one = np.eye(8)[i]
+        by_length = richardson(lambda h, one=one: motion_between(rest, solve(change=h * one)), 2e-4)
+        compare(found.length_sensitivity[..., i], by_length)
+
+        def heavier(h: float, one: Array = one) -> Array:
+            cables = sl.Cable(density * (1.0 + h * one), axial)
+            return motion_between(rest, solve(COGIRO.replace(cables=cables)))
+
+        def stiffer(h: float, one: Array = one) -> Array:
+            return motion_between(rest, solve(COGIRO.replace(cables=sl.Cable(density, axial * (1.0 + h * one)))))
+
+        compare(found.density_sensitivity[..., i], richardson(heavier, 1e-2) / density[i])
+        compare(found.stiffness_sensitivity[..., i], richardson(stiffer, 1e-2) / axial[i])
+    for k in range(6):
+        push = np.eye(6)[k]
+        by_load = richardson(lambda h, push=push: motion_between(rest, solve(wrench=h * push)), 10.0)
+        compare(found.compliance[..., k], by_load)
+
+
+def test_modes_against_scipy() -> None:
+    plan = feasible_plan(COGIRO, 3, seed=4)
+    modes = sl.modes(plan.state)
+    for i in range(3):
+        rotation = plan.state.pose[i].matrix
+        mass = scipy.linalg.block_diag(COGIRO.mass * np.eye(3), rotation @ COGIRO.inertia @ rotation.T)
+        matrix = sl.stiffness(plan.state).matrix[i]
+        squares = scipy.linalg.eigh(matrix, mass, eigvals_only=True)
+        np.testing.assert_allclose((2 * np.pi * modes.frequency[i]) ** 2, squares, rtol=1e-9)
+        np.testing.assert_allclose(modes.shape[i].T @ mass @ modes.shape[i], np.eye(6), atol=1e-12)
+        np.testing.assert_allclose(matrix @ modes.shape[i], mass @ modes.shape[i] * squares, atol=1e-6)
+
+
+def test_a_mass_on_one_cable_is_a_pendulum_on_a_spring() -> None:
+    robot = sl.Robot("pendulum", [[0, 0, 10.0]], [[0, 0, 0]], sl.Cable(1e-9, 1e5), 20.0, motion_pattern="3T")
+    found = sl.forward(robot, [4.0])
+    assert found.status == sl.ForwardStatus.SOLVED
+    stretched = 4.0 * (1.0 + 20.0 * 9.81 / 1e5)
+    np.testing.assert_allclose(found.pose.position, [0, 0, 10.0 - stretched], atol=1e-9)
+    swing = np.sqrt(9.81 / stretched) / (2 * np.pi)
+    bounce = np.sqrt(1e5 / 4.0 / 20.0) / (2 * np.pi)
+    np.testing.assert_allclose(sl.modes(found.state).frequency, [swing, swing, bounce], rtol=1e-6)
+
+
+def test_a_pose_without_lengths_has_no_stiffness() -> None:
+    robot = sl.load_robot("article-suspended")
+    plan = sl.inverse(robot, sl.Pose([[0, 0, 1.5], [0, 0, 9.0]], np.tile(np.eye(3), (2, 1, 1))))
+    assert plan.feasible.tolist() == [True, False]
+    for values in (
+        sl.stiffness(plan.state).matrix,
+        sl.stiffness(plan.state).compliance,
+        sl.modes(plan.state).frequency,
+    ):
+        assert np.isfinite(values[0]).all()
+        assert np.isnan(values[1]).all()
+
+
+def test_a_platform_hung_from_one_point_has_no_compliance() -> None:
+    frame = [[3, 3, 3], [-3, 3, 3], [-3, -3, 3], [3, -3, 3]]
+    robot = sl.Robot("point", frame, np.zeros((4, 3)), sl.Cable(0.05, 5e4), 10.0, np.eye(3))
+    found = sl.forward(robot, [4.4] * 4)
+    assert found.status == sl.ForwardStatus.SINGULAR
+    assert not found.stable
+    assert np.isnan(sl.stiffness(found.state).compliance).all()

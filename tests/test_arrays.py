@@ -1,0 +1,75 @@
+"""The border between a caller's numbers and ours."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sagline.arrays import checked, kernel_input, locked
+from sagline.errors import InvalidValueError
+
+
+def test_a_callers_array_is_copied_and_locked() -> None:
+    given = np.arange(3.0)
+    array = checked(given, "x", "m")
+    given[0] = 9.0
+    assert array[0] == 0.0
+    assert not array.flags.writeable
+
+
+def test_an_immutable_array_is_taken_as_it_is() -> None:
+    ours = locked(np.arange(3.0))
+    assert checked(ours, "x", "m") is ours
+    assert checked(ours[1:], "x", "m").base is ours
+
+
+def test_a_locked_view_of_writable_memory_is_copied() -> None:
+    memory = np.arange(3.0)
+    view = locked(memory.view())
+    array = checked(view, "x", "m")
+    memory[0] = 9.0
+    assert array[0] == 0.0
+
+
+def test_a_locked_array_over_foreign_memory_is_copied() -> None:
+    memory = bytearray(np.arange(3.0).tobytes())
+    array = checked(locked(np.frombuffer(memory)), "x", "m")
+    memory[:8] = np.float64(9.0).tobytes()
+    assert array[0] == 0.0
+
+
+@pytest.mark.parametrize("value", [[1.0, 2.0], 3, np.float32(1.5), np.arange(6.0).reshape(2, 3).T, [[1, 2]], True])
+def test_whatever_is_given_comes_out_as_float64_in_c_order(value: object) -> None:
+    array = checked(value, "x", "m")  # type: ignore[arg-type]
+    assert array.dtype == np.float64
+    assert array.flags.c_contiguous
+    np.testing.assert_array_equal(array, np.asarray(value))
+
+
+def test_kernel_input_keeps_the_shape_of_a_single_value() -> None:
+    assert kernel_input(3.0, ()).shape == ()
+    wide = kernel_input(np.arange(2.0), (3, 2))
+    assert wide.flags.c_contiguous
+    assert not wide.flags.writeable
+    np.testing.assert_array_equal(wide, [[0, 1]] * 3)
+
+
+@pytest.mark.parametrize(
+    ("value", "limits", "words"),
+    [
+        ([1.0, np.nan], {}, r"x\[1\] is nan m; allowed: finite"),
+        ([1.0, np.inf], {}, r"x\[1\] is inf m"),
+        (-np.inf, {"infinite": True, "low": 0.0}, "x is -inf m; allowed: >= 0 m"),
+        ([[0.0, -1.0]], {"low": 0.0}, r"x\[0, 1\] is -1 m; allowed: >= 0 m, finite"),
+        (0.0, {"above": 0.0}, "x is 0 m; allowed: > 0 m, finite"),
+        ([1.0, 2.0], {"shape": (3,)}, r"x is of shape \(2,\); allowed: shape \(..., 3\)"),
+        ("near", {}, "x is 'near'; allowed: numbers"),
+    ],
+)
+def test_what_is_wrong_is_named(value: object, limits: dict[str, object], words: str) -> None:
+    with pytest.raises(InvalidValueError, match=words):
+        checked(value, "x", "m", **limits)  # type: ignore[arg-type]
+
+
+def test_infinity_may_pass_where_it_means_no_limit() -> None:
+    assert checked(np.inf, "x", "m", infinite=True) == np.inf

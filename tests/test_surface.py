@@ -1,0 +1,25 @@
+import subprocess
+import sys
+
+import pytest
+
+import sagline as sl
+
+# yaml is no matter: numba loads it
+HEAVY = ("matplotlib", "xarray", "h5netcdf", "h5py", "pint", "pydantic", "typer", "rich", "scipy.spatial")
+
+
+def test_every_public_name_is_there() -> None:
+    assert [name for name in sl.__all__ if not hasattr(sl, name)] == []
+    assert dir(sl) == sorted(sl.__all__)
+
+
+def test_an_unknown_name_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="module 'sagline' has no attribute 'solve'"):
+        _ = sl.solve
+
+
+def test_import_loads_the_core_alone() -> None:
+    code = f"import sys, sagline; print([name for name in {HEAVY} if name in sys.modules])"
+    out = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
+    assert out.strip() == "[]"
