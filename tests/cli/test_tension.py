@@ -1,0 +1,61 @@
+"""`sagline tension`: numbers of every method, the figure, and what it says where there is no answer."""
+
+import json
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import sagline as sl
+from sagline.cli.main import app
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch) -> FilePath:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "100")
+    return tmp_path
+
+
+def sagline(*words: str) -> Any:
+    return CliRunner().invoke(app, ["tension", *words])
+
+
+def test_numbers_are_those_of_the_library(folder: FilePath) -> None:
+    result = sagline("article-mixed", "--pose", "1,-0.5,2.5,3,0,0", "--json")
+    assert result.exit_code == 0, result.stderr
+    found = json.loads(result.stdout)
+    robot = sl.load_robot("article-mixed")
+    pose = sl.Pose.from_euler([1.0, -0.5, 2.5], np.radians(3.0), 0.0, 0.0)
+    for name in ("MinimumNorm", "Centroid", "LowestMaximum", "Puncture"):
+        plan = sl.inverse(robot, pose, tension=getattr(sl, name)())
+        np.testing.assert_allclose(found["tensions"][name]["chord_tension"], plan.chord_tension, rtol=1e-12)
+    assert found["capacity_margin"] == pytest.approx(float(sl.capacity_margin(plan.state)), rel=1e-6)
+    assert sorted(file.name for file in (folder / "output").iterdir()) == [
+        "article-mixed-tension.png",
+        "article-mixed-tension.svg",
+    ]
+
+
+def test_table_and_robots_without_polygon(folder: FilePath) -> None:
+    result = sagline("falcon-7")
+    assert result.exit_code == 0, result.stderr
+    assert "AnalyticCenter" in result.stdout
+    assert not (folder / "output").exists()
+
+
+def test_infeasible_pose_says_why(folder: FilePath) -> None:
+    result = sagline("article-suspended", "--pose", "7.45,0,1.5")
+    plan = sl.inverse(sl.load_robot("article-suspended"), sl.Pose([7.45, 0, 1.5], np.eye(3)))
+    assert result.exit_code == 1
+    cables = ", ".join(str(i) for i in np.flatnonzero(plan.blocking))
+    assert f"Shortfall {float(plan.shortfall):.4g} N; blocking cables {cables}" in result.stderr.replace("\n", "")
+    assert not (folder / "output").exists()
+
+
+def test_bad_pose() -> None:
+    result = sagline("cogiro", "--pose", "1,2")
+    assert result.exit_code == 2
+    assert "--pose is '1,2'; allowed: three or six numbers" in result.stderr
