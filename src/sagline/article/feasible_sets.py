@@ -67,7 +67,7 @@ class FeasibleSets:
 
     @property
     def half_weight(self) -> float:
-        """w D/2, the magnitude of the article's intercept (28) [N]."""
+        """Half the weight w D, the magnitude of the article's intercept (28) [N]."""
         return 0.5 * float(self.cable.linear_density) * GRAVITY * self.end.chord
 
 

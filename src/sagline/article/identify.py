@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array, checked
+from sagline.arrays import Array, Flags, checked, kernel_input
 from sagline.article.fits import fit_factor
 from sagline.cables.cable import Cable
 from sagline.cables.catenary import Catenary
@@ -172,16 +172,18 @@ def position_error(state: CableState) -> Array:
         Shape (...).
     """
     shape = state.shape
-    operands = (
-        state.horizontal_tension,
-        state.vertical_force,
-        state.unstrained_length,
-        state.cable.linear_density * state.gravity,
-        state.cable.axial_stiffness,
+    horizontal, vertical, length, weight, stiffness = (
+        kernel_input(operand, shape).reshape(-1)
+        for operand in (
+            state.horizontal_tension,
+            state.vertical_force,
+            state.unstrained_length,
+            state.cable.linear_density * state.gravity,
+            state.cable.axial_stiffness,
+        )
     )
-    flat = [np.ascontiguousarray(np.broadcast_to(operand, shape)).ravel() for operand in operands]
-    x, z = np.empty(flat[0].size), np.empty(flat[0].size)
-    batch_end(*flat, x, z)
+    x, z = np.empty(horizontal.size), np.empty(horizontal.size)
+    batch_end(horizontal, vertical, length, weight, stiffness, x, z)
     error: Array = np.abs(x.reshape(shape) - state.span) + np.abs(z.reshape(shape) - state.rise)
     return error
 
@@ -202,7 +204,7 @@ def _tolerance(tolerance: float) -> float:
     return float(checked(tolerance, "tolerance", "m", shape=(), above=0.0))
 
 
-def _first_of_good_tail(values: Array, good: Array) -> float:
+def _first_of_good_tail(values: Array, good: Flags) -> float:
     """The value from which on, to the end of the array, all is good; NaN where the last one is not."""
     bad = np.flatnonzero(~good)
     first = int(bad[-1]) + 1 if bad.size else 0
