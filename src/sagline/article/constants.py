@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from sagline.arrays import Array
 from sagline.article.intercept import intercept_studies
 from sagline.article.sag_constant import sag_study
-from sagline.article.sampling import GRAVITY, Sampling
+from sagline.article.sampling import GRAVITY, Sampling, article_sampling
 from sagline.errors import InvalidValueError
 
 PUBLISHED_K_H = 4.845  # m/s^2, in magnitude: Gia Luan & Truong Thinh 2020, section 4.2.2
@@ -84,6 +85,14 @@ def constants_study(sampling: Sampling, lowest: Array, highest: Array, factors: 
         scaled=tuple(constants(sampling.between(f * found.lowest, f * found.highest)) for f in factors),
         published=found,
     )
+
+
+@cache
+def published_sampling() -> Sampling:
+    """The article's sampling as we choose it, with the tensions that give its constants."""
+    sampling = article_sampling()
+    found = published_range(sampling)
+    return sampling.between(found.lowest, found.highest)
 
 
 def published_range(sampling: Sampling) -> Constants:

@@ -8,7 +8,7 @@ from sagline.article.constants import PUBLISHED_K_P, SHALLOW_K_P
 from sagline.article.erratum import Erratum, Quantity
 from sagline.article.feasible_sets import End
 from sagline.article.sag_constant import sag_study, stretch_study
-from sagline.article.sampling import GRAVITY, article_sampling
+from sagline.article.sampling import ANGLE, GRAVITY, article_sampling
 from sagline.article.simulation import ROBOTS
 from sagline.cables.cable import Cable
 from sagline.cables.catenary import Catenary
@@ -16,7 +16,6 @@ from sagline.files.robot_file import load_robot
 from sagline.robot.pose import Pose
 from sagline.statics.balance import article_balance, structure_matrix
 
-ANGLE = 0.754  # rad, the article's
 LONG = 15.0  # m, the simulated frame
 TAUT = 20.0  # times the sampled tensions: so that only the leading terms are left
 NEARLY = 1e-6  # rad from vertical or level
@@ -24,7 +23,7 @@ NEARLY = 1e-6  # rad from vertical or level
 
 def stretch_by_end_tension() -> Erratum:
     """Erratum 5: the elongation of (36) is that of the tension at B, not of the mean."""
-    cable = _cable()
+    cable = simulated_cable()
     end = End(LONG * float(np.cos(ANGLE)), LONG * float(np.sin(ANGLE)))
     study = stretch_study(cable, end, np.array([500.0]))
     excess = float((study.relieved - study.relieved_exactly)[0])
@@ -69,7 +68,7 @@ def sign_in_bound() -> Erratum:
     """Erratum 7: the bound (54) on T_x of a suspended cable."""
     from scipy.optimize import brentq
 
-    cable, chord = _cable(), 10.0
+    cable, chord = simulated_cable(), 10.0
     span, rise = chord * float(np.cos(ANGLE)), -chord * float(np.sin(ANGLE))
     slope, intercept = rise / span, 0.5 * float(cable.linear_density) * GRAVITY * chord
 
@@ -95,7 +94,7 @@ def vertical_and_level() -> Erratum:
     """Erratum 8: no pose under an anchor, and none with a level cable."""
     robot = load_robot(ROBOTS[0])
     under = robot.frame_anchors[0] - robot.platform_anchors[0] - [0.0, 0.0, 2.0]
-    cable, chord = _cable(), 10.0
+    cable, chord = simulated_cable(), 10.0
     half_weight = 0.5 * float(cable.linear_density) * GRAVITY * chord
     vertical = Catenary().from_tension(cable, 0.0, -chord, 100.0, GRAVITY)
     level = Catenary().from_tension(cable, chord, 0.0, 100.0, GRAVITY)
@@ -121,7 +120,7 @@ def vertical_and_level() -> Erratum:
     )
 
 
-def _cable() -> Cable:
+def simulated_cable() -> Cable:
     """The simulation's cable."""
     cables = load_robot(ROBOTS[0]).cables
     return Cable(cables.linear_density[0], cables.axial_stiffness[0])

@@ -13,6 +13,7 @@ from sagline.cables.catenary import Catenary
 from sagline.cables.state import CableState
 
 GRAVITY = 9.81  # m/s^2, everywhere in the article's studies
+ANGLE = 0.754  # rad, of the article's figure 10
 UNSTRETCHABLE = 1e15  # N: strains below the rounding of a length
 
 
@@ -82,7 +83,7 @@ def article_sampling() -> Sampling:
         Gia Luan & Truong Thinh 2020, figures 6 to 15.
     """
     return Sampling(
-        angles=[0.25, 0.5, 0.754, 1.0, 1.25],
+        angles=[0.25, 0.5, ANGLE, 1.0, 1.25],
         chords=np.linspace(2.0, 16.0, 8),
         densities=np.linspace(0.2, 2.0, 10),
         tensions=np.linspace(100.0, 10_000.0, 60),
