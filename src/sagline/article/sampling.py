@@ -14,7 +14,7 @@ from sagline.cables.state import CableState
 
 GRAVITY = 9.81  # m/s^2, everywhere in the article's studies
 ANGLE = 0.754  # rad, of the article's figure 10
-UNSTRETCHABLE = 1e15  # N: strains below the rounding of a length
+UNSTRETCHABLE = 1e20  # N: strains below the rounding of a length
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -16,6 +16,7 @@ class Verdict(StrEnum):
     HOLDS_WITHIN = "holds within limits"
     FAILS = "does not hold"
     OPEN = "cannot be decided"
+    ERRATUM = "erratum"
     OURS = "not in the article"
 
 

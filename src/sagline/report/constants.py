@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from sagline.arrays import Array
@@ -19,6 +21,9 @@ from sagline.article.intercept import InterceptStudy, intercept_studies
 from sagline.plot.sheet import BLUE, PURPLE, VERMILLION
 from sagline.report.blocks import Chapter, Finding, Table, Verdict, n
 from sagline.report.drawing import Drawings, axes, legend, shades
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 MIDDLE = 2  # of the sampled angles: the article's 0.754 rad
 LOWEST = np.geomspace(40.0, 800.0, 12)  # N
@@ -100,7 +105,7 @@ def _over_density(platform: InterceptStudy, frame: InterceptStudy, draw: Drawing
         title="h_b is proportional to ρ, and k_h",
         statement="h_b is linearly decreasing in ρ and does not depend on β; h_b = k_h ρ with |k_h| ≈ 4.845, "
         "approximately half of g; (28): h_b = −ρg/2.",
-        measured=f"k_h = {n(frame.k_h, '.4f')} m/s² at the frame end and {n(platform.k_h, '+.4f')} m/s² at the platform "
+        measured=f"k_h = {n(frame.k_h, '.4f')} m/s² at the frame end, {n(platform.k_h, '+.4f')} m/s² at the platform "
         f"end; g/2 = {n(SHALLOW_K_H)}. The decreasing h_b of the article's figure is the frame end's; the force on the "
         f"platform needs the other, rising one. Over the angles k_h varies by {n(100 * spread, '.2g')} %.",
         verdict=Verdict.HOLDS_WITHIN,
@@ -139,8 +144,8 @@ def _range(study: ConstantsStudy, draw: Drawings) -> Finding:
         measured=f"With T_x evenly spaced from {n(found.lowest, '.1f')} N to {n(1e-3 * found.highest, '.2f')} kN the "
         f"article's regressions give both: |k_h| = {n(abs(found.k_h_frame), '.4f')} at the frame end and k_p = "
         f"{n(found.k_p, '.4f')}. With other lower ends k_p runs from {n(min(all_k_p), '.3g')} to "
-        f"{n(max(all_k_p), '.3g')}: the least squares of d = a_d/T_x² hear the slackest cables alone. This is one range "
-        "that fits, for our choice of chords, angles and densities, not proof that it was theirs.",
+        f"{n(max(all_k_p), '.3g')}: the least squares of d = a_d/T_x² hear the slackest cables alone. This is one "
+        "range that fits, for our choice of chords, angles and densities, not proof that it was theirs.",
         verdict=Verdict.HOLDS_WITHIN,
         numbers={
             "published_range": found._asdict(),
@@ -178,10 +183,11 @@ def _limit(study: ConstantsStudy, draw: Drawings) -> Finding:
     return Finding(
         key="taut-limit",
         title="taut cables: g/2 and g²/24",
-        statement="k_h is “approximately equal to half of gravitational acceleration”; k_p cannot be formulated exactly.",
+        statement="k_h is “approximately equal to half of gravitational acceleration”; k_p cannot be "
+        "formulated exactly.",
         measured=f"As tensions grow, |k_h| tends to g/2 at both ends and k_p to g²/24: at {n(FACTORS[-1])} times the "
-        f"range they are {n(last.k_h_platform, '.4f')}, {n(last.k_h_frame, '.4f')} and {n(last.k_p, '.4f')}. Both follow "
-        "from the exact equations to first order in sag.",
+        f"range they are {n(last.k_h_platform, '.4f')}, {n(last.k_h_frame, '.4f')} and {n(last.k_p, '.4f')}. Both "
+        "follow from the exact equations to first order in sag.",
         verdict=Verdict.HOLDS_WITHIN,
         numbers={"scaled": [c._asdict() for c in study.scaled], "factors": FACTORS, "g_squared_over_24": SHALLOW_K_P},
         panels=(draw.panel(figure, "How far the constants are from g/2 and g²/24."),),
@@ -202,11 +208,11 @@ def _limit(study: ConstantsStudy, draw: Drawings) -> Finding:
     )
 
 
-def _course(ax: object, course: tuple[Constants, ...], x: str, y: str, color: str, label: str) -> None:
+def _course(ax: Axes, course: tuple[Constants, ...], x: str, y: str, color: str, label: str) -> None:
     values = [abs(getattr(c, y)) for c in course]
     ax.plot(
         [getattr(c, x) for c in course], values, color=color, marker="o", markersize=3.0, linewidth=1.1, label=label
-    )  # type: ignore[attr-defined]
+    )
 
 
 def _bend(chords: Array, intercept: Array, h_b: Array) -> float:

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from html import escape
 from importlib.resources import files
 
 from sagline.report.blocks import Chapter, Finding, Table, Verdict
 
+_subscript = re.compile(r"(?<=[A-Za-zα-ωΑ-Ω])_([A-Za-zα-ω0-9]{1,3})(?![A-Za-zα-ω0-9_])")
+
 CLASSES = {
     Verdict.HOLDS: "holds",
     Verdict.HOLDS_WITHIN: "within",
     Verdict.FAILS: "fails",
     Verdict.OPEN: "open",
+    Verdict.ERRATUM: "fails",
     Verdict.OURS: "ours",
 }
 
@@ -46,10 +50,10 @@ def _contents(chapters: Sequence[Chapter]) -> str:
     for number, chapter in enumerate(chapters, start=1):
         lines.append(
             f'<tr class="part"><th colspan="2" scope="rowgroup"><a href="#{chapter.key}">'
-            f"{number}. {escape(chapter.title)}</a></th></tr>"
+            f"{number}. {_text(chapter.title)}</a></th></tr>"
         )
         lines += [
-            f'<tr><td><a href="#{finding.key}">{escape(_headline(finding))}</a></td><td>{_badge(finding)}</td></tr>'
+            f'<tr><td><a href="#{finding.key}">{_text(_headline(finding))}</a></td><td>{_badge(finding)}</td></tr>'
             for finding in chapter.findings
         ]
     return f'<nav aria-label="Overview">\n<h2>Overview</h2>\n<table>\n{"".join(lines)}\n</table>\n</nav>'
@@ -58,23 +62,21 @@ def _contents(chapters: Sequence[Chapter]) -> str:
 def _chapter(number: int, chapter: Chapter) -> str:
     findings = "\n".join(_finding(finding) for finding in chapter.findings)
     return (
-        f'<section class="chapter" id="{chapter.key}">\n<h2>{number}. {escape(chapter.title)}</h2>\n'
-        f"<p>{escape(chapter.lead)}</p>\n{findings}\n</section>"
+        f'<section class="chapter" id="{chapter.key}">\n<h2>{number}. {_text(chapter.title)}</h2>\n'
+        f"<p>{_text(chapter.lead)}</p>\n{findings}\n</section>"
     )
 
 
 def _finding(finding: Finding) -> str:
-    said = (
-        f'<div class="said"><h4>The article</h4><p>{escape(finding.statement)}</p></div>' if finding.statement else ""
-    )
-    found = f'<div class="found"><h4>Computed</h4><p>{escape(finding.measured)}</p></div>'
+    said = f'<div class="said"><h4>The article</h4><p>{_text(finding.statement)}</p></div>' if finding.statement else ""
+    found = f'<div class="found"><h4>Computed</h4><p>{_text(finding.measured)}</p></div>'
     panels = "".join(
-        f"<figure>{panel.svg}<figcaption>{escape(panel.caption)}</figcaption></figure>" for panel in finding.panels
+        f"<figure>{panel.svg}<figcaption>{_text(panel.caption)}</figcaption></figure>" for panel in finding.panels
     )
     drawn = f'<div class="panels">{panels}</div>\n' if panels else ""
     tables = "\n".join(_table(table) for table in finding.data)
     return (
-        f'<article id="{finding.key}">\n<h3>{escape(_headline(finding))} {_badge(finding)}</h3>\n'
+        f'<article id="{finding.key}">\n<h3>{_text(_headline(finding))} {_badge(finding)}</h3>\n'
         f'<div class="pair">{said}{found}</div>\n{drawn}{tables}\n</article>'
     )
 
@@ -86,7 +88,12 @@ def _headline(finding: Finding) -> str:
         for word, numbers in (("Table", finding.tables), ("Figure", finding.figures))
         if numbers
     ]
-    return f"{', '.join(labels)}: {finding.title}" if labels else finding.title
+    return f"{', '.join(labels)}: {finding.title}" if labels else finding.title[0].upper() + finding.title[1:]
+
+
+def _text(text: str) -> str:
+    """Text with its subscripts set as such: T_x, b_π, ε_max."""
+    return _subscript.sub(r"<sub>\1</sub>", escape(text))
 
 
 def _badge(finding: Finding) -> str:
@@ -94,12 +101,12 @@ def _badge(finding: Finding) -> str:
 
 
 def _table(table: Table) -> str:
-    head = "".join(f'<th scope="col">{escape(cell)}</th>' for cell in table.head)
+    head = "".join(f'<th scope="col">{_text(cell)}</th>' for cell in table.head)
     rows = "".join(
-        f'<tr><th scope="row">{escape(row[0])}</th>{"".join(f"<td>{escape(cell)}</td>" for cell in row[1:])}</tr>'
+        f'<tr><th scope="row">{_text(row[0])}</th>{"".join(f"<td>{_text(cell)}</td>" for cell in row[1:])}</tr>'
         for row in table.rows
     )
     return (
-        f'<div class="scroll" tabindex="0"><table><caption>{escape(table.caption)}</caption>'
+        f'<div class="scroll" tabindex="0"><table><caption>{_text(table.caption)}</caption>'
         f"<thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>"
     )
