@@ -38,7 +38,10 @@ class Figures(NamedTuple):
         tension_min: Smallest T_x [N].
         tension_max: Largest T_x [N].
         vertical_max: Largest |T_z| [N].
-        jerkiness: Largest second difference of T_x over the square of the time step [N/s^2]: bounded when smooth.
+        step_max: Largest change of T_x from one sample to the next [N].
+        slope_max: Largest |dT_x/dt| [N/s].
+        slope_jump: Largest change of dT_x/dt from one step to the next [N/s]: it stays, however small the step, where
+            a course has a corner.
         length_min: Smallest L [m].
         length_max: Largest L [m].
         adjusting_min: Smallest d [m].
@@ -53,7 +56,9 @@ class Figures(NamedTuple):
     tension_min: float
     tension_max: float
     vertical_max: float
-    jerkiness: float
+    step_max: float
+    slope_max: float
+    slope_jump: float
     length_min: float
     length_max: float
     adjusting_min: float
@@ -155,7 +160,7 @@ def figures(run: Confirmation) -> Figures:
     """A run in numbers."""
     plan, good = run.plan, np.atleast_1d(run.plan.feasible & run.held)
     if not good.any():
-        return Figures(*(float("nan"),) * 11, float(np.mean(plan.feasible)), 0.0)
+        return Figures(*(float("nan"),) * 13, float(np.mean(plan.feasible)), 0.0)
     cables, error = plan.state.cables, run.position_error[good]
     distance = np.linalg.norm(error, axis=1)
     tension = plan.horizontal_tension
@@ -166,7 +171,7 @@ def figures(run: Confirmation) -> Figures:
         tension_min=float(tension[good].min()),
         tension_max=float(tension[good].max()),
         vertical_max=float(np.abs(plan.vertical_force[good]).max()),
-        jerkiness=_jerkiness(run),
+        **_smoothness(run),
         length_min=float(plan.unstrained_length[good].min()),
         length_max=float(plan.unstrained_length[good].max()),
         adjusting_min=float(cables.adjusting_length[good].min()),
@@ -180,10 +185,13 @@ def _run(robot: Robot, path: Path, model: CableModel, method: TensionMethod) -> 
     return confirm(inverse(robot, path, model, method))
 
 
-def _jerkiness(run: Confirmation) -> float:
+def _smoothness(run: Confirmation) -> dict[str, float]:
     path, tension = run.plan.path, run.plan.horizontal_tension
-    if path is None or len(path) < 3:
-        return float("nan")
-    step = float(path.time[1] - path.time[0])
-    second = np.abs(np.diff(tension, n=2, axis=0)) / step**2
-    return float(np.nanmax(second)) if np.isfinite(second).any() else float("nan")
+    assert path is not None
+    change = np.diff(tension, axis=0)
+    slope = change / np.diff(path.time)[:, None]
+    return {
+        "step_max": float(np.nanmax(np.abs(change))),
+        "slope_max": float(np.nanmax(np.abs(slope))),
+        "slope_jump": float(np.nanmax(np.abs(np.diff(slope, axis=0)))),
+    }

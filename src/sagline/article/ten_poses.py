@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.arrays import Array, locked
 from sagline.article.fits import Line, fit_line
 from sagline.article.machine import PARAMETERS, Machine, Parameter
 from sagline.article.table2 import Table2, table2
@@ -18,11 +18,13 @@ from sagline.cables.empirical import Empirical
 from sagline.files.robot_file import load_robot
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan
+from sagline.motion.quintic import PEAK_SPEED, quintic_path
 from sagline.robot.pose import Pose
 from sagline.tension.minimum_norm import MinimumNorm
 
 HOME = (0.0, 0.0, 1.5)  # m, the prototype's home position
 METHOD = MinimumNorm("horizontal")
+TOUR_SPEED = 0.2  # m/s, ours: the article says "low speed"
 STEP = 0.02  # of a typical error, for the slopes
 NEWTON_STEPS = 12
 SETTLED = 1e-4  # of a plausible error
@@ -42,6 +44,18 @@ class Trend(NamedTuple):
     error: Array
     height_slope: float
     height_correlation: float
+
+
+class Tour(NamedTuple):
+    """The prototype's way through the ten poses.
+
+    Attributes:
+        plan: Planned along it with the empirical model.
+        stops: When it passes the ten poses [s], shape (10,).
+    """
+
+    plan: Plan
+    stops: Array
 
 
 class Guess(NamedTuple):
@@ -152,6 +166,19 @@ def ten_poses(parameters: Sequence[Parameter] = PARAMETERS, most: int = 3, best:
         unlimited=min(wild, key=lambda guess: guess.rms),
         measured_rms=float(np.sqrt(np.mean(table.error**2))),
     )
+
+
+def tour(rate: float = 10.0) -> Tour:
+    """The prototype's way from its home position through the ten poses and back, from rest to rest, without stops.
+
+    Args:
+        rate: Samples per second [1/s].
+    """
+    stops = [HOME, *table2().desired, HOME]
+    path = quintic_path(stops, speed=TOUR_SPEED, rate=rate)
+    plan = inverse(load_robot("article-prototype"), path, Empirical(), METHOD)
+    way = np.linalg.norm(np.diff(np.asarray(stops), axis=0), axis=1)
+    return Tour(plan, locked(np.cumsum(way * PEAK_SPEED / TOUR_SPEED)[:-1]))
 
 
 def _planned(machine: Machine, positions: Array) -> Plan:

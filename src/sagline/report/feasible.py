@@ -121,9 +121,9 @@ def _line(study: FeasibleSets, draw: Drawings) -> Finding:
         "low T_x.",
         measured=f"R² = {n(line.r_squared, '.8f')}; slope {n(line.slope, '.5f')} against tan φ = "
         f"{n(study.tangent, '.5f')}; intercept {n(line.intercept, '.4f')} N against wD/2 = "
-        f"{n(study.half_weight, '.4f')} N. Largest distance from the fitted line {n(line.deviation, '.2g')} N. With tan φ and wD/2 it is "
-        f"{n(_largest(from_article), '.2g')} N in all and {n(_largest(from_article[taut]), '.2g')} N from "
-        f"{n(LOW_PART)} N on. Nearly a line, and never exactly one.",
+        f"{n(study.half_weight, '.4f')} N. Largest distance from the fitted line {n(line.deviation, '.2g')} N. With "
+        f"tan φ and wD/2 it is {n(_largest(from_article), '.2g')} N in all and "
+        f"{n(_largest(from_article[taut]), '.2g')} N from {n(LOW_PART)} N on. Nearly a line, and never exactly one.",
         verdict=Verdict.HOLDS_WITHIN,
         numbers={
             "r_squared": line.r_squared,

@@ -37,8 +37,8 @@ def identify_chapter() -> Chapter:
         "identify",
         "Identification for a cable of one's own",
         "What the article did for its cables, in two calls: sagline.identify_empirical finds the empirical model for a "
-        "known cable and a working range; sagline.identify_cable, and the command sagline identify, find the cable from "
-        "measured lengths and tensions. Here for the simulation's cable.",
+        "known cable and a working range; sagline.identify_cable, and the command sagline identify, find the cable "
+        "from measured lengths and tensions. Here for the simulation's cable.",
         (_constants(fit, draw), _limits(fit, draw), _measured()),
     )
 
@@ -64,10 +64,10 @@ def _constants(fit: EmpiricalFit, draw: Drawings) -> Finding:
         key="empirical-fit",
         title="constants for a working range",
         statement="",
-        measured=f"Spans {n(SPANS[0])} to {n(SPANS[-1])} m, rises {n(RISES[0])} to {n(RISES[-1])} m, T_x {n(TENSIONS[0])} "
-        f"to {n(TENSIONS[-1])} N: k_h = {n(fit.k_h.value, '.4f')}, k_p = {n(fit.k_p.value, '.4f')}. k_h is below g/2 "
-        "because a stretched cable is lighter. The interval says how far a constant moves within the range; it is no "
-        "measuring error.",
+        measured=f"Spans {n(SPANS[0])} to {n(SPANS[-1])} m, rises {n(RISES[0])} to {n(RISES[-1])} m, T_x "
+        f"{n(TENSIONS[0])} to {n(TENSIONS[-1])} N: k_h = {n(fit.k_h.value, '.4f')}, k_p = {n(fit.k_p.value, '.4f')}. "
+        "k_h is below g/2 because a stretched cable is lighter. The interval says how far a constant moves within the "
+        "range; it is no measuring error.",
         verdict=Verdict.OURS,
         numbers={
             "k_h": fit.k_h._asdict(),
@@ -102,8 +102,8 @@ def _limits(fit: EmpiricalFit, draw: Drawings) -> Finding:
         key="validity-limits",
         title="the validity limits w_max and T_x,min",
         statement="Section 3: ρgL < w_max and T_x > T_x,min must be satisfied. Neither has a value in the article.",
-        measured=f"For 5 mm: T_x,min = {n(limits[2]['tension_min_N'], '.3g')} N with the heaviest cable of the range, or "
-        f"wL ≤ {n(limits[2]['weight_max_N'], '.2f')} N with every tension of it. A dash: not within this range.",
+        measured=f"For 5 mm: T_x,min = {n(limits[2]['tension_min_N'], '.3g')} N with the heaviest cable of the range, "
+        f"or wL ≤ {n(limits[2]['weight_max_N'], '.2f')} N with every tension of it. A dash: not within this range.",
         verdict=Verdict.OPEN,
         numbers={"limits": limits},
         panels=(draw.panel(figure, "Heaviest cable over the lowest tension, for four tolerances."),),
@@ -148,8 +148,9 @@ def _measured() -> Finding:
         title="density and stiffness from measurements",
         statement="",
         measured=f"Four sets of {SAMPLES} made-up measurements of a cable of {n(cable.linear_density)} kg/m and EA = "
-        f"{n(cable.axial_stiffness)} N, with scatter of {n(1e3 * LENGTH_ERROR)} mm and {n(TENSION_ERROR)} N at the frame "
-        "end. Loose cables tell the density, taut ones the stiffness; a zero of the encoder hides in the stiffness.",
+        f"{n(cable.axial_stiffness)} N, with scatter of {n(1e3 * LENGTH_ERROR)} mm and {n(TENSION_ERROR)} N at the "
+        "frame end. Loose cables tell the density, taut ones the stiffness; a zero of the encoder hides in the "
+        "stiffness.",
         verdict=Verdict.OURS,
         numbers={"cases": numbers},
         data=(
