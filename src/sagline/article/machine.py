@@ -16,6 +16,7 @@ from sagline.kinematics.plan import Plan
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
+MODULUS, DENSITY = "Young's modulus E", "linear density ρ"
 PULLEY_ROUNDS = 8  # the exit points move by a radius, the platform by less
 
 
@@ -136,8 +137,8 @@ def _pulley(machine: Machine, millimeters: float) -> Machine:
 
 
 PARAMETERS = (
-    Parameter("Young's modulus E", "%", 20.0, 50.0, False, _modulus),
-    Parameter("linear density ρ", "%", 20.0, 30.0, False, _density),
+    Parameter(MODULUS, "%", 20.0, 50.0, False, _modulus),
+    Parameter(DENSITY, "%", 20.0, 30.0, False, _density),
     Parameter("load", "kg", -2.0, 5.0, False, _load),
     Parameter("anchor height", "mm", 20.0, 50.0, False, _anchor_height),
     Parameter("drum radius", "%", -1.0, 3.0, False, _drum),

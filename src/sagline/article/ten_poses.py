@@ -128,7 +128,7 @@ def ten_poses(parameters: Sequence[Parameter] = PARAMETERS, most: int = 3, best:
     Args:
         parameters: What may be off.
         most: Largest number of parameters in an explanation.
-        best: How many explanations of each number to keep.
+        best: How many explanations by two or more parameters to keep; by one, all.
 
     Returns:
         The study.
@@ -151,9 +151,10 @@ def ten_poses(parameters: Sequence[Parameter] = PARAMETERS, most: int = 3, best:
     explanations = []
     for count in range(1, most + 1):
         guesses = [_guess(chosen, slopes, missing, limited=True) for chosen in combinations(parameters, count)]
-        ranked = sorted(guesses, key=lambda guess: guess.rms)[: 2 * best]
+        kept = len(guesses) if count == 1 else best
+        ranked = sorted(guesses, key=lambda guess: guess.rms)[: 2 * kept]
         fitted = [_fitted(guess.parameters, slopes, error_of, table.error) for guess in ranked]
-        explanations.append(tuple(sorted(fitted, key=lambda found: found.rms)[:best]))
+        explanations.append(tuple(sorted(fitted, key=lambda found: found.rms)[:kept]))
     wild = [_guess(chosen, slopes, missing, limited=False) for chosen in combinations(parameters, most)]
     return TenPoses(
         table=table,

@@ -48,10 +48,12 @@ def identify(
     for name, estimate, unit in (("k_h", model.k_h, "m/s²"), ("k_p", model.k_p, "m²/s⁴")):
         table.add_row(name, written(estimate.value, ".5g"), written(estimate.high - estimate.value, ".2g"), unit)
     show(table)
-    show(f"chi-squared per degree of freedom: {written(cable.chi_squared, '.3g')} (about 1 where the errors are as given)")
     show(
-        f"The empirical model with k_h, k_p keeps a position error of {1e3 * TOLERANCE:g} mm in the measured range from "
-        f"T_x = {written(model.tension_min(TOLERANCE), '.3g')} N on."
+        f"chi-squared per degree of freedom: {written(cable.chi_squared, '.3g')} (about 1 where the errors are as given)"
+    )
+    show(
+        f"The empirical model with k_h, k_p keeps a position error of {1e3 * TOLERANCE:g} mm in the measured range "
+        f"from T_x = {written(model.tension_min(TOLERANCE), '.3g')} N on."
     )
     for warning in cable.warnings:
         note("Warning: ", warning, style="bold yellow")
@@ -60,8 +62,10 @@ def identify(
 def _model(cable: CableFit, data: Measurements) -> EmpiricalFit:
     """The empirical model over the measured range of spans, rises and tensions."""
     horizontal = data.tension * data.span / np.hypot(data.span, data.rise)
-    axes = (np.linspace(values.min(), values.max(), STEPS) for values in (data.span, data.rise, horizontal))
-    return identify_empirical(cable.cable, *axes)
+    spans, rises, tensions = (
+        np.linspace(values.min(), values.max(), STEPS) for values in (data.span, data.rise, horizontal)
+    )
+    return identify_empirical(cable.cable, spans, rises, tensions)
 
 
 def _record(cable: CableFit, model: EmpiricalFit) -> dict[str, Any]:

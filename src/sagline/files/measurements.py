@@ -6,7 +6,7 @@ import csv
 import os
 import re
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -67,7 +67,7 @@ def _factors(path: Path, header: list[str]) -> dict[str, float]:
         if name not in UNITS or name in factors:
             raise FileError(path, f"line 1: column {name!r}", f"Give each of {', '.join(UNITS)} once, and no other.")
         try:
-            factors[name] = 1.0 if unit is None else float(in_si(f"1 {unit}", UNITS[name], name))
+            factors[name] = 1.0 if unit is None else cast(float, in_si(f"1 {unit}", UNITS[name], name))
         except InvalidValueError:
             step = f"Give a unit that converts to {UNITS[name]}."
             raise FileError(path, f"line 1: the unit of {name} is [{unit}]", step) from None
@@ -86,6 +86,9 @@ def _number(path: Path, line: int, row: list[str], column: int, factors: dict[st
     name = list(factors)[column]
     if not np.isfinite(value) or (name != "rise" and value <= 0.0):
         allowed = "a finite number" if name == "rise" else "a number > 0"
-        raise FileError(path, f"line {line}: {name} is {row[column].strip() or 'empty'}; allowed: {allowed}",
-                        f"Correct line {line}.")
+        raise FileError(
+            path,
+            f"line {line}: {name} is {row[column].strip() or 'empty'}; allowed: {allowed}",
+            f"Correct line {line}.",
+        )
     return value

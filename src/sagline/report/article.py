@@ -20,9 +20,10 @@ from sagline.report.parts import selection
 TITLE = "The article, redone"
 LEAD = (
     "Gia Luan & Truong Thinh, “Empirical Quasi-Static and Inverse Kinematics of Cable-Driven Parallel Manipulators "
-    "Including Presence of Sagging”, Appl. Sci. 2020, 10(15), 5318, doi:10.3390/app10155318. What it says stands beside "
-    "what sagline computes, with exact elastic catenaries as the reference. Notation: z up, T acts on the cable at its "
-    "platform end, φ is the article's β. Every number on the computed side was computed when this page was made."
+    "Including Presence of Sagging”, Appl. Sci. 2020, 10(15), 5318, doi:10.3390/app10155318. What it says stands "
+    "beside what sagline computes, with exact elastic catenaries as the reference. Notation: z up, T acts on the "
+    "cable at its platform end, φ is the article's β. Every number on the computed side was computed when this page "
+    "was made."
 )
 
 Progress = Callable[[int, int, str], None]

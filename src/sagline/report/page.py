@@ -69,7 +69,8 @@ def _chapter(number: int, chapter: Chapter) -> str:
 
 def _finding(finding: Finding) -> str:
     said = f'<div class="said"><h4>The article</h4><p>{_text(finding.statement)}</p></div>' if finding.statement else ""
-    found = f'<div class="found"><h4>Computed</h4><p>{_text(finding.measured)}</p></div>'
+    paragraphs = "".join(f"<p>{_text(part)}</p>" for part in finding.measured.split("\n\n"))
+    found = f'<div class="found"><h4>Computed</h4>{paragraphs}</div>'
     panels = "".join(
         f"<figure>{panel.svg}<figcaption>{_text(panel.caption)}</figcaption></figure>" for panel in finding.panels
     )

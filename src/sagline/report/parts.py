@@ -69,7 +69,9 @@ class Selection:
     @property
     def parts(self) -> tuple[Part, ...]:
         """The chapters that have something to build."""
-        return tuple(p for p in PARTS if p.key in self.whole or self.figures & {*p.figures} or self.tables & {*p.tables})
+        return tuple(
+            p for p in PARTS if p.key in self.whole or self.figures & {*p.figures} or self.tables & {*p.tables}
+        )
 
     def cut(self, chapter: Chapter) -> Chapter:
         """What of a chapter is wanted."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from sagline.arrays import Array
 from sagline.article.fits import fit_line
-from sagline.article.machine import Parameter
+from sagline.article.machine import DENSITY, MODULUS, Parameter
 from sagline.article.ten_poses import Explanation, TenPoses, Tour, ten_poses, tour
 from sagline.plot.sheet import BLUE, COLORS, TICK, VERMILLION
 from sagline.report.blocks import Chapter, Finding, Panel, Table, Verdict, n
@@ -170,7 +170,7 @@ def _trends(study: TenPoses, draw: Drawings) -> Finding:
     for k, trend in enumerate(study.trends):
         axis = ax if k < 5 else bx
         line = fit_line(height, 1e3 * trend.error[:, 2])
-        label = f"{trend.parameter.name} {trend.parameter.typical:+g} {trend.parameter.unit}"
+        label = f"{trend.parameter.name} {n(trend.parameter.typical, '+g')} {trend.parameter.unit}"
         axis.plot(fine, line.slope * fine + line.intercept, color=COLORS[k % 5], linewidth=1.2, label=label)
     for axis in (ax, bx):
         axis.set_ylim(-25.0, 85.0)
@@ -191,7 +191,8 @@ def _trends(study: TenPoses, draw: Drawings) -> Finding:
     return Finding(
         key="one-parameter-off",
         title="one parameter off at a time",
-        statement="The error “is produced by many sources”; the relation to the tensions “can be interpreted easily”.",
+        statement="“The larger the cable tensions, the smaller the positioning error”; the relation “can be "
+        "interpreted easily”.",
         measured="A stiffer cable than planned (E too low in the plan) lifts the platform most where tensions are "
         f"high: {n(slopes[study.trends[0].parameter.name], '+.3g')} mm per meter, the opposite of the measured "
         f"{n(1e3 * study.height_line.slope, '+.3g')}. With the signs shown, an error that falls with height comes "
@@ -224,7 +225,7 @@ def _explanations(study: TenPoses, draw: Drawings) -> Finding:
         for found in group
     ]
     best = [group[0] for group in study.explanations]
-    guess = study.unlimited
+    guess, alone = study.unlimited, {found.parameters[0].name: found.rms for found in study.explanations[0]}
     return Finding(
         key="explanations",
         title="what would explain the measured errors",
@@ -234,9 +235,10 @@ def _explanations(study: TenPoses, draw: Drawings) -> Finding:
         f"parameter leaves {n(1e3 * best[0].rms, '.1f')} mm: {_values(best[0])}. Two leave "
         f"{n(1e3 * best[1].rms, '.1f')}: {_values(best[1])}. Three leave {n(1e3 * best[2].rms, '.1f')}: "
         f"{_values(best[2])}. Printing in whole millimeters allows {n(1e3 * PRINTING, '.1f')} mm, so none is the "
-        "whole truth. It says that the pattern is geometric, of the kind that an unmodeled pulley or a wrong height "
-        "of the anchors makes, and not a wrong cable. It does not say that these parts were wrong: anchors and wiring "
-        "are ours, ten poses cannot separate parameters with like patterns, and values without limits fit still "
+        "whole truth.\n\nIt says: the pattern is geometric, as unmodeled pulleys or a wrong height of the anchors "
+        f"make it, not that of a wrong cable: E alone leaves {n(1e3 * alone[MODULUS], '.1f')} mm, ρ alone "
+        f"{n(1e3 * alone[DENSITY], '.1f')} mm.\n\nIt does not say that these parts were wrong: anchors and "
+        "wiring are ours, ten poses cannot separate parameters with like patterns, and values without limits fit still "
         f"better ({n(1e3 * guess.rms, '.1f')} mm) with nonsense: " + _list(guess.parameters, guess.values) + ".",
         verdict=Verdict.OPEN,
         numbers={
