@@ -81,7 +81,7 @@ def euler_rates() -> Erratum:
     at_rest, _ = _angular(angles, still, still)
     return Erratum(
         3,
-        "Euler-angle rates as angular velocity",
+        "Angular velocity from Euler-angle rates",
         "(5) takes the second derivative of (α, β, γ) as angular acceleration, and has a term M W ẋ.",
         "ω follows from the rates by a matrix of the angles, and a mass has no such term in a fixed frame. "
         "Both are right only for a constant orientation, which is the article's test.",

@@ -48,9 +48,7 @@ def identify(
     for name, estimate, unit in (("k_h", model.k_h, "m/s²"), ("k_p", model.k_p, "m²/s⁴")):
         table.add_row(name, written(estimate.value, ".5g"), written(estimate.high - estimate.value, ".2g"), unit)
     show(table)
-    show(
-        f"chi-squared per degree of freedom: {written(cable.chi_squared, '.3g')} (about 1 where the errors are as given)"
-    )
+    show(f"chi-squared per degree of freedom: {written(cable.chi_squared, '.3g')} (about 1 if the errors are as given)")
     show(
         f"The empirical model with k_h, k_p keeps a position error of {1e3 * TOLERANCE:g} mm in the measured range "
         f"from T_x = {written(model.tension_min(TOLERANCE), '.3g')} N on."

@@ -126,14 +126,14 @@ def _range(study: ConstantsStudy, draw: Drawings) -> Finding:
     _course(ax, study.over_lowest, "lowest", "k_p", BLUE, "regression")
     ax.axhline(PUBLISHED_K_P, color=VERMILLION, linewidth=0.9, linestyle="--", label="published")
     ax.axhline(SHALLOW_K_P, color="0.4", linewidth=0.9, linestyle=":", label="$g^2/24$")
-    ax.set_xscale("log")
+    _logarithmic(ax, (50, 100, 200, 500))
     legend(ax)
     second, bx = axes("highest sampled $T_x$ [N]", "$|k_h|$ [m/s²]")
     _course(bx, study.over_highest, "highest", "k_h_frame", BLUE, "frame end")
     _course(bx, study.over_highest, "highest", "k_h_platform", PURPLE, "platform end")
     bx.axhline(PUBLISHED_K_H, color=VERMILLION, linewidth=0.9, linestyle="--", label="published")
     bx.axhline(SHALLOW_K_H, color="0.4", linewidth=0.9, linestyle=":", label="$g/2$")
-    bx.set_xscale("log")
+    _logarithmic(bx, (500, 2000, 10_000, 40_000))
     legend(bx)
     all_k_p = [c.k_p for c in study.over_lowest]
     return Finding(
@@ -213,6 +213,12 @@ def _course(ax: Axes, course: tuple[Constants, ...], x: str, y: str, color: str,
     ax.plot(
         [getattr(c, x) for c in course], values, color=color, marker="o", markersize=3.0, linewidth=1.1, label=label
     )
+
+
+def _logarithmic(ax: Axes, ticks: tuple[int, ...]) -> None:
+    ax.set_xscale("log")
+    ax.minorticks_off()
+    ax.set_xticks(ticks, labels=[str(tick) for tick in ticks])
 
 
 def _bend(chords: Array, intercept: Array, h_b: Array) -> float:

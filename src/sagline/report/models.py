@@ -185,7 +185,7 @@ def _examples() -> Finding:
         length, force = (1e3 * study.length_error.ravel(), study.force_error.ravel())
         weight = density * GRAVITY * chord
         rows.append(
-            (f"{n(chord)} m, {n(tension)} N, wD/τ = {n(weight / tension, '.2g')}", *(n(x, "+.3g") for x in length[:-1]))
+            (f"{n(chord)} m, {n(tension)} N, wD/τ = {n(weight / tension, '.2g')}", *(n(x, "+.2g") for x in length[:-1]))
         )
         numbers.append(
             {

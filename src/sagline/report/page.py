@@ -9,7 +9,9 @@ from importlib.resources import files
 
 from sagline.report.blocks import Chapter, Finding, Table, Verdict
 
-_subscript = re.compile(r"(?<=[A-Za-zα-ωΑ-Ω])_([A-Za-zα-ω0-9]{1,3})(?![A-Za-zα-ω0-9_])")
+SENTENCE = 40  # characters from which on a cell of a table is text
+
+_subscript = re.compile(r"(?<=[A-Za-zα-ωΑ-Ω])_([A-Za-zα-ω0-9]{1,3}(?:,min)?)(?![A-Za-zα-ω0-9_])")
 
 CLASSES = {
     Verdict.HOLDS: "holds",
@@ -101,12 +103,14 @@ def _badge(finding: Finding) -> str:
     return f'<span class="badge {CLASSES[finding.verdict]}">{finding.verdict}</span>'
 
 
+def _cell(text: str) -> str:
+    """A number on one line, or a sentence that may wrap."""
+    return f'<td class="words">{_text(text)}</td>' if len(text) > SENTENCE else f"<td>{_text(text)}</td>"
+
+
 def _table(table: Table) -> str:
     head = "".join(f'<th scope="col">{_text(cell)}</th>' for cell in table.head)
-    rows = "".join(
-        f'<tr><th scope="row">{_text(row[0])}</th>{"".join(f"<td>{_text(cell)}</td>" for cell in row[1:])}</tr>'
-        for row in table.rows
-    )
+    rows = "".join(f'<tr><th scope="row">{_text(row[0])}</th>{"".join(map(_cell, row[1:]))}</tr>' for row in table.rows)
     return (
         f'<div class="scroll" tabindex="0"><table><caption>{_text(table.caption)}</caption>'
         f"<thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>"

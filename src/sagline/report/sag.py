@@ -33,8 +33,8 @@ def sag_chapter() -> Chapter:
     return Chapter(
         "sag",
         "The adjusting length and k_p",
-        "Figures 8 and 9 with the simulation's cable at D = 10 m; figures 10 to 15 with cables that do not stretch, "
-        "sampled as above.",
+        f"Figures 8 and 9 with the simulation's cable at D = {n(CHORD)} m; figures 10 to 15 with cables that do not "
+        "stretch, sampled as above.",
         (
             _with_stretch(stretch, draw),
             _relieved(stretch, draw),

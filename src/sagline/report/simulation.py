@@ -36,7 +36,7 @@ def simulation_chapter() -> Chapter:
         "The simulation",
         "Both robots of Table 1 along a planar rest-to-rest path at z = 1.5 m. The article prints no anchor "
         "coordinates and no numbers of its path: ours are chosen and stated with the presets. Tensions are the least "
-        "norm of T_x within our limits of 25 N and 2 kN. Position errors are those of exact elastic cables wound to "
+        "norm of T_x within the limits of the presets. Position errors are those of exact elastic cables wound to "
         "the planned lengths, inertia included.",
         (
             _robots(study, draw),
