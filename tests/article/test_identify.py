@@ -83,7 +83,7 @@ def test_exact_measurements_give_the_cable_back() -> None:
         ("platform_end", state.platform_end_tension),
         ("chord", state.chord_tension),
     ):
-        fit = sl.identify_cable(*data[:3], tension, tension_at=place)  # type: ignore[arg-type]
+        fit = sl.identify_cable(data[0], data[1], data[2], tension, tension_at=place)  # type: ignore[arg-type]
         assert fit.values == pytest.approx([0.067, 44e3], rel=1e-6)
         assert fit.warnings == ()
     shifted = sl.identify_cable(

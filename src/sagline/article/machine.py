@@ -12,6 +12,7 @@ from sagline.arrays import Array
 from sagline.cables.cable import Cable
 from sagline.errors import InvalidValueError
 from sagline.kinematics.forward import forward
+from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
@@ -29,7 +30,8 @@ class Machine:
         drum_error: Relative error of the drum radius: how much too much is wound, counted from the home pose.
         length_offset: By how much every cable is longer than planned, at every pose [m].
         pulley_radius: Of pulleys that swivel about a vertical axis through the frame anchors, where the cable
-            enters them from below [m]. The planned lengths know nothing of them, but the encoders are set at home.
+            enters them from below [m]. The planned lengths know nothing of them, but the encoders are set
+            while the platform rests in its home pose.
     """
 
     robot: Robot
@@ -48,13 +50,13 @@ class Machine:
             Positions of the platform origin [m], shape (N, 3).
 
         Raises:
-            InvalidValueError: If the platform finds no stable rest at some pose.
+            InvalidValueError: If the cables do not hold the platform in a stable equilibrium at some pose.
         """
         lengths = plan.unstrained_length + self.length_offset
         lengths = lengths + self.drum_error * (plan.unstrained_length - home.unstrained_length)
         if self.pulley_radius == 0.0:
             return _rest(self.robot, lengths, plan.state.pose)
-        at_home = _excess(self.robot, home.state.pose[0], self.pulley_radius)
+        at_home = _zero(self.robot, home, self.pulley_radius)
         return np.array(
             [self._rest_on_pulleys(row + at_home, pose) for row, pose in zip(lengths, plan.state.pose, strict=True)]
         )
@@ -151,10 +153,13 @@ PARAMETERS = (
 
 def _rest(robot: Robot, lengths: Array, start: Pose) -> Array:
     found = forward(robot, lengths, start=start)
-    if not found.stable.all():
-        pose = int(np.argmin(found.stable))
+    if not found.solved.all():
+        pose = int(np.argmin(found.solved))
         raise InvalidValueError(
-            "the changed robot", f"without a stable rest at pose {pose}", "smaller changes", "Change it by less."
+            "the changed robot",
+            f"not held in a stable equilibrium at pose {pose}",
+            "smaller changes",
+            "Change it by less.",
         )
     return found.pose.position
 
@@ -177,10 +182,15 @@ def _exits(robot: Robot, pose: Pose, radius: float) -> tuple[Array, Array]:
     return exits, radius * (0.5 * np.pi + below)
 
 
-def _excess(robot: Robot, pose: Pose, radius: float) -> Array:
-    """How much longer than its chord a taut cable over its pulley is [m], shape (m,)."""
-    exits, wrapped = _exits(robot, pose, radius)
-    ends = pose.position + robot.platform_anchors @ pose.matrix.T
-    chord = np.linalg.norm(ends - robot.frame_anchors, axis=1)
-    excess: Array = wrapped + np.linalg.norm(ends - exits, axis=1) - chord
-    return excess
+def _zero(robot: Robot, home: Plan, radius: float) -> Array:
+    """By how much pulleys lengthen the cables that hold the platform in its home pose [m], shape (m,).
+
+    The encoders, set there, do not count it.
+    """
+    exits, wrapped = _exits(robot, home.state.pose[0], radius)
+    over, bare = (
+        inverse(seen, home.state.pose, tension=home.tension).unstrained_length[0]
+        for seen in (robot.replace(frame_anchors=exits), robot)
+    )
+    zero: Array = over + wrapped - bare
+    return zero

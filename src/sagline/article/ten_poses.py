@@ -25,9 +25,9 @@ from sagline.tension.minimum_norm import MinimumNorm
 HOME = (0.0, 0.0, 1.5)  # m, the prototype's home position
 METHOD = MinimumNorm("horizontal")
 TOUR_SPEED = 0.2  # m/s, ours: the article says "low speed"
-STEP = 0.02  # of a typical error, for the slopes
-NEWTON_STEPS = 12
-SETTLED = 1e-4  # of a plausible error
+STEP = 0.01  # of a plausible error, for the slopes
+NEWTON_STEPS = 8
+SETTLED = 1e-3  # of a plausible error
 
 
 class Trend(NamedTuple):
@@ -142,19 +142,17 @@ def ten_poses(parameters: Sequence[Parameter] = PARAMETERS, most: int = 3, best:
         changed = reduce(lambda m, pair: pair[0].changed(m, float(pair[1])), zip(chosen, values, strict=True), machine)
         return changed.rest(plan, home) - table.desired
 
-    slopes = {}
-    for parameter in parameters:
-        step = STEP * abs(parameter.typical)
-        slopes[parameter.name] = (error_of([parameter], np.array([step])) - (nominal - table.desired)) / step
+    zero = np.zeros(1)
+    slopes = {p.name: _slope([p], zero, 0, nominal - table.desired, error_of) for p in parameters}
     trends = [_trend(p, error_of([p], np.array([p.typical])), table) for p in parameters]
     missing = (table.actual - nominal).ravel()
     explanations = []
     for count in range(1, most + 1):
         guesses = [_guess(chosen, slopes, missing, limited=True) for chosen in combinations(parameters, count)]
         kept = len(guesses) if count == 1 else best
-        ranked = sorted(guesses, key=lambda guess: guess.rms)[: 2 * kept]
-        fitted = [_fitted(guess.parameters, slopes, error_of, table.error) for guess in ranked]
-        explanations.append(tuple(sorted(fitted, key=lambda found: found.rms)[:kept]))
+        ranked = sorted(guesses, key=lambda guess: guess.rms)[:kept]
+        fitted = [_fitted(guess, error_of, table.error) for guess in ranked]
+        explanations.append(tuple(sorted(fitted, key=lambda found: found.rms)))
     wild = [_guess(chosen, slopes, missing, limited=False) for chosen in combinations(parameters, most)]
     return TenPoses(
         table=table,
@@ -192,18 +190,13 @@ def _trend(parameter: Parameter, error: Array, table: Table2) -> Trend:
     return Trend(parameter, error, float(line.slope), float(np.corrcoef(height, error[:, 2])[0, 1]))
 
 
-def _fitted(
-    chosen: tuple[Parameter, ...],
-    slopes: Mapping[str, Array],
-    error_of: Callable[[Sequence[Parameter], Array], Array],
-    measured: Array,
-) -> Explanation:
-    """Least squares within the plausible errors by Gauss-Newton; the slopes change little, so they are kept."""
+def _fitted(guess: Guess, error_of: Callable[[Sequence[Parameter], Array], Array], measured: Array) -> Explanation:
+    """Least squares within the plausible errors by Gauss-Newton, from the guess on."""
+    chosen, values = guess.parameters, guess.values
     low, high = _limits(chosen)
-    matrix = _matrix(chosen, slopes)
-    values = np.zeros(len(chosen))
     predicted = error_of(chosen, values)
     for _ in range(NEWTON_STEPS):
+        matrix = np.stack([_slope(chosen, values, k, predicted, error_of) for k in range(len(chosen))], axis=1)
         new = _bounded(matrix, (measured - predicted).ravel() + matrix @ values, low, high)
         step, values = float(np.abs((new - values) / high).max()), new
         predicted = error_of(chosen, values)
@@ -220,6 +213,21 @@ def _fitted(
     )
 
 
+def _slope(
+    chosen: Sequence[Parameter],
+    values: Array,
+    k: int,
+    error: Array,
+    error_of: Callable[[Sequence[Parameter], Array], Array],
+) -> Array:
+    """Change of the errors with the k-th value, shape (30,), by a difference away from its limit."""
+    step = -STEP * chosen[k].plausible if values[k] > 0.0 else STEP * chosen[k].plausible
+    moved = values.copy()
+    moved[k] += step
+    slope: Array = (error_of(chosen, moved) - error).ravel() / step
+    return slope
+
+
 def _guess(chosen: tuple[Parameter, ...], slopes: Mapping[str, Array], missing: Array, *, limited: bool) -> Guess:
     matrix = _matrix(chosen, slopes)
     values = _bounded(matrix, missing, *_limits(chosen)) if limited else np.asarray(np.linalg.lstsq(matrix, missing)[0])
@@ -227,7 +235,7 @@ def _guess(chosen: tuple[Parameter, ...], slopes: Mapping[str, Array], missing: 
 
 
 def _matrix(chosen: Sequence[Parameter], slopes: Mapping[str, Array]) -> Array:
-    return np.stack([slopes[parameter.name].ravel() for parameter in chosen], axis=1)
+    return np.stack([slopes[parameter.name] for parameter in chosen], axis=1)
 
 
 def _limits(chosen: Sequence[Parameter]) -> tuple[Array, Array]:
