@@ -60,6 +60,9 @@ from sagline.tension.singular import unresisted_motion
 
 if TYPE_CHECKING:
     from sagline import plot
+    from sagline.article.identify import EmpiricalFit, identify_empirical
+    from sagline.article.identify_cable import CableFit, identify_cable
+    from sagline.files.measurements import load_measurements
     from sagline.files.path_file import load_path
     from sagline.files.plan_file import load_plan, save_plan
     from sagline.files.robot_file import dump_robot, load_robot
@@ -70,6 +73,7 @@ __all__ = [
     "AnalyticCenter",
     "ArticleBalance",
     "Cable",
+    "CableFit",
     "CableGeometryError",
     "CableModel",
     "CableState",
@@ -81,6 +85,7 @@ __all__ = [
     "Confirmation",
     "Elastic",
     "Empirical",
+    "EmpiricalFit",
     "Equilibria",
     "Equilibrium",
     "FileError",
@@ -123,9 +128,12 @@ __all__ = [
     "dump_robot",
     "equilibria",
     "forward",
+    "identify_cable",
+    "identify_empirical",
     "inertial_wrench",
     "inverse",
     "limit_margin",
+    "load_measurements",
     "load_path",
     "load_plan",
     "load_robot",
@@ -144,7 +152,12 @@ __all__ = [
 
 # The outer ring loads on first use: it brings xarray, matplotlib, pint and pydantic with it.
 _LAZY = {
+    "CableFit": "sagline.article.identify_cable",
     "dump_robot": "sagline.files.robot_file",
+    "EmpiricalFit": "sagline.article.identify",
+    "identify_cable": "sagline.article.identify_cable",
+    "identify_empirical": "sagline.article.identify",
+    "load_measurements": "sagline.files.measurements",
     "load_path": "sagline.files.path_file",
     "load_plan": "sagline.files.plan_file",
     "load_robot": "sagline.files.robot_file",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from enum import StrEnum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
     from sagline.cables.model import CableModel
@@ -61,6 +61,24 @@ class Tension(StrEnum):
         from sagline.tension.methods import METHODS
 
         return METHODS[self.value.title().replace("-", "")](variable.value)
+
+
+class TensionPlace(StrEnum):
+    """Where a cable's tension is measured."""
+
+    FRAME_END = "frame-end"
+    PLATFORM_END = "platform-end"
+    CHORD = "chord"
+
+    @property
+    def key(self) -> Literal["frame_end", "platform_end", "chord"]:
+        """As the library spells it."""
+        places: dict[TensionPlace, Literal["frame_end", "platform_end", "chord"]] = {
+            TensionPlace.FRAME_END: "frame_end",
+            TensionPlace.PLATFORM_END: "platform_end",
+            TensionPlace.CHORD: "chord",
+        }
+        return places[self]
 
 
 def robot_completions(incomplete: str) -> list[str]:

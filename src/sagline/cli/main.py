@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from sagline.cli.choices import Model, Tension, Variable, robot_completions
+from sagline.cli.choices import Model, Tension, TensionPlace, Variable, robot_completions
 from sagline.cli.terminal import reported
 
 app = typer.Typer(
@@ -104,6 +104,68 @@ def run(out: OutOption = Path("output"), as_json: JsonOption = False) -> None:
 
         code = run_article(out, as_json=as_json)
     raise typer.Exit(code)
+
+
+@app.command()
+def article(
+    parts: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[PART]...",
+            help="figures N-M, table 2, or a chapter: feasible-sets, intercept, sag, constants, identify, models, "
+            "simulation, poses, errata. Default: everything.",
+        ),
+    ] = None,
+    out: OutOption = Path("output"),
+    as_json: JsonOption = False,
+) -> None:
+    """Redo the article's figures, tables and errata, as one page: what it says beside what is computed.
+
+    Writes DIR/article.html, which needs nothing else, and DIR/article.json with the numbers.
+
+    For example:
+
+    ```
+    sagline article
+    sagline article figures 6-9 --out results
+    sagline article errata table 2
+    ```
+    """
+    with reported():
+        from sagline.cli.report import write_report
+
+        write_report(out, parts or [], as_json=as_json)
+
+
+@app.command()
+def identify(
+    file: Annotated[
+        Path, typer.Argument(metavar="CSV", help="Columns span, rise, length, tension; units in brackets: span [mm].")
+    ],
+    length_error: Annotated[float, typer.Option(metavar="M", help="Standard error of a length [m].")] = 1e-3,
+    tension_error: Annotated[float, typer.Option(metavar="N", help="Standard error of a tension [N].")] = 1.0,
+    tension_at: Annotated[TensionPlace, typer.Option(help="Where the tension is measured.")] = TensionPlace.FRAME_END,
+    offset: Annotated[
+        bool, typer.Option("--offset/--no-offset", help="Find the zero of the lengths too, as one more unknown.")
+    ] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Find what a measured cable weighs and how stiff it is, and the empirical model for it.
+
+    Standard errors and warnings say what the measurements do not determine or cannot tell apart.
+
+    For example:
+
+    ```
+    sagline identify cable.csv
+    sagline identify cable.csv --length-error 0.002 --tension-at platform-end --offset
+    ```
+    """
+    with reported():
+        from sagline.cli.identify import identify as run
+
+        unknowns = ["linear_density", "axial_stiffness", *["length_offset"] * offset]
+        run(file, length_error, tension_error, tension_at.key, unknowns, as_json=as_json)
 
 
 @app.command()

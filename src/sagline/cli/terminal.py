@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -41,15 +41,31 @@ def reported() -> Iterator[None]:
 @contextmanager
 def working(what: str) -> Iterator[None]:
     """Say what is being done while it is done, where a person watches; and the first time that it compiles."""
-    from sagline.kernels.jit import is_cold
-
-    if is_cold():
-        note("First run: ", "compiling the numerical core, about a minute; later runs start at once.", style="bold")
+    _say_if_cold()
     if not _err.is_terminal:
         yield
         return
     with _err.status(f"{what} ..."):
         yield
+
+
+def _say_if_cold() -> None:
+    from sagline.kernels.jit import is_cold
+
+    if is_cold():
+        note("First run: ", "compiling the numerical core, about a minute; later runs start at once.", style="bold")
+
+
+@contextmanager
+def counting(what: str) -> Iterator[Callable[[int, int, str], None]]:
+    """A progress bar, where a person watches; it is told how much of how much is done, and what comes next."""
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed}/{task.total}"))
+    _say_if_cold()
+    with Progress(*columns, TimeElapsedColumn(), console=_err, transient=True, disable=not _err.is_terminal) as bar:
+        task = bar.add_task(what, total=None)
+        yield lambda done, total, name: bar.update(task, completed=done, total=total, description=f"{what}: {name}")
 
 
 def note(head: str, text: str, style: str = "") -> None:

@@ -1,0 +1,126 @@
+"""Errata 5 to 8: the single cable."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sagline.article.constants import PUBLISHED_K_P, SHALLOW_K_P
+from sagline.article.erratum import Erratum, Quantity
+from sagline.article.feasible_sets import End
+from sagline.article.sag_constant import sag_study, stretch_study
+from sagline.article.sampling import ANGLE, GRAVITY, article_sampling
+from sagline.article.simulation import ROBOTS
+from sagline.cables.cable import Cable
+from sagline.cables.catenary import Catenary
+from sagline.files.robot_file import load_robot
+from sagline.robot.pose import Pose
+from sagline.statics.balance import article_balance, structure_matrix
+
+LONG = 15.0  # m, the simulated frame
+TAUT = 20.0  # times the sampled tensions: so that only the leading terms are left
+NEARLY = 1e-6  # rad from vertical or level
+
+
+def stretch_by_end_tension() -> Erratum:
+    """Erratum 5: the elongation of (36) is that of the tension at B, not of the mean."""
+    cable = simulated_cable()
+    end = End(LONG * float(np.cos(ANGLE)), LONG * float(np.sin(ANGLE)))
+    study = stretch_study(cable, end, np.array([500.0]))
+    excess = float((study.relieved - study.relieved_exactly)[0])
+    length = end.chord + float(study.stretchable[0])
+    formula = float(cable.linear_density * GRAVITY * length**2 * np.sin(ANGLE) / (2.0 * cable.axial_stiffness))
+    return Erratum(
+        5,
+        "Stretch by the tension at one end",
+        "(35), (36): the elongation is |T|L/EA with T at the platform end.",
+        "By (2) it is that of the mean tension, so the length is off by wL² sin φ/(2EA).",
+        (
+            Quantity("error of (36), simulation's cable at 15 m", 1e3 * excess, "mm"),
+            Quantity("the same over sin φ", 1e3 * excess / float(np.sin(ANGLE)), "mm"),
+            Quantity("wL² sin φ/(2EA)", 1e3 * formula, "mm"),
+            Quantity(
+                "left of d after the mean tension is taken out, against the unstretchable cable",
+                1e3 * float((study.relieved_exactly - study.unstretchable)[0]),
+                "mm",
+            ),
+        ),
+    )
+
+
+def sag_constant() -> Erratum:
+    """Erratum 6: k_p of shallow cables is g^2/24."""
+    sampling = article_sampling()
+    taut = sag_study(sampling.between(*(TAUT * sampling.tensions[[0, -1]])))
+    return Erratum(
+        6,
+        "The sag constant k_p",
+        "(45): k_p = 4.385, “we cannot exactly formulate k_p due to the errors in the established model”.",
+        "For shallow cables it is g²/24; the regression is biased by the lowest tensions it samples.",
+        (
+            Quantity("g²/24", SHALLOW_K_P, "m²/s⁴"),
+            Quantity("k_p by the article's regressions, taut cables", taut.k_p, "m²/s⁴"),
+            Quantity("what the published value adds to the sag term", 100.0 * (PUBLISHED_K_P / SHALLOW_K_P - 1.0), "%"),
+        ),
+    )
+
+
+def sign_in_bound() -> Erratum:
+    """Erratum 7: the bound (54) on T_x of a suspended cable."""
+    from scipy.optimize import brentq
+
+    cable, chord = simulated_cable(), 10.0
+    span, rise = chord * float(np.cos(ANGLE)), -chord * float(np.sin(ANGLE))
+    slope, intercept = rise / span, 0.5 * float(cable.linear_density) * GRAVITY * chord
+
+    def vertical(tension: float) -> float:
+        return float(Catenary().from_tension(cable, span, rise, tension * chord / span, GRAVITY).vertical_force)
+
+    turning = float(brentq(vertical, 0.1 * intercept, 10.0 * intercept))
+    return Erratum(
+        7,
+        "Sign in the lower bound (54)",
+        "(54): T_x > b_π/a_π + T_adj.",
+        "For a suspended cable a_π < 0 and b_π > 0, so that b_π/a_π is negative and bounds nothing. The lowest point "
+        "leaves the span where T_z = 0, at T_x = +|b_π/a_π|.",
+        (
+            Quantity("b_π/a_π", intercept / slope, "N"),
+            Quantity("|b_π/a_π|", abs(intercept / slope), "N"),
+            Quantity("T_x at which T_z = 0, exact cable", turning, "N"),
+        ),
+    )
+
+
+def vertical_and_level() -> Erratum:
+    """Erratum 8: no pose under an anchor, and none with a level cable."""
+    robot = load_robot(ROBOTS[0])
+    under = robot.frame_anchors[0] - robot.platform_anchors[0] - [0.0, 0.0, 2.0]
+    cable, chord = simulated_cable(), 10.0
+    half_weight = 0.5 * float(cable.linear_density) * GRAVITY * chord
+    vertical = Catenary().from_tension(cable, 0.0, -chord, 100.0, GRAVITY)
+    level = Catenary().from_tension(cable, chord, 0.0, 100.0, GRAVITY)
+    numbers = [Quantity("|tan φ| a microradian from vertical", float(abs(np.tan(0.5 * np.pi - NEARLY))), "")]
+    for distance, label in ((1e-3, "1 mm"), (1e-6, "1 µm")):
+        pose = Pose.from_euler(under + np.array([distance, 0.0, 0.0]), 0.0, 0.0, 0.0)
+        condition = float(np.linalg.cond(article_balance(robot, pose).h))
+        numbers.append(Quantity(f"condition of H {label} from under an anchor", condition, ""))
+        condition = float(np.linalg.cond(structure_matrix(robot, pose)))
+        numbers.append(Quantity(f"condition of J {label} from under an anchor", condition, ""))
+    numbers += [
+        Quantity("bound (54) a microradian from level", half_weight / float(np.tan(NEARLY)), "N"),
+        Quantity("length of the exact vertical cable of 10 m at 100 N", float(vertical.unstrained_length), "m"),
+        Quantity("length of the exact level cable of 10 m at 100 N", float(level.unstrained_length), "m"),
+    ]
+    return Erratum(
+        8,
+        "Vertical and level cables",
+        "(26), (50): the slope of π is tan φ. (54): T_x is bounded by |b_π/tan φ|.",
+        "tan φ is infinite under an anchor, and the bound is infinite for a level cable, so that no pose with one is "
+        "admissible. In the chord tension τ = T_x/cos φ both are ordinary.",
+        tuple(numbers),
+    )
+
+
+def simulated_cable() -> Cable:
+    """The simulation's cable."""
+    cables = load_robot(ROBOTS[0]).cables
+    return Cable(cables.linear_density[0], cables.axial_stiffness[0])

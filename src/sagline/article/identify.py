@@ -1,0 +1,211 @@
+"""The article's identification for a cable and a working range of one's own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sagline.arrays import Array, Flags, checked, kernel_input
+from sagline.article.fits import fit_factor
+from sagline.cables.cable import Cable
+from sagline.cables.catenary import Catenary
+from sagline.cables.empirical import Empirical
+from sagline.cables.state import CableState
+from sagline.errors import InvalidValueError
+from sagline.kernels.batch import batch_end
+
+CONFIDENCE = 0.95
+
+
+class Estimate(NamedTuple):
+    """A fitted constant and its confidence interval.
+
+    The interval is that of least squares. Its scatter is no measuring noise but what the model's form cannot
+    follow in the working range, so it says how far the constant moves within the range, not how exact the fit is.
+
+    Attributes:
+        value: The constant.
+        low: Lower end of the 95 % interval.
+        high: Upper end.
+    """
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EmpiricalFit:
+    """An empirical model for one cable and working range, and how good it is there.
+
+    Axes of the maps: s spans, r rises, t tensions, as given, ascending. A position error is that of the article's
+    (20), |dx| + |dz|: how far from B_d the end of the exact cable comes to rest under the model's force and length.
+
+    Attributes:
+        model: The model to use.
+        k_h: Its intercept constant [m/s^2].
+        k_p: Its sag constant [m^2/s^4].
+        cable: Material, a single one.
+        gravity: [m/s^2].
+        spans: [m], shape (s,).
+        rises: [m], shape (r,).
+        tensions: T_x [N], shape (t,).
+        force_residual: T_z of the model less the exact one [N], shape (s, r, t).
+        length_residual: L of the model less the exact one [m], shape (s, r, t).
+        position_error: [m], shape (s, r, t).
+        cable_weight: w L [N], shape (s, r, t).
+    """
+
+    model: Empirical
+    k_h: Estimate
+    k_p: Estimate
+    cable: Cable
+    gravity: float
+    spans: Array
+    rises: Array
+    tensions: Array
+    force_residual: Array
+    length_residual: Array
+    position_error: Array
+    cable_weight: Array
+
+    def tension_min(self, tolerance: float) -> float:
+        """The article's T_x,min [N]: from this sampled T_x on, every sampled cable keeps a position error [m].
+
+        Args:
+            tolerance: Allowed position error [m], > 0.
+
+        Returns:
+            The lowest such tension; NaN if even the highest sampled one is not enough.
+        """
+        worst = self.position_error.max(axis=(0, 1))
+        return _first_of_good_tail(self.tensions, worst <= _tolerance(tolerance))
+
+    def weight_max(self, tolerance: float, tension: float | None = None) -> float:
+        """The article's w_max [N]: up to this weight w L, every sampled cable keeps a position error [m].
+
+        Args:
+            tolerance: Allowed position error [m], > 0.
+            tension: Count only sampled T_x from this one on [N]; None for all of them.
+
+        Returns:
+            The largest such sampled weight; NaN if even the lightest cable is too heavy.
+        """
+        counted = self.tensions >= (0.0 if tension is None else tension)
+        weight = self.cable_weight[..., counted].ravel()
+        error = self.position_error[..., counted].ravel()
+        order = np.argsort(-weight)
+        return _first_of_good_tail(weight[order], error[order] <= _tolerance(tolerance))
+
+
+def identify_empirical(
+    cable: Cable, spans: ArrayLike, rises: ArrayLike, tensions: ArrayLike, gravity: float = 9.81
+) -> EmpiricalFit:
+    """Find the empirical model's constants for a cable and the range in which it will work.
+
+    Both constants enter their equations linearly, so that one least-squares step each is enough: k_h from T_z, with
+    the slope tan phi given; k_p from L by (48), with that k_h.
+
+    Args:
+        cable: Material, a single one of positive density.
+        spans: Horizontal distances of the ends [m], shape (s,), > 0.
+        rises: Heights of the platform end above the frame end [m], shape (r,); below it they are negative.
+        tensions: T_x [N], shape (t,), > 0.
+        gravity: [m/s^2], > 0.
+
+    Returns:
+        The fit; `.model` is ready for `inverse`.
+
+    Raises:
+        InvalidValueError: If the cable is none or weighs nothing, or a value is out of range.
+        CableGeometryError: If a span and a rise are both zero.
+
+    Source:
+        Gia Luan & Truong Thinh 2020, sections 3 to 5, in one step each; docs/article.md.
+    """
+    if cable.linear_density.ndim or not cable.linear_density > 0.0:
+        raise InvalidValueError(
+            "cable", f"of linear density {cable.linear_density} kg/m", "one cable, > 0 kg/m", "Give a single cable."
+        )
+    axes = (
+        np.unique(checked(spans, "spans", "m", shape=(None,), above=0.0)),
+        np.unique(checked(rises, "rises", "m", shape=(None,))),
+        np.unique(checked(tensions, "tensions", "N", shape=(None,), above=0.0)),
+    )
+    gravity = float(checked(gravity, "gravity", "m/s^2", shape=(), above=0.0))
+    span, rise, tension = np.meshgrid(*axes, indexing="ij")
+    chord_tension = tension * np.hypot(span, rise) / span
+    exact = Catenary().from_tension(cable, span, rise, chord_tension, gravity)
+    density, stiffness = cable.linear_density, cable.axial_stiffness
+    k_h = _estimate(density * exact.chord, exact.vertical_force - rise / span * exact.horizontal_tension)
+    stretch = 1.0 + np.hypot(tension, rise / span * tension + k_h.value * density * exact.chord) / stiffness
+    shape = (density * exact.span**2 / tension) ** 2 / (exact.chord * stretch)  # (rho cos^2 phi/T_x)^2 D^3
+    k_p = _estimate(shape, exact.unstrained_length - exact.chord / stretch)
+    model = Empirical(k_h.value, k_p.value)
+    found = model.from_tension(cable, span, rise, chord_tension, gravity)
+    return EmpiricalFit(
+        model=model,
+        k_h=k_h,
+        k_p=k_p,
+        cable=cable,
+        gravity=gravity,
+        spans=axes[0],
+        rises=axes[1],
+        tensions=axes[2],
+        force_residual=found.vertical_force - exact.vertical_force,
+        length_residual=found.unstrained_length - exact.unstrained_length,
+        position_error=position_error(found),
+        cable_weight=exact.cable_weight,
+    )
+
+
+def position_error(state: CableState) -> Array:
+    """The article's (20): how far from B_d exact cables of a state's forces and lengths end, |dx| + |dz| [m].
+
+    Args:
+        state: Of any model, shape (...).
+
+    Returns:
+        Shape (...).
+    """
+    shape = state.shape
+    horizontal, vertical, length, weight, stiffness = (
+        kernel_input(operand, shape).reshape(-1)
+        for operand in (
+            state.horizontal_tension,
+            state.vertical_force,
+            state.unstrained_length,
+            state.cable.linear_density * state.gravity,
+            state.cable.axial_stiffness,
+        )
+    )
+    x, z = np.empty(horizontal.size), np.empty(horizontal.size)
+    batch_end(horizontal, vertical, length, weight, stiffness, x, z)
+    error: Array = np.abs(x.reshape(shape) - state.span) + np.abs(z.reshape(shape) - state.rise)
+    return error
+
+
+def _estimate(shape: Array, value: Array) -> Estimate:
+    """The factor of least squares in value = factor * shape, with its confidence interval."""
+    from scipy.stats import t
+
+    x, y = shape.ravel(), value.ravel()
+    factor = float(fit_factor(x, y))
+    freedom = max(x.size - 1, 1)
+    spread = np.sqrt(np.sum((y - factor * x) ** 2) / freedom / np.sum(x**2))
+    half = float(t.ppf(0.5 + 0.5 * CONFIDENCE, freedom) * spread)
+    return Estimate(factor, factor - half, factor + half)
+
+
+def _tolerance(tolerance: float) -> float:
+    return float(checked(tolerance, "tolerance", "m", shape=(), above=0.0))
+
+
+def _first_of_good_tail(values: Array, good: Flags) -> float:
+    """The value from which on, to the end of the array, all is good; NaN where the last one is not."""
+    bad = np.flatnonzero(~good)
+    first = int(bad[-1]) + 1 if bad.size else 0
+    return float(values[first]) if first < values.size else float("nan")

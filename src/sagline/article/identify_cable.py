@@ -1,0 +1,232 @@
+"""What a real cable weighs and how stiff it is, from measured lengths and tensions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sagline.arrays import Array, checked, locked
+from sagline.cables.cable import Cable
+from sagline.cables.catenary import Catenary
+from sagline.errors import InvalidValueError
+
+TensionAt = Literal["frame_end", "platform_end", "chord"]
+UNITS = {"linear_density": "kg/m", "axial_stiffness": "N", "length_offset": "m"}
+TOO_LOOSE = 0.5  # relative standard error from which on a value is not determined
+TOO_CLOSE = 0.95  # correlation from which on two values are not told apart
+ROUNDS = 30  # of the tension at the chord from that at an end
+WEIGHTINGS = 3  # the weights depend on the answer, but little
+SMALLEST_STRAIN = 1e-12
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CableFit:
+    """A cable found from measurements.
+
+    Attributes:
+        cable: The cable to use.
+        names: What was sought, in the order of the arrays below: "linear_density" [kg/m], "axial_stiffness" [N],
+            "length_offset" [m], by which the measured lengths are too long.
+        values: What was found, shape (k,).
+        covariance: Of the values, shape (k, k), from the given measuring errors.
+        residuals: Measured less predicted length [m], shape (n,).
+        chi_squared: Sum of squares of the residuals in units of their standard errors, per degree of freedom;
+            about 1 where cable and measuring errors are as supposed, far more where they are not.
+    """
+
+    cable: Cable
+    names: tuple[str, ...]
+    values: Array
+    covariance: Array
+    residuals: Array
+    chi_squared: float
+
+    @property
+    def standard_error(self) -> Array:
+        """Of each value, in its unit, shape (k,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def correlation(self) -> Array:
+        """Between the values, shape (k, k)."""
+        error = self.standard_error
+        correlation: Array = self.covariance / np.outer(error, error)
+        return correlation
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the data do not determine or cannot tell apart; empty where all is well."""
+        found = []
+        for name, value, error in zip(self.names, self.values, self.standard_error, strict=True):
+            if name != "length_offset" and error > TOO_LOOSE * value:
+                found.append(f"{name} is not determined: {value:.3g} ± {error:.2g} {UNITS[name]}; {_ADVICE[name]}")
+        correlation = self.correlation
+        for i, first in enumerate(self.names):
+            for j, second in enumerate(self.names[:i]):
+                if abs(correlation[i, j]) > TOO_CLOSE:
+                    found.append(
+                        f"{second} and {first} cannot be told apart (correlation {correlation[i, j]:+.3f}); "
+                        "measure over a wider range of tensions"
+                    )
+        return tuple(found)
+
+
+_ADVICE = {
+    "linear_density": "measure at lower tensions or longer spans, where the cable sags more",
+    "axial_stiffness": "measure at higher tensions, where it stretches more",
+}
+
+
+def identify_cable(
+    span: ArrayLike,
+    rise: ArrayLike,
+    unstrained_length: ArrayLike,
+    tension: ArrayLike,
+    *,
+    length_error: float = 1e-3,
+    tension_error: float = 1.0,
+    tension_at: TensionAt = "frame_end",
+    unknowns: Sequence[str] = ("linear_density", "axial_stiffness"),
+    start: Cable | None = None,
+    gravity: float = 9.81,
+) -> CableFit:
+    """Find a cable's density and stiffness from measured lengths and tensions by weighted least squares.
+
+    The exact cable predicts each length from the measured tension; a residual counts in units of the standard error
+    that both measurements together give it.
+
+    Args:
+        span: Horizontal distance of the ends [m], shape (n,), > 0.
+        rise: Height of the platform end above the frame end [m], shape (n,).
+        unstrained_length: Measured L, as an encoder counts it [m], shape (n,), > 0.
+        tension: Measured tension [N], shape (n,), > 0.
+        length_error: Standard error of a length [m], > 0.
+        tension_error: Standard error of a tension [N], > 0.
+        tension_at: Where it is measured: "frame_end" (a load cell at the winch), "platform_end" or "chord".
+        unknowns: What to find: any of "linear_density", "axial_stiffness", "length_offset".
+        start: What is known of the cable, and where the search starts; None for 0.1 kg/m and 100 kN.
+        gravity: [m/s^2], > 0.
+
+    Returns:
+        The fit, with covariance and `.warnings`.
+
+    Raises:
+        InvalidValueError: If there are fewer measurements than unknowns, or a value is out of range.
+    """
+    names = _checked_unknowns(unknowns)
+    if tension_at not in get_args(TensionAt):
+        raise InvalidValueError("tension_at", repr(tension_at), ", ".join(get_args(TensionAt)), "Name one of them.")
+    data = _Measured(
+        checked(span, "span", "m", shape=(None,), above=0.0),
+        checked(rise, "rise", "m", shape=(None,)),
+        checked(unstrained_length, "unstrained_length", "m", shape=(None,), above=0.0),
+        checked(tension, "tension", "N", shape=(None,), above=0.0),
+        tension_at,
+        float(checked(gravity, "gravity", "m/s^2", shape=(), above=0.0)),
+    )
+    data.check(len(names))
+    errors = (
+        float(checked(length_error, "length_error", "m", shape=(), above=0.0)),
+        float(checked(tension_error, "tension_error", "N", shape=(), above=0.0)),
+    )
+    return _fit(data, names, start or Cable(0.1, 1e5), *errors)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Measured:
+    span: Array
+    rise: Array
+    length: Array
+    tension: Array
+    tension_at: TensionAt
+    gravity: float
+
+    def check(self, unknowns: int) -> None:
+        sizes = {array.shape for array in (self.span, self.rise, self.length, self.tension)}
+        if len(sizes) > 1 or self.span.size < unknowns:
+            raise InvalidValueError(
+                "the measurements",
+                f"of shapes {sorted(sizes)}",
+                f"four arrays of one length, at least {unknowns}",
+                "Give span, rise, length and tension of every measurement, and at least one a value sought.",
+            )
+
+    def predicted(self, cable: Cable, tension: Array) -> Array:
+        """Lengths of exact cables whose tension, where it is measured, is as given [m]."""
+        chord = np.hypot(self.span, self.rise)
+        half = 0.5 * cable.linear_density * self.gravity * chord
+        side = {"frame_end": 1.0, "platform_end": -1.0, "chord": 0.0}[self.tension_at]
+        across = half * self.span / chord if side else 0.0
+        floor = 1e-3 * tension  # a tension below half the cable's weight is none; the search must survive it
+        tau = np.maximum(side * half * self.rise / chord + np.sqrt(np.maximum(tension**2 - across**2, 0.0)), floor)
+        state = Catenary().from_tension(cable, self.span, self.rise, tau, self.gravity)
+        for _ in range(ROUNDS if side else 0):
+            measured = state.frame_end_tension if side > 0.0 else state.platform_end_tension
+            step = tension - measured
+            tau = np.maximum(tau + step, floor)
+            state = Catenary().from_tension(cable, self.span, self.rise, tau, self.gravity)
+            if np.abs(step).max() <= 1e-10 * tension.max():
+                break
+        return state.unstrained_length
+
+
+def _fit(data: _Measured, names: tuple[str, ...], known: Cable, length_error: float, tension_error: float) -> CableFit:
+    from scipy.optimize import least_squares
+
+    # logarithms keep density and stiffness positive; the offset counts in millimeters
+    scale = np.array([1e-3 if name == "length_offset" else 1.0 for name in names])
+    unknown = np.array([0.0 if name == "length_offset" else np.log(float(getattr(known, name))) for name in names])
+    spread = np.full(data.length.size, length_error)
+
+    def cable_of(x: Array) -> tuple[Cable, float]:
+        given = dict(zip(names, x, strict=True))
+        density, stiffness = (
+            np.exp(given[name]) if name in given else getattr(known, name)
+            for name in ("linear_density", "axial_stiffness")
+        )
+        return Cable(density, stiffness), 1e-3 * float(given.get("length_offset", 0.0))
+
+    def residuals(x: Array) -> Array:
+        cable, offset = cable_of(x)
+        return data.length - offset - data.predicted(cable, data.tension)
+
+    for _ in range(WEIGHTINGS):
+        found = least_squares(lambda x: residuals(x) / spread, unknown, x_scale="jac", bounds=_bounds(names))  # noqa: B023
+        unknown = found.x
+        cable, offset = cable_of(unknown)
+        higher, lower = (data.predicted(cable, f * data.tension) for f in (1.0 + 1e-4, 1.0 - 1e-4))
+        slope = (higher - lower) / (2e-4 * data.tension)
+        spread = np.hypot(length_error, slope * tension_error)
+    # the covariance with the weights of the last round
+    jacobian = found.jac
+    covariance = np.linalg.pinv(jacobian.T @ jacobian, rcond=1e-14)
+    values = np.array([offset if name == "length_offset" else float(getattr(cable, name)) for name in names])
+    unit = np.where(scale < 1.0, scale, values)  # of d value/d unknown
+    freedom = max(data.length.size - len(names), 1)
+    rest = residuals(unknown)
+    return CableFit(
+        cable=cable,
+        names=names,
+        values=locked(values),
+        covariance=locked(covariance * np.outer(unit, unit)),
+        residuals=locked(rest),
+        chi_squared=float(np.sum((rest / spread) ** 2) / freedom),
+    )
+
+
+def _bounds(names: tuple[str, ...]) -> tuple[list[float], list[float]]:
+    """Beyond any rope: 1 mg/m to 1 t/m, 1 N to 1 PN."""
+    low = {"linear_density": np.log(1e-6), "axial_stiffness": 0.0, "length_offset": -np.inf}
+    high = {"linear_density": np.log(1e3), "axial_stiffness": np.log(1e15), "length_offset": np.inf}
+    return [low[name] for name in names], [high[name] for name in names]
+
+
+def _checked_unknowns(unknowns: Sequence[str]) -> tuple[str, ...]:
+    names = tuple(unknowns)
+    if not names or len(set(names)) != len(names) or not set(names) <= set(UNITS):
+        raise InvalidValueError("unknowns", repr(names), f"one to three of {', '.join(UNITS)}", "Name what to find.")
+    return names

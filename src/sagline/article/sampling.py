@@ -1,0 +1,90 @@
+"""The cables that the article's empirical study samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sagline.arrays import Array, checked
+from sagline.cables.cable import Cable
+from sagline.cables.catenary import Catenary
+from sagline.cables.state import CableState
+
+GRAVITY = 9.81  # m/s^2, everywhere in the article's studies
+ANGLE = 0.754  # rad, of the article's figure 10
+UNSTRETCHABLE = 1e20  # N: strains below the rounding of a length
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sampling:
+    """Every combination of four quantities of a cable that is held with its platform end above its frame end.
+
+    Attributes:
+        angles: Angle phi of the chord (the article's beta) [rad], shape (a,), between 0 and pi/2.
+        chords: D [m], shape (c,), > 0.
+        densities: rho [kg/m], shape (r,), > 0.
+        tensions: T_x [N], shape (t,), > 0.
+        axial_stiffness: EA of all of them [N].
+    """
+
+    angles: Array
+    chords: Array
+    densities: Array
+    tensions: Array
+    axial_stiffness: float = UNSTRETCHABLE
+
+    def __init__(
+        self,
+        angles: ArrayLike,
+        chords: ArrayLike,
+        densities: ArrayLike,
+        tensions: ArrayLike,
+        axial_stiffness: float = UNSTRETCHABLE,
+    ) -> None:
+        """Check the four.
+
+        Raises:
+            InvalidValueError: If a value is not finite or out of its range.
+        """
+        object.__setattr__(self, "angles", checked(angles, "angles", "rad", shape=(None,)))
+        for name, value, unit in (
+            ("chords", chords, "m"),
+            ("densities", densities, "kg/m"),
+            ("tensions", tensions, "N"),
+        ):
+            object.__setattr__(self, name, checked(value, name, unit, shape=(None,), above=0.0))
+        stiffness = checked(axial_stiffness, "axial_stiffness", "N", shape=(), above=0.0)
+        object.__setattr__(self, "axial_stiffness", float(stiffness))
+
+    def hang(self) -> CableState:
+        """The exact cables, fields of shape (a, c, r, t)."""
+        angle, chord, density, tension = np.meshgrid(
+            self.angles, self.chords, self.densities, self.tensions, indexing="ij"
+        )
+        cable = Cable(density, self.axial_stiffness)
+        cosine = np.cos(angle)
+        return Catenary().from_tension(cable, chord * cosine, chord * np.sin(angle), tension / cosine, GRAVITY)
+
+    def between(self, lowest: float, highest: float) -> Sampling:
+        """The same with as many tensions, evenly spaced between two others [N]."""
+        tensions = np.linspace(lowest, highest, self.tensions.size)
+        return Sampling(self.angles, self.chords, self.densities, tensions, self.axial_stiffness)
+
+
+def article_sampling() -> Sampling:
+    """Our choice of what the article samples: it gives phi = 0.754 rad and rho in (0, 2), and no other number.
+
+    Chords from 2 to 16 m, as in the frames of its Table 1; five angles around its 0.754 rad; ten densities; sixty
+    tensions from 100 N to 10 kN, evenly spaced.
+
+    Source:
+        Gia Luan & Truong Thinh 2020, figures 6 to 15.
+    """
+    return Sampling(
+        angles=[0.25, 0.5, ANGLE, 1.0, 1.25],
+        chords=np.linspace(2.0, 16.0, 8),
+        densities=np.linspace(0.2, 2.0, 10),
+        tensions=np.linspace(100.0, 10_000.0, 60),
+    )

@@ -1,0 +1,197 @@
+"""Figures 17 to 22: both robots along the planar path, with each of the five cable models."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from sagline.arrays import Array
+from sagline.article.model_errors import MODELS
+from sagline.cables.empirical import Empirical
+from sagline.cables.model import CableModel
+from sagline.files.robot_file import load_robot
+from sagline.kinematics.confirm import Confirmation, confirm
+from sagline.kinematics.inverse import inverse
+from sagline.motion.path import Path
+from sagline.motion.planar import article_path
+from sagline.robot.robot import Robot
+from sagline.tension.method import TensionMethod
+from sagline.tension.minimum_norm import MinimumNorm
+
+ROBOTS = ("article-suspended", "article-mixed")  # the article's first and second configuration
+# The article describes (55), closest to the set before, but its figures show cables near their minimum wherever they
+# are not needed and curves that return to where they began: the least norm, in its variable T_x.
+METHOD = MinimumNorm("horizontal")
+ERROR_BAND = 6e-3  # m, the article's "(-6, 6) mm"
+
+
+class Figures(NamedTuple):
+    """A run in numbers, over its feasible poses.
+
+    Attributes:
+        error_max: Largest distance of the platform from where it was planned [m].
+        error_mean: Mean distance [m].
+        axis_error_max: Largest error along one axis [m].
+        tension_min: Smallest T_x [N].
+        tension_max: Largest T_x [N].
+        vertical_max: Largest |T_z| [N].
+        step_max: Largest change of T_x from one sample to the next [N].
+        slope_max: Largest |dT_x/dt| [N/s].
+        slope_jump: Largest change of dT_x/dt from one step to the next [N/s]: it stays, however small the step, where
+            a course has a corner.
+        length_min: Smallest L [m].
+        length_max: Largest L [m].
+        adjusting_min: Smallest d [m].
+        adjusting_max: Largest d [m].
+        feasible: Share of feasible poses.
+        held: Share of poses that the lengths hold in a stable equilibrium.
+    """
+
+    error_max: float
+    error_mean: float
+    axis_error_max: float
+    tension_min: float
+    tension_max: float
+    vertical_max: float
+    step_max: float
+    slope_max: float
+    slope_jump: float
+    length_min: float
+    length_max: float
+    adjusting_min: float
+    adjusting_max: float
+    feasible: float
+    held: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Simulation:
+    """Both robots along one path.
+
+    Attributes:
+        path: The path, N samples.
+        models: The cable models, shape (k,).
+        suspended: Plan and exact equilibria of the first configuration, model by model.
+        mixed: The same of the second configuration.
+    """
+
+    path: Path
+    models: tuple[CableModel, ...]
+    suspended: tuple[Confirmation, ...]
+    mixed: tuple[Confirmation, ...]
+
+    def of(self, kind: type[CableModel]) -> tuple[Confirmation, Confirmation]:
+        """Both robots' runs with the model of a class."""
+        k = [type(model) for model in self.models].index(kind)
+        return self.suspended[k], self.mixed[k]
+
+    @property
+    def tension_ratio(self) -> float:
+        """Highest T_x of the mixed robot over that of the suspended one, with the empirical model."""
+        suspended, mixed = (figures(run) for run in self.of(Empirical))
+        return mixed.tension_max / suspended.tension_max
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LowTension:
+    """The empirical model's position error over the lowest tension that is allowed.
+
+    Attributes:
+        tension_min: Lower limit of the chord tension [N], shape (k,).
+        suspended: Largest error along one axis of the first configuration [m], shape (k,).
+        mixed: The same of the second [m], shape (k,).
+        suspended_bound: With the article's bound (54) in its place, T_adj = 0, and the share of feasible poses.
+        mixed_bound: The same of the second configuration.
+    """
+
+    tension_min: Array
+    suspended: Array
+    mixed: Array
+    suspended_bound: Figures
+    mixed_bound: Figures
+
+
+def simulate(rate: float = 100.0, models: Sequence[CableModel] = MODELS) -> Simulation:
+    """Plan both robots along the article's path and wind the lengths onto exact cables.
+
+    The article's "simple controller", tensions in and lengths out, is the plan; where the platform then is, is the
+    equilibrium on exact cables under the same inertia.
+
+    Args:
+        rate: Samples per second [1/s].
+        models: Cable models, which must include `Empirical`.
+
+    Returns:
+        The runs.
+
+    Source:
+        Gia Luan & Truong Thinh 2020, section 7.1, figures 17 to 22.
+    """
+    path = article_path(rate)
+    runs = [tuple(_run(load_robot(name), path, model, METHOD) for model in models) for name in ROBOTS]
+    suspended, mixed = runs
+    return Simulation(path, tuple(models), suspended, mixed)
+
+
+def low_tension_study(limits: Array, rate: float = 10.0) -> LowTension:
+    """The empirical model where cables may become slack.
+
+    Args:
+        limits: Lower limits of the chord tension [N], shape (k,).
+        rate: Samples per second [1/s].
+
+    Returns:
+        The study.
+    """
+    path, robots = article_path(rate), [load_robot(name) for name in ROBOTS]
+    suspended, mixed = (
+        [figures(_run(robot.replace(tension_min=low), path, Empirical(), METHOD)).axis_error_max for low in limits]
+        for robot in robots
+    )
+    bound = MinimumNorm("horizontal", lowest_point_margin=0.0)
+    bounds = [figures(_run(robot.replace(tension_min=0.0), path, Empirical(), bound)) for robot in robots]
+    return LowTension(np.asarray(limits), np.array(suspended), np.array(mixed), *bounds)
+
+
+def figures(run: Confirmation) -> Figures:
+    """A run in numbers."""
+    plan, good = run.plan, np.atleast_1d(run.plan.feasible & run.held)
+    if not good.any():
+        return Figures(*(float("nan"),) * 13, float(np.mean(plan.feasible)), 0.0)
+    cables, error = plan.state.cables, run.position_error[good]
+    distance = np.linalg.norm(error, axis=1)
+    tension = plan.horizontal_tension
+    return Figures(
+        error_max=float(distance.max()),
+        error_mean=float(distance.mean()),
+        axis_error_max=float(np.abs(error).max()),
+        tension_min=float(tension[good].min()),
+        tension_max=float(tension[good].max()),
+        vertical_max=float(np.abs(plan.vertical_force[good]).max()),
+        **_smoothness(run),
+        length_min=float(plan.unstrained_length[good].min()),
+        length_max=float(plan.unstrained_length[good].max()),
+        adjusting_min=float(cables.adjusting_length[good].min()),
+        adjusting_max=float(cables.adjusting_length[good].max()),
+        feasible=float(np.mean(plan.feasible)),
+        held=float(np.mean(good)),
+    )
+
+
+def _run(robot: Robot, path: Path, model: CableModel, method: TensionMethod) -> Confirmation:
+    return confirm(inverse(robot, path, model, method))
+
+
+def _smoothness(run: Confirmation) -> dict[str, float]:
+    path, tension = run.plan.path, run.plan.horizontal_tension
+    assert path is not None
+    change = np.diff(tension, axis=0)
+    slope = change / np.diff(path.time)[:, None]
+    return {
+        "step_max": float(np.nanmax(np.abs(change))),
+        "slope_max": float(np.nanmax(np.abs(slope))),
+        "slope_jump": float(np.nanmax(np.abs(np.diff(slope, axis=0)))),
+    }

@@ -1,0 +1,84 @@
+"""`sagline identify`: what a measured cable weighs, how stiff it is, and the empirical model for it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sagline.article.identify import EmpiricalFit, identify_empirical
+from sagline.article.identify_cable import UNITS, CableFit, TensionAt, identify_cable
+from sagline.cli.tables import plain_table, written
+from sagline.cli.terminal import note, show, show_json
+from sagline.files.measurements import Measurements, load_measurements
+
+STEPS = 25  # along each axis of the working range
+TOLERANCE = 5e-3  # m, of the position: the article's own is 6 mm
+
+
+def identify(
+    file: Path,
+    length_error: float,
+    tension_error: float,
+    tension_at: TensionAt,
+    unknowns: Sequence[str],
+    *,
+    as_json: bool,
+) -> None:
+    """Find the cable, then the article's constants for it in the measured range, and print both.
+
+    Raises:
+        SaglineError: If the file or a value is wrong.
+    """
+    data = load_measurements(file)
+    cable = identify_cable(
+        *data, length_error=length_error, tension_error=tension_error, tension_at=tension_at, unknowns=unknowns
+    )
+    model = _model(cable, data)
+    if as_json:
+        show_json(_record(cable, model))
+        return
+    table = plain_table(f"{len(data.span)} measurements")
+    for head in ("", "value", "standard error", "unit"):
+        table.add_column(head, justify="left" if head in ("", "unit") else "right", no_wrap=True)
+    for name, value, error in zip(cable.names, cable.values, cable.standard_error, strict=True):
+        table.add_row(name, written(value, ".5g"), written(error, ".2g"), UNITS[name])
+    for name, estimate, unit in (("k_h", model.k_h, "m/s²"), ("k_p", model.k_p, "m²/s⁴")):
+        table.add_row(name, written(estimate.value, ".5g"), written(estimate.high - estimate.value, ".2g"), unit)
+    show(table)
+    show(f"chi-squared per degree of freedom: {written(cable.chi_squared, '.3g')} (about 1 if the errors are as given)")
+    show(
+        f"The empirical model with k_h, k_p keeps a position error of {1e3 * TOLERANCE:g} mm in the measured range "
+        f"from T_x = {written(model.tension_min(TOLERANCE), '.3g')} N on."
+    )
+    for warning in cable.warnings:
+        note("Warning: ", warning, style="bold yellow")
+
+
+def _model(cable: CableFit, data: Measurements) -> EmpiricalFit:
+    """The empirical model over the measured range of spans, rises and tensions."""
+    horizontal = data.tension * data.span / np.hypot(data.span, data.rise)
+    spans, rises, tensions = (
+        np.linspace(values.min(), values.max(), STEPS) for values in (data.span, data.rise, horizontal)
+    )
+    return identify_empirical(cable.cable, spans, rises, tensions)
+
+
+def _record(cable: CableFit, model: EmpiricalFit) -> dict[str, Any]:
+    return {
+        "values": dict(zip(cable.names, cable.values, strict=True)),
+        "standard_errors": dict(zip(cable.names, cable.standard_error, strict=True)),
+        "covariance": cable.covariance,
+        "correlation": cable.correlation,
+        "chi_squared": cable.chi_squared,
+        "warnings": list(cable.warnings),
+        "empirical": {
+            "k_h": model.k_h._asdict(),
+            "k_p": model.k_p._asdict(),
+            "tolerance_m": TOLERANCE,
+            "tension_min_N": model.tension_min(TOLERANCE),
+            "weight_max_N": model.weight_max(TOLERANCE),
+        },
+    }

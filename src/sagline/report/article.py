@@ -1,0 +1,99 @@
+"""The report on the article: an HTML page and its numbers, both written whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sagline.files.whole import check_folder, made_folder, written_whole
+from sagline.report.blocks import Chapter
+from sagline.report.page import page
+from sagline.report.parts import selection
+
+TITLE = "The article, redone"
+LEAD = (
+    "Gia Luan & Truong Thinh, “Empirical Quasi-Static and Inverse Kinematics of Cable-Driven Parallel Manipulators "
+    "Including Presence of Sagging”, Appl. Sci. 2020, 10(15), 5318, doi:10.3390/app10155318. What it says stands "
+    "beside what sagline computes, with exact elastic catenaries as the reference. Notation: z up, T acts on the "
+    "cable at its platform end, φ is the article's β. Every number on the computed side was computed when this page "
+    "was made."
+)
+
+Progress = Callable[[int, int, str], None]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ArticleReport:
+    """A report that has been written.
+
+    Attributes:
+        page: The HTML file.
+        data: The JSON file of its numbers.
+        chapters: What is in it.
+        numbers: Chapter -> finding -> the numbers behind it, plain.
+    """
+
+    page: Path
+    data: Path
+    chapters: tuple[Chapter, ...]
+    numbers: dict[str, dict[str, Any]]
+
+
+def write_article(folder: Path | str, parts: Sequence[str] = (), progress: Progress | None = None) -> ArticleReport:
+    """Redo the article's studies and write a self-contained HTML page and a JSON file of its numbers.
+
+    Args:
+        folder: Where to; created if missing. The files are article.html and article.json.
+        parts: What to redo: chapter keys, "figures 6-9", "table 2"; nothing for everything.
+        progress: Called before each chapter with the number of chapters done, their total, and the next one's key.
+
+    Returns:
+        What was written.
+
+    Raises:
+        InvalidValueError: If a part is unknown.
+        FileError: If the folder cannot be written; then nothing has been.
+    """
+    wanted = selection(parts)
+    check_folder(folder)
+    chapters = []
+    for done, part in enumerate(wanted.parts):
+        if progress is not None:
+            progress(done, len(wanted.parts), part.key)
+        chapters.append(wanted.cut(part.build()))
+    if progress is not None:
+        progress(len(chapters), len(chapters), "done")
+    numbers = {c.key: {finding.key: _plain(finding.numbers) for finding in c.findings} for c in chapters}
+    made = f"Made by sagline {version('sagline')}: sagline article {' '.join(parts)}".rstrip() + "."
+    place = made_folder(folder)
+    report = ArticleReport(place / "article.html", place / "article.json", tuple(chapters), numbers)
+    _write(report.data, json.dumps(numbers, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+    _write(report.page, page(TITLE, LEAD, chapters, made))
+    return report
+
+
+def _write(file: Path, text: str) -> None:
+    with written_whole(file) as partial:
+        partial.write_text(text, encoding="utf-8")
+
+
+def _plain(what: Any) -> Any:
+    """Numbers as JSON has them; null stands for what is not finite."""
+    match what:
+        case dict():
+            return {str(key): _plain(value) for key, value in what.items()}
+        case list() | tuple():
+            return [_plain(value) for value in what]
+        case np.ndarray() | np.generic():
+            return _plain(what.tolist())
+        case float():
+            return what if math.isfinite(what) else None
+        case _:
+            return what

@@ -1,0 +1,180 @@
+"""Chapter: the same identification for a cable of one's own."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.colors import LogNorm
+
+from sagline.arrays import Array
+from sagline.article.errata_cables import simulated_cable
+from sagline.article.identify import EmpiricalFit, identify_empirical
+from sagline.article.identify_cable import CableFit, identify_cable
+from sagline.cables.cable import Cable
+from sagline.cables.catenary import Catenary
+from sagline.plot.sheet import LABEL, TICK
+from sagline.report.blocks import Chapter, Finding, Table, Verdict, n
+from sagline.report.drawing import Drawings, axes, legend, shades
+
+SPANS = np.linspace(1.0, 13.0, 13)  # m: the working range of the simulated robots
+RISES = np.linspace(-5.0, 4.0, 10)  # m
+TENSIONS = np.linspace(20.0, 400.0, 77)  # N
+TOLERANCES = (1e-3, 2e-3, 5e-3, 10e-3)  # m
+SAMPLES, LENGTH_ERROR, TENSION_ERROR, SEED = 60, 1e-3, 1.0, 2020  # of the made-up measurements: m, N
+BOTH = ("linear_density", "axial_stiffness")
+CASES = (  # lowest and highest chord tension [N], what is sought
+    ("loose and taut", 30.0, 600.0, BOTH),
+    ("taut only", 300.0, 600.0, BOTH),
+    ("loose only", 15.0, 40.0, BOTH),
+    ("loose and taut, zero of the encoder unknown", 30.0, 600.0, (*BOTH, "length_offset")),
+)
+
+
+def identify_chapter() -> Chapter:
+    """identify_empirical on the simulation's cable, identify_cable on made-up measurements of it."""
+    fit = identify_empirical(simulated_cable(), SPANS, RISES, TENSIONS)
+    draw = Drawings("identify")
+    return Chapter(
+        "identify",
+        "Identification for a cable of one's own",
+        "What the article did for its cables, in two calls: sagline.identify_empirical finds the empirical model for a "
+        "known cable and a working range; sagline.identify_cable, and the command sagline identify, find the cable "
+        "from measured lengths and tensions. Here for the simulation's cable.",
+        (_constants(fit, draw), _limits(fit, draw), _measured()),
+    )
+
+
+def _constants(fit: EmpiricalFit, draw: Drawings) -> Finding:
+    figure, ax = axes("$T_x$ [N]", "span [m]")
+    figure.subplots_adjust(left=0.13, right=0.9)
+    error = 1e3 * fit.position_error.max(axis=1)
+    mesh = ax.pcolormesh(
+        fit.tensions, fit.spans, error, norm=LogNorm(0.01, 100.0), cmap="magma_r", shading="nearest", rasterized=True
+    )
+    lines = ax.contour(fit.tensions, fit.spans, error, levels=[1.0, 2.0, 5.0, 10.0], colors="black", linewidths=0.7)
+    ax.clabel(lines, fmt=lambda level: f"{level:g} mm", fontsize=TICK - 1.0)
+    ax.grid(visible=False)
+    bar = figure.colorbar(mesh, ax=ax, pad=0.02)
+    bar.set_label("position error [mm]", fontsize=LABEL - 1.0)
+    bar.ax.tick_params(labelsize=TICK - 1.0)
+    rows = [
+        (name, n(estimate.value, ".4f"), f"{n(estimate.low, '.4f')} to {n(estimate.high, '.4f')}", unit)
+        for name, estimate, unit in (("k_h", fit.k_h, "m/s²"), ("k_p", fit.k_p, "m²/s⁴"))
+    ]
+    return Finding(
+        key="empirical-fit",
+        title="constants for a working range",
+        statement="",
+        measured=f"Spans {n(SPANS[0])} to {n(SPANS[-1])} m, rises {n(RISES[0])} to {n(RISES[-1])} m, T_x "
+        f"{n(TENSIONS[0])} to {n(TENSIONS[-1])} N: k_h = {n(fit.k_h.value, '.4f')}, k_p = {n(fit.k_p.value, '.4f')}. "
+        "k_h is below g/2 because a stretched cable is lighter. The interval says how far a constant moves within the "
+        "range; it is no measuring error.",
+        verdict=Verdict.OURS,
+        numbers={
+            "k_h": fit.k_h._asdict(),
+            "k_p": fit.k_p._asdict(),
+            "largest_position_error_m": fit.position_error.max(),
+        },
+        panels=(draw.panel(figure, "Position error of (20), largest over the rises."),),
+        data=(Table("The constants", ("constant", "value", "95 % interval", "unit"), rows),),
+    )
+
+
+def _limits(fit: EmpiricalFit, draw: Drawings) -> Finding:
+    figure, ax = axes("$T_x$ from here on [N]", "cable weight $wL$ up to [N]")
+    frontier = {}
+    for tolerance, color in zip(TOLERANCES, shades(len(TOLERANCES)), strict=True):
+        frontier[tolerance] = np.array([fit.weight_max(tolerance, tension) for tension in fit.tensions])
+        ax.plot(fit.tensions, frontier[tolerance], color=color, linewidth=1.3, label=f"{1e3 * tolerance:g} mm")
+    legend(ax, "position error", loc="lower right")
+    rows, limits = [], []
+    for tolerance in TOLERANCES:
+        tension, weight = fit.tension_min(tolerance), fit.weight_max(tolerance)
+        rows.append(
+            (
+                f"{n(1e3 * tolerance)} mm",
+                n(tension, ".3g"),
+                n(weight, ".2f"),
+                n(fit.weight_max(tolerance, 100.0), ".2f"),
+            )
+        )
+        limits.append({"tolerance_m": tolerance, "tension_min_N": tension, "weight_max_N": weight})
+    return Finding(
+        key="validity-limits",
+        title="the validity limits w_max and T_x,min",
+        statement="Section 3: ρgL < w_max and T_x > T_x,min must be satisfied. Neither has a value in the article.",
+        measured=f"For 5 mm: T_x,min = {n(limits[2]['tension_min_N'], '.3g')} N with the heaviest cable of the range, "
+        f"or wL ≤ {n(limits[2]['weight_max_N'], '.2f')} N with every tension of it. A dash: not within this range.",
+        verdict=Verdict.OPEN,
+        numbers={"limits": limits},
+        panels=(draw.panel(figure, "Heaviest cable over the lowest tension, for four tolerances."),),
+        data=(
+            Table(
+                "Limits that keep the position error of (20) below a tolerance",
+                ("tolerance", "T_x,min [N]", "w_max, all tensions [N]", "w_max, T_x ≥ 100 N [N]"),
+                rows,
+            ),
+        ),
+    )
+
+
+def _measured() -> Finding:
+    cable, rows, numbers = simulated_cable(), [], []
+    for name, lowest, highest, unknowns in CASES:
+        fit = made_up_fit(cable, lowest, highest, unknowns)
+        rows.append(
+            (
+                f"{name} ({n(lowest)} to {n(highest)} N)",
+                *(
+                    f"{n(value, '.4g')} ± {n(error, '.2g')}"
+                    for value, error in zip(fit.values, fit.standard_error, strict=True)
+                ),
+                *["–"] * (3 - len(unknowns)),
+                n(fit.chi_squared, ".2f"),
+                "; ".join(fit.warnings) or "none",
+            )
+        )
+        numbers.append(
+            {
+                "case": name,
+                "names": unknowns,
+                "values": fit.values,
+                "standard_error": fit.standard_error,
+                "correlation": fit.correlation,
+                "warnings": fit.warnings,
+            }
+        )
+    return Finding(
+        key="cable-fit",
+        title="density and stiffness from measurements",
+        statement="",
+        measured=f"Four sets of {SAMPLES} made-up measurements of a cable of {n(cable.linear_density)} kg/m and EA = "
+        f"{n(cable.axial_stiffness)} N, with scatter of {n(1e3 * LENGTH_ERROR)} mm and {n(TENSION_ERROR)} N at the "
+        "frame end. Loose cables tell the density, taut ones the stiffness; an unknown zero of the encoder "
+        "makes the stiffness less certain.",
+        verdict=Verdict.OURS,
+        numbers={"cases": numbers},
+        data=(
+            Table(
+                "What was found",
+                ("chord tensions", "ρ [kg/m]", "EA [N]", "offset [m]", "χ² per freedom", "warnings"),
+                rows,
+            ),
+        ),
+    )
+
+
+def made_up_fit(cable: Cable, lowest: float, highest: float, unknowns: tuple[str, ...]) -> CableFit:
+    """Identify a known cable from measurements with seeded scatter, over a range of chord tensions [N]."""
+    random = np.random.default_rng(SEED)
+    span, rise = random.uniform(2.0, 12.0, SAMPLES), random.uniform(-4.0, 2.0, SAMPLES)
+    tension: Array = random.uniform(lowest, highest, SAMPLES)
+    state = Catenary().from_tension(cable, span, rise, tension)
+    return identify_cable(
+        span,
+        rise,
+        state.unstrained_length + random.normal(0.0, LENGTH_ERROR, SAMPLES),
+        state.frame_end_tension + random.normal(0.0, TENSION_ERROR, SAMPLES),
+        length_error=LENGTH_ERROR,
+        tension_error=TENSION_ERROR,
+        unknowns=unknowns,
+    )

@@ -1,0 +1,223 @@
+"""Chapter: figures 8 to 15."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sagline.arrays import Array
+from sagline.article.constants import PUBLISHED_K_P, SHALLOW_K_P, published_sampling
+from sagline.article.errata_cables import simulated_cable
+from sagline.article.feasible_sets import End
+from sagline.article.sag_constant import SagStudy, StretchStudy, sag_study, stretch_study
+from sagline.article.sampling import ANGLE
+from sagline.plot.sheet import BLUE, GREEN, VERMILLION
+from sagline.report.blocks import Chapter, Finding, Verdict, n
+from sagline.report.drawing import Drawings, axes, legend, shades
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+CHORD = 10.0  # m
+TENSIONS = np.linspace(10.0, 500.0, 150)  # N
+MIDDLE, DENSE = 2, -1  # of the sampled angles: the article's; of the densities: the heaviest
+PICKED = (1, 3, 5, 7)  # chords that are drawn
+
+
+def sag_chapter() -> Chapter:
+    """From the adjusting length to k_p."""
+    end = End(CHORD * float(np.cos(ANGLE)), CHORD * float(np.sin(ANGLE)))
+    stretch, sag = stretch_study(simulated_cable(), end, TENSIONS), sag_study(published_sampling())
+    draw = Drawings("sag")
+    return Chapter(
+        "sag",
+        "The adjusting length and k_p",
+        f"Figures 8 and 9 with the simulation's cable at D = {n(CHORD)} m; figures 10 to 15 with cables that do not "
+        "stretch, sampled as above.",
+        (
+            _with_stretch(stretch, draw),
+            _relieved(stretch, draw),
+            _tension(sag, draw),
+            _chord(sag, draw),
+            _angle(sag, draw),
+            _density(sag, draw),
+        ),
+    )
+
+
+def _with_stretch(study: StretchStudy, draw: Drawings) -> Finding:
+    figure, ax = axes("$T_x$ [N]", "$d$ [mm]")
+    ax.plot(study.tensions, 1e3 * study.unstretchable, color=BLUE, linewidth=1.3, label="does not stretch")
+    ax.plot(study.tensions, 1e3 * study.stretchable, color=VERMILLION, linewidth=1.3, label="stretches")
+    ax.axhline(0.0, color="0.6", linewidth=0.6)
+    legend(ax)
+    hooke = -study.stretchable[-1] / (study.magnitude[-1] * CHORD / float(study.cable.axial_stiffness))
+    return Finding(
+        key="d-over-tension",
+        figures=(8,),
+        title="d of stretchable and unstretchable cables",
+        statement="Unstretchable: d ≥ 0 with d = 0 as asymptote. Stretchable: negative d, an inclined asymptote by "
+        "Hooke's law.",
+        measured=f"The least d of the unstretchable cable is {n(1e3 * study.unstretchable.min(), '.2g')} mm; with "
+        f"stretch d reaches {n(1e3 * study.stretchable[-1], '.3g')} mm, {n(hooke, '.3f')} of |T|D/EA.",
+        verdict=Verdict.HOLDS,
+        numbers={
+            "least_unstretchable_m": study.unstretchable.min(),
+            "last_stretchable_m": study.stretchable[-1],
+            "share_of_hooke": hooke,
+        },
+        panels=(draw.panel(figure, "Adjusting length over T_x."),),
+    )
+
+
+def _relieved(study: StretchStudy, draw: Drawings) -> Finding:
+    printed = 1e3 * (study.relieved - study.unstretchable)
+    mended = 1e3 * (study.relieved_exactly - study.unstretchable)
+    figure, ax = axes("$|T|$ [N]", "$d$ [mm]")
+    ax.plot(study.magnitude, 1e3 * study.unstretchable, color=BLUE, linewidth=2.4, alpha=0.5, label="does not stretch")
+    ax.plot(study.magnitude, 1e3 * study.relieved, color=VERMILLION, linewidth=1.1, label="stretch taken out, (38)")
+    ax.set_yscale("log")
+    legend(ax)
+    second, bx = axes("$|T|$ [N]", "error of $d$ [mm]")
+    bx.plot(study.magnitude, printed, color=VERMILLION, linewidth=1.3, label="(36), (38)")
+    bx.plot(study.magnitude, mended, color=GREEN, linewidth=1.3, label="with the mean tension")
+    legend(bx)
+    return Finding(
+        key="stretch-removed",
+        figures=(9,),
+        title="d with the elongation taken out",
+        statement="(38): d = d_e + Δl with Δl = |T|L/EA of (36); red and blue dots coincide.",
+        measured=f"They do to the eye at low tension, but (36) is {n(np.abs(printed).max(), '.2g')} mm too long: it "
+        f"stretches the cable with the tension at its upper end. With the mean tension "
+        f"{n(np.abs(mended).max(), '.1g')} mm are left (erratum 5).",
+        verdict=Verdict.HOLDS_WITHIN,
+        numbers={"error_of_36_mm": np.abs(printed).max(), "error_with_mean_tension_mm": np.abs(mended).max()},
+        panels=(
+            draw.panel(figure, "d over |T|: unstretchable, and stretchable with (38)."),
+            draw.panel(second, "The difference of the two."),
+        ),
+    )
+
+
+def _tension(study: SagStudy, draw: Drawings) -> Finding:
+    sampling, colors = study.sampling, shades(len(PICKED))
+    figure, ax = axes("$T_x$ [N]", "$d$ [m]")
+    for k, color in zip(PICKED, colors, strict=True):
+        d, a_d = study.adjusting_length[MIDDLE, k, DENSE], study.a_d[MIDDLE, k, DENSE]
+        ax.plot(sampling.tensions, d, "o", color=color, markersize=2.6, label=f"{sampling.chords[k]:g}")
+        ax.plot(sampling.tensions, a_d / sampling.tensions**2, color=color, linewidth=0.9)
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    legend(ax, "$D$ [m]")
+    fit = study.a_d[..., None] / sampling.tensions**2 / study.adjusting_length - 1.0
+    return Finding(
+        key="d-model",
+        figures=(10,),
+        title="d = a_d/T_x²",
+        statement="(41): d = a_d/T_x², “the fittest and simplest”.",
+        measured=f"The exact d divided by its fit is between {n(1.0 / (1.0 + fit.max()), '.3f')} and "
+        f"{n(1.0 / (1.0 + fit.min()), '.3f')} over all sampled cables: the form is right for taut ones and bends for "
+        "slack and steep ones.",
+        verdict=Verdict.HOLDS_WITHIN,
+        numbers={"fit_over_exact_less_one_min": fit.min(), "fit_over_exact_less_one_max": fit.max()},
+        panels=(draw.panel(figure, f"d at φ = {n(ANGLE)} rad, ρ = {n(sampling.densities[DENSE])} kg/m, with fits."),),
+    )
+
+
+def _chord(study: SagStudy, draw: Drawings) -> Finding:
+    sampling = study.sampling
+    figure, ax = axes("$D$ [m]", "$a_d$ [m N²]")
+    a_d, q_a = study.a_d[MIDDLE, :, DENSE], study.q_a[MIDDLE, DENSE]
+    _fit(ax, sampling.chords, a_d, q_a * sampling.chords**3)
+    second, bx = axes("$D$ [m]", "$a_d$ [m N²]")
+    for k, color in enumerate(shades(sampling.angles.size)):
+        label = f"{sampling.angles[k]:g}"
+        bx.plot(sampling.chords, study.a_d[k, :, DENSE], "o", color=color, markersize=2.6, label=label)
+        bx.plot(sampling.chords, study.q_a[k, DENSE] * sampling.chords**3, color=color, linewidth=0.9)
+    legend(bx, r"$\varphi$ [rad]")
+    away = _away(study.q_a[:, None] * sampling.chords[:, None] ** 3, study.a_d)
+    return Finding(
+        key="a-over-chord",
+        figures=(11, 12),
+        title="a_d is cubic in D",
+        statement="(43): a_d = q_a(β) D³, the fittest; at every β.",
+        measured=f"The cubic misses a_d by at most {n(100 * away, '.2g')} % of the largest a_d of its angle "
+        "and density.",
+        verdict=Verdict.HOLDS_WITHIN,
+        numbers={"cubic_away_share": away},
+        panels=(
+            draw.panel(figure, f"a_d at φ = {n(ANGLE)} rad with its cubic (figure 11)."),
+            draw.panel(second, "The same at five angles (figure 12)."),
+        ),
+    )
+
+
+def _angle(study: SagStudy, draw: Drawings) -> Finding:
+    sampling = study.sampling
+    fine = np.linspace(0.0, 0.5 * np.pi, 100)
+    figure, ax = axes(r"$\varphi$ [rad]", "$q_a$ [N²/m²]")
+    ax.plot(sampling.angles, study.q_a[:, DENSE], "o", color=BLUE, markersize=3.5, label="$q_a$")
+    ax.plot(fine, study.p_q[DENSE] * np.cos(fine) ** 4, color="black", linewidth=0.9, label=r"$p_q\cos^4\varphi$")
+    legend(ax)
+    second, bx = axes(r"$\varphi$ [rad]", "$q_a$ [N²/m²]")
+    picked = (1, 3, 5, 7, 9)
+    for k, color in zip(picked, shades(len(picked)), strict=True):
+        bx.plot(
+            sampling.angles, study.q_a[:, k], "o", color=color, markersize=2.6, label=f"{sampling.densities[k]:.1f}"
+        )
+        bx.plot(fine, study.p_q[k] * np.cos(fine) ** 4, color=color, linewidth=0.9)
+    legend(bx, r"$\rho$ [kg/m]")
+    away = _away(study.p_q * np.cos(sampling.angles[:, None]) ** 4, study.q_a)
+    return Finding(
+        key="q-over-angle",
+        figures=(13, 14),
+        title="q_a goes with cos⁴ of the angle",
+        statement="(44): q_a = p_q(ρ) cos⁴ β, chosen “experimentally”.",
+        measured=f"cos⁴ misses q_a by at most {n(100 * away, '.2g')} % of the largest q_a of its density. It is no "
+        "guess: d = D (wD cos φ)²/(24 τ²) of a shallow cable, with τ = T_x/cos φ.",
+        verdict=Verdict.HOLDS_WITHIN,
+        numbers={"cos4_away_share": away},
+        panels=(
+            draw.panel(figure, f"q_a at ρ = {n(sampling.densities[DENSE])} kg/m (figure 13)."),
+            draw.panel(second, "The same at five densities (figure 14)."),
+        ),
+    )
+
+
+def _density(study: SagStudy, draw: Drawings) -> Finding:
+    sampling = study.sampling
+    figure, ax = axes(r"$\rho$ [kg/m]", "$p_q$ [N²/m²]")
+    _fit(ax, sampling.densities, study.p_q, study.k_p * sampling.densities**2)
+    each = study.p_q / sampling.densities**2
+    second, bx = axes(r"$\rho$ [kg/m]", r"$p_q/\rho^2$ [m²/s⁴]")
+    bx.plot(sampling.densities, each, "o-", color=BLUE, markersize=3.0, linewidth=1.1, label="density by density")
+    bx.axhline(PUBLISHED_K_P, color=VERMILLION, linewidth=0.9, linestyle="--", label="published")
+    bx.axhline(SHALLOW_K_P, color="0.4", linewidth=0.9, linestyle=":", label="$g^2/24$")
+    legend(bx)
+    return Finding(
+        key="p-over-density",
+        figures=(15,),
+        title="p_q is quadratic in ρ, and k_p",
+        statement="(45): p_q = k_p ρ² with k_p ≈ 4.385.",
+        measured=f"k_p = {n(study.k_p, '.4f')} with these tensions. Density by density it rises from "
+        f"{n(each[0], '.3f')} (g²/24 = {n(SHALLOW_K_P, '.3f')}) to {n(each[-1], '.3f')}: the heaviest, slackest cables "
+        "make the published value.",
+        verdict=Verdict.HOLDS_WITHIN,
+        numbers={"k_p": study.k_p, "k_p_of_density": each, "densities_kg_per_m": sampling.densities},
+        panels=(
+            draw.panel(figure, "p_q with its parabola."),
+            draw.panel(second, "p_q over ρ² should not depend on ρ."),
+        ),
+    )
+
+
+def _fit(ax: Axes, x: Array, y: Array, fit: Array) -> None:
+    ax.plot(x, y, "o", color=BLUE, markersize=3.5, label="exact")
+    ax.plot(x, fit, color="black", linewidth=0.9, label="fit")
+    legend(ax)
+
+
+def _away(fit: Array, values: Array) -> float:
+    """Largest distance of a fit, over the largest value along the fitted axis, the last but one."""
+    return float((np.abs(fit - values).max(axis=-2) / values.max(axis=-2)).max())

@@ -1,0 +1,90 @@
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.article.model_errors import MODELS, model_errors
+from sagline.article.simulation import ERROR_BAND, Simulation, figures, low_tension_study, simulate
+from tests.article.hanging import length_and_force
+
+
+@pytest.fixture(scope="module")
+def study() -> Simulation:
+    return simulate(rate=20.0)
+
+
+def test_the_mixed_robot_pulls_about_twice_as_hard(study: Simulation) -> None:
+    assert study.tension_ratio == pytest.approx(2.0755, abs=0.002)
+
+
+@pytest.mark.parametrize(
+    ("kind", "suspended", "mixed"),
+    [
+        (sl.Straight, 77.6, 303.8),
+        (sl.Elastic, 9.94, 26.1),
+        (sl.Empirical, 1.711, 1.131),
+        (sl.Parabolic, 0.0363, 0.0353),
+    ],
+)
+def test_each_models_position_error_in_millimeters(
+    study: Simulation, kind: type[sl.CableModel], suspended: float, mixed: float
+) -> None:
+    for run, expected in zip(study.of(kind), (suspended, mixed), strict=True):
+        found = figures(run)
+        assert 1e3 * found.error_max == pytest.approx(expected, rel=0.01)
+        assert found.held == 1.0
+        assert found.error_mean < found.error_max
+
+
+def test_the_exact_model_makes_no_error(study: Simulation) -> None:
+    assert max(figures(run).error_max for run in study.of(sl.Catenary)) < 1e-11
+
+
+def test_the_empirical_model_stays_within_the_articles_band(study: Simulation) -> None:
+    for run in study.of(sl.Empirical):
+        found = figures(run)
+        assert found.axis_error_max < ERROR_BAND / 4.0
+        assert found.axis_error_max == np.abs(run.position_error).max()
+
+
+def test_tensions_are_continuous_with_corners_that_do_not_grow() -> None:
+    coarse, fine = (simulate(rate=rate, models=[sl.Empirical()]) for rate in (25.0, 100.0))
+    for slow, fast in zip(coarse.of(sl.Empirical), fine.of(sl.Empirical), strict=True):
+        assert figures(fast).step_max < 0.3 * figures(slow).step_max
+        assert figures(fast).slope_jump < figures(slow).slope_jump * 1.05
+
+
+def test_loose_cables_cost_accuracy_and_the_bound_54_keeps_it() -> None:
+    low = low_tension_study(np.array([10.0, 25.0]), rate=5.0)
+    assert low.mixed[0] > 0.1
+    assert low.mixed[1] == pytest.approx(1.1e-3, rel=0.05)
+    assert low.suspended[0] == low.suspended[1]  # none of its cables comes near its limit
+    assert low.mixed_bound.axis_error_max < 2e-3
+    assert low.mixed_bound.tension_min == pytest.approx(14.2, abs=0.3)
+
+
+def test_model_errors_are_against_the_exact_cable() -> None:
+    study = model_errors(1e15, [5.0, 12.0], [-0.7, 0.2], [0.1, 0.8], [60.0, 400.0])
+    chord, angle, density, tension = np.meshgrid(
+        study.chords, study.angles, study.densities, study.tensions, indexing="ij"
+    )
+    span, rise = chord * np.cos(angle), chord * np.sin(angle)
+    length, vertical = length_and_force(span, rise, density, tension * np.cos(angle))
+    names = [type(model).__name__ for model in MODELS]
+    assert names == ["Straight", "Elastic", "Empirical", "Parabolic", "Catenary"]
+    weight = density * 9.81
+    sag = chord * (weight * chord * np.cos(angle)) ** 2 / (24.0 * tension**2)
+    np.testing.assert_allclose(study.length_error[0], chord - length, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(study.length_error[3], chord + sag - length, rtol=1e-5, atol=1e-9)
+    pull = vertical - tension * np.sin(angle)
+    np.testing.assert_allclose(study.force_error[2], 4.845 * density * chord - pull, rtol=1e-6, atol=1e-7)
+    np.testing.assert_allclose(study.force_error[0], -pull, rtol=1e-7)
+    assert np.abs(study.length_error[4]).max() == 0.0
+    assert study.position_error[4].max() < 1e-12
+
+
+def test_the_coarsest_sufficient_model_is_the_first_within_the_tolerance() -> None:
+    study = model_errors(44e3, [10.0], [-0.5], [0.067], np.geomspace(5.0, 2000.0, 30))
+    for k, found in enumerate(study.sufficient(1e-3)[0, 0, 0]):
+        errors = np.abs(study.length_error[:, 0, 0, 0, k])
+        assert errors[int(found)] <= 1e-3
+        assert (errors[: int(found)] > 1e-3).all()

@@ -1,0 +1,117 @@
+import numpy as np
+import pytest
+
+from sagline.article.constants import constants, constants_study, published_range, published_sampling
+from sagline.article.feasible_sets import End, feasible_sets
+from sagline.article.fits import fit_factor, fit_line
+from sagline.article.intercept import intercept_studies
+from sagline.article.sag_constant import sag_study, stretch_study
+from sagline.article.sampling import Sampling, article_sampling
+from sagline.cables.cable import Cable
+from sagline.errors import InvalidValueError
+from tests.article.hanging import GRAVITY, end_of, length_and_force
+
+CABLE = Cable.from_material(0.067, 2e9, 22e-6)
+END = End(7.0, 6.0)
+
+
+def test_lines_and_factors_are_those_of_numpy() -> None:
+    random = np.random.default_rng(1)
+    x, y = random.normal(size=40), random.normal(size=(3, 40))
+    line = fit_line(x, y)
+    for k in range(3):
+        slope, intercept = np.polyfit(x, y[k], 1)
+        assert line.slope[k] == pytest.approx(slope, rel=1e-10)
+        assert line.intercept[k] == pytest.approx(intercept, rel=1e-10)
+        assert line.r_squared[k] == pytest.approx(np.corrcoef(x, y[k])[0, 1] ** 2, rel=1e-9)
+        assert line.deviation[k] == pytest.approx(np.abs(y[k] - np.polyval([slope, intercept], x)).max(), rel=1e-10)
+        assert fit_factor(x, y[k]) == pytest.approx(np.linalg.lstsq(x[:, None], y[k])[0][0], rel=1e-10)
+
+
+def test_every_tension_on_the_outline_of_psi_misses_by_the_tolerance() -> None:
+    study = feasible_sets(CABLE, END, 0.01, np.linspace(10.0, 100.0, 5), np.array([15.0, 40.0]), points=16)
+    for length, outline in zip(study.psi_lengths, study.psi, strict=True):
+        for horizontal, vertical in outline:
+            x, z = end_of(horizontal, vertical, length, 0.067 * GRAVITY, 44e3)
+            assert abs(x - END.span) + abs(z - END.rise) == pytest.approx(0.01, rel=1e-6)
+
+
+def test_psi_shrinks_to_a_point_and_the_curve_runs_through_it() -> None:
+    wide, narrow = (feasible_sets(CABLE, END, e, np.array([80.0, 90.0]), np.array([80.0])) for e in (1e-3, 1e-5))
+    assert np.ptp(wide.psi[0, :, 0]) / np.ptp(narrow.psi[0, :, 0]) == pytest.approx(100.0, rel=1e-3)
+    assert narrow.psi[0, :, 0].mean() == pytest.approx(80.0, abs=0.02)
+    assert narrow.psi[0, :, 1].mean() == pytest.approx(narrow.vertical[0], abs=0.02)
+
+
+def test_the_projected_curve_is_nearly_the_line_pi() -> None:
+    study = feasible_sets(CABLE, END, 1e-3, np.linspace(50.0, 500.0, 40), np.array([80.0]))
+    assert study.line.slope == pytest.approx(study.tangent, rel=1e-3)
+    assert study.line.intercept == pytest.approx(study.half_weight, rel=0.02)
+    assert study.line.deviation < 0.02
+    with pytest.raises(InvalidValueError, match="multiple of 4"):
+        feasible_sets(CABLE, END, 1e-3, np.array([50.0, 60.0]), np.array([80.0]), points=10)
+
+
+@pytest.fixture(scope="module")
+def small() -> Sampling:
+    return Sampling([0.3, 0.9], [3.0, 8.0, 14.0], [0.5, 1.5], np.linspace(120.0, 900.0, 20))
+
+
+def test_both_studies_repeat_the_articles_regressions_on_textbook_catenaries(small: Sampling) -> None:
+    angle, chord, density, tension = np.meshgrid(
+        small.angles, small.chords, small.densities, small.tensions, indexing="ij"
+    )
+    length, vertical = length_and_force(chord * np.cos(angle), chord * np.sin(angle), density, tension)
+    platform, frame = intercept_studies(small)
+    for study, force in ((platform, vertical), (frame, vertical - density * GRAVITY * length)):
+        for index in np.ndindex(2, 3, 2):
+            slope, intercept = np.polyfit(small.tensions, force[index], 1)
+            assert study.slope[index] == pytest.approx(slope, rel=1e-7)
+            assert study.intercept[index] == pytest.approx(intercept, rel=1e-6)
+        h_b = np.linalg.lstsq(small.chords[:, None], study.intercept[1, :, 0])[0][0]
+        assert study.h_b[1, 0] == pytest.approx(h_b, rel=1e-9)
+    sag = sag_study(small)
+    np.testing.assert_allclose(sag.adjusting_length, length - chord, rtol=1e-7)
+    a_d = np.linalg.lstsq(small.tensions[:, None] ** -2.0, (length - chord)[1, 2, 0])[0][0]
+    assert sag.a_d[1, 2, 0] == pytest.approx(a_d, rel=1e-7)
+    q_a = np.linalg.lstsq(small.chords[:, None] ** 3, sag.a_d[1, :, 0])[0][0]
+    assert sag.q_a[1, 0] == pytest.approx(q_a, rel=1e-9)
+    assert sag.p_q[0] == pytest.approx(
+        np.linalg.lstsq(np.cos(small.angles)[:, None] ** 4, sag.q_a[:, 0])[0][0], rel=1e-9
+    )
+    assert sag.k_p == pytest.approx(np.linalg.lstsq(small.densities[:, None] ** 2, sag.p_q)[0][0], rel=1e-9)
+
+
+def test_the_published_constants_come_from_tensions_of_97_n_to_12_900_n() -> None:
+    found = published_range(article_sampling())
+    assert found.k_h_frame == pytest.approx(-4.845, abs=1e-6)
+    assert found.k_p == pytest.approx(4.385, abs=1e-6)
+    assert found.lowest == pytest.approx(96.7, abs=0.1)
+    assert found.highest == pytest.approx(12_900.0, abs=5.0)
+    assert found.k_h_platform == pytest.approx(5.0234, abs=1e-4)
+
+
+def test_the_constants_depend_on_the_tensions_and_tend_to_their_limits() -> None:
+    sampling = published_sampling()
+    assert constants(sampling.between(40.0, 12_900.0)).k_p == pytest.approx(6.62, abs=0.01)
+    assert constants(sampling.between(60.0, 12_900.0)).k_p == pytest.approx(5.04, abs=0.01)
+    study = constants_study(sampling, np.array([100.0]), np.array([5e3]), np.array([1.0, 4.0, 64.0]))
+    taut = study.scaled[-1]
+    assert taut.k_h_platform == pytest.approx(4.905, rel=1e-3)
+    assert -taut.k_h_frame == pytest.approx(4.905, rel=1e-3)
+    assert taut.k_p == pytest.approx(9.81**2 / 24.0, rel=1e-4)
+    assert study.scaled[0].k_p > study.scaled[1].k_p > taut.k_p
+
+
+def test_no_range_gives_the_published_constants_for_light_cables() -> None:
+    with pytest.raises(InvalidValueError, match="no range of tensions"):
+        published_range(Sampling([0.754], [2.0], [0.01], np.linspace(100.0, 1000.0, 10)))
+
+
+def test_the_mean_tension_stretches_the_cable_not_the_one_at_its_end() -> None:
+    study = stretch_study(CABLE, END, np.linspace(200.0, 500.0, 4))
+    excess = 0.067 * GRAVITY * END.chord**2 * (END.rise / END.chord) / (2.0 * 44e3)
+    np.testing.assert_allclose(study.relieved - study.relieved_exactly, excess, rtol=0.03)
+    np.testing.assert_allclose(study.relieved_exactly, study.unstretchable, atol=5e-6)
+    assert (np.diff(study.unstretchable) < 0.0).all()
+    assert study.stretchable[-1] < -0.1

@@ -1,0 +1,197 @@
+"""The report: whole, self-contained, and its numbers."""
+
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+import sagline as sl
+from sagline.report.article import ArticleReport, write_article
+from sagline.report.blocks import Verdict
+from sagline.report.parts import PARTS, selection
+
+VOID = {"meta", "br", "link", "img"}
+
+
+class Page(HTMLParser):
+    """What is in a page, and whether its tags are closed in order."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.ids: list[str] = []
+        self.links: list[str] = []
+        self.sources: list[str] = []
+        self.open: list[str] = []
+        self.counts: dict[str, int] = {}
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.counts[tag] = self.counts.get(tag, 0) + 1
+        values = {name: value or "" for name, value in attrs}
+        if "id" in values:
+            self.ids.append(values["id"])
+        for name in ("href", "xlink:href"):
+            if name in values:
+                self.links.append(values[name])
+        if "src" in values:
+            self.sources.append(values["src"])
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.handle_starttag(tag, attrs)
+        if tag not in VOID:
+            self.open.pop()
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> ArticleReport:
+    """The whole report; its seconds are the longest of this folder."""
+    return write_article(tmp_path_factory.mktemp("report"))
+
+
+@pytest.fixture(scope="module")
+def page(report: ArticleReport) -> Page:
+    return Page(report.page.read_text())
+
+
+def test_the_page_needs_nothing_else(report: ArticleReport, page: Page) -> None:
+    assert page.open == []
+    assert page.sources == []
+    assert [link for link in page.links if not link.startswith(("#", "data:image/png;base64,"))] == []
+    text = report.page.read_text()
+    assert re.findall(r"@import|url\((?!#)|<script", text) == []
+    assert len(text) < 4_000_000
+
+
+def test_every_name_in_the_page_is_used_once_and_every_link_leads_to_one(page: Page) -> None:
+    assert len(page.ids) == len(set(page.ids))
+    assert {link[1:] for link in page.links if link.startswith("#")} <= set(page.ids)
+
+
+def test_every_figure_that_can_be_redone_is_there(report: ArticleReport, page: Page) -> None:
+    findings = [finding for chapter in report.chapters for finding in chapter.findings]
+    figures = sorted(number for finding in findings for number in finding.figures)
+    assert figures == [*range(3, 16), *range(17, 23), 25, 26, 27]
+    assert [number for finding in findings for number in finding.tables] == [2]
+    assert page.counts["svg"] == page.counts["figure"] == sum(len(finding.panels) for finding in findings)
+    for finding in findings:
+        assert finding.panels or finding.data
+        assert finding.statement or finding.verdict is Verdict.OURS
+        assert not re.search(r"\bnan\b|\binf\b|None|\[\d", finding.measured)
+
+
+def test_the_numbers_are_in_the_json_file(report: ArticleReport) -> None:
+    numbers = json.loads(report.data.read_text())
+    assert numbers == report.numbers
+    found = numbers["constants"]["published-range"]["published_range"]
+    assert found["k_h_frame"] == pytest.approx(-4.845, abs=1e-5)
+    assert found["k_p"] == pytest.approx(4.385, abs=1e-5)
+    assert numbers["intercept"]["h-over-density"]["k_h_platform"] == pytest.approx(5.0234, abs=1e-3)
+    assert numbers["feasible-sets"]["psi"]["extent_N"] == pytest.approx([46.2, 4.62, 0.462], rel=0.01)
+    assert numbers["feasible-sets"]["psi-curve"]["strictly_falling"] is True
+    assert numbers["feasible-sets"]["line-pi"]["r_squared"] > 0.9999999
+    assert numbers["sag"]["stretch-removed"]["error_of_36_mm"] == pytest.approx(0.51, abs=0.01)
+    assert numbers["sag"]["p-over-density"]["k_p_of_density"][0] == pytest.approx(4.015, abs=2e-3)
+    assert numbers["identify"]["empirical-fit"]["k_h"]["value"] == pytest.approx(4.878, abs=2e-3)
+    limits = {
+        limit["tolerance_m"]: limit["tension_min_N"] for limit in numbers["identify"]["validity-limits"]["limits"]
+    }
+    assert limits == {0.001: None, 0.002: 150.0, 0.005: 100.0, 0.01: 70.0}
+    shares = numbers["models"]["length-error-maps"]["share_within_1_mm"]
+    assert shares["Straight"] < shares["Elastic"] < shares["Empirical"] < shares["Parabolic"] < 1.0
+    simulation = numbers["simulation"]
+    assert simulation["configurations"]["tension_ratio"] == pytest.approx(2.075, abs=0.005)
+    assert simulation["position-error"]["suspended"]["max_mm"] == pytest.approx(1.711, abs=0.005)
+    assert simulation["position-error"]["mixed"]["max_mm"] == pytest.approx(1.131, abs=0.005)
+    assert simulation["configurations"]["share_of_lower_cables_at_limit"] == pytest.approx(0.52, abs=0.02)
+    poses = numbers["poses"]
+    assert poses["table-2"]["distance_mm"][1] == pytest.approx(44.7884, abs=1e-4)
+    assert poses["error-in-space"]["slope_mm_per_m"] == pytest.approx(-18.17, abs=0.01)
+    assert poses["error-in-space"]["lowest_vertical_error_mm"] > 0.0
+    assert poses["explanations"]["explanations"][1][0]["rms_mm"] == pytest.approx(4.21, abs=0.02)
+    assert len(numbers["errata"]) == 11
+
+
+def test_what_the_texts_say_without_numbers_is_so(report: ArticleReport) -> None:
+    numbers = report.numbers
+    cases = {case["case"]: case for case in numbers["identify"]["cable-fit"]["cases"]}
+    both, taut, loose, offset = cases.values()
+    assert loose["standard_error"][0] < both["standard_error"][0] < taut["standard_error"][0]  # loose tell the density
+    assert both["standard_error"][1] < loose["standard_error"][1]  # taut ones the stiffness
+    assert offset["standard_error"][1] > 1.5 * both["standard_error"][1]
+    assert [name for name, case in cases.items() if case["warnings"]] == ["taut only"]
+    slopes = numbers["poses"]["one-parameter-off"]["height_slope_mm_per_m"]
+    falling = [name for name, slope in slopes.items() if slope < 0.0]
+    assert falling == ["linear density ρ", "drum radius", "pulley radius"]
+    low = numbers["simulation"]["low-tension"]
+    good = [max(a, b) <= 6.0 for a, b in zip(low["suspended_mm"], low["mixed_mm"], strict=True)]
+    assert good == sorted(good)  # bad below some limit, good from there on
+    assert numbers["poses"]["tour"]["feasible_share"] == 1.0
+
+
+def test_parts_alone(tmp_path: Path) -> None:
+    told: list[tuple[int, int, str]] = []
+    report = write_article(tmp_path, ["figures", "6-7"], lambda *state: told.append(state))
+    assert told == [(0, 1, "intercept"), (1, 1, "done")]
+    assert [finding.figures for chapter in report.chapters for finding in chapter.findings] == [(6,), (7,)]
+    assert "figures 6-7" in report.page.read_text()
+
+
+def test_the_same_report_has_the_same_bytes(tmp_path: Path) -> None:
+    first, second = (write_article(tmp_path / name, ["figure", "3"]).page.read_bytes() for name in "ab")
+    assert first == second
+
+
+@pytest.mark.parametrize(
+    ("words", "keys"),
+    [
+        ([], [part.key for part in PARTS]),
+        (["figures", "6-9"], ["intercept", "sag"]),
+        (["figures 6-9"], ["intercept", "sag"]),
+        (["Figures", "3,22"], ["feasible-sets", "simulation"]),
+        (["table", "2"], ["poses"]),
+        (["errata", "figure", "27"], ["poses", "errata"]),
+        (["15-17"], ["sag", "simulation"]),
+    ],
+)
+def test_what_is_asked_for_is_understood(words: list[str], keys: list[str]) -> None:
+    assert [part.key for part in selection(words).parts] == keys
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["erata"], "Did you mean errata"),
+        (["figure", "16"], "not redone here"),
+        (["figures", "23-24"], "not redone here"),
+        (["figures"], "without numbers"),
+        (["table", "1"], "Table 1 is in the presets"),
+        (["figures", "3-999999999"], "not redone here"),
+    ],
+)
+def test_what_cannot_be_redone_is_refused(words: list[str], message: str, tmp_path: Path) -> None:
+    with pytest.raises(sl.InvalidValueError, match=message):
+        write_article(tmp_path / "new", words)
+    assert not (tmp_path / "new").exists()
+
+
+def test_an_interrupted_report_leaves_nothing(tmp_path: Path) -> None:
+    def interrupt(done: int, total: int, name: str) -> None:
+        if done == total:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_article(tmp_path, ["figure", "3"], interrupt)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_cannot_be_written_is_refused_before_the_work(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(sl.FileError, match="not a folder"):
+        write_article(tmp_path / "file", progress=lambda *_: pytest.fail("it began"))
