@@ -45,9 +45,13 @@ from sagline.tension.minimum_norm import MinimumNorm
 
 if TYPE_CHECKING:
     from sagline import plot
+    from sagline.files.caspr import load_caspr
+    from sagline.files.imported import Imported
+    from sagline.files.mjcf import dump_mjcf
     from sagline.files.path_file import load_path
     from sagline.files.plan_file import load_plan, save_plan
     from sagline.files.robot_file import dump_robot, load_robot
+    from sagline.files.wirex import load_wirex
 
 __version__ = version("sagline")
 
@@ -71,6 +75,7 @@ __all__ = [
     "ForwardStatus",
     "ForwardStep",
     "Gap",
+    "Imported",
     "InvalidValueError",
     "InverseSolver",
     "InverseStep",
@@ -92,14 +97,17 @@ __all__ = [
     "article_balance",
     "article_path",
     "confirm",
+    "dump_mjcf",
     "dump_robot",
     "equilibria",
     "forward",
     "inertial_wrench",
     "inverse",
+    "load_caspr",
     "load_path",
     "load_plan",
     "load_robot",
+    "load_wirex",
     "modes",
     "path_from_samples",
     "plot",
@@ -112,10 +120,14 @@ __all__ = [
 
 # The outer ring loads on first use: it brings xarray, matplotlib, pint and pydantic with it.
 _LAZY = {
+    "Imported": "sagline.files.imported",
+    "dump_mjcf": "sagline.files.mjcf",
     "dump_robot": "sagline.files.robot_file",
+    "load_caspr": "sagline.files.caspr",
     "load_path": "sagline.files.path_file",
     "load_plan": "sagline.files.plan_file",
     "load_robot": "sagline.files.robot_file",
+    "load_wirex": "sagline.files.wirex",
     "plot": "sagline.plot",
     "save_plan": "sagline.files.plan_file",
 }

@@ -53,6 +53,13 @@ class Tension(StrEnum):
         return (sl.Closest if self is Tension.CLOSEST else sl.MinimumNorm)(variable.value)
 
 
+class Format(StrEnum):
+    """What a robot can be converted to."""
+
+    ROBOT = "robot"
+    MJCF = "mjcf"
+
+
 def robot_completions(incomplete: str) -> list[str]:
     """Presets and robot files that begin so, for the shell."""
     from glob import escape, glob
