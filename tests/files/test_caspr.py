@@ -86,7 +86,9 @@ def test_a_robot_in_full(folder: Path) -> None:
 
 
 def test_what_was_lost_is_told(folder: Path) -> None:
-    lost = " ".join(load_caspr(folder).lost)
+    imported = load_caspr(folder)
+    lost = " ".join(imported.lost)
+    assert imported.robot.notes == f"Not taken over: {lost}"
     for what in (
         "joint's place in the base (0 0 0.5 m)",
         "end location (0 0 0.3 m)",

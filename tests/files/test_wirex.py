@@ -59,7 +59,9 @@ def test_a_robot_in_full(tmp_path: Path) -> None:
 
 
 def test_what_was_lost_is_told(tmp_path: Path) -> None:
-    lost = " ".join(load(tmp_path).lost)
+    imported = load(tmp_path)
+    lost = " ".join(imported.lost)
+    assert imported.robot.notes == f"Not taken over: {lost}"
     for what in ("The pulleys (radius 0.05 m)", "The winches", "The cables' damping", "The controller"):
         assert what in lost
 

@@ -161,7 +161,7 @@ def convert(
 ) -> None:
     """Convert a robot of CASPR or WireX to a robot file, or any robot to a MuJoCo model.
 
-    What had to be assumed and what was lost is told on stderr; `sagline show` marks what was assumed.
+    What had to be assumed and what was lost is told on stderr, and stands in the robot file.
 
     For example:
 

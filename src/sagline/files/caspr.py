@@ -12,7 +12,7 @@ import numpy as np
 from sagline.arrays import Array
 from sagline.cables.cable import Cable
 from sagline.errors import FileError, InvalidValueError
-from sagline.files.imported import STEEL_ROPE_DENSITY, STEEL_ROPE_STIFFNESS, Imported
+from sagline.files.imported import STEEL_ROPE_DENSITY, STEEL_ROPE_STIFFNESS, Imported, imported
 from sagline.files.xml_text import number, numbers, only_child, read_xml
 from sagline.robot.pattern import MotionPattern
 from sagline.robot.robot import Robot
@@ -56,10 +56,11 @@ def load_caspr(source: str | os.PathLike[str], cables: Cable | None = None, cabl
         at = cables_file
         chosen, lost_sets = _chosen_set(read_xml(cables_file), cable_set)
         legs, lost_cables = _legs(chosen, platform.center_of_mass)
+        lost = (*platform.lost, *lost_sets, *lost_cables)
         robot = _robot(bodies.stem.removesuffix("_bodies"), platform, legs, cables)
     except InvalidValueError as error:
         raise FileError(at, f"{error.item} is {error.value}; allowed: {error.allowed}", error.next_step) from None
-    return Imported(robot, (*platform.lost, *lost_sets, *lost_cables))
+    return imported(robot, lost)
 
 
 class _Platform(NamedTuple):

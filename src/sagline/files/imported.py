@@ -17,9 +17,15 @@ class Imported:
     """A robot read from another tool's file, and what the reading cost.
 
     Attributes:
-        robot: The robot; `robot.assumed` holds what the file does not give, field by field, with the reason.
+        robot: The robot; `robot.assumed` holds what the file does not give, field by field, with the reason, and
+            `robot.notes` what was lost.
         lost: What the file gives and the robot does not hold, one sentence each.
     """
 
     robot: Robot
     lost: tuple[str, ...]
+
+
+def imported(robot: Robot, lost: tuple[str, ...]) -> Imported:
+    """A robot whose notes tell what was lost, so that its file does too."""
+    return Imported(robot.replace(notes=" ".join(("Not taken over:", *lost))) if lost else robot, lost)

@@ -12,7 +12,7 @@ import numpy as np
 from sagline.arrays import Array
 from sagline.cables.cable import Cable
 from sagline.errors import FileError, InvalidValueError
-from sagline.files.imported import STEEL_ROPE_DENSITY, STEEL_ROPE_STIFFNESS, Imported
+from sagline.files.imported import STEEL_ROPE_DENSITY, STEEL_ROPE_STIFFNESS, Imported, imported
 from sagline.files.xml_text import number, only_child, read_xml
 from sagline.robot.pattern import MOTION_PATTERNS, PLANAR, ROTATING, MotionPattern
 from sagline.robot.robot import Robot
@@ -40,7 +40,7 @@ def load_wirex(source: str | os.PathLike[str], cables: Cable | None = None) -> I
     try:
         root = read_xml(path)
         _check_generation(root)
-        return _imported(root, path.stem, cables)
+        return _robot(root, path.stem, cables)
     except InvalidValueError as error:
         raise FileError(path, f"{error.item} is {error.value}; allowed: {error.allowed}", error.next_step) from None
 
@@ -54,7 +54,7 @@ def _check_generation(root: Element) -> None:
         )
 
 
-def _imported(root: Element, name: str, cables: Cable | None) -> Imported:
+def _robot(root: Element, name: str, cables: Cable | None) -> Imported:
     robot = only_child(root, "robot", "models")
     chains = robot.findall("geometry/chain")
     if not chains:
@@ -82,7 +82,7 @@ def _imported(root: Element, name: str, cables: Cable | None) -> Imported:
         source=f"WireX file {root.get('version', '')}".strip(),
         assumed=assumed,
     )
-    return Imported(result, _lost(root, chains))
+    return imported(result, _lost(root, chains))
 
 
 def _value(element: Element | None, key: str, item: str, unit: str) -> float | None:
