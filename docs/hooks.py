@@ -29,6 +29,7 @@ RINGS = {  # package -> title and opening line of its page of reference
     "kinematics": ("Kinematics", "From motion to lengths, from lengths to the pose, and the proof of a plan."),
     "tension": ("Tension", "How redundant cables share the load."),
     "statics": ("Statics", "Structure matrix, wrenches, stiffness."),
+    "article": ("Identification", "Constants of cables and of the empirical model, from measurements."),
     "files": ("Files", "What is read and written."),
     "plot": ("Figures", "`sl.plot`: figures for papers, on Matplotlib."),
     "errors": ("Errors", "What sagline raises."),
