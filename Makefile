@@ -9,7 +9,7 @@ FOUND = $(shell for p in python3 python3.13 python3.12 python3.11 python3.14; do
 PYTHON ?= $(FOUND)
 
 .DEFAULT_GOAL := help
-.PHONY: help env run test check format bench soak clean
+.PHONY: help env run test check format bench soak docs clean
 
 help: ## show this list
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{ printf "  make %-8s %s\n", $$1, $$2 }'
@@ -45,6 +45,11 @@ bench: env ## one table of times and ratios, on one core
 
 soak: env ## the long tests that make test leaves out
 	$(BIN)/python -m pytest -m soak
+
+docs: env ## the documentation site, into build/site; warnings are errors
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	@echo "open build/site/index.html; its search needs a server: $(BIN)/python -m http.server -d build/site"
 
 clean: ## remove the environment, the folder output and every cache
 	rm -rf $(VENV) output build dist .coverage htmlcov .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

@@ -62,10 +62,14 @@ if TYPE_CHECKING:
     from sagline import plot
     from sagline.article.identify import EmpiricalFit, identify_empirical
     from sagline.article.identify_cable import CableFit, identify_cable
+    from sagline.files.caspr import load_caspr
+    from sagline.files.imported import Imported
     from sagline.files.measurements import load_measurements
+    from sagline.files.mjcf import dump_mjcf
     from sagline.files.path_file import load_path
     from sagline.files.plan_file import load_plan, save_plan
     from sagline.files.robot_file import dump_robot, load_robot
+    from sagline.files.wirex import load_wirex
 
 __version__ = version("sagline")
 
@@ -94,6 +98,7 @@ __all__ = [
     "ForwardStatus",
     "ForwardStep",
     "Gap",
+    "Imported",
     "ImprovedClosedForm",
     "InvalidValueError",
     "InverseSolver",
@@ -125,6 +130,7 @@ __all__ = [
     "article_path",
     "capacity_margin",
     "confirm",
+    "dump_mjcf",
     "dump_robot",
     "equilibria",
     "forward",
@@ -133,10 +139,12 @@ __all__ = [
     "inertial_wrench",
     "inverse",
     "limit_margin",
+    "load_caspr",
     "load_measurements",
     "load_path",
     "load_plan",
     "load_robot",
+    "load_wirex",
     "modes",
     "path_from_samples",
     "plot",
@@ -158,9 +166,13 @@ _LAZY = {
     "identify_cable": "sagline.article.identify_cable",
     "identify_empirical": "sagline.article.identify",
     "load_measurements": "sagline.files.measurements",
+    "Imported": "sagline.files.imported",
+    "dump_mjcf": "sagline.files.mjcf",
+    "load_caspr": "sagline.files.caspr",
     "load_path": "sagline.files.path_file",
     "load_plan": "sagline.files.plan_file",
     "load_robot": "sagline.files.robot_file",
+    "load_wirex": "sagline.files.wirex",
     "plot": "sagline.plot",
     "save_plan": "sagline.files.plan_file",
 }

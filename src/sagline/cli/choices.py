@@ -81,6 +81,13 @@ class TensionPlace(StrEnum):
         return places[self]
 
 
+class Format(StrEnum):
+    """What a robot can be converted to."""
+
+    ROBOT = "robot"
+    MJCF = "mjcf"
+
+
 def robot_completions(incomplete: str) -> list[str]:
     """Presets and robot files that begin so, for the shell."""
     from glob import escape, glob

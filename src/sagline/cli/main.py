@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from sagline.cli.choices import Model, Tension, TensionPlace, Variable, robot_completions
+from sagline.cli.choices import Format, Model, Tension, TensionPlace, Variable, robot_completions
 from sagline.cli.terminal import reported
 
 app = typer.Typer(
@@ -224,6 +224,51 @@ def show(robot: RobotArgument, as_json: JsonOption = False) -> None:
         from sagline.cli.robots import show_robot
 
         show_robot(robot, as_json=as_json)
+
+
+@app.command()
+def convert(
+    source: Annotated[
+        str,
+        typer.Argument(
+            metavar="SOURCE",
+            help="A WireX file, robot.wcrfx; the folder of a CASPR robot, or its .xml; a robot file; or a preset.",
+        ),
+    ],
+    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="File to write. Default: stdout.")] = None,
+    form: Annotated[
+        Format, typer.Option("--format", help="A robot file in YAML, or a MuJoCo model with straight cables.")
+    ] = Format.ROBOT,
+    linear_density: Annotated[
+        str | None, typer.Option(metavar="QUANTITY", help="Mass of all cables per length, '65 g/m' for instance.")
+    ] = None,
+    axial_stiffness: Annotated[
+        str | None, typer.Option(metavar="QUANTITY", help="EA of all cables, '700 kN' for instance.")
+    ] = None,
+    cable_set: Annotated[
+        str | None, typer.Option(metavar="NAME", help="CASPR: which set of cables. Default: the file's own.")
+    ] = None,
+    at: Annotated[
+        tuple[float, float, float] | None,
+        typer.Option(metavar="X Y Z", help="MuJoCo: where the platform starts, in m. Default: middle of the test box."),
+    ] = None,
+) -> None:
+    """Convert a robot of CASPR or WireX to a robot file, or any robot to a MuJoCo model.
+
+    What had to be assumed and what was lost is told on stderr, and stands in the robot file.
+
+    For example:
+
+    ```
+    sagline convert robot.wcrfx --out robot.yaml
+    sagline convert CASPR/my_robot --linear-density "20 g/m" --axial-stiffness "50 kN" --out my_robot.yaml
+    sagline convert cogiro --format mjcf --out cogiro.xml
+    ```
+    """
+    with reported():
+        from sagline.cli.convert import convert as run
+
+        run(source, out, form, linear_density, axial_stiffness, cable_set, at)
 
 
 def app_entry() -> None:

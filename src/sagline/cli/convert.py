@@ -1,0 +1,92 @@
+"""`sagline convert`: robots of other tools in, robot files and MuJoCo models out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from sagline.cables.cable import Cable
+from sagline.cli.choices import Format
+from sagline.cli.terminal import note
+from sagline.errors import FileError, InvalidValueError
+from sagline.files.imported import Imported
+from sagline.files.quantity import in_si
+from sagline.files.robot_file import dump_robot, load_robot
+from sagline.files.whole import written_whole
+from sagline.robot.pose import Pose
+
+if TYPE_CHECKING:
+    from sagline.robot.robot import Robot
+
+
+def convert(
+    source: str,
+    out: Path | None,
+    form: Format,
+    density: str | None,
+    stiffness: str | None,
+    cable_set: str | None,
+    at: tuple[float, float, float] | None,
+) -> None:
+    """Read, convert, write to a file or to stdout, and report on stderr.
+
+    Raises:
+        SaglineError: If the source is wrong, cannot be converted, or the file cannot be written.
+    """
+    if out is not None and Path(source).exists() and out.resolve() == Path(source).resolve():
+        raise FileError(out, "is the file to convert", "Name another file with --out.")
+    imported = _read(source, _material(density, stiffness), cable_set)
+    text = dump_robot(imported.robot) if form is Format.ROBOT else _mjcf(imported.robot, at)
+    if out is None:
+        typer.echo(text, nl=False)
+    else:
+        with written_whole(out) as partial:
+            partial.write_text(text, encoding="utf-8")
+    _report(imported, out)
+
+
+def _read(source: str, cables: Cable | None, cable_set: str | None) -> Imported:
+    path = Path(source)
+    if path.suffix.lower() == ".wcrfx":
+        from sagline.files.wirex import load_wirex
+
+        return load_wirex(path, cables)
+    if path.suffix.lower() == ".xml" or path.is_dir():
+        from sagline.files.caspr import load_caspr
+
+        return load_caspr(path, cables, cable_set)
+    robot = load_robot(source)
+    return Imported(robot if cables is None else robot.replace(cables=cables), ())
+
+
+def _material(density: str | None, stiffness: str | None) -> Cable | None:
+    if density is None and stiffness is None:
+        return None
+    if density is None or stiffness is None:
+        missing = "--linear-density" if density is None else "--axial-stiffness"
+        raise InvalidValueError(missing, "missing", "both or none of the two", f"Add {missing}.")
+    values = [
+        in_si(text, unit, item)
+        for text, unit, item in ((density, "kg/m", "--linear-density"), (stiffness, "N", "--axial-stiffness"))
+    ]
+    return Cable(*values)
+
+
+def _mjcf(robot: Robot, at: tuple[float, float, float] | None) -> str:
+    from sagline.files.mjcf import dump_mjcf
+
+    if at is None and robot.test_box is None:
+        raise InvalidValueError("--at", "missing", "X Y Z in m", "Say where the platform starts.")
+    position = at if at is not None else 0.5 * (robot.test_box.low + robot.test_box.high)  # type: ignore[union-attr]
+    return dump_mjcf(robot, Pose.from_euler(position, 0.0, 0.0, 0.0))
+
+
+def _report(imported: Imported, out: Path | None) -> None:
+    robot = imported.robot
+    note(f"{robot.name}: ", f"{robot.cable_count} cables, {robot.motion_pattern}" + (f", in {out}" if out else ""))
+    for field, why in robot.assumed.items():
+        note("Assumed: ", f"{field}: {why}")
+    for what in imported.lost:
+        note("Lost: ", what)

@@ -1,0 +1,201 @@
+"""Robots of WireX and WireCenter: one XML file, `.wcrfx`, of geometry, platform, cables and winches."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Final, cast, get_args
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from sagline.arrays import Array
+from sagline.cables.cable import Cable
+from sagline.errors import FileError, InvalidValueError
+from sagline.files.imported import STEEL_ROPE_DENSITY, STEEL_ROPE_STIFFNESS, Imported, imported
+from sagline.files.xml_text import number, only_child, read_xml
+from sagline.robot.pattern import MOTION_PATTERNS, PLANAR, ROTATING, MotionPattern
+from sagline.robot.robot import Robot
+
+_AXES: Final = ("x", "y", "z")
+
+
+def load_wirex(source: str | os.PathLike[str], cables: Cable | None = None) -> Imported:
+    """Read a robot file of WireX (version 0.31 or 0.32 of its format).
+
+    WireX asks for no material, no mass and no limits: what a file leaves out is assumed, and the robot says so in
+    `assumed`. Its winches are kept as the tension limit they give, its pulleys as the points they stand at.
+
+    Args:
+        source: The `.wcrfx` file.
+        cables: The cables' material; None takes the file's, and that of a 4 mm steel rope where it gives none.
+
+    Returns:
+        Imported: the robot, and what was lost.
+
+    Raises:
+        FileError: If the file cannot be read, or describes no robot with one platform.
+    """
+    path = Path(source)
+    try:
+        root = read_xml(path)
+        _check_generation(root)
+        return _robot(root, path.stem, cables)
+    except InvalidValueError as error:
+        raise FileError(path, f"{error.item} is {error.value}; allowed: {error.allowed}", error.next_step) from None
+
+
+def _check_generation(root: Element) -> None:
+    if root.tag != "models":
+        raise InvalidValueError("root element", f"<{root.tag}>", "<models>", "Check that this is a .wcrfx file.")
+    if root.find("robot") is None and root.find("wireRobot") is not None:
+        raise InvalidValueError(
+            "robot", "in the old form <wireRobot>", "<robot>", "Open it in WireCenter and save it again."
+        )
+
+
+def _robot(root: Element, name: str, cables: Cable | None) -> Imported:
+    robot = only_child(root, "robot", "models")
+    chains = robot.findall("geometry/chain")
+    if not chains:
+        raise InvalidValueError("number of <chain>", 0, ">= 1", "Check that the file is whole.")
+    platforms = robot.findall("platform")
+    if len(platforms) > 1:
+        raise InvalidValueError("number of <platform>", len(platforms), "1", "sagline moves a single platform.")
+    materials = [_material(root, chain, k) for k, chain in enumerate(chains)]
+    platform = platforms[0] if platforms else Element("platform")
+    assumed: dict[str, str] = {}
+    pattern = _pattern(robot, assumed)
+    low, high = _limits(root, materials, assumed)
+    result = Robot(
+        robot.get("name") or name,
+        [_point(chain, "base", k) for k, chain in enumerate(chains)],
+        [_point(chain, "platform", k) for k, chain in enumerate(chains)],
+        _cables(materials, assumed) if cables is None else cables,
+        _given(platform, "mass", "platform", "kg"),
+        _inertia(platform, assumed) if pattern in ROTATING else None,
+        center_of_mass=_center(platform, assumed),
+        motion_pattern=pattern,
+        plane_normal=(0.0, 0.0, 1.0) if pattern in PLANAR else None,
+        tension_min=low,
+        tension_max=high,
+        source=f"WireX file {root.get('version', '')}".strip(),
+        assumed=assumed,
+    )
+    return imported(result, _lost(root, chains))
+
+
+def _value(element: Element | None, key: str, item: str, unit: str) -> float | None:
+    """An attribute's number; None where it is missing, empty, or infinite, which some writers put for unknown."""
+    text = "" if element is None else element.get(key, "").strip()
+    if not text or text.lstrip("+").lower() in ("inf", "infinity"):
+        return None
+    return number(text, f"{item}: {key}", unit)
+
+
+def _given(element: Element, key: str, item: str, unit: str) -> float:
+    return number(element.get(key), f"{item}: {key}", unit)
+
+
+def _point(chain: Element, tag: str, k: int) -> list[float]:
+    item = f"chain {k + 1}"
+    element = only_child(chain, tag, item)
+    return [_given(element, axis, f"{item}: {tag}", "m") for axis in _AXES]
+
+
+def _material(root: Element, chain: Element, k: int) -> Element:
+    """The <cable> of a chain: counted from 1 by its cable_id, the first one without; an empty one if there is none."""
+    known = root.findall("cable")
+    text = chain.get("cable_id", "1")
+    if not known:
+        return Element("cable")
+    if not text.isdecimal() or not 1 <= int(text) <= len(known):
+        raise InvalidValueError(f"chain {k + 1}: cable_id", repr(text), f"1 to {len(known)}", "Correct it in the file.")
+    return known[int(text) - 1]
+
+
+def _cables(materials: list[Element], assumed: dict[str, str]) -> Cable:
+    density, stiffness = [], []
+    for element in materials:
+        item = f"cable {element.get('name', '')}".strip()
+        modulus = _value(element, "elasticity", item, "Pa")
+        radius = _value(element, "radius", item, "m")
+        if radius is not None and radius < 0.0:
+            raise InvalidValueError(f"{item}: radius", f"{radius:g} m", ">= 0 m", "Correct it in the file.")
+        density.append(_value(element, "weight", item, "kg/m"))
+        stiffness.append(None if not modulus or not radius else modulus * np.pi * radius**2)
+    missing = [
+        word
+        for word, values in (("linear density", density), ("axial stiffness", stiffness))
+        if not all(values)  # zero is no material either
+    ]
+    if missing:
+        assumed["cables"] = f"{' and '.join(missing)} of a 4 mm steel rope; the WireX file gives none"
+    return Cable(
+        [value or STEEL_ROPE_DENSITY for value in density], [value or STEEL_ROPE_STIFFNESS for value in stiffness]
+    )
+
+
+def _pattern(robot: Element, assumed: dict[str, str]) -> MotionPattern:
+    given = robot.get("motionpattern") or "3R3T"
+    for pattern in get_args(MotionPattern):
+        if pattern == given:
+            if pattern in PLANAR:
+                assumed["plane_normal"] = "z: the file names no plane; taken as that of x and y"
+            return cast(MotionPattern, pattern)
+    raise InvalidValueError(
+        "motionpattern", repr(given), ", ".join(MOTION_PATTERNS), "sagline has no other; correct it in the file."
+    )
+
+
+def _limits(root: Element, materials: list[Element], assumed: dict[str, str]) -> tuple[list[float], list[float]]:
+    """Lower limit from the cable, upper from the winch, or else from the cable's breaking load."""
+    low = [_value(element, "minimum_load", "cable", "N") for element in materials]
+    break_at = [_value(element, "breaking_load", "cable", "N") or None for element in materials]
+    winch = _value(root.find("winch/cable"), "f_max", "winch: cable", "N") or None
+    if None in low:
+        assumed["tension_min"] = "0 N; the WireX file gives none"
+    if winch is None:
+        known = None not in break_at
+        assumed["tension_max"] = (
+            "the breaking load; the WireX file gives no winch"
+            if known
+            else "none; the WireX file gives neither winch nor breaking load"
+        )
+    return [value or 0.0 for value in low], [winch or load or np.inf for load in break_at]
+
+
+def _center(platform: Element, assumed: dict[str, str]) -> list[float]:
+    center = platform.find("centerofgravity")
+    if center is None:
+        assumed["center_of_mass"] = "the platform's origin; the WireX file gives none"
+        return [0.0, 0.0, 0.0]
+    return [_given(center, axis, "centerofgravity", "m") for axis in _AXES]
+
+
+def _inertia(platform: Element, assumed: dict[str, str]) -> Array:
+    """Symmetric matrix; of two mirrored elements one may be left out."""
+    tensor = only_child(platform, "inertiatensor", "platform")
+    assumed["inertia"] = "taken about the center of mass; the WireX format does not say about which point"
+    matrix = np.zeros((3, 3))
+    for i, row in enumerate(_AXES):
+        for j, column in enumerate(_AXES):
+            key = f"I{row}{column}" if tensor.get(f"I{row}{column}") else f"I{column}{row}"
+            matrix[i, j] = _given(tensor, key, "inertiatensor", "kg m^2")
+    return matrix
+
+
+def _lost(root: Element, chains: list[Element]) -> tuple[str, ...]:
+    lost = []
+    bases = [base for chain in chains if (base := chain.find("base")) is not None]
+    radii = sorted({value for base in bases if (value := _value(base, "radius", "base", "m"))})
+    if radii:
+        shown = ", ".join(f"{radius:g}" for radius in radii)
+        lost.append(f"The pulleys (radius {shown} m) and their directions: cables start at the points of <base>.")
+    if root.find("winch") is not None:
+        lost.append("The winches: drums, motors, speeds; only their largest force is taken.")
+    if any(element.get("damping") for element in root.findall("cable")):
+        lost.append("The cables' damping, cost and largest length.")
+    if root.find("robot/controller") is not None:
+        lost.append("The controller.")
+    return tuple(lost)

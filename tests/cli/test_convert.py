@@ -1,0 +1,86 @@
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from sagline.cli.main import app
+from sagline.files.robot_file import load_robot
+
+WIREX = """<models version="0.32"><robot name="swing" motionpattern="3T"><geometry>
+<chain><base x="-1" y="-1" z="2" radius="0.02"/><platform x="0" y="0" z="0"/></chain>
+<chain><base x="1" y="-1" z="2" radius="0.02"/><platform x="0" y="0" z="0"/></chain>
+<chain><base x="0" y="1" z="2" radius="0.02"/><platform x="0" y="0" z="0"/></chain>
+</geometry><platform mass="3"/></robot></models>"""
+
+
+def run(*arguments: str) -> tuple[int, str, str]:
+    result = CliRunner().invoke(app, ["convert", *arguments])
+    return result.exit_code, result.stdout, result.stderr
+
+
+@pytest.fixture
+def wirex(tmp_path: Path) -> Path:
+    file = tmp_path / "swing.wcrfx"
+    file.write_text(WIREX)
+    return file
+
+
+def test_a_wirex_file_becomes_a_robot_file(wirex: Path, tmp_path: Path) -> None:
+    out = tmp_path / "swing.yaml"
+    code, stdout, stderr = run(str(wirex), "--out", str(out))
+    assert (code, stdout) == (0, "")
+    assert "Assumed: cables: linear density and axial stiffness of a 4 mm steel rope" in stderr
+    assert "Lost: The pulleys (radius 0.02 m)" in stderr
+    robot = load_robot(out)
+    np.testing.assert_array_equal(robot.frame_anchors, [[-1, -1, 2], [1, -1, 2], [0, 1, 2]])
+    assert (robot.mass, "cables" in robot.assumed) == (3.0, True)
+
+
+def test_without_a_file_the_text_goes_to_stdout(wirex: Path, tmp_path: Path) -> None:
+    _, stdout, _ = run(str(wirex), "--linear-density", "20 g/m", "--axial-stiffness", "50 kN")
+    file = tmp_path / "from_stdout.yaml"
+    file.write_text(stdout)
+    cables = load_robot(file).cables
+    np.testing.assert_allclose(cables.linear_density, [0.02] * 3, rtol=1e-15)
+    np.testing.assert_allclose(cables.axial_stiffness, [50e3] * 3, rtol=1e-15)
+
+
+def test_a_preset_becomes_a_mujoco_model(tmp_path: Path) -> None:
+    out = tmp_path / "cogiro.xml"
+    code, _, _ = run("cogiro", "--format", "mjcf", "--out", str(out), "--at", "0.5", "-0.25", "2")
+    model = mujoco.MjModel.from_xml_path(str(out))
+    assert (code, model.ntendon) == (0, 8)
+    np.testing.assert_array_equal(model.body("platform").pos, [0.5, -0.25, 2.0])
+
+
+def test_caspr_files_are_recognized(tmp_path: Path) -> None:
+    code, _, stderr = run(str(tmp_path))
+    assert (code, "0 CASPR files of bodies" in " ".join(stderr.split())) == (2, True)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--linear-density", "20 g/m"], "--axial-stiffness is missing; allowed: both or none"),
+        (
+            ["--linear-density", "20 g", "--axial-stiffness", "1"],
+            "--linear-density is '20 g'; allowed: a number in kg/m",
+        ),
+        (["--linear-density", "-1", "--axial-stiffness", "1"], "linear_density is -1 kg/m"),
+        (["--format", "mjcf"], "--at is missing; allowed: X Y Z in m"),
+        (["--format", "mjcf", "--at", "9", "9", "9"], "swing at (9, 9, 9) m is no tensions within the limits"),
+    ],
+)
+def test_bad_input_writes_nothing(wirex: Path, tmp_path: Path, arguments: list[str], message: str) -> None:
+    out = tmp_path / "out.txt"
+    code, stdout, stderr = run(str(wirex), "--out", str(out), *arguments)
+    assert (code, stdout, out.exists()) == (2, "", False)
+    assert message in " ".join(stderr.split())
+
+
+def test_the_source_is_not_overwritten(wirex: Path) -> None:
+    code, _, stderr = run(str(wirex), "--out", str(wirex))
+    assert (code, wirex.read_text()) == (2, WIREX)
+    assert "is the file to convert" in stderr

@@ -1,0 +1,68 @@
+"""Every example of the gallery runs as it stands, and comes to the number it claims."""
+
+import runpy
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+Run = Callable[[str], dict[str, Any]]
+
+
+@pytest.fixture
+def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
+    monkeypatch.chdir(tmp_path)
+    return lambda name: runpy.run_path(str(EXAMPLES / f"{name}.py"))
+
+
+def test_one_cable(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+    names = run("one_cable")
+    # w D^2 / (8 tau) to first order, with the weight along the chord: 0.067 * 9.81 * 160 / (8 * 200)
+    assert names["exact"].sag[-1] == pytest.approx(0.0657, rel=0.01)
+    assert names["worst"]["Straight"] == pytest.approx(76.3, abs=0.1)
+    assert capsys.readouterr().out.startswith("  20 N: 12.7254 m of cable,   659 mm of sag")
+    assert Path("one_cable.png").stat().st_size > 10_000
+
+
+def test_which_model(run: Run) -> None:
+    largest = run("which_model")["largest"]
+    assert largest["article-suspended", "Empirical"] == pytest.approx(1.66, abs=0.01)  # mm
+    assert largest["article-mixed", "Catenary"] < 1e-6
+    assert Path("which_model.png").is_file()
+
+
+def test_feasible_region(run: Run) -> None:
+    names = run("feasible_region")
+    assert names["share"] == pytest.approx(0.754, abs=0.002)
+    assert names["plan"].shortfall[0] == pytest.approx(357.0, abs=1.0)
+    assert Path("feasible_region.png").is_file()
+
+
+def test_how_fast(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("how_fast")["fastest"] == 1.5
+    assert "1.0 s: fails after 0.09 s by 226 N" in capsys.readouterr().out
+
+
+def test_control_loop(run: Run) -> None:
+    names = run("control_loop")
+    assert names["difference"] < 1e-12
+    assert np.median(names["times"]) < 1e-3  # s; the loop runs at 1 kHz
+
+
+def test_encoders(run: Run) -> None:
+    names = run("encoders")
+    assert names["found"].solved.all()
+    assert 1e3 * names["error"].mean() == pytest.approx(1.1, abs=0.1)
+
+
+def test_to_mujoco(run: Run) -> None:
+    text = run("to_mujoco")["text"]
+    assert Path("ipanema-2.xml").read_text() == text
+    model = mujoco.MjModel.from_xml_path("ipanema-2.xml")
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    np.testing.assert_allclose(data.qacc, 0.0, atol=1e-8)  # m/s^2: it rests where it was put

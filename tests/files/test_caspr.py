@@ -1,0 +1,185 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sagline.cables.cable import Cable
+from sagline.errors import FileError
+from sagline.files.caspr import load_caspr
+
+BODIES = """<?xml version="1.0" encoding="utf-8"?>
+<links display_range="-3 3 -2 2 0 4">
+  <link_rigid num="1" name="gondola">
+    <joint type="SPATIAL_EULER_XYZ" q_initial="0 0 1 0 0 0"/>
+    <physical>
+      <mass>8</mass>
+      <com_location>0.1 0.0 -0.2</com_location>
+      <end_location>0 0 0.3</end_location>
+      <inertia ref="joint">
+        <Ixx>0.82</Ixx><Iyy>1.00</Iyy><Izz>0.48</Izz><Ixy>0</Ixy><Ixz>0.16</Ixz><Iyz>0</Iyz>
+      </inertia>
+    </physical>
+    <parent><num>0</num><location>0 0 0.5</location></parent>
+  </link_rigid>
+</links>
+"""
+
+
+def cable(kind: str, name: str, reference: str, properties: str, attachments: str) -> str:
+    return (
+        f'<{kind} name="{name}" attachment_reference="{reference}">'
+        f"<properties>{properties}</properties><attachments>{attachments}</attachments></{kind}>"
+    )
+
+
+def point(link: int, place: str) -> str:
+    return f"<attachment><link>{link}</link><location>{place}</location></attachment>"
+
+
+LIMITS = "<force_min>5</force_min><force_max>300</force_max>"
+IDEAL = cable("cable_ideal", "left", "joint", LIMITS, point(0, "-3 0 4") + point(1, "-0.2 0 0.1"))
+SPRING = cable("cable_linear_spring", "right", "com", LIMITS + "<K>9e4</K>", point(1, "0.2 0 0.1") + point(0, "3 0 4"))
+PULLEY = cable(
+    "cable_ideal",
+    "rear",
+    "joint",
+    LIMITS,
+    "<attachment_base_pulley><link>0</link><fixed_location>0 2 4</fixed_location><pulley_radius>0.04</pulley_radius>"
+    "</attachment_base_pulley>" + point(1, "0 0.2 0"),
+)
+PASSIVE = cable(
+    "cable_passive_linear_spring", "spring 1", "com", "<K>5</K><l0>1</l0>", point(0, "0 0 5") + point(1, "0 0 0")
+)
+
+
+def cables_file(*cables: str, default: str = "all") -> str:
+    return (
+        '<!DOCTYPE cables [<!ATTLIST cable_set id ID #REQUIRED>]><cables default_cable_set="' + default + '">'
+        f'<cable_set id="all">{"".join(cables)}</cable_set><cable_set id="one">{IDEAL}</cable_set></cables>'
+    )
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "gondola_bodies.xml").write_text(BODIES)
+    (tmp_path / "cables").mkdir()
+    (tmp_path / "cables" / "gondola_cables.xml").write_text(cables_file(IDEAL, SPRING, PULLEY, PASSIVE))
+    (tmp_path / "gondola_trajectories.xml").write_text("<trajectories/>")
+    return tmp_path
+
+
+def test_a_robot_in_full(folder: Path) -> None:
+    imported = load_caspr(folder)
+    robot = imported.robot
+    assert (robot.name, robot.mass, robot.motion_pattern) == ("gondola", 8.0, "3R3T")
+    np.testing.assert_array_equal(robot.frame_anchors, [[-3, 0, 4], [3, 0, 4], [0, 2, 4]])
+    # the second cable's end is given from the center of mass, (0.1, 0, -0.2)
+    np.testing.assert_allclose(robot.platform_anchors, [[-0.2, 0, 0.1], [0.3, 0, -0.1], [0, 0.2, 0]], atol=1e-15)
+    np.testing.assert_array_equal(robot.center_of_mass, [0.1, 0.0, -0.2])
+    # Steiner by hand: 8 kg at (0.1, 0, -0.2) takes 0.32, 0.40, 0.08 and adds 8 * 0.1 * -0.2 to Ixz
+    np.testing.assert_allclose(robot.inertia, [[0.5, 0, 0], [0, 0.6, 0], [0, 0, 0.4]], atol=1e-15)
+    np.testing.assert_array_equal(robot.tension_min, [5, 5, 5])
+    np.testing.assert_array_equal(robot.tension_max, [300, 300, 300])
+    np.testing.assert_array_equal(robot.cables.axial_stiffness, [700e3, 90e3, 700e3])
+    np.testing.assert_array_equal(robot.cables.linear_density, [0.065] * 3)
+    assert robot.assumed["cables"].startswith("linear density and axial stiffness of a 4 mm steel rope")
+
+
+def test_what_was_lost_is_told(folder: Path) -> None:
+    imported = load_caspr(folder)
+    lost = " ".join(imported.lost)
+    assert imported.robot.notes == f"Not taken over: {lost}"
+    for what in (
+        "joint's place in the base (0 0 0.5 m)",
+        "end location (0 0 0.3 m)",
+        "joint's q_initial",
+        "other sets of cables: one",
+        "cable_ideal rear: its pulley",
+        "cable_passive_linear_spring spring 1: no cable on a winch",
+    ):
+        assert what in lost
+
+
+@pytest.mark.parametrize("file", ["gondola_bodies.xml", "cables/gondola_cables.xml"])
+def test_either_file_finds_the_other(folder: Path, file: str) -> None:
+    assert load_caspr(folder / file).robot.cable_count == 3
+
+
+def test_the_file_named_wins_over_others(folder: Path) -> None:
+    (folder / "other_cables.xml").write_text(cables_file(IDEAL))
+    assert load_caspr(folder / "other_cables.xml").robot.cable_count == 1
+    with pytest.raises(FileError, match=r"2 CASPR files of cables \(gondola_cables.xml, other_cables.xml\)"):
+        load_caspr(folder)
+
+
+def test_set_and_material_of_choice(folder: Path) -> None:
+    imported = load_caspr(folder, Cable(0.02, 5e4), "one")
+    assert imported.robot.cable_count == 1
+    assert imported.robot.cables.linear_density.tolist() == [0.02]
+    assert not imported.robot.assumed
+    with pytest.raises(FileError, match="cable set is 'two'; allowed: 'all', 'one'"):
+        load_caspr(folder, cable_set="two")
+
+
+@pytest.mark.parametrize(
+    ("joint", "pattern", "normal"),
+    [
+        ("T_XYZ", "3T", None),
+        ("PLANAR_XY", "1R2T", [0, 0, 1]),
+        ("PLANAR_XZ", "1R2T", [0, 1, 0]),
+        ("PLANAR_YZ", "1R2T", [1, 0, 0]),
+        ("P_XY", "2T", [0, 0, 1]),
+    ],
+)
+def test_joints_become_patterns(folder: Path, joint: str, pattern: str, normal: list[float] | None) -> None:
+    (folder / "gondola_bodies.xml").write_text(BODIES.replace("SPATIAL_EULER_XYZ", joint))
+    robot = load_caspr(folder).robot
+    assert robot.motion_pattern == pattern
+    assert (None if robot.plane_normal is None else robot.plane_normal.tolist()) == normal
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("SPATIAL_EULER_XYZ", "R_Z", "joint type is 'R_Z'; allowed: SPATIAL"),
+        ("<mass>8</mass>", "", "mass is missing"),
+        ("<mass>8</mass>", "<mass>eight</mass>", "mass is 'eight'; allowed: a number in kg"),
+        ("<mass>8</mass>", "<mass>-8</mass>", "mass is -8 kg"),
+        ('ref="joint"', "", "inertia: ref is ''"),
+        ("</links>", BODIES[BODIES.index("<link_rigid") :], "number of <link_rigid> is 2; allowed: 1"),
+        ("<Ixx>0.82</Ixx>", "<Ixx>0.1</Ixx>", "inertia is a matrix with the principal moment"),
+    ],
+)
+def test_bodies_that_will_not_do(folder: Path, old: str, new: str, message: str) -> None:
+    (folder / "gondola_bodies.xml").write_text(BODIES.replace(old, new))
+    with pytest.raises(FileError, match=message):
+        load_caspr(folder)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (point(0, "-3 0 4"), "", "cable_ideal left: number of attachments is 1; allowed: 2"),
+        (point(0, "-3 0 4"), point(0, "-3 0 4") + point(0, "0 0 4"), "number of attachments is 3"),
+        (point(0, "-3 0 4"), point(2, "-3 0 4"), "cable_ideal left: links is 2, 1; allowed: 0, 1"),
+        (point(0, "-3 0 4"), point(0, "-3 0"), "cable_ideal left: location on link 0 is '-3 0'; allowed: 3 numbers"),
+        ("<force_max>300</force_max>", "", "cable_ideal left: force_max is missing"),
+        ("<force_max>300</force_max>", "<force_max>3</force_max>", r"tension_min\[0\] is 5 N"),
+        ("cable_set id", "set id", "is no complete XML"),
+        ("cable_set", "group", "cable set is '[a-z]*'; allowed: none"),
+    ],
+)
+def test_cables_that_will_not_do(folder: Path, old: str, new: str, message: str) -> None:
+    (folder / "cables" / "gondola_cables.xml").write_text(cables_file(IDEAL, SPRING).replace(old, new))
+    with pytest.raises(FileError, match=message):
+        load_caspr(folder)
+
+
+def test_files_that_are_not_there(folder: Path) -> None:
+    with pytest.raises(FileError, match="does not exist"):
+        load_caspr(folder / "none")
+    with pytest.raises(FileError, match="holds neither <link_rigid> nor <cables>"):
+        load_caspr(folder / "gondola_trajectories.xml")
+    (folder / "gondola_bodies.xml").unlink()
+    with pytest.raises(FileError, match=r"0 CASPR files of bodies \(none\)"):
+        load_caspr(folder)

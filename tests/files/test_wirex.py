@@ -1,0 +1,127 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sagline.cables.cable import Cable
+from sagline.errors import FileError
+from sagline.files.wirex import load_wirex
+
+TEXT = """<?xml version="1.0" ?>
+<models version="0.32">
+  <robot name="shelf" motionpattern="3R3T" generator="by hand">
+    <geometry>
+      <chain id="1" winchtype="small"><base x="-2" y="-1" z="3" a11="1" a22="1" a33="1" radius="0.05" />
+        <platform x="-0.1" y="-0.1" z="0.2" /></chain>
+      <chain id="2" cable_id="2"><base x="2" y="-1" z="3" radius="0.05" /><platform x="0.1" y="-0.1" z="0.2" /></chain>
+      <chain id="3"><base x="0" y="1.5" z="3" radius="0" /><platform x="0" y="0.1" z="0.2" /></chain>
+    </geometry>
+    <platform name="tray" mass="12.5" swing_angle="40">
+      <inertiatensor Ixx="0.5" Ixy="0.01" Ixz="0" Iyy="0.6" Iyz="-0.02" Izz="0.7" />
+      <centerofgravity x="0" y="0.01" z="-0.03" />
+    </platform>
+    <controller ipo_clock="4" />
+  </robot>
+  <cable id="1" name="thin" elasticity="2.5e10" radius="0.001" weight="0.01" minimum_load="4" breaking_load="900"
+    damping="0.1" max_length="30" />
+  <cable id="2" name="thick" elasticity="1e10" radius="0.002" weight="0.03" minimum_load="6" breaking_load="2500" />
+  <winch id="1" name="small"><cable f_max="800" max_velocity="4" /></winch>
+</models>
+"""
+
+
+def load(folder: Path, *changes: tuple[str, str], cables: Cable | None = None):  # type: ignore[no-untyped-def]
+    text = TEXT
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    file = folder / "shelf.wcrfx"
+    file.write_text(text)
+    return load_wirex(file, cables)
+
+
+WINCH = '<winch id="1" name="small"><cable f_max="800" max_velocity="4" /></winch>'
+
+
+def test_a_robot_in_full(tmp_path: Path) -> None:
+    robot = load(tmp_path).robot
+    assert (robot.name, robot.mass, robot.motion_pattern, robot.plane_normal) == ("shelf", 12.5, "3R3T", None)
+    np.testing.assert_array_equal(robot.frame_anchors, [[-2, -1, 3], [2, -1, 3], [0, 1.5, 3]])
+    np.testing.assert_array_equal(robot.platform_anchors, [[-0.1, -0.1, 0.2], [0.1, -0.1, 0.2], [0, 0.1, 0.2]])
+    np.testing.assert_array_equal(robot.center_of_mass, [0.0, 0.01, -0.03])
+    np.testing.assert_array_equal(robot.inertia, [[0.5, 0.01, 0], [0.01, 0.6, -0.02], [0, -0.02, 0.7]])
+    # E pi r^2: 25 GPa at 1 mm, 10 GPa at 2 mm
+    np.testing.assert_allclose(robot.cables.axial_stiffness, [78539.816339745, 125663.706143592, 78539.816339745])
+    np.testing.assert_array_equal(robot.cables.linear_density, [0.01, 0.03, 0.01])
+    np.testing.assert_array_equal(robot.tension_min, [4, 6, 4])
+    np.testing.assert_array_equal(robot.tension_max, [800, 800, 800])
+    assert list(robot.assumed) == ["inertia"]
+
+
+def test_what_was_lost_is_told(tmp_path: Path) -> None:
+    imported = load(tmp_path)
+    lost = " ".join(imported.lost)
+    assert imported.robot.notes == f"Not taken over: {lost}"
+    for what in ("The pulleys (radius 0.05 m)", "The winches", "The cables' damping", "The controller"):
+        assert what in lost
+
+
+def test_what_is_missing_is_assumed_and_said(tmp_path: Path) -> None:
+    robot = load(
+        tmp_path,
+        (WINCH, ""),
+        (' minimum_load="4" breaking_load="900"', ' breaking_load=""'),
+        (' weight="0.01"', ' weight="0"'),
+        ('elasticity="1e10"', 'elasticity="inf"'),
+        ('<centerofgravity x="0" y="0.01" z="-0.03" />', ""),
+    ).robot
+    np.testing.assert_array_equal(robot.cables.linear_density, [0.065, 0.03, 0.065])
+    np.testing.assert_allclose(robot.cables.axial_stiffness, [78539.816339745, 700e3, 78539.816339745])
+    np.testing.assert_array_equal(robot.tension_min, [0, 6, 0])
+    np.testing.assert_array_equal(robot.tension_max, [np.inf, 2500, np.inf])
+    np.testing.assert_array_equal(robot.center_of_mass, [0, 0, 0])
+    assert set(robot.assumed) == {"cables", "center_of_mass", "inertia", "tension_min", "tension_max"}
+    assert robot.assumed["cables"].startswith("linear density and axial stiffness of a 4 mm steel rope")
+
+
+def test_without_a_winch_the_breaking_load_limits(tmp_path: Path) -> None:
+    robot = load(tmp_path, (WINCH, "")).robot
+    np.testing.assert_array_equal(robot.tension_max, [900, 2500, 900])
+    assert robot.assumed["tension_max"].startswith("the breaking load")
+
+
+def test_a_material_of_choice_replaces_the_file_s(tmp_path: Path) -> None:
+    robot = load(tmp_path, cables=Cable(0.02, 5e4)).robot
+    assert robot.cables.linear_density.tolist() == [0.02] * 3
+
+
+def test_planar_robots_get_a_plane(tmp_path: Path) -> None:
+    robot = load(tmp_path, ('motionpattern="3R3T"', 'motionpattern="1R2T"')).robot
+    assert robot.plane_normal is not None
+    assert robot.plane_normal.tolist() == [0, 0, 1]
+    assert "plane_normal" in robot.assumed
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("3R3T", "2R3T", "motionpattern is '2R3T'; allowed: 3R3T, 3T, 1R2T, 2T"),
+        ('mass="12.5" ', "", "platform: mass is missing"),
+        ('mass="12.5"', 'mass="0"', "mass is 0 kg"),
+        ('base x="2"', 'base x="two"', "chain 2: base: x is 'two'; allowed: a number in m"),
+        ('<platform x="0" y="0.1" z="0.2" />', "", "chain 3: number of <platform> is 0; allowed: 1"),
+        ('cable_id="2"', 'cable_id="3"', "chain 2: cable_id is '3'; allowed: 1 to 2"),
+        ('Iyz="-0.02"', "", "inertiatensor: I"),
+        ('f_max="800"', 'f_max="5"', r"tension_min\[1\] is 6 N"),
+        ('radius="0.001"', 'radius="thin"', "cable thin: radius is 'thin'"),
+        ('radius="0.001"', 'radius="-0.001"', "cable thin: radius is -0.001 m"),
+        ("<controller", '<platform name="second" /><controller', "number of <platform> is 2; allowed: 1"),
+        ("models", "shelves", "root element is <shelves>; allowed: <models>"),
+        ("robot", "wireRobot", "robot is in the old form <wireRobot>"),
+        ("chain", "leg", "number of <chain> is 0"),
+        ("</models>", "", "is no complete XML"),
+    ],
+)
+def test_files_that_will_not_do(tmp_path: Path, old: str, new: str, message: str) -> None:
+    with pytest.raises(FileError, match=message):
+        load(tmp_path, (old, new))

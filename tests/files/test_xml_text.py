@@ -1,0 +1,53 @@
+import re
+from pathlib import Path
+
+import pytest
+
+from sagline.errors import FileError, InvalidValueError
+from sagline.files.xml_text import number, numbers, read_xml
+
+
+def written(folder: Path, text: bytes) -> Path:
+    file = folder / "robot.xml"
+    file.write_bytes(text)
+    return file
+
+
+def test_a_document_type_is_skipped_and_not_opened(tmp_path: Path) -> None:
+    text = b'<!DOCTYPE cables SYSTEM "no_folder/cables.dtd" [<!ATTLIST a id ID #REQUIRED>]><cables><a>7</a></cables>'
+    root = read_xml(written(tmp_path, text))
+    assert number(root.findtext("a"), "a", "m") == 7.0
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (b'<!DOCTYPE a [<!ENTITY b "bbbb">]><a>&b;</a>', "declares the entity b"),
+        (b'<!DOCTYPE a [<!ENTITY b SYSTEM "file:///etc/hostname">]><a>&b;</a>', "declares the entity b"),
+        (b"<!DOCTYPE a [<!ENTITY % b \"<!ENTITY c 'd'>\"> %b;]><a/>", "declares the entity b"),
+        (b"<a><b></a>", "is no complete XML"),
+        (b"<a><b>", "is no complete XML"),
+        (b"", "is no complete XML"),
+        (b"mass: 3", "is no complete XML"),
+        (b'<?xml version="1.0" encoding="none-such"?><a/>', "is no complete XML"),
+        (b"<a>\xff\xfe</a>", "is no complete XML"),
+    ],
+)
+def test_what_is_refused(tmp_path: Path, text: bytes, message: str) -> None:
+    with pytest.raises(FileError, match=message):
+        read_xml(written(tmp_path, text))
+
+
+def test_missing_file_and_folder(tmp_path: Path) -> None:
+    for path in (tmp_path / "none.xml", tmp_path):
+        with pytest.raises(FileError, match="cannot be read"):
+            read_xml(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [(None, "missing"), ("  ", "missing"), ("1 2", "'1 2'"), ("1 2 x", "'1 2 x'"), ("1 nan 3", "'1 nan 3'")],
+)
+def test_numbers_that_are_none(text: str | None, shown: str) -> None:
+    with pytest.raises(InvalidValueError, match=re.escape(f"place is {shown}; allowed: 3 numbers between blanks in m")):
+        numbers(text, 3, "place", "m")
