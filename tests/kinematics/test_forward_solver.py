@@ -53,6 +53,11 @@ def test_bad_input() -> None:
         solver.step([5.0, 5.0, -1.0, 5.0, 5.0, 5.0, 5.0, 5.0])
     with pytest.raises(sl.InvalidValueError, match="shape"):
         solver.step([5.0] * 7)
+    for wrong in (-1.0, 0.0, np.nan, np.inf):
+        with pytest.raises(sl.InvalidValueError, match=r"unstrained_length\[5\]"):
+            solver.step(np.where(np.arange(8) == 5, wrong, 5.0))
+    with pytest.raises(sl.InvalidValueError, match="one sample"):
+        solver.step(np.full((1, 8), 5.0))
     with pytest.raises(sl.InvalidValueError, match="one pose"):
         solver.reset(box_poses(COGIRO, 2, seed=0))
     with pytest.raises(sl.InvalidValueError, match="Straight"):

@@ -19,7 +19,8 @@ from sagline.kernels.forward import ENERGY, ITERATIONS, fill_scales
 from sagline.kernels.freedom import norm, project, spread
 from sagline.kernels.geometry import cable_geometry
 from sagline.kernels.jit import kernel
-from sagline.kernels.platform import Problem, Space, moved_pose, new_space
+from sagline.kernels.platform import moved_pose
+from sagline.kernels.problem import Problem, Space, new_space
 
 FIT_STEPS = 200
 FIRST_DAMPING = 1e-3  # of the largest diagonal element

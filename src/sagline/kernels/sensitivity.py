@@ -14,7 +14,8 @@ from sagline.kernels.codes import CATENARY, ELASTIC, STRAIGHT
 from sagline.kernels.hyperbolic import atanhc_excess
 from sagline.kernels.jit import kernel
 from sagline.kernels.models import pull_of_shallow
-from sagline.kernels.platform import Problem, end_stiffness, new_space, platform_stiffness, unbalance
+from sagline.kernels.platform import end_stiffness, platform_stiffness, unbalance
+from sagline.kernels.problem import Problem, new_space
 from sagline.kernels.stiffness import shallow_slopes
 
 # which datum changes
