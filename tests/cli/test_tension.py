@@ -29,7 +29,7 @@ def test_numbers_are_those_of_the_library(folder: FilePath) -> None:
     found = json.loads(result.stdout)
     robot = sl.load_robot("article-mixed")
     pose = sl.Pose.from_euler([1.0, -0.5, 2.5], np.radians(3.0), 0.0, 0.0)
-    for name in ("MinimumNorm", "Centroid", "LowestMaximum", "Puncture"):
+    for name in ("Centroid", "LowestMaximum", "Puncture", "MinimumNorm"):
         plan = sl.inverse(robot, pose, tension=getattr(sl, name)())
         np.testing.assert_allclose(found["tensions"][name]["chord_tension"], plan.chord_tension, rtol=1e-12)
     assert found["capacity_margin"] == pytest.approx(float(sl.capacity_margin(plan.state)), rel=1e-6)

@@ -10,8 +10,8 @@ POSE = sl.Pose([1.0, -0.5, 2.5], np.eye(3))
 
 
 def test_polygon_shows_corners_limits_and_methods() -> None:
-    shape = sl.tension_polygon(MIXED, POSE)
-    plan = sl.inverse(MIXED, POSE, tension=sl.Centroid())
+    shape = sl.tension_polygon(MIXED, POSE, model=sl.Elastic())
+    plan = sl.inverse(MIXED, POSE, model=sl.Elastic(), tension=sl.Centroid())
     ax = plot.polygon(shape, {"Centroid": plan.chord_tension, "none": np.full(8, np.nan)})
     sides = [line for line in ax.get_lines() if line.get_marker() == "None"]
     drawn = np.array([np.asarray(line.get_xydata())[0] for line in sides])

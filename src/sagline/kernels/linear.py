@@ -15,6 +15,7 @@ from sagline.kernels.tables import HIGH, LOW, START
 LP_SOLVED, LP_EMPTY, LP_UNBOUNDED, LP_GAVE_UP = 0, 1, 2, 3
 PIVOTS = 2000
 CAREFUL = 60  # pivots after which ties are broken by index (Bland), which cannot cycle
+ROUNDING = 4e-16  # of a point's largest coordinate
 PIVOT = 1e-11  # smallest pivot, of the row's largest
 
 
@@ -96,10 +97,14 @@ def lowest_point(
         point[k] = -radius * sign
     for pivots in range(PIVOTS):
         careful = pivots > CAREFUL
-        entering = most_violated(rows, sides, count, point, slack, careful)
+        far = 0.0
+        for k in range(d):
+            far = max(far, abs(point[k]))
+        seen = max(slack, ROUNDING * d * far)  # far out, rounding hides more than the slack
+        entering = most_violated(rows, sides, count, point, seen, careful)
         if entering < 0:
             refine(rows, sides, basis, inverse, point)
-            entering = most_violated(rows, sides, count, point, slack, careful)
+            entering = most_violated(rows, sides, count, point, seen, careful)
         if entering < 0:
             for j in range(d):
                 if basis[j] >= count and weights[j] > 0.0:
