@@ -9,7 +9,7 @@ FOUND = $(shell for p in python3 python3.13 python3.12 python3.11 python3.14; do
 PYTHON ?= $(FOUND)
 
 .DEFAULT_GOAL := help
-.PHONY: help env run test check format bench soak docs clean
+.PHONY: help env run article test check format bench soak docs clean
 
 help: ## show this list
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{ printf "  make %-8s %s\n", $$1, $$2 }'
@@ -26,6 +26,9 @@ $(STAMP): pyproject.toml
 
 run: env ## the main job: the article's test, its table, runs and figures in OUT (default: output)
 	$(BIN)/sagline run --out $(OUT)
+
+article: env ## the article's figures, tables and errata redone, as one page in OUT
+	$(BIN)/sagline article --out $(OUT)
 
 test: env check ## all checks, then the whole test suite with its coverage
 	$(BIN)/python -m pytest --cov

@@ -171,8 +171,8 @@ def _limit(study: ConstantsStudy, draw: Drawings) -> Finding:
     rows = [
         (
             f"{factor:g}",
-            n(c.lowest, ".4g"),
-            n(c.highest, ".4g"),
+            n(c.lowest, ",.0f"),
+            n(c.highest, ",.0f"),
             n(c.k_h_platform, "+.5f"),
             n(c.k_h_frame, ".5f"),
             n(c.k_p, ".5f"),

@@ -148,8 +148,8 @@ def _measured() -> Finding:
         title="density and stiffness from measurements",
         statement="",
         measured=f"Four sets of {SAMPLES} made-up measurements of a cable of {n(cable.linear_density)} kg/m and EA = "
-        f"{n(cable.axial_stiffness)} N, with scatter of {n(1e3 * LENGTH_ERROR)} mm and {n(TENSION_ERROR)} N at the "
-        "frame end. Loose cables tell the density, taut ones the stiffness; an unknown zero of the encoder "
+        f"{n(1e-3 * cable.axial_stiffness)} kN, with scatter of {n(1e3 * LENGTH_ERROR)} mm and {n(TENSION_ERROR)} N "
+        "at the frame end. Loose cables tell the density, taut ones the stiffness; an unknown zero of the encoder "
         "makes the stiffness less certain.",
         verdict=Verdict.OURS,
         numbers={"cases": numbers},

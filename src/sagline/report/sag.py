@@ -129,12 +129,13 @@ def _chord(study: SagStudy, draw: Drawings) -> Finding:
     sampling = study.sampling
     figure, ax = axes("$D$ [m]", "$a_d$ [m N²]")
     a_d, q_a = study.a_d[MIDDLE, :, DENSE], study.q_a[MIDDLE, DENSE]
-    _fit(ax, sampling.chords, a_d, q_a * sampling.chords**3)
+    _fit(ax, sampling.chords, a_d, q_a, 3)
     second, bx = axes("$D$ [m]", "$a_d$ [m N²]")
+    fine = np.linspace(0.0, sampling.chords[-1], 80)
     for k, color in enumerate(shades(sampling.angles.size)):
         label = f"{sampling.angles[k]:g}"
         bx.plot(sampling.chords, study.a_d[k, :, DENSE], "o", color=color, markersize=2.6, label=label)
-        bx.plot(sampling.chords, study.q_a[k, DENSE] * sampling.chords**3, color=color, linewidth=0.9)
+        bx.plot(fine, study.q_a[k, DENSE] * fine**3, color=color, linewidth=0.9)
     legend(bx, r"$\varphi$ [rad]")
     away = _away(study.q_a[:, None] * sampling.chords[:, None] ** 3, study.a_d)
     return Finding(
@@ -188,7 +189,7 @@ def _angle(study: SagStudy, draw: Drawings) -> Finding:
 def _density(study: SagStudy, draw: Drawings) -> Finding:
     sampling = study.sampling
     figure, ax = axes(r"$\rho$ [kg/m]", "$p_q$ [N²/m²]")
-    _fit(ax, sampling.densities, study.p_q, study.k_p * sampling.densities**2)
+    _fit(ax, sampling.densities, study.p_q, study.k_p, 2)
     each = study.p_q / sampling.densities**2
     second, bx = axes(r"$\rho$ [kg/m]", r"$p_q/\rho^2$ [m²/s⁴]")
     bx.plot(sampling.densities, each, "o-", color=BLUE, markersize=3.0, linewidth=1.1, label="density by density")
@@ -212,9 +213,10 @@ def _density(study: SagStudy, draw: Drawings) -> Finding:
     )
 
 
-def _fit(ax: Axes, x: Array, y: Array, fit: Array) -> None:
+def _fit(ax: Axes, x: Array, y: Array, factor: float, power: int) -> None:
+    fine = np.linspace(0.0, x[-1], 80)
     ax.plot(x, y, "o", color=BLUE, markersize=3.5, label="exact")
-    ax.plot(x, fit, color="black", linewidth=0.9, label="fit")
+    ax.plot(fine, factor * fine**power, color="black", linewidth=0.9, label="fit")
     legend(ax)
 
 

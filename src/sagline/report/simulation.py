@@ -110,7 +110,7 @@ def _courses(study: Simulation, draw: Drawings) -> Finding:
             panels.append(_cables(run.plan, values, label, f"Figure {figure}, {robot}: {what}.", draw))
         found = figures(run)
         texts.append(
-            f"{robot}: L {n(found.length_min, '.2f')} to {n(found.length_max, '.2f')} m, d "
+            f"{robot.capitalize()}: L {n(found.length_min, '.2f')} to {n(found.length_max, '.2f')} m, d "
             f"{n(1e3 * found.adjusting_min, '.3g')} to {n(1e3 * found.adjusting_max, '.3g')} mm, T_x "
             f"{n(found.tension_min, '.3g')} to {n(found.tension_max, '.3g')} N, changing by at most "
             f"{n(found.step_max, '.2g')} N from sample to sample, its slope of up to {n(found.slope_max, '.2g')} N/s "
@@ -121,9 +121,9 @@ def _courses(study: Simulation, draw: Drawings) -> Finding:
         figures=(20, 21),
         title="lengths, adjusting lengths and tensions",
         statement="“Our proposed model produces a continuous and smooth set of tension.”",
-        measured="Continuous, with mild corners. "
-        + "; ".join(texts)
-        + ". The slope jumps where the 5th order polynomials begin and end, and where a cable reaches its limit.",
+        measured="Continuous, with mild corners.\n\n"
+        + ".\n\n".join(texts)
+        + ".\n\nThe slope jumps where the 5th order polynomials begin and end, and where a cable reaches its limit.",
         verdict=Verdict.HOLDS_WITHIN,
         numbers=numbers,
         panels=tuple(panels),
@@ -244,15 +244,15 @@ def _models(study: Simulation, draw: Drawings) -> Finding:
         ax.set_yscale("log")
         ax.set_ylim(1e-3, 2e3)
         legend(ax, columns=4, loc="upper left")
-        panels.append(draw.panel(figure, f"Position error of four models, {robot}; the exact one is below 1 pm."))
+        panels.append(draw.panel(figure, f"Position error of four models, {robot}; the exact one is the zero."))
     shallow = [figures(run).error_max for run in study.of(Parabolic)]
     return Finding(
         key="five-models",
         title="all five cable models on the same path",
         statement="",
-        measured=f"The exact model comes back to within {n(_worst(study.of(Catenary)), '.1g')} m. The parabolic one, "
-        f"as cheap as the article's, is within {n(1e6 * max(shallow), '.2g')} µm: the published constants and the "
-        "stretch by one end's tension make up nearly all of the empirical model's error.",
+        measured=f"The exact model comes back to within {n(1e12 * _worst(study.of(Catenary)), '.2g')} pm. The "
+        f"parabolic one, as cheap as the article's, is within {n(1e6 * max(shallow), '.2g')} µm: the published "
+        "constants and the stretch by one end's tension make up nearly all of the empirical model's error.",
         verdict=Verdict.OURS,
         numbers={"largest_error": numbers},
         panels=tuple(panels),
