@@ -146,7 +146,7 @@ def grid(box: PoseBox) -> Pose:
 
 
 def _header(said: dict[str, str]) -> str:
-    made = ", ".join(f"{key} {value}" for key, value in said.items())
+    made = ", ".join(f"{key} {' '.join(value.split())}" for key, value in said.items())
     return f"# made by sagline new: {made}\n# values in SI units; a quantity may also have its unit, 22 mm^2\n"
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Final
 
 import numpy as np
@@ -18,6 +18,7 @@ from sagline.robot.robot import Robot
 
 LAYOUTS: Final = ("top", "mixed", "bottom")
 COUNTS: Final = {"top": (8, 6), "mixed": (8, 7)}
+THINNEST, THICKEST = 0.0003, 0.08  # m, of ropes that robots hang on
 SLACK_LIMIT = 0.05  # lowest tension, of the platform's weight
 _CORNERS = np.array([[0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.5, -0.5]])  # counter-clockwise, of the edges
 _POSTS = np.array([[0.5, -0.5], [-0.5, -0.5], [0.0, 0.5]])  # a triangle in the same rectangle
@@ -79,9 +80,16 @@ class Design:
             allowed = " or ".join(map(str, COUNTS[layout]))
             raise InvalidValueError(f"cables of layout {layout}", cables, allowed, "Choose another number or layout.")
         choice(rope, "rope", tuple(ROPES))
+        if not THINNEST <= diameter <= THICKEST:
+            raise InvalidValueError(
+                "diameter",
+                f"{diameter:g} m",
+                f"{1e3 * THINNEST:g} mm to {1e3 * THICKEST:g} mm",
+                "Give it with its unit.",
+            )
         values = (name, outer, inner, float(mass), rope, float(diameter), int(cables), layout)
-        for field, value in zip(self.__slots__, values, strict=True):
-            object.__setattr__(self, field, value)
+        for field, value in zip(fields(self), values, strict=True):
+            object.__setattr__(self, field.name, value)
 
     def robot(self) -> Robot:
         """The robot, its limits from its weight and its ropes.
@@ -114,7 +122,7 @@ class Design:
                 "cables": f"{rope.source}; {rope.assumed}",
                 "inertia": "a solid box of the platform's size",
                 "tension_min": f"{100 * SLACK_LIMIT:g} % of the platform's weight, so that no cable hangs slack",
-                "tension_max": f"breaking force {rope.breaking_force(self.diameter):.4g} N over a safety of {SAFETY:g}",
+                "tension_max": f"breaking force {SAFETY * strongest:,.0f} N over a safety of {SAFETY:g}",
             },
         )
 
