@@ -271,6 +271,74 @@ def convert(
         run(source, out, form, linear_density, axial_stiffness, cable_set, at)
 
 
+@app.command()
+def view(
+    robot: RobotArgument,
+    run: Annotated[
+        Path | None, typer.Argument(metavar="RUN.nc", help="A run of this robot, written by `sagline track`, to play.")
+    ] = None,
+    host: Annotated[
+        str, typer.Option(help="Address to listen on; 0.0.0.0 is every one, for others to look.")
+    ] = "127.0.0.1",
+    port: Annotated[int, typer.Option(help="Port to listen on; 0 takes any that is free.")] = 8080,
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open it in a browser here.")] = True,
+) -> None:
+    """Look at a robot in the browser: drag its platform, and the cables follow.
+
+    Over SSH, forward the port (`ssh -L 8080:localhost:8080 ...`) and open http://localhost:8080 at home.
+
+    For example:
+
+    ```
+    sagline view cogiro
+    sagline view my_robot.yaml --port 9000
+    sagline track article-mixed --model empirical && sagline view article-mixed output/article-mixed-empirical.nc
+    ```
+    """
+    with reported():
+        from sagline.cli.view import view as serve
+
+        code = serve(robot, run, host, port, browser=browser)
+    raise typer.Exit(code)
+
+
+@app.command()
+def new(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The robot file to write, my_robot.yaml.")],
+    frame: Annotated[str | None, typer.Option(help='Edges of the frame, "6 x 4 x 3 m".')] = None,
+    layout: Annotated[str | None, typer.Option(help="Cables from the top, or mixed: from above and below.")] = None,
+    cables: Annotated[str | None, typer.Option(help="Number of cables, 6 to 8.")] = None,
+    platform: Annotated[str | None, typer.Option(help='Edges of the platform, "0.5 x 0.5 x 0.4 m".')] = None,
+    mass: Annotated[str | None, typer.Option(help='Mass of the platform with its load, "30 kg".')] = None,
+    rope: Annotated[
+        str | None, typer.Option(help="What the cables are: dyneema-sk78, dyneema-sk62, steel-6x19, steel-7x19.")
+    ] = None,
+    diameter: Annotated[str | None, typer.Option(help='Diameter of the rope, "4 mm".')] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace the file if it exists.")] = False,
+    look: Annotated[bool, typer.Option("--view", help="Look at it in the browser afterwards.")] = False,
+) -> None:
+    """Make a robot file of your own: asks for what no option says, checks it, explains it.
+
+    For example:
+
+    ```
+    sagline new my_robot.yaml
+    sagline new my_robot.yaml --frame "15 x 11 x 6 m" --mass "50 kg" --rope steel-6x19 --diameter "3 mm"
+    ```
+    """
+    with reported():
+        from sagline.cli.new import new as make
+        from sagline.cli.view import serve
+
+        answers = {
+            "frame": frame, "layout": layout, "cables": cables, "platform": platform, "mass": mass, "rope": rope,
+            "diameter": diameter,
+        }  # fmt: skip
+        machine = make(file, answers, force=force)
+        code = serve(machine, None, "127.0.0.1", 8080, browser=True) if look else 0
+    raise typer.Exit(code)
+
+
 def app_entry() -> None:
     """Run the command; what the shell starts."""
     app(prog_name="sagline")

@@ -1,0 +1,97 @@
+"""Ropes that cables are made of: a small catalogue, each by its diameter, with where its numbers come from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+from sagline.arrays import checked
+from sagline.cables.cable import Cable
+
+SAFETY = 5.0  # breaking force over the highest tension that a robot may use, as usual for general lifting
+
+
+@dataclass(frozen=True, slots=True)
+class Rope:
+    """A kind of rope whose numbers go with the square of its diameter.
+
+    Attributes:
+        name: What it is called here.
+        description: What it is.
+        density_factor: Linear density over the diameter squared [kg/m^3].
+        stiffness_factor: Axial stiffness over the diameter squared [Pa].
+        strength_factor: Breaking force over the diameter squared [Pa].
+        source: Where the numbers were read.
+        assumed: Which of them are ours, and why.
+    """
+
+    name: str
+    description: str
+    density_factor: float
+    stiffness_factor: float
+    strength_factor: float
+    source: str
+    assumed: str
+
+    def cable(self, diameter: float) -> Cable:
+        """A cable of this rope.
+
+        Args:
+            diameter: Nominal diameter [m], > 0.
+
+        Raises:
+            InvalidValueError: If the diameter is none.
+        """
+        square = float(checked(diameter, "diameter", "m", shape=(), above=0.0)) ** 2
+        return Cable(self.density_factor * square, self.stiffness_factor * square)
+
+    def breaking_force(self, diameter: float) -> float:
+        """Least force at which a new rope breaks [N]; diameter in m."""
+        return self.strength_factor * diameter**2
+
+
+def _steel(name: str, construction: str, mass: float, section: float, strength: float) -> Rope:
+    """A steel rope by the factors of EN 12385-4: length mass W [kg/(100 m mm^2)], metallic section C, strength K."""
+    return Rope(
+        name=name,
+        description=f"steel wire rope {construction}, grade 1770",
+        density_factor=1e4 * mass,
+        stiffness_factor=_STEEL_MODULUS * section,
+        strength_factor=1.77e9 * strength,
+        source=f"EN 12385-4, calculation factors of {construction}: W = {mass}, C = {section}, K = {strength}",
+        assumed="modulus 100 GPa on the metallic section, a usual value for a bedded-in rope; makers give their own",
+    )
+
+
+def _braid(name: str, fiber: str, modulus: float, strength: float, source: str) -> Rope:
+    """A braid of a fiber of modulus [Pa] and strength [Pa]."""
+    section = 0.7853981633974483 * _BRAID_FILL
+    return Rope(
+        name=name,
+        description=f"12-strand braid of {fiber}",
+        density_factor=_POLYETHYLENE * section,
+        stiffness_factor=0.5 * modulus * section,
+        strength_factor=0.55 * strength * section,
+        source=source,
+        assumed="fiber fills two thirds of the rope's circle, and the braid keeps 50 % of its modulus and 55 % of its "
+        "strength: usual values for a bedded-in braid; makers give their own",
+    )
+
+
+_STEEL_MODULUS = 100e9  # Pa, on the metallic section
+_BRAID_FILL = 2.0 / 3.0  # fiber in the circle of the nominal diameter
+_POLYETHYLENE = 975.0  # kg/m^3
+_DSM = "DSM Dyneema, fact sheet UHMWPE fiber, CIS YA100 (2010): {}; density 975 kg/m^3"
+
+ROPES: Final = MappingProxyType(
+    {
+        rope.name: rope
+        for rope in (
+            _braid("dyneema-sk78", "Dyneema SK78", 109e9, 3.3e9, _DSM.format("SK78 at least 109 GPa, 3.3 GPa")),
+            _braid("dyneema-sk62", "Dyneema SK62", 65e9, 2.4e9, _DSM.format("SK62 at least 65 GPa, 2.4 GPa")),
+            _steel("steel-6x19", "6x19 with a steel core (IWRC)", 0.400, 0.449, 0.356),
+            _steel("steel-7x19", "7x19 (6x19M with a strand core, WSC)", 0.381, 0.418, 0.362),
+        )
+    }
+)

@@ -1,0 +1,175 @@
+"""`sagline new`: a first robot file from a few questions or options."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+import typer
+
+from sagline.arrays import Array
+from sagline.cables.rope import ROPES
+from sagline.cli.terminal import note, show, working
+from sagline.errors import FileError, InvalidValueError
+from sagline.files.quantity import in_si
+from sagline.files.robot_file import dump_robot, parse_robot
+from sagline.files.whole import written_whole
+from sagline.kinematics.inverse import inverse
+from sagline.kinematics.plan import Plan
+from sagline.robot.design import COUNTS, Design
+from sagline.robot.pose import Pose
+from sagline.robot.pose_box import PoseBox
+from sagline.robot.robot import Robot
+
+MIDDLE = 0.5  # of the frame's edges: where the feasible share is told
+GRID = 7  # poses along each edge of a box
+NEARLY_ALL = 0.95  # feasible poses of a box that the file recommends
+_BOXES = (0.7, 0.6, 0.5, 0.4, 0.3, 0.2)  # of the frame's edges, tried in this order
+
+
+class Question(NamedTuple):
+    """One thing to be told.
+
+    Attributes:
+        key: Its option.
+        text: How it is asked.
+        default: What is taken where nothing is said.
+    """
+
+    key: str
+    text: str
+    default: str
+
+
+QUESTIONS = (
+    Question("frame", "Frame, length x width x height", "6 x 4 x 3 m"),
+    Question("layout", "Cables from the top, or mixed from above and below (top, mixed)", "top"),
+    Question("cables", "Number of cables (6 to 8)", "8"),
+    Question("platform", "Platform, length x width x height", "0.5 x 0.5 x 0.4 m"),
+    Question("mass", "Mass of the platform with its load", "30 kg"),
+    Question("rope", f"Rope ({', '.join(ROPES)})", "dyneema-sk78"),
+    Question("diameter", "Diameter of the rope", "4 mm"),
+)
+
+
+def new(file: Path, answers: dict[str, str | None], *, force: bool) -> Robot:
+    """Ask what is missing, check, explain, write.
+
+    Args:
+        file: The robot file to be, my_robot.yaml.
+        answers: What the options say; what is None is asked on a terminal, and takes its default elsewhere.
+        force: Whether a file that exists is replaced.
+
+    Raises:
+        SaglineError: If an answer is wrong, or the file exists or cannot be written; nothing has been written then.
+    """
+    _refuse_existing(file, force=force)
+    asks = sys.stdin.isatty() and sys.stderr.isatty()
+    said = {question.key: answers.get(question.key) or _asked(question, asks=asks) for question in QUESTIONS}
+    design = _design(file.stem, said)
+    with working("checking 343 poses of each of a few boxes"):
+        robot, middle = _boxed(design)
+    text = _header(said) + dump_robot(robot)
+    checked = parse_robot(text, file)
+    with written_whole(file) as partial:
+        partial.write_text(text, encoding="utf-8")
+    _explain(checked, design, middle)
+    show(f"Written: {file}\nLook at it: sagline view {file}\nEvery value: sagline show {file}")
+    return checked
+
+
+def _refuse_existing(file: Path, *, force: bool) -> None:
+    if file.suffix not in (".yaml", ".yml"):
+        raise FileError(file, "is no name for a robot file", "Let it end in .yaml.")
+    if file.exists() and not force:
+        raise FileError(file, "exists", "Choose another name, or replace it with --force.")
+
+
+def _asked(question: Question, *, asks: bool) -> str:
+    if not asks:
+        return question.default
+    return str(typer.prompt(question.text, default=question.default, err=True))
+
+
+def _design(name: str, said: dict[str, str]) -> Design:
+    return Design(
+        name=name,
+        frame=_edges(said["frame"], "frame"),
+        platform=_edges(said["platform"], "platform"),
+        mass=_quantity(said["mass"], "kg", "mass"),
+        rope=said["rope"],
+        diameter=_quantity(said["diameter"], "m", "diameter"),
+        cables=_count(said["cables"], said["layout"]),
+        layout=said["layout"],
+    )
+
+
+def _quantity(text: str, unit: str, item: str) -> float:
+    return float(cast(float, in_si(text, unit, item)))
+
+
+def _count(text: str, layout: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        allowed = " or ".join(map(str, COUNTS.get(layout, (6, 7, 8))))
+        raise InvalidValueError("cables", repr(text), allowed, "Give a whole number.") from None
+
+
+def _edges(text: str, item: str) -> Any:
+    """Three edges in m from "6 x 4 x 3 m", "6x4x3", or "600 cm x 4 m x 3 m"."""
+    parts = [part.strip() for part in text.replace("×", "x").split("x")]
+    if len(parts) != 3:
+        raise InvalidValueError(item, repr(text), 'three edges, such as "6 x 4 x 3 m"', f"Correct {item}.")
+    unit = parts[2].lstrip("0123456789.+-eE ")
+    return in_si([part if part[-1:].isalpha() or not unit else f"{part} {unit}" for part in parts], "m", item)
+
+
+def _boxed(design: Design) -> tuple[Robot, Plan]:
+    """The robot with the largest box of poses of which nearly all are feasible, and the plan of its middle."""
+    robot = design.robot()
+    middle = inverse(robot, grid(design.placed(MIDDLE)))
+    for share in _BOXES:
+        box = design.placed(share)
+        if inverse(robot, grid(box)).feasible.mean() >= NEARLY_ALL:
+            return robot.replace(test_box=box), middle
+    return robot, middle
+
+
+def grid(box: PoseBox) -> Pose:
+    """Level poses on a grid in a box, a batch of GRID cubed."""
+    axes = [np.linspace(low, high, GRID) for low, high in zip(box.low, box.high, strict=True)]
+    places: Array = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    return Pose.from_quaternion(places, np.array([0.0, 0.0, 0.0, 1.0]))
+
+
+def _header(said: dict[str, str]) -> str:
+    made = ", ".join(f"{key} {' '.join(value.split())}" for key, value in said.items())
+    return f"# made by sagline new: {made}\n# values in SI units; a quantity may also have its unit, 22 mm^2\n"
+
+
+def _explain(robot: Robot, design: Design, middle: Plan) -> None:
+    share = float(middle.feasible.mean())
+    density, stiffness = float(robot.cables.linear_density[0]), float(robot.cables.axial_stiffness[0])
+    lines = [
+        f"{robot.name}: {robot.cable_count} cables, {ROPES[design.rope].description}, {1e3 * design.diameter:g} mm: "
+        f"{1e3 * density:.3g} g/m, EA {1e-3 * stiffness:.4g} kN",
+        f"Tensions allowed: {robot.tension_min[0]:.3g} N (5 % of the weight) to {robot.tension_max[0]:.4g} N "
+        f"(a fifth of the breaking force)",
+        f"Of the middle half of the frame, {100 * share:.0f} % of the level poses are feasible",
+    ]
+    if share > 0.0:
+        tension = middle.chord_tension[middle.feasible]
+        sag = middle.state.cables.sag[middle.feasible]
+        lines.append(
+            f"There cables carry {tension.min():.3g} to {tension.max():.4g} N and sag by up to {1e3 * sag.max():.3g} mm"
+        )
+    show("\n".join(lines))
+    if share < NEARLY_ALL:
+        note(
+            "Advice: ",
+            "for more of it, try a larger platform, the other layout, a thicker rope or a lighter load.",
+            style="bold",
+        )

@@ -1,0 +1,76 @@
+"""`sagline view`: a robot, or a run of it, in the browser."""
+
+from __future__ import annotations
+
+import os
+import sys
+import webbrowser
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from sagline.cli.terminal import note, show, working
+from sagline.errors import FileError
+from sagline.files.plan_file import load_plan
+from sagline.files.robot_file import load_robot
+from sagline.kernels.jit import is_cold
+from sagline.robot.robot import Robot
+
+if TYPE_CHECKING:
+    from sagline.viewer.run import Run
+
+
+def view(robot: str, run: Path | None, host: str, port: int, *, browser: bool) -> int:
+    """Serve until Ctrl-C; returns the exit code.
+
+    Raises:
+        SaglineError: If the robot or the run cannot be read, or nothing can listen there.
+    """
+    return serve(load_robot(robot), run, host, port, browser=browser)
+
+
+def serve(robot: Robot, run: Path | None, host: str, port: int, *, browser: bool) -> int:
+    """Serve a robot until Ctrl-C; returns the exit code."""
+    try:
+        from sagline.viewer import server as web
+        from sagline.viewer.viewer import Viewer
+    except ModuleNotFoundError as error:
+        raise FileError(
+            f"package {error.name}", "is not installed", 'The viewer needs it: pip install "sagline[viewer]"'
+        ) from None
+    course = None if run is None else _run(robot, run)
+    machine = robot if course is None else course.plan.state.robot
+    server = web.started(host, port, machine.name)
+    try:
+        if is_cold():
+            note("First run: ", "compiling the numerical core, about a minute; later runs start at once.", style="bold")
+        address = web.url(server, host)
+        show(f"{machine.name} is at {address}   (Ctrl-C stops it)")
+        if host not in ("127.0.0.1", "::1", "localhost"):
+            note("Note: ", "everyone who can reach this machine can look at it and drag it.", style="bold")
+        viewer = Viewer(server, machine, course)
+        if browser and _has_display():
+            webbrowser.open(address)
+        viewer.serve()
+    except KeyboardInterrupt:
+        note("", "Stopped.")
+    finally:
+        web.stop(server)
+    return 0
+
+
+def _run(robot: Robot, file: Path) -> Run:
+    from sagline.viewer.run import Run
+
+    plan = load_plan(file)
+    made_for = plan.state.robot.name
+    if made_for != robot.name:
+        raise FileError(
+            file, f"is a run of {made_for}, not of {robot.name}", f"View it as: sagline view {made_for} {file}"
+        )
+    with working(f"{made_for}: confirming {len(plan.state.pose) if plan.state.pose.shape else 1:,} poses"):
+        return Run.of(plan)
+
+
+def _has_display() -> bool:
+    """Whether a browser could open: over SSH it would open in the terminal, in the way."""
+    return sys.platform in ("win32", "darwin") or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))

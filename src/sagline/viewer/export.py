@@ -1,0 +1,70 @@
+"""What one takes away: the scene as GLB, a picture as PNG, a run as GIF. Bytes in memory, no browser."""
+
+from __future__ import annotations
+
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+from PIL import Image
+
+from sagline.viewer import lines, solids
+from sagline.viewer.snapshot import Snapshot
+from sagline.viewer.stage import DRUM, INFEASIBLE, PLATFORM, STEEL
+from sagline.viewer.tension_scale import TensionScale
+
+Picture = NDArray[np.uint8]
+
+_CABLE_RADIUS = 0.0012  # of the robot's size: real cables would not be seen
+_Z_UP_TO_Y_UP = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+
+
+def scene_as_glb(snapshot: Snapshot, scale: TensionScale, sag_scale: float = 1.0) -> bytes:
+    """Frame, winches, platform and cables, in meters, y up as glTF wants it."""
+    robot = snapshot.robot
+    scene = trimesh.Scene()
+    place = np.eye(4)
+    place[:3, :3], place[:3, 3] = snapshot.pose.matrix, snapshot.pose.position
+    _add(scene, "frame", solids.frame(robot), STEEL)
+    _add(scene, "winches", solids.winches(robot), DRUM)
+    _add(scene, "platform", solids.platform(robot), PLATFORM if snapshot.feasible else INFEASIBLE, place)
+    ends = lines.chords(robot, snapshot.pose)
+    plan = snapshot.plan
+    hang = plan is not None and snapshot.feasible
+    courses = lines.hanging(ends, plan.state.cables, sag_scale) if plan is not None and hang else lines.straight(ends)
+    colors = scale.colors(snapshot.tension)
+    for i, course in enumerate(courses):
+        _add(scene, f"cable {i}", solids.tube(course, _CABLE_RADIUS * solids.size_of(robot)), tuple(colors[i]))
+    scene.apply_transform(_Z_UP_TO_Y_UP)
+    glb: bytes = scene.export(file_type="glb")
+    return glb
+
+
+def picture_as_png(picture: Picture) -> bytes:
+    """A rendered picture (h, w, 3 or 4) on white."""
+    image = Image.fromarray(picture)
+    white = Image.new("RGBA", image.size, "white")
+    buffer = BytesIO()
+    Image.alpha_composite(white, image.convert("RGBA")).convert("RGB").save(buffer, "PNG", optimize=True)
+    return buffer.getvalue()
+
+
+def pictures_as_gif(pictures: list[Picture], seconds: float) -> bytes:
+    """Pictures of one size as a GIF that repeats, each shown for a while [s]."""
+    frames = [Image.fromarray(picture).convert("RGB").quantize(128, dither=Image.Dither.NONE) for picture in pictures]
+    buffer = BytesIO()
+    frames[0].save(
+        buffer, "GIF", save_all=True, append_images=frames[1:], duration=max(20, round(1000 * seconds)), loop=0
+    )
+    return buffer.getvalue()
+
+
+def _add(scene: Any, name: str, solid: solids.Solid, color: tuple[int, ...], place: Any = None) -> None:
+    mesh = trimesh.Trimesh(solid.vertices, solid.faces, process=False)
+    shade = [*(int(part) for part in color[:3]), 255]
+    mesh.visual = trimesh.visual.TextureVisuals(
+        material=trimesh.visual.material.PBRMaterial(baseColorFactor=shade, metallicFactor=0.1, roughnessFactor=0.7)
+    )
+    scene.add_geometry(mesh, node_name=name, geom_name=name, transform=place)

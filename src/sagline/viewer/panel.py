@@ -1,0 +1,117 @@
+"""The panels in the browser: on the left what can be changed, on the right what comes of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import viser
+
+from sagline.robot.robot import Robot
+from sagline.viewer import readout
+from sagline.viewer.settings import METHODS, MODELS, Settings
+from sagline.viewer.tension_scale import TensionScale
+
+LEFT_WIDTH, RIGHT_WIDTH = 290, 370  # px
+_LIGHTEST, _HEAVIEST = 0.1, 4.0  # of the robot's own mass
+
+
+class Panel:
+    """Sliders, choices and readings. Reading a value twice is free; nothing here calls back but `changed`."""
+
+    def __init__(
+        self, server: viser.ViserServer, robot: Robot, scale: TensionScale, changed: Callable[[], None]
+    ) -> None:
+        """Build the panels; `changed` is called, from any thread, when a value changes."""
+        self._gui = server.gui
+        self._changed = changed
+        self._gui.main_panel.dock_left()
+        self._gui.main_panel.set_width(LEFT_WIDTH)
+        self._build_what_if(robot)
+        self._build_drawing()
+        readings = self._gui.add_panel()
+        with readings.add_tab("Readings"):
+            self._verdict = self._gui.add_html("")
+            self._gui.add_html(readout.legend(scale))
+            self._numbers = self._gui.add_html("")
+            with self._gui.add_folder("Feasible tensions"):
+                self._polygon = self._gui.add_html("")
+        readings.dock_right()
+        readings.set_width(RIGHT_WIDTH)
+
+    @property
+    def ghost(self) -> bool:
+        """Whether straight cables are drawn beside the real ones."""
+        return bool(self._ghost.value)
+
+    def settings(self) -> Settings:
+        """What is set.
+
+        Raises:
+            InvalidValueError: If a client sent what no slider gives.
+        """
+        return Settings(
+            mass=float(self._mass.value),
+            density=float(self._density.value),
+            stiffness=float(self._stiffness.value),
+            model=MODELS.get(self._model.value, MODELS["catenary (exact)"]),
+            tension=METHODS.get(self._method.value, METHODS["closest to the last"]),
+            sag_scale=float(self._sag_scale.value),
+            error_scale=float(self._error_scale.value),
+        )
+
+    def lock_what_if(self, locked: bool) -> None:
+        """Disable what would change the robot: a run is what it is."""
+        for handle in (self._mass, self._density, self._stiffness, self._model, self._method):
+            handle.disabled = locked
+
+    def read_out(self, verdict: str, numbers: str, polygon: str) -> None:
+        """Show the readings."""
+        self._verdict.content = verdict
+        self._numbers.content = numbers
+        self._polygon.content = polygon
+
+    def refuse(self, message: str) -> None:
+        """Say why a setting cannot be had."""
+        self._verdict.content = readout.refused(message)
+
+    def watched(self, handle: Any) -> Any:
+        """A handle whose changes are told."""
+        handle.on_update(lambda _: self._changed())
+        return handle
+
+    def _build_what_if(self, robot: Robot) -> None:
+        gui = self._gui
+        with gui.add_folder("What if"):
+            self._mass = self.watched(
+                gui.add_slider(
+                    "Platform + load [kg]",
+                    _LIGHTEST * robot.mass, _HEAVIEST * robot.mass, 0.01 * robot.mass, robot.mass,
+                    hint="Mass of the platform with its load; the inertia grows with it.",
+                )
+            )  # fmt: skip
+            self._density = self.watched(
+                gui.add_slider("Cable density ×", 0.1, 10.0, 0.1, 1.0, hint="Factor on the cables' mass per length.")
+            )
+            self._stiffness = self.watched(
+                gui.add_slider("Cable stiffness ×", 0.1, 10.0, 0.1, 1.0, hint="Factor on the cables' EA.")
+            )
+            self._model = self.watched(
+                gui.add_dropdown(
+                    "Cable model",
+                    tuple(MODELS),
+                    hint="With an approximate model, orange shows where the platform rests.",
+                )
+            )
+            self._method = self.watched(
+                gui.add_dropdown("Tensions", tuple(METHODS), hint="How redundant cables share the load.")
+            )
+
+    def _build_drawing(self) -> None:
+        gui = self._gui
+        with gui.add_folder("Drawing"):
+            self._sag_scale = self.watched(gui.add_slider("Sag drawn ×", 0.0, 20.0, 0.5, 1.0))
+            self._error_scale = self.watched(
+                gui.add_slider("Error drawn ×", 1.0, 200.0, 1.0, 1.0, hint="Position error of the orange platform.")
+            )
+            self._ghost = self.watched(gui.add_checkbox("Straight cables beside", False))

@@ -1,0 +1,80 @@
+"""A run: a plan along a path, its proof, and any of its samples as a moment to look at."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from sagline.arrays import Array
+from sagline.cables.state import CableState
+from sagline.errors import InvalidValueError
+from sagline.kinematics.confirm import Confirmation, confirm
+from sagline.kinematics.plan import Plan
+from sagline.robot.equilibrium import Equilibrium
+from sagline.viewer.snapshot import Snapshot
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Run:
+    """A plan of N poses with where the platform really goes.
+
+    Attributes:
+        plan: The plan.
+        confirmation: Its lengths wound onto exact cables.
+        time: Time of each sample [s], shape (N,), from 0 on; one second a sample for poses without a path.
+    """
+
+    plan: Plan
+    confirmation: Confirmation
+    time: Array
+
+    @classmethod
+    def of(cls, plan: Plan) -> Run:
+        """The run of a plan.
+
+        Raises:
+            InvalidValueError: If it is the plan of a single pose.
+        """
+        if not plan.state.pose.shape:
+            raise InvalidValueError(
+                "run", "a plan of a single pose", "a plan of poses in a row", "Save a plan of a path."
+            )
+        time = np.arange(len(plan.state.pose), dtype=np.float64) if plan.path is None else plan.path.time
+        return cls(plan, confirm(plan), time - time[0])
+
+    @property
+    def duration(self) -> float:
+        """Time of the last sample [s]."""
+        return float(self.time[-1])
+
+    def index_at(self, time: float) -> int:
+        """The sample at or before a time."""
+        return int(np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, len(self.time) - 1))
+
+    def snapshot(self, index: int) -> Snapshot:
+        """One sample."""
+        plan = _sample(self.plan, index)
+        rest = self.confirmation.pose[index] if plan.feasible else None
+        return Snapshot(plan.state.robot, plan.state.pose, plan, rest)
+
+    def traces(self, most: int, error_scale: float) -> tuple[Array, Array]:
+        """Desired and actual positions (n, 3), n <= most, the error drawn some times as large; NaN in gaps."""
+        rows = np.unique(np.linspace(0, len(self.time) - 1, most).astype(np.intp))
+        wanted = self.plan.state.pose.position[rows]
+        return wanted, wanted + error_scale * self.confirmation.position_error[rows]
+
+
+def _sample(plan: Plan, i: int) -> Plan:
+    """The plan of one of its poses."""
+    state = plan.state
+    cables = replace(state.cables, **_entries(state.cables, i))
+    moment = Equilibrium(state.robot, state.pose[i], state.wrench[i], cables)
+    return replace(plan, state=moment, path=None, **_entries(plan, i))
+
+
+def _entries(batch: CableState | Plan, i: int) -> dict[str, Any]:
+    """Entry i of every array of a batch, by its field."""
+    values = {field.name: getattr(batch, field.name) for field in fields(batch)}
+    return {name: value[i] for name, value in values.items() if isinstance(value, np.ndarray)}

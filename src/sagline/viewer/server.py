@@ -1,0 +1,75 @@
+"""The web server: viser's, on the loopback address unless told otherwise, quiet, and never shared to the outside."""
+
+from __future__ import annotations
+
+import logging
+import socket
+from contextlib import redirect_stdout
+from io import StringIO
+
+import viser
+
+from sagline.errors import InvalidValueError
+
+LOOPBACK = "127.0.0.1"
+PORT = 8080
+
+
+class Server(viser.ViserServer):
+    """A viser server that no page can ask to open a tunnel to the internet."""
+
+    def request_share_url(self, verbose: bool = True) -> str | None:
+        """Refuse: viser would publish this machine's page under a public address."""
+        return None
+
+
+def started(host: str = LOOPBACK, port: int = PORT, title: str = "sagline") -> Server:
+    """A running server.
+
+    Args:
+        host: Address to listen on; "0.0.0.0" is every one.
+        port: Port; 0 for any that is free.
+        title: What stands at the top of the panel.
+
+    Raises:
+        InvalidValueError: If nothing can listen there; viser itself would take the next port, or wait for ever.
+    """
+    _check(host, port)
+    # a client that says nonsense is cut off; that is no error of ours, and needs no traceback
+    logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
+    with redirect_stdout(StringIO()):
+        server = Server(host=host, port=port, label=title, verbose=False)
+    server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
+    return server
+
+
+def stop(server: Server) -> None:
+    """Stop it and its threads."""
+    with redirect_stdout(StringIO()):
+        server.stop()
+
+
+def url(server: Server, host: str) -> str:
+    """The address to open in a browser on this machine."""
+    shown = "localhost" if host in ("0.0.0.0", "::", "") else f"[{host}]" if ":" in host else host
+    return f"http://{shown}:{server.get_port()}"
+
+
+def _check(host: str, port: int) -> None:
+    if not 0 <= port <= 65535:
+        raise InvalidValueError("port", port, "0 to 65535", "Choose another with --port.")
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(
+            host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+        )[0]
+        with socket.socket(family, kind, protocol) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind(address)
+    except (OSError, UnicodeError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InvalidValueError(
+            f"{host}:{port}",
+            f"not to be had ({reason})",
+            "an address of this machine and a free port",
+            "Choose others with --host and --port; --port 0 takes any that is free.",
+        ) from None

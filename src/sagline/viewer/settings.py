@@ -1,0 +1,76 @@
+"""What a person has set in the panel, and the robot that follows from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Final
+
+from sagline.arrays import checked
+from sagline.cables.cable import Cable
+from sagline.cables.catenary import Catenary
+from sagline.cables.elastic import Elastic
+from sagline.cables.empirical import Empirical
+from sagline.cables.model import CableModel
+from sagline.cables.parabolic import Parabolic
+from sagline.cables.straight import Straight
+from sagline.robot.robot import Robot
+from sagline.tension.closest import Closest
+from sagline.tension.method import TensionMethod
+from sagline.tension.minimum_norm import MinimumNorm
+
+MODELS: Final = MappingProxyType(
+    {
+        "catenary (exact)": Catenary(),
+        "parabolic": Parabolic(),
+        "empirical (the article's)": Empirical(),
+        "elastic, weightless": Elastic(),
+        "straight": Straight(),
+    }
+)
+METHODS: Final = MappingProxyType({"closest to the last": Closest(), "minimum norm": MinimumNorm()})
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """The robot's changes, how it is solved, and how it is drawn.
+
+    Attributes:
+        mass: Mass of the platform with its load [kg], > 0; the inertia grows with it.
+        density: Factor on the cables' linear density, > 0.
+        stiffness: Factor on the cables' axial stiffness, > 0.
+        model: Cable model that the lengths are planned with.
+        tension: How the load is shared.
+        sag_scale: How many times its sag a cable is drawn with, >= 0.
+        error_scale: How many times its position error the platform as it really hangs is drawn with, >= 0.
+    """
+
+    mass: float
+    density: float = 1.0
+    stiffness: float = 1.0
+    model: CableModel = field(default_factory=Catenary)
+    tension: TensionMethod = field(default_factory=Closest)
+    sag_scale: float = 1.0
+    error_scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Check what no robot checks.
+
+        Raises:
+            InvalidValueError: If a number is not finite or out of its range.
+        """
+        checked(self.density, "cable density", "times", above=0.0)
+        checked(self.stiffness, "cable stiffness", "times", above=0.0)
+        checked(self.sag_scale, "drawn sag", "times", low=0.0)
+        checked(self.error_scale, "drawn error", "times", low=0.0)
+
+    def applied(self, robot: Robot) -> Robot:
+        """The robot with its load and cables changed.
+
+        Raises:
+            InvalidValueError: If the mass is none.
+        """
+        if self.mass == robot.mass and self.density == self.stiffness == 1.0:
+            return robot
+        cables = Cable(robot.cables.linear_density * self.density, robot.cables.axial_stiffness * self.stiffness)
+        return robot.replace(mass=self.mass, inertia=robot.inertia * (self.mass / robot.mass), cables=cables)

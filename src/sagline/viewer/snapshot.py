@@ -1,0 +1,121 @@
+"""One moment of a robot: what there is to see and to read, without a browser."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sagline.arrays import Array
+from sagline.cables.catenary import Catenary
+from sagline.errors import CableGeometryError
+from sagline.kinematics.confirm import confirm
+from sagline.kinematics.inverse import inverse
+from sagline.kinematics.plan import Plan
+from sagline.kinematics.status import PoseStatus
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.tension.closest import Closest
+from sagline.viewer import lines
+from sagline.viewer.settings import Settings
+from sagline.viewer.tension_scale import Colors, TensionScale
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Snapshot:
+    """A robot at one pose.
+
+    Attributes:
+        robot: The robot, as the settings have changed it.
+        pose: Where the platform is wanted.
+        plan: The plan for this pose; None where a cable has no chord.
+        rest: Where the platform would really rest on exact cables of the planned lengths; None where the plan has no
+            answer or the model is exact.
+    """
+
+    robot: Robot
+    pose: Pose
+    plan: Plan | None
+    rest: Pose | None
+
+    @property
+    def feasible(self) -> bool:
+        """Whether tensions within the limits carry the platform."""
+        return self.plan is not None and bool(self.plan.feasible)
+
+    @property
+    def reason(self) -> str:
+        """Why it is not feasible, with the shortfall and the blocking cables; "" where it is."""
+        if self.plan is None:
+            return PoseStatus.NO_CHORD.text
+        if self.plan.feasible:
+            return ""
+        status = PoseStatus(int(self.plan.status))
+        if status is not PoseStatus.INFEASIBLE:
+            return status.text
+        shortfall = float(self.plan.shortfall)
+        short = f"short of {shortfall:,.1f} N" if np.isfinite(shortfall) else "no force alone would do"
+        blocking = ", ".join(str(i) for i in np.flatnonzero(self.plan.blocking))
+        return f"{short}; at their limits: cables {blocking}" if blocking else short
+
+    @property
+    def tension(self) -> Array:
+        """Chord tensions [N], shape (m,); NaN where there is no answer."""
+        return np.full(self.robot.cable_count, np.nan) if self.plan is None else self.plan.chord_tension
+
+    @property
+    def margin(self) -> Array:
+        """How far each limited tension is within its limits [N], shape (m,); NaN where there is no answer."""
+        if self.plan is None:
+            return self.tension
+        cables = self.plan.state.cables
+        limited = cables.chord_tension if self.robot.tension_limits_of == "chord" else cables.frame_end_tension
+        return np.minimum(limited - self.robot.tension_min, self.robot.tension_max - limited)
+
+    @property
+    def origin(self) -> str:
+        """Model and way of sharing that the tensions come from; "" where there are none."""
+        return (
+            ""
+            if self.plan is None
+            else f"{type(self.plan.state.cables.model).__name__}, {type(self.plan.tension).__name__}"
+        )
+
+    @property
+    def error(self) -> Array | None:
+        """Where the platform would really rest less where it is wanted [m], shape (3,)."""
+        return None if self.rest is None else self.rest.position - self.pose.position
+
+    def cable_segments(self, sag_scale: float) -> Array:
+        """Segments to draw the cables with (m (POINTS - 1), 2, 3): hanging, or dashed chords where not feasible."""
+        ends = lines.chords(self.robot, self.pose)
+        if self.plan is None or not self.plan.feasible:
+            return lines.segments(lines.straight(ends), dashed=True)
+        return lines.segments(lines.hanging(ends, self.plan.state.cables, sag_scale), dashed=False)
+
+    def cable_colors(self, scale: TensionScale) -> Colors:
+        """Colors of both ends of every segment as viser takes them, shape (m (POINTS - 1), 2, 3)."""
+        return np.repeat(scale.linear_colors(self.tension), 2 * (lines.POINTS - 1), axis=0).reshape(-1, 2, 3)
+
+    def drawn_rest(self, error_scale: float) -> Array | None:
+        """Where to draw the platform at rest: its position error some times as large."""
+        error = self.error
+        return None if error is None else self.pose.position + error_scale * error
+
+
+def taken_at(robot: Robot, pose: Pose, settings: Settings, previous: Plan | None) -> Snapshot:
+    """A robot, already changed by the settings, held at rest at a pose.
+
+    Args:
+        robot: The robot.
+        pose: One pose.
+        settings: Model and method.
+        previous: The plan before, whose tensions `Closest` stays near to.
+    """
+    reference = previous if isinstance(settings.tension, Closest) else None
+    try:
+        plan = inverse(robot, pose, settings.model, settings.tension, previous=reference)
+    except CableGeometryError:
+        return Snapshot(robot, pose, None, None)
+    approximate = not isinstance(settings.model, Catenary) and bool(plan.feasible)
+    return Snapshot(robot, pose, plan, confirm(plan).pose if approximate else None)

@@ -1,0 +1,135 @@
+"""The solid parts of a robot as triangles: frame, winches, platform."""
+
+from __future__ import annotations
+
+from itertools import combinations, product
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, QhullError
+
+from sagline.arrays import Array
+from sagline.robot.robot import Robot
+
+Faces = NDArray[np.int64]
+
+_BEAM = 0.0045  # thickness of the frame's beams, of the robot's size
+_WINCH = 0.009  # radius of a winch, of the robot's size
+_THINNEST = 0.08  # thinnest platform, of its largest edge
+_SIDES = 20  # of a winch's drum
+_FLAT = 0.05  # anchors that differ in height by less than this, of the robot's size, all hang at the top
+_SIGNS: Final = np.array(list(product((-0.5, 0.5), repeat=3)))
+
+
+class Solid(NamedTuple):
+    """A closed surface.
+
+    Attributes:
+        vertices: Corners [m], shape (v, 3).
+        faces: Triangles, as indices of corners, counter-clockwise from outside, shape (f, 3).
+    """
+
+    vertices: Array
+    faces: Faces
+
+
+def bounds(robot: Robot) -> tuple[Array, Array]:
+    """Lowest and highest corner of the box that the robot stands in [m]: its frame, or what its anchors span.
+
+    Frames stand: their top is where the highest anchors are. Where all anchors hang at the top and no frame is given,
+    the box reaches down to the floor, or to the lowest pose that the robot is meant for.
+    """
+    low, high = robot.frame_anchors.min(axis=0), robot.frame_anchors.max(axis=0)
+    if robot.frame_size is not None:
+        middle = 0.5 * (low + high)
+        low, up = middle - 0.5 * robot.frame_size, middle + 0.5 * robot.frame_size
+        return np.array([*low[:2], high[2] - robot.frame_size[2]]), np.array([*up[:2], high[2]])
+    if high[2] - low[2] < _FLAT * float(np.linalg.norm(high - low)):
+        floor = 0.0 if robot.test_box is None else min(0.0, float(robot.test_box.low[2]))
+        low = np.array([*low[:2], min(floor, low[2])])
+    return low, high
+
+
+def size_of(robot: Robot) -> float:
+    """Diagonal of the robot's box [m]."""
+    low, high = bounds(robot)
+    return float(np.linalg.norm(high - low))
+
+
+def frame(robot: Robot) -> Solid:
+    """The twelve beams of the robot's box."""
+    low, high = bounds(robot)
+    corners = low + (_SIGNS + 0.5) * (high - low)
+    edges = [(a, b) for a, b in combinations(range(8), 2) if np.count_nonzero(_SIGNS[a] != _SIGNS[b]) == 1]
+    thick = _BEAM * size_of(robot)
+    return merged([box(0.5 * (corners[a] + corners[b]), np.abs(corners[b] - corners[a]) + thick) for a, b in edges])
+
+
+def winches(robot: Robot) -> Solid:
+    """A drum at every frame anchor."""
+    radius = _WINCH * size_of(robot)
+    return merged([drum(place, radius) for place in np.unique(robot.frame_anchors, axis=0)])
+
+
+def platform(robot: Robot) -> Solid:
+    """The platform in its own frame: a box of its size, or the hull of its anchors."""
+    anchors = robot.platform_anchors
+    low, high = anchors.min(axis=0), anchors.max(axis=0)
+    if robot.platform_size is not None:
+        return box(0.5 * (low + high), robot.platform_size)
+    extent = high - low
+    thinnest = max(_THINNEST * float(extent.max()), 0.002 * size_of(robot))
+    if extent.min() >= thinnest:
+        try:
+            return _hull(anchors)
+        except QhullError:  # the anchors lie in a plane that is not level
+            pass
+    return box(0.5 * (low + high), np.maximum(extent, thinnest))
+
+
+def box(middle: Array, edges: Array) -> Solid:
+    """A box along the axes."""
+    return _hull(middle + _SIGNS * edges)
+
+
+def drum(middle: Array, radius: float) -> Solid:
+    """A cylinder as wide as it is thick, its axis upright."""
+    angle = np.linspace(0.0, 2.0 * np.pi, _SIDES, endpoint=False)
+    ring = radius * np.stack((np.cos(angle), np.sin(angle), np.zeros(_SIDES)), axis=1)
+    up = np.array([0.0, 0.0, radius])
+    return _hull(middle + np.concatenate((ring - up, ring + up)))
+
+
+def tube(points: Array, radius: float, sides: int = 6) -> Solid:
+    """A thin tube along a line of points (P, 3), open at its ends."""
+    forward = np.gradient(points, axis=0)
+    forward /= np.linalg.norm(forward, axis=1, keepdims=True)
+    helper = np.where(np.abs(forward[:, 2:]) > 0.9, [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
+    left = np.cross(helper, forward)
+    left /= np.linalg.norm(left, axis=1, keepdims=True)
+    up = np.cross(forward, left)
+    angle = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)[:, None, None]
+    rings = points + radius * (np.cos(angle) * left + np.sin(angle) * up)  # (sides, P, 3)
+    count = len(points)
+    here = np.arange(sides)[:, None] * count + np.arange(count - 1)
+    there = np.roll(np.arange(sides), -1)[:, None] * count + np.arange(count - 1)
+    quads = np.stack((here, there, there + 1, here + 1), axis=-1).reshape(-1, 4)
+    return Solid(rings.reshape(-1, 3), np.concatenate((quads[:, [0, 1, 2]], quads[:, [0, 2, 3]])))
+
+
+def merged(parts: list[Solid]) -> Solid:
+    """Several solids as one."""
+    starts = np.cumsum([0, *(len(part.vertices) for part in parts[:-1])])
+    faces = [part.faces + start for part, start in zip(parts, starts, strict=True)]
+    return Solid(np.concatenate([part.vertices for part in parts]), np.concatenate(faces))
+
+
+def _hull(points: Array) -> Solid:
+    """The convex hull; its triangles share no corners, so that each is shaded flat."""
+    hull = ConvexHull(points)
+    corners = points[hull.simplices]  # (f, 3, 3)
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    inward = np.einsum("fi,fi->f", normal, hull.equations[:, :3]) < 0.0
+    corners[inward] = corners[inward][:, ::-1]
+    return Solid(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))

@@ -1,0 +1,82 @@
+"""The colors of tensions: one scale for a robot, from its lowest to its highest allowed tension."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite, log, log10
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sagline.arrays import Array
+from sagline.robot.robot import Robot
+
+Colors = NDArray[np.uint8]
+
+# matplotlib's plasma at ten equal steps up to 0.85: told apart by color-blind eyes, and none too pale on white
+_STEPS = np.array(
+    [
+        [13, 8, 135],
+        [63, 4, 156],
+        [102, 0, 167],
+        [138, 9, 165],
+        [170, 35, 149],
+        [196, 62, 127],
+        [218, 91, 105],
+        [236, 119, 84],
+        [249, 151, 63],
+        [254, 186, 44],
+    ],
+    dtype=np.float64,
+)
+GRAY = np.array([140, 140, 140], dtype=np.uint8)  # of a cable without a tension
+_SPREAD = 100.0  # highest over lowest tension where the robot has no lower limit
+_PER_WEIGHT = 4.0  # highest tension over the platform's weight where the robot has no upper limit
+
+
+@dataclass(frozen=True, slots=True)
+class TensionScale:
+    """Tensions on a logarithmic scale: a robot's limits are often two decades apart.
+
+    Attributes:
+        low: Tension at the dark end [N], > 0.
+        high: Tension at the bright end [N], > low.
+    """
+
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, robot: Robot) -> TensionScale:
+        """The scale between the limits of a robot; where it has none, between guesses from its weight."""
+        weight = robot.mass * max(robot.gravity, 1.0)
+        top, bottom = float(robot.tension_max.max()), float(robot.tension_min.min())
+        high = top if isfinite(top) and top > 0.0 else max(_PER_WEIGHT * weight, 10.0 * bottom)
+        low = bottom if bottom > 0.0 else high / _SPREAD
+        return cls(low, high) if low < high else cls(0.5 * low, 2.0 * high)
+
+    def share(self, tension: Array) -> Array:
+        """Where tensions lie on the scale, 0 to 1; beyond its ends they stay there."""
+        inside = np.clip(tension, self.low, self.high)
+        return np.asarray((np.log(inside) - log(self.low)) / (log(self.high) - log(self.low)))
+
+    def colors(self, tension: Array) -> Colors:
+        """Color of each tension, shape (..., 3); gray for NaN."""
+        known = np.isfinite(tension)
+        place = self.share(np.where(known, tension, self.low)) * (len(_STEPS) - 1)
+        first = np.minimum(place.astype(np.intp), len(_STEPS) - 2)
+        rest = (place - first)[..., None]
+        mixed = (1.0 - rest) * _STEPS[first] + rest * _STEPS[first + 1]
+        return np.where(known[..., None], np.rint(mixed).astype(np.uint8), GRAY)
+
+    def linear_colors(self, tension: Array) -> Colors:
+        """The same colors with the sRGB curve undone: viser's client applies it to the colors of line ends."""
+        share = self.colors(tension) / 255.0
+        linear = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+        return np.rint(255.0 * linear).astype(np.uint8)
+
+    def ticks(self) -> tuple[float, ...]:
+        """Round tensions to write beside the scale: 1, 2 and 5 times powers of ten within it."""
+        decades = range(int(log10(self.low)) - 1, int(log10(self.high)) + 2)
+        found = tuple(step * 10.0**decade for decade in decades for step in (1, 2, 5))
+        return tuple(tick for tick in found if self.low <= tick <= self.high)

@@ -1,0 +1,117 @@
+"""`sagline new`: the robot file it writes, what it says of it, and what it refuses."""
+
+import re
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import sagline as sl
+from sagline.cables.rope import ROPES
+from sagline.cli.main import app
+from sagline.cli.new import grid
+from sagline.robot.design import Design
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch) -> FilePath:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def new(*words: str) -> Any:
+    return CliRunner().invoke(app, ["new", *words])
+
+
+def test_options_become_the_robot(folder: FilePath) -> None:
+    result = new(
+        *("mine.yaml", "--frame", "15 x 11 x 6 m", "--platform", "30cm x 30 cm x 0.5 m", "--mass", "50 kg"),
+        *("--layout", "mixed", "--rope", "steel-6x19", "--diameter", "3 mm"),
+    )
+    assert result.exit_code == 0
+    robot = sl.load_robot(folder / "mine.yaml")
+    mixed = sl.load_robot("article-mixed")  # the same frame, platform and layout; its cables in another order
+    order = [0, 2, 4, 6, 1, 3, 5, 7]
+    assert robot.frame_anchors == pytest.approx(mixed.frame_anchors[order])
+    assert robot.platform_anchors == pytest.approx(mixed.platform_anchors[order])
+    assert robot.inertia == pytest.approx(mixed.inertia)
+    assert robot.cables.linear_density == pytest.approx(np.full(8, 0.036))  # 0.400 kg/(100 m mm^2) x 9 mm^2
+    assert robot.cables.axial_stiffness == pytest.approx(np.full(8, 100e9 * 0.449 * 9e-6))
+    assert robot.tension_max == pytest.approx(np.full(8, 0.356 * 1770e6 * 9e-6 / 5.0))
+    assert robot.tension_min == pytest.approx(np.full(8, 0.05 * 50.0 * 9.81))
+
+
+def test_it_tells_the_feasible_share_of_the_middle(folder: FilePath) -> None:
+    result = new("mine.yaml", "--cables", "6")
+    robot = sl.load_robot(folder / "mine.yaml")
+    half = 0.25 * (np.array([6.0, 4.0, 3.0]) - [0.5, 0.5, 0.4])
+    axes = [np.linspace(m - h, m + h, 7) for m, h in zip([0.0, 0.0, 1.5], half, strict=True)]
+    places = np.array(np.meshgrid(*axes)).reshape(3, -1).T
+    share = np.mean([bool(sl.inverse(robot, sl.Pose(place, np.eye(3))).feasible) for place in places])
+    assert 0.0 < share < 1.0
+    assert f"{100 * share:.0f} % of the level poses are feasible" in result.stdout
+    assert "Advice" in result.stderr
+
+
+def test_the_box_it_recommends_is_feasible(folder: FilePath) -> None:
+    assert new("mine.yaml").exit_code == 0
+    robot = sl.load_robot(folder / "mine.yaml")
+    assert robot.test_box is not None
+    assert sl.inverse(robot, grid(robot.test_box)).feasible.mean() >= 0.95
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (["--layout", "bottom"], "only pull down"),
+        (["--cables", "9"], "8 or 6"),
+        (["--cables", "some"], "whole number"),
+        (["--diameter", "3"], "0.3 mm to 80 mm"),
+        (["--diameter", "3 kg"], "diameter"),
+        (["--mass", "0 kg"], "mass"),
+        (["--mass", "9 t", "--diameter", "1 mm"], "thicker rope"),
+        (["--frame", "3 x 2"], "three edges"),
+        (["--frame", "3 x 2 x -1 m"], "frame"),
+        (["--platform", "7 x 1 x 1 m"], "< frame"),
+        (["--rope", "string"], "steel-6x19"),
+    ],
+)
+def test_a_wrong_answer_writes_nothing(folder: FilePath, options: list[str], told: str) -> None:
+    result = new("mine.yaml", *options)
+    assert result.exit_code == 2
+    assert told in " ".join(result.stderr.split())
+    assert list(folder.iterdir()) == []
+
+
+def test_it_replaces_nothing_unasked(folder: FilePath) -> None:
+    (folder / "mine.yaml").write_text("precious")
+    assert new("mine.yaml").exit_code == 2
+    assert (folder / "mine.yaml").read_text() == "precious"
+    assert new("mine.yaml", "--force").exit_code == 0
+    assert sl.load_robot(folder / "mine.yaml").name == "mine"
+
+
+def test_an_answer_is_no_yaml(folder: FilePath) -> None:
+    assert new("mine.yaml", "--mass", "30\nname: 'evil'").exit_code == 2
+    assert new("mine.yaml", "--mass", "30 \n kg").exit_code == 0
+    assert not re.search(r"^ *kg", (folder / "mine.yaml").read_text(), re.MULTILINE)
+
+
+@pytest.mark.parametrize(("layout", "cables"), [("top", 8), ("top", 6), ("mixed", 8), ("mixed", 7)])
+def test_every_layout_is_feasible_somewhere(layout: str, cables: int) -> None:
+    design = Design("x", [6.0, 4.0, 3.0], [0.5, 0.5, 0.4], 30.0, diameter=0.004, cables=cables, layout=layout)
+    robot = design.robot()
+    assert robot.cable_count == cables
+    assert sl.inverse(robot, grid(design.placed(0.5))).feasible.mean() > 0.2
+
+
+def test_ropes_agree_with_a_makers_table() -> None:
+    # 6x19 IWRC 10 mm, grade 1770, EN 12385-4: 40.0 kg/100 m, 63.0 kN
+    steel = ROPES["steel-6x19"]
+    assert float(steel.cable(0.010).linear_density) == pytest.approx(0.400)
+    assert steel.breaking_force(0.010) == pytest.approx(63.0e3, rel=1e-3)
+    # a braid of polyethylene is lighter and, for its weight, stronger than steel
+    braid = ROPES["dyneema-sk78"]
+    assert braid.strength_factor / braid.density_factor > 5.0 * steel.strength_factor / steel.density_factor

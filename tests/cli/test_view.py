@@ -1,0 +1,77 @@
+"""`sagline view` as a process: where it listens, what it says, and how it ends."""
+
+import re
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path as FilePath
+from urllib.request import urlopen
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import sagline as sl
+from sagline.cli.main import app
+from tests.viewer.client import Client
+
+
+@contextmanager
+def viewing(*words: str) -> Iterator[tuple[subprocess.Popen[str], int]]:
+    command = [sys.executable, "-m", "sagline.cli", "view", *words, "--port", "0", "--no-browser"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        assert process.stdout is not None
+        found = re.search(r"http://127\.0\.0\.1:(\d+)", process.stdout.readline())
+        assert found is not None
+        yield process, int(found[1])
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def test_it_serves_a_page_and_stops_at_ctrl_c_mid_drag() -> None:
+    with viewing("article-suspended") as (process, port):
+        with urlopen(f"http://127.0.0.1:{port}") as page:
+            assert b"<html" in page.read().lower()
+        client = Client(port)
+        client.grab()
+        client.drag([0.5, 0.0, 2.0])
+        client.send(b"\xff nonsense")
+        assert any("Feasible" in str(message) for message in client.heard(20.0))
+        process.send_signal(signal.SIGINT)
+        said, complained = process.communicate(timeout=20.0)
+        assert process.returncode == 0
+        assert "Traceback" not in said + complained
+        assert "Stopped." in complained
+        client.break_off()
+
+
+def test_a_taken_port_is_told() -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = str(taken.getsockname()[1])
+        result = CliRunner().invoke(app, ["view", "article-suspended", "--port", port, "--no-browser"])
+    assert result.exit_code == 2
+    assert f"127.0.0.1:{port}" in result.stderr
+    assert "--port 0" in result.stderr
+
+
+def test_a_run_of_another_robot_is_refused(tmp_path: FilePath) -> None:
+    robot = sl.load_robot("article-mixed")
+    poses = sl.Pose(np.array([[0.0, 0.0, 1.5], [0.1, 0.0, 1.5]]), np.stack([np.eye(3)] * 2))
+    sl.inverse(robot, poses).save(tmp_path / "run.nc")
+    result = CliRunner().invoke(app, ["view", "cogiro", str(tmp_path / "run.nc"), "--port", "0", "--no-browser"])
+    assert result.exit_code == 2
+    assert "sagline view article-mixed" in " ".join(result.stderr.split())
+
+
+@pytest.mark.parametrize("wrong", [["nothing-like-it"], ["cogiro", "missing.nc"], ["cogiro", "--port", "99999"]])
+def test_bad_input_ends_with_a_message(wrong: list[str]) -> None:
+    result = CliRunner().invoke(app, ["view", *wrong, "--no-browser"])
+    assert result.exit_code == 2
+    assert "Error:" in result.stderr

@@ -1,0 +1,80 @@
+"""A client without a browser: speaks viser's protocol over a bare websocket."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import TracebackType
+from typing import Any
+
+import msgspec.msgpack
+import viser
+import zstandard
+from websockets.sync.client import connect
+from websockets.typing import Subprotocol
+
+
+class Client:
+    """Connects, drags, sets, and hears what is sent."""
+
+    def __init__(self, port: int) -> None:
+        protocol = Subprotocol(f"viser-v{viser.__version__}")
+        self._socket = connect(f"ws://127.0.0.1:{port}", subprotocols=[protocol], compression=None, max_size=None)
+        eye = {"wxyz": [1, 0, 0, 0], "position": [0, -10, 3], "look_at": [0, 0, 0], "up_direction": [0, 0, 1]}
+        lens = {"fov": 1.0, "near": 0.1, "far": 100.0, "image_height": 600, "image_width": 800}
+        self.say(type="ViewerCameraMessage", **eye, **lens)
+
+    def __enter__(self) -> Client:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._socket.close()
+
+    def say(self, **message: Any) -> None:
+        self.send(msgspec.msgpack.encode(message))
+
+    def send(self, raw: bytes | str) -> None:
+        self._socket.send(raw)
+
+    def grab(self) -> None:
+        self.say(type="TransformControlsDragStartMessage", name="/platform", owner="")
+
+    def drag(self, position: Any, wxyz: Any = (1.0, 0.0, 0.0, 0.0)) -> None:
+        self.say(
+            type="TransformControlsUpdateMessage",
+            name="/platform",
+            owner="",
+            position=[float(x) for x in position],
+            wxyz=[float(x) for x in wxyz],
+        )
+
+    def set(self, uuid: str, value: Any) -> None:
+        self.say(type="GuiUpdateMessage", uuid=uuid, updates={"value": value})
+
+    def heard(self, timeout: float) -> Iterator[dict[str, Any]]:
+        """Messages, until none has come for a while [s]."""
+        while True:
+            try:
+                raw = self._socket.recv(timeout=timeout)
+            except TimeoutError:
+                return
+            assert isinstance(raw, bytes)
+            size = int.from_bytes(raw[8:16], "little")
+            yield from msgspec.msgpack.decode(zstandard.ZstdDecompressor().decompress(raw[16 : 16 + size]))["messages"]
+
+    def break_off(self) -> None:
+        """Leave without a word, as a laptop does that is closed."""
+        self._socket.socket.close()
+
+
+@contextmanager
+def clients(port: int, count: int) -> Iterator[list[Client]]:
+    """Several clients at once."""
+    some = [Client(port) for _ in range(count)]
+    try:
+        yield some
+    finally:
+        for client in some:
+            client.__exit__(None, None, None)

@@ -1,0 +1,43 @@
+"""What one takes away."""
+
+from io import BytesIO
+
+import numpy as np
+import pytest
+import trimesh
+from PIL import Image
+
+import sagline as sl
+from sagline.viewer.export import picture_as_png, pictures_as_gif, scene_as_glb
+from sagline.viewer.settings import Settings
+from sagline.viewer.snapshot import taken_at
+from sagline.viewer.tension_scale import TensionScale
+
+ROBOT = sl.load_robot("article-suspended")
+
+
+def test_glb_holds_the_scene_in_meters_with_y_up() -> None:
+    pose = sl.Pose([1.0, 0.5, 2.0], np.eye(3))
+    scale = TensionScale.of(ROBOT)
+    glb = scene_as_glb(taken_at(ROBOT, pose, Settings(mass=50.0), None), scale)
+    scene = trimesh.load(BytesIO(glb), file_type="glb")
+    assert isinstance(scene, trimesh.Scene)
+    assert set(scene.geometry) == {"frame", "winches", "platform", *(f"cable {i}" for i in range(8))}
+    assert scene.bounds[0] == pytest.approx([-7.5, 0.0, -5.5], abs=0.3)
+    assert scene.bounds[1] == pytest.approx([7.5, 6.0, 5.5], abs=0.3)
+    place, _ = scene.graph["platform"]
+    corners = trimesh.transform_points(scene.geometry["platform"].vertices, place)
+    assert corners.mean(axis=0) == pytest.approx([1.0, 2.0, -0.5], abs=1e-5)
+
+
+def test_pictures_become_png_and_gif() -> None:
+    clear = np.zeros((20, 30, 4), dtype=np.uint8)
+    clear[5:10, 5:10] = (255, 0, 0, 255)
+    with Image.open(BytesIO(picture_as_png(clear))) as image:
+        assert image.size == (30, 20)
+        assert image.getpixel((0, 0)) == (255, 255, 255)
+        assert image.getpixel((7, 7)) == (255, 0, 0)
+    frames = [np.full((20, 30, 3), shade, dtype=np.uint8) for shade in (0, 120, 240)]
+    with Image.open(BytesIO(pictures_as_gif(frames, 0.1))) as film:
+        assert getattr(film, "n_frames", 1) == 3
+        assert film.info["duration"] == 100

@@ -1,0 +1,58 @@
+"""A run and its clock."""
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.viewer.run import Run
+from sagline.viewer.timeline import Timeline
+
+ROBOT = sl.load_robot("article-mixed")
+PATH = sl.quintic_path(
+    sl.Pose(np.array([[0.0, 0.0, 1.5], [6.9, 3.0, 1.5]]), np.stack([np.eye(3)] * 2)), durations=[4.0], rate=10
+)
+PLAN = sl.inverse(ROBOT, PATH, model=sl.Empirical())
+RUN = Run.of(PLAN)
+
+
+def test_samples_are_those_of_the_plan() -> None:
+    index = RUN.index_at(1.25)
+    assert index == 12
+    snapshot = RUN.snapshot(index)
+    assert np.array_equal(snapshot.pose.position, PATH.pose.position[12])
+    assert np.array_equal(snapshot.tension, PLAN.chord_tension[12])
+    assert snapshot.plan is not None
+    assert snapshot.plan.state.cables.sag == pytest.approx(PLAN.state.cables.sag[12])
+    found = sl.forward(ROBOT, PLAN.unstrained_length[12], start=snapshot.pose, wrench=PLAN.state.wrench[12])
+    assert snapshot.error == pytest.approx(found.pose.position - PATH.pose.position[12], abs=1e-9)
+
+
+def test_times_outside_are_the_nearer_end() -> None:
+    assert RUN.index_at(-1.0) == 0
+    assert RUN.index_at(1e9) == len(PATH) - 1
+    assert RUN.duration == pytest.approx(4.0)
+
+
+def test_traces_draw_the_error_times_its_scale() -> None:
+    wanted, actual = RUN.traces(1000, 50.0)
+    error = sl.confirm(PLAN).position_error
+    assert np.array_equal(wanted, PATH.pose.position)
+    assert actual - wanted == pytest.approx(50.0 * error, nan_ok=True)
+    assert len(RUN.traces(7, 1.0)[0]) == 7
+
+
+def test_plan_of_a_single_pose_is_no_run() -> None:
+    with pytest.raises(sl.InvalidValueError, match="single pose"):
+        Run.of(sl.inverse(ROBOT, sl.Pose([0.0, 0.0, 1.5], np.eye(3))))
+
+
+def test_clock_plays_pauses_scrubs_and_stops_at_the_end() -> None:
+    clock = Timeline(10.0)
+    assert clock.advanced(1.0, 1.0).time == 0.0
+    playing = clock.toggled()
+    assert playing.advanced(0.5, 4.0) == Timeline(10.0, 2.0, True)
+    assert playing.advanced(99.0, 1.0) == Timeline(10.0, 10.0, False)
+    assert Timeline(10.0, 10.0, False).toggled() == Timeline(10.0, 0.0, True)
+    assert playing.scrubbed(3.0) == Timeline(10.0, 3.0, False)
+    assert playing.scrubbed(-3.0).time == 0.0
+    assert playing.advanced(-5.0, 1.0).time == 0.0

@@ -1,0 +1,73 @@
+"""One moment of a robot."""
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.viewer.settings import Settings
+from sagline.viewer.snapshot import taken_at
+
+ROBOT = sl.load_robot("article-suspended")
+HERE = sl.Pose([1.0, 0.5, 2.0], np.eye(3))
+
+
+def test_snapshot_shows_the_plan_of_its_pose() -> None:
+    snapshot = taken_at(ROBOT, HERE, Settings(mass=50.0), None)
+    plan = sl.inverse(ROBOT, HERE)
+    assert snapshot.feasible
+    assert snapshot.reason == ""
+    assert np.array_equal(snapshot.tension, plan.chord_tension)
+    low, high = plan.chord_tension - 25.0, 2000.0 - plan.chord_tension
+    assert np.array_equal(snapshot.margin, np.minimum(low, high))
+    assert snapshot.rest is None
+
+
+def test_settings_change_the_robot() -> None:
+    robot = Settings(mass=75.0, density=2.0, stiffness=0.5).applied(ROBOT)
+    assert robot.mass == 75.0
+    assert robot.inertia == pytest.approx(1.5 * ROBOT.inertia)
+    assert robot.cables.linear_density == pytest.approx(0.134)
+    assert robot.cables.axial_stiffness == pytest.approx(22e3)
+    heavier = taken_at(robot, HERE, Settings(mass=75.0), None)
+    assert heavier.tension.sum() > 1.4 * taken_at(ROBOT, HERE, Settings(mass=50.0), None).tension.sum()
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"density": np.nan}, {"stiffness": 0.0}, {"sag_scale": -1.0}, {"error_scale": np.inf}]
+)
+def test_senseless_settings_are_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(sl.InvalidValueError):
+        Settings(mass=50.0, **wrong)
+    with pytest.raises(sl.InvalidValueError):
+        Settings(mass=np.nan).applied(ROBOT)
+
+
+def test_approximate_model_rests_where_forward_finds_it() -> None:
+    snapshot = taken_at(ROBOT, HERE, Settings(mass=50.0, model=sl.Empirical()), None)
+    lengths = sl.inverse(ROBOT, HERE, model=sl.Empirical()).unstrained_length
+    found = sl.forward(ROBOT, lengths, start=HERE)
+    assert snapshot.error == pytest.approx(found.pose.position - HERE.position, abs=1e-9)
+    assert 1e-4 < np.linalg.norm(found.pose.position - HERE.position) < 1e-2
+    drawn = snapshot.drawn_rest(100.0)
+    assert drawn is not None
+    assert drawn - HERE.position == pytest.approx(100.0 * (found.pose.position - HERE.position), abs=1e-7)
+
+
+def test_infeasible_pose_says_by_how_much_and_which_cables() -> None:
+    outside = sl.Pose([7.2, 3.0, 1.5], np.eye(3))
+    snapshot = taken_at(ROBOT, outside, Settings(mass=50.0), None)
+    plan = sl.inverse(ROBOT, outside)
+    assert not snapshot.feasible
+    assert f"short of {float(plan.shortfall):,.1f} N" in snapshot.reason
+    assert snapshot.reason.endswith("cables " + ", ".join(str(i) for i in np.flatnonzero(plan.blocking)))
+    assert np.isnan(snapshot.tension).all()
+    sizes = np.linalg.norm(np.diff(snapshot.cable_segments(1.0), axis=1), axis=2)
+    assert np.count_nonzero(sizes) == sizes.size // 2  # dashed
+
+
+def test_platform_on_an_anchor_is_no_accident() -> None:
+    on_anchor = sl.Pose(ROBOT.frame_anchors[0] - ROBOT.platform_anchors[0], np.eye(3))
+    snapshot = taken_at(ROBOT, on_anchor, Settings(mass=50.0), None)
+    assert not snapshot.feasible
+    assert "coincide" in snapshot.reason
+    assert np.isfinite(snapshot.cable_segments(1.0)).all()

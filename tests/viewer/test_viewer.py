@@ -1,0 +1,212 @@
+"""The viewer with clients that drag, set, leave and talk nonsense."""
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.viewer.run import Run
+from sagline.viewer.server import Server, started, stop
+from sagline.viewer.viewer import Viewer
+from tests.viewer.client import Client, clients
+
+ROBOT = sl.load_robot("article-suspended")
+PATH = sl.quintic_path(
+    sl.Pose(np.array([[0.0, 0.0, 1.5], [2.0, 1.0, 1.5]]), np.stack([np.eye(3)] * 2)), durations=[2.0], rate=50
+)
+
+
+class Shown(NamedTuple):
+    server: Server
+    viewer: Viewer
+    thread: threading.Thread
+
+    @property
+    def port(self) -> int:
+        return int(self.server.get_port())
+
+    @property
+    def position(self) -> np.ndarray:
+        assert self.viewer.view is not None
+        return self.viewer.view.snapshot.pose.position
+
+
+def shown(run: Run | None) -> Iterator[Shown]:
+    server = started(port=0)
+    viewer = Viewer(server, ROBOT, run)
+    thread = threading.Thread(target=viewer.serve)
+    thread.start()
+    await_that(lambda: viewer.view is not None, seconds=300.0)
+    yield Shown(server, viewer, thread)
+    viewer.stop()
+    thread.join(timeout=10.0)
+    stop(server)
+    assert not thread.is_alive()
+
+
+@pytest.fixture(scope="module")
+def page() -> Iterator[Shown]:
+    yield from shown(None)
+
+
+@pytest.fixture(scope="module")
+def film() -> Iterator[Shown]:
+    yield from shown(Run.of(sl.inverse(ROBOT, PATH, model=sl.Empirical())))
+
+
+def await_that(done: Callable[[], bool], seconds: float = 10.0) -> None:
+    end = time.monotonic() + seconds
+    while not done():
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.01)
+
+
+def handle(page: Shown, label: str) -> Any:
+    found = [each for each in page.server.gui._gui_input_handle_from_uuid.values() if each.label == label]
+    assert len(found) == 1
+    return found[0]
+
+
+def test_it_listens_on_the_loopback_address_alone(page: Shown) -> None:
+    sockets = page.server._websock_server
+    assert sockets._host == "127.0.0.1"
+    assert page.server.request_share_url() is None
+
+
+def test_a_port_that_is_taken_is_told(page: Shown) -> None:
+    with pytest.raises(sl.InvalidValueError, match="--port"):
+        started(port=page.port)
+    with pytest.raises(sl.InvalidValueError, match="--host"):
+        started(host="203.0.113.7", port=0)
+    with pytest.raises(sl.InvalidValueError, match="65535"):
+        started(port=70000)
+
+
+def test_everything_follows_a_drag(page: Shown) -> None:
+    with Client(page.port) as client:
+        client.grab()
+        half = np.radians(4.0) / 2.0
+        client.drag([1.0, 0.5, 2.0], [np.cos(half), 0.0, 0.0, np.sin(half)])
+        await_that(lambda: np.array_equal(page.position, [1.0, 0.5, 2.0]))
+        plan = sl.inverse(ROBOT, sl.Pose.from_euler([1.0, 0.5, 2.0], 2.0 * half, 0.0, 0.0), tension=sl.MinimumNorm())
+        view = page.viewer.view
+        assert view is not None
+        assert view.snapshot.plan is not None
+        # Closest keeps near to the tensions before, which differ; but the balance is the same
+        matrix = sl.structure_matrix(ROBOT, plan.state.pose)
+        assert matrix @ view.snapshot.tension == pytest.approx(matrix @ plan.chord_tension, abs=1.0)
+        texts = [m["updates"]["content"] for m in client.heard(0.5) if "content" in m.get("updates", {})]
+        assert any("1.000, 0.500, 2.000 m" in text for text in texts)
+
+
+def test_thirty_updates_a_second_reach_a_client(page: Shown) -> None:
+    with Client(page.port) as client:
+        list(client.heard(1.0))
+        before, start = page.viewer.updates, time.monotonic()
+        while time.monotonic() - start < 2.0:
+            angle = 3.0 * (time.monotonic() - start)
+            client.drag([np.cos(angle), np.sin(angle), 2.0])
+            time.sleep(0.01)
+        seen = sum(m.get("name") == "/cables" and "points" in m.get("updates", {}) for m in client.heard(0.5))
+        assert (page.viewer.updates - before) / 2.0 >= 30.0
+        assert seen / 2.0 >= 30.0
+
+
+def test_infeasible_pose_turns_the_platform_red_and_back(page: Shown) -> None:
+    with Client(page.port) as client:
+        client.drag([7.2, 3.0, 1.5])
+        await_that(lambda: page.viewer.view is not None and not page.viewer.view.snapshot.feasible)
+        updates = [m for m in client.heard(0.5) if "updates" in m]
+        assert any("Not feasible" in str(m["updates"].get("content", "")) for m in updates)
+        client.drag([0.0, 0.0, 2.0])
+        await_that(lambda: page.viewer.view is not None and page.viewer.view.snapshot.feasible)
+
+
+def test_a_slider_changes_the_robot(page: Shown) -> None:
+    with Client(page.port) as client:
+        mass = handle(page, "Platform + load [kg]")
+        client.set(mass._impl.uuid, 100.0)
+        await_that(lambda: page.viewer.view is not None and page.viewer.view.snapshot.robot.mass == 100.0)
+        model = handle(page, "Cable model")
+        client.set(model._impl.uuid, "empirical (the article's)")
+        await_that(lambda: page.viewer.view is not None and page.viewer.view.snapshot.rest is not None)
+        client.set(model._impl.uuid, "catenary (exact)")
+        client.set(mass._impl.uuid, 50.0)
+        await_that(lambda: page.viewer.view is not None and page.viewer.view.snapshot.robot.mass == 50.0)
+
+
+def test_a_client_that_vanishes_mid_drag_is_not_missed(page: Shown) -> None:
+    client = Client(page.port)
+    client.grab()
+    client.drag([0.3, 0.0, 2.0])
+    client.break_off()
+    with Client(page.port) as other:
+        other.drag([0.6, 0.0, 2.0])
+        await_that(lambda: page.position[0] == 0.6)
+
+
+def test_ten_clients_at_once_all_see_the_drag_of_one(page: Shown) -> None:
+    with clients(page.port, 10) as some:
+        for client in some:
+            list(client.heard(0.3))
+        some[3].drag([0.9, 0.1, 2.0])
+        for client in some:
+            assert any(m.get("name") == "/cables" for m in client.heard(0.5))
+
+
+@pytest.mark.parametrize(
+    "nonsense",
+    [b"", b"\xff\xfe\x00", "text", b"\x81\xa4type\xa4None", b"\x80"],
+)
+def test_a_malformed_message_harms_its_sender_only(page: Shown, nonsense: bytes | str) -> None:
+    with Client(page.port) as good:
+        bad = Client(page.port)
+        bad.send(nonsense)
+        good.drag([0.2, 0.7, 2.0])
+        await_that(lambda: page.position[1] == 0.7)
+        good.drag([0.0, 0.0, 2.0])
+        await_that(lambda: page.position[1] == 0.0)
+        bad.break_off()
+
+
+def test_a_pose_that_is_none_is_refused_and_forgotten(page: Shown) -> None:
+    for position, wxyz in (
+        ([np.nan, 0.0, 2.0], [1, 0, 0, 0]),
+        ([1e9, 0.0, 2.0], [1, 0, 0, 0]),
+        ([0.0, 0.0, 2.0], [0, 0, 0, 0]),
+        ([0.0, 0.0], [1, 0, 0, 0]),
+        ([0.0, 0.0, 2.0], [1, 0]),
+    ):
+        client = Client(page.port)
+        client.drag(position, wxyz)
+        time.sleep(0.1)
+        client.break_off()
+        assert page.thread.is_alive()
+    with Client(page.port) as client:
+        client.drag([0.0, 0.4, 2.0])
+        await_that(lambda: page.position[1] == 0.4)
+
+
+def test_a_run_plays_pauses_and_is_left_by_a_drag(film: Shown) -> None:
+    play, follow = handle(film, "Play"), handle(film, "Follow the run")
+    with Client(film.port) as client:
+        assert np.array_equal(film.position, PATH.pose.position[0])
+        client.set(play._impl.uuid, True)
+        await_that(lambda: film.position[0] > 0.5)
+        assert film.viewer.view is not None
+        index = int(np.argmin(np.abs(PATH.pose.position[:, 0] - film.position[0])))
+        assert np.array_equal(film.position, PATH.pose.position[index])
+        await_that(lambda: play.label == "Play" and film.position[0] == 2.0)
+        scrubbed = handle(film, "Time [s]")
+        client.set(scrubbed._impl.uuid, 1.0)
+        await_that(lambda: np.array_equal(film.position, PATH.pose.position[50]))
+        client.grab()
+        client.drag([0.0, 0.8, 2.0])
+        await_that(lambda: film.position[1] == 0.8)
+        assert follow.value is False
+        client.set(play._impl.uuid, True)
+        await_that(lambda: follow.value and film.position[2] == 1.5)
