@@ -1,4 +1,4 @@
-"""The page in headless Chromium: it loads, a slider changes the picture, a run plays, and nothing is complained about."""
+"""The page in headless Chromium: it loads, a slider changes it, a run plays, and the console does not complain."""
 
 import os
 import shutil
@@ -6,7 +6,6 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from io import BytesIO
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -80,18 +79,12 @@ def await_that(page: Page, done: Callable[[], bool]) -> None:
 
 def type_in(page: Page, label: str, value: str) -> None:
     """Set a slider by the number beside it."""
-    uuid = page.locator("label", has_text=label).first.get_attribute("for")
-    field = page.locator(f"[id='{uuid}-numberinput']") if uuid else page.get_by_label(label)
+    field = page.locator(f"//label[contains(., '{label}')]/following::input[contains(@class, 'NumberInput')]").first
     field.fill(value)
     field.press("Enter")
 
 
-def colors(page: Page) -> np.ndarray:
-    with Image.open(BytesIO(page.screenshot(timeout=1e3 * PATIENCE))) as image:
-        return np.asarray(image.convert("RGB")).reshape(-1, 3).astype(int)
-
-
-def test_a_slider_makes_it_infeasible_and_the_platform_red(browser: Browser) -> None:
+def test_a_slider_changes_cables_and_numbers(browser: Browser) -> None:
     with opened(browser, sl.load_robot("cogiro")) as (page, viewer):
         assert page.get_by_text("Natural frequencies").is_visible()
         type_in(page, "Cable density", "10")
@@ -116,7 +109,9 @@ def test_scene_and_picture_can_be_taken_away(browser: Browser, tmp_path: FilePat
         with page.expect_download() as download:
             page.get_by_role("button", name="Scene (GLB)").click()
         download.value.save_as(tmp_path / "scene.glb")
-        assert len(trimesh.load(tmp_path / "scene.glb").geometry) == 11
+        scene = trimesh.load(tmp_path / "scene.glb")
+        assert isinstance(scene, trimesh.Scene)
+        assert len(scene.geometry) == 11
         with page.expect_download() as download:
             page.get_by_role("button", name="Picture (PNG)").click()
         download.value.save_as(tmp_path / "picture.png")

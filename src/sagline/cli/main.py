@@ -53,6 +53,8 @@ def sagline(
     sagline robots                       the robots that come with it
     sagline show ipanema-1               all values of one of them
     sagline track cogiro my_path.yaml    a robot along a path of your own
+    sagline view cogiro                  drag a robot's platform in the browser
+    sagline new my_robot.yaml            a robot of your own, by a few questions
     ```
     """
 

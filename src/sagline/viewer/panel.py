@@ -55,7 +55,7 @@ class Panel:
             density=float(self._density.value),
             stiffness=float(self._stiffness.value),
             model=MODELS.get(self._model.value, MODELS["catenary (exact)"]),
-            tension=METHODS.get(self._method.value, METHODS["closest to the last"]),
+            tension=METHODS.get(self._method.value, METHODS["Closest"]),
             sag_scale=float(self._sag_scale.value),
             error_scale=float(self._error_scale.value),
         )

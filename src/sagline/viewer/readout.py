@@ -7,6 +7,7 @@ from html import escape
 import numpy as np
 
 from sagline.arrays import Array
+from sagline.tension.margin import capacity_margin
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.tension_scale import TensionScale
 
@@ -81,6 +82,9 @@ def _summary(snapshot: Snapshot) -> str:
         f"tensions {tension.min():.4g} to {tension.max():.4g} N",
         f"margin {_number(margin[nearest], '.1f')} N (cable {nearest})",
     ]
+    if snapshot.plan is not None:
+        extra = float(capacity_margin(snapshot.plan.state))
+        parts.append(f"takes {_number(extra, '.1f')} N more in any direction")
     if (error := snapshot.error) is not None:
         parts.append(f"really rests {1e3 * float(np.linalg.norm(error)):.3g} mm off")
     return " · ".join(parts)

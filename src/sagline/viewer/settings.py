@@ -17,7 +17,7 @@ from sagline.cables.straight import Straight
 from sagline.robot.robot import Robot
 from sagline.tension.closest import Closest
 from sagline.tension.method import TensionMethod
-from sagline.tension.minimum_norm import MinimumNorm
+from sagline.tension.methods import METHODS as ALL_METHODS
 
 MODELS: Final = MappingProxyType(
     {
@@ -28,7 +28,7 @@ MODELS: Final = MappingProxyType(
         "straight": Straight(),
     }
 )
-METHODS: Final = MappingProxyType({"closest to the last": Closest(), "minimum norm": MinimumNorm()})
+METHODS: Final = MappingProxyType({name: method() for name, method in ALL_METHODS.items()})
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,6 +20,7 @@ from sagline.statics.stiffness import modes
 from sagline.viewer import readout, solids
 from sagline.viewer.export_panel import ExportPanel
 from sagline.viewer.panel import Panel
+from sagline.viewer.polygon_figure import polygon_figure
 from sagline.viewer.run import Run
 from sagline.viewer.run_panel import RunPanel
 from sagline.viewer.settings import Settings
@@ -187,7 +188,7 @@ class Viewer:
         self._panel.read_out(
             readout.verdict(snapshot),
             readout.numbers(snapshot, self._scale, _frequencies(snapshot)),
-            "",
+            polygon_figure(snapshot),
         )
         self.view = view
         self.updates += 1

@@ -1,0 +1,93 @@
+"""The feasible tensions of one pose as a small drawing (SVG) in the null space of two redundant cables."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sagline.arrays import Array
+from sagline.errors import InvalidValueError
+from sagline.kinematics.polygon import tension_polygon
+from sagline.tension.polygon import TensionPolygon
+from sagline.viewer.readout import FONT
+from sagline.viewer.snapshot import Snapshot
+
+MOST_REDUNDANT = 2  # dimensions of a drawing
+WIDTH, HEIGHT, BORDER = 340, 190, 26  # px
+_BLUE, _VERMILLION = "#0072B2", "#D55E00"
+
+
+def polygon_figure(snapshot: Snapshot) -> str:
+    """HTML: the polygon with the chosen tensions in it; for one redundant cable the interval; else a sentence."""
+    redundant = snapshot.robot.cable_count - snapshot.robot.degrees_of_freedom
+    if redundant > MOST_REDUNDANT:
+        return _sentence(f"{redundant} redundant cables: their feasible tensions have no picture in a plane.")
+    if redundant == 0:
+        return _sentence("As many cables as freedoms: the balance leaves nothing to choose.")
+    polygon = _polygon(snapshot)
+    if polygon is None or not len(polygon.vertices):
+        return _sentence("No tensions within the limits balance the platform: there is nothing to choose from.")
+    point = polygon.basis @ (snapshot.tension - polygon.origin)
+    return _interval(polygon.vertices[:, 0], float(point[0])) if redundant == 1 else _drawing(polygon, point)
+
+
+def _polygon(snapshot: Snapshot) -> TensionPolygon | None:
+    if snapshot.plan is None:
+        return None
+    state = snapshot.plan.state
+    try:
+        return tension_polygon(snapshot.robot, snapshot.pose, state.cables.model, state.wrench)
+    except InvalidValueError:  # a pose without a balance
+        return None
+
+
+def _drawing(polygon: TensionPolygon, point: Array) -> str:
+    corners = polygon.vertices
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    scale = float(np.min((np.array([WIDTH, HEIGHT]) - 2 * BORDER) / np.maximum(high - low, 1e-9)))
+    middle = 0.5 * (low + high)
+
+    def place(at: Array) -> tuple[float, float]:
+        x, y = scale * (at - middle)
+        return 0.5 * WIDTH + float(x), 0.5 * HEIGHT - float(y)
+
+    outline = " ".join(f"{x:.1f},{y:.1f}" for x, y in map(place, corners))
+    sides = "".join(
+        _side(polygon, k, place(corners[k]), place(corners[(k + 1) % len(corners)]), place(middle))
+        for k in range(len(corners))
+    )
+    x, y = place(point)
+    return (
+        f'<svg width="100%" viewBox="0 0 {WIDTH} {HEIGHT}" style="{FONT};font-size:10px" role="img" '
+        f'aria-label="polygon of feasible tensions">'
+        f'<polygon points="{outline}" fill="{_BLUE}" fill-opacity="0.15" stroke="{_BLUE}" stroke-width="1.5"/>{sides}'
+        f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4.5" fill="{_VERMILLION}" stroke="white"/></svg>'
+        f"{_sentence(f'Dot: the chosen tensions. Sides: the limit that each is. {_extent(high - low)}')}"
+    )
+
+
+def _side(
+    polygon: TensionPolygon, k: int, start: tuple[float, float], end: tuple[float, float], middle: tuple[float, float]
+) -> str:
+    """The name of a side, outside of it; none for a side that is too short to name, or no limit."""
+    side = polygon.sides[k]
+    if side is None or np.hypot(end[0] - start[0], end[1] - start[1]) < 22.0:
+        return ""
+    x, y = 0.5 * (start[0] + end[0]), 0.5 * (start[1] + end[1])
+    nx, ny = end[1] - start[1], start[0] - end[0]
+    outward = 1.0 if nx * (x - middle[0]) + ny * (y - middle[1]) > 0.0 else -1.0
+    length = outward * np.hypot(nx, ny)
+    x, y = x + 15.0 * nx / length, y + 9.0 * ny / length + 3.0
+    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="middle" fill="#444">{side.cable} {side.limit}</text>'
+
+
+def _interval(ends: Array, point: float) -> str:
+    low, high = float(ends.min()), float(ends.max())
+    return _sentence(f"One redundant cable: λ may be {low:.4g} to {high:.4g} N; chosen: {point:.4g} N.")
+
+
+def _extent(size: Array) -> str:
+    return f"Width {size[0]:,.0f} N, height {size[1]:,.0f} N."
+
+
+def _sentence(text: str) -> str:
+    return f'<div style="{FONT};color:#555;padding:0 4px">{text}</div>'

@@ -1,0 +1,41 @@
+"""The drawing of the feasible tensions."""
+
+import re
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.viewer.polygon_figure import polygon_figure
+from sagline.viewer.settings import Settings
+from sagline.viewer.snapshot import taken_at
+
+ROBOT = sl.load_robot("article-suspended")
+HERE = sl.Pose([1.0, 0.5, 2.0], np.eye(3))
+
+
+def test_drawing_has_the_shape_of_the_polygon_and_the_dot_in_its_place() -> None:
+    html = polygon_figure(taken_at(ROBOT, HERE, Settings(mass=50.0, tension=sl.Centroid()), None))
+    polygon = sl.tension_polygon(ROBOT, HERE)
+    found = re.search(r'<polygon points="(.*?)"', html)
+    assert found is not None
+    drawn = np.array([[float(part) for part in point.split(",")] for point in found[1].split()]) * [1.0, -1.0]
+    size = np.ptp(drawn, axis=0)[0] / np.ptp(polygon.vertices, axis=0)[0]
+    shape = (polygon.vertices - polygon.vertices[0]) * size
+    assert drawn - drawn[0] == pytest.approx(shape, abs=0.2)
+    dot = re.search(r'<circle cx="([\d.]+)" cy="([\d.]+)"', html)
+    assert dot is not None
+    tension = sl.inverse(ROBOT, HERE, tension=sl.Centroid()).chord_tension
+    where = (polygon.basis @ (tension - polygon.origin) - polygon.vertices[0]) * size
+    assert np.array([float(dot[1]), -float(dot[2])]) - drawn[0] == pytest.approx(where, abs=0.5)
+
+
+def test_other_redundancies_are_told_in_words() -> None:
+    seven = sl.load_robot("falcon-7")
+    assert seven.test_box is not None
+    middle = sl.Pose(0.5 * (seven.test_box.low + seven.test_box.high), np.eye(3))
+    html = polygon_figure(taken_at(seven, middle, Settings(mass=seven.mass), None))
+    ends = sl.tension_polygon(seven, middle).vertices[:, 0]
+    assert f"{ends.min():.4g} to {ends.max():.4g} N" in html
+    outside = taken_at(ROBOT, sl.Pose([7.2, 3.0, 1.5], np.eye(3)), Settings(mass=50.0), None)
+    assert "nothing to choose from" in polygon_figure(outside)
