@@ -81,8 +81,8 @@ def _braid(name: str, fiber: str, modulus: float, strength: float, source: str) 
 
 _STEEL_MODULUS = 100e9  # Pa, on the metallic section
 _BRAID_FILL = 2.0 / 3.0  # fiber in the circle of the nominal diameter
-_POLYETHYLENE = 975.0  # kg/m^3
-_DSM = "DSM Dyneema, fact sheet UHMWPE fiber, CIS YA100 (2010): {}; density 975 kg/m^3"
+_POLYETHYLENE = 975.0  # kg/m^3, ours: a common figure for the fiber
+_DSM = "DSM Dyneema, fact sheet UHMWPE fiber, CIS YA100 (2010): {}; density 975 kg/m^3 assumed"
 
 ROPES: Final = MappingProxyType(
     {

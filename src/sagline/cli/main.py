@@ -53,6 +53,9 @@ def sagline(
     sagline robots                       the robots that come with it
     sagline show ipanema-1               all values of one of them
     sagline track cogiro my_path.yaml    a robot along a path of your own
+    sagline forward cogiro lengths.csv   from measured lengths to poses
+    sagline tension cogiro               every way of sharing the load of a pose
+    sagline article                      the article redone, as one page
     sagline view cogiro                  drag a robot's platform in the browser
     sagline new my_robot.yaml            a robot of your own, by a few questions
     ```
@@ -168,6 +171,34 @@ def identify(
 
         unknowns = ["linear_density", "axial_stiffness", *["length_offset"] * offset]
         run(file, length_error, tension_error, tension_at.key, unknowns, as_json=as_json)
+
+
+@app.command()
+def forward(
+    robot: RobotArgument,
+    lengths: Annotated[
+        Path, typer.Argument(metavar="CSV", help="Columns L0, L1, ... and perhaps time; units in brackets: L0 [mm].")
+    ],
+    model: Annotated[Model, typer.Option(help="Cable model.")] = Model.CATENARY,
+    out: OutOption = Path("output"),
+    as_json: JsonOption = False,
+) -> None:
+    """Find the poses in which the platform rests on cables of measured lengths.
+
+    The first sample needs no start; each other begins where the last one ended. Exit code 1 where a sample
+    ends in no stable equilibrium.
+
+    For example:
+
+    ```
+    sagline forward cogiro encoders.csv --out poses
+    ```
+    """
+    with reported():
+        from sagline.cli.forward import forward as run
+
+        code = run(robot, lengths, model, out, as_json=as_json)
+    raise typer.Exit(code)
 
 
 @app.command()

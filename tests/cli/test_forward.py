@@ -1,0 +1,88 @@
+"""`sagline forward`: poses from a file of lengths."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import sagline as sl
+from sagline.cli.main import app
+from sagline.files.lengths_file import load_lengths
+
+ROBOT = "article-suspended"
+
+
+@pytest.fixture(scope="module")
+def plan() -> sl.Plan:
+    path = sl.quintic_path([(0.0, 0.0, 1.5), (2.0, 1.0, 2.5)], durations=4.0, rate=5.0)
+    return sl.inverse(sl.load_robot(ROBOT), path.pose)
+
+
+def write_lengths(file: Path, plan: sl.Plan, scale: float = 1.0, unit: str = "") -> None:
+    header = ["time [s]", *(f"L{k}{unit}" for k in range(8))]
+    with file.open("w", newline="") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(header)
+        for k, row in enumerate(plan.unstrained_length):
+            writer.writerow([0.2 * k, *(repr(float(scale * length)) for length in row)])
+
+
+def test_planned_lengths_lead_back_to_the_planned_poses(tmp_path: Path, plan: sl.Plan) -> None:
+    write_lengths(tmp_path / "lengths.csv", plan)
+    done = CliRunner().invoke(app, ["forward", ROBOT, str(tmp_path / "lengths.csv"), "--out", str(tmp_path / "out")])
+    assert done.exit_code == 0, done.output
+    with (tmp_path / "out" / f"{ROBOT}-poses.csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    found = np.array([[float(row[f"{axis} [m]"]) for axis in "xyz"] for row in rows])
+    np.testing.assert_allclose(found, plan.state.pose.position, atol=1e-9)
+    assert [float(row["time [s]"]) for row in rows] == pytest.approx([0.2 * k for k in range(len(rows))])
+    assert {row["status"] for row in rows} == {"SOLVED"}
+
+
+def test_json_carries_the_same_poses_and_units_are_read(tmp_path: Path, plan: sl.Plan) -> None:
+    write_lengths(tmp_path / "lengths.csv", plan, 1e3, " [mm]")
+    arguments = ["forward", ROBOT, str(tmp_path / "lengths.csv"), "--out", str(tmp_path / "out"), "--json"]
+    done = CliRunner().invoke(app, arguments)
+    assert done.exit_code == 0, done.output
+    last = json.loads(done.stdout)["poses"][-1]
+    np.testing.assert_allclose([float(last[axis]) for axis in "xyz"], (2.0, 1.0, 2.5), atol=1e-9)
+
+
+def test_lengths_too_short_to_meet_are_told_and_end_with_1(tmp_path: Path, plan: sl.Plan) -> None:
+    write_lengths(tmp_path / "lengths.csv", plan, 0.7)
+    done = CliRunner().invoke(app, ["forward", ROBOT, str(tmp_path / "lengths.csv"), "--out", str(tmp_path / "out")])
+    assert done.exit_code == 1
+    assert f"{len(plan.unstrained_length)} of {len(plan.unstrained_length)} samples" in done.output
+    with (tmp_path / "out" / f"{ROBOT}-poses.csv").open(newline="") as stream:
+        assert {row["status"] for row in csv.DictReader(stream)} == {"OVERSTRETCHED"}
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("L0,L1\n1,2\n", "line 1: missing column L2, L3, L4, L5, L6, L7; the robot has 8 cables"),
+        ("L0,L1,L2,L3,L4,L5,L6,L7\n1,1,1,1,-2,1,1,1\n", "line 2: L4 is -2 m; allowed: > 0 m"),
+        ("L0,L1,L2,L3,L4,L5,L6,L7\n1,1,1,1,nan,1,1,1\n", "line 2: L4 is nan m; allowed: a finite number"),
+        ("L0,L1,L2,L3,L4,L5,L6,L8\n1,1,1,1,1,1,1,1\n", "unknown column 'L8'"),
+        (
+            "L0 [kg],L1,L2,L3,L4,L5,L6,L7\n1,1,1,1,1,1,1,1\n",
+            "the unit of L0 is [kg]; allowed: a unit that converts to m",
+        ),
+        ("L0,L1,L2,L3,L4,L5,L6,L7\n", "no rows below"),
+        ("time,L0,L1,L2,L3,L4,L5,L6,L7\n1,1,1,1,1,1,1,1,1\n1,1,1,1,1,1,1,1,1\n", "line 3: time is 1 s"),
+    ],
+)
+def test_a_wrong_file_is_named_with_its_line(tmp_path: Path, text: str, words: str) -> None:
+    file = tmp_path / "lengths.csv"
+    file.write_text(text)
+    with pytest.raises(sl.FileError) as caught:
+        load_lengths(file, 8)
+    assert words in str(caught.value)
+    done = CliRunner().invoke(app, ["forward", ROBOT, str(file), "--out", str(tmp_path / "out")])
+    assert done.exit_code == 2
+    assert not (tmp_path / "out").exists()
