@@ -100,6 +100,9 @@ class _Segments:
 
     @classmethod
     def between(cls, stops: Pose) -> _Segments:
+        move, kept = np.diff(stops.position, axis=0), stops.quaternion[:-1]
+        if np.array_equal(kept, stops.quaternion[1:]):  # nothing turns: the axis is never asked for
+            return cls(stops.position[:-1], move, np.zeros_like(move), kept, np.zeros_like(kept))
         from scipy.spatial.transform import Rotation  # takes a third of the time that sagline takes to load
 
         first, second = stops.rotation[:-1], stops.rotation[1:]
@@ -108,7 +111,7 @@ class _Segments:
         axis = np.where(angle > 0.0, turn / np.where(angle > 0.0, angle, 1.0), (0.0, 0.0, 1.0))
         half_turn = Rotation.from_quat(np.hstack((axis, np.zeros_like(angle))))  # a pure quaternion is half a turn
         side = (half_turn * first).as_quat()
-        return cls(stops.position[:-1], np.diff(stops.position, axis=0), turn, first.as_quat(), side)
+        return cls(stops.position[:-1], move, turn, first.as_quat(), side)
 
     def __len__(self) -> int:
         return len(self.start)
