@@ -80,12 +80,13 @@ def platform(robot: Robot) -> Solid:
         return box(0.5 * (low + high), robot.platform_size)
     extent = high - low
     thinnest = max(_THINNEST * float(extent.max()), 0.002 * size_of(robot))
-    if extent.min() >= thinnest:
-        try:
-            return _hull(anchors)
-        except QhullError:  # the anchors lie in a plane that is not level
-            pass
-    return box(0.5 * (low + high), np.maximum(extent, thinnest))
+    flat = box(0.5 * (low + high), np.maximum(extent, thinnest))
+    if extent.min() < thinnest:
+        return flat
+    try:
+        return _hull(anchors)
+    except QhullError:  # the anchors lie in a plane that is not level
+        return flat
 
 
 def box(middle: Array, edges: Array) -> Solid:
