@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-import csv
 import os
-import re
 from pathlib import Path
-from typing import NamedTuple, cast
-
-import numpy as np
+from typing import NamedTuple
 
 from sagline.arrays import Array, locked
-from sagline.errors import FileError, InvalidValueError
-from sagline.files.quantity import in_si
+from sagline.files.table import Table, line_error
 from sagline.files.text import read_text
 
 UNITS = {"span": "m", "rise": "m", "length": "m", "tension": "N"}
-
-_column = re.compile(r"\s*(\w+)\s*(?:\[(.*)\])?\s*")  # name, or name [unit]
 
 
 class Measurements(NamedTuple):
@@ -48,47 +41,10 @@ def load_measurements(file: os.PathLike[str] | str) -> Measurements:
         FileError: If it cannot be read, or a column or number is wrong; the message names the line.
     """
     path = Path(file)
-    rows = [(k, row) for k, row in enumerate(csv.reader(read_text(path).splitlines()), start=1) if "".join(row).strip()]
-    if not rows:
-        raise FileError(path, "is empty", f"Give the columns {', '.join(UNITS)}.")
-    factors = _factors(path, rows[0][1])
-    numbers = [[_number(path, line, row, column, factors) for column in range(len(factors))] for line, row in rows[1:]]
-    table = np.array(numbers, dtype=np.float64).reshape(-1, len(factors))
-    names = list(factors)
-    return Measurements(*(locked(table[:, names.index(name)] * factors[name]) for name in UNITS))
-
-
-def _factors(path: Path, header: list[str]) -> dict[str, float]:
-    """Column names, and what to multiply their numbers by to have them in SI."""
-    factors: dict[str, float] = {}
-    for cell in header:
-        found = _column.fullmatch(cell)
-        name, unit = (found[1].lower(), found[2]) if found else (cell, None)
-        if name not in UNITS or name in factors:
-            raise FileError(path, f"line 1: column {name!r}", f"Give each of {', '.join(UNITS)} once, and no other.")
-        try:
-            factors[name] = 1.0 if unit is None else cast(float, in_si(f"1 {unit}", UNITS[name], name))
-        except InvalidValueError:
-            step = f"Give a unit that converts to {UNITS[name]}."
-            raise FileError(path, f"line 1: the unit of {name} is [{unit}]", step) from None
-    if missing := [name for name in UNITS if name not in factors]:
-        raise FileError(path, f"line 1: missing column {', '.join(missing)}", "Add it.")
-    return factors
-
-
-def _number(path: Path, line: int, row: list[str], column: int, factors: dict[str, float]) -> float:
-    if len(row) != len(factors):
-        raise FileError(path, f"line {line}: {len(row)} columns; allowed: {len(factors)}", f"Correct line {line}.")
-    try:
-        value = float(row[column])
-    except ValueError:
-        value = float("nan")
-    name = list(factors)[column]
-    if not np.isfinite(value) or (name != "rise" and value <= 0.0):
-        allowed = "a finite number" if name == "rise" else "a number > 0"
-        raise FileError(
-            path,
-            f"line {line}: {name} is {row[column].strip() or 'empty'}; allowed: {allowed}",
-            f"Correct line {line}.",
-        )
-    return value
+    table = Table.read(path, read_text(path), UNITS)
+    if missing := [name for name in UNITS if name not in table.columns]:
+        raise line_error(path, table.header, f"missing column {', '.join(missing)}; found: {', '.join(table.columns)}")
+    for name, unit in UNITS.items():
+        if name != "rise":
+            table.refuse(table.columns[name] <= 0.0, name, table.columns[name], unit, f"> 0 {unit}")
+    return Measurements(*(locked(table.columns[name]) for name in UNITS))
