@@ -71,3 +71,8 @@ def test_course_draws_gaps_as_gaps_and_its_cursor_in_place() -> None:
     cursor = re.search(r'<line x1="([\d.]+)" x2="\1" y1="18"', figure.at(2.5))
     assert cursor is not None
     assert float(cursor[1]) == pytest.approx(LEFT + 0.25 * (WIDTH - LEFT - RIGHT))
+
+
+def test_until_the_first_numbers_the_page_says_what_it_waits_for() -> None:
+    assert "Getting ready" in readout.waiting()
+    assert "compiles" in readout.waiting()

@@ -31,7 +31,7 @@ class Panel:
         self._build_drawing()
         readings = self._gui.add_panel()
         with readings.add_tab("Readings"):
-            self._verdict = self._gui.add_html("")
+            self._verdict = self._gui.add_html(readout.waiting())
             self._gui.add_html(readout.legend(scale))
             self._numbers = self._gui.add_html("")
             with self._gui.add_folder("Feasible tensions"):

@@ -12,6 +12,7 @@ from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.tension_scale import TensionScale
 
 GOOD, BAD = "#0b7a4b", "#c92a2a"  # green and red that hold their contrast on white
+QUIET = "#555555"  # of what is neither good nor bad
 FONT = "font-family:system-ui,sans-serif;font-size:12px;line-height:1.45;color:#222"
 _CELL = "padding:1px 0 1px 10px;text-align:right;font-variant-numeric:tabular-nums"
 
@@ -32,6 +33,15 @@ def refused(message: str) -> str:
     return (
         f'<div style="{FONT};border-left:5px solid {BAD};background:{BAD}14;padding:6px 10px;margin:2px 8px">'
         f'<b style="color:{BAD};font-size:14px">Not possible</b><br>{escape(message)}</div>'
+    )
+
+
+def waiting() -> str:
+    """What stands there until the first numbers do: at the first run the numerical core is compiled before them."""
+    return (
+        f'<div style="{FONT};border-left:5px solid {QUIET};background:{QUIET}14;padding:6px 10px;margin:2px 8px">'
+        f'<b style="color:{QUIET};font-size:14px">Getting ready</b><br>'
+        "The first run on a machine compiles the numerical core, one to two minutes; later ones start at once.</div>"
     )
 
 
