@@ -20,7 +20,6 @@ TOO_LOOSE = 0.5  # relative standard error from which on a value is not determin
 TOO_CLOSE = 0.95  # correlation from which on two values are not told apart
 ROUNDS = 30  # of the tension at the chord from that at an end
 WEIGHTINGS = 3  # the weights depend on the answer, but little
-SMALLEST_STRAIN = 1e-12
 
 
 @dataclass(frozen=True, slots=True, eq=False)

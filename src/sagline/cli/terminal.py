@@ -41,7 +41,7 @@ def reported() -> Iterator[None]:
 @contextmanager
 def working(what: str) -> Iterator[None]:
     """Say what is being done while it is done, where a person watches; and the first time that it compiles."""
-    _say_if_cold()
+    say_if_cold()
     if not _err.is_terminal:
         yield
         return
@@ -49,7 +49,8 @@ def working(what: str) -> Iterator[None]:
         yield
 
 
-def _say_if_cold() -> None:
+def say_if_cold() -> None:
+    """Say that the first run compiles, where nothing is compiled yet."""
     from sagline.kernels.jit import is_cold
 
     if is_cold():
@@ -62,7 +63,7 @@ def counting(what: str) -> Iterator[Callable[[int, int, str], None]]:
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed}/{task.total}"))
-    _say_if_cold()
+    say_if_cold()
     with Progress(*columns, TimeElapsedColumn(), console=_err, transient=True, disable=not _err.is_terminal) as bar:
         task = bar.add_task(what, total=None)
         yield lambda done, total, name: bar.update(task, completed=done, total=total, description=f"{what}: {name}")

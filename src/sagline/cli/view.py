@@ -8,11 +8,10 @@ import webbrowser
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sagline.cli.terminal import note, show, working
+from sagline.cli.terminal import note, say_if_cold, show, working
 from sagline.errors import FileError
 from sagline.files.plan_file import load_plan
 from sagline.files.robot_file import load_robot
-from sagline.kernels.jit import is_cold
 from sagline.robot.robot import Robot
 
 if TYPE_CHECKING:
@@ -41,8 +40,7 @@ def serve(robot: Robot, run: Path | None, host: str, port: int, *, browser: bool
     machine = robot if course is None else course.plan.state.robot
     server = web.started(host, port, machine.name)
     try:
-        if is_cold():
-            note("First run: ", "compiling the numerical core, about a minute; later runs start at once.", style="bold")
+        say_if_cold()
         address = web.url(server, host)
         show(f"{machine.name} is at {address}   (Ctrl-C stops it)")
         if host not in ("127.0.0.1", "::1", "localhost"):
