@@ -21,7 +21,7 @@ from benchmarks.measure import (
     show,
 )
 from sagline.arrays import Array, locked
-from sagline.kernels.batch import batch_from_length, batch_from_tension
+from sagline.kernels.cable.batch import batch_from_length, batch_from_tension
 from tests.cables.reference import load_reference
 
 CABLES = 1_000_000

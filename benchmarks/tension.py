@@ -18,8 +18,8 @@ import sagline as sl
 from benchmarks.measure import Row, best_seconds, one_core, show
 from sagline.arrays import Array
 from sagline.kernels import tables
-from sagline.kernels.polygon import SPARE_CORNERS
-from sagline.kernels.sharing import share_load
+from sagline.kernels.sharing.polygon import SPARE_CORNERS
+from sagline.kernels.sharing.sharing import share_load
 from tests.tension.reference import presets, random_poses
 from tests.tension.test_verdicts import sampled, unproved
 

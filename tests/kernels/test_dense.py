@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from sagline.arrays import Array
-from sagline.kernels.dense import cholesky, extreme_eigenvalues, solve_general, solve_lower, solve_upper, trust_step
+from sagline.kernels.algebra.dense import (
+    cholesky,
+    extreme_eigenvalues,
+    solve_general,
+    solve_lower,
+    solve_upper,
+    trust_step,
+)
 
 RNG = np.random.default_rng(5)
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from sagline.kernels import hyperbolic
+from sagline.kernels.algebra import hyperbolic
 
 ARGUMENTS = np.concatenate((np.geomspace(1e-9, 2.0, 400), np.linspace(1.99, 2.01, 41), np.linspace(2.0, 300.0, 200)))
 

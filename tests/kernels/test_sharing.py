@@ -5,12 +5,12 @@ import pytest
 from scipy.optimize import linprog
 
 from sagline.kernels import tables
-from sagline.kernels.linear import LP_EMPTY, LP_SOLVED, LP_UNBOUNDED, lowest_point
-from sagline.kernels.null_space import factorize, minimum_norm, orthogonal_factor, pseudo_inverse
-from sagline.kernels.polygon import SPARE_CORNERS, feasible_polygon, nearest_point
-from sagline.kernels.projection import project
-from sagline.kernels.shortfall import wrench_shortfall
-from sagline.kernels.walk import walk_polygon
+from sagline.kernels.algebra.linear import LP_EMPTY, LP_SOLVED, LP_UNBOUNDED, lowest_point
+from sagline.kernels.algebra.null_space import factorize, minimum_norm, orthogonal_factor, pseudo_inverse
+from sagline.kernels.algebra.projection import project
+from sagline.kernels.sharing.polygon import SPARE_CORNERS, feasible_polygon, nearest_point
+from sagline.kernels.sharing.shortfall import wrench_shortfall
+from sagline.kernels.sharing.walk import walk_polygon
 
 
 @pytest.mark.parametrize(("n", "m"), [(6, 8), (6, 7), (6, 6), (2, 4), (3, 9)])

@@ -7,9 +7,9 @@ import pytest
 
 import sagline as sl
 from sagline.arrays import Array
-from sagline.kernels.catenary import catenary_from_length
-from sagline.kernels.energy import catenary_energy, elastic_energy
-from sagline.kernels.stiffness import cable_stiffness, catenary_stiffness
+from sagline.kernels.cable.catenary import catenary_from_length
+from sagline.kernels.cable.energy import catenary_energy, elastic_energy
+from sagline.kernels.cable.stiffness import cable_stiffness, catenary_stiffness
 
 # horizontal and vertical force at the platform end [N], length [m], weight per length [N/m], axial stiffness [N]
 CABLES = {

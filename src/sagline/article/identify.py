@@ -15,7 +15,7 @@ from sagline.cables.catenary import Catenary
 from sagline.cables.empirical import Empirical
 from sagline.cables.state import CableState
 from sagline.errors import InvalidValueError
-from sagline.kernels.batch import batch_end
+from sagline.kernels.cable.batch import batch_end
 
 CONFIDENCE = 0.95
 

@@ -13,7 +13,7 @@ from sagline.arrays import Array, Codes, checked, kernel_input, locked
 from sagline.cables.cable import Cable
 from sagline.cables.state import CableState
 from sagline.errors import CableGeometryError, InvalidValueError
-from sagline.kernels import batch
+from sagline.kernels.cable import batch
 
 
 @dataclass(frozen=True, slots=True)

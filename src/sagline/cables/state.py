@@ -9,7 +9,7 @@ import numpy as np
 
 from sagline.arrays import Array, Codes, kernel_input, locked
 from sagline.cables.cable import Cable
-from sagline.kernels import shape
+from sagline.kernels.cable import shape
 
 if TYPE_CHECKING:
     from sagline.cables.model import CableModel

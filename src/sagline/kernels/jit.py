@@ -21,8 +21,9 @@ F = TypeVar("F", bound=Callable[..., object])
 def cache_folder() -> Path:
     """Folder of the compiled kernels: below NUMBA_CACHE_DIR if set, else below the user's cache folder."""
     digest = hashlib.sha256()
-    for source in sorted(Path(__file__).parent.glob("*.py")):
-        digest.update(source.name.encode() + b"\0" + source.read_bytes())
+    kernels = Path(__file__).parent
+    for source in sorted(kernels.rglob("*.py")):
+        digest.update(source.relative_to(kernels).as_posix().encode() + b"\0" + source.read_bytes())
     chosen = os.environ.get("NUMBA_CACHE_DIR")
     base = Path(chosen) if chosen else user_cache_path("sagline")
     return base / f"kernels-{digest.hexdigest()[:16]}"

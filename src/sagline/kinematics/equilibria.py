@@ -11,7 +11,7 @@ from sagline.arrays import Array, Indices, locked
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
-from sagline.kernels import forward as kernel
+from sagline.kernels.forward import forward as kernel
 from sagline.kinematics.forward import checked_lengths
 from sagline.kinematics.forward_rows import Found
 from sagline.kinematics.forward_solution import ForwardSolution

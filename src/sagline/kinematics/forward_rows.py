@@ -10,8 +10,8 @@ from sagline.arrays import Array, Codes, Flags, Indices, locked
 from sagline.cables.model import CableModel
 from sagline.cables.state import CableState
 from sagline.kernels import codes, tables
-from sagline.kernels import forward as kernel
-from sagline.kernels.fit import fit_poses
+from sagline.kernels.forward import forward as kernel
+from sagline.kernels.forward.fit import fit_poses
 from sagline.kinematics.forward_solution import ForwardSolution
 from sagline.kinematics.forward_status import STABLE
 from sagline.robot.equilibrium import Equilibrium

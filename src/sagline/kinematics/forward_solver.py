@@ -12,7 +12,13 @@ from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
 from sagline.kernels import codes, tables
-from sagline.kernels.forward import FORCE_RESIDUAL, FORWARD_NUMBERS, MOMENT_RESIDUAL, STIFFNESS_MIN, forward_poses
+from sagline.kernels.forward.forward import (
+    FORCE_RESIDUAL,
+    FORWARD_NUMBERS,
+    MOMENT_RESIDUAL,
+    STIFFNESS_MIN,
+    forward_poses,
+)
 from sagline.kinematics.forward_status import STABLE, ForwardStatus
 from sagline.kinematics.start import search
 from sagline.robot.pose import Pose

@@ -13,8 +13,8 @@ from sagline.cables.model import CableModel
 from sagline.cables.state import CableState
 from sagline.errors import CableGeometryError, InvalidValueError
 from sagline.kernels import codes, tables
-from sagline.kernels.answer import FORCE_RESIDUAL, MOMENT_RESIDUAL, POSE_NUMBERS, SHORTFALL
-from sagline.kernels.inverse import inverse_poses
+from sagline.kernels.inverse.answer import FORCE_RESIDUAL, MOMENT_RESIDUAL, POSE_NUMBERS, SHORTFALL
+from sagline.kernels.inverse.inverse import inverse_poses
 from sagline.kinematics.plan import Plan
 from sagline.motion.path import Path
 from sagline.robot.equilibrium import Equilibrium

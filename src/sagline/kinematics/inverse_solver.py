@@ -14,8 +14,8 @@ from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
 from sagline.kernels import tables
-from sagline.kernels.answer import POSE_NUMBERS, SHORTFALL
-from sagline.kernels.inverse import inverse_poses
+from sagline.kernels.inverse.answer import POSE_NUMBERS, SHORTFALL
+from sagline.kernels.inverse.inverse import inverse_poses
 from sagline.kinematics.status import PoseStatus
 from sagline.robot.robot import Robot
 from sagline.statics.tables import body_table, cable_table

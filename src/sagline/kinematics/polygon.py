@@ -10,8 +10,8 @@ from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
 from sagline.kernels import tables
-from sagline.kernels.polygon import SPARE_CORNERS
-from sagline.kernels.pose_queries import polygon_of_pose
+from sagline.kernels.inverse.pose_queries import polygon_of_pose
+from sagline.kernels.sharing.polygon import SPARE_CORNERS
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus

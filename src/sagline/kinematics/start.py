@@ -7,7 +7,7 @@ import numpy as np
 from sagline.arrays import Array, Flags, Indices, locked
 from sagline.cables.model import CableModel
 from sagline.kernels import codes, tables
-from sagline.kernels import forward as kernel
+from sagline.kernels.forward import forward as kernel
 from sagline.kinematics.forward_rows import Found, solve_rows
 from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.pose import Pose

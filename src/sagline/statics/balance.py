@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from sagline.arrays import Array, locked
-from sagline.kernels import geometry as rows
-from sagline.kernels.geometry import cable_geometry
-from sagline.kernels.statics import structure_matrix as fill_structure_matrix
+from sagline.kernels.balance import geometry as rows
+from sagline.kernels.balance.geometry import cable_geometry
+from sagline.kernels.balance.statics import structure_matrix as fill_structure_matrix
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.tables import body_table, cable_table, pose_rows

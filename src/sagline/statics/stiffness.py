@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sagline.arrays import Array, locked
-from sagline.kernels.sensitivity import BY_DENSITY, BY_LENGTH, BY_STIFFNESS, describe_states
+from sagline.kernels.forward.sensitivity import BY_DENSITY, BY_LENGTH, BY_STIFFNESS, describe_states
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.robot import Robot
 from sagline.statics.tables import body_table, cable_table, pose_rows

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sagline.arrays import Array, locked
-from sagline.kernels.pose_queries import margins_of_poses
+from sagline.kernels.inverse.pose_queries import margins_of_poses
 from sagline.robot.equilibrium import Equilibrium
 from sagline.statics.tables import body_table, cable_table, pose_rows
 from sagline.tension.options import LIMITS_OF

@@ -1,0 +1,1 @@
+"""Small dense algebra: no word of cables in it."""

@@ -1,0 +1,1 @@
+"""The platform on its cables: geometry, structure matrix, needed wrench."""

@@ -1,0 +1,1 @@
+"""One cable, and all cables of one pose each by itself."""

@@ -1,0 +1,129 @@
+"""Loops over many cables. An operand of length 1 holds for all of them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from sagline.arrays import Array, Codes
+from sagline.kernels.cable.catenary import (
+    catenary_end,
+    is_ordinary,
+    ordinary_length_ratio,
+    ordinary_pull_ratio,
+)
+from sagline.kernels.cable.models import from_length, from_tension
+from sagline.kernels.codes import CABLE_SOLVED, CATENARY
+from sagline.kernels.jit import kernel
+
+CHUNK = 256  # cables at a time: ten buffers of this length stay in the fastest cache
+
+
+@kernel
+def lift(source: Array, start: int, stop: int, target: Array) -> None:
+    """Copy a chunk of an operand, or repeat its one value."""
+    if source.shape[0] == 1:
+        for i in range(stop - start):
+            target[i] = source[0]
+    else:
+        for i in range(stop - start):
+            target[i] = source[start + i]
+
+
+@kernel
+def batch_from_tension(
+    code: int,
+    k_h: float,
+    k_p: float,
+    gravity: float,
+    span: Array,
+    rise: Array,
+    density: Array,
+    stiffness: Array,
+    tension: Array,
+    length_out: Array,
+    horizontal_out: Array,
+    vertical_out: Array,
+    status_out: Codes,
+) -> None:
+    """Length, forces on the platform end and status of every cable at its chord tension.
+
+    Ordinary catenaries are solved for a whole chunk in loops without branches; what is not ordinary
+    is solved again, one by one. One result a loop: with more, the compiler gives up on vectorizing.
+    """
+    count = length_out.shape[0]
+    buffer = np.empty((11, CHUNK))
+    x, z, rho, ea, tau, chord, sine, cosine, half, ratio, pull = buffer
+    for start in range(0, count, CHUNK):
+        stop = min(start + CHUNK, count)
+        size = stop - start
+        lift(span, start, stop, x)
+        lift(rise, start, stop, z)
+        lift(density, start, stop, rho)
+        lift(stiffness, start, stop, ea)
+        lift(tension, start, stop, tau)
+        for i in range(size):
+            chord[i] = math.sqrt(x[i] * x[i] + z[i] * z[i])
+        for i in range(size):
+            sine[i] = z[i] / chord[i]
+        for i in range(size):
+            cosine[i] = x[i] / chord[i]
+        for i in range(size):
+            half[i] = 0.5 * rho[i] * gravity * chord[i] / tau[i]
+        if code == CATENARY:
+            for i in range(size):
+                ratio[i] = ordinary_length_ratio(half[i], sine[i], cosine[i], tau[i] / ea[i])
+            for i in range(size):
+                pull[i] = ordinary_pull_ratio(half[i], sine[i], tau[i] / ea[i], ratio[i]) * tau[i]
+            for i in range(size):
+                ratio[i] *= chord[i]
+        for i in range(size):
+            status = CABLE_SOLVED
+            if code != CATENARY or not is_ordinary(half[i], tau[i] / ea[i]):
+                ratio[i], pull[i], status = from_tension(
+                    code, k_h, k_p, gravity, chord[i], sine[i], cosine[i], rho[i], ea[i], tau[i]
+                )
+            status_out[start + i] = status
+        length_out[start:stop] = ratio[:size]
+        for i in range(size):
+            horizontal_out[start + i] = tau[i] * cosine[i]
+        for i in range(size):
+            vertical_out[start + i] = tau[i] * sine[i] + pull[i]
+
+
+@kernel
+def batch_from_length(
+    code: int,
+    k_h: float,
+    k_p: float,
+    gravity: float,
+    span: Array,
+    rise: Array,
+    density: Array,
+    stiffness: Array,
+    length: Array,
+    tension_out: Array,
+    horizontal_out: Array,
+    vertical_out: Array,
+    status_out: Codes,
+) -> None:
+    """Chord tension, forces on the platform end and status of every cable at its unstrained length."""
+    x = min(span.shape[0] - 1, 1)
+    z = min(rise.shape[0] - 1, 1)
+    d = min(density.shape[0] - 1, 1)
+    e = min(stiffness.shape[0] - 1, 1)
+    n = min(length.shape[0] - 1, 1)
+    for i in range(tension_out.shape[0]):
+        horizontal_out[i], vertical_out[i], tension_out[i], status_out[i] = from_length(
+            code, k_h, k_p, gravity, span[i * x], rise[i * z], density[i * d], stiffness[i * e], length[i * n]
+        )
+
+
+@kernel
+def batch_end(
+    horizontal: Array, vertical: Array, length: Array, weight: Array, stiffness: Array, x_out: Array, z_out: Array
+) -> None:
+    """Where exact catenaries of the given forces and lengths end; all operands of full length."""
+    for i in range(x_out.shape[0]):
+        x_out[i], z_out[i] = catenary_end(horizontal[i], vertical[i], length[i], weight[i], stiffness[i])

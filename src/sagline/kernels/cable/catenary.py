@@ -1,0 +1,282 @@
+"""One elastic catenary (Irvine), all three directions, without cancellation.
+
+docs/model.md, section 2. Forces act on the cable at its platform end; z points up. The equations
+are written in ratios that stay regular as the weight per length w goes to zero.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from sagline.kernels.algebra.hyperbolic import (
+    POLYNOMIAL_LIMIT,
+    atanhc,
+    cosh,
+    cosh_polynomial,
+    sinh_excess,
+    sinhc,
+    sinhc_polynomial,
+)
+from sagline.kernels.codes import CABLE_NOT_CONVERGED, CABLE_SLACK, CABLE_SOLVED, CABLE_TOO_SLACK
+from sagline.kernels.jit import formula, kernel
+
+RANGE = 500.0  # of X = wD/(2 tau): beyond it sinh X overflows and no cable hangs like this
+ORDINARY_STRAIN = 0.01  # of e = tau/EA: up to here two Newton steps reach the last digit
+STEPS = 80
+# Relative steps after which no other counts: Newton squares what is left, Halley cubes it.
+SMALL_NEWTON_STEP = 1e-9
+SMALL_HALLEY_STEP = 1e-6
+
+
+@kernel
+def slack_series(horizontal: float, vertical_a: float, vertical: float, tension_a: float, tension_b: float) -> float:
+    """atanh(u)/u of P1 where u = (T_zB - T_zA)/(T_A + T_B) may be close to 1; infinite for a fold."""
+    total = tension_a + tension_b
+    u = (vertical - vertical_a) / total
+    # total (1 - u) from sums of positive terms, not by subtraction
+    square = horizontal * horizontal
+    rest = square / (tension_b + abs(vertical)) + square / (tension_a + abs(vertical_a))
+    if vertical * vertical_a > 0.0:
+        rest += 2.0 * min(abs(vertical), abs(vertical_a))
+    return 0.5 * math.log((1.0 + u) * total / rest) / u if rest > 0.0 else math.inf
+
+
+@kernel
+def catenary_end(
+    horizontal: float, vertical: float, length: float, weight: float, stiffness: float
+) -> tuple[float, float]:
+    """P1: position (x, z) of the platform end from the force on it and the unstrained length."""
+    vertical_a = vertical - weight * length
+    tension_a = math.hypot(horizontal, vertical_a)
+    tension_b = math.hypot(horizontal, vertical)
+    total = tension_a + tension_b
+    if total == 0.0:
+        return 0.0, 0.0
+    u = weight * length / total
+    series = atanhc(u) if u <= 0.5 else slack_series(horizontal, vertical_a, vertical, tension_a, tension_b)
+    x = horizontal * length * (1.0 / stiffness + 2.0 / total * series) if horizontal != 0.0 else 0.0
+    z = (vertical - 0.5 * weight * length) * length * (1.0 / stiffness + 2.0 / total)
+    return x, z
+
+
+@formula
+def is_ordinary(half_weight: float, strain: float) -> bool:
+    """Whether `ordinary_length_ratio` is exact here: X <= 2 and e <= 0.01."""
+    return half_weight * half_weight <= POLYNOMIAL_LIMIT and strain <= ORDINARY_STRAIN
+
+
+@formula
+def ordinary_newton_step(ratio: float, square: float, cosine2: float, sine2: float, strain: float) -> float:
+    """One Newton step on P3 in its root form; square = X^2."""
+    taut = 1.0 - strain * ratio
+    y = square * taut * taut
+    s = taut * sinhc_polynomial(y)
+    c = strain * cosh_polynomial(y)
+    inverse = 1.0 / (s + ratio * c)
+    pull = sine2 * inverse * inverse
+    root = math.sqrt(cosine2 + pull)
+    excess = ratio - s * root
+    slope = 1.0 + c * root - pull * inverse * (s * s * strain * strain * square * ratio) / root
+    return ratio - excess / slope
+
+
+@formula
+def ordinary_length_ratio(half_weight: float, sine: float, cosine: float, strain: float) -> float:
+    """P3 by two Newton steps: L/D for X = wD/(2 tau) <= 2 and e = tau/EA <= 0.01.
+
+    Free of branches, so that a loop over cables vectorizes: two calls, not a loop, for the same reason.
+    """
+    cosine2 = cosine * cosine
+    sine2 = sine * sine
+    square = half_weight * half_weight
+    start = sinhc_polynomial(square)
+    ratio = math.sqrt(start * start * cosine2 + sine2)  # the inextensible answer
+    ratio = ratio / (1.0 + strain * ratio)
+    ratio = ordinary_newton_step(ratio, square, cosine2, sine2, strain)
+    return ordinary_newton_step(ratio, square, cosine2, sine2, strain)
+
+
+@formula
+def ordinary_length_ratio_near(half_weight: float, sine: float, cosine: float, strain: float, ratio: float) -> float:
+    """The same by one Newton step from the ratio at a tension less than a thousandth away."""
+    return ordinary_newton_step(ratio, half_weight * half_weight, cosine * cosine, sine * sine, strain)
+
+
+@kernel
+def length_ratio(half_weight: float, sine: float, cosine: float, strain: float) -> tuple[float, int]:
+    """P3 anywhere: L/D and a status, by Newton steps kept inside a bracket."""
+    if is_ordinary(half_weight, strain):
+        return ordinary_length_ratio(half_weight, sine, cosine, strain), CABLE_SOLVED
+    if not half_weight < RANGE:
+        return math.nan, CABLE_TOO_SLACK
+    cosine2 = cosine * cosine
+    sine2 = sine * sine
+    square = half_weight * half_weight
+    start = sinhc(half_weight)
+    high = math.sqrt(start * start * cosine2 + sine2)
+    if strain * high > 1.0:
+        high = 1.0 / strain
+    low = 0.0
+    ratio = high / (1.0 + strain * high)
+    for _ in range(STEPS):
+        taut = 1.0 - strain * ratio
+        h = half_weight * taut
+        s = taut * sinhc(h)
+        c = strain * cosh(h)
+        inverse = 1.0 / (s + ratio * c)
+        pull = sine2 * inverse * inverse
+        root = math.sqrt(cosine2 + pull)
+        excess = ratio - s * root
+        slope = 1.0 + c * root - pull * inverse * (s * s * strain * strain * square * ratio) / root
+        if excess > 0.0:
+            high = ratio
+        else:
+            low = ratio
+        new = ratio - excess / slope
+        if not low <= new <= high:
+            new = 0.5 * (low + high)
+        change = abs(new - ratio)
+        ratio = new
+        if change <= SMALL_NEWTON_STEP * ratio:
+            return ratio, CABLE_SOLVED
+    return ratio, CABLE_NOT_CONVERGED
+
+
+@kernel
+def pull_ratio(half_weight: float, sine: float, strain: float, ratio: float) -> float:
+    """(T_z/tau - sin phi): what the weight adds to the vertical force on the platform end, in chord tensions."""
+    taut = 1.0 - strain * ratio
+    h = half_weight * taut
+    s = taut * sinhc(h)
+    c = cosh(h)
+    return half_weight * ratio + sine * (c / (s + strain * ratio * c) - 1.0)
+
+
+@formula
+def ordinary_pull_ratio(half_weight: float, sine: float, strain: float, ratio: float) -> float:
+    """The same for an ordinary cable, free of branches."""
+    taut = 1.0 - strain * ratio
+    y = half_weight * half_weight * taut * taut
+    s = taut * sinhc_polynomial(y)
+    c = cosh_polynomial(y)
+    return half_weight * ratio + sine * (c / (s + strain * ratio * c) - 1.0)
+
+
+@formula
+def product_error(a: float, product: float) -> float:
+    """a*a - product exactly, where product is a*a rounded (Dekker)."""
+    split = 134217729.0 * a  # 2^27 + 1
+    high = split - (split - a)
+    low = a - high
+    return ((high * high - product) + 2.0 * high * low) + low * low
+
+
+@formula
+def relative_excess(span: float, rise: float, length: float) -> float:
+    """(D^2 - L^2)/L^2 without rounding error in the difference."""
+    x2 = span * span
+    z2 = rise * rise
+    l2 = length * length
+    d2 = x2 + z2
+    big = d2 - x2
+    tail = (x2 - (d2 - big)) + (z2 - big)
+    difference = d2 - l2
+    big = difference - d2
+    tail += (d2 - (difference - big)) - (l2 + big)
+    tail += product_error(span, x2) + product_error(rise, z2) - product_error(length, l2)
+    return (difference + tail) / l2
+
+
+@formula
+def parameter_start(xi: float, zeta: float, kappa: float, excess: float) -> float:
+    """First guess of h: root of xi^2 h^3/3 + excess h = 2 kappa (1 + excess), or the deep-sag asymptote."""
+    scale = 3.0 / (xi * xi)
+    p = scale * excess
+    q = 2.0 * scale * kappa * (1.0 + excess)
+    h = math.sqrt(max(-p, 0.0)) + np.cbrt(q)
+    if p * h > q:
+        h = q / p
+    for _ in range(2):  # from above on a convex cubic: monotone
+        h -= (h * (h * h + p) - q) / (3.0 * h * h + p)
+    if h > 1.0:
+        steep = zeta / (1.0 + kappa)
+        r = 2.0 * math.sqrt(max(1.0 - steep * steep, 1e-30)) / xi
+        h = max(1.0, math.log(r * (1.0 + kappa + math.log(max(r, 1.0)))))
+    return h
+
+
+@formula
+def catenary_parameter(xi: float, zeta: float, kappa: float, excess: float) -> tuple[float, int]:
+    """P2: the h of a cable with span/L = xi > 0, rise/L = zeta, kappa = wL/(2EA) and (D^2 - L^2)/L^2, and a status."""
+    xi2 = xi * xi
+    zeta2 = zeta * zeta
+    low = 0.0
+    high = math.inf
+    h = parameter_start(xi, zeta, kappa, excess)
+    for _ in range(STEPS):
+        s = h * sinhc(h)
+        c = cosh(h)
+        total = 1.0 / (h + kappa)
+        lever = 1.0 / (s + kappa * c)
+        a = s * total  # 1 + alpha
+        alpha = (sinh_excess(h) - kappa) * total
+        alpha1 = (c - a) * total
+        alpha2 = (s - 2.0 * alpha1) * total
+        e = s * lever  # 1 + eta
+        eta = -kappa * c * lever
+        eta1 = kappa * lever * lever
+        eta2 = -2.0 * eta1 * lever * (c + kappa * s)
+        error = excess + xi2 * alpha * (2.0 + alpha) + zeta2 * eta * (2.0 + eta)
+        slope = 2.0 * (xi2 * a * alpha1 + zeta2 * e * eta1)
+        bend = xi2 * (alpha1 * alpha1 + a * alpha2) + zeta2 * (eta1 * eta1 + e * eta2)
+        if error > 0.0:
+            high = h
+        else:
+            low = h
+        if error > 1.0:  # exponential there: Newton on its logarithm
+            new = h - math.log1p(error) * (1.0 + error) / slope
+        else:  # Halley
+            new = h - error * slope / (slope * slope - error * bend)
+        if not low <= new <= high:
+            new = 0.5 * (low + high) if high < math.inf else 2.0 * h
+        change = abs(new - h)
+        h = new
+        if change <= SMALL_HALLEY_STEP * (h + kappa):
+            return h, CABLE_SOLVED
+    return h, CABLE_NOT_CONVERGED
+
+
+@formula
+def vertical_from_length(rise: float, length: float, weight: float, stiffness: float) -> tuple[float, float, int]:
+    """P2 on a vertical chord, in closed form: vertical force, chord tension and a status."""
+    height = abs(rise)
+    kappa = 0.5 * weight * length / stiffness
+    stretch = (height - length) / length  # exact difference for a taut cable
+    if stretch >= kappa:
+        pull = stiffness * stretch
+        vertical = math.copysign(pull, rise) + 0.5 * weight * length
+        # tanh h = kappa/stretch; a weightless cable has h = 0 and carries the pull alone
+        h = math.atanh(kappa / stretch) if stretch > kappa else math.inf
+        tension = pull if weight == 0.0 else 0.5 * weight * height / (h + kappa)
+        return vertical, tension, CABLE_SOLVED if tension > 0.0 else CABLE_SLACK
+    return 0.5 * weight * length + 0.5 * weight * rise / (1.0 + kappa), 0.0, CABLE_SLACK
+
+
+@kernel
+def catenary_from_length(
+    span: float, rise: float, length: float, weight: float, stiffness: float
+) -> tuple[float, float, float, int]:
+    """P2: horizontal and vertical force on the platform end, chord tension and a status; weight > 0."""
+    if span == 0.0:
+        vertical, tension, status = vertical_from_length(rise, length, weight, stiffness)
+        return 0.0, vertical, tension, status
+    kappa = 0.5 * weight * length / stiffness
+    excess = relative_excess(span, rise, length)
+    inverse = 1.0 / length
+    h, status = catenary_parameter(span * inverse, rise * inverse, kappa, excess)
+    half = 0.5 * weight / (h + kappa)
+    tangent = h * sinhc(h) / cosh(h) if h < 20.0 else 1.0  # tanh h
+    vertical = 0.5 * weight * (length + rise / (tangent + kappa))
+    return half * span, vertical, half * math.sqrt(span * span + rise * rise), status

@@ -1,0 +1,61 @@
+"""Potential energy of one cable, whose gradient is the force on its platform end; docs/model.md, section 6.
+
+The weightless and the exact cable have one. The shallow models have none: their forces are not the
+gradient of anything (the curl of the parabolic one is of the order of its own error), so there is no energy
+to go downhill in, and their equilibria are reached from the exact cable's.
+"""
+
+from __future__ import annotations
+
+import math
+
+from sagline.kernels.cable.stiffness import series_excess
+from sagline.kernels.codes import CATENARY, ELASTIC
+from sagline.kernels.jit import kernel
+
+
+@kernel
+def catenary_energy(
+    span: float, rise: float, length: float, horizontal: float, vertical: float, weight: float, stiffness: float
+) -> float:
+    """V = T.B - C(T) [J] of the exact cable, strain and height of its mass included, frame end at height 0."""
+    weight_length = weight * length
+    vertical_a = vertical - weight_length
+    square = horizontal * horizontal
+    tension_a = math.sqrt(square + vertical_a * vertical_a)
+    tension_b = math.sqrt(square + vertical * vertical)
+    total = tension_a + tension_b
+    half_mean = tension_a + vertical * (2.0 * vertical - weight_length) / total
+    if horizontal != 0.0:
+        excess = series_excess(horizontal, vertical_a, vertical, tension_a, tension_b, weight_length)
+        half_mean += 2.0 * square / total * (1.0 + excess)
+    strain = square + vertical * (vertical - weight_length) + weight_length * weight_length / 3.0
+    return horizontal * span + vertical * rise - 0.5 * length * (strain / stiffness + half_mean)
+
+
+@kernel
+def elastic_energy(chord: float, length: float, tension: float, stiffness: float) -> float:
+    """Strain energy [J] of the weightless cable; zero where it is slack."""
+    return 0.5 * tension * (chord - length) if tension > 0.0 else 0.0
+
+
+@kernel
+def cable_energy(
+    code: int,
+    gravity: float,
+    span: float,
+    rise: float,
+    density: float,
+    stiffness: float,
+    length: float,
+    horizontal: float,
+    vertical: float,
+    tension: float,
+) -> float:
+    """Energy [J] of a cable of the exact or the weightless model; NaN for the others."""
+    weight = density * gravity
+    if code == CATENARY and weight > 0.0:
+        return catenary_energy(span, rise, length, horizontal, vertical, weight, stiffness)
+    if code in (CATENARY, ELASTIC) or weight == 0.0:
+        return elastic_energy(math.sqrt(span * span + rise * rise), length, tension, stiffness)
+    return math.nan

@@ -1,0 +1,146 @@
+"""All cables of one pose at once: ratios and pulls at given chord tensions, and limits as chord tensions."""
+
+from __future__ import annotations
+
+import math
+
+from sagline.arrays import Array, Codes
+from sagline.kernels import tables as t
+from sagline.kernels.balance import geometry as g
+from sagline.kernels.cable.catenary import (
+    is_ordinary,
+    ordinary_length_ratio,
+    ordinary_length_ratio_near,
+    ordinary_pull_ratio,
+)
+from sagline.kernels.cable.models import from_tension
+from sagline.kernels.codes import CABLE_SOLVED, CATENARY, ELASTIC, STRAIGHT
+from sagline.kernels.jit import formula, kernel
+
+NEAR = 1e-3  # relative change of tension within which one Newton step from the last ratio is exact
+LIMIT_STEPS = 30
+LIMIT_PRECISION = 1e-13  # relative
+
+
+@formula
+def hang_cables(
+    code: int, k_h: float, k_p: float, gravity: float, geometry: Array, work: Array, statuses: Codes, near: bool
+) -> int:
+    """Fill SLACKNESS, STRAIN, RATIO and PULL of work, and the statuses (m,), at one pose's chord tensions TAU.
+
+    Ordinary catenaries go through loops without branches, which vectorize; the others follow one by one.
+
+    Args:
+        code: Cable model.
+        k_h: The empirical model's constant.
+        k_p: The empirical model's constant.
+        gravity: [m/s^2].
+        geometry: Rows of `cable_geometry`.
+        work: Rows of one pose's cables.
+        statuses: Filled.
+        near: Whether RATIO holds the answer at tensions less than NEAR away.
+
+    Returns:
+        The gravest status.
+    """
+    m = work.shape[1]
+    for i in range(m):
+        work[t.SLACKNESS, i] = work[t.HALF_WEIGHT, i] / work[t.TAU, i]
+    for i in range(m):
+        work[t.STRAIN, i] = work[t.TAU, i] / work[t.STIFFNESS_ROW, i]
+    if code == CATENARY:
+        if near:
+            for i in range(m):
+                work[t.RATIO, i] = ordinary_length_ratio_near(
+                    work[t.SLACKNESS, i],
+                    geometry[g.SINE, i],
+                    geometry[g.COSINE, i],
+                    work[t.STRAIN, i],
+                    work[t.RATIO, i],
+                )
+        else:
+            for i in range(m):
+                work[t.RATIO, i] = ordinary_length_ratio(
+                    work[t.SLACKNESS, i], geometry[g.SINE, i], geometry[g.COSINE, i], work[t.STRAIN, i]
+                )
+        for i in range(m):
+            work[t.PULL, i] = work[t.TAU, i] * ordinary_pull_ratio(
+                work[t.SLACKNESS, i], geometry[g.SINE, i], work[t.STRAIN, i], work[t.RATIO, i]
+            )
+    gravest = CABLE_SOLVED
+    for i in range(m):
+        statuses[i] = CABLE_SOLVED
+        if code != CATENARY or not is_ordinary(work[t.SLACKNESS, i], work[t.STRAIN, i]):
+            length, pull, status = from_tension(
+                code,
+                k_h,
+                k_p,
+                gravity,
+                geometry[g.CHORD, i],
+                geometry[g.SINE, i],
+                geometry[g.COSINE, i],
+                work[t.DENSITY_ROW, i],
+                work[t.STIFFNESS_ROW, i],
+                work[t.TAU, i],
+            )
+            work[t.RATIO, i] = length / geometry[g.CHORD, i]
+            work[t.PULL, i] = pull
+            statuses[i] = status
+            gravest = max(gravest, status)
+    return gravest
+
+
+@kernel
+def frame_end_tension(
+    code: int,
+    k_h: float,
+    k_p: float,
+    gravity: float,
+    chord: float,
+    sine: float,
+    cosine: float,
+    density: float,
+    stiffness: float,
+    tau: float,
+) -> float:
+    """Tension at the frame end of a cable at a chord tension [N]."""
+    if code == STRAIGHT or code == ELASTIC:
+        return tau
+    length, pull, _status = from_tension(code, k_h, k_p, gravity, chord, sine, cosine, density, stiffness, tau)
+    return math.hypot(tau * cosine, tau * sine + pull - density * gravity * length)
+
+
+@kernel
+def chord_tension_at_frame_end(
+    code: int,
+    k_h: float,
+    k_p: float,
+    gravity: float,
+    chord: float,
+    sine: float,
+    cosine: float,
+    density: float,
+    stiffness: float,
+    tension: float,
+) -> float:
+    """Chord tension at which the tension at the frame end has a given value, on the taut side.
+
+    A sagging cable's frame-end tension has a least value, near wD cos(phi)/2; what lies below it is met there.
+    Newton's slope is the first-order one, T_A^2 = tau^2 - tau wD sin phi + (wD/2)^2; the value is the model's own.
+    """
+    weight = density * gravity
+    if code == STRAIGHT or code == ELASTIC or weight == 0.0 or tension == math.inf:
+        return tension
+    along = 0.5 * weight * chord * sine
+    across = 0.5 * weight * chord * cosine
+    tau = along + math.sqrt(max(tension * tension - across * across, 0.0))
+    if tension <= 1.01 * across or tau <= 0.0:
+        return max(tau, 0.0)
+    for _ in range(LIMIT_STEPS):
+        value = frame_end_tension(code, k_h, k_p, gravity, chord, sine, cosine, density, stiffness, tau)
+        step = (value - tension) * value / (tau - along)
+        new = tau - step
+        tau = new if new > 0.5 * tau else 0.5 * tau
+        if abs(step) <= LIMIT_PRECISION * tau:
+            break
+    return tau

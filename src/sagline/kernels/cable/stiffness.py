@@ -1,0 +1,171 @@
+"""Stiffness dT/dB of one cable at fixed unstrained length, for every cable model.
+
+In the vertical plane of the cable it is a 2 x 2 matrix (xx, xz, zx, zz), rows force, columns
+displacement of the platform end; normal to that plane it is T_x/x_B = tau/D, regular on a vertical chord.
+"""
+
+from __future__ import annotations
+
+import math
+
+from sagline.kernels.algebra.hyperbolic import atanhc_excess
+from sagline.kernels.cable.catenary import slack_series
+from sagline.kernels.cable.models import pull_of_shallow, sag_of_shallow
+from sagline.kernels.cable.shallow import stretching_tension
+from sagline.kernels.codes import CATENARY, ELASTIC, EMPIRICAL, STRAIGHT
+from sagline.kernels.jit import formula, kernel
+
+
+@formula
+def series_excess(
+    horizontal: float, vertical_a: float, vertical: float, tension_a: float, tension_b: float, weight_length: float
+) -> float:
+    """atanh(u)/u - 1 of P1; infinite for a fold."""
+    u = weight_length / (tension_a + tension_b)
+    if u <= 0.5:
+        return atanhc_excess(u)
+    return slack_series(horizontal, vertical_a, vertical, tension_a, tension_b) - 1.0
+
+
+@kernel
+def catenary_stiffness(horizontal: float, vertical: float, length: float, weight: float, stiffness: float):  # type: ignore[no-untyped-def]
+    """In-plane stiffness (xx, xz, zz) [N/m] of the exact cable: the inverse of dB/dT of P1, without cancellation.
+
+    With p, q the parts of dx/dT_x, dz/dT_z that go with length/(T_A + T_B), and c that of -dx/dT_z,
+    p + q = 2 and p q = c^2 hold exactly, so that the determinant is a sum of positive terms.
+    """
+    vertical_a = vertical - weight * length
+    square = horizontal * horizontal
+    tension_a = math.sqrt(square + vertical_a * vertical_a)
+    tension_b = math.sqrt(square + vertical * vertical)
+    product = tension_a * tension_b
+    excess = series_excess(horizontal, vertical_a, vertical, tension_a, tension_b, weight * length)
+    stretch = 1.0 / stiffness
+    turn = 1.0 / (tension_a + tension_b)
+    if product == 0.0:  # an end without force
+        return 0.0, 0.0, 1.0 / (length * (stretch + turn))
+    c = horizontal * (vertical_a + vertical) / product
+    level = (square - vertical_a * vertical) / product
+    if level >= 0.0:
+        q = 1.0 + level
+        p = c * c / q
+    else:
+        p = 1.0 - level
+        q = c * c / p
+    zz = stretch + turn * q
+    if excess == math.inf:  # a fold does not resist a first sideways motion
+        return 0.0, 0.0, 1.0 / (length * zz)
+    xx = stretch + turn * (2.0 * excess + p)
+    determinant = stretch * (stretch + 2.0 * turn * (1.0 + excess)) + 2.0 * turn * turn * q * excess
+    inverse = 1.0 / (length * determinant)
+    return zz * inverse, c * turn * inverse, xx * inverse
+
+
+@kernel
+def elastic_stiffness(span: float, rise: float, length: float, tension: float, stiffness: float):  # type: ignore[no-untyped-def]
+    """In-plane stiffness (xx, xz, zz) [N/m] of the weightless cable; zero where it is slack."""
+    if tension == 0.0:
+        return 0.0, 0.0, 0.0
+    chord = math.sqrt(span * span + rise * rise)
+    cosine = span / chord
+    sine = rise / chord
+    along = stiffness / length
+    across = tension / chord
+    xx = along * cosine * cosine + across * sine * sine
+    zz = along * sine * sine + across * cosine * cosine
+    return xx, (along - across) * sine * cosine, zz
+
+
+@kernel
+def shallow_slopes(  # type: ignore[no-untyped-def]
+    code: int,
+    k_h: float,
+    k_p: float,
+    gravity: float,
+    span: float,
+    rise: float,
+    density: float,
+    stiffness: float,
+    length: float,
+    tension: float,
+):
+    """How tau of a shallow cable follows x_B, z_B, L, rho and EA: five partial derivatives.
+
+    From L (1 + s/EA) = D (1 + S/tau^2), S = k (rho x_B)^2, s = |T| (empirical) or tau (parabolic).
+    """
+    chord = math.sqrt(span * span + rise * rise)
+    cosine = span / chord
+    sine = rise / chord
+    sag = sag_of_shallow(code, k_p, chord, cosine, density, gravity)
+    pull = pull_of_shallow(code, k_h, chord, density, gravity) if code == EMPIRICAL else 0.0
+    stretch = stretching_tension(tension, sine, cosine, pull)
+    square = tension * tension
+    share = sag / square
+    by_tension = length * (tension + pull * sine) / (stretch * stiffness) + 2.0 * chord * share / tension
+    # what s changes with the chord at fixed tau: through sin phi and through the pull, which is proportional to D
+    by_pull = (pull + tension * sine) / stretch
+    by_sine = tension * pull / stretch
+    stretch_x = by_pull * pull * cosine / chord - by_sine * sine * cosine / chord
+    stretch_z = by_pull * pull * sine / chord + by_sine * cosine * cosine / chord
+    sag_x = 2.0 * sag_of_shallow(code, k_p, 1.0, 1.0, density, gravity) * span / square
+    slope_x = (cosine * (1.0 + share) + chord * sag_x - length * stretch_x / stiffness) / by_tension
+    slope_z = (sine * (1.0 + share) - length * stretch_z / stiffness) / by_tension
+    slope_length = -(1.0 + stretch / stiffness) / by_tension
+    slope_density = (2.0 * chord * share - length * by_pull * pull / stiffness) / (density * by_tension)
+    slope_stiffness = length * stretch / (stiffness * stiffness * by_tension)
+    return slope_x, slope_z, slope_length, slope_density, slope_stiffness
+
+
+@kernel
+def shallow_stiffness(  # type: ignore[no-untyped-def]
+    code: int,
+    k_h: float,
+    k_p: float,
+    gravity: float,
+    span: float,
+    rise: float,
+    density: float,
+    stiffness: float,
+    length: float,
+    tension: float,
+):
+    """In-plane stiffness (xx, xz, zx, zz) [N/m] of a shallow cable, not symmetric: its forces are no gradient."""
+    slope_x, slope_z, _, _, _ = shallow_slopes(code, k_h, k_p, gravity, span, rise, density, stiffness, length, tension)
+    chord = math.sqrt(span * span + rise * rise)
+    cosine = span / chord
+    sine = rise / chord
+    across = tension / chord
+    unit_pull = pull_of_shallow(code, k_h, 1.0, density, gravity)
+    xx = slope_x * cosine + across * sine * sine
+    xz = slope_z * cosine - across * sine * cosine
+    zx = slope_x * sine - across * sine * cosine + unit_pull * cosine
+    zz = slope_z * sine + across * cosine * cosine + unit_pull * sine
+    return xx, xz, zx, zz
+
+
+@kernel
+def cable_stiffness(  # type: ignore[no-untyped-def]
+    code: int,
+    k_h: float,
+    k_p: float,
+    gravity: float,
+    span: float,
+    rise: float,
+    density: float,
+    stiffness: float,
+    length: float,
+    horizontal: float,
+    vertical: float,
+    tension: float,
+):
+    """In-plane stiffness (xx, xz, zx, zz) [N/m] of a cable of any model; NaN for the straight one, which has none."""
+    if code == STRAIGHT:
+        return math.nan, math.nan, math.nan, math.nan
+    weight = density * gravity
+    if code == CATENARY and weight > 0.0:
+        xx, xz, zz = catenary_stiffness(horizontal, vertical, length, weight, stiffness)
+        return xx, xz, xz, zz
+    if code in (CATENARY, ELASTIC) or weight == 0.0:
+        xx, xz, zz = elastic_stiffness(span, rise, length, tension, stiffness)
+        return xx, xz, xz, zz
+    return shallow_stiffness(code, k_h, k_p, gravity, span, rise, density, stiffness, length, tension)

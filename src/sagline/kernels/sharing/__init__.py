@@ -1,0 +1,1 @@
+"""Which of the tensions that balance the platform."""
