@@ -57,7 +57,7 @@ def speed_of_cables() -> Iterator[Row]:
     rho, ea = CABLE.linear_density.reshape(1), CABLE.axial_stiffness.reshape(1)
 
     def kernel_of(batch: Callable[..., None], given: Array) -> Callable[[], None]:
-        return lambda: batch(model.code, 0.0, 0.0, 9.81, span, rise, rho, ea, given, *work, codes)
+        return lambda: batch(model.terms(9.81), span, rise, rho, ea, given, *work, codes)
 
     to_ns = 1e9 / CABLES
     printed = best_seconds(lambda: as_printed(span, rise, horizontal, 0.067, 44e3, out)) * to_ns

@@ -1,5 +1,6 @@
 """One cable's stiffness and energy against long-digit derivatives and integrals, and against its own forces."""
 
+import math
 from decimal import Decimal, localcontext
 
 import numpy as np
@@ -10,6 +11,7 @@ from sagline.arrays import Array
 from sagline.kernels.cable.catenary import catenary_from_length
 from sagline.kernels.cable.energy import catenary_energy, elastic_energy
 from sagline.kernels.cable.stiffness import cable_stiffness, catenary_stiffness
+from sagline.kernels.cable.terms import Force, Material, Model
 
 # horizontal and vertical force at the platform end [N], length [m], weight per length [N/m], axial stiffness [N]
 CABLES = {
@@ -61,7 +63,7 @@ def test_catenary_stiffness_is_the_inverse_of_the_flexibility(case: tuple[float,
 
 
 def test_a_vertical_cable_is_as_stiff_across_the_plane_as_in_it() -> None:
-    t_x, t_z, tension, _ = catenary_from_length(0.0, 3.0, 2.99, 0.66, 44e3)
+    (t_x, t_z, tension), _ = catenary_from_length(0.0, 3.0, 2.99, 0.66, 44e3)
     assert t_x == 0.0
     xx, xz, _ = catenary_stiffness(t_x, t_z, 2.99, 0.66, 44e3)
     assert xz == 0.0
@@ -81,7 +83,7 @@ def test_catenary_energy_is_strain_and_height_of_its_mass(case: tuple[float, ...
             pull = t_z - w * (length - s)
             _, height = exact_end(t_x, pull, s, w, ea)
             expected += Decimal(weight) * length / 2 * ((t_x**2 + pull**2) / (2 * ea) + w * height)
-    found = catenary_energy(float(x), float(z), case[2], case[0], case[1], case[3], case[4])
+    found = catenary_energy(float(x), float(z), case[2], Force(case[0], case[1], math.nan), case[3], case[4])
     size = abs(case[0] * float(x)) + abs(case[1] * float(z))
     assert found == pytest.approx(float(expected), abs=2e-14 * size)
 
@@ -111,21 +113,17 @@ def test_stiffness_of_every_model_is_the_slope_of_its_forces(
     by_z = (force(model, span, rise + h, length) - force(model, span, rise - h, length)) / (2 * h)
     state = model.from_length(sl.Cable(0.067, 44e3), span, rise, length)
     found = cable_stiffness(
-        model.code,
-        *model.parameters,
-        9.81,
+        Model(*model.terms(9.81)),
         span,
         rise,
-        0.067,
-        44e3,
+        Material(0.067, 44e3),
         length,
-        float(state.horizontal_tension),
-        float(state.vertical_force),
-        float(state.chord_tension),
+        Force(float(state.horizontal_tension), float(state.vertical_force), float(state.chord_tension)),
     )
     expected = np.array([by_x[0], by_z[0], by_x[1], by_z[1]])
     np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-7 * np.abs(expected).max())
 
 
 def test_a_slack_elastic_cable_resists_nothing() -> None:
-    assert cable_stiffness(sl.Elastic().code, 0.0, 0.0, 9.81, 3.0, 1.0, 0.1, 1e4, 5.0, 0.0, 0.0, 0.0) == (0, 0, 0, 0)
+    slack = Force(0.0, 0.0, 0.0)
+    assert cable_stiffness(Model(*sl.Elastic().terms(9.81)), 3.0, 1.0, Material(0.1, 1e4), 5.0, slack) == (0, 0, 0, 0)

@@ -14,6 +14,7 @@ from sagline.cables.cable import Cable
 from sagline.cables.state import CableState
 from sagline.errors import CableGeometryError, InvalidValueError
 from sagline.kernels.cable import batch
+from sagline.kernels.cable.terms import Terms
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +33,10 @@ class CableModel:
     def parameters(self) -> tuple[float, float]:
         """The article's k_h and k_p; zero where the model has none."""
         return 0.0, 0.0
+
+    def terms(self, gravity: float) -> Terms:
+        """The model as kernels take it, where gravity is as given [m/s^2]."""
+        return self.code, *self.parameters, gravity
 
     def from_tension(
         self, cable: Cable, span: ArrayLike, rise: ArrayLike, chord_tension: ArrayLike, gravity: float = 9.81
@@ -60,9 +65,7 @@ class CableModel:
         tension = checked(chord_tension, "chord_tension", "N", low=0.0)
         problem = _problem(cable, span, rise, tension, gravity)
         length, horizontal, vertical, status = _outputs(problem.size)
-        batch.batch_from_tension(
-            self.code, *self.parameters, problem.gravity, *problem.operands, length, horizontal, vertical, status
-        )
+        batch.batch_from_tension(self.terms(problem.gravity), *problem.operands, length, horizontal, vertical, status)
         return problem.state(self, cable, length, horizontal, vertical, tension, status)
 
     def from_length(
@@ -92,9 +95,7 @@ class CableModel:
         length = checked(unstrained_length, "unstrained_length", "m", above=0.0)
         problem = _problem(cable, span, rise, length, gravity)
         tension, horizontal, vertical, status = _outputs(problem.size)
-        batch.batch_from_length(
-            self.code, *self.parameters, problem.gravity, *problem.operands, tension, horizontal, vertical, status
-        )
+        batch.batch_from_length(self.terms(problem.gravity), *problem.operands, tension, horizontal, vertical, status)
         return problem.state(self, cable, length, horizontal, vertical, tension, status)
 
     def profile(self, cable: Cable, state: CableState, points: int = 50) -> Array:

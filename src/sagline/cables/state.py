@@ -81,20 +81,20 @@ class CableState:
     def sag(self) -> Array:
         """Largest vertical drop below the chord [m]; on a vertical chord, below the lower end."""
         out = np.empty(self.unstrained_length.size)
-        shape.sags(self.model.code, self.gravity, *self._columns(), out)
+        shape.sags(self.model.terms(self.gravity), *self._columns(), out)
         return out.reshape(self.shape)
 
     @property
     def closure_residual(self) -> Array:
         """By how much the state misses its own model's equations [m]."""
         out = np.empty(self.unstrained_length.size)
-        shape.closures(self.model.code, self.model.parameters[1], self.gravity, *self._columns(), out)
+        shape.closures(self.model.terms(self.gravity), *self._columns(), out)
         return out.reshape(self.shape)
 
     def points(self, count: int) -> Array:
         """Points along the cable in its own vertical plane, frame end first, shape (..., count, 2) [m]."""
         out = np.empty((self.unstrained_length.size, count, 2))
-        shape.shape_points(self.model.code, self.gravity, *self._columns(), out)
+        shape.shape_points(self.model.terms(self.gravity), *self._columns(), out)
         return locked(out.reshape(*self.shape, count, 2))
 
     def _columns(self) -> tuple[Array, Array, Array, Array, Array, Array, Array, Array]:

@@ -11,6 +11,7 @@ from sagline.kernels.balance import geometry as g
 from sagline.kernels.balance.statics import restrict_rows, structure_matrix
 from sagline.kernels.cable.hanging import chord_tension_at_frame_end
 from sagline.kernels.cable.models import pull_of_shallow
+from sagline.kernels.cable.terms import Chord, Material, Model
 from sagline.kernels.codes import (
     CLOSEST,
     FRAME_END_TENSION,
@@ -25,12 +26,9 @@ SHORTEST_CHORD = 1e-9  # [m]
 
 @formula
 def place_cables(
-    code: int,
-    k_h: float,
-    k_p: float,
+    model: Model,
     limits_of: int,
     validity: float,
-    gravity: float,
     robot: Array,
     geometry: Array,
     work: Array,
@@ -47,11 +45,12 @@ def place_cables(
             return False
         work[tables.DENSITY_ROW, i] = density
         work[tables.STIFFNESS_ROW, i] = stiffness
-        work[tables.HALF_WEIGHT, i] = 0.5 * density * gravity * chord
-        work[tables.PULL, i] = pull_of_shallow(code, k_h, chord, density, gravity)
+        work[tables.HALF_WEIGHT, i] = 0.5 * density * model.gravity * chord
+        work[tables.PULL, i] = pull_of_shallow(model, chord, density)
         if limits_of == LIMITS_OF_FRAME_END:
-            low = chord_tension_at_frame_end(code, k_h, k_p, gravity, chord, sine, cosine, density, stiffness, low)
-            high = chord_tension_at_frame_end(code, k_h, k_p, gravity, chord, sine, cosine, density, stiffness, high)
+            line, material = Chord(chord, sine, cosine), Material(density, stiffness)
+            low = chord_tension_at_frame_end(model, line, material, low)
+            high = chord_tension_at_frame_end(model, line, material, high)
         if not math.isnan(validity):
             low = max(low, work[tables.HALF_WEIGHT, i] / abs(sine) + validity / cosine)
         work[tables.CHORD_LOW, i] = low

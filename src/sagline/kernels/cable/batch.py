@@ -14,6 +14,7 @@ from sagline.kernels.cable.catenary import (
     ordinary_pull_ratio,
 )
 from sagline.kernels.cable.models import from_length, from_tension
+from sagline.kernels.cable.terms import Chord, Material, Model, Terms
 from sagline.kernels.codes import CABLE_SOLVED, CATENARY
 from sagline.kernels.jit import kernel
 
@@ -33,10 +34,7 @@ def lift(source: Array, start: int, stop: int, target: Array) -> None:
 
 @kernel
 def batch_from_tension(
-    code: int,
-    k_h: float,
-    k_p: float,
-    gravity: float,
+    terms: Terms,
     span: Array,
     rise: Array,
     density: Array,
@@ -52,6 +50,7 @@ def batch_from_tension(
     Ordinary catenaries are solved for a whole chunk in loops without branches; what is not ordinary
     is solved again, one by one. One result a loop: with more, the compiler gives up on vectorizing.
     """
+    model = Model(*terms)
     count = length_out.shape[0]
     buffer = np.empty((11, CHUNK))
     x, z, rho, ea, tau, chord, sine, cosine, half, ratio, pull = buffer
@@ -70,8 +69,8 @@ def batch_from_tension(
         for i in range(size):
             cosine[i] = x[i] / chord[i]
         for i in range(size):
-            half[i] = 0.5 * rho[i] * gravity * chord[i] / tau[i]
-        if code == CATENARY:
+            half[i] = 0.5 * rho[i] * model.gravity * chord[i] / tau[i]
+        if model.code == CATENARY:
             for i in range(size):
                 ratio[i] = ordinary_length_ratio(half[i], sine[i], cosine[i], tau[i] / ea[i])
             for i in range(size):
@@ -80,10 +79,9 @@ def batch_from_tension(
                 ratio[i] *= chord[i]
         for i in range(size):
             status = CABLE_SOLVED
-            if code != CATENARY or not is_ordinary(half[i], tau[i] / ea[i]):
-                ratio[i], pull[i], status = from_tension(
-                    code, k_h, k_p, gravity, chord[i], sine[i], cosine[i], rho[i], ea[i], tau[i]
-                )
+            if model.code != CATENARY or not is_ordinary(half[i], tau[i] / ea[i]):
+                line = Chord(chord[i], sine[i], cosine[i])
+                ratio[i], pull[i], status = from_tension(model, line, Material(rho[i], ea[i]), tau[i])
             status_out[start + i] = status
         length_out[start:stop] = ratio[:size]
         for i in range(size):
@@ -94,10 +92,7 @@ def batch_from_tension(
 
 @kernel
 def batch_from_length(
-    code: int,
-    k_h: float,
-    k_p: float,
-    gravity: float,
+    terms: Terms,
     span: Array,
     rise: Array,
     density: Array,
@@ -109,15 +104,17 @@ def batch_from_length(
     status_out: Codes,
 ) -> None:
     """Chord tension, forces on the platform end and status of every cable at its unstrained length."""
+    model = Model(*terms)
     x = min(span.shape[0] - 1, 1)
     z = min(rise.shape[0] - 1, 1)
     d = min(density.shape[0] - 1, 1)
     e = min(stiffness.shape[0] - 1, 1)
     n = min(length.shape[0] - 1, 1)
     for i in range(tension_out.shape[0]):
-        horizontal_out[i], vertical_out[i], tension_out[i], status_out[i] = from_length(
-            code, k_h, k_p, gravity, span[i * x], rise[i * z], density[i * d], stiffness[i * e], length[i * n]
-        )
+        material = Material(density[i * d], stiffness[i * e])
+        force, status = from_length(model, span[i * x], rise[i * z], material, length[i * n])
+        horizontal_out[i], vertical_out[i], tension_out[i] = force
+        status_out[i] = status
 
 
 @kernel

@@ -19,6 +19,7 @@ from sagline.kernels.algebra.hyperbolic import (
     sinhc,
     sinhc_polynomial,
 )
+from sagline.kernels.cable.terms import Force
 from sagline.kernels.codes import CABLE_NOT_CONVERGED, CABLE_SLACK, CABLE_SOLVED, CABLE_TOO_SLACK
 from sagline.kernels.jit import formula, kernel
 
@@ -265,13 +266,11 @@ def vertical_from_length(rise: float, length: float, weight: float, stiffness: f
 
 
 @kernel
-def catenary_from_length(
-    span: float, rise: float, length: float, weight: float, stiffness: float
-) -> tuple[float, float, float, int]:
-    """P2: horizontal and vertical force on the platform end, chord tension and a status; weight > 0."""
+def catenary_from_length(span: float, rise: float, length: float, weight: float, stiffness: float) -> tuple[Force, int]:
+    """P2: force on the platform end and a status; weight > 0."""
     if span == 0.0:
         vertical, tension, status = vertical_from_length(rise, length, weight, stiffness)
-        return 0.0, vertical, tension, status
+        return Force(0.0, vertical, tension), status
     kappa = 0.5 * weight * length / stiffness
     excess = relative_excess(span, rise, length)
     inverse = 1.0 / length
@@ -279,4 +278,4 @@ def catenary_from_length(
     half = 0.5 * weight / (h + kappa)
     tangent = h * sinhc(h) / cosh(h) if h < 20.0 else 1.0  # tanh h
     vertical = 0.5 * weight * (length + rise / (tangent + kappa))
-    return half * span, vertical, half * math.sqrt(span * span + rise * rise), status
+    return Force(half * span, vertical, half * math.sqrt(span * span + rise * rise)), status

@@ -10,15 +10,15 @@ from __future__ import annotations
 import math
 
 from sagline.kernels.cable.stiffness import series_excess
+from sagline.kernels.cable.terms import Force, Material, Model
 from sagline.kernels.codes import CATENARY, ELASTIC
 from sagline.kernels.jit import kernel
 
 
 @kernel
-def catenary_energy(
-    span: float, rise: float, length: float, horizontal: float, vertical: float, weight: float, stiffness: float
-) -> float:
+def catenary_energy(span: float, rise: float, length: float, force: Force, weight: float, stiffness: float) -> float:
     """V = T.B - C(T) [J] of the exact cable, strain and height of its mass included, frame end at height 0."""
+    horizontal, vertical, _ = force
     weight_length = weight * length
     vertical_a = vertical - weight_length
     square = horizontal * horizontal
@@ -40,22 +40,11 @@ def elastic_energy(chord: float, length: float, tension: float, stiffness: float
 
 
 @kernel
-def cable_energy(
-    code: int,
-    gravity: float,
-    span: float,
-    rise: float,
-    density: float,
-    stiffness: float,
-    length: float,
-    horizontal: float,
-    vertical: float,
-    tension: float,
-) -> float:
+def cable_energy(model: Model, span: float, rise: float, material: Material, length: float, force: Force) -> float:
     """Energy [J] of a cable of the exact or the weightless model; NaN for the others."""
-    weight = density * gravity
-    if code == CATENARY and weight > 0.0:
-        return catenary_energy(span, rise, length, horizontal, vertical, weight, stiffness)
-    if code in (CATENARY, ELASTIC) or weight == 0.0:
-        return elastic_energy(math.sqrt(span * span + rise * rise), length, tension, stiffness)
+    weight = material.density * model.gravity
+    if model.code == CATENARY and weight > 0.0:
+        return catenary_energy(span, rise, length, force, weight, material.stiffness)
+    if model.code in (CATENARY, ELASTIC) or weight == 0.0:
+        return elastic_energy(math.sqrt(span * span + rise * rise), length, force.tension, material.stiffness)
     return math.nan

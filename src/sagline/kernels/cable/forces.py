@@ -14,6 +14,7 @@ from sagline.kernels.algebra.hyperbolic import cosh_polynomial, sinh_excess_poly
 from sagline.kernels.balance import geometry as g
 from sagline.kernels.cable.catenary import SMALL_HALLEY_STEP, relative_excess
 from sagline.kernels.cable.models import from_length
+from sagline.kernels.cable.terms import Material, Model
 from sagline.kernels.codes import CABLE_SOLVED, CATENARY
 from sagline.kernels.jit import formula, kernel
 
@@ -82,10 +83,7 @@ def is_settled(before: float, first: float, second: float, kappa: float) -> bool
 
 @kernel
 def cable_forces(
-    code: int,
-    k_h: float,
-    k_p: float,
-    gravity: float,
+    model: Model,
     cables: Array,
     lengths: Array,
     geometry: Array,
@@ -95,15 +93,15 @@ def cable_forces(
 ) -> None:
     """Fill the rows T_x, T_z and tau of the result and the statuses (m,) after `cable_geometry`."""
     m = lengths.shape[0]
-    if code == CATENARY:
-        settle(gravity, cables, lengths, geometry, memory)
+    if model.code == CATENARY:
+        settle(model.gravity, cables, lengths, geometry, memory)
     for i in range(m):
         kappa = memory[KAPPA, i]
         h = memory[SECOND, i]
         span, rise, chord = geometry[g.SPAN, i], geometry[g.RISE, i], geometry[g.CHORD, i]
         density = cables[i, tables.DENSITY]
-        weight = density * gravity
-        if code == CATENARY and is_settled(memory[PARAMETER, i], memory[FIRST, i], h, kappa):
+        weight = density * model.gravity
+        if model.code == CATENARY and is_settled(memory[PARAMETER, i], memory[FIRST, i], h, kappa):
             half = 0.5 * weight / (h + kappa)
             y = h * h
             tangent = h * sinhc_polynomial(y) / cosh_polynomial(y)
@@ -113,12 +111,11 @@ def cable_forces(
             statuses[i] = CABLE_SOLVED
             memory[PARAMETER, i] = h
             continue
-        stiffness = cables[i, tables.STIFFNESS]
-        horizontal, vertical, tension, status = from_length(
-            code, k_h, k_p, gravity, span, rise, density, stiffness, lengths[i]
-        )
-        result[tables.HORIZONTAL, i] = horizontal
-        result[tables.VERTICAL, i] = vertical
+        material = Material(density, cables[i, tables.STIFFNESS])
+        force, status = from_length(model, span, rise, material, lengths[i])
+        tension = force.tension
+        result[tables.HORIZONTAL, i] = force.horizontal
+        result[tables.VERTICAL, i] = force.vertical
         result[tables.TENSION, i] = tension
         statuses[i] = status
         # h back from tau = wD/(2 (h + kappa)), for the next pose

@@ -14,6 +14,7 @@ from sagline.kernels.cable.catenary import (
     ordinary_pull_ratio,
 )
 from sagline.kernels.cable.models import from_tension
+from sagline.kernels.cable.terms import Chord, Material, Model
 from sagline.kernels.codes import CABLE_SOLVED, CATENARY, ELASTIC, STRAIGHT
 from sagline.kernels.jit import formula, kernel
 
@@ -23,18 +24,13 @@ LIMIT_PRECISION = 1e-13  # relative
 
 
 @formula
-def hang_cables(
-    code: int, k_h: float, k_p: float, gravity: float, geometry: Array, work: Array, statuses: Codes, near: bool
-) -> int:
+def hang_cables(model: Model, geometry: Array, work: Array, statuses: Codes, near: bool) -> int:
     """Fill SLACKNESS, STRAIN, RATIO and PULL of work, and the statuses (m,), at one pose's chord tensions TAU.
 
     Ordinary catenaries go through loops without branches, which vectorize; the others follow one by one.
 
     Args:
-        code: Cable model.
-        k_h: The empirical model's constant.
-        k_p: The empirical model's constant.
-        gravity: [m/s^2].
+        model: Cable model.
         geometry: Rows of `cable_geometry`.
         work: Rows of one pose's cables.
         statuses: Filled.
@@ -48,7 +44,7 @@ def hang_cables(
         work[t.SLACKNESS, i] = work[t.HALF_WEIGHT, i] / work[t.TAU, i]
     for i in range(m):
         work[t.STRAIN, i] = work[t.TAU, i] / work[t.STIFFNESS_ROW, i]
-    if code == CATENARY:
+    if model.code == CATENARY:
         if near:
             for i in range(m):
                 work[t.RATIO, i] = ordinary_length_ratio_near(
@@ -70,19 +66,10 @@ def hang_cables(
     gravest = CABLE_SOLVED
     for i in range(m):
         statuses[i] = CABLE_SOLVED
-        if code != CATENARY or not is_ordinary(work[t.SLACKNESS, i], work[t.STRAIN, i]):
-            length, pull, status = from_tension(
-                code,
-                k_h,
-                k_p,
-                gravity,
-                geometry[g.CHORD, i],
-                geometry[g.SINE, i],
-                geometry[g.COSINE, i],
-                work[t.DENSITY_ROW, i],
-                work[t.STIFFNESS_ROW, i],
-                work[t.TAU, i],
-            )
+        if model.code != CATENARY or not is_ordinary(work[t.SLACKNESS, i], work[t.STRAIN, i]):
+            chord = Chord(geometry[g.CHORD, i], geometry[g.SINE, i], geometry[g.COSINE, i])
+            material = Material(work[t.DENSITY_ROW, i], work[t.STIFFNESS_ROW, i])
+            length, pull, status = from_tension(model, chord, material, work[t.TAU, i])
             work[t.RATIO, i] = length / geometry[g.CHORD, i]
             work[t.PULL, i] = pull
             statuses[i] = status
@@ -91,53 +78,31 @@ def hang_cables(
 
 
 @kernel
-def frame_end_tension(
-    code: int,
-    k_h: float,
-    k_p: float,
-    gravity: float,
-    chord: float,
-    sine: float,
-    cosine: float,
-    density: float,
-    stiffness: float,
-    tau: float,
-) -> float:
+def frame_end_tension(model: Model, chord: Chord, material: Material, tau: float) -> float:
     """Tension at the frame end of a cable at a chord tension [N]."""
-    if code == STRAIGHT or code == ELASTIC:
+    if model.code == STRAIGHT or model.code == ELASTIC:
         return tau
-    length, pull, _status = from_tension(code, k_h, k_p, gravity, chord, sine, cosine, density, stiffness, tau)
-    return math.hypot(tau * cosine, tau * sine + pull - density * gravity * length)
+    length, pull, _status = from_tension(model, chord, material, tau)
+    return math.hypot(tau * chord.cosine, tau * chord.sine + pull - material.density * model.gravity * length)
 
 
 @kernel
-def chord_tension_at_frame_end(
-    code: int,
-    k_h: float,
-    k_p: float,
-    gravity: float,
-    chord: float,
-    sine: float,
-    cosine: float,
-    density: float,
-    stiffness: float,
-    tension: float,
-) -> float:
+def chord_tension_at_frame_end(model: Model, chord: Chord, material: Material, tension: float) -> float:
     """Chord tension at which the tension at the frame end has a given value, on the taut side.
 
     A sagging cable's frame-end tension has a least value, near wD cos(phi)/2; what lies below it is met there.
     Newton's slope is the first-order one, T_A^2 = tau^2 - tau wD sin phi + (wD/2)^2; the value is the model's own.
     """
-    weight = density * gravity
-    if code == STRAIGHT or code == ELASTIC or weight == 0.0 or tension == math.inf:
+    weight = material.density * model.gravity
+    if model.code == STRAIGHT or model.code == ELASTIC or weight == 0.0 or tension == math.inf:
         return tension
-    along = 0.5 * weight * chord * sine
-    across = 0.5 * weight * chord * cosine
+    along = 0.5 * weight * chord.length * chord.sine
+    across = 0.5 * weight * chord.length * chord.cosine
     tau = along + math.sqrt(max(tension * tension - across * across, 0.0))
     if tension <= 1.01 * across or tau <= 0.0:
         return max(tau, 0.0)
     for _ in range(LIMIT_STEPS):
-        value = frame_end_tension(code, k_h, k_p, gravity, chord, sine, cosine, density, stiffness, tau)
+        value = frame_end_tension(model, chord, material, tau)
         step = (value - tension) * value / (tau - along)
         new = tau - step
         tau = new if new > 0.5 * tau else 0.5 * tau

@@ -8,6 +8,7 @@ from sagline.arrays import Array
 from sagline.kernels.cable.catenary import catenary_end
 from sagline.kernels.cable.models import sag_of_shallow
 from sagline.kernels.cable.shallow import shallow_length_ratio
+from sagline.kernels.cable.terms import Model, Terms
 from sagline.kernels.codes import CATENARY, ELASTIC, EMPIRICAL, STRAIGHT
 from sagline.kernels.jit import kernel
 
@@ -23,8 +24,7 @@ def catenary_point(
 
 @kernel
 def shape_points(
-    code: int,
-    gravity: float,
+    terms: Terms,
     span: Array,
     rise: Array,
     density: Array,
@@ -36,23 +36,26 @@ def shape_points(
     points_out: Array,
 ) -> None:
     """Points (cables, points, 2) at equal steps of unstrained length; the shallow models draw a parabola."""
+    model = Model(*terms)
     count = points_out.shape[1]
     for i in range(points_out.shape[0]):
         for k in range(count):
             t = k / (count - 1)
-            if code == CATENARY and density[i] * gravity > 0.0:
-                x, z = catenary_point(t, horizontal[i], vertical[i], length[i], density[i] * gravity, stiffness[i])
+            if model.code == CATENARY and density[i] * model.gravity > 0.0:
+                x, z = catenary_point(
+                    t, horizontal[i], vertical[i], length[i], density[i] * model.gravity, stiffness[i]
+                )
             else:
-                drop = shallow_drop(t, code, span[i], rise[i], vertical[i], tension[i])
+                drop = shallow_drop(t, model, span[i], rise[i], vertical[i], tension[i])
                 x, z = t * span[i], t * rise[i] - drop
             points_out[i, k, 0] = x
             points_out[i, k, 1] = z
 
 
 @kernel
-def shallow_drop(t: float, code: int, span: float, rise: float, vertical: float, tension: float) -> float:
+def shallow_drop(t: float, model: Model, span: float, rise: float, vertical: float, tension: float) -> float:
     """Drop below the chord [m] at a fraction t of it: b D t (1 - t)/tau, with b the pull on the end."""
-    if code == STRAIGHT or code == ELASTIC or tension == 0.0:
+    if model.code == STRAIGHT or model.code == ELASTIC or tension == 0.0:
         return 0.0
     chord = math.hypot(span, rise)
     pull = vertical - tension * rise / chord
@@ -76,8 +79,7 @@ def catenary_sag(
 
 @kernel
 def sags(
-    code: int,
-    gravity: float,
+    terms: Terms,
     span: Array,
     rise: Array,
     density: Array,
@@ -89,19 +91,18 @@ def sags(
     sag_out: Array,
 ) -> None:
     """Largest drop below the chord of every cable."""
+    model = Model(*terms)
     for i in range(sag_out.shape[0]):
-        weight = density[i] * gravity
-        if code == CATENARY and weight > 0.0:
+        weight = density[i] * model.gravity
+        if model.code == CATENARY and weight > 0.0:
             sag_out[i] = catenary_sag(span[i], rise[i], length[i], horizontal[i], vertical[i], weight, stiffness[i])
         else:
-            sag_out[i] = shallow_drop(0.5, code, span[i], rise[i], vertical[i], tension[i])
+            sag_out[i] = shallow_drop(0.5, model, span[i], rise[i], vertical[i], tension[i])
 
 
 @kernel
 def closures(
-    code: int,
-    k_p: float,
-    gravity: float,
+    terms: Terms,
     span: Array,
     rise: Array,
     density: Array,
@@ -116,20 +117,21 @@ def closures(
 
     Catenary: distance of its computed end from the platform end. Others: the error in length.
     """
+    model = Model(*terms)
     for i in range(residual_out.shape[0]):
         chord = math.hypot(span[i], rise[i])
-        if code == STRAIGHT:
+        if model.code == STRAIGHT:
             residual_out[i] = abs(length[i] - chord)
-        elif code == CATENARY and density[i] * gravity > 0.0:
-            x, z = catenary_end(horizontal[i], vertical[i], length[i], density[i] * gravity, stiffness[i])
+        elif model.code == CATENARY and density[i] * model.gravity > 0.0:
+            x, z = catenary_end(horizontal[i], vertical[i], length[i], density[i] * model.gravity, stiffness[i])
             residual_out[i] = math.hypot(x - span[i], z - rise[i])
         elif tension[i] == 0.0:  # slack: any length beyond the chord will do
             residual_out[i] = max(chord - length[i], 0.0)
         else:
             sine = rise[i] / chord
             cosine = span[i] / chord
-            weightless = code == ELASTIC or density[i] * gravity == 0.0
-            sag = 0.0 if weightless else sag_of_shallow(code, k_p, chord, cosine, density[i], gravity)
-            pull = vertical[i] - tension[i] * sine if code == EMPIRICAL else 0.0
+            weightless = model.code == ELASTIC or density[i] * model.gravity == 0.0
+            sag = 0.0 if weightless else sag_of_shallow(model, density[i] * chord * cosine)
+            pull = vertical[i] - tension[i] * sine if model.code == EMPIRICAL else 0.0
             ratio = shallow_length_ratio(tension[i], sine, cosine, pull, sag, stiffness[i])
             residual_out[i] = abs(length[i] - chord * ratio)

@@ -12,6 +12,7 @@ from sagline.kernels.algebra.hyperbolic import atanhc_excess
 from sagline.kernels.cable.catenary import slack_series
 from sagline.kernels.cable.models import pull_of_shallow, sag_of_shallow
 from sagline.kernels.cable.shallow import stretching_tension
+from sagline.kernels.cable.terms import Force, Material, Model
 from sagline.kernels.codes import CATENARY, ELASTIC, EMPIRICAL, STRAIGHT
 from sagline.kernels.jit import formula, kernel
 
@@ -78,16 +79,7 @@ def elastic_stiffness(span: float, rise: float, length: float, tension: float, s
 
 @kernel
 def shallow_slopes(  # type: ignore[no-untyped-def]
-    code: int,
-    k_h: float,
-    k_p: float,
-    gravity: float,
-    span: float,
-    rise: float,
-    density: float,
-    stiffness: float,
-    length: float,
-    tension: float,
+    model: Model, span: float, rise: float, material: Material, length: float, tension: float
 ):
     """How tau of a shallow cable follows x_B, z_B, L, rho and EA: five partial derivatives.
 
@@ -96,8 +88,9 @@ def shallow_slopes(  # type: ignore[no-untyped-def]
     chord = math.sqrt(span * span + rise * rise)
     cosine = span / chord
     sine = rise / chord
-    sag = sag_of_shallow(code, k_p, chord, cosine, density, gravity)
-    pull = pull_of_shallow(code, k_h, chord, density, gravity) if code == EMPIRICAL else 0.0
+    density, stiffness = material
+    sag = sag_of_shallow(model, density * chord * cosine)
+    pull = pull_of_shallow(model, chord, density) if model.code == EMPIRICAL else 0.0
     stretch = stretching_tension(tension, sine, cosine, pull)
     square = tension * tension
     share = sag / square
@@ -107,7 +100,7 @@ def shallow_slopes(  # type: ignore[no-untyped-def]
     by_sine = tension * pull / stretch
     stretch_x = by_pull * pull * cosine / chord - by_sine * sine * cosine / chord
     stretch_z = by_pull * pull * sine / chord + by_sine * cosine * cosine / chord
-    sag_x = 2.0 * sag_of_shallow(code, k_p, 1.0, 1.0, density, gravity) * span / square
+    sag_x = 2.0 * sag_of_shallow(model, density) * span / square
     slope_x = (cosine * (1.0 + share) + chord * sag_x - length * stretch_x / stiffness) / by_tension
     slope_z = (sine * (1.0 + share) - length * stretch_z / stiffness) / by_tension
     slope_length = -(1.0 + stretch / stiffness) / by_tension
@@ -118,24 +111,15 @@ def shallow_slopes(  # type: ignore[no-untyped-def]
 
 @kernel
 def shallow_stiffness(  # type: ignore[no-untyped-def]
-    code: int,
-    k_h: float,
-    k_p: float,
-    gravity: float,
-    span: float,
-    rise: float,
-    density: float,
-    stiffness: float,
-    length: float,
-    tension: float,
+    model: Model, span: float, rise: float, material: Material, length: float, tension: float
 ):
     """In-plane stiffness (xx, xz, zx, zz) [N/m] of a shallow cable, not symmetric: its forces are no gradient."""
-    slope_x, slope_z, _, _, _ = shallow_slopes(code, k_h, k_p, gravity, span, rise, density, stiffness, length, tension)
+    slope_x, slope_z, _, _, _ = shallow_slopes(model, span, rise, material, length, tension)
     chord = math.sqrt(span * span + rise * rise)
     cosine = span / chord
     sine = rise / chord
     across = tension / chord
-    unit_pull = pull_of_shallow(code, k_h, 1.0, density, gravity)
+    unit_pull = pull_of_shallow(model, 1.0, material.density)
     xx = slope_x * cosine + across * sine * sine
     xz = slope_z * cosine - across * sine * cosine
     zx = slope_x * sine - across * sine * cosine + unit_pull * cosine
@@ -145,27 +129,16 @@ def shallow_stiffness(  # type: ignore[no-untyped-def]
 
 @kernel
 def cable_stiffness(  # type: ignore[no-untyped-def]
-    code: int,
-    k_h: float,
-    k_p: float,
-    gravity: float,
-    span: float,
-    rise: float,
-    density: float,
-    stiffness: float,
-    length: float,
-    horizontal: float,
-    vertical: float,
-    tension: float,
+    model: Model, span: float, rise: float, material: Material, length: float, force: Force
 ):
     """In-plane stiffness (xx, xz, zx, zz) [N/m] of a cable of any model; NaN for the straight one, which has none."""
-    if code == STRAIGHT:
+    if model.code == STRAIGHT:
         return math.nan, math.nan, math.nan, math.nan
-    weight = density * gravity
-    if code == CATENARY and weight > 0.0:
-        xx, xz, zz = catenary_stiffness(horizontal, vertical, length, weight, stiffness)
+    weight = material.density * model.gravity
+    if model.code == CATENARY and weight > 0.0:
+        xx, xz, zz = catenary_stiffness(force.horizontal, force.vertical, length, weight, material.stiffness)
         return xx, xz, xz, zz
-    if code in (CATENARY, ELASTIC) or weight == 0.0:
-        xx, xz, zz = elastic_stiffness(span, rise, length, tension, stiffness)
+    if model.code in (CATENARY, ELASTIC) or weight == 0.0:
+        xx, xz, zz = elastic_stiffness(span, rise, length, force.tension, material.stiffness)
         return xx, xz, xz, zz
-    return shallow_stiffness(code, k_h, k_p, gravity, span, rise, density, stiffness, length, tension)
+    return shallow_stiffness(model, span, rise, material, length, force.tension)

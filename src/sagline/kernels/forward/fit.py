@@ -16,6 +16,7 @@ from sagline.kernels.algebra.dense import cholesky, solve_lower, solve_upper
 from sagline.kernels.balance import geometry as g
 from sagline.kernels.balance.freedom import norm, project, spread
 from sagline.kernels.balance.geometry import cable_geometry
+from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import CABLE_NO_TENSION, FORWARD_FITTED, FORWARD_NO_LENGTHS, FORWARD_NOT_CONVERGED, STRAIGHT
 from sagline.kernels.forward.forward import ENERGY, ITERATIONS, fill_scales
 from sagline.kernels.forward.platform import moved_pose
@@ -143,7 +144,8 @@ def fit_poses(
             pose[k] = last[k] if chained else starts[min(p, starts.shape[0] - 1), k]
         fill_scales(freedom, cables, body, lengths[p], scale, arc)
         wrench = wrenches[min(p, wrenches.shape[0] - 1)]
-        problem = Problem(STRAIGHT, 0.0, 0.0, freedom, cables, body, lengths[p], wrench, scale)
+        model = Model(STRAIGHT, 0.0, 0.0, body[tables.GRAVITY])
+        problem = Problem(model, freedom, cables, body, lengths[p], wrench, scale)
         numbers[p, ENERGY], numbers[p, ITERATIONS], fitted = fit_pose(problem, pose, space)
         pose_statuses[p] = FORWARD_FITTED if fitted else FORWARD_NOT_CONVERGED
         for k in range(tables.POSE_COLUMNS):

@@ -14,6 +14,7 @@ from sagline.kernels import tables
 from sagline.kernels.algebra.dense import extreme_eigenvalues
 from sagline.kernels.balance import geometry as g
 from sagline.kernels.balance.freedom import make_symmetric, norm, project, restricted
+from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import (
     CATENARY,
     ELASTIC,
@@ -43,7 +44,7 @@ FORWARD_NUMBERS = 5
 def verdict(problem: Problem, space: Space, size: float, low: float, high: float) -> int:
     """What kind of solution space holds; size is the sum of tensions, low and high the extreme stiffnesses."""
     cables, result = problem.cables, space.result
-    gravity = problem.body[tables.GRAVITY]
+    gravity = problem.model.gravity
     m = cables.shape[0]
     n = problem.freedom.shape[0]
     project(problem.freedom, space.gradient, problem.scale, space.part)
@@ -57,7 +58,7 @@ def verdict(problem: Problem, space: Space, size: float, low: float, high: float
     strain = 0.0
     for i in range(m):
         tension = result[tables.TENSION, i]
-        half_weight = 0.0 if problem.code == ELASTIC else 0.5 * cables[i, tables.DENSITY] * gravity
+        half_weight = 0.0 if problem.model.code == ELASTIC else 0.5 * cables[i, tables.DENSITY] * gravity
         taut += 1 if tension > half_weight * space.geometry[g.CHORD, i] else 0
         strain = max(strain, tension / cables[i, tables.STIFFNESS])
     if strain > OVERSTRETCHED:
@@ -110,7 +111,7 @@ def fill_scales(freedom: Array, cables: Array, body: Array, lengths: Array, scal
 def solve_pose(problem: Problem, energy_problem: Problem, pose: Array, arc: Array, space: Space, numbers: Array) -> int:
     """Move pose to the equilibrium and fill the numbers; returns the status."""
     steps, size = descend(energy_problem, pose, space)
-    if size == 0.0 or problem.code != energy_problem.code:
+    if size == 0.0 or problem.model.code != energy_problem.model.code:
         size = unbalance(problem, pose, space)
     steps += polish(problem, pose, space, size * norm(problem.scale))
     numbers[ENERGY] = platform_energy(problem, pose, space)[0]
@@ -185,8 +186,10 @@ def forward_poses(
         if not chained:  # an answer must not depend on the sample before
             space.memory[:] = math.nan
         fill_scales(freedom, cables, body, lengths[p], scale, arc)
-        problem = Problem(code, k_h, k_p, freedom, cables, body, lengths[p], wrench, scale)
-        energy_problem = Problem(energy_code, 0.0, 0.0, freedom, cables, body, lengths[p], wrench, scale)
+        model = Model(code, k_h, k_p, body[tables.GRAVITY])
+        exact = Model(energy_code, 0.0, 0.0, body[tables.GRAVITY])
+        problem = Problem(model, freedom, cables, body, lengths[p], wrench, scale)
+        energy_problem = Problem(exact, freedom, cables, body, lengths[p], wrench, scale)
         status = solve_pose(problem, energy_problem, pose, arc, space, numbers[p])
         pose_statuses[p] = status
         for k in range(tables.POSE_COLUMNS):

@@ -15,6 +15,7 @@ from sagline.kernels.balance.geometry import cable_geometry
 from sagline.kernels.cable.energy import cable_energy
 from sagline.kernels.cable.forces import cable_forces
 from sagline.kernels.cable.stiffness import cable_stiffness
+from sagline.kernels.cable.terms import Force, Material
 from sagline.kernels.forward.problem import Problem, Space
 from sagline.kernels.jit import formula, kernel
 
@@ -30,20 +31,8 @@ def unbalance(problem: Problem, pose: Array, space: Space) -> float:
     cables, body, wrench = problem.cables, problem.body, problem.wrench
     geometry, result, gradient = space.geometry, space.result, space.gradient
     cable_geometry(cables, body, pose, space.rotation, geometry)
-    gravity = body[tables.GRAVITY]
-    cable_forces(
-        problem.code,
-        problem.k_h,
-        problem.k_p,
-        gravity,
-        cables,
-        problem.lengths,
-        geometry,
-        space.memory,
-        result,
-        space.statuses,
-    )
-    weight = body[tables.MASS] * gravity
+    cable_forces(problem.model, cables, problem.lengths, geometry, space.memory, result, space.statuses)
+    weight = body[tables.MASS] * problem.model.gravity
     for k in range(6):
         gradient[k] = -wrench[k]
     gradient[2] += weight
@@ -75,31 +64,21 @@ def platform_energy(problem: Problem, pose: Array, space: Space):  # type: ignor
     """
     cables, body, wrench = problem.cables, problem.body, problem.wrench
     rotation, result = space.rotation, space.result
-    gravity = body[tables.GRAVITY]
     energy = 0.0
     size = 0.0
     for k in range(3):
         center = pose[k]
         for j in range(3):
             center += rotation[k, j] * body[tables.CENTER_X + j]
-        force = wrench[k] - (body[tables.MASS] * gravity if k == 2 else 0.0)
-        energy -= force * center
-        size += abs(force * center)
+        given = wrench[k] - (body[tables.MASS] * problem.model.gravity if k == 2 else 0.0)
+        energy -= given * center
+        size += abs(given * center)
     for i in range(cables.shape[0]):
-        energy += cable_energy(
-            problem.code,
-            gravity,
-            result[tables.SPAN, i],
-            result[tables.RISE, i],
-            cables[i, tables.DENSITY],
-            cables[i, tables.STIFFNESS],
-            result[tables.LENGTH, i],
-            result[tables.HORIZONTAL, i],
-            result[tables.VERTICAL, i],
-            result[tables.TENSION, i],
-        )
-        size += abs(result[tables.HORIZONTAL, i] * result[tables.SPAN, i])
-        size += abs(result[tables.VERTICAL, i] * result[tables.RISE, i])
+        span, rise = result[tables.SPAN, i], result[tables.RISE, i]
+        material = Material(cables[i, tables.DENSITY], cables[i, tables.STIFFNESS])
+        force = Force(result[tables.HORIZONTAL, i], result[tables.VERTICAL, i], result[tables.TENSION, i])
+        energy += cable_energy(problem.model, span, rise, material, result[tables.LENGTH, i], force)
+        size += abs(force.horizontal * span) + abs(force.vertical * rise)
     return energy, size
 
 
@@ -107,22 +86,12 @@ def platform_energy(problem: Problem, pose: Array, space: Space):  # type: ignor
 def end_stiffness(problem: Problem, space: Space, i: int):  # type: ignore[no-untyped-def]
     """Stiffness of cable i against displacements of its platform end in world axes, row by row: nine numbers [N/m]."""
     cables, geometry, result = problem.cables, space.geometry, space.result
-    tension = result[tables.TENSION, i]
+    material = Material(cables[i, tables.DENSITY], cables[i, tables.STIFFNESS])
+    force = Force(result[tables.HORIZONTAL, i], result[tables.VERTICAL, i], result[tables.TENSION, i])
     xx, xz, zx, zz = cable_stiffness(
-        problem.code,
-        problem.k_h,
-        problem.k_p,
-        problem.body[tables.GRAVITY],
-        geometry[g.SPAN, i],
-        geometry[g.RISE, i],
-        cables[i, tables.DENSITY],
-        cables[i, tables.STIFFNESS],
-        result[tables.LENGTH, i],
-        result[tables.HORIZONTAL, i],
-        result[tables.VERTICAL, i],
-        tension,
+        problem.model, geometry[g.SPAN, i], geometry[g.RISE, i], material, result[tables.LENGTH, i], force
     )
-    across = tension / geometry[g.CHORD, i]
+    across = force.tension / geometry[g.CHORD, i]
     c, s = geometry[g.AZIMUTH_X, i], geometry[g.AZIMUTH_Y, i]
     mixed = (xx - across) * c * s
     return (

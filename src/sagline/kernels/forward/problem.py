@@ -10,6 +10,7 @@ from sagline.arrays import Array, Codes
 from sagline.kernels import tables
 from sagline.kernels.balance import geometry as g
 from sagline.kernels.cable.forces import FORCE_ROWS
+from sagline.kernels.cable.terms import Model
 from sagline.kernels.jit import kernel
 
 
@@ -17,9 +18,7 @@ class Problem(NamedTuple):
     """One pose to find: the cable model, what the robot is, and what is given.
 
     Attributes:
-        code: Cable model.
-        k_h: The empirical model's constant.
-        k_p: The empirical model's constant.
+        model: Cable model.
         freedom: Rows that pick the free motions, (n, 6).
         cables: Rows of the cable_table, (m, CABLE_COLUMNS).
         body: Row of the body_table, (BODY_COLUMNS,).
@@ -28,9 +27,7 @@ class Problem(NamedTuple):
         scale: Unit of each free motion [m or rad], (n,): what counts as equally far.
     """
 
-    code: int
-    k_h: float
-    k_p: float
+    model: Model
     freedom: Array
     cables: Array
     body: Array

@@ -13,6 +13,7 @@ from sagline.kernels.balance import geometry as g
 from sagline.kernels.cable.catenary import slack_series
 from sagline.kernels.cable.models import pull_of_shallow
 from sagline.kernels.cable.stiffness import shallow_slopes
+from sagline.kernels.cable.terms import Material, Model
 from sagline.kernels.codes import CATENARY, ELASTIC, STRAIGHT
 from sagline.kernels.forward.platform import end_stiffness, platform_stiffness, unbalance
 from sagline.kernels.forward.problem import Problem, new_space
@@ -54,24 +55,14 @@ def catenary_end_slopes(horizontal: float, vertical: float, length: float, weigh
 @kernel
 def shallow_force_slopes(problem: Problem, i: int, span: float, rise: float, tension: float):  # type: ignore[no-untyped-def]
     """dT/dL, dT/d(rho), dT/d(EA) of a shallow cable in its plane, as three pairs."""
-    density = problem.cables[i, tables.DENSITY]
-    gravity = problem.body[tables.GRAVITY]
+    material = Material(problem.cables[i, tables.DENSITY], problem.cables[i, tables.STIFFNESS])
     _, _, by_length, by_density, by_stiffness = shallow_slopes(
-        problem.code,
-        problem.k_h,
-        problem.k_p,
-        gravity,
-        span,
-        rise,
-        density,
-        problem.cables[i, tables.STIFFNESS],
-        problem.lengths[i],
-        tension,
+        problem.model, span, rise, material, problem.lengths[i], tension
     )
     chord = math.hypot(span, rise)
     cosine = span / chord
     sine = rise / chord
-    pull = pull_of_shallow(problem.code, problem.k_h, chord, 1.0, gravity)
+    pull = pull_of_shallow(problem.model, chord, 1.0)
     return (
         (by_length * cosine, by_length * sine),
         (by_density * cosine, by_density * sine + pull),
@@ -113,10 +104,10 @@ def describe_state(problem: Problem, pose: Array, matrix: Array, blocks: Array, 
         horizontal = space.result[tables.HORIZONTAL, i]
         vertical = space.result[tables.VERTICAL, i]
         tension = space.result[tables.TENSION, i]
-        gravity = problem.body[tables.GRAVITY]
+        gravity = problem.model.gravity
         weight = problem.cables[i, tables.DENSITY] * gravity
         stiffness = problem.cables[i, tables.STIFFNESS]
-        if problem.code == CATENARY and weight > 0.0:
+        if problem.model.code == CATENARY and weight > 0.0:
             ends = catenary_end_slopes(horizontal, vertical, problem.lengths[i], weight, stiffness)
             for q in range(3):
                 x, z = ends[q]
@@ -124,7 +115,7 @@ def describe_state(problem: Problem, pose: Array, matrix: Array, blocks: Array, 
                 for j in range(3):  # the force gives way to the end's own motion
                     slopes[q, i, j] = -unit * (rows[j][0] * c * x + rows[j][1] * s * x + rows[j][2] * z)
             continue
-        if problem.code in (CATENARY, ELASTIC) or weight == 0.0:
+        if problem.model.code in (CATENARY, ELASTIC) or weight == 0.0:
             forces = elastic_force_slopes(span, rise, problem.lengths[i], tension, stiffness)
         else:
             forces = shallow_force_slopes(problem, i, span, rise, tension)
@@ -160,13 +151,12 @@ def describe_states(
             slopes[p] = math.nan
             levers[p] = math.nan
             continue
+        body = bodies[min(p, bodies.shape[0] - 1)]
         problem = Problem(
-            code,
-            k_h,
-            k_p,
+            Model(code, k_h, k_p, body[tables.GRAVITY]),
             freedom,
             robots[min(p, robots.shape[0] - 1)],
-            bodies[min(p, bodies.shape[0] - 1)],
+            body,
             lengths[p],
             wrenches[min(p, wrenches.shape[0] - 1)],
             scale,

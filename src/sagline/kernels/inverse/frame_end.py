@@ -9,6 +9,7 @@ from sagline.kernels import tables
 from sagline.kernels.balance import geometry as g
 from sagline.kernels.balance.setting import factor_balance, limit_variable, refer
 from sagline.kernels.cable.hanging import frame_end_tension
+from sagline.kernels.cable.terms import Chord, Material, Model
 from sagline.kernels.codes import (
     FRAME_END_TENSION,
 )
@@ -19,24 +20,16 @@ SLOPE_STEP = 1e-4  # relative step of the central difference of the frame-end te
 
 
 @kernel
-def linearize_ends(
-    code: int, k_h: float, k_p: float, preference: Array, gravity: float, geometry: Array, work: Array
-) -> None:
+def linearize_ends(model: Model, preference: Array, geometry: Array, work: Array) -> None:
     """Fill SCALE, OFFSET, LOW and HIGH of the frame-end tensions as they run near the present chord tensions."""
     ends = np.empty(3)
     for i in range(work.shape[1]):
         tau = work[tables.TAU, i]
         for k in range(3):
             ends[k] = frame_end_tension(
-                code,
-                k_h,
-                k_p,
-                gravity,
-                geometry[g.CHORD, i],
-                geometry[g.SINE, i],
-                geometry[g.COSINE, i],
-                work[tables.DENSITY_ROW, i],
-                work[tables.STIFFNESS_ROW, i],
+                model,
+                Chord(geometry[g.CHORD, i], geometry[g.SINE, i], geometry[g.COSINE, i]),
+                Material(work[tables.DENSITY_ROW, i], work[tables.STIFFNESS_ROW, i]),
                 tau * (1.0 + (k - 1) * SLOPE_STEP),
             )
         slope = (ends[2] - ends[0]) / (2.0 * SLOPE_STEP * tau)
@@ -46,14 +39,11 @@ def linearize_ends(
 
 @kernel
 def relinearize(
-    code: int,
-    k_h: float,
-    k_p: float,
+    model: Model,
     method: int,
     freedom: Array,
     preference: Array,
     previous: Array,
-    gravity: float,
     geometry: Array,
     work: Array,
     full: Array,
@@ -66,7 +56,7 @@ def relinearize(
     reference: Array,
 ) -> bool:
     """Set the balance up again, in frame-end tensions as they run near the present chord tensions; False: rank lost."""
-    linearize_ends(code, k_h, k_p, preference, gravity, geometry, work)
+    linearize_ends(model, preference, geometry, work)
     if not factor_balance(freedom, geometry, work, full, matrix, reduced, balance, q, inverse, null):
         return False
     refer(method, FRAME_END_TENSION, preference, previous, work, null, reference)

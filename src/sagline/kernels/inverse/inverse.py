@@ -15,6 +15,7 @@ from sagline.kernels import tables
 from sagline.kernels.balance import geometry as g
 from sagline.kernels.balance.geometry import cable_geometry
 from sagline.kernels.balance.setting import factor_balance, place_cables, refer, scale_tensions
+from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import (
     POSE_INFEASIBLE,
     POSE_NO_CHORD,
@@ -104,7 +105,7 @@ def inverse_poses(
         robot = robots[min(p, robots.shape[0] - 1)]
         body = bodies[min(p, bodies.shape[0] - 1)]
         wrench = wrenches[min(p, wrenches.shape[0] - 1)]
-        gravity = body[tables.GRAVITY]
+        model = Model(code, k_h, k_p, body[tables.GRAVITY])
         statuses[p, :] = 0
         blocking[p, :] = False
         numbers[p, SHORTFALL] = 0.0
@@ -112,18 +113,18 @@ def inverse_poses(
         numbers[p, MOMENT_RESIDUAL] = math.nan
         cable_geometry(robot, body, poses[p], rotation, geometry)
         status = POSE_NO_CHORD
-        if place_cables(code, k_h, k_p, limits_of, validity, gravity, robot, geometry, work):
+        if place_cables(model, limits_of, validity, robot, geometry, work):
             status = POSE_SINGULAR
             scale_tensions(variable, preference, geometry, work)
             if factor_balance(freedom, geometry, work, full, matrix, reduced, balance, q, inverse, null):
                 refer(method, variable, preference, previous, work, null, reference)
                 status = settle(
-                    code, k_h, k_p, method, parameter, variable, freedom, preference, previous, body, wrench, geometry,
+                    model, method, parameter, variable, freedom, preference, previous, body, wrench, geometry,
                     work, full, matrix, reduced, balance, q, inverse, null, reference, corners, labels, statuses[p],
                 )  # fmt: skip
         if status == POSE_SOLVED:
             measure_balance(freedom, body, wrench, geometry, work, matrix, balance, numbers, p)
-            remember(code, k_h, k_p, variable, gravity, geometry, work, previous)
+            remember(model, variable, geometry, work, previous)
         elif status == POSE_INFEASIBLE:
             numbers[p, SHORTFALL] = explain(freedom, work, matrix, balance, inverse, null, blocking[p])
         else:

@@ -13,6 +13,7 @@ from sagline.kernels.balance import geometry as g
 from sagline.kernels.balance.geometry import cable_geometry
 from sagline.kernels.balance.setting import factor_balance, place_cables, scale_tensions
 from sagline.kernels.balance.statics import needed_wrench, restrict_needed, restrict_rows, structure_matrix
+from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import (
     FRAME_END_TENSION,
 )
@@ -59,7 +60,7 @@ def polygon_of_pose(
     """
     r, m = null.shape
     n = freedom.shape[0]
-    gravity = body[tables.GRAVITY]
+    model = Model(code, k_h, k_p, body[tables.GRAVITY])
     geometry = np.empty((g.GEOMETRY_ROWS, m))
     balance = np.empty((tables.BALANCE_ROWS, 6))
     full = np.empty((6, m))
@@ -68,14 +69,14 @@ def polygon_of_pose(
     q = np.empty((m + 1, m))
     inverse = np.empty((n, m))
     cable_geometry(robot, body, pose, np.empty((3, 3)), geometry)
-    place_cables(code, k_h, k_p, limits_of, validity, gravity, robot, geometry, work)
+    place_cables(model, limits_of, validity, robot, geometry, work)
     known = not math.isnan(tensions[0])
     if known:
         work[tables.TAU] = tensions
         work[tables.PULL] = pulls
     scale_tensions(variable, preference, geometry, work)
     if known and variable == FRAME_END_TENSION:
-        linearize_ends(code, k_h, k_p, preference, gravity, geometry, work)
+        linearize_ends(model, preference, geometry, work)
     factor_balance(freedom, geometry, work, full, matrix, reduced, balance, q, inverse, null)
     needed_wrench(geometry, body, wrench, work, balance)
     restrict_needed(freedom, balance)
@@ -120,7 +121,8 @@ def margins_of_poses(
         body = bodies[min(p, bodies.shape[0] - 1)]
         wrench = wrenches[min(p, wrenches.shape[0] - 1)]
         cable_geometry(robot, body, poses[p], np.empty((3, 3)), geometry)
-        placed = place_cables(code, k_h, k_p, limits_of, validity, body[tables.GRAVITY], robot, geometry, work)
+        model = Model(code, k_h, k_p, body[tables.GRAVITY])
+        placed = place_cables(model, limits_of, validity, robot, geometry, work)
         if placed and not math.isnan(pulls[p, 0]):
             work[tables.PULL] = pulls[p]
             needed_wrench(geometry, body, wrench, work, balance)

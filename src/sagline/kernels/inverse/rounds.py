@@ -8,6 +8,7 @@ from sagline.kernels.algebra.null_space import minimum_norm
 from sagline.kernels.balance import geometry as g
 from sagline.kernels.balance.statics import needed_wrench, restrict_needed
 from sagline.kernels.cable.hanging import NEAR, frame_end_tension, hang_cables
+from sagline.kernels.cable.terms import Chord, Material, Model
 from sagline.kernels.codes import (
     CABLE_NOT_CONVERGED,
     CABLE_TOO_SLACK,
@@ -30,9 +31,7 @@ SETTLED = 1e-10  # [N]; pulls that change by less, or by 1e-15 of the largest te
 
 
 @formula
-def remember(
-    code: int, k_h: float, k_p: float, variable: int, gravity: float, geometry: Array, work: Array, previous: Array
-) -> None:
+def remember(model: Model, variable: int, geometry: Array, work: Array, previous: Array) -> None:
     """Keep the tensions, in the variable they were shared in, for the pose that follows."""
     for i in range(previous.size):
         tau = work[tables.TAU, i]
@@ -41,15 +40,9 @@ def remember(
             previous[i] = tau * geometry[g.COSINE, i]
         elif variable == FRAME_END_TENSION:
             previous[i] = frame_end_tension(
-                code,
-                k_h,
-                k_p,
-                gravity,
-                geometry[g.CHORD, i],
-                geometry[g.SINE, i],
-                geometry[g.COSINE, i],
-                work[tables.DENSITY_ROW, i],
-                work[tables.STIFFNESS_ROW, i],
+                model,
+                Chord(geometry[g.CHORD, i], geometry[g.SINE, i], geometry[g.COSINE, i]),
+                Material(work[tables.DENSITY_ROW, i], work[tables.STIFFNESS_ROW, i]),
                 tau,
             )
 
@@ -65,9 +58,7 @@ def keep_near(work: Array, null: Array, reference: Array) -> None:
 
 @formula
 def settle(
-    code: int,
-    k_h: float,
-    k_p: float,
+    model: Model,
     method: int,
     parameter: float,
     variable: int,
@@ -112,8 +103,7 @@ def settle(
             largest = max(largest, new)
             work[tables.TAU, i] = new
             work[tables.LAST_PULL, i] = work[tables.PULL, i]
-        gravity = body[tables.GRAVITY]
-        gravest = hang_cables(code, k_h, k_p, gravity, geometry, work, statuses, near and moved < NEAR)
+        gravest = hang_cables(model, geometry, work, statuses, near and moved < NEAR)
         if gravest == CABLE_TOO_SLACK:
             return POSE_TOO_SLACK
         if gravest == CABLE_NOT_CONVERGED:
@@ -121,12 +111,12 @@ def settle(
         change = 0.0
         for i in range(m):
             change = max(change, abs(work[tables.PULL, i] - work[tables.LAST_PULL, i]))
-        stands = code != CATENARY or change <= SETTLED + 1e-15 * largest
+        stands = model.code != CATENARY or change <= SETTLED + 1e-15 * largest
         if stands and (variable != FRAME_END_TENSION or (near and moved <= STILL)):
             return POSE_SOLVED
         near = True
         if variable == FRAME_END_TENSION and not relinearize(
-            code, k_h, k_p, method, freedom, preference, previous, gravity,
+            model, method, freedom, preference, previous,
             geometry, work, full, matrix, reduced, balance, q, inverse, null, reference,
         ):  # fmt: skip
             return POSE_SINGULAR

@@ -1,0 +1,66 @@
+"""The words of one cable, as scalars: what kernels of a single cable take and give.
+
+They cost nothing in compiled code, where a NamedTuple of numbers is its numbers.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+Terms = tuple[int, float, float, float]  # a Model as it comes from Python: numba knows plain tuples three times faster
+
+
+class Model(NamedTuple):
+    """A cable model where it stands.
+
+    Attributes:
+        code: Which equations.
+        k_h: The empirical model's constant of the pull.
+        k_p: The empirical model's constant of the sag.
+        gravity: [m/s^2].
+    """
+
+    code: int
+    k_h: float
+    k_p: float
+    gravity: float
+
+
+class Material(NamedTuple):
+    """What a cable is made of.
+
+    Attributes:
+        density: Mass per length [kg/m].
+        stiffness: EA [N].
+    """
+
+    density: float
+    stiffness: float
+
+
+class Chord(NamedTuple):
+    """The straight line from a cable's frame end to its platform end.
+
+    Attributes:
+        length: D [m].
+        sine: sin phi.
+        cosine: cos phi.
+    """
+
+    length: float
+    sine: float
+    cosine: float
+
+
+class Force(NamedTuple):
+    """What acts on a cable at its platform end.
+
+    Attributes:
+        horizontal: T_x [N].
+        vertical: T_z [N], up positive.
+        tension: tau, the chord tension [N].
+    """
+
+    horizontal: float
+    vertical: float
+    tension: float
