@@ -5,26 +5,28 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from sagline.arrays import Array, Codes, locked
+from sagline.arrays import Array, Codes, Flags, locked
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.cables.state import CableState
 from sagline.errors import CableGeometryError, InvalidValueError
 from sagline.kernels import codes, tables
-from sagline.kernels.inverse.answer import FORCE_RESIDUAL, MOMENT_RESIDUAL, POSE_NUMBERS, SHORTFALL
-from sagline.kernels.inverse.inverse import inverse_poses
+from sagline.kernels.inverse.explain import explain_poses
+from sagline.kernels.inverse.poses import Answers, inverse_poses
 from sagline.kinematics.plan import Plan
 from sagline.motion.path import Path
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.statics.tables import body_table, cable_table, pose_rows
+from sagline.statics.tables import pose_rows, robot_terms
 from sagline.statics.wrench import external_wrench, inertial_wrench
 from sagline.tension.closest import Closest
 from sagline.tension.method import TensionMethod, Variable
-from sagline.tension.options import kernel_options
+from sagline.tension.options import Options, kernel_options, takes_default_kernel
+
+BLOCK = 1 << 12  # poses solved at once: less than 0.2 s, after which an interrupt is heard
 
 _CATENARY = Catenary()
 _CLOSEST = Closest()
@@ -71,18 +73,13 @@ def inverse(
     if isinstance(motion, Path):
         load = locked(inertial_wrench(robot, pose, motion.twist, motion.twist_rate) + load)
     reference = _reference(robot, previous, tension.variable)
-    found = _Answers.empty(count, robot.cable_count, robot.degrees_of_freedom)
-    inverse_poses(
-        *options,
-        robot.freedom,
-        body_table(robot),
-        cable_table(robot),
-        rows,
-        np.atleast_2d(load),
-        reference,
-        *found,
-    )
+    found = Found.empty(count, robot.cable_count, robot.degrees_of_freedom)
+    otherwise = None if takes_default_kernel(method) else True
+    given = (*options, robot_terms(robot), rows, np.atleast_2d(load), reference, otherwise, found.answers)
+    for first in range(0, count, BLOCK):
+        inverse_poses(*given, first, min(first + BLOCK, count))
     _refuse_missing_chords(found.pose_status, found.results)
+    shortfall, farkas, blocking = explained(robot, options, rows, found)
     cables = CableState(
         model=model,
         cable=robot.cables,
@@ -101,37 +98,65 @@ def inverse(
         path=motion if isinstance(motion, Path) else None,
         tension=tension,
         status=locked(found.pose_status.reshape(pose.shape)),
-        shortfall=locked(found.numbers[:, SHORTFALL].reshape(pose.shape)),
-        wrench_residual=locked(found.numbers[:, [FORCE_RESIDUAL, MOMENT_RESIDUAL]].reshape(*pose.shape, 2)),
-        blocking=locked(found.blocking.reshape(*pose.shape, -1)),
-        farkas=locked((found.proofs[:, 0] @ robot.freedom).reshape(*pose.shape, 6)),
-        needed=locked((found.proofs[:, 1] @ robot.freedom).reshape(*pose.shape, 6)),
+        shortfall=locked(shortfall.reshape(pose.shape)),
+        wrench_residual=locked(found.residuals.reshape(*pose.shape, 2)),
+        blocking=locked(blocking.reshape(*pose.shape, -1)),
+        farkas=locked((farkas @ robot.freedom).reshape(*pose.shape, 6)),
+        needed=locked((found.needed @ robot.freedom).reshape(*pose.shape, 6)),
     )
 
 
-class _Answers(NamedTuple):
-    """What the kernel fills, in its order."""
+class Found(NamedTuple):
+    """What the kernel fills, in its order; arrays lead with the N poses but for results (RESULT_ROWS, N, m)."""
 
     results: Array
     cable_status: Codes
-    numbers: Array
-    proofs: Array
+    residuals: Array
+    needed: Array
     pose_status: Codes
-    blocking: NDArray[np.bool_]
 
     @classmethod
-    def empty(cls, count: int, cables: int, freedoms: int) -> _Answers:
+    def empty(cls, count: int, cables: int, freedoms: int) -> Found:
+        """Room for a batch."""
         return cls(
             np.empty((tables.RESULT_ROWS, count, cables)),
             np.empty((count, cables), dtype=np.int8),
-            np.empty((count, POSE_NUMBERS)),
-            np.empty((count, 2, freedoms)),
+            np.empty((count, 2)),
+            np.empty((count, freedoms)),
             np.empty(count, dtype=np.int8),
-            np.empty((count, cables), dtype=np.bool_),
         )
 
+    @property
+    def answers(self) -> Answers:
+        """As the kernel takes it: a plain tuple."""
+        return self.results, self.cable_status, self.residuals, self.needed, self.pose_status
+
     def row(self, row: int, pose: Pose) -> Array:
+        """One row of the results in the caller's shape."""
         return locked(self.results[row].reshape(*pose.shape, -1))
+
+
+def explained(robot: Robot, options: Options, rows: Array, found: Found) -> tuple[Array, Array, Flags]:
+    """Shortfall [N] (N,), Farkas vectors along the free motions (N, n) and blocking cables (N, m) of a batch."""
+    count, n = found.needed.shape
+    solved = found.pose_status == codes.POSE_SOLVED
+    shortfall = np.where(solved, 0.0, np.nan)
+    farkas = np.full((count, n), np.nan)
+    blocking = np.zeros((count, robot.cable_count), dtype=np.bool_)
+    which = np.flatnonzero(found.pose_status == codes.POSE_INFEASIBLE)
+    weight = np.ones(robot.cable_count)
+    for first in range(0, which.size, BLOCK):
+        explain_poses(
+            options.model,
+            options.limits,
+            robot_terms(robot),
+            rows,
+            found.needed,
+            which[first : first + BLOCK],
+            weight,
+            (shortfall, farkas, blocking),
+        )
+    return shortfall, farkas, blocking
 
 
 def _reference(robot: Robot, previous: Plan | None, variable: Variable) -> Array:

@@ -31,3 +31,8 @@ def pose_rows(pose: Pose) -> Array:
     """Positions and quaternions of a pose or a batch, shape (N, POSE_COLUMNS); N = 1 for a single pose."""
     rows = np.concatenate((np.atleast_2d(pose.position), np.atleast_2d(pose.quaternion)), axis=1)
     return locked(rows)
+
+
+def robot_terms(robot: Robot) -> tuple[Array, Array, Array]:
+    """Free motions (n, 6), body_table and cable_table, as kernels take a robot."""
+    return robot.freedom, body_table(robot), cable_table(robot)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from sagline.arrays import Array, locked
-from sagline.kernels.inverse.pose_queries import margins_of_poses
+from sagline.kernels.inverse.queries import margins_of_poses
 from sagline.robot.equilibrium import Equilibrium
-from sagline.statics.tables import body_table, cable_table, pose_rows
+from sagline.statics.tables import pose_rows, robot_terms
 from sagline.tension.options import LIMITS_OF
 
 
@@ -47,13 +47,9 @@ def capacity_margin(state: Equilibrium) -> Array:
     pulls = np.atleast_2d(cables.vertical_force - cables.chord_tension * cables.rise / cables.chord)
     margins = np.empty(len(rows))
     margins_of_poses(
-        cables.model.code,
-        *cables.model.parameters,
-        LIMITS_OF[robot.tension_limits_of],
-        np.nan,
-        robot.freedom,
-        body_table(robot),
-        cable_table(robot),
+        (cables.model.code, *cables.model.parameters),
+        (LIMITS_OF[robot.tension_limits_of], np.nan),
+        robot_terms(robot),
         rows,
         np.atleast_2d(state.wrench),
         locked(np.ascontiguousarray(pulls)),

@@ -2,37 +2,53 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.arrays import locked
 from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
 from sagline.kernels import codes
+from sagline.kernels.inverse.poses import LimitTerms, ModelTerms, SharingTerms
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 
 LIMITS_OF = {"chord": codes.LIMITS_OF_CHORD, "frame_end": codes.LIMITS_OF_FRAME_END}
 
 
-def kernel_options(
-    robot: Robot, model: CableModel, tension: TensionMethod
-) -> tuple[int, float, float, int, float, int, int, float, Array]:
-    """Model, method and limits as the kernels' leading codes and parameters.
+class Options(NamedTuple):
+    """Model, method and limits as kernels take them first.
+
+    Attributes:
+        model: Code, k_h, k_p.
+        sharing: Method, parameter, variable, root weights and goals of the cables.
+        limits: Which quantity is limited, and the article's T_adj [N] or NaN.
+    """
+
+    model: ModelTerms
+    sharing: SharingTerms
+    limits: LimitTerms
+
+
+def kernel_options(robot: Robot, model: CableModel, tension: TensionMethod) -> Options:
+    """Model, method and limits as kernels take them first.
 
     Raises:
         InvalidValueError: If the robot's tensions cannot be determined, or not by this method.
     """
     check_sharing(robot, tension)
-    return (
-        model.code,
-        *model.parameters,
-        tension.code,
-        tension.parameter,
-        tension.variable_code,
-        LIMITS_OF[robot.tension_limits_of],
-        tension.validity,
-        tension.preference(robot.cable_count),
+    weight, goal = (locked(row) for row in tension.preference(robot.cable_count))
+    return Options(
+        (model.code, *model.parameters),
+        (tension.code, tension.parameter, tension.variable_code, weight, goal),
+        (LIMITS_OF[robot.tension_limits_of], tension.validity),
     )
+
+
+def takes_default_kernel(tension: TensionMethod) -> bool:
+    """Whether a method shares nearest to a reference in a linear variable: what is compiled first."""
+    return tension.code <= codes.QUADRATIC_PROGRAM and tension.variable_code != codes.FRAME_END_TENSION
 
 
 def check_sharing(robot: Robot, tension: TensionMethod) -> None:

@@ -17,7 +17,7 @@ from sagline.kernels.cable.terms import Material, Model
 from sagline.kernels.codes import CATENARY, ELASTIC, STRAIGHT
 from sagline.kernels.forward.platform import end_stiffness, platform_stiffness, unbalance
 from sagline.kernels.forward.problem import Problem, new_space
-from sagline.kernels.jit import kernel
+from sagline.kernels.jit import entry, kernel
 
 # which datum changes
 BY_LENGTH, BY_DENSITY, BY_STIFFNESS = 0, 1, 2
@@ -126,7 +126,7 @@ def describe_state(problem: Problem, pose: Array, matrix: Array, blocks: Array, 
             slopes[q, i, 2] = z
 
 
-@kernel
+@entry
 def describe_states(
     code: int,
     k_h: float,

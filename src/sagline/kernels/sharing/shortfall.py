@@ -11,57 +11,44 @@ import math
 import numpy as np
 
 from sagline.arrays import Array, Codes
-from sagline.kernels.jit import kernel
+from sagline.kernels.algebra.gram_schmidt import keep, take_out
+from sagline.kernels.jit import glue, kernel
 
 MOMENT_WEIGHT = 1e5  # per typical lever arm; the moment's residual is this squared smaller than the force's
 STEPS = 200
 AT_LOW, AT_HIGH, FREE = 0, 1, 2
 
 
-@kernel
+@glue
 def solve_free(matrix: Array, right: Array, side: Codes, tensions: Array, solution: Array) -> None:
-    """Least squares in the free tensions, the others held: fills solution (m,), by modified Gram-Schmidt twice."""
+    """Least squares in the free tensions, the others held: fills solution (m,)."""
     n, m = matrix.shape
-    orthonormal = np.empty((n, n))
-    triangle = np.zeros((n, n))
+    frame = np.empty((n + 1, n))
+    triangle = np.empty((n + 1, n + 1))
     columns = np.empty(n, dtype=np.int64)
     residual = right.copy()
     count = 0
     for i in range(m):
         solution[i] = tensions[i]
         if side[i] == FREE and count < n:
+            for k in range(n):
+                frame[count, k] = matrix[k, i]
+            keep(frame, count, triangle, take_out(frame, count, triangle))
             columns[count] = i
             count += 1
         else:
             for k in range(n):
                 residual[k] -= matrix[k, i] * tensions[i]
-    for c in range(count):
-        for k in range(n):
-            orthonormal[k, c] = matrix[k, columns[c]]
-        for _ in range(2):
-            for b in range(c):
-                total = 0.0
-                for k in range(n):
-                    total += orthonormal[k, b] * orthonormal[k, c]
-                triangle[b, c] += total
-                for k in range(n):
-                    orthonormal[k, c] -= total * orthonormal[k, b]
-        square = 0.0
-        for k in range(n):
-            square += orthonormal[k, c] * orthonormal[k, c]
-        triangle[c, c] = math.sqrt(square)
-        for k in range(n):
-            orthonormal[k, c] /= triangle[c, c]
     for c in range(count - 1, -1, -1):
         total = 0.0
         for k in range(n):
-            total += orthonormal[k, c] * residual[k]
+            total += frame[c, k] * residual[k]
         for b in range(c + 1, count):
             total -= triangle[c, b] * solution[columns[b]]
         solution[columns[c]] = total / triangle[c, c]
 
 
-@kernel
+@glue
 def slopes(matrix: Array, right: Array, tensions: Array, residual: Array, gradient: Array) -> None:
     """Fill the residual right - matrix t (n,) and its components along the columns (m,)."""
     n, m = matrix.shape
@@ -75,7 +62,7 @@ def slopes(matrix: Array, right: Array, tensions: Array, residual: Array, gradie
             gradient[i] += matrix[k, i] * residual[k]
 
 
-@kernel
+@glue
 def bounded_least_squares(
     matrix: Array, right: Array, low: Array, high: Array, tensions: Array, residual: Array
 ) -> bool:

@@ -16,23 +16,22 @@ import math
 import numpy as np
 
 from sagline.arrays import Array, Indices
+from sagline.kernels.algebra.strips import HIGH, LOW, START, TOLERANCE, largest_number
 from sagline.kernels.jit import kernel
-from sagline.kernels.sharing.polygon import TOLERANCE, largest_tension
-from sagline.kernels.tables import HIGH, LOW, START
 
 PARALLEL = 1e-12
 
 
 @kernel
-def limit_lines(work: Array, null: Array, lines: Array) -> None:
+def limit_lines(strips: Array, null: Array, lines: Array) -> None:
     """Fill the limits 2i and 2i + 1 as rows gx, gy, offset of gx x + gy y + offset >= 0, (2m, 3)."""
     for i in range(null.shape[1]):
         lines[2 * i, 0] = null[0, i]
         lines[2 * i, 1] = null[1, i]
-        lines[2 * i, 2] = work[START, i] - work[LOW, i]
+        lines[2 * i, 2] = strips[START, i] - strips[LOW, i]
         lines[2 * i + 1, 0] = -null[0, i]
         lines[2 * i + 1, 1] = -null[1, i]
-        lines[2 * i + 1, 2] = work[HIGH, i] - work[START, i]
+        lines[2 * i + 1, 2] = strips[HIGH, i] - strips[START, i]
 
 
 @kernel
@@ -51,15 +50,15 @@ def most_independent(null: Array) -> tuple[int, int]:
 
 
 @kernel
-def walk_polygon(work: Array, null: Array, corners: Array, labels: Indices) -> int:
+def walk_polygon(strips: Array, null: Array, corners: Array, labels: Indices) -> int:
     """Fill corners, counter-clockwise, and labels as `feasible_polygon` does; returns how many.
 
     0 if the polygon is empty, -1 if the walk lost its way. All limits must be finite.
     """
     m = null.shape[1]
-    slack = TOLERANCE * largest_tension(work)
+    slack = TOLERANCE * largest_number(strips)
     lines = np.empty((2 * m, 3))
-    limit_lines(work, null, lines)
+    limit_lines(strips, null, lines)
     met = np.zeros(2 * m, dtype=np.bool_)
     a, b = most_independent(null)
     line = 2 * a
