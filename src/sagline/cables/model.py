@@ -65,7 +65,15 @@ class CableModel:
         tension = checked(chord_tension, "chord_tension", "N", low=0.0)
         problem = _problem(cable, span, rise, tension, gravity)
         length, horizontal, vertical, status = _outputs(problem.size)
-        batch.batch_from_tension(self.terms(problem.gravity), *problem.operands, length, horizontal, vertical, status)
+        batch.batch_from_tension(
+            self.terms(problem.gravity),
+            *problem.operands,
+            length,
+            horizontal,
+            vertical,
+            status,
+            np.empty((batch.BUFFERS, batch.CHUNK)),
+        )
         return problem.state(self, cable, length, horizontal, vertical, tension, status)
 
     def from_length(

@@ -37,6 +37,10 @@ def entry(function: F) -> F:
     return _compiled(function, nogil=True)
 
 
+def entry_with_memory(function: F) -> F:
+    return _compiled(function, nogil=True, _nrt=True)
+
+
 def kernel(function: F) -> F:
     """A kernel that only kernels call."""
     return _compiled(function, **INNER)
@@ -52,16 +56,20 @@ def glue(function: F) -> F:
     return _compiled(function, inline="always")
 
 
-INNER: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # what Python would need, and takes time to compile
+INNER: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # Python would need them
 
 
 def _compiled(function: F, **options: Any) -> F:
-    """Machine code is kept on disk; a division by zero gives inf or NaN as in NumPy."""
+    """Machine code is kept on disk; a division by zero gives inf or NaN as in NumPy.
+
+    Kernels allocate nothing (`sagline.kernels.memory`), and so need no counting of references (_nrt), which would take
+    a quarter of their time where arrays come in NamedTuples.
+    """
     # numba reads its cache folder while it decorates: set for that moment only, other users of numba keep theirs.
     before = getattr(config, "CACHE_DIR")  # noqa: B009 - set by numba at run time, unknown to type checkers
     setattr(config, "CACHE_DIR", str(FOLDER))  # noqa: B010
     try:
-        return cast("F", njit(cache=True, error_model="numpy", **options)(function))
+        return cast("F", njit(**({"cache": True, "error_model": "numpy", "_nrt": False} | options))(function))
     finally:
         setattr(config, "CACHE_DIR", before)  # noqa: B010
 

@@ -15,6 +15,7 @@ from sagline.errors import CableGeometryError, InvalidValueError
 from sagline.kernels import codes, tables
 from sagline.kernels.inverse.explain import explain_poses
 from sagline.kernels.inverse.poses import Answers, inverse_poses
+from sagline.kernels.memory import memory_for
 from sagline.kinematics.plan import Plan
 from sagline.motion.path import Path
 from sagline.robot.equilibrium import Equilibrium
@@ -75,7 +76,8 @@ def inverse(
     reference = _reference(robot, previous, tension.variable)
     found = Found.empty(count, robot.cable_count, robot.degrees_of_freedom)
     otherwise = None if takes_default_kernel(method) else True
-    given = (*options, robot_terms(robot), rows, np.atleast_2d(load), reference, otherwise, found.answers)
+    memory = memory_for(robot.cable_count)
+    given = (*options, robot_terms(robot), rows, np.atleast_2d(load), reference, memory, otherwise, found.answers)
     for first in range(0, count, BLOCK):
         inverse_poses(*given, first, min(first + BLOCK, count))
     _refuse_missing_chords(found.pose_status, found.results)
@@ -144,7 +146,7 @@ def explained(robot: Robot, options: Options, rows: Array, found: Found) -> tupl
     farkas = np.full((count, n), np.nan)
     blocking = np.zeros((count, robot.cable_count), dtype=np.bool_)
     which = np.flatnonzero(found.pose_status == codes.POSE_INFEASIBLE)
-    weight = np.ones(robot.cable_count)
+    memory = memory_for(robot.cable_count)
     for first in range(0, which.size, BLOCK):
         explain_poses(
             options.model,
@@ -153,7 +155,7 @@ def explained(robot: Robot, options: Options, rows: Array, found: Found) -> tupl
             rows,
             found.needed,
             which[first : first + BLOCK],
-            weight,
+            memory,
             (shortfall, farkas, blocking),
         )
     return shortfall, farkas, blocking

@@ -15,6 +15,7 @@ from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
 from sagline.kernels import codes, tables
 from sagline.kernels.inverse.poses import inverse_poses
+from sagline.kernels.memory import memory_for
 from sagline.kinematics.inverse import Found, explained
 from sagline.kinematics.status import PoseStatus
 from sagline.robot.robot import Robot
@@ -85,6 +86,7 @@ class InverseSolver:
             self._rows,
             locked(self._wrench.view()),
             self._reference,
+            memory_for(m),
             None if takes_default_kernel(method) else True,
             self._found.answers,
             0,

@@ -11,6 +11,7 @@ from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
 from sagline.kernels.algebra import strips
 from sagline.kernels.inverse.queries import polygon_of_pose
+from sagline.kernels.memory import memory_for
 from sagline.kernels.sharing.polygon import SPARE_CORNERS
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan
@@ -75,6 +76,7 @@ def tension_polygon(
         pose_rows(pose)[0],
         plan.state.wrench,
         (plan.chord_tension, _pulls(plan)),
+        memory_for(m),
         (scale, offset, limits, null, corners, labels),
     )
     origin = limits[strips.START]

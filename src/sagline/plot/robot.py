@@ -71,7 +71,7 @@ def _cable_lines(robot: Robot, pose: Pose) -> tuple[Array, bool]:
     """Points of the cables in the world [m], shape (m, POINTS, 3), and whether tensions carry the platform."""
     plan = inverse(robot, pose)
     tables = np.empty((1, geometry.GEOMETRY_ROWS, robot.cable_count))
-    geometry.cable_geometries(cable_table(robot), body_table(robot), pose_rows(pose), tables)
+    geometry.cable_geometries(cable_table(robot), body_table(robot), pose_rows(pose), np.empty((3, 3)), tables)
     table = tables[0]
     if plan.feasible:
         along, up = np.moveaxis(plan.state.cables.points(POINTS), -1, 0)

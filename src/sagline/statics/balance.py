@@ -31,7 +31,7 @@ def _geometry(robot: Robot, pose: Pose) -> Array:
     """Geometry rows of every pose, shape (N, GEOMETRY_ROWS, m)."""
     poses = pose_rows(pose)
     out = np.empty((len(poses), rows.GEOMETRY_ROWS, robot.cable_count))
-    cable_geometries(cable_table(robot), body_table(robot), poses, out)
+    cable_geometries(cable_table(robot), body_table(robot), poses, np.empty((3, 3)), out)
     return out
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from sagline.arrays import Array, locked
 from sagline.kernels.inverse.queries import margins_of_poses
+from sagline.kernels.memory import memory_for
 from sagline.robot.equilibrium import Equilibrium
 from sagline.statics.tables import pose_rows, robot_terms
 from sagline.tension.options import LIMITS_OF
@@ -53,6 +54,7 @@ def capacity_margin(state: Equilibrium) -> Array:
         rows,
         np.atleast_2d(state.wrench),
         locked(np.ascontiguousarray(pulls)),
+        memory_for(robot.cable_count),
         margins,
     )
     return margins.reshape(state.pose.shape)

@@ -10,11 +10,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from sagline.arrays import Array, Indices
 from sagline.kernels.algebra.strips import TOLERANCE, box_radius, inward, largest_number, most_missed, side_of
 from sagline.kernels.jit import formula, glue, kernel
+from sagline.kernels.memory import Memory, block
 
 LP_SOLVED, LP_EMPTY, LP_UNBOUNDED, LP_GAVE_UP = 0, 1, 2, 3
 PIVOTS = 2000
@@ -39,9 +38,12 @@ class Basis(NamedTuple):
 
 
 @glue
-def no_basis(d: int) -> Basis:
-    """Memory for d unknowns, with no basis."""
-    return Basis(np.full(d + 1, -1, dtype=np.int64), np.empty(d + 1), np.empty((d, d)))
+def new_basis(memory: Memory, d: int) -> tuple[Basis, Memory]:
+    """Room for d unknowns, and the memory that is left."""
+    weights, at = block(memory.numbers, 0, 1, d + 1)
+    inverse, at = block(memory.numbers, at, d, d)
+    labels = memory.counters[: d + 1]
+    return Basis(labels, weights[0], inverse), Memory(memory.numbers[at:], memory.counters[d + 1 :])
 
 
 @formula

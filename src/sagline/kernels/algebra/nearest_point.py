@@ -14,12 +14,11 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from sagline.arrays import Array, Indices
 from sagline.kernels.algebra.gram_schmidt import keep, take_out
 from sagline.kernels.algebra.strips import inward, most_missed, side_of
 from sagline.kernels.jit import glue, kernel
+from sagline.kernels.memory import Memory, block
 
 EXCHANGES = 2000
 DEPENDENT = 1e-10  # a side that leaves less than this of itself outside the span of others depends on them
@@ -45,14 +44,13 @@ class Held(NamedTuple):
 
 
 @glue
-def nothing_held(d: int) -> Held:
-    """Memory for d unknowns, with no side held."""
-    return Held(
-        np.zeros(d + 2, dtype=np.int64),
-        np.empty((d + 1, d)),
-        np.empty((d + 1, d + 1)),
-        np.empty((2, d + 1)),
-    )
+def new_held(memory: Memory, d: int) -> tuple[Held, Memory]:
+    """Room for d unknowns, and the memory that is left."""
+    frame, at = block(memory.numbers, 0, d + 1, d)
+    triangle, at = block(memory.numbers, at, d + 1, d + 1)
+    pushes, at = block(memory.numbers, at, 2, d + 1)
+    labels = memory.counters[: d + 2]
+    return Held(labels, frame, triangle, pushes), Memory(memory.numbers[at:], memory.counters[d + 2 :])
 
 
 @glue
@@ -108,7 +106,7 @@ def drop(rows: Array, held: Held, leaving: int) -> None:
 def nearest_point(rows: Array, strips: Array, target: Array, slack: float, held: Held, point: Array) -> bool:
     """Fill the point (d,) nearest to the target (d,) that keeps all strips up to a slack; False where there is none.
 
-    held: what a similar problem left, or `nothing_held`; filled with what this point stands on.
+    held: what a similar problem left, or labels[0] = 0; filled with what this point stands on.
     """
     labels, frame, triangle, pushes = held
     d = target.size

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from sagline.arrays import Array
 from sagline.kernels import tables
 from sagline.kernels.jit import entry, formula
@@ -61,9 +59,11 @@ def cable_geometry(cables: Array, body: Array, pose: Array, rotation: Array, geo
 
 
 @entry
-def cable_geometries(robots: Array, bodies: Array, poses: Array, geometries: Array) -> None:
-    """Fill the geometry rows of N poses, (N, GEOMETRY_ROWS, m); tables and poses as in `sagline.kernels.tables`."""
-    rotation = np.empty((3, 3))
+def cable_geometries(robots: Array, bodies: Array, poses: Array, rotation: Array, geometries: Array) -> None:
+    """Fill the geometry rows of N poses, (N, GEOMETRY_ROWS, m); tables and poses as in `sagline.kernels.tables`.
+
+    rotation: room, (3, 3).
+    """
     for p in range(poses.shape[0]):
         robot = robots[min(p, robots.shape[0] - 1)]
         body = bodies[min(p, bodies.shape[0] - 1)]

@@ -1,15 +1,13 @@
-"""What is given at one pose: cables in place, their limits, and the balance factored. The one place that sets a pose up.
+"""What is given at one pose: cables in place, their limits, and the balance factored.
 
-The load is shared in a variable t that is SCALE chord tensions plus OFFSET: chord, horizontal or frame-end tensions, and
-weighted ones. Limits and minimum norm are those of t - OFFSET.
+This is the one place that sets a pose up. The load is shared in a variable t that is scale times the chord tension plus
+offset: chord, horizontal or frame-end tensions, and weighted ones. Limits and minimum norm are those of t - offset.
 """
 
 from __future__ import annotations
 
 import math
 from typing import NamedTuple
-
-import numpy as np
 
 from sagline.arrays import Array
 from sagline.kernels import tables
@@ -18,7 +16,7 @@ from sagline.kernels.algebra.strips import HIGH, LOW, START, STRIP_ROWS
 from sagline.kernels.balance import geometry as g
 from sagline.kernels.balance.geometry import cable_geometry
 from sagline.kernels.balance.wrench import along_freedom, fill_structure_matrix, needed_wrench, rows_along_freedom
-from sagline.kernels.cable.cables import Cables, chord_of, material_of, new_cables
+from sagline.kernels.cable.cables import Cables, chord_of, material_of
 from sagline.kernels.cable.hanging import chord_tension_at_frame_end
 from sagline.kernels.cable.models import pull_of_shallow
 from sagline.kernels.cable.terms import Model
@@ -31,6 +29,7 @@ from sagline.kernels.codes import (
     POSE_SOLVED,
 )
 from sagline.kernels.jit import glue
+from sagline.kernels.memory import Memory, block
 
 SHORTEST_CHORD = 1e-9  # [m]
 
@@ -104,31 +103,27 @@ class Balance(NamedTuple):
 
 
 @glue
-def new_balance(m: int, n: int) -> Balance:
-    """Memory for m cables and n free motions."""
-    return Balance(
-        np.empty((3, 3)),
-        np.empty((g.GEOMETRY_ROWS, m)),
-        np.empty((6, m)),
-        np.empty((n, m)),
-        np.empty((n, m)),
-        np.empty((2, n)),
-        np.empty((m + 1, m)),
-        np.empty((n, m)),
-        np.empty((m - n, m)),
-        np.empty(6),
-        np.empty(n),
-        np.empty(m),
-        np.empty(m),
-        np.empty((STRIP_ROWS, m)),
-        np.empty(m),
-    )
-
-
-@glue
-def new_setting(m: int, n: int) -> tuple[Cables, Balance]:
-    """Memory for one pose."""
-    return new_cables(m), new_balance(m, n)
+def new_balance(memory: Memory, m: int, n: int) -> tuple[Balance, Memory]:
+    """Room for m cables and n free motions, and the memory that is left."""
+    numbers = memory.numbers
+    rotation, at = block(numbers, 0, 3, 3)
+    geometry, at = block(numbers, at, g.GEOMETRY_ROWS, m)
+    full, at = block(numbers, at, 6, m)
+    matrix, at = block(numbers, at, n, m)
+    reduced, at = block(numbers, at, n, m)
+    diagonals, at = block(numbers, at, 2, n)
+    q, at = block(numbers, at, m + 1, m)
+    inverse, at = block(numbers, at, n, m)
+    null, at = block(numbers, at, m - n, m)
+    needed, at = block(numbers, at, 1, 6)
+    right, at = block(numbers, at, 1, n)
+    strips, at = block(numbers, at, STRIP_ROWS, m)
+    rows, at = block(numbers, at, 3, m)
+    balance = Balance(
+        rotation, geometry, full, matrix, reduced, diagonals, q, inverse, null,
+        needed[0], right[0], rows[0], rows[1], strips, rows[2],
+    )  # fmt: skip
+    return balance, Memory(numbers[at:], memory.counters)
 
 
 @glue

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from sagline.arrays import Array, Codes
 from sagline.kernels.cable.catenary import (
     catenary_end,
@@ -18,7 +16,8 @@ from sagline.kernels.cable.terms import Chord, Material, Model, Terms
 from sagline.kernels.codes import CABLE_SOLVED, CATENARY
 from sagline.kernels.jit import entry, kernel
 
-CHUNK = 256  # cables at a time: ten buffers of this length stay in the fastest cache
+CHUNK = 256  # cables at a time: so many buffers of this length stay in the fastest cache
+BUFFERS = 11
 
 
 @kernel
@@ -44,16 +43,19 @@ def batch_from_tension(
     horizontal_out: Array,
     vertical_out: Array,
     status_out: Codes,
+    buffer: Array,
 ) -> None:
     """Length, forces on the platform end and status of every cable at its chord tension.
 
     Ordinary catenaries are solved for a whole chunk in loops without branches; what is not ordinary
     is solved again, one by one. One result a loop: with more, the compiler gives up on vectorizing.
+    buffer is room, (BUFFERS, CHUNK).
     """
     model = Model(*terms)
     count = length_out.shape[0]
-    buffer = np.empty((11, CHUNK))
-    x, z, rho, ea, tau, chord, sine, cosine, half, ratio, pull = buffer
+    x, z, rho, ea, tau = buffer[0], buffer[1], buffer[2], buffer[3], buffer[4]
+    chord, sine, cosine, half = buffer[5], buffer[6], buffer[7], buffer[8]
+    ratio, pull = buffer[9], buffer[10]
     for start in range(0, count, CHUNK):
         stop = min(start + CHUNK, count)
         size = stop - start

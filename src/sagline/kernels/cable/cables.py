@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
 from sagline.arrays import Array
 from sagline.kernels.cable.terms import Chord, Material
 from sagline.kernels.jit import glue
+from sagline.kernels.memory import Memory, block
 
 
 class Cables(NamedTuple):
@@ -48,13 +47,14 @@ class Cables(NamedTuple):
 
 
 @glue
-def new_cables(m: int) -> Cables:
-    """Memory for m cables."""
-    rows = np.empty((14, m))
-    return Cables(
+def new_cables(memory: Memory, m: int) -> tuple[Cables, Memory]:
+    """Room for m cables, and the memory that is left."""
+    rows, at = block(memory.numbers, 0, 14, m)
+    cables = Cables(
         rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6],
         rows[7], rows[8], rows[9], rows[10], rows[11], rows[12], rows[13],
     )  # fmt: skip
+    return cables, Memory(memory.numbers[at:], memory.counters)
 
 
 @glue

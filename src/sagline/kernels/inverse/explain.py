@@ -5,11 +5,13 @@ from __future__ import annotations
 from sagline.arrays import Array, Flags, Indices
 from sagline.kernels import tables
 from sagline.kernels.balance.freedom import turns
-from sagline.kernels.balance.setting import Limits, Platform, new_setting, set_pose, start_from_minimum_norm
+from sagline.kernels.balance.setting import Limits, Platform, new_balance, set_pose, start_from_minimum_norm
+from sagline.kernels.cable.cables import new_cables
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import CHORD_TENSION
 from sagline.kernels.inverse.poses import LimitTerms, ModelTerms, Robots
 from sagline.kernels.jit import entry
+from sagline.kernels.memory import Memory
 from sagline.kernels.sharing.proof import prove_empty
 from sagline.kernels.sharing.shortfall import wrench_shortfall
 
@@ -22,10 +24,10 @@ def explain_poses(
     poses: Array,
     needed: Array,
     which: Indices,
-    weight: Array,
+    room: tuple[Array, Indices],
     explanations: tuple[Array, Array, Flags],
 ) -> None:
-    """Explain those of N poses that no tensions balance.
+    """Explain those of N poses that no tensions balance, in chord tensions, however the load is shared.
 
     Args:
         model_terms: As in `inverse_poses`.
@@ -34,7 +36,7 @@ def explain_poses(
         poses: Rows (N, POSE_COLUMNS).
         needed: The wrench that J tau had to supply, along the free motions, (N, n).
         which: Which poses, (K,).
-        weight: Ones, (m,): the explanation is in chord tensions, however the load is shared.
+        room: `memory_for` as many cables.
         explanations: Filled for these poses: smallest change of the force [N], (N,); Farkas vectors along the free
             motions, (N, n); whether a cable stands against the needed wrench, (N, m).
     """
@@ -42,7 +44,13 @@ def explain_poses(
     freedom, bodies, robots = robot_terms
     shortfall, farkas, blocking = explanations
     n = freedom.shape[0]
-    cables, balance = new_setting(weight.size, n)
+    m = blocking.shape[1]
+    cables, rest = new_cables(Memory(*room), m)
+    balance, rest = new_balance(rest, m, n)
+    weight = rest.numbers[:m]
+    for i in range(m):
+        weight[i] = 1.0
+    rest = Memory(rest.numbers[m:], rest.counters)
     translations = 0
     for k in range(n):
         translations += 0 if turns(freedom, k) else 1
@@ -55,5 +63,5 @@ def explain_poses(
         for k in range(n):
             balance.right[k] = needed[p, k]
         start_from_minimum_norm(balance)
-        prove_empty(balance.strips, balance.inverse, balance.null, translations, farkas[p], blocking[p])
-        shortfall[p] = wrench_shortfall(balance.matrix, balance.right, cables.low, cables.high, translations)
+        prove_empty(balance.strips, balance.inverse, balance.null, translations, rest, farkas[p], blocking[p])
+        shortfall[p] = wrench_shortfall(balance.matrix, balance.right, cables.low, cables.high, translations, rest)

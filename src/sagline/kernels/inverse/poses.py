@@ -8,18 +8,19 @@ from __future__ import annotations
 
 import math
 
-from sagline.arrays import Array, Codes
+from sagline.arrays import Array, Codes, Indices
 from sagline.kernels import tables
 from sagline.kernels.balance import geometry as g
 from sagline.kernels.balance.freedom import turns
-from sagline.kernels.balance.setting import Balance, Limits, Platform, need, new_setting, set_pose
-from sagline.kernels.cable.cables import Cables
+from sagline.kernels.balance.setting import Balance, Limits, Platform, need, new_balance, set_pose
+from sagline.kernels.cable.cables import Cables, new_cables
 from sagline.kernels.cable.terms import Model
-from sagline.kernels.codes import CLOSEST, POSE_NO_CHORD, POSE_SINGULAR, POSE_SOLVED
+from sagline.kernels.codes import CABLE_SOLVED, CLOSEST, POSE_NO_CHORD, POSE_SINGULAR, POSE_SOLVED
 from sagline.kernels.inverse.rounds import remember, share_and_hang
 from sagline.kernels.jit import entry, glue
+from sagline.kernels.memory import Memory
 from sagline.kernels.sharing.nearest import Sharing, new_nearness
-from sagline.kernels.sharing.otherwise import new_room
+from sagline.kernels.sharing.room import new_room
 
 FORCE, MOMENT = 0, 1  # columns of the residuals
 
@@ -40,6 +41,7 @@ def inverse_poses(
     poses: Array,
     wrenches: Array,
     previous: Array,
+    room: tuple[Array, Indices],
     otherwise: bool | None,
     answers: Answers,
     first: int,
@@ -57,6 +59,7 @@ def inverse_poses(
         wrenches: External plus inertial, about the center of mass, (1 or N, 6).
         previous: Tensions in the sharing's variable (m,) to stay close to, NaN for the minimum norm; with CLOSEST the
             last feasible ones on return.
+        room: `memory_for` as many cables.
         otherwise: None for the ways of sharing nearest to a reference, in chord or horizontal tensions: all others are
             then left out of the machine code. True for any.
         answers: Filled: span, rise, length, T_x, T_z, tau, (RESULT_ROWS, N, m); status of each cable, (N, m); norms of
@@ -71,22 +74,24 @@ def inverse_poses(
     results, statuses, residuals, needed, pose_statuses = answers
     m = statuses.shape[1]
     n = freedom.shape[0]
-    cables, balance = new_setting(m, n)
-    near = new_nearness(m - n)
-    room = None if otherwise is None else new_room(sharing.method, m, m - n)
+    cables, rest = new_cables(Memory(*room), m)
+    balance, rest = new_balance(rest, m, n)
+    near, rest = new_nearness(rest, m - n)
+    others = None if otherwise is None else new_room(sharing.method, rest, m, m - n)
     for p in range(first, last):
         body = bodies[min(p, bodies.shape[0] - 1)]
         wrench = wrenches[min(p, wrenches.shape[0] - 1)]
         platform = Platform(freedom, body, robots[min(p, robots.shape[0] - 1)], poses[p], wrench)
         model = Model(model_terms[0], model_terms[1], model_terms[2], body[tables.GRAVITY])
-        statuses[p, :] = 0
+        for i in range(m):
+            statuses[p, i] = CABLE_SOLVED
         status = set_pose(model, limits, sharing.variable, sharing.weight, platform, cables, balance)
         if status == POSE_SOLVED:
-            status = share_and_hang(model, sharing, platform, cables, balance, previous, near, room, statuses[p])
+            status = share_and_hang(model, sharing, platform, cables, balance, previous, near, others, statuses[p])
         if status == POSE_SOLVED:
             measure_balance(platform, cables, balance, residuals[p])
             if sharing.method == CLOSEST:
-                remember(model, sharing, cables, room, previous)
+                remember(model, sharing, cables, others, previous)
         else:
             residuals[p, FORCE] = residuals[p, MOMENT] = math.nan
         for k in range(n):

@@ -21,7 +21,8 @@ from sagline.kernels.codes import (
 from sagline.kernels.inverse.frame_end import STILL, linearize_ends
 from sagline.kernels.jit import glue
 from sagline.kernels.sharing.nearest import Nearness, Sharing, is_nearest, refer, share_nearest
-from sagline.kernels.sharing.otherwise import Room, forget, share_otherwise
+from sagline.kernels.sharing.otherwise import share_otherwise
+from sagline.kernels.sharing.room import Room, forget
 
 ROUNDS = 30
 FREE_ROUNDS = 8  # then a choice that jumps with the last digits of the pulls is held where it is

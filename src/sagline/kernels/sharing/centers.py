@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from sagline.arrays import Array, Indices
+from sagline.arrays import Array
 from sagline.kernels.algebra.cholesky import factor_positive, solve_lower, solve_upper
-from sagline.kernels.algebra.linear_program import LP_SOLVED, Basis, lowest_point
-from sagline.kernels.algebra.strips import HIGH, LOW, START, TOLERANCE, largest_number
+from sagline.kernels.algebra.linear_program import LP_SOLVED, lowest_point
+from sagline.kernels.algebra.strips import HIGH, LOW, START, STRIP_ROWS, TOLERANCE, largest_number
 from sagline.kernels.codes import POSE_INFEASIBLE, POSE_NOT_CONVERGED, POSE_SOLVED, POSE_UNBOUNDED
 from sagline.kernels.jit import kernel
+from sagline.kernels.memory import Memory, block
 from sagline.kernels.sharing.on_polygon import centroid, feasible_corners
 from sagline.kernels.sharing.programs import status_of
+from sagline.kernels.sharing.room import Room
 
 THIN = 1e-9  # of the largest tension: a set thinner than this has no inside worth centering in
 NEWTON_STEPS = 200
@@ -21,19 +21,15 @@ CENTERED = 1e-18  # square of the Newton decrement at which the center is found
 
 
 @kernel
-def share_at_center(
-    strips: Array, null: Array, point: Array, corners: Array, labels: Indices, known: Indices, basis: Basis
-) -> int:
-    """Move the point (r,) to the analytic center.
-
-    known: whether the point is that of a round before, (1,); corners, labels and basis are room to find a first one in.
-    """
-    if known[0] > 0 and is_inside(strips, null, point) and analytic_center(strips, null, point):
+def share_at_center(strips: Array, null: Array, point: Array, room: Room) -> int:
+    """Move the point (r,) to the analytic center, from that of the round before if there was one."""
+    corners, labels, known = room.corners, room.labels, room.known
+    if known[0] > 0 and is_inside(strips, null, point) and analytic_center(strips, null, room.rest, point):
         return POSE_SOLVED
     known[0] = 0
     r, m = null.shape
     if r > 2:
-        status = deepest_point(strips, null, basis, point)
+        status = deepest_point(strips, null, room, point)
         if status != POSE_SOLVED:
             return status
     else:
@@ -47,7 +43,7 @@ def share_at_center(
         point[0] = x
         if r == 2:
             point[1] = y
-    if not analytic_center(strips, null, point):
+    if not analytic_center(strips, null, room.rest, point):
         return POSE_NOT_CONVERGED
     known[0] = 1
     return POSE_SOLVED
@@ -67,11 +63,15 @@ def is_inside(strips: Array, null: Array, point: Array) -> bool:
 
 
 @kernel
-def deepest_point(strips: Array, null: Array, basis: Basis, point: Array) -> int:
+def deepest_point(strips: Array, null: Array, room: Room, point: Array) -> int:
     """Fill the point (r,) whose tensions keep farthest from their nearest limits; returns the pose's status."""
     r, m = null.shape
-    rows = np.empty((r + 1, 2 * m))
-    halves = np.empty((3, 2 * m))  # every side a strip of its own, which the depth makes narrower
+    rows, at = block(room.rest.numbers, 0, r + 1, 2 * m)
+    halves, at = block(
+        room.rest.numbers, at, STRIP_ROWS, 2 * m
+    )  # every side one of its own, which depth makes narrower
+    vectors, at = block(room.rest.numbers, at, 2, r + 1)
+    cost, found = vectors[0], vectors[1]
     for i in range(m):
         for k in range(r):
             rows[k, i], rows[k, m + i] = null[k, i], -null[k, i]
@@ -79,19 +79,19 @@ def deepest_point(strips: Array, null: Array, basis: Basis, point: Array) -> int
         halves[START, i], halves[LOW, i], halves[HIGH, i] = strips[START, i], strips[LOW, i], math.inf
         halves[START, m + i], halves[LOW, m + i] = -strips[START, i], -strips[HIGH, i]
         halves[HIGH, m + i] = math.inf
-    cost = np.zeros(r + 1)
+    for k in range(r):
+        cost[k] = 0.0
     cost[r] = -1.0
-    found = np.empty(r + 1)
     slack = TOLERANCE * largest_number(strips)
-    basis.labels[0] = -1
-    outcome = lowest_point(rows, halves, cost, slack, basis, found)
+    room.basis.labels[0] = -1
+    outcome = lowest_point(rows, halves, cost, slack, room.basis, found)
     for k in range(r):
         point[k] = found[k]
     return POSE_INFEASIBLE if outcome == LP_SOLVED and found[r] < -slack else status_of(outcome)
 
 
 @kernel
-def analytic_center(strips: Array, null: Array, point: Array) -> bool:
+def analytic_center(strips: Array, null: Array, memory: Memory, point: Array) -> bool:
     """Move a point inside the feasible set (r,) to the one of largest product of distances to all limits.
 
     Newton's method with damped steps on the barrier, which is self-concordant; infinite limits do not count. A set
@@ -101,9 +101,9 @@ def analytic_center(strips: Array, null: Array, point: Array) -> bool:
         Whether the center was found.
     """
     r, m = null.shape
-    slope = np.empty(r)
-    step = np.empty(r)
-    curve = np.empty((r, r))
+    vectors, at = block(memory.numbers, 0, 2, r)
+    curve, at = block(memory.numbers, at, r, r)
+    slope, step = vectors[0], vectors[1]
     largest = largest_number(strips)
     for _ in range(NEWTON_STEPS):
         for k in range(r):

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from sagline.arrays import Array
 from sagline.kernels.algebra.gram_schmidt import keep, take_out
 from sagline.kernels.algebra.strips import HIGH, LOW, START, TOLERANCE, largest_number
 from sagline.kernels.codes import CLOSED_FORM, PUNCTURE
 from sagline.kernels.jit import glue, kernel
+from sagline.kernels.memory import Memory, block
 from sagline.kernels.sharing.nearest import within_limits
 
 DEPENDENT = 1e-10  # square of what is left of a cable's row once the cables before it are held
 
 
 @kernel
-def share_near_middle(method: int, strips: Array, null: Array, tension: Array) -> bool:
+def share_near_middle(method: int, strips: Array, null: Array, memory: Memory, tension: Array) -> bool:
     """Fill the tensions (m,) by the closed form, the improved closed form or the puncture method.
 
     Returns:
@@ -38,7 +37,7 @@ def share_near_middle(method: int, strips: Array, null: Array, tension: Array) -
             tension[i] += null[k, i] * share
     if method == CLOSED_FORM:
         return within_limits(strips, tension, slack)
-    if not hold_violated(strips, null, slack, tension):
+    if not hold_violated(strips, null, slack, memory, tension):
         return False
     if method == PUNCTURE:
         puncture(strips, tension)
@@ -46,14 +45,14 @@ def share_near_middle(method: int, strips: Array, null: Array, tension: Array) -
 
 
 @glue
-def hold_violated(strips: Array, null: Array, slack: float, tension: Array) -> bool:
+def hold_violated(strips: Array, null: Array, slack: float, memory: Memory, tension: Array) -> bool:
     """Hold the cable that misses its limit most at that limit, and share the rest again, until all keep theirs.
 
     Works on the tensions, by orthogonal steps in the null space; a cable once held stays there.
     """
     r, m = null.shape
-    held = np.empty((r + 1, r))
-    triangle = np.empty((r + 1, r + 1))
+    held, at = block(memory.numbers, 0, r + 1, r)
+    triangle, at = block(memory.numbers, at, r + 1, r + 1)
     for count in range(r + 1):
         worst = slack
         cable = -1

@@ -9,13 +9,12 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from sagline.arrays import Array
-from sagline.kernels.algebra.nearest_point import Held, nearest_point, nothing_held
+from sagline.kernels.algebra.nearest_point import Held, nearest_point, new_held
 from sagline.kernels.algebra.strips import HIGH, LOW, START, TOLERANCE, largest_number
 from sagline.kernels.codes import CLOSEST, POSE_INFEASIBLE, POSE_SOLVED, QUADRATIC_PROGRAM
 from sagline.kernels.jit import formula, glue
+from sagline.kernels.memory import Memory, block
 
 
 class Sharing(NamedTuple):
@@ -51,9 +50,11 @@ class Nearness(NamedTuple):
 
 
 @glue
-def new_nearness(r: int) -> Nearness:
-    """Memory for r redundant cables."""
-    return Nearness(np.empty(r), nothing_held(r), np.empty(r))
+def new_nearness(memory: Memory, r: int) -> tuple[Nearness, Memory]:
+    """Room for r redundant cables, and the memory that is left."""
+    rows, at = block(memory.numbers, 0, 2, r)
+    held, rest = new_held(Memory(memory.numbers[at:], memory.counters), r)
+    return Nearness(rows[0], held, rows[1]), rest
 
 
 @glue

@@ -16,6 +16,7 @@ from sagline.kernels.codes import (
 from sagline.kernels.jit import kernel
 from sagline.kernels.sharing.nearest import Nearness
 from sagline.kernels.sharing.polygon import feasible_polygon, nearest_corner_point, nearest_on_side, polygon_again
+from sagline.kernels.sharing.room import Room
 from sagline.kernels.sharing.walk import walk_polygon
 
 TIED = 1e-10  # of the largest tension: sums that differ by less are the same
@@ -23,19 +24,14 @@ WALK_SUM, WALK_NORM, WALK_CENTROID = 0.0, 1.0, 2.0  # the optimum of the polygon
 
 
 @kernel
-def share_on_polygon(
-    method: int, parameter: float, strips: Array, null: Array, near: Nearness, corners: Array, labels: Indices,
-    known: Indices,
-) -> int:  # fmt: skip
-    """Fill the point (r,) of near by the centroid or the polygon walk.
-
-    known: how many corners the polygon of the last round had, (1,), so that its sides are tried first; 0 for none.
-    """
+def share_on_polygon(method: int, parameter: float, strips: Array, null: Array, near: Nearness, room: Room) -> int:
+    """Fill the point (r,) of near by the centroid or the polygon walk; the sides of the last round are tried first."""
     r, m = null.shape
+    corners, labels, known = room.corners, room.labels, room.known
     count = known[0]
     if count == 0 or not polygon_again(strips, null, corners, labels, count):
         if method == POLYGON_WALK and r == 2:
-            count = walk_polygon(strips, null, corners, labels)
+            count = walk_polygon(strips, null, room.rest, corners, labels)
         else:
             count = feasible_corners(strips, null, corners, labels)
     known[0] = count if r == 2 else 0

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from sagline.arrays import Array, Indices
 from sagline.kernels.algebra.cholesky import factor_positive, solve_lower, solve_upper
 from sagline.kernels.algebra.nearest_point import nearest_point
 from sagline.kernels.algebra.strips import START, TOLERANCE, largest_number, most_missed
 from sagline.kernels.codes import POSE_INFEASIBLE, POSE_NOT_CONVERGED, POSE_SOLVED
 from sagline.kernels.jit import formula, glue, kernel
+from sagline.kernels.memory import Memory, block
 from sagline.kernels.sharing.nearest import Nearness
 
 STEPS = 200
@@ -21,7 +20,9 @@ STILL = 1e-12  # of the largest tension: a step shorter than this ends the searc
 
 
 @kernel
-def share_by_norm(p: float, strips: Array, offset: Array, null: Array, near: Nearness, known: Indices) -> int:
+def share_by_norm(
+    p: float, strips: Array, offset: Array, null: Array, near: Nearness, known: Indices, memory: Memory
+) -> int:
     """Fill the point (r,) of near whose tensions have the least p-norm.
 
     known: whether that point is the answer of a round before, (1,), from which the search then starts.
@@ -29,15 +30,17 @@ def share_by_norm(p: float, strips: Array, offset: Array, null: Array, near: Nea
     point = near.point
     slack = TOLERANCE * largest_number(strips)
     if known[0] > 0:
-        last = point.copy()
-        if nearest_point(null, strips, last, slack, near.held, point):
-            if lowest_p_norm(p, p, strips, offset, null, near, slack):
-                return POSE_SOLVED
+        last = memory.numbers[: point.size]
+        for k in range(point.size):
+            last[k] = point[k]
+        kept = nearest_point(null, strips, last, slack, near.held, point)
+        if kept and lowest_p_norm(p, p, strips, offset, null, near, memory):
+            return POSE_SOLVED
     known[0] = 0
     near.held.labels[0] = 0
     if not nearest_point(null, strips, near.reference, slack, near.held, point):
         return POSE_INFEASIBLE
-    if not lowest_p_norm(min(4.0, p), p, strips, offset, null, near, slack):
+    if not lowest_p_norm(min(4.0, p), p, strips, offset, null, near, memory):
         return POSE_NOT_CONVERGED
     known[0] = 1
     return POSE_SOLVED
@@ -101,12 +104,9 @@ def newton_target(
 
 
 @glue
-def project_in_metric(
-    strips: Array, null: Array, curve: Array, slack: float, near: Nearness, turned: Array, target: Array
-) -> bool:
-    """Replace the target (r,) by the feasible point nearest to it in the metric L L^T; turned is room, (r, m)."""
+def turn(null: Array, curve: Array, target: Array, turned: Array, goal: Array) -> None:
+    """Fill null space (r, m) and target (r,) in coordinates in which the metric L L^T is the ordinary one."""
     r, m = null.shape
-    goal = np.empty(r)
     for k in range(r):
         goal[k] = 0.0
         for j in range(k, r):
@@ -118,18 +118,11 @@ def project_in_metric(
                 turned[k, i] -= curve[k, j] * turned[j, i]
         for i in range(m):
             turned[k, i] /= curve[k, k]
-    if not nearest_point(turned, strips, goal, slack * max(curve[0, 0], 1.0), near.held, target):
-        return False
-    solve_upper(curve, target)
-    for k in range(r):
-        if not math.isfinite(target[k]):
-            target[k] = near.point[k]
-    return True
 
 
 @kernel
 def lowest_p_norm(
-    first: float, p: float, strips: Array, offset: Array, null: Array, near: Nearness, slack: float
+    first: float, p: float, strips: Array, offset: Array, null: Array, near: Nearness, memory: Memory
 ) -> bool:
     """Move the feasible point (r,) of near to that of least p-norm.
 
@@ -140,12 +133,12 @@ def lowest_p_norm(
     """
     r, m = null.shape
     point = near.point
-    slope = np.empty(r)
-    target = np.empty(r)
-    trial = np.empty(r)
-    curve = np.empty((r, r))
-    turned = np.empty((r, m))
+    vectors, at = block(memory.numbers, 0, 4, r)
+    slope, target, trial, goal = vectors[0], vectors[1], vectors[2], vectors[3]
+    curve, at = block(memory.numbers, at, r, r)
+    turned, at = block(memory.numbers, at, r, m)
     largest = largest_number(strips)
+    slack = TOLERANCE * largest
     exponent = first
     for _ in range(STEPS):
         scale = 0.0
@@ -155,8 +148,13 @@ def lowest_p_norm(
             return True
         newton_target(strips, offset, null, point, exponent, scale, slope, curve, target)
         if most_missed(null, strips, target, 0.0, True) >= 0:
-            if not project_in_metric(strips, null, curve, slack, near, turned, target):
+            turn(null, curve, target, turned, goal)
+            if not nearest_point(turned, strips, goal, slack * max(curve[0, 0], 1.0), near.held, target):
                 return False
+            solve_upper(curve, target)
+            for k in range(r):
+                if not math.isfinite(target[k]):
+                    target[k] = point[k]
         length = 0.0
         gain = 0.0
         for k in range(r):

@@ -1,10 +1,8 @@
-"""Sharing by a linear program, for any number of redundant cables: the lowest sum and the lowest maximum of tensions."""
+"""Sharing by a linear program, among any number of redundant cables: lowest sum and lowest maximum of tensions."""
 
 from __future__ import annotations
 
 import math
-
-import numpy as np
 
 from sagline.arrays import Array
 from sagline.kernels.algebra.linear_program import LP_GAVE_UP, LP_SOLVED, LP_UNBOUNDED, Basis, lowest_point
@@ -12,9 +10,10 @@ from sagline.kernels.algebra.nearest_point import nearest_point
 from sagline.kernels.algebra.strips import HIGH, LOW, START, STRIP_ROWS, TOLERANCE, largest_number
 from sagline.kernels.codes import POSE_INFEASIBLE, POSE_NOT_CONVERGED, POSE_SOLVED, POSE_UNBOUNDED
 from sagline.kernels.jit import formula, kernel
+from sagline.kernels.memory import Memory, block
 from sagline.kernels.sharing.nearest import Nearness
 
-TIED = 1e-10  # of the largest tension: sums that differ by less are the same; and of the largest weight: such weigh nothing
+TIED = 1e-10  # of the largest tension: sums that differ by less are the same; of the largest weight: none
 
 
 @formula
@@ -39,11 +38,13 @@ def is_tied(basis: Basis) -> bool:
 
 
 @kernel
-def share_lowest_sum(strips: Array, null: Array, near: Nearness, basis: Basis) -> int:
+def share_lowest_sum(strips: Array, null: Array, near: Nearness, basis: Basis, memory: Memory) -> int:
     """Fill the point (r,) of near whose tensions have the least sum; of several the one nearest to the reference."""
     r, m = null.shape
-    cost = np.zeros(r)
+    costs, at = block(memory.numbers, 0, 1, r)
+    cost = costs[0]
     for k in range(r):
+        cost[k] = 0.0
         for i in range(m):
             cost[k] += null[k, i]
     outcome = lowest_point(null, strips, cost, 0.0, basis, near.point)
@@ -52,31 +53,40 @@ def share_lowest_sum(strips: Array, null: Array, near: Nearness, basis: Basis) -
         return status_of(outcome)
     if not is_tied(basis):
         return POSE_SOLVED
-    rows = np.empty((r, m + 1))
-    tied = np.empty((STRIP_ROWS, m + 1))
-    rows[:, :m] = null
-    rows[:, m] = cost
-    tied[:, :m] = strips
+    rows, at = block(memory.numbers, at, r, m + 1)
+    tied, at = block(memory.numbers, at, STRIP_ROWS, m + 1)
+    found, at = block(memory.numbers, at, 1, r)
     least = 0.0
     for k in range(r):
+        rows[k, m] = cost[k]
         least += cost[k] * near.point[k]
+    for i in range(m):
+        for k in range(r):
+            rows[k, i] = null[k, i]
+        for row in range(STRIP_ROWS):
+            tied[row, i] = strips[row, i]
     largest = largest_number(strips)
     tied[START, m], tied[LOW, m], tied[HIGH, m] = 0.0, -math.inf, least + TIED * largest
-    found = np.empty(r)
-    if nearest_point(rows, tied, near.reference, TOLERANCE * largest, near.held, found):
-        near.point[:] = found
+    if nearest_point(rows, tied, near.reference, TOLERANCE * largest, near.held, found[0]):
+        for k in range(r):
+            near.point[k] = found[0, k]
     return POSE_SOLVED
 
 
 @kernel
 def share_lowest_maximum(
-    strips: Array, offset: Array, null: Array, near: Nearness, basis: Basis, rows: Array, wide: Array
+    strips: Array, offset: Array, null: Array, near: Nearness, basis: Basis, memory: Memory
 ) -> int:
     """Fill the point (r,) of near whose largest tension is least; of several the one nearest to the reference.
 
-    rows (r + 1, 2m) and wide (3, 2m) are room for the program, whose last unknown is the largest tension.
+    The program's last unknown is the largest tension.
     """
     r, m = null.shape
+    rows, at = block(memory.numbers, 0, r + 1, 2 * m)
+    wide, at = block(memory.numbers, at, STRIP_ROWS, 2 * m)
+    lower, at = block(memory.numbers, at, STRIP_ROWS, m)
+    vectors, at = block(memory.numbers, at, 3, r + 1)
+    cost, found, nearest = vectors[0], vectors[1], vectors[2, :r]
     for i in range(m):
         for k in range(r):
             rows[k, i] = null[k, i]
@@ -87,9 +97,9 @@ def share_lowest_maximum(
             wide[row, i] = strips[row, i]
         # the largest tension less this one is not negative
         wide[START, m + i], wide[LOW, m + i], wide[HIGH, m + i] = -strips[START, i] - offset[i], 0.0, math.inf
-    cost = np.zeros(r + 1)
+    for k in range(r):
+        cost[k] = 0.0
     cost[r] = 1.0
-    found = np.empty(r + 1)
     largest = largest_number(strips)
     outcome = lowest_point(rows, wide, cost, TOLERANCE * largest, basis, found)
     if outcome != LP_SOLVED:
@@ -99,11 +109,12 @@ def share_lowest_maximum(
         near.point[k] = found[k]
     if not is_tied(basis):
         return POSE_SOLVED
-    lower = strips.copy()
     for i in range(m):
+        for row in range(STRIP_ROWS):
+            lower[row, i] = strips[row, i]
         highest = found[r] - offset[i] + 4.0 * TOLERANCE * largest
         lower[HIGH, i] = max(min(strips[HIGH, i], highest), strips[LOW, i])
-    nearest = np.empty(r)
     if nearest_point(null, lower, near.reference, TOLERANCE * largest, near.held, nearest):
-        near.point[:] = nearest
+        for k in range(r):
+            near.point[k] = nearest[k]
     return POSE_SOLVED

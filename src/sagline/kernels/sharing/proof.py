@@ -9,38 +9,44 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from sagline.arrays import Array, Flags
-from sagline.kernels.algebra.linear_program import LP_EMPTY, lowest_point, no_basis
+from sagline.kernels.algebra.linear_program import LP_EMPTY, lowest_point, new_basis
 from sagline.kernels.algebra.strips import largest_number
 from sagline.kernels.jit import glue, kernel
+from sagline.kernels.memory import Memory, block
 
 CERTAIN = 1e-14  # of the largest tension: limits that contradict by less may do so by rounding
 SUPPORT = 1e-9  # of the largest weight: cables that weigh less take no part
 
 
 @kernel
-def prove_empty(strips: Array, inverse: Array, null: Array, translations: int, farkas: Array, blocking: Flags) -> None:
+def prove_empty(
+    strips: Array, inverse: Array, null: Array, translations: int, memory: Memory, farkas: Array, blocking: Flags
+) -> None:
     """Fill the Farkas vector y (n,) and which cables (m,) take part in it.
 
     y . (needed - J t) > 0 for every t within the limits. Its force part has length 1, so that the gap is in newtons;
     if it has none, its moment part has. NaN, and no cables, where the limits do not contradict beyond rounding.
     """
     r, m = null.shape
-    cost = np.zeros(r)
+    basis, rest = new_basis(memory, r)
+    vectors, at = block(rest.numbers, 0, 2, r)
+    weights, at = block(rest.numbers, at, 1, m)
+    cost, point, z = vectors[0], vectors[1], weights[0]
     for k in range(r):
+        cost[k] = 0.0
         for i in range(m):
             cost[k] += null[k, i]
-    basis = no_basis(r)
-    outcome = lowest_point(null, strips, cost, CERTAIN * largest_number(strips), basis, np.empty(r))
+    basis.labels[0] = -1
+    outcome = lowest_point(null, strips, cost, CERTAIN * largest_number(strips), basis, point)
     for k in range(farkas.size):
         farkas[k] = math.nan
     for i in range(m):
         blocking[i] = False
     if outcome != LP_EMPTY:
         return
-    z = np.zeros(m)
+    for i in range(m):
+        z[i] = 0.0
     for j in range(r + 1):
         label = basis.labels[j]
         if label < 2 * m:
