@@ -17,15 +17,15 @@ STRIP_ROWS = 3
 TOLERANCE = 1e-12  # of the largest number at hand: a side missed by less counts as kept
 
 
-@kernel
+@formula
 def largest_number(strips: Array) -> float:
     """The largest finite number at hand, by which tolerances are measured."""
-    largest = 0.0
+    start = low = high = 0.0  # three, so that none waits for the others
     for i in range(strips.shape[1]):
-        largest = max(largest, abs(strips[START, i]), abs(strips[LOW, i]))
-        if strips[HIGH, i] < math.inf:
-            largest = max(largest, abs(strips[HIGH, i]))
-    return largest
+        start = max(start, abs(strips[START, i]))
+        low = max(low, abs(strips[LOW, i]))
+        high = max(high, abs(strips[HIGH, i]) if strips[HIGH, i] < math.inf else 0.0)
+    return max(start, low, high)
 
 
 @kernel

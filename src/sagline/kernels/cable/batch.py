@@ -6,9 +6,11 @@ import math
 
 from sagline.arrays import Array, Codes
 from sagline.kernels.cable.catenary import (
+    TAUT_STRAIN,
     catenary_end,
     is_ordinary,
     ordinary_length_ratio,
+    ordinary_length_ratio_near,
     ordinary_pull_ratio,
 )
 from sagline.kernels.cable.models import from_length, from_tension
@@ -75,6 +77,12 @@ def batch_from_tension(
         if model.code == CATENARY:
             for i in range(size):
                 ratio[i] = ordinary_length_ratio(half[i], sine[i], cosine[i], tau[i] / ea[i])
+            largest = 0.0
+            for i in range(size):
+                largest = max(largest, tau[i] / ea[i])
+            if largest > TAUT_STRAIN:
+                for i in range(size):
+                    ratio[i] = ordinary_length_ratio_near(half[i], sine[i], cosine[i], tau[i] / ea[i], ratio[i])
             for i in range(size):
                 pull[i] = ordinary_pull_ratio(half[i], sine[i], tau[i] / ea[i], ratio[i]) * tau[i]
             for i in range(size):
@@ -85,7 +93,8 @@ def batch_from_tension(
                 line = Chord(chord[i], sine[i], cosine[i])
                 ratio[i], pull[i], status = from_tension(model, line, Material(rho[i], ea[i]), tau[i])
             status_out[start + i] = status
-        length_out[start:stop] = ratio[:size]
+        for i in range(size):
+            length_out[start + i] = ratio[i]
         for i in range(size):
             horizontal_out[start + i] = tau[i] * cosine[i]
         for i in range(size):

@@ -7,6 +7,7 @@ import math
 from sagline.arrays import Codes
 from sagline.kernels.cable.cables import Cables, chord_of, material_of
 from sagline.kernels.cable.catenary import (
+    TAUT_STRAIN,
     is_ordinary,
     ordinary_length_ratio,
     ordinary_length_ratio_near,
@@ -43,15 +44,18 @@ def hang_cables(model: Model, cables: Cables, near: bool, statuses: Codes) -> in
     for i in range(m):
         cables.strain[i] = cables.tau[i] / cables.stiffness[i]
     if model.code == CATENARY:
-        if near:
-            for i in range(m):
-                cables.ratio[i] = ordinary_length_ratio_near(
-                    cables.slackness[i], cables.sine[i], cables.cosine[i], cables.strain[i], cables.ratio[i]
-                )
-        else:
+        largest = 0.0
+        if not near:
             for i in range(m):
                 cables.ratio[i] = ordinary_length_ratio(
                     cables.slackness[i], cables.sine[i], cables.cosine[i], cables.strain[i]
+                )
+            for i in range(m):
+                largest = max(largest, cables.strain[i])
+        if near or largest > TAUT_STRAIN:
+            for i in range(m):
+                cables.ratio[i] = ordinary_length_ratio_near(
+                    cables.slackness[i], cables.sine[i], cables.cosine[i], cables.strain[i], cables.ratio[i]
                 )
         for i in range(m):
             cables.pull[i] = cables.tau[i] * ordinary_pull_ratio(
