@@ -98,6 +98,24 @@ QUANTITIES = (
     ),
 )
 
+# of a plan that has them: one of a file written before they were kept has none
+PROOF = (
+    Quantity(
+        "farkas",
+        "farkas",
+        ("wrench_part",),
+        "1, 1/m",
+        "vector y that proves a pose infeasible: y . J tau < y . needed for all chord tensions within the limits",
+    ),
+    Quantity(
+        "needed",
+        "needed",
+        ("wrench_part",),
+        "N, N m",
+        "wrench J tau that the chord tensions must supply, to which the proof refers",
+    ),
+)
+
 # of a path only
 TIME = Quantity("time", "path.time", (), "s", "time from the start of the path")
 MOTION = (

@@ -43,6 +43,20 @@ def written_whole(file: os.PathLike[str] | str, size: int = 0) -> Iterator[Path]
             partial.unlink()
 
 
+def write_text(file: os.PathLike[str] | str, text: str) -> None:
+    """Write a text in UTF-8, whole or not at all.
+
+    Args:
+        file: The file; one that exists is replaced.
+        text: What is to stand in it.
+
+    Raises:
+        FileError: If the file cannot be written; what was there before is untouched.
+    """
+    with written_whole(file) as partial:
+        partial.write_text(text, encoding="utf-8")
+
+
 def check_folder(folder: os.PathLike[str] | str) -> None:
     """Refuse a folder that files could not be written to, without creating it.
 

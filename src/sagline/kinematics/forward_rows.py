@@ -7,8 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sagline.arrays import Array, Codes, Flags, Indices, locked
-from sagline.cables.model import CableModel
-from sagline.cables.state import CableState
+from sagline.cables.model import CableModel, CableState
 from sagline.kernels import codes, tables
 from sagline.kernels.forward import forward as kernel
 from sagline.kernels.forward.fit import fit_poses

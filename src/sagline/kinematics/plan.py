@@ -55,7 +55,7 @@ class Plan:
         farkas: Proof of each infeasible pose, shape (6,) or (N, 6), NaN elsewhere: with y = farkas and the structure
             matrix J, y . J tau < y . needed for all chord tensions tau within their limits. Its force part has length
             1, so that the gap is in newtons. NaN also where the limits contradict by no more than rounding. None for
-            a plan that was read from a file.
+            a plan from a file that was written before files kept it.
         needed: The wrench J tau that the chord tensions must supply, shape (6,) or (N, 6): weight, given wrench and
             the cables' pulls T_z - tau sin phi of the last linearization; to that the proof refers. None as above.
     """

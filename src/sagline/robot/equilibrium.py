@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from sagline.arrays import Array
-from sagline.cables.state import CableState
+from sagline.cables.model import CableState
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
@@ -26,3 +26,9 @@ class Equilibrium:
     pose: Pose
     wrench: Array
     cables: CableState
+
+    @property
+    def limited_tension(self) -> Array:
+        """The tension that the robot's limits name [N], shape (m,) or (N, m): along the chord, or at the frame end."""
+        chord = self.robot.tension_limits_of == "chord"
+        return self.cables.chord_tension if chord else self.cables.frame_end_tension
