@@ -34,7 +34,14 @@ class CableModel:
         return 0.0, 0.0
 
     def terms(self, gravity: float) -> Terms:
-        """The model as kernels take it, where gravity is as given [m/s^2]."""
+        """The model as kernels take it.
+
+        Args:
+            gravity: Gravitational acceleration [m/s^2].
+
+        Returns:
+            Code, k_h, k_p and gravity.
+        """
         return self.code, *self.parameters, gravity
 
     def from_tension(
@@ -57,6 +64,17 @@ class CableModel:
         Raises:
             CableGeometryError: If span is negative, or span and rise are both zero.
             InvalidValueError: If a tension or gravity is negative or not finite, or shapes do not broadcast.
+
+        Examples:
+            One cable, and the same at three tensions:
+
+            >>> import sagline as sl
+            >>> cable, model = sl.Cable(linear_density=0.067, axial_stiffness=44e3), sl.Catenary()
+            >>> print(f"{model.from_tension(cable, span=12.0, rise=-4.0, chord_tension=100.0).unstrained_length:.4f} m")
+            12.6237 m
+            >>> state = model.from_tension(cable, span=12.0, rise=-4.0, chord_tension=[50.0, 100.0, 200.0])
+            >>> print((1e3 * state.sag).round(1), "mm")
+            [262.7 131.2  65.4] mm
 
         Source:
             Irvine 1981, ch. 2; docs/model.md, sections 2 (P3) and 3.
@@ -131,6 +149,9 @@ class CableModel:
 
         Returns:
             Horizontal and vertical coordinates from the frame end on [m], shape (..., points, 2).
+
+        Raises:
+            InvalidValueError: If fewer than two points are asked for.
         """
         if points < 2:
             raise InvalidValueError("points", points, ">= 2", "Ask for the two ends at least.")
@@ -214,7 +235,14 @@ class CableState:
         return out.reshape(self.shape)
 
     def points(self, count: int) -> Array:
-        """Points along the cable in its own vertical plane, frame end first, shape (..., count, 2) [m]."""
+        """Points along the cable in its own vertical plane.
+
+        Args:
+            count: How many, at equal steps of unstrained length, >= 2.
+
+        Returns:
+            Horizontal and vertical coordinates [m], frame end first, shape (..., count, 2).
+        """
         out = np.empty((self.unstrained_length.size, count, 2))
         shape.shape_points(self.model.terms(self.gravity), *self._columns(), out)
         return locked(out.reshape(*self.shape, count, 2))

@@ -73,12 +73,23 @@ class Problem(NamedTuple):
         return cls(shape, gravity, span, rise, (a, b, c, d, e))
 
     def outputs(self) -> tuple[Array, Array, Array, Codes]:
-        """Room for what kernels find: three numbers and a status a cable."""
+        """Room for what kernels find: three numbers and a status a cable.
+
+        Returns:
+            Arrays as long as the batch, not yet filled.
+        """
         size = math.prod(self.shape)
         return np.empty(size), np.empty(size), np.empty(size), np.empty(size, dtype=np.int8)
 
     def shaped(self, field: Array) -> Array:
-        """The batch's shape, locked: results are reshaped, operands repeated without copying."""
+        """A result or an operand in the batch's shape, locked.
+
+        Args:
+            field: Array as long as the batch, or one that broadcasts with its shape.
+
+        Returns:
+            Array of shape (...): results are reshaped, operands repeated without copying.
+        """
         whole = field.size == math.prod(self.shape)
         return locked(field.reshape(self.shape) if whole else np.broadcast_to(field, self.shape))
 

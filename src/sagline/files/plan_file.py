@@ -67,8 +67,19 @@ def load_plan(file: os.PathLike[str] | str) -> Plan:
     Args:
         file: The NetCDF file.
 
+    Returns:
+        The plan; its proofs, `farkas` and `needed`, are None in a file that was written before files kept them.
+
     Raises:
         FileError: If the file is missing, cut off, no NetCDF file, no plan, or of a newer format.
+
+    Examples:
+        >>> import sagline as sl
+        >>> path = sl.quintic_path([(0, 0, 1.5), (1, 1, 2)], speed=1.0)
+        >>> sl.inverse(sl.load_robot("cogiro"), path).save("run.nc")
+        >>> plan = sl.load_plan("run.nc")
+        >>> print(plan.state.robot.name, plan.unstrained_length.shape, plan.feasible.all())
+        cogiro (283, 8) True
     """
     path = FilePath(file)
     data = _opened(path)

@@ -42,7 +42,14 @@ class Quantity(NamedTuple):
     codes: type[IntEnum] | None = None
 
     def of(self, plan: Plan) -> Any:
-        """The plan's values."""
+        """The values of a plan.
+
+        Args:
+            plan: The plan.
+
+        Returns:
+            Array, or None for a proof that the plan does not have.
+        """
         return attrgetter(self.place)(plan)
 
     @property

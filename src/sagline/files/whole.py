@@ -60,6 +60,9 @@ def write_text(file: os.PathLike[str] | str, text: str) -> None:
 def check_folder(folder: os.PathLike[str] | str) -> None:
     """Refuse a folder that files could not be written to, without creating it.
 
+    Args:
+        folder: The folder; it need not exist.
+
     Raises:
         FileError: If it is no folder, or neither it nor the nearest folder above it can be written.
     """
@@ -73,6 +76,12 @@ def check_folder(folder: os.PathLike[str] | str) -> None:
 
 def made_folder(folder: os.PathLike[str] | str) -> Path:
     """The folder, created with everything above it where it is missing.
+
+    Args:
+        folder: The folder.
+
+    Returns:
+        Its path.
 
     Raises:
         FileError: If it cannot be created.

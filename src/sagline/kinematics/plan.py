@@ -132,8 +132,11 @@ class Plan:
     def save(self, file: FilePath | str) -> None:
         """Write the plan to a NetCDF file, whole or not at all, with units and the robot inside.
 
+        Args:
+            file: The file, "run.nc" for instance; one that exists is replaced. `load_plan` reads it.
+
         Raises:
-            FileError: If the file cannot be written.
+            FileError: If the file cannot be written; what was there before is untouched.
         """
         from sagline.files.plan_file import save_plan  # the one call outward: a plan knows how to leave
 
