@@ -2,9 +2,11 @@
 
 import json
 import re
+import statistics
 from html.parser import HTMLParser
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import sagline as sl
@@ -114,6 +116,9 @@ def test_the_numbers_are_in_the_json_file(report: ArticleReport) -> None:
     assert poses["table-2"]["distance_mm"][1] == pytest.approx(44.7884, abs=1e-4)
     assert poses["error-in-space"]["slope_mm_per_m"] == pytest.approx(-18.17, abs=0.01)
     assert poses["error-in-space"]["lowest_vertical_error_mm"] > 0.0
+    tension, distance = np.mean(poses["table-2"]["horizontal_tension_N"], axis=1), poses["table-2"]["distance_mm"]
+    against = statistics.correlation(tension.tolist(), distance)
+    assert poses["error-in-space"]["correlation_with_tension"] == pytest.approx(against, rel=1e-9)
     assert poses["explanations"]["explanations"][1][0]["rms_mm"] == pytest.approx(4.21, abs=0.02)
     assert len(numbers["errata"]) == 11
 
