@@ -210,7 +210,12 @@ def _density(study: SagStudy, draw: Drawings) -> Finding:
         f"{n(each[0], '.3f')} (g²/24 = {n(SHALLOW_K_P, '.3f')}) to {n(each[-1], '.3f')}: the heaviest, slackest cables "
         "make the published value.",
         verdict=Verdict.HOLDS_WITHIN,
-        numbers={"k_p": study.k_p, "k_p_of_density": each, "densities_kg_per_m": densities},
+        numbers={
+            "k_p": study.k_p,
+            "shallow_k_p": SHALLOW_K_P,
+            "k_p_of_density": each,
+            "densities_kg_per_m": densities,
+        },
         panels=(
             draw.panel(figure, "p_q with its parabola."),
             draw.panel(second, "p_q over ρ² should not depend on ρ."),
