@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +14,7 @@ from sagline.cables.status import CableStatus
 from sagline.kinematics.status import PoseStatus
 from sagline.motion.path import Path
 from sagline.robot.equilibrium import Equilibrium
-
-if TYPE_CHECKING:
-    from sagline.tension.method import TensionMethod
+from sagline.tension.method import TensionMethod
 
 
 class Gap(NamedTuple):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,10 +23,7 @@ from sagline.article.sag_constant import (
 from sagline.article.sampling import ANGLE
 from sagline.plot.sheet import BLUE, GREEN, VERMILLION
 from sagline.report.blocks import Chapter, Finding, Verdict, n
-from sagline.report.drawing import Drawings, axes, legend, shades
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from sagline.report.drawing import Courses, Drawings, axes, legend, with_fit
 
 CHORD = 10.0  # m
 TENSIONS = np.linspace(10.0, 500.0, 150)  # N
@@ -121,7 +117,7 @@ def _tension(study: SagStudy, draw: Drawings) -> Finding:
     ax.set_yscale("log")
     d, a_d = (values[MIDDLE, PICKED, DENSE] for values in (study.adjusting_length, study.a_d))
     fits = a_d[:, None] * length_shape(tensions)
-    _fits(ax, tensions, d, tensions, fits, _named(study.sampling.chords[[*PICKED]], "g"), "$D$ [m]")
+    Courses(tensions, d, tensions, fits, _named(study.sampling.chords[[*PICKED]], "g")).draw(ax, "$D$ [m]")
     share = study.adjusting_length / study.fitted_length
     numbers = {"exact_over_fit_min": share.min(), "exact_over_fit_max": share.max()}
     return Finding(
@@ -141,12 +137,12 @@ def _tension(study: SagStudy, draw: Drawings) -> Finding:
 def _chord(study: SagStudy, draw: Drawings) -> Finding:
     sampling = study.sampling
     fine = np.linspace(0.0, sampling.chords[-1], 80)
-    figure, ax = axes("$D$ [m]", "$a_d$ [m N²]")
-    _fit(ax, sampling.chords, study.a_d[MIDDLE, :, DENSE], fine, study.q_a[MIDDLE, DENSE] * chord_shape(fine))
-    second, bx = axes("$D$ [m]", "$a_d$ [m N²]")
     fits = study.q_a[:, DENSE, None] * chord_shape(fine)
-    labels = _named(sampling.angles, "g")
-    _fits(bx, sampling.chords, study.a_d[..., DENSE], fine, fits, labels, r"$\varphi$ [rad]")
+    courses = Courses(sampling.chords, study.a_d[..., DENSE], fine, fits, _named(sampling.angles, "g"))
+    captions = (
+        f"a_d {_middle_and_dense(study)} with its cubic (figure 11).",
+        "The same at five angles (figure 12).",
+    )
     away = _away(study.fitted_a_d, study.a_d)
     return Finding(
         key="a-over-chord",
@@ -157,22 +153,20 @@ def _chord(study: SagStudy, draw: Drawings) -> Finding:
         "and density.",
         verdict=Verdict.HOLDS_WITHIN,
         numbers={"cubic_away_share": away},
-        panels=(
-            draw.panel(figure, f"a_d {_middle_and_dense(study)} with its cubic (figure 11)."),
-            draw.panel(second, "The same at five angles (figure 12)."),
-        ),
+        panels=courses.panels(("$D$ [m]", "$a_d$ [m N²]", r"$\varphi$ [rad]"), MIDDLE, captions, draw),
     )
 
 
 def _angle(study: SagStudy, draw: Drawings) -> Finding:
     sampling = study.sampling
     fine = np.linspace(0.0, 0.5 * np.pi, 100)
-    figure, ax = axes(r"$\varphi$ [rad]", "$q_a$ [N²/m²]")
-    _fit(ax, sampling.angles, study.q_a[:, DENSE], fine, study.p_q[DENSE] * angle_shape(fine))
-    second, bx = axes(r"$\varphi$ [rad]", "$q_a$ [N²/m²]")
     fits = study.p_q[[*DRAWN], None] * angle_shape(fine)
     labels = _named(sampling.densities[[*DRAWN]], ".1f")
-    _fits(bx, sampling.angles, study.q_a[:, DRAWN].T, fine, fits, labels, r"$\rho$ [kg/m]")
+    courses = Courses(sampling.angles, study.q_a[:, DRAWN].T, fine, fits, labels)
+    captions = (
+        f"q_a at ρ = {n(sampling.densities[DENSE])} kg/m (figure 13).",
+        "The same at five densities (figure 14).",
+    )
     away = _away(study.fitted_q_a, study.q_a)
     return Finding(
         key="q-over-angle",
@@ -183,10 +177,7 @@ def _angle(study: SagStudy, draw: Drawings) -> Finding:
         "guess: d = D (wD cos φ)²/(24 τ²) of a shallow cable, with τ = T_x/cos φ.",
         verdict=Verdict.HOLDS_WITHIN,
         numbers={"cos4_away_share": away},
-        panels=(
-            draw.panel(figure, f"q_a at ρ = {n(sampling.densities[DENSE])} kg/m (figure 13)."),
-            draw.panel(second, "The same at five densities (figure 14)."),
-        ),
+        panels=courses.panels((r"$\varphi$ [rad]", "$q_a$ [N²/m²]", r"$\rho$ [kg/m]"), DENSE, captions, draw),
     )
 
 
@@ -194,7 +185,7 @@ def _density(study: SagStudy, draw: Drawings) -> Finding:
     densities = study.sampling.densities
     fine = np.linspace(0.0, densities[-1], 80)
     figure, ax = axes(r"$\rho$ [kg/m]", "$p_q$ [N²/m²]")
-    _fit(ax, densities, study.p_q, fine, study.k_p * density_shape(fine))
+    with_fit(ax, densities, study.p_q, fine, study.k_p * density_shape(fine))
     each = study.p_q / density_shape(densities)
     second, bx = axes(r"$\rho$ [kg/m]", r"$p_q/\rho^2$ [m²/s⁴]")
     bx.plot(densities, each, "o-", color=BLUE, markersize=3.0, linewidth=1.1, label="density by density")
@@ -221,21 +212,6 @@ def _density(study: SagStudy, draw: Drawings) -> Finding:
             draw.panel(second, "p_q over ρ² should not depend on ρ."),
         ),
     )
-
-
-def _fit(ax: Axes, x: Array, y: Array, fine: Array, fit: Array) -> None:
-    """One course with its fit."""
-    ax.plot(x, y, "o", color=BLUE, markersize=3.5, label="exact")
-    ax.plot(fine, fit, color="black", linewidth=0.9, label="fit")
-    legend(ax)
-
-
-def _fits(ax: Axes, x: Array, rows: Array, fine: Array, fits: Array, labels: list[str], title: str) -> None:
-    """Several courses (k, n) with their fits (k, l), dark to light."""
-    for row, fit, label, color in zip(rows, fits, labels, shades(len(labels)), strict=True):
-        ax.plot(x, row, "o", color=color, markersize=2.6, label=label)
-        ax.plot(fine, fit, color=color, linewidth=0.9)
-    legend(ax, title)
 
 
 def _named(values: Iterable[float], form: str) -> list[str]:
