@@ -9,6 +9,7 @@ from sagline.cables.model import CableModel
 from sagline.kernels import codes
 from sagline.kernels.forward import forward as kernel
 from sagline.kinematics.forward_rows import Found, solve_rows
+from sagline.robot.equilibrium import limited_tension
 from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
@@ -95,7 +96,7 @@ def start_quaternions(robot: Robot) -> Array:
 
 def outside_limits(robot: Robot, model: CableModel, found: Found) -> Indices:
     """How many cables of each sample are outside the robot's tension limits, (N,); none known for straight ones."""
-    tension = found.solution(robot, model, np.zeros(6), found.pose_status.shape).state.limited_tension
+    tension = limited_tension(robot, found.cables(robot, model, found.pose_status.shape))
     low = (1.0 - _LIMIT_SLACK) * robot.tension_min
     high = (1.0 + _LIMIT_SLACK) * robot.tension_max
     count: Indices = ((tension < low) | (tension > high)).sum(axis=1)

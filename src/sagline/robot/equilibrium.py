@@ -30,5 +30,17 @@ class Equilibrium:
     @property
     def limited_tension(self) -> Array:
         """The tension that the robot's limits name [N], shape (m,) or (N, m): along the chord, or at the frame end."""
-        chord = self.robot.tension_limits_of == "chord"
-        return self.cables.chord_tension if chord else self.cables.frame_end_tension
+        return limited_tension(self.robot, self.cables)
+
+
+def limited_tension(robot: Robot, cables: CableState) -> Array:
+    """The tension that a robot's limits name: along the chord, or at the frame end.
+
+    Args:
+        robot: The robot.
+        cables: State of its cables, fields of shape (m,) or (N, m).
+
+    Returns:
+        Tensions [N], of the shape of the cables' fields.
+    """
+    return cables.chord_tension if robot.tension_limits_of == "chord" else cables.frame_end_tension
