@@ -7,8 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sagline.arrays import Array, Codes, Flags, Indices, locked
-from sagline.cables.model import CableModel
-from sagline.cables.state import CableState
+from sagline.cables.model import CableModel, CableState
 from sagline.kernels import codes, tables
 from sagline.kernels.forward import forward as kernel
 from sagline.kernels.forward.fit import fit_poses
@@ -63,18 +62,10 @@ class Found(NamedTuple):
         """Whether each sample is a stable equilibrium, (N,)."""
         return np.isin(self.pose_status, STABLE)
 
-    def solution(
-        self,
-        robot: Robot,
-        model: CableModel,
-        load: Array,
-        shape: tuple[int, ...],
-        covariance: Array | None = None,
-    ) -> ForwardSolution:
-        """The batch in the caller's shape, () or (N,)."""
+    def cables(self, robot: Robot, model: CableModel, shape: tuple[int, ...]) -> CableState:
+        """The cables of the batch in the caller's shape, () or (N,)."""
         wide = (*shape, robot.cable_count)
-        pose = Pose._adopt(self.poses[:, :3].reshape(*shape, 3), self.poses[:, 3:].reshape(*shape, 4))
-        cables = CableState(
+        return CableState(
             model=model,
             cable=robot.cables,
             gravity=robot.gravity,
@@ -86,10 +77,21 @@ class Found(NamedTuple):
             chord_tension=locked(self.results[tables.TENSION].reshape(wide)),
             status=locked(self.cable_status.reshape(wide)),
         )
+
+    def solution(
+        self,
+        robot: Robot,
+        model: CableModel,
+        load: Array,
+        shape: tuple[int, ...],
+        covariance: Array | None = None,
+    ) -> ForwardSolution:
+        """The batch in the caller's shape, () or (N,)."""
+        pose = Pose._adopt(self.poses[:, :3].reshape(*shape, 3), self.poses[:, 3:].reshape(*shape, 4))
         whole = locked(np.ascontiguousarray(np.broadcast_to(load, (*shape, 6))))
         residuals = self.numbers[:, [kernel.FORCE_RESIDUAL, kernel.MOMENT_RESIDUAL]]
         return ForwardSolution(
-            state=Equilibrium(robot, pose, whole, cables),
+            state=Equilibrium(robot, pose, whole, self.cables(robot, model, shape)),
             status=locked(self.pose_status.reshape(shape)),
             stiffness_min=locked(self.numbers[:, kernel.STIFFNESS_MIN].reshape(shape)),
             energy=locked(self.numbers[:, kernel.ENERGY].reshape(shape)),

@@ -9,8 +9,7 @@ from numpy.typing import ArrayLike
 
 from sagline.arrays import Array, Codes, Flags, locked
 from sagline.cables.catenary import Catenary
-from sagline.cables.model import CableModel
-from sagline.cables.state import CableState
+from sagline.cables.model import CableModel, CableState
 from sagline.errors import CableGeometryError, InvalidValueError
 from sagline.kernels import codes, tables
 from sagline.kernels.inverse.explain import explain_poses

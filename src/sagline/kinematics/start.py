@@ -6,9 +6,10 @@ import numpy as np
 
 from sagline.arrays import Array, Flags, Indices, locked
 from sagline.cables.model import CableModel
-from sagline.kernels import codes, tables
+from sagline.kernels import codes
 from sagline.kernels.forward import forward as kernel
 from sagline.kinematics.forward_rows import Found, solve_rows
+from sagline.robot.equilibrium import limited_tension
 from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
@@ -41,9 +42,9 @@ def search(robot: Robot, model: CableModel, lengths: Array, wrenches: Array) -> 
         answer = from_orientations(robot, model, locked(lengths[open_samples]), loads, quaternion)
         better = np.ones(len(open_samples), dtype=np.bool_)
         if round_:
-            better = _is_better(_rank(robot, answer), _rank(robot, found.part(open_samples)))
+            better = _is_better(_rank(robot, model, answer), _rank(robot, model, found.part(open_samples)))
         found.keep(open_samples[better], answer, np.flatnonzero(better))
-        settled = _is_plausible(robot, answer)
+        settled = _is_plausible(robot, model, answer)
         open_samples = open_samples[~settled]
         if not len(open_samples):
             break
@@ -55,16 +56,23 @@ def from_orientations(robot: Robot, model: CableModel, lengths: Array, wrenches:
 
     Quaternions (x, y, z, w) of shape (4,) or (N, 4).
     """
-    # below the middle, because the two ends of a single cable must not coincide
-    depth = _BELOW * np.nan_to_num(lengths.mean(axis=1, keepdims=True), nan=1.0)
-    below = depth * (robot.freedom[:, 2] @ robot.freedom[:, :3])
-    starts = pose_rows(Pose.from_quaternion(middle(robot, quaternion) - below, quaternion))
+    starts = pose_rows(Pose.from_quaternion(hung(robot, lengths, quaternion), quaternion))
     if robot.motion_pattern not in ROTATING:
         return solve_rows(robot, model, lengths, starts, wrenches)
     freedom = robot.freedom
     translations = locked(freedom[~freedom[:, 3:].any(axis=1)])
     placed = solve_rows(robot, model, lengths, starts, wrenches, freedom=translations)
     return solve_rows(robot, model, lengths, locked(placed.poses), wrenches)
+
+
+def hung(robot: Robot, lengths: Array, quaternion: Array) -> Array:
+    """Positions (N, 3) in which the platform hangs a little below the middle of the frame ends, as far as it can move.
+
+    Not in the middle itself, because the two ends of a single cable must not coincide.
+    """
+    depth = _BELOW * np.nan_to_num(lengths.mean(axis=1, keepdims=True), nan=1.0)
+    position: Array = middle(robot, quaternion) - depth * (robot.freedom[:, 2] @ robot.freedom[:, :3])
+    return position
 
 
 def middle(robot: Robot, quaternion: Array) -> Array:
@@ -86,28 +94,24 @@ def start_quaternions(robot: Robot) -> Array:
     return np.array(rows)
 
 
-def outside_limits(robot: Robot, found: Found) -> Indices:
+def outside_limits(robot: Robot, model: CableModel, found: Found) -> Indices:
     """How many cables of each sample are outside the robot's tension limits, (N,); none known for straight ones."""
-    results = found.results
-    tension = results[tables.TENSION]
-    if robot.tension_limits_of == "frame_end":
-        weight = robot.cables.linear_density * robot.gravity * results[tables.LENGTH]
-        tension = np.hypot(results[tables.HORIZONTAL], results[tables.VERTICAL] - weight)
+    tension = limited_tension(robot, found.cables(robot, model, found.pose_status.shape))
     low = (1.0 - _LIMIT_SLACK) * robot.tension_min
     high = (1.0 + _LIMIT_SLACK) * robot.tension_max
     count: Indices = ((tension < low) | (tension > high)).sum(axis=1)
     return count
 
 
-def _is_plausible(robot: Robot, found: Found) -> Flags:
+def _is_plausible(robot: Robot, model: CableModel, found: Found) -> Flags:
     done = np.isin(found.pose_status, (codes.FORWARD_SOLVED, codes.FORWARD_NO_LENGTHS))
-    return np.asarray(done & (outside_limits(robot, found) == 0))
+    return np.asarray(done & (outside_limits(robot, model, found) == 0))
 
 
-def _rank(robot: Robot, found: Found) -> Array:
+def _rank(robot: Robot, model: CableModel, found: Found) -> Array:
     """Rows (status, cables outside their limits, energy) of which the smaller is the better, (N, 3)."""
     energy = np.nan_to_num(found.numbers[:, kernel.ENERGY], nan=0.0)
-    return np.stack((_POOR[found.pose_status].astype(np.float64), outside_limits(robot, found), energy), axis=1)
+    return np.stack((_POOR[found.pose_status].astype(np.float64), outside_limits(robot, model, found), energy), axis=1)
 
 
 def _is_better(new: Array, old: Array) -> Flags:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from sagline.arrays import Array
-from sagline.cables.state import CableState
+from sagline.cables.model import CableState
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
@@ -26,3 +26,21 @@ class Equilibrium:
     pose: Pose
     wrench: Array
     cables: CableState
+
+    @property
+    def limited_tension(self) -> Array:
+        """The tension that the robot's limits name [N], shape (m,) or (N, m): along the chord, or at the frame end."""
+        return limited_tension(self.robot, self.cables)
+
+
+def limited_tension(robot: Robot, cables: CableState) -> Array:
+    """The tension that a robot's limits name: along the chord, or at the frame end.
+
+    Args:
+        robot: The robot.
+        cables: State of its cables, fields of shape (m,) or (N, m).
+
+    Returns:
+        Tensions [N], of the shape of the cables' fields.
+    """
+    return cables.chord_tension if robot.tension_limits_of == "chord" else cables.frame_end_tension

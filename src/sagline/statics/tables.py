@@ -10,7 +10,14 @@ from sagline.robot.robot import Robot
 
 
 def cable_table(robot: Robot) -> Array:
-    """Anchors, material and limits of the cables, shape (1, m, CABLE_COLUMNS); columns as in kernels.tables."""
+    """Anchors, material and limits of the cables.
+
+    Args:
+        robot: The robot.
+
+    Returns:
+        Shape (1, m, CABLE_COLUMNS); columns as in kernels.tables.
+    """
     columns = (
         robot.frame_anchors,
         robot.platform_anchors,
@@ -23,12 +30,26 @@ def cable_table(robot: Robot) -> Array:
 
 
 def body_table(robot: Robot) -> Array:
-    """Mass, gravity and center of mass of the platform, shape (1, BODY_COLUMNS); columns as in kernels.tables."""
+    """Mass, gravity and center of mass of the platform.
+
+    Args:
+        robot: The robot.
+
+    Returns:
+        Shape (1, BODY_COLUMNS); columns as in kernels.tables.
+    """
     return locked(np.array([[robot.mass, robot.gravity, *robot.center_of_mass]]))
 
 
 def pose_rows(pose: Pose) -> Array:
-    """Positions and quaternions of a pose or a batch, shape (N, POSE_COLUMNS); N = 1 for a single pose."""
+    """Positions and quaternions of a pose or a batch.
+
+    Args:
+        pose: One pose or a batch of N.
+
+    Returns:
+        Shape (N, POSE_COLUMNS); N = 1 for a single pose.
+    """
     rows = np.concatenate((np.atleast_2d(pose.position), np.atleast_2d(pose.quaternion)), axis=1)
     return locked(rows)
 

@@ -22,10 +22,23 @@ def limit_margin(state: Equilibrium) -> Array:
         Smallest distance [N] of the quantity that the robot's limits name, shape () or (N,): 0 where a cable is at its
         limit, NaN where there are no tensions. It depends on how the load is shared.
     """
-    robot, cables = state.robot, state.cables
-    tension = cables.frame_end_tension if robot.tension_limits_of == "frame_end" else cables.chord_tension
-    gap: Array = np.minimum(tension - robot.tension_min, robot.tension_max - tension).min(axis=-1)
-    return gap
+    margin: Array = cable_margins(state).min(axis=-1)
+    return margin
+
+
+def cable_margins(state: Equilibrium) -> Array:
+    """Distance of each cable's tension to its nearest limit: what `limit_margin` takes the smallest of.
+
+    Args:
+        state: Robot and cables, `plan.state` for instance.
+
+    Returns:
+        Distance [N] of the quantity that the robot's limits name, shape (m,) or (N, m); NaN where there are no
+        tensions.
+    """
+    tension, robot = state.limited_tension, state.robot
+    margins: Array = np.minimum(tension - robot.tension_min, robot.tension_max - tension)
+    return margins
 
 
 def capacity_margin(state: Equilibrium) -> Array:

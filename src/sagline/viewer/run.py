@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from sagline.arrays import Array
-from sagline.cables.state import CableState
+from sagline.cables.model import CableState
 from sagline.errors import InvalidValueError
 from sagline.kinematics.confirm import Confirmation, confirm
 from sagline.kinematics.plan import Plan
