@@ -68,8 +68,9 @@ def _compiled(function: F, **options: Any) -> F:
     # numba reads its cache folder while it decorates: set for that moment only, other users of numba keep theirs.
     before = getattr(config, "CACHE_DIR")  # noqa: B009 - set by numba at run time, unknown to type checkers
     setattr(config, "CACHE_DIR", str(FOLDER))  # noqa: B010
+    every: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
     try:
-        return cast("F", njit(**({"cache": True, "error_model": "numpy", "_nrt": False} | options))(function))
+        return cast("F", njit(**{**every, **options})(function))
     finally:
         setattr(config, "CACHE_DIR", before)  # noqa: B010
 

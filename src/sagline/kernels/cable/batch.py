@@ -77,10 +77,10 @@ def batch_from_tension(
         if model.code == CATENARY:
             for i in range(size):
                 ratio[i] = ordinary_length_ratio(half[i], sine[i], cosine[i], tau[i] / ea[i])
-            largest = 0.0
+            stretched = 0
             for i in range(size):
-                largest = max(largest, tau[i] / ea[i])
-            if largest > TAUT_STRAIN:
+                stretched += 1 if tau[i] > TAUT_STRAIN * ea[i] else 0
+            if stretched > 0:
                 for i in range(size):
                     ratio[i] = ordinary_length_ratio_near(half[i], sine[i], cosine[i], tau[i] / ea[i], ratio[i])
             for i in range(size):

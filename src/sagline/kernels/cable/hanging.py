@@ -44,15 +44,15 @@ def hang_cables(model: Model, cables: Cables, near: bool, statuses: Codes) -> in
     for i in range(m):
         cables.strain[i] = cables.tau[i] / cables.stiffness[i]
     if model.code == CATENARY:
-        largest = 0.0
+        stretched = 0
         if not near:
             for i in range(m):
                 cables.ratio[i] = ordinary_length_ratio(
                     cables.slackness[i], cables.sine[i], cables.cosine[i], cables.strain[i]
                 )
             for i in range(m):
-                largest = max(largest, cables.strain[i])
-        if near or largest > TAUT_STRAIN:
+                stretched += 1 if cables.strain[i] > TAUT_STRAIN else 0
+        if near or stretched > 0:
             for i in range(m):
                 cables.ratio[i] = ordinary_length_ratio_near(
                     cables.slackness[i], cables.sine[i], cables.cosine[i], cables.strain[i], cables.ratio[i]

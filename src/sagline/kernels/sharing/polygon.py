@@ -78,7 +78,10 @@ def make_room(corners: Array, labels: Indices, count: int, leaving: int, enterin
 
 @glue
 def widest_pair(null: Array) -> tuple[int, int, float]:
-    """Two cables whose rows span a large parallelogram, and its signed area: the longest row, and what crosses it most."""
+    """Two cables whose rows span a large parallelogram, and its signed area.
+
+    One has the longest row; the other crosses it most.
+    """
     m = null.shape[1]
     first = second = 0
     longest = 0.0
