@@ -54,7 +54,7 @@ def assert_same(plan: sl.Plan, other: sl.Plan) -> None:
         assert not theirs.flags.writeable
     assert plan.tension == other.tension
     assert plan.state.cables.model == other.state.cables.model
-    assert dump_robot(plan.state.robot) == dump_robot(other.state.robot)
+    assert dump_robot(plan.state.one_robot) == dump_robot(other.state.one_robot)
     assert (plan.path is None) == (other.path is None)
 
 

@@ -49,10 +49,11 @@ def save_plan(plan: Plan, file: os.PathLike[str] | str) -> None:
     an answer are kept, with their status, shortfall and blocking cables, and NaN lengths and forces.
 
     Args:
-        plan: The plan.
+        plan: The plan, of one robot.
         file: The file, "run.nc" for instance; one that exists is replaced.
 
     Raises:
+        InvalidValueError: If the plan is of several robots, one a pose.
         FileError: If the file cannot be written; what was there before is untouched.
     """
     data = _dataset(plan)
@@ -93,7 +94,8 @@ def _dataset(plan: Plan) -> Dataset:
     quantities = QUANTITIES if plan.path is None else QUANTITIES + MOTION
     used = {part for quantity in quantities for part in quantity.parts} & PARTS.keys()
     coordinates: dict[str, Any] = {part: (part, list(PARTS[part])) for part in sorted(used)}
-    coordinates["cable"] = ("cable", np.arange(plan.state.robot.cable_count), {"long_name": "cable, counted from 0"})
+    cables = np.arange(plan.state.one_robot.cable_count)
+    coordinates["cable"] = ("cable", cables, {"long_name": "cable, counted from 0"})
     if plan.path is not None:
         coordinates["time"] = variable(TIME)
     labels = Coordinates(coordinates, indexes={})  # whoever reads the file builds what indexes they need
@@ -102,12 +104,12 @@ def _dataset(plan: Plan) -> Dataset:
 
 def _attributes(plan: Plan) -> dict[str, Any]:
     return {
-        "title": f"Cable lengths and tensions of {plan.state.robot.name}",
+        "title": f"Cable lengths and tensions of {plan.state.one_robot.name}",
         "source": f"sagline {version('sagline')}",
         "sagline_format": FORMAT,
         **_written("model", plan.state.cables.model),
         **_written("tension", plan.tension),
-        "robot": dump_robot(plan.state.robot),
+        "robot": dump_robot(plan.state.one_robot),
     }
 
 

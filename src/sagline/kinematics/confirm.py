@@ -68,8 +68,8 @@ def confirm(plan: Plan) -> Confirmation:
         return Confirmation(plan, found.pose, found.status, found.wrench_residual)
     blocks = []
     for first in range(0, len(lengths), BLOCK):
-        part = slice(first, first + BLOCK)
-        found = forward(state.robot, lengths[part], start=state.pose[part], wrench=state.wrench[part])
+        part = state[first : first + BLOCK]
+        found = forward(part.robot, part.cables.unstrained_length, start=part.pose, wrench=part.wrench)
         blocks.append((found.pose.position, found.pose.quaternion, found.status, found.wrench_residual))
     position, quaternion, status, residual = (locked(np.concatenate(parts)) for parts in zip(*blocks, strict=True))
     return Confirmation(plan, Pose._adopt(position, quaternion), status, residual)

@@ -16,7 +16,7 @@ from sagline.kinematics.forward_solution import ForwardSolution
 from sagline.kinematics.forward_status import STABLE
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
-from sagline.robot.robot import Robot
+from sagline.robot.several import Robots, cables_of, first_of
 from sagline.statics.tables import body_table, cable_table
 
 
@@ -65,19 +65,19 @@ class Found(NamedTuple):
 
     def solution(
         self,
-        robot: Robot,
+        robot: Robots,
         model: CableModel,
         load: Array,
         shape: tuple[int, ...],
         covariance: Array | None = None,
     ) -> ForwardSolution:
         """The batch in the caller's shape, () or (N,)."""
-        wide = (*shape, robot.cable_count)
+        wide = (*shape, self.cable_status.shape[1])
         pose = Pose._adopt(self.poses[:, :3].reshape(*shape, 3), self.poses[:, 3:].reshape(*shape, 4))
         cables = CableState(
             model=model,
-            cable=robot.cables,
-            gravity=robot.gravity,
+            cable=cables_of(robot),
+            gravity=first_of(robot).gravity,
             span=locked(self.results[tables.SPAN].reshape(wide)),
             rise=locked(self.results[tables.RISE].reshape(wide)),
             unstrained_length=locked(self.results[tables.LENGTH].reshape(wide)),
@@ -100,7 +100,7 @@ class Found(NamedTuple):
 
 
 def solve_rows(
-    robot: Robot,
+    robot: Robots,
     model: CableModel,
     lengths: Array,
     starts: Array,
@@ -112,16 +112,19 @@ def solve_rows(
     """Run the kernel over samples.
 
     Args:
-        robot: The robot.
+        robot: The robot, or one a sample.
         model: Cable model; straight cables are fitted.
         lengths: Unstrained lengths (N, m).
         starts: Pose rows (1 or N, POSE_COLUMNS).
         wrenches: External plus inertial (1 or N, 6).
         chained: Whether each sample starts where the last one ended.
         freedom: Motions to allow (n, 6); None for those of the robot.
+
+    Returns:
+        The answers.
     """
     found = Found.empty(*lengths.shape)
-    allowed = robot.freedom if freedom is None else freedom
+    allowed = first_of(robot).freedom if freedom is None else freedom
     given = (allowed, body_table(robot), cable_table(robot), lengths, starts, wrenches)
     filled: tuple[Any, ...] = found
     if model.code == codes.STRAIGHT:

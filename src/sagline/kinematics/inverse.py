@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +21,7 @@ from sagline.motion.path import Path
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
+from sagline.robot.several import cables_of, first_of, one_a_pose
 from sagline.statics.tables import body_table, cable_table, pose_rows
 from sagline.statics.wrench import external_wrench, inertial_wrench
 from sagline.tension.closest import Closest
@@ -31,7 +33,7 @@ _CLOSEST = Closest()
 
 
 def inverse(
-    robot: Robot,
+    robot: Robot | Sequence[Robot],
     motion: Path | Pose,
     model: CableModel = _CATENARY,
     tension: TensionMethod = _CLOSEST,
@@ -41,7 +43,8 @@ def inverse(
     """Tensions that balance the platform within their limits, and the unstrained lengths that produce them.
 
     Args:
-        robot: The robot, with m cables and n degrees of freedom, m >= n.
+        robot: The robot, with m cables and n degrees of freedom, m >= n. Or a sequence of N robots, one a pose, that
+            differ in anything but number of cables, motion pattern with its plane, kind of tension limits and gravity.
         motion: A path of N samples, whose inertia is included; or a pose or batch of N poses at rest.
         model: Cable model; the default is exact.
         tension: How the load is shared among redundant cables. `Closest` carries its reference along a
@@ -55,28 +58,31 @@ def inverse(
         feasible there, says why, and holds NaN.
 
     Raises:
-        InvalidValueError: If the robot has fewer cables than degrees of freedom, the method cannot share among
-            its cables, or an argument is of the wrong shape.
+        InvalidValueError: If a robot has fewer cables than degrees of freedom, the method cannot share among
+            its cables, several robots do not fit together (the message names which), or an argument is of the
+            wrong shape.
         CableGeometryError: If a cable has no length at some pose.
 
     Source:
         Gia Luan & Truong Thinh 2020, figure 16; made exact in docs/model.md, section 5.
     """
     method = tension if isinstance(motion, Path) or previous is not None else tension.alone
-    options = kernel_options(robot, model, method)
     pose = motion.pose if isinstance(motion, Path) else motion
+    robots = one_a_pose(robot, len(pose) if pose.shape else None)
+    shared = first_of(robots)
+    options = kernel_options(robots, model, method)
     rows = pose_rows(pose)
     count = len(rows)
     load = external_wrench(wrench, count if pose.shape else None)
     if isinstance(motion, Path):
-        load = locked(inertial_wrench(robot, pose, motion.twist, motion.twist_rate) + load)
-    reference = _reference(robot, previous, tension.variable)
-    found = _Answers.empty(count, robot.cable_count, robot.degrees_of_freedom)
+        load = locked(inertial_wrench(robots, pose, motion.twist, motion.twist_rate) + load)
+    reference = _reference(shared, previous, tension.variable)
+    found = _Answers.empty(count, shared.cable_count, shared.degrees_of_freedom)
     inverse_poses(
         *options,
-        robot.freedom,
-        body_table(robot),
-        cable_table(robot),
+        shared.freedom,
+        body_table(robots),
+        cable_table(robots),
         rows,
         np.atleast_2d(load),
         reference,
@@ -85,8 +91,8 @@ def inverse(
     _refuse_missing_chords(found.pose_status, found.results)
     cables = CableState(
         model=model,
-        cable=robot.cables,
-        gravity=robot.gravity,
+        cable=cables_of(robots),
+        gravity=shared.gravity,
         span=found.row(tables.SPAN, pose),
         rise=found.row(tables.RISE, pose),
         unstrained_length=found.row(tables.LENGTH, pose),
@@ -97,15 +103,15 @@ def inverse(
     )
     whole = locked(np.ascontiguousarray(np.broadcast_to(load, (*pose.shape, 6))))
     return Plan(
-        state=Equilibrium(robot, pose, whole, cables),
+        state=Equilibrium(robots, pose, whole, cables),
         path=motion if isinstance(motion, Path) else None,
         tension=tension,
         status=locked(found.pose_status.reshape(pose.shape)),
         shortfall=locked(found.numbers[:, SHORTFALL].reshape(pose.shape)),
         wrench_residual=locked(found.numbers[:, [FORCE_RESIDUAL, MOMENT_RESIDUAL]].reshape(*pose.shape, 2)),
         blocking=locked(found.blocking.reshape(*pose.shape, -1)),
-        farkas=locked((found.proofs[:, 0] @ robot.freedom).reshape(*pose.shape, 6)),
-        needed=locked((found.proofs[:, 1] @ robot.freedom).reshape(*pose.shape, 6)),
+        farkas=locked((found.proofs[:, 0] @ shared.freedom).reshape(*pose.shape, 6)),
+        needed=locked((found.proofs[:, 1] @ shared.freedom).reshape(*pose.shape, 6)),
     )
 
 

@@ -132,7 +132,11 @@ class Plan:
     def save(self, file: FilePath | str) -> None:
         """Write the plan to a NetCDF file, whole or not at all, with units and the robot inside.
 
+        Args:
+            file: The file, "run.nc" for instance; one that exists is replaced.
+
         Raises:
+            InvalidValueError: If the plan is of several robots, one a pose: to save those, solve them one by one.
             FileError: If the file cannot be written.
         """
         from sagline.files.plan_file import save_plan  # the one call outward: a plan knows how to leave

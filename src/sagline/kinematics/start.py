@@ -12,6 +12,7 @@ from sagline.kinematics.forward_rows import Found, solve_rows
 from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
+from sagline.robot.several import Robots, anchors_of, cables_of, first_of, limits_of, robots_at
 from sagline.statics.tables import pose_rows
 
 _TILTS = (25.0, 60.0)  # degrees, tried where the level platform leads nowhere
@@ -20,7 +21,7 @@ _LIMIT_SLACK = 0.01  # a measured tension may miss its limit by this share
 _POOR = np.array([0, 1, 2, 3, 4, 5, 6, 0])  # how little each status is worth; fitted is as good as solved
 
 
-def search(robot: Robot, model: CableModel, lengths: Array, wrenches: Array) -> Found:
+def search(robot: Robots, model: CableModel, lengths: Array, wrenches: Array) -> Found:
     """Forward kinematics without a start, sample by sample.
 
     With its orientation held, the platform has a single equilibrium, because the energy is convex in the position:
@@ -29,50 +30,56 @@ def search(robot: Robot, model: CableModel, lengths: Array, wrenches: Array) -> 
     counts: the better status, then fewer cables outside their limits, then the lower energy.
 
     Args:
-        robot: The robot.
+        robot: The robot, or one a sample.
         model: Cable model.
         lengths: Unstrained lengths (N, m), rows of NaN are left out.
         wrenches: External plus inertial (1 or N, 6).
+
+    Returns:
+        The best answer to each sample.
     """
     found = Found.empty(*lengths.shape)
     open_samples = np.arange(len(lengths))
-    for round_, quaternion in enumerate(start_quaternions(robot)):
+    for round_, quaternion in enumerate(start_quaternions(first_of(robot))):
         loads = wrenches if len(wrenches) == 1 else locked(wrenches[open_samples])
-        answer = from_orientations(robot, model, locked(lengths[open_samples]), loads, quaternion)
+        robots = robots_at(robot, open_samples)
+        answer = from_orientations(robots, model, locked(lengths[open_samples]), loads, quaternion)
         better = np.ones(len(open_samples), dtype=np.bool_)
         if round_:
-            better = _is_better(_rank(robot, answer), _rank(robot, found.part(open_samples)))
+            better = _is_better(_rank(robots, answer), _rank(robots, found.part(open_samples)))
         found.keep(open_samples[better], answer, np.flatnonzero(better))
-        settled = _is_plausible(robot, answer)
+        settled = _is_plausible(robots, answer)
         open_samples = open_samples[~settled]
         if not len(open_samples):
             break
     return found
 
 
-def from_orientations(robot: Robot, model: CableModel, lengths: Array, wrenches: Array, quaternion: Array) -> Found:
+def from_orientations(robot: Robots, model: CableModel, lengths: Array, wrenches: Array, quaternion: Array) -> Found:
     """From the middle of the frame, with one orientation or one a sample: first the position alone, then all motions.
 
     Quaternions (x, y, z, w) of shape (4,) or (N, 4).
     """
+    shared = first_of(robot)
+    freedom = shared.freedom
     # below the middle, because the two ends of a single cable must not coincide
     depth = _BELOW * np.nan_to_num(lengths.mean(axis=1, keepdims=True), nan=1.0)
-    below = depth * (robot.freedom[:, 2] @ robot.freedom[:, :3])
+    below = depth * (freedom[:, 2] @ freedom[:, :3])
     starts = pose_rows(Pose.from_quaternion(middle(robot, quaternion) - below, quaternion))
-    if robot.motion_pattern not in ROTATING:
+    if shared.motion_pattern not in ROTATING:
         return solve_rows(robot, model, lengths, starts, wrenches)
-    freedom = robot.freedom
     translations = locked(freedom[~freedom[:, 3:].any(axis=1)])
     placed = solve_rows(robot, model, lengths, starts, wrenches, freedom=translations)
     return solve_rows(robot, model, lengths, locked(placed.poses), wrenches)
 
 
-def middle(robot: Robot, quaternion: Array) -> Array:
-    """Position at which the middle of the platform ends is in the middle of the frame ends."""
-    ends = robot.platform_anchors.mean(axis=0)
+def middle(robot: Robots, quaternion: Array) -> Array:
+    """Position at which the middle of the platform ends is in the middle of the frame ends, (3,) or (N, 3)."""
+    anchors = anchors_of(robot)
+    ends = anchors.platform.mean(axis=-2)
     vector, scalar = quaternion[..., :3], quaternion[..., 3:]
     turn = 2.0 * np.cross(vector, ends)
-    position: Array = robot.frame_anchors.mean(axis=0) - (ends + scalar * turn + np.cross(vector, turn))
+    position: Array = anchors.frame.mean(axis=-2) - (ends + scalar * turn + np.cross(vector, turn))
     return position
 
 
@@ -86,25 +93,25 @@ def start_quaternions(robot: Robot) -> Array:
     return np.array(rows)
 
 
-def outside_limits(robot: Robot, found: Found) -> Indices:
+def outside_limits(robot: Robots, found: Found) -> Indices:
     """How many cables of each sample are outside the robot's tension limits, (N,); none known for straight ones."""
-    results = found.results
+    results, limits, shared = found.results, limits_of(robot), first_of(robot)
     tension = results[tables.TENSION]
-    if robot.tension_limits_of == "frame_end":
-        weight = robot.cables.linear_density * robot.gravity * results[tables.LENGTH]
+    if shared.tension_limits_of == "frame_end":
+        weight = cables_of(robot).linear_density * shared.gravity * results[tables.LENGTH]
         tension = np.hypot(results[tables.HORIZONTAL], results[tables.VERTICAL] - weight)
-    low = (1.0 - _LIMIT_SLACK) * robot.tension_min
-    high = (1.0 + _LIMIT_SLACK) * robot.tension_max
+    low = (1.0 - _LIMIT_SLACK) * limits.low
+    high = (1.0 + _LIMIT_SLACK) * limits.high
     count: Indices = ((tension < low) | (tension > high)).sum(axis=1)
     return count
 
 
-def _is_plausible(robot: Robot, found: Found) -> Flags:
+def _is_plausible(robot: Robots, found: Found) -> Flags:
     done = np.isin(found.pose_status, (codes.FORWARD_SOLVED, codes.FORWARD_NO_LENGTHS))
     return np.asarray(done & (outside_limits(robot, found) == 0))
 
 
-def _rank(robot: Robot, found: Found) -> Array:
+def _rank(robot: Robots, found: Found) -> Array:
     """Rows (status, cables outside their limits, energy) of which the smaller is the better, (N, 3)."""
     energy = np.nan_to_num(found.numbers[:, kernel.ENERGY], nan=0.0)
     return np.stack((_POOR[found.pose_status].astype(np.float64), outside_limits(robot, found), energy), axis=1)

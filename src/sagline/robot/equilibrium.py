@@ -2,27 +2,75 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
-from sagline.arrays import Array
+from sagline.arrays import Array, locked
 from sagline.cables.state import CableState
+from sagline.errors import InvalidValueError
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
+from sagline.robot.several import Index, robots_at
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Equilibrium:
     """The one type that stiffness, modes, the viewer and the files take.
 
+    A batch is indexed like an array: `state[3]` is one of its poses, `state[2:5]` and `state[mask]` are batches;
+    slices share the batch's memory.
+
     Attributes:
-        robot: The robot.
+        robot: The robot; or a tuple of N, one a pose, where a sequence of robots was solved.
         pose: Pose of the platform, single or a batch of N.
         wrench: External plus inertial wrench on the platform about its center of mass, world axes, without
             gravity: force [N], moment [N m], shape (6,) or (N, 6).
         cables: State of the cables, fields of shape (m,) or (N, m).
     """
 
-    robot: Robot
+    robot: Robot | tuple[Robot, ...]
     pose: Pose
     wrench: Array
     cables: CableState
+
+    @property
+    def one_robot(self) -> Robot:
+        """The robot, where it is the same at all poses.
+
+        Raises:
+            InvalidValueError: If there is one a pose.
+        """
+        if isinstance(self.robot, Robot):
+            return self.robot
+        raise InvalidValueError(
+            "robot",
+            f"a sequence of {len(self.robot)} robots, one a pose",
+            "one robot for all poses",
+            "Take the poses one by one: state[i].",
+        )
+
+    def __len__(self) -> int:
+        """Number of poses in a batch."""
+        if not self.pose.shape:
+            raise TypeError("a single equilibrium has no length")
+        return len(self.pose)
+
+    def __getitem__(self, index: Index) -> Equilibrium:
+        """One pose of a batch, or a part of the batch.
+
+        Args:
+            index: A number, which may count from the end; a slice; or an array of numbers or of N booleans.
+
+        Raises:
+            TypeError: If the equilibrium is a single one.
+            IndexError: If there is no such pose.
+        """
+        if not self.pose.shape:
+            raise TypeError("a single equilibrium cannot be indexed")
+        return Equilibrium(
+            robots_at(self.robot, index), self.pose[index], locked(self.wrench[index]), self.cables[index]
+        )
+
+    def __iter__(self) -> Iterator[Equilibrium]:
+        """The poses of a batch, one by one."""
+        return (self[i] for i in range(len(self)))

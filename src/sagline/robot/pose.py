@@ -131,6 +131,32 @@ class Pose:
         )
         return locked(np.stack([np.stack(row, axis=-1) for row in rows], axis=-2))
 
+    def transform(self, points: ArrayLike) -> Array:
+        """Points of the platform frame in the world.
+
+        Every point is taken along by every pose. Points that differ from pose to pose are transformed pose by pose:
+        `pose[i].transform(points[i])`.
+
+        Args:
+            points: Coordinates in the platform frame [m], shape (..., 3).
+
+        Returns:
+            Coordinates in the world [m]: shape (..., 3) for a single pose, (N, ..., 3) for a batch of N. NaN for a pose
+            that was not found.
+
+        Raises:
+            InvalidValueError: If a coordinate is not finite, or the last axis is not x, y, z.
+
+        Example:
+            >>> pose = sl.Pose.from_euler([1, 2, 3], alpha=np.pi / 2, beta=0, gamma=0)
+            >>> pose.transform([[1, 0, 0], [0, 1, 0]]).round(12)
+            array([[1., 3., 3.],
+                   [0., 2., 3.]])
+        """
+        given = checked(points, "points", "m", shape=(3,))
+        turned = given.reshape(-1, 3) @ np.swapaxes(self.matrix, -1, -2)
+        return locked((turned + self.position[..., None, :]).reshape(*self.shape, *given.shape))
+
     @property
     def shape(self) -> tuple[int, ...]:
         """() for a single pose, (N,) for a batch."""

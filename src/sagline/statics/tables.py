@@ -1,4 +1,4 @@
-"""A robot and its poses in the form in which kernels take them."""
+"""Robots and their poses in the form in which kernels take them."""
 
 from __future__ import annotations
 
@@ -7,24 +7,41 @@ import numpy as np
 from sagline.arrays import Array, locked
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
+from sagline.robot.several import Robots
 
 
-def cable_table(robot: Robot) -> Array:
-    """Anchors, material and limits of the cables, shape (1, m, CABLE_COLUMNS); columns as in kernels.tables."""
+def cable_table(robot: Robots) -> Array:
+    """Anchors, material and limits of the cables, columns as in kernels.tables.
+
+    Args:
+        robot: One robot for all poses, or a tuple of N that fit together, one a pose.
+
+    Returns:
+        Array of shape (1 or N, m, CABLE_COLUMNS).
+    """
+    robots = (robot,) if isinstance(robot, Robot) else robot
     columns = (
-        robot.frame_anchors,
-        robot.platform_anchors,
-        robot.cables.linear_density[:, None],
-        robot.cables.axial_stiffness[:, None],
-        robot.tension_min[:, None],
-        robot.tension_max[:, None],
+        np.stack([one.frame_anchors for one in robots]),
+        np.stack([one.platform_anchors for one in robots]),
+        np.stack([one.cables.linear_density for one in robots])[..., None],
+        np.stack([one.cables.axial_stiffness for one in robots])[..., None],
+        np.stack([one.tension_min for one in robots])[..., None],
+        np.stack([one.tension_max for one in robots])[..., None],
     )
-    return locked(np.hstack(columns)[None])
+    return locked(np.concatenate(columns, axis=-1))
 
 
-def body_table(robot: Robot) -> Array:
-    """Mass, gravity and center of mass of the platform, shape (1, BODY_COLUMNS); columns as in kernels.tables."""
-    return locked(np.array([[robot.mass, robot.gravity, *robot.center_of_mass]]))
+def body_table(robot: Robots) -> Array:
+    """Mass, gravity and center of mass of the platform, columns as in kernels.tables.
+
+    Args:
+        robot: One robot for all poses, or a tuple of N that fit together, one a pose.
+
+    Returns:
+        Array of shape (1 or N, BODY_COLUMNS).
+    """
+    robots = (robot,) if isinstance(robot, Robot) else robot
+    return locked(np.array([[one.mass, one.gravity, *one.center_of_mass] for one in robots]))
 
 
 def pose_rows(pose: Pose) -> Array:

@@ -7,6 +7,7 @@ import numpy as np
 from sagline.arrays import Array, locked
 from sagline.kernels.inverse.pose_queries import margins_of_poses
 from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.several import first_of, limits_of
 from sagline.statics.tables import body_table, cable_table, pose_rows
 from sagline.tension.options import LIMITS_OF
 
@@ -15,15 +16,15 @@ def limit_margin(state: Equilibrium) -> Array:
     """Distance of each pose's tensions to their nearest limit.
 
     Args:
-        state: Robot and cables, `plan.state` for instance.
+        state: Robot or robots, and cables, `plan.state` for instance.
 
     Returns:
         Smallest distance [N] of the quantity that the robot's limits name, shape () or (N,): 0 where a cable is at its
         limit, NaN where there are no tensions. It depends on how the load is shared.
     """
-    robot, cables = state.robot, state.cables
-    tension = cables.frame_end_tension if robot.tension_limits_of == "frame_end" else cables.chord_tension
-    gap: Array = np.minimum(tension - robot.tension_min, robot.tension_max - tension).min(axis=-1)
+    shared, cables, limits = first_of(state.robot), state.cables, limits_of(state.robot)
+    tension = cables.frame_end_tension if shared.tension_limits_of == "frame_end" else cables.chord_tension
+    gap: Array = np.minimum(tension - limits.low, limits.high - tension).min(axis=-1)
     return gap
 
 
@@ -34,7 +35,7 @@ def capacity_margin(state: Equilibrium) -> Array:
     binomial of m over n - 1: 56 faces for eight cables, some microseconds a pose.
 
     Args:
-        state: Robot, poses, wrench and cables, `plan.state` for instance.
+        state: Robot or robots, poses, wrench and cables, `plan.state` for instance.
 
     Returns:
         Force [N], shape () or (N,), whatever the way of sharing; infinite where no force alone can make the pose fail,
@@ -43,17 +44,17 @@ def capacity_margin(state: Equilibrium) -> Array:
     Source:
         Bouchard, Gosselin & Moore 2010; Guay, Cardou, Cruz-Ruiz & Caro 2014.
     """
-    robot, cables, rows = state.robot, state.cables, pose_rows(state.pose)
+    shared, cables, rows = first_of(state.robot), state.cables, pose_rows(state.pose)
     pulls = np.atleast_2d(cables.vertical_force - cables.chord_tension * cables.rise / cables.chord)
     margins = np.empty(len(rows))
     margins_of_poses(
         cables.model.code,
         *cables.model.parameters,
-        LIMITS_OF[robot.tension_limits_of],
+        LIMITS_OF[shared.tension_limits_of],
         np.nan,
-        robot.freedom,
-        body_table(robot),
-        cable_table(robot),
+        shared.freedom,
+        body_table(state.robot),
+        cable_table(state.robot),
         rows,
         np.atleast_2d(state.wrench),
         locked(np.ascontiguousarray(pulls)),
