@@ -20,7 +20,7 @@ from sagline.cables.parabolic import Parabolic
 from sagline.cables.state import CableState
 from sagline.cables.straight import Straight
 from sagline.errors import FileError, InvalidValueError
-from sagline.files.plan_layout import MOTION, PARTS, QUANTITIES, TIME, Quantity
+from sagline.files.plan_layout import JERK, MOTION, PARTS, QUANTITIES, TIME, Quantity
 from sagline.files.robot_file import dump_robot, parse_robot
 from sagline.files.whole import written_whole
 from sagline.kinematics.plan import Plan
@@ -91,7 +91,9 @@ def _dataset(plan: Plan) -> Dataset:
     def variable(quantity: Quantity) -> tuple[tuple[str, ...], Any, dict[str, Any]]:
         return (*rows, *quantity.parts), quantity.of(plan), quantity.attributes
 
-    quantities = QUANTITIES if plan.path is None else QUANTITIES + MOTION
+    quantities = list(QUANTITIES if plan.path is None else QUANTITIES + MOTION)
+    if plan.path is not None and plan.path.jerk is not None:
+        quantities.append(JERK)
     used = {part for quantity in quantities for part in quantity.parts} & PARTS.keys()
     coordinates: dict[str, Any] = {part: (part, list(PARTS[part])) for part in sorted(used)}
     cables = np.arange(plan.state.one_robot.cable_count)
@@ -180,9 +182,13 @@ def _plan(path: FilePath, data: Dataset, robot: Robot) -> Plan:
         **{name: values(name) for name in STATE_ARRAYS},
         status=values("cable_status"),
     )
+    motion = None
+    if "time" in data.coords:
+        jerk = values("jerk") if "jerk" in data else None
+        motion = Path(values("time"), pose, values("twist"), values("twist_rate"), jerk)
     return Plan(
         state=Equilibrium(robot, pose, values("wrench"), cables),
-        path=Path(values("time"), pose, values("twist"), values("twist_rate")) if "time" in data.coords else None,
+        path=motion,
         tension=_read(path, data, "tension", METHODS),
         status=values("pose_status"),
         shortfall=values("shortfall"),
