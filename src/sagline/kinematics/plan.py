@@ -96,6 +96,17 @@ class Plan:
         return self.state.cables.chord_tension
 
     @property
+    def length_rate(self) -> Array | None:
+        """dL/dt: how fast to wind [m/s], shape (N, m), along the path; None for poses without a path.
+
+        The rate at which `unstrained_length` changes as the platform moves on and the load is shared anew; NaN where
+        the plan has no answer. Worked out at each call. See docs/model.md, section 7.
+        """
+        from sagline.kinematics.length_rate import length_rate  # which solves again, and so makes plans
+
+        return None if self.path is None else length_rate(self, self.path)
+
+    @property
     def gaps(self) -> tuple[Gap, ...]:
         """The runs of consecutive poses without an answer, in order; a single pose counts as a batch of one."""
         lost = ~np.atleast_1d(self.feasible)

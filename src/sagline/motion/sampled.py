@@ -40,14 +40,22 @@ def path_from_samples(time: ArrayLike, pose: Pose) -> Path:
             "as many poses as times, at least two",
             "Give one pose for each time.",
         )
-    velocity, acceleration = _spline_rates(clock, pose.position)
+    velocity, acceleration = spline_rates(clock, pose.position)
     angular_velocity, angular_acceleration = _angular_rates(clock, _without_sign_changes(pose.quaternion))
     twist = np.hstack((velocity, angular_velocity))
     return Path(clock, pose, twist, np.hstack((acceleration, angular_acceleration)))
 
 
-def _spline_rates(time: Array, values: Array) -> tuple[Array, Array]:
-    """First and second derivative, at its knots, of the cubic spline through the values."""
+def spline_rates(time: Array, values: Array) -> tuple[Array, Array]:
+    """First and second derivative, at its knots, of the cubic spline through the values.
+
+    Args:
+        time: Times of the knots, strictly increasing, shape (N,), N >= 2.
+        values: Shape (N, ...).
+
+    Returns:
+        Two arrays of the shape of the values.
+    """
     from scipy.interpolate import CubicSpline  # takes longer to load than all the rest of motion
 
     spline = CubicSpline(time, values, bc_type="not-a-knot")
@@ -71,7 +79,7 @@ def _angular_rates(time: Array, quaternion: Array) -> tuple[Array, Array]:
     scipy's RotationSpline is not used: it starts and ends with the mean velocity of the outermost steps, which leaves
     an error in the acceleration there that smaller steps do not cure.
     """
-    rate, curvature = _spline_rates(time, quaternion)
+    rate, curvature = spline_rates(time, quaternion)
     velocity = 2.0 * _vector_of_product_with_conjugate(rate, quaternion)
     growth = np.sum(quaternion * rate, axis=1, keepdims=True)  # of the norm, which a spline does not keep at 1
     return velocity, 2.0 * _vector_of_product_with_conjugate(curvature, quaternion) - 2.0 * growth * velocity
