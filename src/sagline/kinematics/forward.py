@@ -58,6 +58,13 @@ def forward(
 
     Source:
         docs/model.md, section 6.
+
+    Example:
+        >>> robot = sl.load_robot("cogiro")
+        >>> plan = sl.inverse(robot, sl.Pose.from_euler([1, 1, 2], 0, 0, 0))
+        >>> found = sl.forward(robot, plan.unstrained_length)
+        >>> print(found.solved, found.pose.position.round(9))
+        True [1. 1. 2.]
     """
     robots = together(robot)
     lengths = checked_lengths(first_of(robots), unstrained_length)
@@ -79,6 +86,13 @@ def forward(
 
 def checked_lengths(robot: Robot, lengths: ArrayLike) -> Array:
     """The caller's lengths, shape (m,) or (N, m), positive or whole rows of NaN.
+
+    Args:
+        robot: Gives the number of cables, and its name to messages.
+        lengths: What the caller gave [m].
+
+    Returns:
+        Write-locked array of shape (m,) or (N, m).
 
     Raises:
         InvalidValueError: If they are not; the message names the cable and, of many, the sample.
@@ -112,7 +126,14 @@ def checked_lengths(robot: Robot, lengths: ArrayLike) -> Array:
 
 
 def start_rows(start: Pose, lengths: Array) -> Array:
-    """Pose rows (1 or N, POSE_COLUMNS) to begin at.
+    """Pose rows to begin at.
+
+    Args:
+        start: One pose, or one a sample.
+        lengths: The samples, shape (m,) or (N, m).
+
+    Returns:
+        Array of shape (1 or N, POSE_COLUMNS).
 
     Raises:
         InvalidValueError: If the counts of poses and samples differ.

@@ -30,7 +30,13 @@ class Found(NamedTuple):
     pose_status: Codes
 
     def keep(self, samples: Indices, other: Found, which: Indices) -> None:
-        """Replace the answers of some samples by some of another's."""
+        """Replace the answers of some samples by some of another's.
+
+        Args:
+            samples: Which to replace (k,).
+            other: The answers to take from.
+            which: Which of those to take (k,).
+        """
         self.poses[samples] = other.poses[which]
         self.results[:, samples] = other.results[:, which]
         self.cable_status[samples] = other.cable_status[which]
@@ -38,7 +44,14 @@ class Found(NamedTuple):
         self.pose_status[samples] = other.pose_status[which]
 
     def part(self, samples: Indices) -> Found:
-        """The answers of some samples."""
+        """The answers of some samples.
+
+        Args:
+            samples: Which (k,).
+
+        Returns:
+            Copies of their answers.
+        """
         return Found(
             self.poses[samples],
             self.results[:, samples],
@@ -49,7 +62,15 @@ class Found(NamedTuple):
 
     @classmethod
     def empty(cls, count: int, cables: int) -> Found:
-        """Room for a batch."""
+        """Room for a batch.
+
+        Args:
+            count: Number of samples N.
+            cables: Number of cables m.
+
+        Returns:
+            Arrays to be filled.
+        """
         return cls(
             np.empty((count, tables.POSE_COLUMNS)),
             np.empty((tables.RESULT_ROWS, count, cables)),
@@ -71,7 +92,18 @@ class Found(NamedTuple):
         shape: tuple[int, ...],
         covariance: Array | None = None,
     ) -> ForwardSolution:
-        """The batch in the caller's shape, () or (N,)."""
+        """The batch in the caller's shape, () or (N,).
+
+        Args:
+            robot: The robot, or one a sample.
+            model: Cable model.
+            load: External plus inertial wrench, shape (6,) or (N, 6).
+            shape: () for a single sample, (N,) for a batch.
+            covariance: Of the poses, shape (N, 6, 6), or None.
+
+        Returns:
+            ForwardSolution around these arrays.
+        """
         wide = (*shape, self.cable_status.shape[1])
         pose = Pose._adopt(self.poses[:, :3].reshape(*shape, 3), self.poses[:, 3:].reshape(*shape, 4))
         cables = CableState(

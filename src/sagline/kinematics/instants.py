@@ -30,7 +30,14 @@ class Instant(NamedTuple):
     wrench: Array
 
     def part(self, samples: Indices) -> Instant:
-        """Those near some of the samples."""
+        """Those near some of the samples.
+
+        Args:
+            samples: Which (k,).
+
+        Returns:
+            Instant of k samples.
+        """
         return Instant(self.pose[samples], self.wrench[samples])
 
 

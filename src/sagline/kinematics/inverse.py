@@ -65,6 +65,12 @@ def inverse(
 
     Source:
         Gia Luan & Truong Thinh 2020, figure 16; made exact in docs/model.md, section 5.
+
+    Example:
+        >>> robot = sl.load_robot("cogiro")
+        >>> plan = sl.inverse(robot, sl.Pose.from_euler([1, 1, 2], 0, 0, 0))
+        >>> print(plan.feasible, plan.unstrained_length.round(3))
+        True [11.049 10.542  9.674  9.829  8.49   7.85   9.453  9.402]
     """
     method = tension if isinstance(motion, Path) or previous is not None else tension.alone
     pose = motion.pose if isinstance(motion, Path) else motion

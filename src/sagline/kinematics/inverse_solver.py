@@ -52,6 +52,12 @@ class InverseSolver:
 
     It owns its working memory and, for `Closest`, the last feasible tensions: `reset` forgets them. One solver
     serves one control loop; it is not to be shared between threads.
+
+    Example:
+        >>> solver = sl.InverseSolver(sl.load_robot("cogiro"))
+        >>> step = solver.step((1.0, 1.0, 2.0), (0.0, 0.0, 0.0, 1.0))
+        >>> print(step.status.name, step.unstrained_length[:3].round(3))
+        SOLVED [11.049 10.542  9.674]
     """
 
     def __init__(self, robot: Robot, model: CableModel | None = None, tension: TensionMethod | None = None) -> None:

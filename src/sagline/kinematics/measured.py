@@ -41,6 +41,11 @@ class MeasuredTension:
     def __init__(self, frame_end_tension: ArrayLike, tension_deviation: ArrayLike, length_deviation: ArrayLike) -> None:
         """Check the three.
 
+        Args:
+            frame_end_tension: Readings [N], shape (m,) or (N, m); NaN for a cable without a cell.
+            tension_deviation: Standard deviation of a reading [N], > 0.
+            length_deviation: Standard deviation of a length [m], > 0.
+
         Raises:
             InvalidValueError: If a reading is negative or infinite, or a deviation is not positive.
         """
@@ -159,7 +164,15 @@ class _Fit(NamedTuple):
 
 
 def frame_end_slopes(state: Equilibrium, motion_by_length: Array) -> Array:
-    """d(tension at the frame end of cable i)/dL_j while the platform keeps its balance, shape (m, m) [N/m]."""
+    """d(tension at the frame end of cable i)/dL_j while the platform keeps its balance.
+
+    Args:
+        state: A single equilibrium.
+        motion_by_length: d(motion)/dL, shape (6, m).
+
+    Returns:
+        Array of shape (m, m) [N/m].
+    """
     robot, cables = state.one_robot, state.cables
     slopes = cable_slopes(state)
     # the platform end moves by dp + dphi x r

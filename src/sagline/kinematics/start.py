@@ -56,9 +56,17 @@ def search(robot: Robots, model: CableModel, lengths: Array, wrenches: Array) ->
 
 
 def from_orientations(robot: Robots, model: CableModel, lengths: Array, wrenches: Array, quaternion: Array) -> Found:
-    """From the middle of the frame, with one orientation or one a sample: first the position alone, then all motions.
+    """From the middle of the frame: first the position alone, then all motions.
 
-    Quaternions (x, y, z, w) of shape (4,) or (N, 4).
+    Args:
+        robot: The robot, or one a sample.
+        model: Cable model.
+        lengths: Unstrained lengths (N, m).
+        wrenches: External plus inertial (1 or N, 6).
+        quaternion: Orientation to begin with (x, y, z, w), shape (4,), or one a sample (N, 4).
+
+    Returns:
+        The answers.
     """
     shared = first_of(robot)
     freedom = shared.freedom
@@ -74,7 +82,15 @@ def from_orientations(robot: Robots, model: CableModel, lengths: Array, wrenches
 
 
 def middle(robot: Robots, quaternion: Array) -> Array:
-    """Position at which the middle of the platform ends is in the middle of the frame ends, (3,) or (N, 3)."""
+    """Position at which the middle of the platform ends is in the middle of the frame ends.
+
+    Args:
+        robot: The robot, or one a sample.
+        quaternion: Orientation of the platform, shape (4,) or (N, 4).
+
+    Returns:
+        Position of the platform origin [m], shape (3,) or (N, 3).
+    """
     anchors = anchors_of(robot)
     ends = anchors.platform.mean(axis=-2)
     vector, scalar = quaternion[..., :3], quaternion[..., 3:]
@@ -84,7 +100,14 @@ def middle(robot: Robots, quaternion: Array) -> Array:
 
 
 def start_quaternions(robot: Robot) -> Array:
-    """Level first, then tilted about each axis that the robot can turn about, one way and the other, (K, 4)."""
+    """Orientations to start from: level, then tilted about each axis that the robot can turn about, both ways.
+
+    Args:
+        robot: The robot.
+
+    Returns:
+        Quaternions (K, 4), scalar last.
+    """
     rows = [np.array([0.0, 0.0, 0.0, 1.0])]
     if robot.motion_pattern in ROTATING:
         axes = robot.freedom[2:, 3:] if robot.motion_pattern in PLANAR else np.eye(3)
@@ -94,7 +117,15 @@ def start_quaternions(robot: Robot) -> Array:
 
 
 def outside_limits(robot: Robots, found: Found) -> Indices:
-    """How many cables of each sample are outside the robot's tension limits, (N,); none known for straight ones."""
+    """How many cables of each sample are outside their robot's tension limits.
+
+    Args:
+        robot: The robot, or one a sample.
+        found: Answers to N samples.
+
+    Returns:
+        Counts (N,); 0 for straight cables, whose tensions are not known.
+    """
     results, limits, shared = found.results, limits_of(robot), first_of(robot)
     tension = results[tables.TENSION]
     if shared.tension_limits_of == "frame_end":

@@ -44,6 +44,9 @@ def placed(state: Equilibrium, pose: Pose, chord_tension: Array) -> Placed:
         state: A batch of N: its robots and model.
         pose: N poses.
         chord_tension: tau [N], shape (N, m).
+
+    Returns:
+        Cables, and the matrices of their forces.
     """
     anchors, body, shared = anchors_of(state.robot), bodies_of(state.robot), first_of(state.robot)
     turn = np.swapaxes(pose.matrix, -1, -2)

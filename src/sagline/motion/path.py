@@ -36,6 +36,13 @@ class Path:
     ) -> None:
         """Check the fields against each other.
 
+        Args:
+            time: Time of each sample [s], shape (N,), strictly increasing.
+            pose: A batch of N poses.
+            twist: Velocity [m/s] and angular velocity [rad/s], shape (N, 6).
+            twist_rate: Their rates [m/s^2, rad/s^2], shape (N, 6).
+            jerk: Their second rates [m/s^3, rad/s^3], shape (N, 6), or None.
+
         Raises:
             InvalidValueError: If the times do not increase, a number is not finite, or the lengths differ.
         """

@@ -30,7 +30,14 @@ class Profile:
 
     @classmethod
     def of_order(cls, order: int) -> Profile:
-        """The profile whose first `order` derivatives vanish at both ends."""
+        """The profile whose first `order` derivatives vanish at both ends.
+
+        Args:
+            order: k, >= 2.
+
+        Returns:
+            Profile of degree 2 k + 1.
+        """
         k = order
         scale = factorial(2 * k + 1) // factorial(k) ** 2
         binomials = (factorial(k) // factorial(i) // factorial(k - i) for i in range(k + 1))
@@ -54,14 +61,28 @@ class Profile:
         return float(self.slope * k * (0.25 * (1.0 - q)) ** (k - 1) * np.sqrt(q))
 
     def share(self, s: Array) -> Array:
-        """Share of the way that is done at a share s of the time, 0 <= s <= 1."""
+        """Share of the way that is done.
+
+        Args:
+            s: Share of the time, 0 to 1, of any shape.
+
+        Returns:
+            Array of the shape of s, from 0 to 1.
+        """
         total: Array = np.full_like(s, self.tail[-1])
         for coefficient in self.tail[-2::-1]:
             total = coefficient + s * total
         return s ** (self.order + 1) * total
 
     def rates(self, s: Array) -> tuple[Array, Array, Array]:
-        """First, second and third derivative of the share by s; the first k of them exactly 0 at both ends."""
+        """First, second and third derivative of the share by s; the first k of them exactly 0 at both ends.
+
+        Args:
+            s: Share of the time, 0 to 1, of any shape.
+
+        Returns:
+            Three arrays of the shape of s.
+        """
         k = self.order
         u, bend = s * (1.0 - s), 1.0 - 2.0 * s
         second = self.slope * k * u ** (k - 1) * bend

@@ -31,6 +31,12 @@ def path_from_samples(time: ArrayLike, pose: Pose) -> Path:
 
     Raises:
         InvalidValueError: If the times do not increase, there are fewer than two, or the number of poses differs.
+
+    Example:
+        >>> time = np.linspace(0.0, 2.0, 21)
+        >>> path = sl.path_from_samples(time, sl.Pose.from_euler(np.outer(time**2, [1, 0, 2]), 0, 0, 0))
+        >>> print(path.twist[-1, :3].round(6), path.twist_rate[0, :3].round(6))
+        [4. 0. 8.] [2. 0. 4.]
     """
     clock = checked_time(time)
     if clock.size < 2 or pose.shape != (clock.size,):

@@ -39,7 +39,15 @@ class Segments:
 
     @classmethod
     def between(cls, stops: Pose, profile: Profile) -> Segments:
-        """The segments from each pose of a batch to the next."""
+        """The segments from each pose of a batch to the next.
+
+        Args:
+            stops: The waypoints, a batch of S + 1 poses.
+            profile: How to get from each to the next.
+
+        Returns:
+            S segments.
+        """
         move, kept = np.diff(stops.position, axis=0), stops.quaternion[:-1]
         if np.array_equal(kept, stops.quaternion[1:]):  # nothing turns: the axis is never asked for
             return cls(profile, stops.position[:-1], move, np.zeros_like(move), kept, np.zeros_like(kept))
@@ -150,6 +158,14 @@ def _limit(value: float | None, item: str, unit: str) -> float:
 
 def positive(value: float, item: str, unit: str) -> float:
     """One positive number, whatever the shape of the path.
+
+    Args:
+        value: What a caller gave.
+        item: The name a message uses.
+        unit: Unit of the value, for the message.
+
+    Returns:
+        The number.
 
     Raises:
         InvalidValueError: If it is not; the message names the item.

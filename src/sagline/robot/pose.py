@@ -55,6 +55,9 @@ class Pose:
             beta: Angle about y [rad], a number or shape (N,).
             gamma: Angle about x [rad], a number or shape (N,).
 
+        Returns:
+            Pose, single or a batch of N.
+
         Raises:
             InvalidValueError: If a number is not finite or the counts differ.
 
@@ -83,6 +86,9 @@ class Pose:
         Args:
             position: Position of the platform frame's origin [m], shape (3,) or (N, 3).
             quaternion: Of length 1 to 1e-6 (what is left is normalized away), shape (4,) or (N, 4).
+
+        Returns:
+            Pose, single or a batch of N.
 
         Raises:
             InvalidValueError: If a number is not finite, a length is not 1, or the counts differ.

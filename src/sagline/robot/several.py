@@ -28,6 +28,9 @@ def together(robot: Robot | Sequence[Robot]) -> Robots:
     Args:
         robot: A robot, or a sequence of them.
 
+    Returns:
+        The robot, or a tuple.
+
     Raises:
         InvalidValueError: If there is none, or one of them (the message names it) cannot stand in a batch with the
             first.
@@ -59,7 +62,18 @@ def check_count(robot: Robots, poses: int | None) -> None:
 
 
 def one_a_pose(robot: Robot | Sequence[Robot], poses: int | None) -> Robots:
-    """`together` and `check_count` in one."""
+    """`together` and `check_count` in one.
+
+    Args:
+        robot: A robot, or a sequence of them.
+        poses: How many poses there are; None for a single one.
+
+    Returns:
+        The robot, or a tuple of one a pose.
+
+    Raises:
+        InvalidValueError: As those two.
+    """
     robots = together(robot)
     check_count(robots, poses)
     return robots
@@ -67,6 +81,12 @@ def one_a_pose(robot: Robot | Sequence[Robot], poses: int | None) -> Robots:
 
 def first_of(robot: Robots) -> Robot:
     """The robot, or the first of several: for what all of them share.
+
+    Args:
+        robot: The robot or robots.
+
+    Returns:
+        One robot.
 
     Raises:
         InvalidValueError: If there is none, as in a selection that chose no pose.
@@ -79,7 +99,15 @@ def first_of(robot: Robots) -> Robot:
 
 
 def robots_at(robot: Robots, index: Index) -> Robots:
-    """The robot of all poses, or of several those of the poses that an index names."""
+    """The robot of all poses, or of several those of the poses that an index names.
+
+    Args:
+        robot: The robot or robots.
+        index: As of a batch.
+
+    Returns:
+        One robot, or a tuple.
+    """
     if isinstance(robot, Robot):
         return robot
     chosen = np.arange(len(robot))[index]
@@ -87,12 +115,27 @@ def robots_at(robot: Robots, index: Index) -> Robots:
 
 
 def robot_at(robot: Robots, pose: int) -> Robot:
-    """The robot of one pose."""
+    """The robot of one pose.
+
+    Args:
+        robot: The robot or robots.
+        pose: Index of the pose.
+
+    Returns:
+        One robot.
+    """
     return robot if isinstance(robot, Robot) else robot[pose]
 
 
 def cables_of(robot: Robots) -> Cable:
-    """Material of the cables, fields of shape (m,), or (N, m) for several robots."""
+    """Material of the cables.
+
+    Args:
+        robot: The robot or robots.
+
+    Returns:
+        Cable with fields of shape (m,), or (N, m) for several robots.
+    """
     if isinstance(robot, Robot):
         return robot.cables
     materials = [one.cables for one in robot]
@@ -114,7 +157,14 @@ class Bodies(NamedTuple):
 
 
 def bodies_of(robot: Robots) -> Bodies:
-    """Mass, center of mass and inertia of the platform or platforms."""
+    """Mass, center of mass and inertia of the platform or platforms.
+
+    Args:
+        robot: The robot or robots.
+
+    Returns:
+        Bodies, with a leading axis N for several robots.
+    """
     if isinstance(robot, Robot):
         return Bodies(np.asarray(robot.mass), robot.center_of_mass, robot.inertia)
     return Bodies(
@@ -137,7 +187,14 @@ class Anchors(NamedTuple):
 
 
 def anchors_of(robot: Robots) -> Anchors:
-    """Anchors of the robot or robots."""
+    """Anchors of the robot or robots.
+
+    Args:
+        robot: The robot or robots.
+
+    Returns:
+        Anchors, with a leading axis N for several robots.
+    """
     if isinstance(robot, Robot):
         return Anchors(robot.frame_anchors, robot.platform_anchors)
     return Anchors(np.stack([one.frame_anchors for one in robot]), np.stack([one.platform_anchors for one in robot]))
@@ -156,7 +213,14 @@ class Limits(NamedTuple):
 
 
 def limits_of(robot: Robots) -> Limits:
-    """Tension limits of the robot or robots."""
+    """Tension limits of the robot or robots.
+
+    Args:
+        robot: The robot or robots.
+
+    Returns:
+        Limits, with a leading axis N for several robots.
+    """
     if isinstance(robot, Robot):
         return Limits(robot.tension_min, robot.tension_max)
     return Limits(np.stack([one.tension_min for one in robot]), np.stack([one.tension_max for one in robot]))
