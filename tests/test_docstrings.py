@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 import sagline as sl
@@ -54,7 +53,7 @@ EXAMPLES = {
 @pytest.mark.parametrize("name", sorted(EXAMPLES))
 def test_the_examples_give_what_they_say(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    test = doctest.DocTest(EXAMPLES[name], {"sl": sl, "np": np}, name, None, None, None)
+    test = doctest.DocTest(EXAMPLES[name], {}, name, None, None, None)
     said: list[str] = []
     doctest.DocTestRunner(verbose=False).run(test, out=said.append)
     assert not said, "".join(said)
@@ -81,7 +80,7 @@ def test_a_docstring_tells_what_goes_in_what_comes_out_and_what_goes_wrong(name:
     (node,) = (found for found in tree.body if isinstance(found, ast.FunctionDef))
     given = [a for a in inspect.signature(function).parameters if a not in ("self", "cls")]
     for argument in given:
-        assert f"    {argument}: " in text or f"    **{argument}: " in text, f"{argument} is not explained"
+        assert f"    {argument}: " in text, f"{argument} is not explained"
     if node.returns is not None and ast.unparse(node.returns) != "None":
         assert "Returns:" in text
     if any(isinstance(inner, ast.Raise) for inner in ast.walk(node)):

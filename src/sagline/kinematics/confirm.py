@@ -62,7 +62,9 @@ def confirm(plan: Plan) -> Confirmation:
     Returns:
         The plan with the poses found.
 
-    Example:
+    Examples:
+        >>> import numpy as np
+        >>> import sagline as sl
         >>> path = sl.quintic_path([(0, 0, 2), (2, 1, 2.5)], durations=4.0)
         >>> proof = sl.confirm(sl.inverse(sl.load_robot("cogiro"), path, model=sl.Elastic()))
         >>> print(f"{1e3 * np.linalg.norm(proof.position_error, axis=1).max():.2f} mm off")

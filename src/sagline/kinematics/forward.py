@@ -59,7 +59,8 @@ def forward(
     Source:
         docs/model.md, section 6.
 
-    Example:
+    Examples:
+        >>> import sagline as sl
         >>> robot = sl.load_robot("cogiro")
         >>> plan = sl.inverse(robot, sl.Pose.from_euler([1, 1, 2], 0, 0, 0))
         >>> found = sl.forward(robot, plan.unstrained_length)

@@ -66,7 +66,8 @@ def inverse(
     Source:
         Gia Luan & Truong Thinh 2020, figure 16; made exact in docs/model.md, section 5.
 
-    Example:
+    Examples:
+        >>> import sagline as sl
         >>> robot = sl.load_robot("cogiro")
         >>> plan = sl.inverse(robot, sl.Pose.from_euler([1, 1, 2], 0, 0, 0))
         >>> print(plan.feasible, plan.unstrained_length.round(3))

@@ -53,7 +53,8 @@ class InverseSolver:
     It owns its working memory and, for `Closest`, the last feasible tensions: `reset` forgets them. One solver
     serves one control loop; it is not to be shared between threads.
 
-    Example:
+    Examples:
+        >>> import sagline as sl
         >>> solver = sl.InverseSolver(sl.load_robot("cogiro"))
         >>> step = solver.step((1.0, 1.0, 2.0), (0.0, 0.0, 0.0, 1.0))
         >>> print(step.status.name, step.unstrained_length[:3].round(3))

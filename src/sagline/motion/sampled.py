@@ -32,7 +32,9 @@ def path_from_samples(time: ArrayLike, pose: Pose) -> Path:
     Raises:
         InvalidValueError: If the times do not increase, there are fewer than two, or the number of poses differs.
 
-    Example:
+    Examples:
+        >>> import numpy as np
+        >>> import sagline as sl
         >>> time = np.linspace(0.0, 2.0, 21)
         >>> path = sl.path_from_samples(time, sl.Pose.from_euler(np.outer(time**2, [1, 0, 2]), 0, 0, 0))
         >>> print(path.twist[-1, :3].round(6), path.twist_rate[0, :3].round(6))

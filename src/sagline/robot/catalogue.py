@@ -16,7 +16,8 @@ def robot_names() -> tuple[str, ...]:
     Returns:
         In alphabetical order.
 
-    Example:
+    Examples:
+        >>> import sagline as sl
         >>> sl.robot_names()[:3]
         ('article-mixed', 'article-prototype', 'article-suspended')
     """

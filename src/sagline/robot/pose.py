@@ -153,7 +153,9 @@ class Pose:
         Raises:
             InvalidValueError: If a coordinate is not finite, or the last axis is not x, y, z.
 
-        Example:
+        Examples:
+            >>> import numpy as np
+            >>> import sagline as sl
             >>> pose = sl.Pose.from_euler([1, 2, 3], alpha=np.pi / 2, beta=0, gamma=0)
             >>> pose.transform([[1, 0, 0], [0, 1, 0]]).round(12)
             array([[1., 3., 3.],

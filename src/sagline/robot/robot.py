@@ -116,7 +116,9 @@ class Robot:
         Raises:
             InvalidValueError: If a field is wrong; the message names it, with its index.
 
-        Example:
+        Examples:
+            >>> import numpy as np
+            >>> import sagline as sl
             >>> tripod = sl.Robot(
             ...     "tripod",
             ...     frame_anchors=[[3, 0, 3], [-2, 2, 3], [-2, -2, 3]],
@@ -171,20 +173,25 @@ class Robot:
         return freedom_matrix(self.motion_pattern, self.plane_normal)
 
     def replace(self, **changes: Any) -> Robot:
-        """A robot with some fields changed, checked like a new one (dataclasses.replace).
+        """A robot with some fields changed, checked like a new one.
 
         Args:
-            **changes: New values, by the names of the attributes.
+            changes: Fields of `Robot` and their new values.
 
         Returns:
-            A new robot; this one stays what it is.
+            A new robot; this one stays as it is.
 
         Raises:
-            InvalidValueError: If a new value is wrong; the message names it.
+            InvalidValueError: If there is no such field, or the new values are none the constructor accepts.
 
-        Example:
-            >>> heavy = sl.load_robot("cogiro").replace(mass=500.0)
+        Examples:
+            >>> import sagline as sl
+            >>> heavy = sl.load_robot("cogiro").replace(mass=300.0, tension_min=50.0)
+            >>> print(heavy.mass, heavy.tension_min[0])
+            300.0 50.0
         """
+        for field in changes:
+            checks.choice(field, "field", Robot.__slots__)
         return replace(self, **changes)
 
     def __reduce__(self) -> tuple[Any, tuple[dict[str, Any]]]:
