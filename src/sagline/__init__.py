@@ -10,9 +10,8 @@ from sagline.cables.cable import Cable
 from sagline.cables.catenary import Catenary
 from sagline.cables.elastic import Elastic
 from sagline.cables.empirical import Empirical
-from sagline.cables.model import CableModel
+from sagline.cables.model import CableModel, CableState
 from sagline.cables.parabolic import Parabolic
-from sagline.cables.state import CableState
 from sagline.cables.status import CableStatus
 from sagline.cables.straight import Straight
 from sagline.errors import CableGeometryError, FileError, InvalidValueError, SaglineError

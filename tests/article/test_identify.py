@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+import scipy.stats
 
 import sagline as sl
 from tests.article.hanging import end_of
@@ -34,6 +35,18 @@ def test_the_constants_are_those_of_least_squares(fit: sl.EmpiricalFit) -> None:
     assert (fit.model.k_h, fit.model.k_p) == (k_h, k_p)
     assert k_h == pytest.approx(4.878, abs=0.01)
     assert k_p == pytest.approx(4.01, abs=0.03)
+
+
+def test_the_interval_holds_the_intercept_with_95_percent(fit: sl.EmpiricalFit) -> None:
+    """By NumPy's least squares and the interval of Student's distribution."""
+    span, rise, tension = np.meshgrid(SPANS, RISES, TENSIONS, indexing="ij")
+    chord = np.hypot(span, rise)
+    exact = sl.Catenary().from_tension(CABLE, span, rise, tension * chord / span)
+    shape, value = (0.067 * chord).ravel(), (exact.vertical_force - tension * rise / span).ravel()
+    factor, rest, _, _ = np.linalg.lstsq(shape[:, None], value)
+    error = np.sqrt(rest[0] / (value.size - 1) / (shape @ shape))
+    low, high = scipy.stats.t.interval(0.95, value.size - 1, loc=factor[0], scale=error)
+    assert tuple(fit.k_h) == pytest.approx((factor[0], low, high), rel=1e-9)
 
 
 def test_the_position_error_is_that_of_the_articles_own_equations(fit: sl.EmpiricalFit) -> None:

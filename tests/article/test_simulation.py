@@ -1,3 +1,6 @@
+from dataclasses import replace
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -51,6 +54,29 @@ def test_tensions_are_continuous_with_corners_that_do_not_grow() -> None:
     for slow, fast in zip(coarse.of(sl.Empirical), fine.of(sl.Empirical), strict=True):
         assert figures(fast).step_max < 0.3 * figures(slow).step_max
         assert figures(fast).slope_jump < figures(slow).slope_jump * 1.05
+
+
+def test_steps_slopes_and_corners_by_hand(study: Simulation) -> None:
+    for run in study.of(sl.Empirical):
+        time, tension = study.path.time, run.plan.horizontal_tension
+        steps, slopes, corners = [], [], []
+        for i in range(tension.shape[1]):
+            slope = [(tension[k + 1, i] - tension[k, i]) / (time[k + 1] - time[k]) for k in range(len(time) - 1)]
+            steps.append(max(abs(tension[k + 1, i] - tension[k, i]) for k in range(len(time) - 1)))
+            slopes.append(max(map(abs, slope)))
+            corners.append(max(abs(after - before) for before, after in pairwise(slope)))
+        found = figures(run)
+        assert found.step_max == pytest.approx(max(steps), rel=1e-12)
+        assert found.slope_max == pytest.approx(max(slopes), rel=1e-12)
+        assert found.slope_jump == pytest.approx(max(corners), rel=1e-12)
+        mirrored = replace(run, plan=_reversed_signs(run.plan))
+        assert figures(mirrored).slope_jump == pytest.approx(max(corners), rel=1e-12)
+
+
+def _reversed_signs(plan: sl.Plan) -> sl.Plan:
+    """The same plan with tensions that fall where they rose: what is largest in size stays so."""
+    cables = replace(plan.state.cables, horizontal_tension=-plan.horizontal_tension)
+    return replace(plan, state=replace(plan.state, cables=cables))
 
 
 def test_loose_cables_cost_accuracy_and_the_bound_54_keeps_it() -> None:

@@ -49,8 +49,15 @@ def test_json_carries_the_same_poses_and_units_are_read(tmp_path: Path, plan: sl
     arguments = ["forward", ROBOT, str(tmp_path / "lengths.csv"), "--out", str(tmp_path / "out"), "--json"]
     done = CliRunner().invoke(app, arguments)
     assert done.exit_code == 0, done.output
-    last = json.loads(done.stdout)["poses"][-1]
-    np.testing.assert_allclose([float(last[axis]) for axis in "xyz"], (2.0, 1.0, 2.5), atol=1e-9)
+    poses = json.loads(done.stdout)["poses"]
+    last = poses[-1]
+    np.testing.assert_allclose([last[axis] for axis in "xyz"], (2.0, 1.0, 2.5), atol=1e-9)
+    assert {type(value) for name, value in last.items() if name not in ("status", "iterations")} == {float}
+    assert (type(last["iterations"]), last["status"]) == (int, "SOLVED")
+    with (tmp_path / "out" / f"{ROBOT}-poses.csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    for pose, row in zip(poses, rows, strict=True):  # the same to the last bit
+        assert [float(row[f"{axis} [m]"]) for axis in "xyz"] == [pose[axis] for axis in "xyz"]
 
 
 def test_lengths_too_short_to_meet_are_told_and_end_with_1(tmp_path: Path, plan: sl.Plan) -> None:

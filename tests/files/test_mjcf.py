@@ -64,6 +64,17 @@ def test_other_lengths_settle_in_the_equilibrium_of_the_elastic_model() -> None:
     assert turn.magnitude() < 1e-7
 
 
+def test_mass_and_inertia_are_the_robots() -> None:
+    inertia = np.array([[1.2, 0.1, -0.2], [0.1, 1.5, 0.3], [-0.2, 0.3, 2.0]])
+    robot = load_robot("article-suspended").replace(inertia=inertia, center_of_mass=(0.1, -0.05, 0.02), mass=12.0)
+    model, _ = opened(dump_mjcf(robot, POSE, [7.0] * 8))
+    w, x, y, z = model.body("platform").iquat
+    principal = Rotation.from_quat((x, y, z, w)).as_matrix()
+    np.testing.assert_allclose(principal @ np.diag(model.body("platform").inertia) @ principal.T, inertia, atol=1e-12)
+    np.testing.assert_allclose(model.body("platform").ipos, (0.1, -0.05, 0.02), atol=1e-15)
+    assert model.body("platform").mass == 12.0
+
+
 def test_a_slack_cable_does_not_push() -> None:
     robot = load_robot("article-suspended")
     lengths = inverse(robot, POSE, model=Elastic()).unstrained_length + np.array([0.0, 0, 0, 0.5, 0, 0, 0, 0])

@@ -68,6 +68,24 @@ def test_the_profile_is_quintic_unless_the_file_says_septic(tmp_path: FilePath) 
         load_path(write(tmp_path, "tour.yaml", "profile: cubic\n" + WAYPOINTS))
 
 
+@pytest.mark.parametrize(
+    ("limits", "duration"),
+    [
+        # a way of 1 m and a turn of 0.3 rad: 15/8 way/speed, sqrt(10/sqrt(3) way/acceleration)
+        ("speed: 50 cm/s\nangular_speed: 5 turn/s", 15 / 8 / 0.5),
+        ("speed: 9 km/s\nangular_speed: 30 deg/s", 15 / 8 * 0.3 / np.radians(30.0)),
+        ("acceleration: 80 cm/s^2\nangular_speed: 5 turn/s", np.sqrt(10 / np.sqrt(3) / 0.8)),
+        ("speed: 9 km/s\nangular_acceleration: 40 deg/s^2", np.sqrt(10 / np.sqrt(3) * 0.3 / np.radians(40.0))),
+        ("durations: 0.05 min", 3.0),
+    ],
+)
+def test_every_limit_is_taken_in_its_unit(tmp_path: FilePath, limits: str, duration: float) -> None:
+    way = "waypoints: [{position: [0, 0, 1]}, {position: [1, 0, 1], euler: {alpha: 0.3}}]"
+    path = load_path(write(tmp_path, "tour.yaml", f"rate: 30000 1/min\n{limits}\n{way}\n"))
+    assert path.duration == pytest.approx(duration, rel=1e-12)
+    assert path.time[1] == pytest.approx(1 / 500, rel=1e-12)
+
+
 def test_a_quaternion_of_few_decimals(tmp_path: FilePath) -> None:
     text = "durations: 1\nwaypoints: [{position: [0, 0, 1]}, {position: [0, 0, 1], quaternion: [0.707, 0, 0, 0.707]}]"
     path = load_path(write(tmp_path, "tour.yaml", text))

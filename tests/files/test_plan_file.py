@@ -41,7 +41,7 @@ PLACES = (
     ),
     *(f"state.cables.{name}" for name in ("span", "rise", "status")),
     *("state.pose.position", "state.pose.quaternion", "state.wrench"),
-    *("status", "shortfall", "wrench_residual", "blocking"),
+    *("status", "shortfall", "wrench_residual", "blocking", "farkas", "needed"),
 )
 PATH_PLACES = ("path.time", "path.twist", "path.twist_rate", "path.jerk", "path.pose.position", "path.pose.quaternion")
 
@@ -119,6 +119,32 @@ def test_infeasible_poses_are_kept_and_marked(saved: FilePath) -> None:
     assert gap.shortfall == pytest.approx(np.max(a_plan().shortfall), rel=0.0)
     assert np.isnan(loaded.unstrained_length[37:]).all()
     assert np.isfinite(loaded.unstrained_length[:37]).all()
+
+
+def test_the_proofs_are_kept(saved: FilePath) -> None:
+    plan = sl.load_plan(saved)
+    assert plan.farkas is not None
+    assert plan.needed is not None
+    matrices = sl.structure_matrix(SUSPENDED, plan.state.pose[37:])
+    y, needed = plan.farkas[37:], plan.needed[37:]
+    along = np.einsum("nk,nki->ni", y, matrices)
+    most = np.maximum(along * SUSPENDED.tension_min, along * SUSPENDED.tension_max).sum(axis=1)
+    assert (np.einsum("nk,nk->n", y, needed) > most).all()  # no tensions within the limits supply it
+    assert np.isnan(plan.farkas[:37]).all()
+    with xr.open_dataset(saved, engine="h5netcdf") as data:
+        assert [data[name].attrs["units"] for name in ("farkas", "needed")] == ["1, 1/m", "N, N m"]
+
+
+def test_a_file_from_before_proofs_were_kept(saved: FilePath) -> None:
+    with h5py.File(saved, "r+") as file:
+        del file["farkas"], file["needed"]
+    plan = sl.load_plan(saved)
+    assert plan.farkas is None
+    assert plan.needed is None
+    plan.save(saved)
+    again = sl.load_plan(saved)
+    assert again.farkas is None
+    np.testing.assert_array_equal(again.unstrained_length, a_plan().unstrained_length)
 
 
 def test_a_disk_that_fills_up_leaves_nothing(tmp_path: FilePath) -> None:

@@ -63,6 +63,73 @@ def test_units_become_si() -> None:
     assert (robot.mass, dict(robot.assumed), robot.gravity) == (0.5, {"mass": "a guess"}, 9.81)
 
 
+# the same value in SI and in another unit, for every quantity of a robot file
+QUANTITIES: dict[str, tuple[Any, Any]] = {
+    "frame_anchors": ([[0, 0, 3], [4, 0, 3], [0, 4, 3]], [[0, 0, "300 cm"], ["4 m", 0, 3], [0, "0.004 km", "30 dm"]]),
+    "platform_anchors": ([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0]], [[0, 0, 0], ["100 mm", 0, 0], [0, "10 cm", 0]]),
+    "mass": (0.5, "500 g"),
+    "center_of_mass": ([0.01, 0, -0.02], ["10 mm", 0, "-2 cm"]),
+    "gravity": (1.62, "162 cm/s^2"),
+    "tension_min": ([20, 30, 40], ["20000 mN", "0.03 kN", 40]),
+    "tension_max": (1500, "1.5 kN"),
+    "platform_size": ([0.3, 0.3, 0.5], ["300 mm", "30 cm", 0.5]),
+    "frame_size": ([4, 4, 3], ["400 cm", "4000 mm", 3]),
+    "cables.linear_density": (0.067, "67 g/m"),
+    "cables.axial_stiffness": (44e3, "44 kN"),
+    "cables.youngs_modulus": (2e9, "2 kN/mm^2"),
+    "cables.section_area": (22e-6, "22 mm^2"),
+    "cables.radius": (2e-3, "2 mm"),
+    "cables.diameter": (4e-3, "0.4 cm"),
+    "inertia.matrix": (np.diag([0.1, 0.2, 0.25]).tolist(), [["1000 kg cm^2", 0, 0], [0, 0.2, 0], [0, 0, 0.25]]),
+    "inertia.diagonal": ([0.1, 0.2, 0.25], ["100 g*m^2", 0.2, "2500 kg*cm^2"]),
+    "inertia.Ixx": (0.1, "1000 kg*cm^2"),
+    "inertia.Ixz": (0.01, "100 kg*cm^2"),
+    "inertia.box": ([0.3, 0.3, 0.5], ["30 cm", "300 mm", 0.5]),
+    "inertia.cylinder_radius": (0.2, "20 cm"),
+    "inertia.cylinder_height": (0.5, "500 mm"),
+    "test_box.low": ([-1, -1, 1], ["-100 cm", -1, "1000 mm"]),
+    "test_box.high": ([1, 1, 2], ["100 cm", 1, "2000 mm"]),
+    "test_box.tilt": (0.1, "0.1 rad"),
+}
+BESIDE: dict[str, dict[str, Any]] = {
+    "cables.linear_density": {"axial_stiffness": 1e4},
+    "cables.axial_stiffness": {"linear_density": 0.1},
+    "cables.youngs_modulus": {"linear_density": 0.1, "section_area": 1e-6},
+    "cables.section_area": {"linear_density": 0.1, "youngs_modulus": 1e9},
+    "cables.radius": {"linear_density": 0.1, "youngs_modulus": 1e9},
+    "cables.diameter": {"linear_density": 0.1, "youngs_modulus": 1e9},
+    "inertia.matrix": {},
+    "inertia.diagonal": {},
+    "inertia.box": {},
+    "inertia.Ixx": {"Iyy": 0.2, "Izz": 0.25},
+    "inertia.Ixz": {"Ixx": 0.1, "Iyy": 0.2, "Izz": 0.25},
+    "inertia.cylinder_radius": {"cylinder_height": 0.5},
+    "inertia.cylinder_height": {"cylinder_radius": 0.2},
+    "test_box.low": {"high": [1, 1, 2]},
+    "test_box.high": {"low": [-1, -1, 1]},
+    "test_box.tilt": {"low": [-1, -1, 1], "high": [1, 1, 2]},
+}
+
+
+def with_quantity(key: str, value: Any) -> Robot:
+    outer, _, inner = key.partition(".")
+    return parse_robot(edited(**{outer: {**BESIDE[key], inner: value} if inner else value}), "robot.yaml")
+
+
+@pytest.mark.parametrize("key", QUANTITIES)
+def test_every_quantity_is_taken_in_its_unit(key: str) -> None:
+    plain, other = (arrays_of(with_quantity(key, value)) for value in QUANTITIES[key])
+    for name, value in plain.items():
+        if isinstance(value, np.ndarray | float):
+            np.testing.assert_allclose(other[name], value, rtol=1e-14, err_msg=name)
+
+
+def test_a_tilt_in_degrees() -> None:
+    box = with_quantity("test_box.tilt", "30 deg").test_box
+    assert box is not None
+    assert box.tilt == pytest.approx(np.pi / 6, rel=1e-15)
+
+
 @pytest.mark.parametrize(
     ("section", "area"),
     [({"section_area": 3e-6}, 3e-6), ({"radius": "2 mm"}, 4e-6 * np.pi), ({"diameter": "2 mm"}, 1e-6 * np.pi)],

@@ -1,10 +1,11 @@
+import os
 import resource
 from pathlib import Path
 
 import pytest
 
 from sagline.errors import FileError
-from sagline.files.whole import check_folder, made_folder, written_whole
+from sagline.files.whole import check_folder, made_folder, write_text, written_whole
 
 
 def test_a_file_appears_when_it_is_complete(tmp_path: Path) -> None:
@@ -73,3 +74,11 @@ def test_a_folder_without_permission(tmp_path: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.setattr("os.access", lambda *_: False)  # root may write anywhere, so it cannot be tried for real
     with pytest.raises(FileError, match="no permission in"):
         check_folder(tmp_path / "new")
+
+
+def test_what_takes_the_files_name_is_on_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    target, seen = tmp_path / "run.nc", []
+    monkeypatch.setattr("os.fsync", lambda handle: seen.append((os.fstat(handle).st_size, target.exists())))
+    write_text(target, "whole")
+    assert seen == [(5, False)]  # all of it, before the name
+    assert target.read_text() == "whole"

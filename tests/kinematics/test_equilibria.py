@@ -57,6 +57,14 @@ def test_a_planar_robot_finds_itself_and_its_twisted_twins() -> None:
     np.testing.assert_allclose(found.solutions.pose.matrix[:, 1], [[0, 1, 0]] * len(found), atol=1e-12)
 
 
+def test_without_an_energy_the_one_that_most_starts_reach_comes_first() -> None:
+    plan = sl.inverse(SUSPENDED, sl.Pose((0.0, 0.0, 2.0), np.eye(3)), sl.Parabolic(), sl.MinimumNorm())
+    found = sl.equilibria(SUSPENDED, plan.unstrained_length, sl.Parabolic(), starts=200)
+    assert np.isnan(found.solutions.energy).all()
+    assert len(set(found.reached.tolist())) > 1
+    assert (np.diff(found.reached) <= 0).all()
+
+
 def test_straight_cables_have_mirrored_poses() -> None:
     frame = [[3, 2, 4], [-3, 2, 4], [0, -3, 4]]
     robot = sl.Robot("tripod", frame, np.zeros((3, 3)), sl.Cable(0.05, 5e4), 10.0, motion_pattern="3T")

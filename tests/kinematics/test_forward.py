@@ -1,5 +1,7 @@
 """Forward kinematics: against plans, against SciPy on an independent balance, and from bad starts."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.optimize
@@ -157,6 +159,17 @@ def test_lengths_too_long_let_it_hang_on_few_cables() -> None:
     assert not found.solved
     assert found.slack.sum() >= 3
     assert found.wrench_residual.max() < 1e-8
+
+
+def test_a_cable_is_slack_below_half_the_weight_of_its_chord() -> None:
+    found = sl.forward(COGIRO, sl.inverse(COGIRO, sl.Pose((0, 0, 2.0), np.eye(3))).unstrained_length)
+    cables = found.state.cables
+    half = 0.5 * COGIRO.cables.linear_density * 9.81 * np.hypot(cables.span, cables.rise)
+    shares = np.array([0.0, 0.5, 0.99, 1.01, 1.5, 1.99, 3.0, 100.0])
+    hung = replace(found, state=replace(found.state, cables=replace(cables, chord_tension=shares * half)))
+    assert hung.slack.tolist() == [True] * 3 + [False] * 5
+    weightless = replace(cables, chord_tension=shares * half, model=sl.Elastic())
+    assert replace(found, state=replace(found.state, cables=weightless)).slack.tolist() == [True] + [False] * 7
 
 
 def test_rows_without_lengths_are_left_out() -> None:

@@ -1,9 +1,13 @@
 """The solver of a control loop answers what `forward` answers."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 import sagline as sl
+from sagline.kinematics.forward_rows import Found
+from sagline.kinematics.start import search
 from tests.kinematics.feasible import box_poses, feasible_plan
 
 COGIRO = sl.load_robot("cogiro")
@@ -24,6 +28,26 @@ def test_steps_equal_the_batch() -> None:
         assert solver.step_into(row, position, quaternion) == step.status
         np.testing.assert_allclose(position, step.position, atol=1e-12)
         np.testing.assert_allclose(quaternion, step.quaternion, atol=1e-12)
+
+
+def test_it_searches_once_and_again_when_told_to_forget(monkeypatch: pytest.MonkeyPatch) -> None:
+    plan = feasible_plan(COGIRO, 1, seed=4)
+    solver, searches = sl.ForwardSolver(COGIRO), []
+
+    def counted(*arguments: Any) -> Found:
+        searches.append(1)
+        return search(*arguments)
+
+    monkeypatch.setattr("sagline.kinematics.forward_solver.search", counted)
+    for known in (0, 1, 1):
+        assert len(searches) == known
+        assert solver.step(plan.unstrained_length[0]).status == sl.ForwardStatus.SOLVED
+    solver.reset()
+    solver.step(plan.unstrained_length[0])
+    assert len(searches) == 2
+    solver.reset(plan.state.pose[0])
+    solver.step(plan.unstrained_length[0])
+    assert len(searches) == 2
 
 
 def test_results_belong_to_the_caller_and_the_wrench_counts() -> None:

@@ -21,6 +21,7 @@ from sagline.robot.catalogue import robot_names
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.balance import article_balance, structure_matrix
+from sagline.tension.analytic_center import AnalyticCenter
 from sagline.tension.broken import without_cables
 from sagline.tension.closest import Closest
 from sagline.tension.method import Variable
@@ -194,6 +195,27 @@ def test_no_upper_limit() -> None:
     assert both.sum() > 20
     np.testing.assert_allclose(found.chord_tension[both], same.chord_tension[both], rtol=1e-9)
     assert (found.feasible | ~same.feasible).all()
+
+
+@pytest.mark.parametrize("variable", ["chord", "horizontal", "frame_end"])
+def test_closest_to_tensions_that_will_do_are_these_tensions(variable: Variable) -> None:
+    robot = load_robot("article-mixed")
+    pose = random_poses(robot, 1, np.random.default_rng(3))[0]
+    before = inverse(robot, pose, tension=AnalyticCenter())
+    same = inverse(robot, pose, tension=Closest(variable), previous=before)
+    np.testing.assert_allclose(same.chord_tension, before.chord_tension, rtol=1e-9)
+    assert np.abs(inverse(robot, pose, tension=Closest(variable)).chord_tension - before.chord_tension).max() > 1.0
+
+
+def test_the_solver_forgets_the_wrench_of_the_step_before() -> None:
+    robot, pose = load_robot("article-suspended"), Pose([1.0, 0.5, 2.0], np.eye(3))
+    wrench = np.array([30.0, -20.0, -100.0, 1.0, 2.0, 3.0])
+    solver = InverseSolver(robot, tension=MinimumNorm())
+    at = pose.position, pose.quaternion
+    free, loaded = (inverse(robot, pose, tension=MinimumNorm(), wrench=load).chord_tension for load in (None, wrench))
+    np.testing.assert_allclose(solver.step(*at, wrench).chord_tension, loaded, rtol=1e-12)
+    np.testing.assert_allclose(solver.step(*at).chord_tension, free, rtol=1e-12)
+    assert np.abs(free - loaded).max() > 1.0
 
 
 def test_solver_repeats_inverse() -> None:

@@ -152,9 +152,9 @@ def test_a_search_judges_each_sample_by_the_limits_and_cables_of_its_robot(limit
     # limits 5 % beside the tensions of each robot leave out as many cables as are asked for
     low = [1.05 * row[k] for row, k in zip(tension, (0, 1, 2, 0, 0, 3), strict=True)]
     robots = [robot.replace(tension_min=value) for robot, value in zip(robots, low, strict=True)]
-    singles = [outside_limits(robot, found.part(np.array([i])))[0] for i, robot in enumerate(robots)]
+    singles = [outside_limits(robot, sl.Catenary(), found.part(np.array([i])))[0] for i, robot in enumerate(robots)]
     assert len(set(singles)) > 2
-    np.testing.assert_array_equal(outside_limits(tuple(robots), found), singles)
+    np.testing.assert_array_equal(outside_limits(tuple(robots), sl.Catenary(), found), singles)
 
 
 def test_straight_cables_are_fitted_robot_by_robot() -> None:

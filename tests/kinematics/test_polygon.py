@@ -63,6 +63,18 @@ def test_polygon_contains_the_plan() -> None:
     assert ((polygon.vertices - point) @ point >= -1e-6 * point @ point).all()
 
 
+def test_points_of_the_polygon_of_winch_tensions_are_winch_tensions() -> None:
+    robot = load_robot("article-mixed").replace(tension_limits_of="frame_end")
+    pose = random_poses(robot, 1, np.random.default_rng(3))[0]
+    plan = inverse(robot, pose, tension=MinimumNorm("frame_end"))
+    polygon = tension_polygon(robot, pose, variable="frame_end")
+    winch = plan.state.cables.frame_end_tension
+    np.testing.assert_allclose(polygon.scale * plan.chord_tension + polygon.offset, winch, atol=1e-6)
+    point = polygon.coordinates(plan.chord_tension)
+    np.testing.assert_allclose(polygon.origin + point @ polygon.basis, winch, atol=1e-6)
+    assert np.abs(polygon.offset).max() > 1e-3
+
+
 def test_interval_and_point() -> None:
     seven = load_robot("falcon-7")
     pose = Pose([-0.25, 0.0, 0.75], np.eye(3))

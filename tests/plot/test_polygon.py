@@ -16,6 +16,8 @@ def test_polygon_shows_corners_limits_and_methods() -> None:
     sides = [line for line in ax.get_lines() if line.get_marker() == "None"]
     drawn = np.array([np.asarray(line.get_xydata())[0] for line in sides])
     np.testing.assert_array_equal(drawn, shape.vertices)
+    ends = np.array([np.asarray(line.get_xydata())[1] for line in sides])
+    np.testing.assert_array_equal(ends, np.roll(shape.vertices, -1, axis=0))
     names = [text.get_text() for text in ax.texts if isinstance(text, Annotation)]
     assert names == [f"cable {side.cable} {side.limit}" for side in shape.sides if side is not None]
     (point,) = [line for line in ax.get_lines() if line.get_marker() != "None"]

@@ -2,9 +2,13 @@
 
 import json
 import re
+import statistics
+from collections.abc import Iterator
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 import sagline as sl
@@ -105,6 +109,13 @@ def test_the_numbers_are_in_the_json_file(report: ArticleReport) -> None:
     assert limits == {0.001: None, 0.002: 150.0, 0.005: 100.0, 0.01: 70.0}
     shares = numbers["models"]["length-error-maps"]["share_within_1_mm"]
     assert shares["Straight"] < shares["Elastic"] < shares["Empirical"] < shares["Parabolic"] < 1.0
+    chord, tension = np.meshgrid(np.geomspace(1.0, 30.0, 41), np.geomspace(5.0, 2000.0, 61))
+    down = chord * np.sin(np.radians(30.0))
+    exact = sl.Catenary().from_tension(sl.Cable(0.067, 44e3), chord * np.sqrt(0.75), -down, tension).unstrained_length
+    good = {"Straight": chord, "Elastic": chord / (1.0 + tension / 44e3)}
+    assert {name: shares[name] for name in good} == pytest.approx(
+        {name: np.mean(np.abs(length - exact) <= 1e-3) for name, length in good.items()}, abs=1e-12
+    )
     simulation = numbers["simulation"]
     assert simulation["configurations"]["tension_ratio"] == pytest.approx(2.075, abs=0.005)
     assert simulation["position-error"]["suspended"]["max_mm"] == pytest.approx(1.711, abs=0.005)
@@ -114,8 +125,48 @@ def test_the_numbers_are_in_the_json_file(report: ArticleReport) -> None:
     assert poses["table-2"]["distance_mm"][1] == pytest.approx(44.7884, abs=1e-4)
     assert poses["error-in-space"]["slope_mm_per_m"] == pytest.approx(-18.17, abs=0.01)
     assert poses["error-in-space"]["lowest_vertical_error_mm"] > 0.0
+    tension, distance = np.mean(poses["table-2"]["horizontal_tension_N"], axis=1), poses["table-2"]["distance_mm"]
+    against = statistics.correlation(tension.tolist(), distance)
+    assert poses["error-in-space"]["correlation_with_tension"] == pytest.approx(against, rel=1e-9)
     assert poses["explanations"]["explanations"][1][0]["rms_mm"] == pytest.approx(4.21, abs=0.02)
     assert len(numbers["errata"]) == 11
+
+
+NUMBER = re.compile(r"(?<![\w.])[-−]?\d[\d,]*(?:\.\d+)?(?:e[-−+]?\d+)?")
+NAMES = re.compile(r"\(\d+\)|errat(?:um|a) \d+|[Ff]igures? \d+|[Tt]ables? \d+|/24?\b|\(24 ")  # and parts of formulas
+SCALES = (1.0, 1e2, 1e3, 1e-3, 1e6)  # as it is, in percent, in mm or the like, in kN, in micrometers
+
+
+def leaves(numbers: Any) -> Iterator[float]:
+    """Every number in it."""
+    match numbers:
+        case dict():
+            for value in numbers.values():
+                yield from leaves(value)
+        case list():
+            for value in numbers:
+                yield from leaves(value)
+        case int() | float():
+            yield float(numbers)
+
+
+def is_told_by(text: str, numbers: list[float]) -> bool:
+    """Whether a printed number is one of the others, rounded to as many digits."""
+    mantissa, _, exponent = text.replace("−", "-").replace(",", "").partition("e")
+    places = len(mantissa.partition(".")[2]) - int(exponent or 0)
+    printed = abs(float(mantissa)) * 10.0 ** int(exponent or 0)
+    return any(abs(scale * abs(value) - printed) <= 0.5001 * 10.0**-places for value in numbers for scale in SCALES)
+
+
+def test_every_number_in_a_sentence_is_one_of_the_numbers_of_its_finding(report: ArticleReport) -> None:
+    told = 0
+    for chapter in report.chapters:
+        for finding in chapter.findings:
+            numbers = list(leaves(report.numbers[chapter.key][finding.key]))
+            printed = NUMBER.findall(NAMES.sub("", finding.measured))
+            told += len(printed)
+            assert [text for text in printed if not is_told_by(text, numbers)] == [], finding.measured
+    assert told > 150
 
 
 def test_what_the_texts_say_without_numbers_is_so(report: ArticleReport) -> None:

@@ -109,6 +109,8 @@ def test_a_matrix_good_to_the_tolerance_passes() -> None:
 
 
 def test_other_wrong_values_are_named() -> None:
+    with pytest.raises(InvalidValueError, match=r"quaternion 1: length is 0\.5;"):
+        Pose.from_quaternion(np.zeros(3), [[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0, 0.5]])
     with pytest.raises(InvalidValueError, match="quaternion 1: length is 2;"):
         Pose.from_quaternion(np.zeros(3), [[0, 0, 0, 1], [0, 0, 0, 2]])
     with pytest.raises(InvalidValueError, match="position and rotation is of batch shapes \\(2,\\) and \\(3,\\)"):

@@ -3,7 +3,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from sagline.cables.cable import Cable
@@ -52,6 +52,7 @@ def test_freedom_by_hand() -> None:
 
 
 @given(st.lists(st.floats(-1, 1), min_size=3, max_size=3).filter(lambda v: np.linalg.norm(v) > 1e-3))
+@example([0.0, 6e-8, 1.0])  # nearly level, and yet it has a direction that is up
 def test_planar_axes_are_right_handed_about_the_normal(normal: list[float]) -> None:
     rows = tripod(motion_pattern="1R2T", plane_normal=normal).freedom
     np.testing.assert_allclose(rows @ rows.T, np.eye(3), atol=1e-12)
@@ -85,6 +86,8 @@ def test_replace_checks_again_and_leaves_the_original() -> None:
     np.testing.assert_array_equal(heavier.frame_anchors, CORNERS)
     with pytest.raises(InvalidValueError, match="mass is -1 kg; allowed: > 0 kg"):
         robot.replace(mass=-1.0)
+    with pytest.raises(InvalidValueError, match=r"field is 'weight'; allowed: name, frame_anchors, .*notes"):
+        robot.replace(weight=1.0)
 
 
 def test_pickling_and_locks() -> None:
@@ -142,6 +145,11 @@ def test_a_wrong_field_is_named(changes: dict[str, Any], message: str) -> None:
 def test_two_cables_may_share_one_end() -> None:
     robot = tripod(frame_anchors=CORNERS[[0, 0, 1]], platform_anchors=[[0, 0, 0], [0, 0, 1], [0, 0, 0]])
     assert robot.cable_count == 3
+
+
+def test_a_flat_box_is_a_box() -> None:
+    box = PoseBox([0, 0, 1], [1, 1, 1])
+    np.testing.assert_array_equal(box.high, [1, 1, 1])
 
 
 def test_a_crossed_box_is_refused() -> None:

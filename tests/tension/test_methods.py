@@ -304,6 +304,22 @@ def test_broken_cable() -> None:
         without_cables(robot, 8)
 
 
+def test_what_is_left_when_cables_break_keeps_its_own_material_and_limits() -> None:
+    whole = load_robot("article-mixed").replace(
+        cables=Cable(0.01 * np.arange(1, 9), 1e4 * np.arange(1, 9)),
+        tension_min=np.arange(8.0),
+        tension_max=1000.0 + np.arange(8.0),
+    )
+    left, kept = without_cables(whole, 1, 6), [0, 2, 3, 4, 5, 7]
+    np.testing.assert_array_equal(left.frame_anchors, whole.frame_anchors[kept])
+    np.testing.assert_array_equal(left.platform_anchors, whole.platform_anchors[kept])
+    np.testing.assert_array_equal(left.cables.linear_density, [0.01 * (k + 1) for k in kept])
+    np.testing.assert_array_equal(left.cables.axial_stiffness, [1e4 * (k + 1) for k in kept])
+    np.testing.assert_array_equal(left.tension_min, kept)
+    np.testing.assert_array_equal(left.tension_max, [1000.0 + k for k in kept])
+    assert (left.mass, left.name) == (whole.mass, whole.name)
+
+
 def test_unlimited_cables() -> None:
     robot = planar(tension_max=np.inf)
     pose = Pose([0.1, 0.0, 0.0], np.eye(3))

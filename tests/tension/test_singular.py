@@ -3,10 +3,12 @@ import pytest
 
 from sagline.cables.cable import Cable
 from sagline.errors import InvalidValueError
+from sagline.files.robot_file import load_robot
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.status import PoseStatus
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
+from sagline.statics.balance import structure_matrix
 from sagline.tension.singular import unresisted_motion
 from tests.tension.reference import planar
 
@@ -39,6 +41,30 @@ def test_translation_no_cable_resists() -> None:
     motion = unresisted_motion(robot, pose)
     np.testing.assert_allclose(np.abs(motion.twist), [0, 1, 0, 0, 0, 0], atol=1e-12)
     assert motion.text in ("translation along (0, 1, 0)", "translation along (0, -1, 0)")
+
+
+def test_the_resistance_is_a_number_without_unit() -> None:
+    """A robot ten times as large resists as well: turning is counted by the platform's own lever."""
+    robot = load_robot("cogiro")
+    large = robot.replace(
+        frame_anchors=10.0 * robot.frame_anchors,
+        platform_anchors=10.0 * robot.platform_anchors,
+        center_of_mass=10.0 * robot.center_of_mass,
+    )
+    turned = Pose.from_euler((1.0, -0.5, 1.5), 0.1, 0.05, -0.1)
+    motion = unresisted_motion(robot, turned)
+    same = unresisted_motion(large, Pose.from_quaternion(10.0 * turned.position, turned.quaternion))
+    assert same.resistance == pytest.approx(motion.resistance, rel=1e-9)
+    # speeds of the cables, where the platform turns at one lever a second or moves by one meter a second
+    lever = np.linalg.norm(robot.platform_anchors - robot.center_of_mass, axis=1).max()
+    weights = np.array([1.0, 1.0, 1.0, lever, lever, lever])
+    speeds = structure_matrix(robot, turned).T / weights
+    random = np.random.default_rng(1).normal(size=(20_000, 6))
+    found = np.linalg.norm(speeds @ (random / np.linalg.norm(random, axis=1)[:, None]).T, axis=0)
+    least = np.linalg.norm(speeds @ (weights * motion.twist)) / np.linalg.norm(weights * motion.twist)
+    assert least <= found.min()
+    assert motion.resistance <= least / found.max() * (1.0 + 1e-12)
+    assert motion.resistance == pytest.approx(least / found.max(), rel=0.05)
 
 
 def test_one_pose_at_a_time() -> None:

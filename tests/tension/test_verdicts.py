@@ -13,11 +13,10 @@ from sagline.files.robot_file import load_robot
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
-from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.tension.margin import capacity_margin, limit_margin
+from sagline.tension.margin import capacity_margin
 from sagline.tension.minimum_norm import MinimumNorm
-from tests.tension.reference import is_feasible, planar, presets, random_poses, structures
+from tests.tension.reference import is_feasible, presets, random_poses, structures
 
 MARGIN = 1e-9  # of the upper limit: what the verdict may be wrong by
 
@@ -206,9 +205,3 @@ def _reach(sample: Sample, i: int, way: np.ndarray) -> float:
     )
     assert found.status == 0
     return float(-found.fun * scale)
-
-
-def test_limit_margin_by_hand() -> None:
-    plan = inverse(planar(), Pose(np.zeros(3), np.eye(3)), model=Elastic(), tension=MinimumNorm())
-    np.testing.assert_allclose(plan.chord_tension, 3.8)
-    assert limit_margin(plan.state) == pytest.approx(0.0, abs=1e-12)

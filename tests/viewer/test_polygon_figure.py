@@ -30,6 +30,22 @@ def test_drawing_has_the_shape_of_the_polygon_and_the_dot_in_its_place() -> None
     assert np.array([float(dot[1]), -float(dot[2])]) - drawn[0] == pytest.approx(where, abs=0.5)
 
 
+def test_sides_are_named_outside_of_the_polygon() -> None:
+    html = polygon_figure(taken_at(ROBOT, HERE, Settings(mass=50.0), None))
+    found = re.search(r'<polygon points="(.*?)"', html)
+    assert found is not None
+    corners = np.array([[float(part) for part in point.split(",")] for point in found[1].split()])
+    labels = re.findall(r'<text x="([\d.]+)" y="([\d.]+)"[^>]*>(\d) (min|max)</text>', html)
+    sides = {(side.cable, side.limit): k for k, side in enumerate(sl.tension_polygon(ROBOT, HERE).sides) if side}
+    assert len(labels) > 2
+    turn = np.sign(np.linalg.det([corners[1] - corners[0], corners[2] - corners[1]]))
+    for x, y, cable, limit in labels:
+        k = sides[int(cable), limit]
+        start, end = corners[k], corners[(k + 1) % len(corners)]
+        away = np.array([float(x), float(y) - 3.0]) - start  # a text stands on its line
+        assert turn * np.linalg.det([end - start, away]) < 0.0
+
+
 def test_other_redundancies_are_told_in_words() -> None:
     seven = sl.load_robot("falcon-7")
     assert seven.test_box is not None

@@ -37,6 +37,16 @@ def test_table_holds_the_numbers_of_every_cable() -> None:
     assert ", ".join(f"{value:.2f}" for value in frequency) + " Hz" in html
 
 
+def test_the_verdict_names_the_cable_that_is_nearest_to_its_limit() -> None:
+    pose = sl.Pose([1.0, 0.5, 2.0], np.eye(3))
+    tension = sl.inverse(ROBOT, pose).chord_tension
+    margins = np.minimum(tension - 25.0, 2000.0 - tension)
+    text = readout.verdict(taken_at(ROBOT, pose, Settings(mass=50.0), None))
+    assert f"tensions {tension.min():.4g} to {tension.max():.4g} N" in text
+    assert f"margin {margins.min():.1f} N (cable {int(np.argmin(margins))})" in text
+    assert f"takes {float(sl.capacity_margin(sl.inverse(ROBOT, pose).state)):.1f} N more" in text
+
+
 def test_infeasible_pose_shows_dashes_and_the_reason() -> None:
     snapshot = taken_at(ROBOT, sl.Pose([7.2, 3.0, 1.5], np.eye(3)), Settings(mass=50.0), None)
     assert all(cell == "–" for row in cells(readout.numbers(snapshot, SCALE, None)) for cell in row[1:])

@@ -33,6 +33,11 @@ def test_times_outside_are_the_nearer_end() -> None:
     assert RUN.duration == pytest.approx(4.0)
 
 
+def test_at_the_time_of_a_sample_it_is_that_sample() -> None:
+    assert [RUN.index_at(float(time)) for time in RUN.time] == list(range(len(PATH)))
+    assert RUN.index_at(float(np.nextafter(RUN.time[7], 0.0))) == 6
+
+
 def test_traces_draw_the_error_times_its_scale() -> None:
     wanted, actual = RUN.traces(1000, 50.0)
     error = sl.confirm(PLAN).position_error

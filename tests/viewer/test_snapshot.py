@@ -24,6 +24,17 @@ def test_snapshot_shows_the_plan_of_its_pose() -> None:
     assert snapshot.rest is None
 
 
+def test_margins_are_those_of_the_tension_that_is_limited() -> None:
+    robot = ROBOT.replace(tension_limits_of="frame_end")
+    snapshot = taken_at(robot, HERE, Settings(mass=50.0), None)
+    plan = sl.inverse(robot, HERE)
+    weight = robot.cables.linear_density * 9.81 * plan.unstrained_length
+    winch = np.hypot(plan.horizontal_tension, plan.vertical_force - weight)
+    assert snapshot.margin == pytest.approx(np.minimum(winch - 25.0, 2000.0 - winch), rel=1e-12)
+    assert snapshot.margin.min() == pytest.approx(float(sl.limit_margin(plan.state)), rel=1e-12)
+    assert np.abs(winch - plan.chord_tension).min() > 0.5  # the chord tensions would be seen
+
+
 def test_settings_change_the_robot() -> None:
     robot = Settings(mass=75.0, density=2.0, stiffness=0.5).applied(ROBOT)
     assert robot.mass == 75.0

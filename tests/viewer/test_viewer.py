@@ -11,6 +11,7 @@ import pytest
 import sagline as sl
 from sagline.viewer.run import Run
 from sagline.viewer.server import Server, started, stop
+from sagline.viewer.stage import Stage
 from sagline.viewer.viewer import Viewer
 from tests.viewer.client import Client, clients
 
@@ -84,6 +85,19 @@ def test_a_port_that_is_taken_is_told(page: Shown) -> None:
         started(host="203.0.113.7", port=0)
     with pytest.raises(sl.InvalidValueError, match="65535"):
         started(port=70000)
+
+
+def test_the_gizmo_goes_where_it_is_put() -> None:
+    server = started(port=0)
+    try:
+        pose = sl.Pose.from_euler([1.0, 0.5, 2.0], 0.3, -0.2, 0.1)
+        stage = Stage(server, ROBOT, pose)
+        x, y, z, w = pose.quaternion
+        assert stage.gizmo.wxyz == pytest.approx([w, x, y, z], abs=1e-15)
+        np.testing.assert_allclose(stage.dragged_pose().matrix, pose.matrix, atol=1e-14)
+        np.testing.assert_array_equal(stage.dragged_pose().position, pose.position)
+    finally:
+        stop(server)
 
 
 def test_everything_follows_a_drag(page: Shown) -> None:

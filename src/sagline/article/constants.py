@@ -59,7 +59,14 @@ class ConstantsStudy:
 
 
 def constants(sampling: Sampling) -> Constants:
-    """Both constants by the article's regressions."""
+    """Both constants by the article's regressions.
+
+    Args:
+        sampling: The cables.
+
+    Returns:
+        The constants, and between which tensions.
+    """
     platform, frame = intercept_studies(sampling)
     tensions = sampling.tensions
     return Constants(float(tensions.min()), float(tensions.max()), platform.k_h, frame.k_h, sag_study(sampling).k_p)
@@ -89,7 +96,11 @@ def constants_study(sampling: Sampling, lowest: Array, highest: Array, factors: 
 
 @cache
 def published_sampling() -> Sampling:
-    """The article's sampling as we choose it, with the tensions that give its constants."""
+    """The article's sampling as we choose it, with the tensions that give its constants.
+
+    Returns:
+        The sampling; found once, then kept.
+    """
     sampling = article_sampling()
     found = published_range(sampling)
     return sampling.between(found.lowest, found.highest)
@@ -99,6 +110,12 @@ def published_range(sampling: Sampling) -> Constants:
     """The range of tensions that gives both published constants: k_h = -4.845 at the frame end and k_p = 4.385.
 
     Two ends of the range for two constants: k_p falls with the lower end, |k_h| rises with the upper one.
+
+    Args:
+        sampling: The cables; only their tensions are changed.
+
+    Returns:
+        The constants, and between which tensions.
 
     Raises:
         InvalidValueError: If there is none for these cables between LOWEST and HIGHEST.

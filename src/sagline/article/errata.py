@@ -23,5 +23,9 @@ DEMONSTRATIONS = (
 
 
 def errata() -> tuple[Erratum, ...]:
-    """All eleven, in the order of docs/errata.md."""
+    """All eleven, in the order of docs/errata.md.
+
+    Returns:
+        The errata, each with what the article prints beside what is computed.
+    """
     return tuple(demonstrate() for demonstrate in DEMONSTRATIONS)

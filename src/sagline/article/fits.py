@@ -26,7 +26,15 @@ class Line(NamedTuple):
 
 
 def fit_line(x: Array, y: Array) -> Line:
-    """The line of least squares through samples along the last axis."""
+    """The line of least squares through samples along the last axis.
+
+    Args:
+        x: Shape (..., n), or one that broadcasts with that of y.
+        y: Shape (..., n).
+
+    Returns:
+        Lines with fields of shape (...).
+    """
     x, y = np.broadcast_arrays(x, y)
     away_x = x - x.mean(axis=-1, keepdims=True)
     away_y = y - y.mean(axis=-1, keepdims=True)
@@ -42,6 +50,14 @@ def fit_factor(shape: Array, y: Array, axis: int = -1) -> Array:
 
     Every regression of the article but that of the line is of this form, with the shape 1/T_x^2, D^3,
     cos^4(phi), rho^2, D or rho.
+
+    Args:
+        shape: What y is supposed to be proportional to; it broadcasts with y.
+        y: Samples.
+        axis: Along which the samples are.
+
+    Returns:
+        Factors, of the shape of y without that axis.
     """
     shape, y = np.broadcast_arrays(shape, y)
     factor: Array = np.sum(shape * y, axis=axis) / np.sum(shape**2, axis=axis)

@@ -13,7 +13,7 @@ from sagline.article.fits import fit_factor
 from sagline.cables.cable import Cable
 from sagline.cables.catenary import Catenary
 from sagline.cables.empirical import Empirical
-from sagline.cables.state import CableState
+from sagline.cables.model import CableState
 from sagline.errors import InvalidValueError
 from sagline.kernels.cable.batch import batch_end
 

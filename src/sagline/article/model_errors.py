@@ -52,7 +52,14 @@ class ModelErrors:
     position_error: Array
 
     def sufficient(self, tolerance: float) -> Array:
-        """Number of the coarsest model whose length error is within a tolerance [m], shape (c, a, r, t)."""
+        """The coarsest model that will do.
+
+        Args:
+            tolerance: Largest length error allowed [m].
+
+        Returns:
+            Its number among the models, shape (c, a, r, t).
+        """
         within = np.abs(self.length_error) <= tolerance
         coarsest: Array = np.argmax(within, axis=0).astype(np.float64)
         return coarsest
@@ -72,6 +79,9 @@ def model_errors(
 
     Returns:
         The errors.
+
+    Raises:
+        InvalidValueError: If a value is not finite or out of its range.
     """
     axes = (
         checked(chords, "chords", "m", shape=(None,), above=0.0),

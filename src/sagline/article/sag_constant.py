@@ -59,6 +59,70 @@ class SagStudy:
     p_q: Array
     k_p: float
 
+    @property
+    def fitted_length(self) -> Array:
+        """D of (41) [m], shape (a, c, r, t)."""
+        return self.a_d[..., None] * length_shape(self.sampling.tensions)
+
+    @property
+    def fitted_a_d(self) -> Array:
+        """a_d of (43) [m N^2], shape (a, c, r)."""
+        return self.q_a[:, None] * chord_shape(self.sampling.chords)[:, None]
+
+    @property
+    def fitted_q_a(self) -> Array:
+        """q_a of (44) [N^2/m^2], shape (a, r)."""
+        return self.p_q * angle_shape(self.sampling.angles)[:, None]
+
+
+def length_shape(tension: Array) -> Array:
+    """What (41) says of the adjusting length: it goes with 1/T_x^2.
+
+    Args:
+        tension: T_x [N], shape (...).
+
+    Returns:
+        Shape (...) [1/N^2].
+    """
+    return tension**-2
+
+
+def chord_shape(chord: Array) -> Array:
+    """What (43) says of a_d: it goes with D^3.
+
+    Args:
+        chord: D [m], shape (...).
+
+    Returns:
+        Shape (...) [m^3].
+    """
+    return chord**3
+
+
+def angle_shape(angle: Array) -> Array:
+    """What (44) says of q_a: it goes with cos^4 of the chord's angle.
+
+    Args:
+        angle: phi [rad], shape (...).
+
+    Returns:
+        Shape (...).
+    """
+    shape: Array = np.cos(angle) ** 4
+    return shape
+
+
+def density_shape(density: Array) -> Array:
+    """What (45) says of p_q: it goes with rho^2.
+
+    Args:
+        density: rho [kg/m], shape (...).
+
+    Returns:
+        Shape (...) [kg^2/m^2].
+    """
+    return density**2
+
 
 def stretch_study(cable: Cable, end: End, tensions: Array) -> StretchStudy:
     """Take the stretch out of a cable's adjusting length, as (36) and (38) do, and as they should.
@@ -107,14 +171,14 @@ def sag_study(sampling: Sampling) -> SagStudy:
         Gia Luan & Truong Thinh 2020, section 5.2, figures 10 to 15.
     """
     excess = sampling.hang().adjusting_length
-    a_d = fit_factor(sampling.tensions**-2, excess)
-    q_a = fit_factor(sampling.chords[:, None] ** 3, a_d, axis=-2)
-    p_q = fit_factor(np.cos(sampling.angles[:, None]) ** 4, q_a, axis=-2)
+    a_d = fit_factor(length_shape(sampling.tensions), excess)
+    q_a = fit_factor(chord_shape(sampling.chords)[:, None], a_d, axis=-2)
+    p_q = fit_factor(angle_shape(sampling.angles)[:, None], q_a, axis=-2)
     return SagStudy(
         sampling=sampling,
         adjusting_length=excess,
         a_d=a_d,
         q_a=q_a,
         p_q=p_q,
-        k_p=float(fit_factor(sampling.densities**2, p_q)),
+        k_p=float(fit_factor(density_shape(sampling.densities), p_q)),
     )

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from sagline.arrays import Array, checked
 from sagline.cables.cable import Cable
 from sagline.cables.catenary import Catenary
-from sagline.cables.state import CableState
+from sagline.cables.model import CableState
 
 GRAVITY = 9.81  # m/s^2, everywhere in the article's studies
 ANGLE = 0.754  # rad, of the article's figure 10
@@ -59,7 +59,11 @@ class Sampling:
         object.__setattr__(self, "axial_stiffness", float(stiffness))
 
     def hang(self) -> CableState:
-        """The exact cables, fields of shape (a, c, r, t)."""
+        """The exact cables.
+
+        Returns:
+            Their states, fields of shape (a, c, r, t).
+        """
         angle, chord, density, tension = np.meshgrid(
             self.angles, self.chords, self.densities, self.tensions, indexing="ij"
         )
@@ -68,7 +72,15 @@ class Sampling:
         return Catenary().from_tension(cable, chord * cosine, chord * np.sin(angle), tension / cosine, GRAVITY)
 
     def between(self, lowest: float, highest: float) -> Sampling:
-        """The same with as many tensions, evenly spaced between two others [N]."""
+        """The same with as many tensions, evenly spaced between two others.
+
+        Args:
+            lowest: [N].
+            highest: [N].
+
+        Returns:
+            The sampling.
+        """
         tensions = np.linspace(lowest, highest, self.tensions.size)
         return Sampling(self.angles, self.chords, self.densities, tensions, self.axial_stiffness)
 
@@ -78,6 +90,9 @@ def article_sampling() -> Sampling:
 
     Chords from 2 to 16 m, as in the frames of its Table 1; five angles around its 0.754 rad; ten densities; sixty
     tensions from 100 N to 10 kN, evenly spaced.
+
+    Returns:
+        The sampling.
 
     Source:
         Gia Luan & Truong Thinh 2020, figures 6 to 15.

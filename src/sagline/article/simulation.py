@@ -84,7 +84,14 @@ class Simulation:
     mixed: tuple[Confirmation, ...]
 
     def of(self, kind: type[CableModel]) -> tuple[Confirmation, Confirmation]:
-        """Both robots' runs with the model of a class."""
+        """Both robots' runs with one model.
+
+        Args:
+            kind: Class of the model, one of `models`.
+
+        Returns:
+            The run of the suspended robot and that of the mixed one.
+        """
         k = [type(model) for model in self.models].index(kind)
         return self.suspended[k], self.mixed[k]
 
@@ -157,7 +164,14 @@ def low_tension_study(limits: Array, rate: float = 10.0) -> LowTension:
 
 
 def figures(run: Confirmation) -> Figures:
-    """A run in numbers."""
+    """A run in numbers.
+
+    Args:
+        run: A plan along a path, confirmed.
+
+    Returns:
+        Its numbers over the poses that are feasible and held; NaN if there are none.
+    """
     plan, good = run.plan, np.atleast_1d(run.plan.feasible & run.held)
     if not good.any():
         return Figures(*(float("nan"),) * 13, float(np.mean(plan.feasible)), 0.0)

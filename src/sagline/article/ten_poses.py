@@ -173,6 +173,9 @@ def tour(rate: float = 10.0) -> Tour:
 
     Args:
         rate: Samples per second [1/s].
+
+    Returns:
+        The tour.
     """
     stops = [HOME, *table2().desired, HOME]
     path = quintic_path(stops, speed=TOUR_SPEED, rate=rate)

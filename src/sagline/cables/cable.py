@@ -19,6 +19,17 @@ class Cable:
     Attributes:
         linear_density: Mass per unstrained length [kg/m], shape (...), >= 0.
         axial_stiffness: Young's modulus times section area EA [N], shape (...), > 0.
+
+    Examples:
+        Braided fiber of 67 g/m and 44 kN, and two cables at once:
+
+        >>> import sagline as sl
+        >>> cable = sl.Cable(linear_density=0.067, axial_stiffness=44e3)
+        >>> state = sl.Catenary().from_tension(cable, span=12.0, rise=-4.0, chord_tension=100.0)
+        >>> print(f"{state.unstrained_length:.4f} m, {1e3 * state.sag:.1f} mm")
+        12.6237 m, 131.2 mm
+        >>> sl.Cable([0.067, 0.1], 44e3).axial_stiffness
+        array([44000., 44000.])
     """
 
     linear_density: Array
@@ -26,6 +37,10 @@ class Cable:
 
     def __init__(self, linear_density: ArrayLike, axial_stiffness: ArrayLike) -> None:
         """Check and broadcast the two fields.
+
+        Args:
+            linear_density: Mass per unstrained length [kg/m], shape (...), >= 0.
+            axial_stiffness: EA [N], > 0; a shape that broadcasts with that of linear_density.
 
         Raises:
             InvalidValueError: If a density is negative, a stiffness not positive, or the shapes do not broadcast.
@@ -46,7 +61,25 @@ class Cable:
 
     @classmethod
     def from_material(cls, linear_density: ArrayLike, youngs_modulus: ArrayLike, section_area: ArrayLike) -> Cable:
-        """A cable from its Young's modulus [Pa] and section area [m^2]."""
+        """A cable from its Young's modulus and section area; all three arguments broadcast to one shape (...).
+
+        Args:
+            linear_density: Mass per unstrained length [kg/m], >= 0.
+            youngs_modulus: E [Pa], > 0: of the rope as a whole, which is below that of its fibers or wires.
+            section_area: A [m^2], > 0: what E was measured on, for a rope usually its fibers or metal alone.
+
+        Returns:
+            Cable of axial stiffness EA.
+
+        Raises:
+            InvalidValueError: If a density is negative, a modulus or area not positive, or the shapes do not broadcast.
+
+        Examples:
+            >>> import sagline as sl
+            >>> cable = sl.Cable.from_material(linear_density=0.067, youngs_modulus=2e9, section_area=22e-6)
+            >>> print(f"{cable.axial_stiffness:.0f} N")
+            44000 N
+        """
         modulus = checked(youngs_modulus, "youngs_modulus", "Pa", above=0.0)
         area = checked(section_area, "section_area", "m^2", above=0.0)
         return cls(linear_density, modulus * area)

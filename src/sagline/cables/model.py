@@ -1,20 +1,30 @@
-"""The interface all cable models share: from a tension, from a length, and the shape."""
+"""The interface all cable models share, from a tension or from a length, and the states they give."""
 
 from __future__ import annotations
 
-import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from sagline.arrays import Array, Codes, checked, kernel_input, locked
 from sagline.cables.cable import Cable
-from sagline.cables.state import CableState
-from sagline.errors import CableGeometryError, InvalidValueError
-from sagline.kernels.cable import batch
+from sagline.cables.problem import Problem
+from sagline.errors import InvalidValueError
+from sagline.kernels.cable import batch, shape
 from sagline.kernels.cable.terms import Terms
+
+_ARRAYS = (
+    "span",
+    "rise",
+    "unstrained_length",
+    "horizontal_tension",
+    "vertical_force",
+    "chord_tension",
+    "status",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +45,14 @@ class CableModel:
         return 0.0, 0.0
 
     def terms(self, gravity: float) -> Terms:
-        """The model as kernels take it, where gravity is as given [m/s^2]."""
+        """The model as kernels take it.
+
+        Args:
+            gravity: Gravitational acceleration [m/s^2].
+
+        Returns:
+            Code, k_h, k_p and gravity.
+        """
         return self.code, *self.parameters, gravity
 
     def from_tension(
@@ -59,14 +76,25 @@ class CableModel:
             CableGeometryError: If span is negative, or span and rise are both zero.
             InvalidValueError: If a tension or gravity is negative or not finite, or shapes do not broadcast.
 
+        Examples:
+            One cable, and the same at three tensions:
+
+            >>> import sagline as sl
+            >>> cable, model = sl.Cable(linear_density=0.067, axial_stiffness=44e3), sl.Catenary()
+            >>> print(f"{model.from_tension(cable, span=12.0, rise=-4.0, chord_tension=100.0).unstrained_length:.4f} m")
+            12.6237 m
+            >>> state = model.from_tension(cable, span=12.0, rise=-4.0, chord_tension=[50.0, 100.0, 200.0])
+            >>> print((1e3 * state.sag).round(1), "mm")
+            [262.7 131.2  65.4] mm
+
         Source:
             Irvine 1981, ch. 2; docs/model.md, sections 2 (P3) and 3.
         """
         tension = checked(chord_tension, "chord_tension", "N", low=0.0)
-        problem = _problem(cable, span, rise, tension, gravity)
-        length, horizontal, vertical, status = _outputs(problem.size)
+        problem = Problem.of(cable, span, rise, tension, gravity)
+        length, horizontal, vertical, status = problem.outputs()
         batch.batch_from_tension(self.terms(problem.gravity), *problem.operands, length, horizontal, vertical, status)
-        return problem.state(self, cable, length, horizontal, vertical, tension, status)
+        return self._state(cable, problem, length, horizontal, vertical, tension, status)
 
     def from_length(
         self, cable: Cable, span: ArrayLike, rise: ArrayLike, unstrained_length: ArrayLike, gravity: float = 9.81
@@ -93,10 +121,34 @@ class CableModel:
             Irvine 1981, ch. 2; docs/model.md, sections 2 (P2) and 3.
         """
         length = checked(unstrained_length, "unstrained_length", "m", above=0.0)
-        problem = _problem(cable, span, rise, length, gravity)
-        tension, horizontal, vertical, status = _outputs(problem.size)
+        problem = Problem.of(cable, span, rise, length, gravity)
+        tension, horizontal, vertical, status = problem.outputs()
         batch.batch_from_length(self.terms(problem.gravity), *problem.operands, tension, horizontal, vertical, status)
-        return problem.state(self, cable, length, horizontal, vertical, tension, status)
+        return self._state(cable, problem, length, horizontal, vertical, tension, status)
+
+    def _state(
+        self,
+        cable: Cable,
+        problem: Problem,
+        length: Array,
+        horizontal: Array,
+        vertical: Array,
+        tension: Array,
+        status: Codes,
+    ) -> CableState:
+        """The solved batch in the caller's shape."""
+        return CableState(
+            model=self,
+            cable=cable,
+            gravity=problem.gravity,
+            span=problem.shaped(problem.span),
+            rise=problem.shaped(problem.rise),
+            unstrained_length=problem.shaped(length),
+            horizontal_tension=problem.shaped(horizontal),
+            vertical_force=problem.shaped(vertical),
+            chord_tension=problem.shaped(tension),
+            status=locked(status.reshape(problem.shape)),
+        )
 
     def profile(self, cable: Cable, state: CableState, points: int = 50) -> Array:
         """Points of a cable in its own vertical plane as this model draws it.
@@ -108,95 +160,143 @@ class CableModel:
 
         Returns:
             Horizontal and vertical coordinates from the frame end on [m], shape (..., points, 2).
+
+        Raises:
+            InvalidValueError: If fewer than two points are asked for.
         """
         if points < 2:
             raise InvalidValueError("points", points, ">= 2", "Ask for the two ends at least.")
         return replace(state, model=self, cable=cable).points(points)
 
 
-class _Problem(NamedTuple):
-    """Checked operands of a batch: flat, each as long as the batch or of length 1."""
+@dataclass(frozen=True, slots=True, eq=False)
+class CableState:
+    """Where a cable's ends are, what it carries and how long it is: results of a cable model.
 
-    shape: tuple[int, ...]
+    Every array has shape (...), one entry a cable. Forces act on the cable at its platform end. A batch is indexed
+    along its first axis, by a number, a slice, or an array of numbers or booleans; slices share its memory.
+
+    Attributes:
+        model: The cable model that was solved.
+        cable: Material; its fields broadcast with shape (...).
+        gravity: Gravitational acceleration [m/s^2].
+        span: Horizontal distance from frame end to platform end [m].
+        rise: Height of the platform end above the frame end [m].
+        unstrained_length: L [m].
+        horizontal_tension: T_x [N], >= 0.
+        vertical_force: T_z [N], up positive.
+        chord_tension: tau = T_x/cos phi [N].
+        status: Codes of `CableStatus`; where it is not SOLVED, SLACK or BELOW_VALIDITY the answer is NaN.
+    """
+
+    model: CableModel
+    cable: Cable
     gravity: float
     span: Array
     rise: Array
-    operands: tuple[Array, Array, Array, Array, Array]
+    unstrained_length: Array
+    horizontal_tension: Array
+    vertical_force: Array
+    chord_tension: Array
+    status: Codes
 
     @property
-    def size(self) -> int:
-        return math.prod(self.shape)
+    def shape(self) -> tuple[int, ...]:
+        """Shape of every array."""
+        return self.unstrained_length.shape
 
-    def state(
-        self,
-        model: CableModel,
-        cable: Cable,
-        length: Array,
-        horizontal: Array,
-        vertical: Array,
-        tension: Array,
-        status: Codes,
-    ) -> CableState:
-        """The solved batch in the caller's shape."""
-        arrays = (self.span, self.rise, length, horizontal, vertical, tension)
-        span, rise, length, horizontal, vertical, tension = (_shaped(array, self.shape) for array in arrays)
-        return CableState(
-            model=model,
-            cable=cable,
-            gravity=self.gravity,
-            span=span,
-            rise=rise,
-            unstrained_length=length,
-            horizontal_tension=horizontal,
-            vertical_force=vertical,
-            chord_tension=tension,
-            status=locked(status.reshape(self.shape)),
+    def __len__(self) -> int:
+        """Length of the first axis."""
+        if not self.shape:
+            raise TypeError("the state of a single cable has no length")
+        return self.shape[0]
+
+    def __getitem__(self, index: int | slice | NDArray[Any]) -> CableState:
+        """The state of a part of the cables, along the first axis.
+
+        Args:
+            index: A number, which may count from the end; a slice; or an array of numbers or booleans.
+
+        Raises:
+            TypeError: If the state is that of a single cable.
+            IndexError: If there is no such entry.
+        """
+        if not self.shape:
+            raise TypeError("the state of a single cable cannot be indexed")
+        arrays: dict[str, Any] = {name: locked(getattr(self, name)[index, ...]) for name in _ARRAYS}
+        return replace(self, cable=self.cable._part(index, self.shape), **arrays)
+
+    def __iter__(self) -> Iterator[CableState]:
+        """The entries along the first axis, one by one."""
+        return (self[i] for i in range(len(self)))
+
+    @property
+    def chord(self) -> Array:
+        """D, distance between the two ends [m]."""
+        return np.hypot(self.span, self.rise)
+
+    @property
+    def adjusting_length(self) -> Array:
+        """The article's d = L - D [m]."""
+        return self.unstrained_length - self.chord
+
+    @property
+    def cable_weight(self) -> Array:
+        """Weight of the whole cable [N] as its model sees it: zero for the weightless models."""
+        if self.model.weightless:
+            return np.zeros(self.shape)
+        return self.cable.linear_density * self.gravity * self.unstrained_length
+
+    @property
+    def frame_end_tension(self) -> Array:
+        """Tension at the frame end, where a winch's load cell sits [N]."""
+        return np.hypot(self.horizontal_tension, self.vertical_force - self.cable_weight)
+
+    @property
+    def platform_end_tension(self) -> Array:
+        """Tension at the platform end [N]."""
+        return np.hypot(self.horizontal_tension, self.vertical_force)
+
+    @property
+    def sag(self) -> Array:
+        """Largest vertical drop below the chord [m]; on a vertical chord, below the lower end."""
+        out = np.empty(self.unstrained_length.size)
+        shape.sags(self.model.terms(self.gravity), *self._columns(), out)
+        return out.reshape(self.shape)
+
+    @property
+    def closure_residual(self) -> Array:
+        """By how much the state misses its own model's equations [m]."""
+        out = np.empty(self.unstrained_length.size)
+        shape.closures(self.model.terms(self.gravity), *self._columns(), out)
+        return out.reshape(self.shape)
+
+    def points(self, count: int) -> Array:
+        """Points along the cable in its own vertical plane.
+
+        Args:
+            count: How many, at equal steps of unstrained length, >= 2.
+
+        Returns:
+            Horizontal and vertical coordinates [m], frame end first, shape (..., count, 2).
+        """
+        out = np.empty((self.unstrained_length.size, count, 2))
+        shape.shape_points(self.model.terms(self.gravity), *self._columns(), out)
+        return locked(out.reshape(*self.shape, count, 2))
+
+    def _columns(self) -> tuple[Array, Array, Array, Array, Array, Array, Array, Array]:
+        flat = (kernel_input(field, self.shape).reshape(-1) for field in self._fields())
+        span, rise, density, stiffness, length, horizontal, vertical, tension = flat
+        return span, rise, density, stiffness, length, horizontal, vertical, tension
+
+    def _fields(self) -> tuple[Array, ...]:
+        return (
+            self.span,
+            self.rise,
+            self.cable.linear_density,
+            self.cable.axial_stiffness,
+            self.unstrained_length,
+            self.horizontal_tension,
+            self.vertical_force,
+            self.chord_tension,
         )
-
-
-def _problem(cable: Cable, span: ArrayLike, rise: ArrayLike, given: Array, gravity: float) -> _Problem:
-    """Check geometry and gravity and bring everything to one shape."""
-    span = _checked_span(span)
-    rise = checked(rise, "rise", "m")
-    gravity = float(checked(gravity, "gravity", "m/s^2", low=0.0, shape=()))
-    try:
-        shape = np.broadcast_shapes(span.shape, rise.shape, given.shape, cable.linear_density.shape)
-    except ValueError as error:
-        raise InvalidValueError(
-            "cable, span, rise and tension or length",
-            f"not of one shape ({error})",
-            "shapes that broadcast",
-            "Give one value for each cable, or one for all.",
-        ) from None
-    if (span.size == 0 or span.min() == 0.0) and not np.all((span != 0.0) | (rise != 0.0)):
-        raise CableGeometryError(
-            "span and rise",
-            "both 0 m",
-            "two different ends",
-            "Move one end: a cable between equal points has no chord.",
-        )
-    fields = (span, rise, cable.linear_density, cable.axial_stiffness, given)
-    a, b, c, d, e = (_flat(field, shape) for field in fields)
-    return _Problem(shape, gravity, span, rise, (a, b, c, d, e))
-
-
-def _checked_span(span: ArrayLike) -> Array:
-    try:
-        return checked(span, "span", "m", low=0.0)
-    except InvalidValueError as error:
-        raise CableGeometryError(*error.args) from None
-
-
-def _flat(field: Array, shape: tuple[int, ...]) -> Array:
-    """One axis: the whole batch, or a single value that holds for all of it."""
-    return field.reshape(1) if field.size == 1 else kernel_input(field, shape).reshape(-1)
-
-
-def _shaped(field: Array, shape: tuple[int, ...]) -> Array:
-    """The batch's shape, locked: results are reshaped, operands repeated without copying."""
-    array = field.reshape(shape) if field.size == math.prod(shape) else np.broadcast_to(field, shape)
-    return locked(array)
-
-
-def _outputs(count: int) -> tuple[Array, Array, Array, Codes]:
-    return np.empty(count), np.empty(count), np.empty(count), np.empty(count, dtype=np.int8)

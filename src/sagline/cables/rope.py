@@ -40,14 +40,24 @@ class Rope:
         Args:
             diameter: Nominal diameter [m], > 0.
 
+        Returns:
+            Its material.
+
         Raises:
-            InvalidValueError: If the diameter is none.
+            InvalidValueError: If the diameter is not one positive number.
         """
         square = float(checked(diameter, "diameter", "m", shape=(), above=0.0)) ** 2
         return Cable(self.density_factor * square, self.stiffness_factor * square)
 
     def breaking_force(self, diameter: float) -> float:
-        """Least force at which a new rope breaks [N]; diameter in m."""
+        """Least force at which a new rope breaks.
+
+        Args:
+            diameter: Nominal diameter [m].
+
+        Returns:
+            Force [N].
+        """
         return self.strength_factor * diameter**2
 
 

@@ -14,7 +14,7 @@ from sagline.errors import FileError, InvalidValueError
 from sagline.files.imported import Imported
 from sagline.files.quantity import in_si
 from sagline.files.robot_file import dump_robot, load_robot
-from sagline.files.whole import written_whole
+from sagline.files.whole import write_text
 from sagline.robot.pose import Pose
 
 if TYPE_CHECKING:
@@ -42,8 +42,7 @@ def convert(
     if out is None:
         typer.echo(text, nl=False)
     else:
-        with written_whole(out) as partial:
-            partial.write_text(text, encoding="utf-8")
+        write_text(out, text)
     _report(imported, out)
 
 

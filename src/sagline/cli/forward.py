@@ -22,6 +22,8 @@ SHOWN = 12  # rows of the table on the terminal; the file has them all
 FINE = (ForwardStatus.SOLVED, ForwardStatus.FITTED)
 COLUMNS = ("x", "y", "z", "qx", "qy", "qz", "qw", "force_residual", "moment_residual", "iterations")
 
+Cell = float | str
+
 
 def forward(name: str, file: Path, model: Model, folder: Path, *, as_json: bool) -> int:
     """Find the poses, tell, and write them; returns the exit code.
@@ -44,7 +46,7 @@ def forward(name: str, file: Path, model: Model, folder: Path, *, as_json: bool)
         csv.writer(stream).writerows(rows)
     lost = [k for k, status in enumerate(found.status) if status not in FINE]
     if as_json:
-        header = [cell.split(" ")[0] for cell in rows[0]]
+        header = [str(cell).split(" ")[0] for cell in rows[0]]
         show_json({"poses": [dict(zip(header, row, strict=True)) for row in rows[1:]], "file": target})
     else:
         show(_table(rows))
@@ -56,31 +58,25 @@ def forward(name: str, file: Path, model: Model, folder: Path, *, as_json: bool)
     return OUTSIDE
 
 
-def _rows(lengths: Lengths, found: ForwardSolution) -> list[list[str]]:
-    """Header and one row a sample, to the last digit; the time if it was given."""
+def _rows(lengths: Lengths, found: ForwardSolution) -> list[list[Cell]]:
+    """Header and one row a sample; the time if it was given."""
     units = {"x": "m", "y": "m", "z": "m", "force_residual": "N", "moment_residual": "N*m"}
-    numbers = np.hstack(
-        (found.pose.position, found.pose.quaternion, found.wrench_residual, found.iterations[:, np.newaxis])
-    )
-    header = [f"{name} [{units[name]}]" if name in units else name for name in COLUMNS]
-    times = [] if lengths.time is None else [["time [s]"], *([repr(float(t))] for t in lengths.time)]
+    numbers = np.hstack((found.pose.position, found.pose.quaternion, found.wrench_residual)).tolist()
     words = [ForwardStatus(int(code)).name for code in found.status]
-    body = [[*(repr(float(value)) for value in row), word] for row, word in zip(numbers, words, strict=True)]
-    rows = [[*header, "status"], *body]
-    return [[*time, *row] for time, row in zip(times, rows, strict=True)] if times else rows
+    body = [[*row, steps, word] for row, steps, word in zip(numbers, found.iterations.tolist(), words, strict=True)]
+    header = [f"{name} [{units[name]}]" if name in units else name for name in (*COLUMNS, "status")]
+    if lengths.time is None:
+        return [header, *body]
+    return [["time [s]", *header], *([time, *row] for time, row in zip(lengths.time.tolist(), body, strict=True))]
 
 
-def _table(rows: list[list[str]]) -> Table:
+def _table(rows: list[list[Cell]]) -> Table:
     header, *body = rows
     table = plain_table()
     for name in header:
-        table.add_column(name, justify="right")
+        table.add_column(str(name), justify="right")
     for row in body[:SHOWN]:
-        table.add_row(*(cell if not _is_number(cell) else f"{float(cell):.6g}" for cell in row))
+        table.add_row(*(cell if isinstance(cell, str) else f"{cell:.6g}" for cell in row))
     if len(body) > SHOWN:
         table.add_row("...", *[""] * (len(header) - 1))
     return table
-
-
-def _is_number(cell: str) -> bool:
-    return cell not in ForwardStatus.__members__

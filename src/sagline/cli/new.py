@@ -15,7 +15,7 @@ from sagline.cli.terminal import note, show, working
 from sagline.errors import FileError, InvalidValueError
 from sagline.files.quantity import in_si
 from sagline.files.robot_file import dump_robot, parse_robot
-from sagline.files.whole import written_whole
+from sagline.files.whole import write_text
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan
 from sagline.robot.design import COUNTS, Design
@@ -73,8 +73,7 @@ def new(file: Path, answers: dict[str, str | None], *, force: bool) -> Robot:
         robot, middle = _boxed(design)
     text = _header(said) + dump_robot(robot)
     checked = parse_robot(text, file)
-    with written_whole(file) as partial:
-        partial.write_text(text, encoding="utf-8")
+    write_text(file, text)
     _explain(checked, design, middle)
     show(f"Written: {file}\nLook at it: sagline view {file}\nEvery value: sagline show {file}")
     return checked

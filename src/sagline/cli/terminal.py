@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import json
-import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-import numpy as np
 import typer
 from rich.console import Console, RenderableType
 from rich.text import Text
 
 from sagline.errors import SaglineError
+from sagline.files.json_text import json_text
 
 OUTSIDE, BAD_INPUT, INTERRUPTED = 1, 2, 130
 
@@ -81,20 +79,4 @@ def show(what: RenderableType) -> None:
 
 def show_json(what: Any) -> None:
     """The result, for a program: one JSON document; null stands for what is not finite."""
-    typer.echo(json.dumps(_plain(what), indent=2, ensure_ascii=False, allow_nan=False))
-
-
-def _plain(what: Any) -> Any:
-    match what:
-        case dict():
-            return {str(key): _plain(value) for key, value in what.items()}
-        case list() | tuple():
-            return [_plain(value) for value in what]
-        case np.ndarray() | np.generic():
-            return _plain(what.tolist())
-        case float():
-            return what if math.isfinite(what) else None
-        case str() | int() | None:
-            return what
-        case _:
-            return str(what)
+    typer.echo(json_text(what))

@@ -27,5 +27,13 @@ class Imported:
 
 
 def imported(robot: Robot, lost: tuple[str, ...]) -> Imported:
-    """A robot whose notes tell what was lost, so that its file does too."""
+    """A robot whose notes tell what was lost, so that its file does too.
+
+    Args:
+        robot: The robot that was read.
+        lost: What the file gives and the robot does not hold, one sentence each.
+
+    Returns:
+        Both; the robot's notes begin with "Not taken over:" where something was lost.
+    """
     return Imported(robot.replace(notes=" ".join(("Not taken over:", *lost))) if lost else robot, lost)

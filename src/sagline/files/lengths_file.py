@@ -34,6 +34,9 @@ def load_lengths(file: os.PathLike[str] | str, cable_count: int) -> Lengths:
         file: The file.
         cable_count: Number of cables m of the robot.
 
+    Returns:
+        Times, if there are any, and lengths in SI.
+
     Raises:
         FileError: If it cannot be read, a column is missing or unknown, a length is not positive or the times do
             not increase; the message names the line.

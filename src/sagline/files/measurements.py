@@ -37,6 +37,9 @@ def load_measurements(file: os.PathLike[str] | str) -> Measurements:
     Args:
         file: The file.
 
+    Returns:
+        The four columns in SI.
+
     Raises:
         FileError: If it cannot be read, or a column or number is wrong; the message names the line.
     """

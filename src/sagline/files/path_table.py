@@ -20,7 +20,14 @@ QUATERNION_TOLERANCE = 1e-3  # of a length 1, printed with three decimals; more 
 
 
 def path_from_table(path: FilePath, text: str) -> Path:
-    """The path of a CSV text; `path` is for messages.
+    """The path of a CSV text.
+
+    Args:
+        path: The file, for messages.
+        text: What is in it.
+
+    Returns:
+        The path, its velocities and accelerations those of a spline.
 
     Raises:
         FileError: If a column, row or number is wrong; it names the line.

@@ -15,12 +15,11 @@ from sagline.arrays import locked
 from sagline.cables.catenary import Catenary
 from sagline.cables.elastic import Elastic
 from sagline.cables.empirical import Empirical
-from sagline.cables.model import CableModel
+from sagline.cables.model import CableModel, CableState
 from sagline.cables.parabolic import Parabolic
-from sagline.cables.state import CableState
 from sagline.cables.straight import Straight
 from sagline.errors import FileError, InvalidValueError
-from sagline.files.plan_layout import JERK, MOTION, PARTS, QUANTITIES, TIME, Quantity
+from sagline.files.plan_layout import JERK, MOTION, PARTS, PROOF, QUANTITIES, TIME, Quantity
 from sagline.files.robot_file import dump_robot, parse_robot
 from sagline.files.whole import written_whole
 from sagline.kinematics.plan import Plan
@@ -46,7 +45,7 @@ def save_plan(plan: Plan, file: os.PathLike[str] | str) -> None:
     """Write a plan to a NetCDF file, whole or not at all.
 
     Dimensions are pose (absent for a single pose) and cable; a path's times are a coordinate of pose. Poses without
-    an answer are kept, with their status, shortfall and blocking cables, and NaN lengths and forces.
+    an answer are kept, with their status, shortfall, blocking cables and proof, and NaN lengths and forces.
 
     Args:
         plan: The plan, of one robot.
@@ -69,8 +68,19 @@ def load_plan(file: os.PathLike[str] | str) -> Plan:
     Args:
         file: The NetCDF file.
 
+    Returns:
+        The plan; its proofs, `farkas` and `needed`, are None in a file that was written before files kept them.
+
     Raises:
         FileError: If the file is missing, cut off, no NetCDF file, no plan, or of a newer format.
+
+    Examples:
+        >>> import sagline as sl
+        >>> path = sl.quintic_path([(0, 0, 1.5), (1, 1, 2)], speed=1.0)
+        >>> sl.inverse(sl.load_robot("cogiro"), path).save("run.nc")
+        >>> plan = sl.load_plan("run.nc")
+        >>> print(plan.state.robot.name, plan.unstrained_length.shape, plan.feasible.all())
+        cogiro (283, 8) True
     """
     path = FilePath(file)
     data = _opened(path)
@@ -91,9 +101,9 @@ def _dataset(plan: Plan) -> Dataset:
     def variable(quantity: Quantity) -> tuple[tuple[str, ...], Any, dict[str, Any]]:
         return (*rows, *quantity.parts), quantity.of(plan), quantity.attributes
 
-    quantities = list(QUANTITIES if plan.path is None else QUANTITIES + MOTION)
-    if plan.path is not None and plan.path.jerk is not None:
-        quantities.append(JERK)
+    proof = tuple(quantity for quantity in PROOF if quantity.of(plan) is not None)
+    motion = () if plan.path is None else MOTION if plan.path.jerk is None else (*MOTION, JERK)
+    quantities = QUANTITIES + proof + motion
     used = {part for quantity in quantities for part in quantity.parts} & PARTS.keys()
     coordinates: dict[str, Any] = {part: (part, list(PARTS[part])) for part in sorted(used)}
     cables = np.arange(plan.state.one_robot.cable_count)
@@ -194,4 +204,5 @@ def _plan(path: FilePath, data: Dataset, robot: Robot) -> Plan:
         shortfall=values("shortfall"),
         wrench_residual=values("wrench_residual"),
         blocking=values("blocking"),
+        **{quantity.name: values(quantity.name) for quantity in PROOF if quantity.name in data},
     )

@@ -42,7 +42,14 @@ class Quantity(NamedTuple):
     codes: type[IntEnum] | None = None
 
     def of(self, plan: Plan) -> Any:
-        """The plan's values."""
+        """The values of a plan.
+
+        Args:
+            plan: The plan.
+
+        Returns:
+            Array, or None for a proof that the plan does not have.
+        """
         return attrgetter(self.place)(plan)
 
     @property
@@ -95,6 +102,24 @@ QUANTITIES = (
         ("quaternion_part",),
         "1",
         "rotation from platform to world, scalar last",
+    ),
+)
+
+# of a plan that has them: one of a file written before they were kept has none
+PROOF = (
+    Quantity(
+        "farkas",
+        "farkas",
+        ("wrench_part",),
+        "1, 1/m",
+        "vector y that proves a pose infeasible: y . J tau < y . needed for all chord tensions within the limits",
+    ),
+    Quantity(
+        "needed",
+        "needed",
+        ("wrench_part",),
+        "N, N m",
+        "wrench J tau that the chord tensions must supply, to which the proof refers",
     ),
 )
 

@@ -36,6 +36,9 @@ def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
         name_or_path: One of `robot_names()`, or the path of a file. A path object, and a text that ends in .yaml
             or .yml, has a folder in it or names what exists, is a path.
 
+    Returns:
+        The robot, checked.
+
     Raises:
         FileError: If the file cannot be read, or says something wrong; the message names the key and the value.
         InvalidValueError: If there is no such preset.
@@ -59,6 +62,9 @@ def parse_robot(text: str, origin: Path | str) -> Robot:
         text: The YAML text.
         origin: The file or whatever else the text came from, for the messages.
 
+    Returns:
+        The robot, checked.
+
     Raises:
         FileError: If the text is no robot file; the message names the line, or the key and the value.
     """
@@ -70,7 +76,19 @@ def parse_robot(text: str, origin: Path | str) -> Robot:
 
 
 def dump_robot(robot: Robot) -> str:
-    """The text of a robot file, in SI, that `parse_robot` turns into the same robot to the last bit."""
+    """A robot as the text of a robot file, in SI.
+
+    Args:
+        robot: The robot.
+
+    Returns:
+        YAML text that `load_robot` turns into the same robot to the last bit, once it is in a file.
+
+    Examples:
+        >>> import sagline as sl
+        >>> print(sl.dump_robot(sl.load_robot("cogiro")).splitlines()[0])
+        name: cogiro
+    """
     data: dict[str, Any] = {"name": robot.name, "source": robot.source, "notes": robot.notes}
     data["assumed"] = dict(robot.assumed)
     data["cables"] = {key: getattr(robot.cables, key).tolist() for key in ("linear_density", "axial_stiffness")}

@@ -167,6 +167,9 @@ class RobotEntry(_RobotPart):
     def robot(self) -> Robot:
         """The robot the file describes.
 
+        Returns:
+            The robot, checked.
+
         Raises:
             InvalidValueError: If a value has a wrong unit, or is none the robot accepts.
         """

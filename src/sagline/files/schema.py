@@ -33,6 +33,9 @@ def validated(data: Mapping[Any, Any], schema: type[Schema], origin: Path | str)
         schema: What it may say.
         origin: The file, for the message.
 
+    Returns:
+        The entry, every key known and of its type.
+
     Raises:
         FileError: If a key is unknown, missing, or holds the wrong kind of value.
     """

@@ -47,6 +47,9 @@ class Table:
             text: What is in it.
             units: The columns it may have, and the SI unit of each.
 
+        Returns:
+            The table, all its numbers finite.
+
         Raises:
             FileError: If it is no such text; the message names the line.
         """
@@ -75,7 +78,18 @@ class Table:
         return table
 
     def refuse(self, wrong: NDArray[np.bool_], item: str, values: Array, unit: str, allowed: str) -> None:
-        """Raise a FileError for the first row that is wrong."""
+        """Refuse the first row that is wrong.
+
+        Args:
+            wrong: Which rows are wrong, shape (rows,).
+            item: What is wrong in them, for the message.
+            values: Its values, shape (rows,).
+            unit: Their unit; "" for none.
+            allowed: What would do.
+
+        Raises:
+            FileError: If a row is wrong; it names the line.
+        """
         if wrong.any():
             k = int(np.argmax(wrong))
             value = f"{values[k]:.12g} {unit}".rstrip()
@@ -125,5 +139,14 @@ def _is_number(cell: str) -> bool:
 
 
 def line_error(path: FilePath, line: int, reason: str) -> FileError:
-    """An error that names the line."""
+    """An error that names the line.
+
+    Args:
+        path: The file.
+        line: The line, from 1.
+        reason: What is wrong with it, and what is allowed.
+
+    Returns:
+        The error, to be raised.
+    """
     return FileError(path, f"line {line}: {reason}", f"Correct line {line}.")

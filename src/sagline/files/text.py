@@ -14,6 +14,12 @@ from sagline.errors import FileError
 def read_text(path: Path) -> str:
     """A whole text file in UTF-8, with or without a byte order mark.
 
+    Args:
+        path: The file.
+
+    Returns:
+        The text, without a byte order mark.
+
     Raises:
         FileError: If it is missing, a folder, unreadable, or not text.
     """
@@ -35,6 +41,9 @@ def parse_mapping(text: str, origin: Path | str) -> dict[Any, Any]:
     Args:
         text: The YAML text.
         origin: The file or whatever else the text came from, for the message.
+
+    Returns:
+        The mapping.
 
     Raises:
         FileError: If it is empty, not YAML, cut off, or not a mapping.

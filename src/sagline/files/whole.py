@@ -43,8 +43,25 @@ def written_whole(file: os.PathLike[str] | str, size: int = 0) -> Iterator[Path]
             partial.unlink()
 
 
+def write_text(file: os.PathLike[str] | str, text: str) -> None:
+    """Write a text in UTF-8, whole or not at all.
+
+    Args:
+        file: The file; one that exists is replaced.
+        text: What is to stand in it.
+
+    Raises:
+        FileError: If the file cannot be written; what was there before is untouched.
+    """
+    with written_whole(file) as partial:
+        partial.write_text(text, encoding="utf-8")
+
+
 def check_folder(folder: os.PathLike[str] | str) -> None:
     """Refuse a folder that files could not be written to, without creating it.
+
+    Args:
+        folder: The folder; it need not exist.
 
     Raises:
         FileError: If it is no folder, or neither it nor the nearest folder above it can be written.
@@ -59,6 +76,12 @@ def check_folder(folder: os.PathLike[str] | str) -> None:
 
 def made_folder(folder: os.PathLike[str] | str) -> Path:
     """The folder, created with everything above it where it is missing.
+
+    Args:
+        folder: The folder.
+
+    Returns:
+        Its path.
 
     Raises:
         FileError: If it cannot be created.

@@ -19,6 +19,12 @@ def read_xml(path: Path) -> Element:
     A file that declares entities is refused, so that none can grow without bound or name another file; a document
     type is skipped, and what it points to is never opened.
 
+    Args:
+        path: The file.
+
+    Returns:
+        The root element.
+
     Raises:
         FileError: If the file is missing, unreadable, no complete XML, or declares entities.
     """
@@ -46,6 +52,15 @@ def read_xml(path: Path) -> Element:
 def numbers(text: str | None, count: int, item: str, unit: str) -> Array:
     """As many finite numbers as wanted, between blanks.
 
+    Args:
+        text: The text; None where the file has none.
+        count: How many numbers there must be.
+        item: The name a message uses.
+        unit: Their unit, for the message; "" for none.
+
+    Returns:
+        The numbers, shape (count,).
+
     Raises:
         InvalidValueError: If the text is missing or says anything else; the message names the item.
     """
@@ -61,12 +76,32 @@ def numbers(text: str | None, count: int, item: str, unit: str) -> Array:
 
 
 def number(text: str | None, item: str, unit: str) -> float:
-    """One finite number; raises like `numbers`."""
+    """One finite number.
+
+    Args:
+        text: The text; None where the file has none.
+        item: The name a message uses.
+        unit: Its unit, for the message; "" for none.
+
+    Returns:
+        The number.
+
+    Raises:
+        InvalidValueError: If the text is missing or says anything else; the message names the item.
+    """
     return float(numbers(text, 1, item, unit)[0])
 
 
 def only_child(parent: Element, tag: str, item: str) -> Element:
     """The element of this tag inside another.
+
+    Args:
+        parent: The element to look in.
+        tag: The tag to look for.
+        item: What the parent is called in a message.
+
+    Returns:
+        The element.
 
     Raises:
         InvalidValueError: If there is none, or more than one.

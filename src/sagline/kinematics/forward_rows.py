@@ -7,8 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sagline.arrays import Array, Codes, Flags, Indices, locked
-from sagline.cables.model import CableModel
-from sagline.cables.state import CableState
+from sagline.cables.model import CableModel, CableState
 from sagline.kernels import codes, tables
 from sagline.kernels.forward import forward as kernel
 from sagline.kernels.forward.fit import fit_poses
@@ -84,6 +83,31 @@ class Found(NamedTuple):
         """Whether each sample is a stable equilibrium, (N,)."""
         return np.isin(self.pose_status, STABLE)
 
+    def cables(self, robot: Robots, model: CableModel, shape: tuple[int, ...]) -> CableState:
+        """The cables of the batch in the caller's shape.
+
+        Args:
+            robot: The robot, or one a sample.
+            model: Cable model.
+            shape: () for a single sample, (N,) for a batch.
+
+        Returns:
+            State with fields of shape (m,) or (N, m).
+        """
+        wide = (*shape, self.cable_status.shape[1])
+        return CableState(
+            model=model,
+            cable=cables_of(robot),
+            gravity=first_of(robot).gravity,
+            span=locked(self.results[tables.SPAN].reshape(wide)),
+            rise=locked(self.results[tables.RISE].reshape(wide)),
+            unstrained_length=locked(self.results[tables.LENGTH].reshape(wide)),
+            horizontal_tension=locked(self.results[tables.HORIZONTAL].reshape(wide)),
+            vertical_force=locked(self.results[tables.VERTICAL].reshape(wide)),
+            chord_tension=locked(self.results[tables.TENSION].reshape(wide)),
+            status=locked(self.cable_status.reshape(wide)),
+        )
+
     def solution(
         self,
         robot: Robots,
@@ -104,24 +128,11 @@ class Found(NamedTuple):
         Returns:
             ForwardSolution around these arrays.
         """
-        wide = (*shape, self.cable_status.shape[1])
         pose = Pose._adopt(self.poses[:, :3].reshape(*shape, 3), self.poses[:, 3:].reshape(*shape, 4))
-        cables = CableState(
-            model=model,
-            cable=cables_of(robot),
-            gravity=first_of(robot).gravity,
-            span=locked(self.results[tables.SPAN].reshape(wide)),
-            rise=locked(self.results[tables.RISE].reshape(wide)),
-            unstrained_length=locked(self.results[tables.LENGTH].reshape(wide)),
-            horizontal_tension=locked(self.results[tables.HORIZONTAL].reshape(wide)),
-            vertical_force=locked(self.results[tables.VERTICAL].reshape(wide)),
-            chord_tension=locked(self.results[tables.TENSION].reshape(wide)),
-            status=locked(self.cable_status.reshape(wide)),
-        )
         whole = locked(np.ascontiguousarray(np.broadcast_to(load, (*shape, 6))))
         residuals = self.numbers[:, [kernel.FORCE_RESIDUAL, kernel.MOMENT_RESIDUAL]]
         return ForwardSolution(
-            state=Equilibrium(robot, pose, whole, cables),
+            state=Equilibrium(robot, pose, whole, self.cables(robot, model, shape)),
             status=locked(self.pose_status.reshape(shape)),
             stiffness_min=locked(self.numbers[:, kernel.STIFFNESS_MIN].reshape(shape)),
             energy=locked(self.numbers[:, kernel.ENERGY].reshape(shape)),

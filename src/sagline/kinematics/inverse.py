@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sagline.arrays import Array, Codes, locked
 from sagline.cables.catenary import Catenary
-from sagline.cables.model import CableModel
-from sagline.cables.state import CableState
+from sagline.cables.model import CableModel, CableState
 from sagline.errors import CableGeometryError, InvalidValueError
 from sagline.kernels import codes, tables
 from sagline.kernels.inverse.answer import FORCE_RESIDUAL, MOMENT_RESIDUAL, POSE_NUMBERS, SHORTFALL

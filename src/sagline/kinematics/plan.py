@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +14,7 @@ from sagline.cables.status import CableStatus
 from sagline.kinematics.status import PoseStatus
 from sagline.motion.path import Path
 from sagline.robot.equilibrium import Equilibrium
-
-if TYPE_CHECKING:
-    from sagline.tension.method import TensionMethod
+from sagline.tension.method import TensionMethod
 
 
 class Gap(NamedTuple):
@@ -55,7 +53,7 @@ class Plan:
         farkas: Proof of each infeasible pose, shape (6,) or (N, 6), NaN elsewhere: with y = farkas and the structure
             matrix J, y . J tau < y . needed for all chord tensions tau within their limits. Its force part has length
             1, so that the gap is in newtons. NaN also where the limits contradict by no more than rounding. None for
-            a plan that was read from a file.
+            a plan from a file that was written before files kept it.
         needed: The wrench J tau that the chord tensions must supply, shape (6,) or (N, 6): weight, given wrench and
             the cables' pulls T_z - tau sin phi of the last linearization; to that the proof refers. None as above.
     """
@@ -144,11 +142,11 @@ class Plan:
         """Write the plan to a NetCDF file, whole or not at all, with units and the robot inside.
 
         Args:
-            file: The file, "run.nc" for instance; one that exists is replaced.
+            file: The file, "run.nc" for instance; one that exists is replaced. `load_plan` reads it.
 
         Raises:
             InvalidValueError: If the plan is of several robots, one a pose: to save those, solve them one by one.
-            FileError: If the file cannot be written.
+            FileError: If the file cannot be written; what was there before is untouched.
         """
         from sagline.files.plan_file import save_plan  # the one call outward: a plan knows how to leave
 

@@ -6,13 +6,14 @@ import numpy as np
 
 from sagline.arrays import Array, Flags, Indices, locked
 from sagline.cables.model import CableModel
-from sagline.kernels import codes, tables
+from sagline.kernels import codes
 from sagline.kernels.forward import forward as kernel
 from sagline.kinematics.forward_rows import Found, solve_rows
+from sagline.robot.equilibrium import limited_tension
 from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.robot.several import Robots, anchors_of, cables_of, first_of, limits_of, robots_at
+from sagline.robot.several import Robots, anchors_of, first_of, limits_of, robots_at
 from sagline.statics.tables import pose_rows
 
 _TILTS = (25.0, 60.0)  # degrees, tried where the level platform leads nowhere
@@ -46,9 +47,9 @@ def search(robot: Robots, model: CableModel, lengths: Array, wrenches: Array) ->
         answer = from_orientations(robots, model, locked(lengths[open_samples]), loads, quaternion)
         better = np.ones(len(open_samples), dtype=np.bool_)
         if round_:
-            better = _is_better(_rank(robots, answer), _rank(robots, found.part(open_samples)))
+            better = _is_better(_rank(robots, model, answer), _rank(robots, model, found.part(open_samples)))
         found.keep(open_samples[better], answer, np.flatnonzero(better))
-        settled = _is_plausible(robots, answer)
+        settled = _is_plausible(robots, model, answer)
         open_samples = open_samples[~settled]
         if not len(open_samples):
             break
@@ -70,15 +71,31 @@ def from_orientations(robot: Robots, model: CableModel, lengths: Array, wrenches
     """
     shared = first_of(robot)
     freedom = shared.freedom
-    # below the middle, because the two ends of a single cable must not coincide
-    depth = _BELOW * np.nan_to_num(lengths.mean(axis=1, keepdims=True), nan=1.0)
-    below = depth * (freedom[:, 2] @ freedom[:, :3])
-    starts = pose_rows(Pose.from_quaternion(middle(robot, quaternion) - below, quaternion))
+    starts = pose_rows(Pose.from_quaternion(hung(robot, lengths, quaternion), quaternion))
     if shared.motion_pattern not in ROTATING:
         return solve_rows(robot, model, lengths, starts, wrenches)
     translations = locked(freedom[~freedom[:, 3:].any(axis=1)])
     placed = solve_rows(robot, model, lengths, starts, wrenches, freedom=translations)
     return solve_rows(robot, model, lengths, locked(placed.poses), wrenches)
+
+
+def hung(robot: Robots, lengths: Array, quaternion: Array) -> Array:
+    """Where the platform hangs a little below the middle of the frame ends, as far as it can move.
+
+    Not in the middle itself, because the two ends of a single cable must not coincide.
+
+    Args:
+        robot: The robot, or one a sample.
+        lengths: Unstrained lengths (N, m).
+        quaternion: Orientation of the platform, shape (4,) or (N, 4).
+
+    Returns:
+        Positions of the platform origin [m], shape (N, 3).
+    """
+    freedom = first_of(robot).freedom
+    depth = _BELOW * np.nan_to_num(lengths.mean(axis=1, keepdims=True), nan=1.0)
+    position: Array = middle(robot, quaternion) - depth * (freedom[:, 2] @ freedom[:, :3])
+    return position
 
 
 def middle(robot: Robots, quaternion: Array) -> Array:
@@ -116,36 +133,34 @@ def start_quaternions(robot: Robot) -> Array:
     return np.array(rows)
 
 
-def outside_limits(robot: Robots, found: Found) -> Indices:
+def outside_limits(robot: Robots, model: CableModel, found: Found) -> Indices:
     """How many cables of each sample are outside their robot's tension limits.
 
     Args:
         robot: The robot, or one a sample.
+        model: Cable model.
         found: Answers to N samples.
 
     Returns:
         Counts (N,); 0 for straight cables, whose tensions are not known.
     """
-    results, limits, shared = found.results, limits_of(robot), first_of(robot)
-    tension = results[tables.TENSION]
-    if shared.tension_limits_of == "frame_end":
-        weight = cables_of(robot).linear_density * shared.gravity * results[tables.LENGTH]
-        tension = np.hypot(results[tables.HORIZONTAL], results[tables.VERTICAL] - weight)
+    limits = limits_of(robot)
+    tension = limited_tension(robot, found.cables(robot, model, found.pose_status.shape))
     low = (1.0 - _LIMIT_SLACK) * limits.low
     high = (1.0 + _LIMIT_SLACK) * limits.high
     count: Indices = ((tension < low) | (tension > high)).sum(axis=1)
     return count
 
 
-def _is_plausible(robot: Robots, found: Found) -> Flags:
+def _is_plausible(robot: Robots, model: CableModel, found: Found) -> Flags:
     done = np.isin(found.pose_status, (codes.FORWARD_SOLVED, codes.FORWARD_NO_LENGTHS))
-    return np.asarray(done & (outside_limits(robot, found) == 0))
+    return np.asarray(done & (outside_limits(robot, model, found) == 0))
 
 
-def _rank(robot: Robots, found: Found) -> Array:
+def _rank(robot: Robots, model: CableModel, found: Found) -> Array:
     """Rows (status, cables outside their limits, energy) of which the smaller is the better, (N, 3)."""
     energy = np.nan_to_num(found.numbers[:, kernel.ENERGY], nan=0.0)
-    return np.stack((_POOR[found.pose_status].astype(np.float64), outside_limits(robot, found), energy), axis=1)
+    return np.stack((_POOR[found.pose_status].astype(np.float64), outside_limits(robot, model, found), energy), axis=1)
 
 
 def _is_better(new: Array, old: Array) -> Flags:

@@ -2,44 +2,35 @@
 
 from __future__ import annotations
 
-from enum import IntEnum
-
 from sagline.kernels import codes
+from sagline.status import Status
 
 
-class PoseStatus(IntEnum):
+class PoseStatus(Status):
     """Status of one pose of a plan; `text` says what it means and what to do."""
 
-    SOLVED = codes.POSE_SOLVED
-    INFEASIBLE = codes.POSE_INFEASIBLE
-    SINGULAR = codes.POSE_SINGULAR
-    TOO_SLACK = codes.POSE_TOO_SLACK
-    NOT_CONVERGED = codes.POSE_NOT_CONVERGED
-    NO_CHORD = codes.POSE_NO_CHORD
-    NOT_COVERED = codes.POSE_NOT_COVERED
-    UNBOUNDED = codes.POSE_UNBOUNDED
-
-    @property
-    def text(self) -> str:
-        """One sentence for a person."""
-        return _TEXTS[self]
-
-
-_TEXTS = {
-    PoseStatus.SOLVED: "solved",
-    PoseStatus.INFEASIBLE: (
+    SOLVED = codes.POSE_SOLVED, "solved"
+    INFEASIBLE = (
+        codes.POSE_INFEASIBLE,
         "no tensions within the limits balance the platform; move it, widen the limits of the blocking cables, "
-        "or change the load by the shortfall"
-    ),
-    PoseStatus.SINGULAR: "the structure matrix has lost rank: some motion no cable resists; move the platform",
-    PoseStatus.TOO_SLACK: "a cable would carry less than a thousandth of its own weight; raise tension_min",
-    PoseStatus.NOT_CONVERGED: "the tensions did not settle; please report this robot and pose",
-    PoseStatus.NO_CHORD: "both ends of a cable coincide; move the platform away from the anchor",
-    PoseStatus.NOT_COVERED: (
+        "or change the load by the shortfall",
+    )
+    SINGULAR = (
+        codes.POSE_SINGULAR,
+        "the structure matrix has lost rank: some motion no cable resists; move the platform",
+    )
+    TOO_SLACK = (
+        codes.POSE_TOO_SLACK,
+        "a cable would carry less than a thousandth of its own weight; raise tension_min",
+    )
+    NOT_CONVERGED = codes.POSE_NOT_CONVERGED, "the tensions did not settle; please report this robot and pose"
+    NO_CHORD = codes.POSE_NO_CHORD, "both ends of a cable coincide; move the platform away from the anchor"
+    NOT_COVERED = (
+        codes.POSE_NOT_COVERED,
         "there are tensions within the limits, but the chosen way of sharing does not find them; "
-        "choose MinimumNorm or AnalyticCenter"
-    ),
-    PoseStatus.UNBOUNDED: (
-        "the feasible tensions have no upper end, and so no middle; give tension_max, or choose MinimumNorm"
-    ),
-}
+        "choose MinimumNorm or AnalyticCenter",
+    )
+    UNBOUNDED = (
+        codes.POSE_UNBOUNDED,
+        "the feasible tensions have no upper end, and so no middle; give tension_max, or choose MinimumNorm",
+    )

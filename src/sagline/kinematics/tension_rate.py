@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sagline.arrays import Array, Flags
-from sagline.cables.state import CableState
+from sagline.cables.model import CableState
 from sagline.kinematics.instants import Instant
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose

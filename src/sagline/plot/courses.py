@@ -97,7 +97,14 @@ def overview(plan: Plan) -> Figure:
 
 
 def clock_of(plan: Plan) -> Array:
-    """What a plan runs along: its path's times [s], or the numbers of its poses."""
+    """What a plan runs along.
+
+    Args:
+        plan: The plan.
+
+    Returns:
+        Times of its path [s], or the numbers of its poses, shape (N,).
+    """
     return np.arange(plan.status.size, dtype=np.float64) if plan.path is None else plan.path.time
 
 

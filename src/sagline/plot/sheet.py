@@ -41,17 +41,40 @@ class Sheet(Figure):
 
 
 def sheet(height: float, width: float = WIDTH) -> Sheet:
-    """An empty figure [in] that leaves room for what stands outside its axes."""
+    """An empty figure that leaves room for what stands outside its axes.
+
+    Args:
+        height: [in].
+        width: [in].
+
+    Returns:
+        The figure.
+    """
     return Sheet(figsize=(width, height), layout="constrained")
 
 
 def axes_or_new(ax: Axes | None, height: float = 3.0, width: float = WIDTH) -> Axes:
-    """The caller's Axes, or the only ones of a new figure."""
+    """The caller's Axes, or the only ones of a new figure.
+
+    Args:
+        ax: The caller's; None for a new figure.
+        height: Of the new figure [in].
+        width: Of the new figure [in].
+
+    Returns:
+        The axes.
+    """
     return sheet(height, width).add_subplot() if ax is None else ax
 
 
 def dressed(ax: Axes, x: str, y: str) -> None:
-    """Labels, a light grid, and no more lines around it than needed."""
+    """Labels, a light grid, and no more lines around it than needed.
+
+    Args:
+        ax: The axes.
+        x: Label of the horizontal axis, with its unit.
+        y: Label of the vertical axis, with its unit.
+    """
     ax.set_xlabel(x, fontsize=LABEL)
     ax.set_ylabel(y, fontsize=LABEL)
     ax.tick_params(labelsize=TICK, length=3.0, width=0.6)
@@ -62,7 +85,12 @@ def dressed(ax: Axes, x: str, y: str) -> None:
 
 
 def legend_outside(ax: Axes, title: str = "") -> None:
-    """The legend of the axes, to the right of them."""
+    """The legend of the axes, to the right of them.
+
+    Args:
+        ax: The axes.
+        title: Over the legend; "" for none.
+    """
     ax.legend(
         loc="upper left",
         bbox_to_anchor=(1.01, 1.0),
@@ -76,7 +104,14 @@ def legend_outside(ax: Axes, title: str = "") -> None:
 
 
 def shade(ax: Axes, clock: Array, spans: Iterable[tuple[int, int]], label: str) -> None:
-    """Shade the spans of samples (first, last), each up to halfway to its neighbors."""
+    """Shade the spans of samples (first, last), each up to halfway to its neighbors.
+
+    Args:
+        ax: The axes.
+        clock: Where the samples are on the horizontal axis, shape (N,).
+        spans: First and last sample of each span.
+        label: Of all of them, in the legend.
+    """
     if clock.size > 1:
         middles = [0.5 * (before + after) for before, after in pairwise(clock)]
         edges = np.array([clock[0], *middles, clock[-1]])

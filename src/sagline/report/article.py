@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import json
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from sagline.files.whole import check_folder, made_folder, written_whole
+from sagline.files.json_text import plain, save_json
+from sagline.files.whole import check_folder, made_folder, write_text
 from sagline.report.blocks import Chapter
 from sagline.report.page import page
 from sagline.report.parts import selection
@@ -70,30 +67,10 @@ def write_article(folder: Path | str, parts: Sequence[str] = (), progress: Progr
         chapters.append(wanted.cut(part.build()))
     if progress is not None:
         progress(len(chapters), len(chapters), "done")
-    numbers = {c.key: {finding.key: _plain(finding.numbers) for finding in c.findings} for c in chapters}
+    numbers = {c.key: {finding.key: plain(finding.numbers) for finding in c.findings} for c in chapters}
     made = f"Made by sagline {version('sagline')}: sagline article {' '.join(parts)}".rstrip() + "."
     place = made_folder(folder)
     report = ArticleReport(place / "article.html", place / "article.json", tuple(chapters), numbers)
-    _write(report.data, json.dumps(numbers, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
-    _write(report.page, page(TITLE, LEAD, chapters, made))
+    save_json(numbers, report.data)
+    write_text(report.page, page(TITLE, LEAD, chapters, made))
     return report
-
-
-def _write(file: Path, text: str) -> None:
-    with written_whole(file) as partial:
-        partial.write_text(text, encoding="utf-8")
-
-
-def _plain(what: Any) -> Any:
-    """Numbers as JSON has them; null stands for what is not finite."""
-    match what:
-        case dict():
-            return {str(key): _plain(value) for key, value in what.items()}
-        case list() | tuple():
-            return [_plain(value) for value in what]
-        case np.ndarray() | np.generic():
-            return _plain(what.tolist())
-        case float():
-            return what if math.isfinite(what) else None
-        case _:
-            return what

@@ -115,6 +115,7 @@ def _over_density(platform: InterceptStudy, frame: InterceptStudy, draw: Drawing
             "k_h_frame_of_angle": frame.k_h_of_angle,
             "k_h_platform_of_angle": platform.k_h_of_angle,
             "half_gravity": SHALLOW_K_H,
+            "k_h_spread_over_angles": spread,
         },
         panels=(draw.panel(figure, "h_b at five angles: platform end (circles), frame end (squares, dashed)."),),
     )

@@ -5,11 +5,12 @@ from __future__ import annotations
 import re
 from io import StringIO
 from itertools import count
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import matplotlib
 
-from sagline.plot.sheet import TICK, Sheet, dressed
+from sagline.arrays import Array
+from sagline.plot.sheet import BLUE, TICK, Sheet, dressed
 from sagline.report.blocks import Panel
 
 if TYPE_CHECKING:
@@ -70,3 +71,45 @@ def shades(number: int) -> list[tuple[float, float, float, float]]:
 def thinned(number: int) -> slice:
     """Every so many samples."""
     return slice(None, None, max(1, number // MOST_POINTS))
+
+
+def with_fit(ax: Axes, x: Array, y: Array, fine: Array, fit: Array) -> None:
+    """Draw one course, sampled at x, with its fit."""
+    ax.plot(x, y, "o", color=BLUE, markersize=3.5, label="exact")
+    ax.plot(fine, fit, color="black", linewidth=0.9, label="fit")
+    legend(ax)
+
+
+class Courses(NamedTuple):
+    """Several courses with their fits.
+
+    Attributes:
+        x: Where they are sampled, shape (n,).
+        rows: The samples, shape (k, n).
+        fine: Where the fits are drawn, shape (l,).
+        fits: The fits, shape (k, l).
+        names: What the courses are called in the legend.
+    """
+
+    x: Array
+    rows: Array
+    fine: Array
+    fits: Array
+    names: list[str]
+
+    def draw(self, ax: Axes, title: str) -> None:
+        """All of them, dark to light."""
+        for row, fit, name, color in zip(self.rows, self.fits, self.names, shades(len(self.names)), strict=True):
+            ax.plot(self.x, row, "o", color=color, markersize=2.6, label=name)
+            ax.plot(self.fine, fit, color=color, linewidth=0.9)
+        legend(ax, title)
+
+    def panels(
+        self, labels: tuple[str, str, str], one: int, captions: tuple[str, str], draw: Drawings
+    ) -> tuple[Panel, Panel]:
+        """One of them alone, and all; labels of both axes and of the legend."""
+        figure, ax = axes(*labels[:2])
+        with_fit(ax, self.x, self.rows[one], self.fine, self.fits[one])
+        second, bx = axes(*labels[:2])
+        self.draw(bx, labels[2])
+        return draw.panel(figure, captions[0]), draw.panel(second, captions[1])

@@ -62,7 +62,12 @@ def _psi(studies: list[FeasibleSets], draw: Drawings) -> Finding:
         + f": it shrinks {n(ratio[0], '.3g')} and {n(ratio[1], '.3g')} times when the tolerance does 10 times, to a "
         "point. It is a sliver along the chord: 1 mm of position is many newtons of a taut cable.",
         verdict=Verdict.HOLDS,
-        numbers={"unstrained_length_m": length, "tolerance_m": list(TOLERANCES), "extent_N": extents},
+        numbers={
+            "unstrained_length_m": length,
+            "tolerance_m": list(TOLERANCES),
+            "extent_N": extents,
+            "times_smaller": ratio,
+        },
         panels=(
             draw.panel(figure, f"ψ for L = {n(length, '.5g')} m and three tolerances."),
             draw.panel(second, "The same sets from their middle, along and across the chord: mind the scales."),
@@ -89,6 +94,8 @@ def _curve(study: FeasibleSets, draw: Drawings) -> Finding:
         "strictly.",
         verdict=Verdict.HOLDS,
         numbers={
+            "tension_first_N": TENSIONS[0],
+            "tension_last_N": TENSIONS[-1],
             "d_first_m": study.lengths[0] - CHORD,
             "d_last_m": study.lengths[-1] - CHORD,
             "strictly_falling": bool(np.all(np.diff(study.lengths) < 0.0)),
@@ -133,6 +140,8 @@ def _line(study: FeasibleSets, draw: Drawings) -> Finding:
             "half_weight_N": study.half_weight,
             "deviation_N": line.deviation,
             "deviation_from_tangent_N": _largest(from_article),
+            "taut_from_N": LOW_PART,
+            "taut_deviation_from_tangent_N": _largest(from_article[taut]),
         },
         panels=(
             draw.panel(figure, "The projection of Ψ and the fitted line."),

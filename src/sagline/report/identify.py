@@ -70,6 +70,9 @@ def _constants(fit: EmpiricalFit, draw: Drawings) -> Finding:
         "range; it is no measuring error.",
         verdict=Verdict.OURS,
         numbers={
+            "spans_m": SPANS,
+            "rises_m": RISES,
+            "tensions_N": TENSIONS,
             "k_h": fit.k_h._asdict(),
             "k_p": fit.k_p._asdict(),
             "largest_position_error_m": fit.position_error.max(),
@@ -152,7 +155,14 @@ def _measured() -> Finding:
         "at the frame end. Loose cables tell the density, taut ones the stiffness; an unknown zero of the encoder "
         "makes the stiffness less certain.",
         verdict=Verdict.OURS,
-        numbers={"cases": numbers},
+        numbers={
+            "measurements": SAMPLES,
+            "linear_density_kg_per_m": cable.linear_density,
+            "axial_stiffness_N": cable.axial_stiffness,
+            "length_error_m": LENGTH_ERROR,
+            "tension_error_N": TENSION_ERROR,
+            "cases": numbers,
+        },
         data=(
             Table(
                 "What was found",

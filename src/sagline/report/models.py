@@ -200,10 +200,11 @@ def _examples() -> Finding:
         key="model-examples",
         title="five cables as examples",
         statement="",
-        measured="Errors in length [mm] at the same horizontal tension; 30° below level. As a rule wD/τ decides: the "
+        measured="Errors in length [mm] at the same horizontal tension; "
+        f"{n(-np.degrees(REFERENCE['angle']))}° below level. As a rule wD/τ decides: the "
         "sag term is D (wD cos φ/τ)²/24, what the shallow models leave out is smaller by that square again.",
         verdict=Verdict.OURS,
-        numbers={"examples": numbers},
+        numbers={"angle_below_level_deg": -np.degrees(REFERENCE["angle"]), "examples": numbers},
         data=(Table("Length less the exact one [mm]", ("cable", *names), rows),),
     )
 

@@ -243,6 +243,7 @@ def _explanations(study: TenPoses, draw: Drawings) -> Finding:
         verdict=Verdict.OPEN,
         numbers={
             "measured_rms_mm": 1e3 * study.measured_rms,
+            "printing_rms_mm": 1e3 * PRINTING,
             "explanations": [
                 [
                     {
@@ -255,6 +256,7 @@ def _explanations(study: TenPoses, draw: Drawings) -> Finding:
                 for group in study.explanations
             ],
             "unlimited_rms_mm": 1e3 * guess.rms,
+            "unlimited_values": dict(zip((p.name for p in guess.parameters), guess.values, strict=True)),
         },
         panels=tuple(_fit_panel(study, found, count, draw) for found, count in zip(best, COUNTS, strict=True)),
         data=(

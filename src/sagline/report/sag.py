@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -10,19 +10,26 @@ from sagline.arrays import Array
 from sagline.article.constants import PUBLISHED_K_P, SHALLOW_K_P, published_sampling
 from sagline.article.errata_cables import simulated_cable
 from sagline.article.feasible_sets import End
-from sagline.article.sag_constant import SagStudy, StretchStudy, sag_study, stretch_study
+from sagline.article.sag_constant import (
+    SagStudy,
+    StretchStudy,
+    angle_shape,
+    chord_shape,
+    density_shape,
+    length_shape,
+    sag_study,
+    stretch_study,
+)
 from sagline.article.sampling import ANGLE
 from sagline.plot.sheet import BLUE, GREEN, VERMILLION
 from sagline.report.blocks import Chapter, Finding, Verdict, n
-from sagline.report.drawing import Drawings, axes, legend, shades
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from sagline.report.drawing import Courses, Drawings, axes, legend, with_fit
 
 CHORD = 10.0  # m
 TENSIONS = np.linspace(10.0, 500.0, 150)  # N
 MIDDLE, DENSE = 2, -1  # of the sampled angles: the article's; of the densities: the heaviest
 PICKED = (1, 3, 5, 7)  # chords that are drawn
+DRAWN = (1, 3, 5, 7, 9)  # densities that are drawn
 
 
 def sag_chapter() -> Chapter:
@@ -52,21 +59,23 @@ def _with_stretch(study: StretchStudy, draw: Drawings) -> Finding:
     ax.plot(study.tensions, 1e3 * study.stretchable, color=VERMILLION, linewidth=1.3, label="stretches")
     ax.axhline(0.0, color="0.6", linewidth=0.6)
     legend(ax)
-    hooke = -study.stretchable[-1] / (study.magnitude[-1] * CHORD / float(study.cable.axial_stiffness))
+    hooke = study.magnitude[-1] * CHORD / float(study.cable.axial_stiffness)
+    numbers = {
+        "least_unstretchable_m": study.unstretchable.min(),
+        "last_stretchable_m": study.stretchable[-1],
+        "share_of_hooke": -study.stretchable[-1] / hooke,
+    }
     return Finding(
         key="d-over-tension",
         figures=(8,),
         title="d of stretchable and unstretchable cables",
         statement="Unstretchable: d ≥ 0 with d = 0 as asymptote. Stretchable: negative d, an inclined asymptote by "
         "Hooke's law.",
-        measured=f"The least d of the unstretchable cable is {n(1e3 * study.unstretchable.min(), '.2g')} mm; with "
-        f"stretch d reaches {n(1e3 * study.stretchable[-1], '.3g')} mm, {n(hooke, '.3f')} of |T|D/EA.",
+        measured=f"The least d of the unstretchable cable is {n(1e3 * numbers['least_unstretchable_m'], '.2g')} mm; "
+        f"with stretch d reaches {n(1e3 * numbers['last_stretchable_m'], '.3g')} mm, "
+        f"{n(numbers['share_of_hooke'], '.3f')} of |T|D/EA.",
         verdict=Verdict.HOLDS,
-        numbers={
-            "least_unstretchable_m": study.unstretchable.min(),
-            "last_stretchable_m": study.stretchable[-1],
-            "share_of_hooke": hooke,
-        },
+        numbers=numbers,
         panels=(draw.panel(figure, "Adjusting length over T_x."),),
     )
 
@@ -74,6 +83,7 @@ def _with_stretch(study: StretchStudy, draw: Drawings) -> Finding:
 def _relieved(study: StretchStudy, draw: Drawings) -> Finding:
     printed = 1e3 * (study.relieved - study.unstretchable)
     mended = 1e3 * (study.relieved_exactly - study.unstretchable)
+    numbers = {"error_of_36_mm": np.abs(printed).max(), "error_with_mean_tension_mm": np.abs(mended).max()}
     figure, ax = axes("$|T|$ [N]", "$d$ [mm]")
     ax.plot(study.magnitude, 1e3 * study.unstretchable, color=BLUE, linewidth=2.4, alpha=0.5, label="does not stretch")
     ax.plot(study.magnitude, 1e3 * study.relieved, color=VERMILLION, linewidth=1.1, label="stretch taken out, (38)")
@@ -88,11 +98,11 @@ def _relieved(study: StretchStudy, draw: Drawings) -> Finding:
         figures=(9,),
         title="d with the elongation taken out",
         statement="(38): d = d_e + Δl with Δl = |T|L/EA of (36); red and blue dots coincide.",
-        measured=f"They do to the eye at low tension, but (36) is {n(np.abs(printed).max(), '.2g')} mm too long: it "
-        f"stretches the cable with the tension at its upper end. With the mean tension "
-        f"{n(np.abs(mended).max(), '.1g')} mm are left (erratum 5).",
+        measured=f"They do to the eye at low tension, but (36) is {n(numbers['error_of_36_mm'], '.2g')} mm too long: "
+        "it stretches the cable with the tension at its upper end. With the mean tension "
+        f"{n(numbers['error_with_mean_tension_mm'], '.1g')} mm are left (erratum 5).",
         verdict=Verdict.HOLDS_WITHIN,
-        numbers={"error_of_36_mm": np.abs(printed).max(), "error_with_mean_tension_mm": np.abs(mended).max()},
+        numbers=numbers,
         panels=(
             draw.panel(figure, "d over |T|: unstretchable, and stretchable with (38)."),
             draw.panel(second, "The difference of the two."),
@@ -101,43 +111,39 @@ def _relieved(study: StretchStudy, draw: Drawings) -> Finding:
 
 
 def _tension(study: SagStudy, draw: Drawings) -> Finding:
-    sampling, colors = study.sampling, shades(len(PICKED))
+    tensions = study.sampling.tensions
     figure, ax = axes("$T_x$ [N]", "$d$ [m]")
-    for k, color in zip(PICKED, colors, strict=True):
-        d, a_d = study.adjusting_length[MIDDLE, k, DENSE], study.a_d[MIDDLE, k, DENSE]
-        ax.plot(sampling.tensions, d, "o", color=color, markersize=2.6, label=f"{sampling.chords[k]:g}")
-        ax.plot(sampling.tensions, a_d / sampling.tensions**2, color=color, linewidth=0.9)
     ax.set_xscale("log")
     ax.set_yscale("log")
-    legend(ax, "$D$ [m]")
-    fit = study.a_d[..., None] / sampling.tensions**2 / study.adjusting_length - 1.0
+    d, a_d = (values[MIDDLE, PICKED, DENSE] for values in (study.adjusting_length, study.a_d))
+    fits = a_d[:, None] * length_shape(tensions)
+    Courses(tensions, d, tensions, fits, _named(study.sampling.chords[[*PICKED]], "g")).draw(ax, "$D$ [m]")
+    share = study.adjusting_length / study.fitted_length
+    numbers = {"exact_over_fit_min": share.min(), "exact_over_fit_max": share.max()}
     return Finding(
         key="d-model",
         figures=(10,),
         title="d = a_d/T_x²",
         statement="(41): d = a_d/T_x², “the fittest and simplest”.",
-        measured=f"The exact d divided by its fit is between {n(1.0 / (1.0 + fit.max()), '.3f')} and "
-        f"{n(1.0 / (1.0 + fit.min()), '.3f')} over all sampled cables: the form is right for taut ones and bends for "
-        "slack and steep ones.",
+        measured=f"The exact d divided by its fit is between {n(numbers['exact_over_fit_min'], '.3f')} and "
+        f"{n(numbers['exact_over_fit_max'], '.3f')} over all sampled cables: the form is right for taut ones and bends "
+        "for slack and steep ones.",
         verdict=Verdict.HOLDS_WITHIN,
-        numbers={"fit_over_exact_less_one_min": fit.min(), "fit_over_exact_less_one_max": fit.max()},
-        panels=(draw.panel(figure, f"d at φ = {n(ANGLE)} rad, ρ = {n(sampling.densities[DENSE])} kg/m, with fits."),),
+        numbers=numbers,
+        panels=(draw.panel(figure, f"d {_middle_and_dense(study)}, with fits."),),
     )
 
 
 def _chord(study: SagStudy, draw: Drawings) -> Finding:
     sampling = study.sampling
-    figure, ax = axes("$D$ [m]", "$a_d$ [m N²]")
-    a_d, q_a = study.a_d[MIDDLE, :, DENSE], study.q_a[MIDDLE, DENSE]
-    _fit(ax, sampling.chords, a_d, q_a, 3)
-    second, bx = axes("$D$ [m]", "$a_d$ [m N²]")
     fine = np.linspace(0.0, sampling.chords[-1], 80)
-    for k, color in enumerate(shades(sampling.angles.size)):
-        label = f"{sampling.angles[k]:g}"
-        bx.plot(sampling.chords, study.a_d[k, :, DENSE], "o", color=color, markersize=2.6, label=label)
-        bx.plot(fine, study.q_a[k, DENSE] * fine**3, color=color, linewidth=0.9)
-    legend(bx, r"$\varphi$ [rad]")
-    away = _away(study.q_a[:, None] * sampling.chords[:, None] ** 3, study.a_d)
+    fits = study.q_a[:, DENSE, None] * chord_shape(fine)
+    courses = Courses(sampling.chords, study.a_d[..., DENSE], fine, fits, _named(sampling.angles, "g"))
+    captions = (
+        f"a_d {_middle_and_dense(study)} with its cubic (figure 11).",
+        "The same at five angles (figure 12).",
+    )
+    away = _away(study.fitted_a_d, study.a_d)
     return Finding(
         key="a-over-chord",
         figures=(11, 12),
@@ -147,29 +153,21 @@ def _chord(study: SagStudy, draw: Drawings) -> Finding:
         "and density.",
         verdict=Verdict.HOLDS_WITHIN,
         numbers={"cubic_away_share": away},
-        panels=(
-            draw.panel(figure, f"a_d at φ = {n(ANGLE)} rad with its cubic (figure 11)."),
-            draw.panel(second, "The same at five angles (figure 12)."),
-        ),
+        panels=courses.panels(("$D$ [m]", "$a_d$ [m N²]", r"$\varphi$ [rad]"), MIDDLE, captions, draw),
     )
 
 
 def _angle(study: SagStudy, draw: Drawings) -> Finding:
     sampling = study.sampling
     fine = np.linspace(0.0, 0.5 * np.pi, 100)
-    figure, ax = axes(r"$\varphi$ [rad]", "$q_a$ [N²/m²]")
-    ax.plot(sampling.angles, study.q_a[:, DENSE], "o", color=BLUE, markersize=3.5, label="$q_a$")
-    ax.plot(fine, study.p_q[DENSE] * np.cos(fine) ** 4, color="black", linewidth=0.9, label=r"$p_q\cos^4\varphi$")
-    legend(ax)
-    second, bx = axes(r"$\varphi$ [rad]", "$q_a$ [N²/m²]")
-    picked = (1, 3, 5, 7, 9)
-    for k, color in zip(picked, shades(len(picked)), strict=True):
-        bx.plot(
-            sampling.angles, study.q_a[:, k], "o", color=color, markersize=2.6, label=f"{sampling.densities[k]:.1f}"
-        )
-        bx.plot(fine, study.p_q[k] * np.cos(fine) ** 4, color=color, linewidth=0.9)
-    legend(bx, r"$\rho$ [kg/m]")
-    away = _away(study.p_q * np.cos(sampling.angles[:, None]) ** 4, study.q_a)
+    fits = study.p_q[[*DRAWN], None] * angle_shape(fine)
+    labels = _named(sampling.densities[[*DRAWN]], ".1f")
+    courses = Courses(sampling.angles, study.q_a[:, DRAWN].T, fine, fits, labels)
+    captions = (
+        f"q_a at ρ = {n(sampling.densities[DENSE])} kg/m (figure 13).",
+        "The same at five densities (figure 14).",
+    )
+    away = _away(study.fitted_q_a, study.q_a)
     return Finding(
         key="q-over-angle",
         figures=(13, 14),
@@ -179,20 +177,18 @@ def _angle(study: SagStudy, draw: Drawings) -> Finding:
         "guess: d = D (wD cos φ)²/(24 τ²) of a shallow cable, with τ = T_x/cos φ.",
         verdict=Verdict.HOLDS_WITHIN,
         numbers={"cos4_away_share": away},
-        panels=(
-            draw.panel(figure, f"q_a at ρ = {n(sampling.densities[DENSE])} kg/m (figure 13)."),
-            draw.panel(second, "The same at five densities (figure 14)."),
-        ),
+        panels=courses.panels((r"$\varphi$ [rad]", "$q_a$ [N²/m²]", r"$\rho$ [kg/m]"), DENSE, captions, draw),
     )
 
 
 def _density(study: SagStudy, draw: Drawings) -> Finding:
-    sampling = study.sampling
+    densities = study.sampling.densities
+    fine = np.linspace(0.0, densities[-1], 80)
     figure, ax = axes(r"$\rho$ [kg/m]", "$p_q$ [N²/m²]")
-    _fit(ax, sampling.densities, study.p_q, study.k_p, 2)
-    each = study.p_q / sampling.densities**2
+    with_fit(ax, densities, study.p_q, fine, study.k_p * density_shape(fine))
+    each = study.p_q / density_shape(densities)
     second, bx = axes(r"$\rho$ [kg/m]", r"$p_q/\rho^2$ [m²/s⁴]")
-    bx.plot(sampling.densities, each, "o-", color=BLUE, markersize=3.0, linewidth=1.1, label="density by density")
+    bx.plot(densities, each, "o-", color=BLUE, markersize=3.0, linewidth=1.1, label="density by density")
     bx.axhline(PUBLISHED_K_P, color=VERMILLION, linewidth=0.9, linestyle="--", label="published")
     bx.axhline(SHALLOW_K_P, color="0.4", linewidth=0.9, linestyle=":", label="$g^2/24$")
     legend(bx)
@@ -205,7 +201,12 @@ def _density(study: SagStudy, draw: Drawings) -> Finding:
         f"{n(each[0], '.3f')} (g²/24 = {n(SHALLOW_K_P, '.3f')}) to {n(each[-1], '.3f')}: the heaviest, slackest cables "
         "make the published value.",
         verdict=Verdict.HOLDS_WITHIN,
-        numbers={"k_p": study.k_p, "k_p_of_density": each, "densities_kg_per_m": sampling.densities},
+        numbers={
+            "k_p": study.k_p,
+            "shallow_k_p": SHALLOW_K_P,
+            "k_p_of_density": each,
+            "densities_kg_per_m": densities,
+        },
         panels=(
             draw.panel(figure, "p_q with its parabola."),
             draw.panel(second, "p_q over ρ² should not depend on ρ."),
@@ -213,11 +214,13 @@ def _density(study: SagStudy, draw: Drawings) -> Finding:
     )
 
 
-def _fit(ax: Axes, x: Array, y: Array, factor: float, power: int) -> None:
-    fine = np.linspace(0.0, x[-1], 80)
-    ax.plot(x, y, "o", color=BLUE, markersize=3.5, label="exact")
-    ax.plot(fine, factor * fine**power, color="black", linewidth=0.9, label="fit")
-    legend(ax)
+def _named(values: Iterable[float], form: str) -> list[str]:
+    return [format(value, form) for value in values]
+
+
+def _middle_and_dense(study: SagStudy) -> str:
+    """Which cables are drawn, for a caption."""
+    return f"at φ = {n(ANGLE)} rad, ρ = {n(study.sampling.densities[DENSE])} kg/m"
 
 
 def _away(fit: Array, values: Array) -> float:

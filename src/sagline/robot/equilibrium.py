@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from sagline.arrays import Array, locked
-from sagline.cables.state import CableState
+from sagline.cables.model import CableState
 from sagline.errors import InvalidValueError
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.robot.several import Index, robots_at
+from sagline.robot.several import Index, Robots, first_of, robots_at
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,3 +74,21 @@ class Equilibrium:
     def __iter__(self) -> Iterator[Equilibrium]:
         """The poses of a batch, one by one."""
         return (self[i] for i in range(len(self)))
+
+    @property
+    def limited_tension(self) -> Array:
+        """The tension that the robot's limits name [N], shape (m,) or (N, m): along the chord, or at the frame end."""
+        return limited_tension(self.robot, self.cables)
+
+
+def limited_tension(robot: Robots, cables: CableState) -> Array:
+    """The tension that a robot's limits name: along the chord, or at the frame end.
+
+    Args:
+        robot: The robot, or several that fit together.
+        cables: State of their cables, fields of shape (m,) or (N, m).
+
+    Returns:
+        Tensions [N], of the shape of the cables' fields.
+    """
+    return cables.chord_tension if first_of(robot).tension_limits_of == "chord" else cables.frame_end_tension

@@ -75,6 +75,9 @@ def article_balance(robot: Robot, pose: Pose, k_h: float = 4.845) -> ArticleBala
         pose: One pose or a batch of N.
         k_h: The intercept constant of (28).
 
+    Returns:
+        H of shape (6, m) or (N, 6, m), b of shape (6,) or (N, 6).
+
     Source:
         Gia Luan & Truong Thinh 2020, equations (26), (27), (50), (51).
     """

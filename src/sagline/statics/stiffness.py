@@ -87,6 +87,18 @@ def stiffness(state: Equilibrium) -> Stiffness:
     Returns:
         Stiffness; NaN where the state has no lengths, and for straight cables, which have none.
 
+    Examples:
+        How far 100 N upwards lift the platform, and how far 1 mm more of cable 0 does:
+
+        >>> import numpy as np
+        >>> import sagline as sl
+        >>> plan = sl.inverse(sl.load_robot("cogiro"), sl.Pose((1.0, 0.5, 1.5), np.eye(3)))
+        >>> found = sl.stiffness(plan.state)
+        >>> print(f"{1e3 * 100.0 * found.compliance[2, 2]:.3f} mm")
+        1.438 mm
+        >>> print(f"{1e3 * 1e-3 * found.length_sensitivity[2, 0]:.3f} mm")
+        -0.303 mm
+
     Source:
         docs/model.md, section 6.
     """
@@ -110,6 +122,13 @@ def modes(state: Equilibrium) -> Modes:
 
     Returns:
         Modes; NaN where the state has no lengths.
+
+    Examples:
+        >>> import numpy as np
+        >>> import sagline as sl
+        >>> plan = sl.inverse(sl.load_robot("cogiro"), sl.Pose((1.0, 0.5, 1.5), np.eye(3)))
+        >>> print(sl.modes(plan.state).frequency.round(2), "Hz")
+        [ 4.38  5.31  6.93  8.05 10.88 13.17] Hz
     """
     freedom = first_of(state.robot).freedom
     matrix = freedom @ cable_slopes(state).matrix @ freedom.T
@@ -125,7 +144,14 @@ def modes(state: Equilibrium) -> Modes:
 
 
 def cable_slopes(state: Equilibrium) -> CableSlopes:
-    """How the cables' forces change with the platform's motion and with their own data."""
+    """How the cables' forces change with the platform's motion and with their own data.
+
+    Args:
+        state: An equilibrium, single or N of them.
+
+    Returns:
+        The slopes; NaN where the state has no lengths.
+    """
     shared, cables = first_of(state.robot), state.cables
     shape, m = state.pose.shape, shared.cable_count
     lengths = np.atleast_2d(cables.unstrained_length)
@@ -159,7 +185,15 @@ def cable_slopes(state: Equilibrium) -> CableSlopes:
 
 
 def on_platform(forces: Array, levers: Array) -> Array:
-    """Forces at the platform ends (..., m, 3) as columns of force and moment about the center of mass, (..., 6, m)."""
+    """Forces at the platform ends as wrenches about the center of mass.
+
+    Args:
+        forces: Of each cable, world axes [N] or N by something, shape (..., m, 3).
+        levers: From the center of mass to the platform ends [m], shape (..., m, 3).
+
+    Returns:
+        Columns of force and moment, shape (..., 6, m).
+    """
     return np.swapaxes(np.concatenate((forces, np.cross(levers, forces)), axis=-1), -1, -2)
 
 

@@ -45,6 +45,13 @@ def body_table(robot: Robots) -> Array:
 
 
 def pose_rows(pose: Pose) -> Array:
-    """Positions and quaternions of a pose or a batch, shape (N, POSE_COLUMNS); N = 1 for a single pose."""
+    """Positions and quaternions of a pose or a batch.
+
+    Args:
+        pose: One pose or a batch of N.
+
+    Returns:
+        Shape (N, POSE_COLUMNS); N = 1 for a single pose.
+    """
     rows = np.concatenate((np.atleast_2d(pose.position), np.atleast_2d(pose.quaternion)), axis=1)
     return locked(rows)

@@ -49,7 +49,14 @@ def inertial_wrench(robot: Robot | Sequence[Robot], pose: Pose, twist: Array, tw
 
 
 def external_wrench(wrench: ArrayLike | None, count: int | None) -> Array:
-    """The caller's wrench, checked: zeros for None, shape (6,) for all poses or (N, 6).
+    """The caller's wrench, checked.
+
+    Args:
+        wrench: Force [N] and moment [N m], shape (6,) or (N, 6); None for none.
+        count: N of the poses; None for a single pose.
+
+    Returns:
+        Zeros for None, shape (6,) for all poses or (N, 6).
 
     Args:
         wrench: What the caller gave: force [N], then moment [N m], or None.

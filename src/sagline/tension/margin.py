@@ -22,10 +22,23 @@ def limit_margin(state: Equilibrium) -> Array:
         Smallest distance [N] of the quantity that the robot's limits name, shape () or (N,): 0 where a cable is at its
         limit, NaN where there are no tensions. It depends on how the load is shared.
     """
-    shared, cables, limits = first_of(state.robot), state.cables, limits_of(state.robot)
-    tension = cables.frame_end_tension if shared.tension_limits_of == "frame_end" else cables.chord_tension
-    gap: Array = np.minimum(tension - limits.low, limits.high - tension).min(axis=-1)
-    return gap
+    margin: Array = cable_margins(state).min(axis=-1)
+    return margin
+
+
+def cable_margins(state: Equilibrium) -> Array:
+    """Distance of each cable's tension to its nearest limit: what `limit_margin` takes the smallest of.
+
+    Args:
+        state: Robot or robots, and cables, `plan.state` for instance.
+
+    Returns:
+        Distance [N] of the quantity that the robot's limits name, shape (m,) or (N, m); NaN where there are no
+        tensions.
+    """
+    tension, limits = state.limited_tension, limits_of(state.robot)
+    margins: Array = np.minimum(tension - limits.low, limits.high - tension)
+    return margins
 
 
 def capacity_margin(state: Equilibrium) -> Array:

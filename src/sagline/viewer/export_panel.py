@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import viser
 
 from sagline.viewer.export import picture_as_png, pictures_as_gif, scene_as_glb
 from sagline.viewer.run import Run
-
-if TYPE_CHECKING:
-    from sagline.viewer.viewer import View
+from sagline.viewer.view import View
 
 Send = Callable[[viser.ClientHandle], None]
 

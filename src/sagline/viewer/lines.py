@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sagline.arrays import Array, locked
-from sagline.cables.state import CableState
+from sagline.cables.model import CableState
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 

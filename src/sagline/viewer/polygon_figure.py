@@ -26,7 +26,7 @@ def polygon_figure(snapshot: Snapshot) -> str:
     polygon = _polygon(snapshot)
     if polygon is None or not len(polygon.vertices):
         return _sentence("No tensions within the limits balance the platform: there is nothing to choose from.")
-    point = polygon.basis @ (snapshot.tension - polygon.origin)
+    point = polygon.coordinates(snapshot.tension)
     return _interval(polygon.vertices[:, 0], float(point[0])) if redundant == 1 else _drawing(polygon, point)
 
 
@@ -52,8 +52,7 @@ def _drawing(polygon: TensionPolygon, point: Array) -> str:
 
     outline = " ".join(f"{x:.1f},{y:.1f}" for x, y in map(place, corners))
     sides = "".join(
-        _side(polygon, k, place(corners[k]), place(corners[(k + 1) % len(corners)]), place(middle))
-        for k in range(len(corners))
+        _side(polygon, k, place(corners[k]), place(corners[(k + 1) % len(corners)])) for k in range(len(corners))
     )
     x, y = place(point)
     return (
@@ -65,17 +64,14 @@ def _drawing(polygon: TensionPolygon, point: Array) -> str:
     )
 
 
-def _side(
-    polygon: TensionPolygon, k: int, start: tuple[float, float], end: tuple[float, float], middle: tuple[float, float]
-) -> str:
+def _side(polygon: TensionPolygon, k: int, start: tuple[float, float], end: tuple[float, float]) -> str:
     """The name of a side, outside of it; none for a side that is too short to name, or no limit."""
     side = polygon.sides[k]
     if side is None or np.hypot(end[0] - start[0], end[1] - start[1]) < 22.0:
         return ""
     x, y = 0.5 * (start[0] + end[0]), 0.5 * (start[1] + end[1])
-    nx, ny = end[1] - start[1], start[0] - end[0]
-    outward = 1.0 if nx * (x - middle[0]) + ny * (y - middle[1]) > 0.0 else -1.0
-    length = outward * np.hypot(nx, ny)
+    nx, ny = start[1] - end[1], end[0] - start[0]  # outward: corners go around counter-clockwise, and y points down
+    length = np.hypot(nx, ny)
     x, y = x + 15.0 * nx / length, y + 9.0 * ny / length + 3.0
     return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="middle" fill="#444">{side.cable} {side.limit}</text>'
 

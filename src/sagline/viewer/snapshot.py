@@ -16,6 +16,7 @@ from sagline.kinematics.status import PoseStatus
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.tension.closest import Closest
+from sagline.tension.margin import cable_margins
 from sagline.viewer import lines
 from sagline.viewer.settings import Settings
 from sagline.viewer.tension_scale import Colors, TensionScale
@@ -66,11 +67,7 @@ class Snapshot:
     @property
     def margin(self) -> Array:
         """How far each limited tension is within its limits [N], shape (m,); NaN where there is no answer."""
-        if self.plan is None:
-            return self.tension
-        cables = self.plan.state.cables
-        limited = cables.chord_tension if self.robot.tension_limits_of == "chord" else cables.frame_end_tension
-        return np.minimum(limited - self.robot.tension_min, self.robot.tension_max - limited)
+        return self.tension if self.plan is None else cable_margins(self.plan.state)
 
     @property
     def origin(self) -> str:

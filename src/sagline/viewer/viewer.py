@@ -6,7 +6,6 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 import viser
@@ -28,19 +27,11 @@ from sagline.viewer.snapshot import Snapshot, taken_at
 from sagline.viewer.stage import Stage
 from sagline.viewer.tension_scale import TensionScale
 from sagline.viewer.timeline import Timeline
+from sagline.viewer.view import View
 
 FRAME_TIME = 1.0 / 60.0  # s: no update comes sooner after the one before
 TRACE_POINTS = 600
 IDLE = 0.5  # s: how long Ctrl-C may go unheard where waiting cannot be interrupted
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class View:
-    """What is shown: a snapshot, and how it is drawn."""
-
-    snapshot: Snapshot
-    settings: Settings
-    scale: TensionScale
 
 
 class Viewer:

@@ -1,0 +1,106 @@
+"""A batch of cables to be solved: checked, flat, and back in the caller's shape."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sagline.arrays import Array, Codes, checked, kernel_input, locked
+from sagline.cables.cable import Cable
+from sagline.errors import CableGeometryError, InvalidValueError
+
+
+class Problem(NamedTuple):
+    """Checked operands of a batch.
+
+    Attributes:
+        shape: The batch's shape, (...).
+        gravity: Gravitational acceleration [m/s^2].
+        span: Horizontal distances between the ends [m]; broadcasts with the shape.
+        rise: Heights of the platform ends above the frame ends [m]; broadcasts with the shape.
+        operands: Span, rise, linear density, axial stiffness and what is given, flat: each as long as the batch, or of
+            length 1.
+    """
+
+    shape: tuple[int, ...]
+    gravity: float
+    span: Array
+    rise: Array
+    operands: tuple[Array, Array, Array, Array, Array]
+
+    @classmethod
+    def of(cls, cable: Cable, span: ArrayLike, rise: ArrayLike, given: Array, gravity: float) -> Self:
+        """Check geometry and gravity and bring everything to one shape.
+
+        Args:
+            cable: Material.
+            span: Horizontal distance between the ends [m], >= 0.
+            rise: Height of the platform end above the frame end [m].
+            given: Tension [N] or length [m], already checked.
+            gravity: Gravitational acceleration [m/s^2], >= 0.
+
+        Returns:
+            The problem.
+
+        Raises:
+            CableGeometryError: If span is negative, or span and rise are both zero.
+            InvalidValueError: If gravity is negative or not finite, or shapes do not broadcast.
+        """
+        span = _checked_span(span)
+        rise = checked(rise, "rise", "m")
+        gravity = float(checked(gravity, "gravity", "m/s^2", low=0.0, shape=()))
+        try:
+            shape = np.broadcast_shapes(span.shape, rise.shape, given.shape, cable.linear_density.shape)
+        except ValueError as error:
+            raise InvalidValueError(
+                "cable, span, rise and tension or length",
+                f"not of one shape ({error})",
+                "shapes that broadcast",
+                "Give one value for each cable, or one for all.",
+            ) from None
+        if (span.size == 0 or span.min() == 0.0) and not np.all((span != 0.0) | (rise != 0.0)):
+            raise CableGeometryError(
+                "span and rise",
+                "both 0 m",
+                "two different ends",
+                "Move one end: a cable between equal points has no chord.",
+            )
+        fields = (span, rise, cable.linear_density, cable.axial_stiffness, given)
+        a, b, c, d, e = (_flat(field, shape) for field in fields)
+        return cls(shape, gravity, span, rise, (a, b, c, d, e))
+
+    def outputs(self) -> tuple[Array, Array, Array, Codes]:
+        """Room for what kernels find: three numbers and a status a cable.
+
+        Returns:
+            Arrays as long as the batch, not yet filled.
+        """
+        size = math.prod(self.shape)
+        return np.empty(size), np.empty(size), np.empty(size), np.empty(size, dtype=np.int8)
+
+    def shaped(self, field: Array) -> Array:
+        """A result or an operand in the batch's shape, locked.
+
+        Args:
+            field: Array as long as the batch, or one that broadcasts with its shape.
+
+        Returns:
+            Array of shape (...): results are reshaped, operands repeated without copying.
+        """
+        whole = field.size == math.prod(self.shape)
+        return locked(field.reshape(self.shape) if whole else np.broadcast_to(field, self.shape))
+
+
+def _checked_span(span: ArrayLike) -> Array:
+    try:
+        return checked(span, "span", "m", low=0.0)
+    except InvalidValueError as error:
+        raise CableGeometryError(*error.args) from None
+
+
+def _flat(field: Array, shape: tuple[int, ...]) -> Array:
+    """One axis: the whole batch, or a single value that holds for all of it."""
+    return field.reshape(1) if field.size == 1 else kernel_input(field, shape).reshape(-1)

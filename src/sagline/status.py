@@ -1,0 +1,23 @@
+"""What every status has in common: a code that kernels return, and a sentence about it."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import Self
+
+
+class Status(IntEnum):
+    """How a calculation ended; a member is written as its code and its sentence.
+
+    Attributes:
+        text: What it means and what to do, one sentence for a person.
+    """
+
+    text: str
+
+    def __new__(cls, code: int, text: str = "") -> Self:
+        """A member that is the code."""
+        member = int.__new__(cls, code)
+        member._value_ = code
+        member.text = text
+        return member

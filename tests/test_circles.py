@@ -1,0 +1,85 @@
+"""No two modules import one another, not even for their types: each can be read without the other."""
+
+import ast
+from collections.abc import Iterator
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+DECLARED = {("sagline.kinematics.plan", "sagline.files.plan_file")}  # Plan.save, the one lazy call outward
+
+
+def modules() -> dict[str, Path]:
+    """Every module of sagline and its file."""
+    spec = find_spec("sagline")
+    assert spec is not None
+    assert spec.origin is not None
+    root = Path(spec.origin).parent
+    parts = {file: file.relative_to(root.parent).with_suffix("").parts for file in root.rglob("*.py")}
+    return {".".join(part for part in place if part != "__init__"): file for file, place in parts.items()}
+
+
+def imported(tree: ast.Module, known: set[str]) -> Iterator[str]:
+    """The modules of sagline that a module imports, anywhere in it: inside functions and for types alone too."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names if alias.name in known)
+        elif isinstance(node, ast.ImportFrom) and node.module in known:
+            for alias in node.names:
+                inner = f"{node.module}.{alias.name}"
+                yield inner if inner in known else node.module
+
+
+def circles(graph: dict[str, set[str]]) -> list[list[str]]:
+    """Groups of modules each of which leads to every other (Tarjan's strongly connected components)."""
+    number: dict[str, int] = {}
+    low: dict[str, int] = {}
+    stack: list[str] = []
+    found: list[list[str]] = []
+
+    def visit(node: str) -> None:
+        number[node] = low[node] = len(number)
+        stack.append(node)
+        for following in sorted(graph[node]):
+            if following not in number:
+                visit(following)
+                low[node] = min(low[node], low[following])
+            elif following in stack:
+                low[node] = min(low[node], number[following])
+        if low[node] == number[node]:
+            place = stack.index(node)
+            group = sorted(stack[place:])
+            del stack[place:]
+            if len(group) > 1 or node in graph[node]:
+                found.append(group)
+
+    for node in sorted(graph):
+        if node not in number:
+            visit(node)
+    return found
+
+
+@pytest.fixture(scope="module")
+def graph() -> dict[str, set[str]]:
+    files = modules()
+    return {name: set(imported(ast.parse(file.read_text()), set(files))) for name, file in files.items()}
+
+
+def test_no_module_leads_back_to_itself(graph: dict[str, set[str]]) -> None:
+    assert len(graph) > 200
+    kept = {name: {to for to in targets if (name, to) not in DECLARED} for name, targets in graph.items()}
+    assert circles(kept) == []
+
+
+def test_what_is_declared_is_there_and_closes_a_circle(graph: dict[str, set[str]]) -> None:
+    for outward, target in DECLARED:
+        assert target in graph[outward]
+        assert [outward in group and target in group for group in circles(graph)] == [True]
+
+
+def test_a_circle_would_be_found() -> None:
+    tree = ast.parse("if TYPE_CHECKING:\n    from a.b import C\ndef f():\n    from a import d, E\n    import a.g\n")
+    assert set(imported(tree, {"a", "a.b", "a.d", "a.g"})) == {"a.b", "a.d", "a", "a.g"}
+    graph = {"a": {"b"}, "b": {"c"}, "c": {"a", "d"}, "d": set(), "e": {"e"}}
+    assert circles(graph) == [["a", "b", "c"], ["e"]]

@@ -1,0 +1,26 @@
+"""Statuses are the codes that kernels return, each with its sentence."""
+
+import pickle
+
+import pytest
+
+import sagline as sl
+from sagline.kernels import codes
+from sagline.status import Status
+
+PREFIX = {sl.CableStatus: "CABLE_", sl.PoseStatus: "POSE_", sl.ForwardStatus: "FORWARD_"}
+
+
+@pytest.mark.parametrize("kind", PREFIX)
+def test_a_status_for_every_code_and_a_sentence_for_every_status(kind: type[Status]) -> None:
+    known = {
+        name.removeprefix(PREFIX[kind]): code for name, code in vars(codes).items() if name.startswith(PREFIX[kind])
+    }
+    assert {status.name: int(status) for status in kind} == known
+    assert [kind(int(status)) for status in kind] == list(kind)
+    assert len({status.text for status in kind}) == len(kind)
+    for status in kind:
+        assert len(status.text) > 5
+        assert pickle.loads(pickle.dumps(status)) is status
+    with pytest.raises(ValueError, match="99 is not a valid"):
+        kind(99)
