@@ -93,7 +93,10 @@ class CableModel:
         tension = checked(chord_tension, "chord_tension", "N", low=0.0)
         problem = Problem.of(cable, span, rise, tension, gravity)
         length, horizontal, vertical, status = problem.outputs()
-        batch.batch_from_tension(self.terms(problem.gravity), *problem.operands, length, horizontal, vertical, status)
+        room = np.empty((batch.BUFFERS, batch.CHUNK))
+        batch.batch_from_tension(
+            self.terms(problem.gravity), *problem.operands, length, horizontal, vertical, status, room
+        )
         return self._state(cable, problem, length, horizontal, vertical, tension, status)
 
     def from_length(

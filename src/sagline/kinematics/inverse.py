@@ -3,25 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from sagline.arrays import Array, Codes, locked
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel, CableState
 from sagline.errors import CableGeometryError, InvalidValueError
 from sagline.kernels import codes, tables
-from sagline.kernels.inverse.answer import FORCE_RESIDUAL, MOMENT_RESIDUAL, POSE_NUMBERS, SHORTFALL
-from sagline.kernels.inverse.inverse import inverse_poses
+from sagline.kinematics.inverse_rows import explained, solve_rows
 from sagline.kinematics.plan import Plan
 from sagline.motion.path import Path
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.robot.several import cables_of, first_of, one_a_pose
-from sagline.statics.tables import body_table, cable_table, pose_rows
+from sagline.statics.tables import pose_rows
 from sagline.statics.wrench import external_wrench, inertial_wrench
 from sagline.tension.closest import Closest
 from sagline.tension.method import TensionMethod, Variable
@@ -83,18 +81,9 @@ def inverse(
     if isinstance(motion, Path):
         load = locked(inertial_wrench(robots, pose, motion.twist, motion.twist_rate) + load)
     reference = _reference(shared, previous, tension.variable)
-    found = _Answers.empty(count, shared.cable_count, shared.degrees_of_freedom)
-    inverse_poses(
-        *options,
-        shared.freedom,
-        body_table(robots),
-        cable_table(robots),
-        rows,
-        np.atleast_2d(load),
-        reference,
-        *found,
-    )
+    found = solve_rows(robots, method, options, rows, np.atleast_2d(load), reference)
     _refuse_missing_chords(found.pose_status, found.results)
+    shortfall, farkas, blocking = explained(robots, options, rows, found)
     cables = CableState(
         model=model,
         cable=cables_of(robots),
@@ -113,37 +102,12 @@ def inverse(
         path=motion if isinstance(motion, Path) else None,
         tension=tension,
         status=locked(found.pose_status.reshape(pose.shape)),
-        shortfall=locked(found.numbers[:, SHORTFALL].reshape(pose.shape)),
-        wrench_residual=locked(found.numbers[:, [FORCE_RESIDUAL, MOMENT_RESIDUAL]].reshape(*pose.shape, 2)),
-        blocking=locked(found.blocking.reshape(*pose.shape, -1)),
-        farkas=locked((found.proofs[:, 0] @ shared.freedom).reshape(*pose.shape, 6)),
-        needed=locked((found.proofs[:, 1] @ shared.freedom).reshape(*pose.shape, 6)),
+        shortfall=locked(shortfall.reshape(pose.shape)),
+        wrench_residual=locked(found.residuals.reshape(*pose.shape, 2)),
+        blocking=locked(blocking.reshape(*pose.shape, -1)),
+        farkas=locked((farkas @ shared.freedom).reshape(*pose.shape, 6)),
+        needed=locked((found.needed @ shared.freedom).reshape(*pose.shape, 6)),
     )
-
-
-class _Answers(NamedTuple):
-    """What the kernel fills, in its order."""
-
-    results: Array
-    cable_status: Codes
-    numbers: Array
-    proofs: Array
-    pose_status: Codes
-    blocking: NDArray[np.bool_]
-
-    @classmethod
-    def empty(cls, count: int, cables: int, freedoms: int) -> _Answers:
-        return cls(
-            np.empty((tables.RESULT_ROWS, count, cables)),
-            np.empty((count, cables), dtype=np.int8),
-            np.empty((count, POSE_NUMBERS)),
-            np.empty((count, 2, freedoms)),
-            np.empty(count, dtype=np.int8),
-            np.empty((count, cables), dtype=np.bool_),
-        )
-
-    def row(self, row: int, pose: Pose) -> Array:
-        return locked(self.results[row].reshape(*pose.shape, -1))
 
 
 def _reference(robot: Robot, previous: Plan | None, variable: Variable) -> Array:

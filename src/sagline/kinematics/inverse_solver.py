@@ -9,21 +9,23 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array, Codes, checked, locked
+from sagline.arrays import Array, checked, locked
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
-from sagline.kernels import tables
-from sagline.kernels.inverse.answer import POSE_NUMBERS, SHORTFALL
-from sagline.kernels.inverse.inverse import inverse_poses
+from sagline.kernels import codes, tables
+from sagline.kernels.inverse.poses import inverse_poses
+from sagline.kernels.memory import memory_for
+from sagline.kinematics.inverse_rows import Found, explained
 from sagline.kinematics.status import PoseStatus
 from sagline.robot.robot import Robot
-from sagline.statics.tables import body_table, cable_table
+from sagline.statics.tables import robot_terms
 from sagline.tension.closest import Closest
 from sagline.tension.method import TensionMethod
-from sagline.tension.options import kernel_options
+from sagline.tension.options import kernel_options, takes_default_kernel
 
 _STATUSES = tuple(PoseStatus)  # by code; a lookup costs a tenth of a conversion
+_INFEASIBLE = locked(np.array([codes.POSE_INFEASIBLE], dtype=np.int8))
 QUATERNION_TOLERANCE = 2e-6  # of the squared length: as `Pose.from_quaternion`
 
 
@@ -72,33 +74,33 @@ class InverseSolver:
         Raises:
             InvalidValueError: If the robot has too few cables, or the method cannot share among them.
         """
-        m = robot.cable_count
-        options = kernel_options(robot, model or Catenary(), tension or Closest())
+        m, n = robot.cable_count, robot.degrees_of_freedom
+        method = tension or Closest()
+        self._robot = robot
+        self._options = kernel_options(robot, model or Catenary(), method)
         self._pose = np.zeros((1, tables.POSE_COLUMNS))
         self._pose[0, 6] = 1.0
         self._wrench = np.zeros((1, 6))
         self._reference = np.full(m, np.nan)
-        self._results = np.empty((tables.RESULT_ROWS, 1, m))
-        self._numbers = np.empty((1, POSE_NUMBERS))
-        self._pose_status: Codes = np.empty(1, dtype=np.int8)
+        self._found = Found.empty(1, m, n)
+        self._lengths = self._found.results[tables.LENGTH, 0]
         # the views are read-only: kernels are compiled for read-only inputs, and writing goes through the owner
+        self._rows = locked(self._pose.view())
         self._solve = partial(
             inverse_poses,
-            *options,
-            robot.freedom,
-            body_table(robot),
-            cable_table(robot),
-            locked(self._pose.view()),
+            *self._options,
+            robot_terms(robot),
+            self._rows,
             locked(self._wrench.view()),
             self._reference,
-            self._results,
-            np.empty((1, m), dtype=np.int8),
-            self._numbers,
-            np.empty((1, 2, robot.degrees_of_freedom)),
-            self._pose_status,
-            np.empty((1, m), dtype=np.bool_),
+            memory_for(m),
+            None if takes_default_kernel(method) else True,
+            self._found.answers,
+            0,
+            1,
         )
         self._solve()
+        explained(robot, self._options, self._rows, self._found._replace(pose_status=_INFEASIBLE))
         self.reset()
 
     def reset(self) -> None:
@@ -125,11 +127,11 @@ class InverseSolver:
         status = self.step_into(position, quaternion, lengths, load)
         return InverseStep(
             lengths,
-            self._results[tables.TENSION, 0].copy(),
-            self._results[tables.HORIZONTAL, 0].copy(),
-            self._results[tables.VERTICAL, 0].copy(),
+            self._found.results[tables.TENSION, 0].copy(),
+            self._found.results[tables.HORIZONTAL, 0].copy(),
+            self._found.results[tables.VERTICAL, 0].copy(),
             status,
-            float(self._numbers[0, SHORTFALL]),
+            self._shortfall(status),
         )
 
     def step_into(
@@ -150,9 +152,15 @@ class InverseSolver:
         self._pose[0, 3:] = quaternion
         self._wrench[0] = 0.0 if wrench is None else wrench
         self._solve()
-        out[:] = self._results[tables.LENGTH, 0]
-        status: PoseStatus = _STATUSES[self._pose_status[0]]
+        out[:] = self._lengths
+        status: PoseStatus = _STATUSES[self._found.pose_status[0]]
         return status
+
+    def _shortfall(self, status: PoseStatus) -> float:
+        if status is PoseStatus.SOLVED:
+            return 0.0
+        shortfall, _, _ = explained(self._robot, self._options, self._rows, self._found)
+        return float(shortfall[0])
 
 
 def _check_pose(position: Any, quaternion: Any) -> None:

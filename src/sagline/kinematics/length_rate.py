@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from sagline.arrays import Array, Indices, locked
+from sagline.arrays import Array, Flags, Indices, locked
+from sagline.kernels import tables
 from sagline.kinematics.instants import Instants, instants
+from sagline.kinematics.inverse_rows import solve_rows
 from sagline.kinematics.tension_rate import closest_rates, placed
 from sagline.motion.path import Path
+from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.several import first_of
+from sagline.statics.tables import pose_rows
 from sagline.tension.closest import Closest
+from sagline.tension.method import TensionMethod
+from sagline.tension.options import kernel_options
 
-if TYPE_CHECKING:
-    from sagline.kinematics.plan import Plan
 
-
-def length_rate(plan: Plan, path: Path) -> Array:
+def length_rate(state: Equilibrium, path: Path, tension: TensionMethod, feasible: Flags) -> Array:
     """Rate of the unstrained lengths while the platform follows the path and the load is shared as planned.
 
     Geometry and tensions both change: L(t) = L(pose(t), tau(t)). A method that depends on the pose alone is solved
@@ -25,8 +27,10 @@ def length_rate(plan: Plan, path: Path) -> Array:
     cables held at the limits that they would cross.
 
     Args:
-        plan: A plan along the path.
+        state: Robot, poses, wrench and cables along the path.
         path: The path; where it knows no jerk, a spline through its accelerations gives it.
+        tension: How the load was shared.
+        feasible: Which samples have an answer, shape (N,).
 
     Returns:
         dL/dt [m/s], shape (N, m): good to 1e-8 of its largest value; NaN where the plan has no answer. Where the rate
@@ -35,36 +39,37 @@ def length_rate(plan: Plan, path: Path) -> Array:
     Source:
         docs/model.md, section 7.
     """
-    near = instants(plan.state.robot, path, plan.state.wrench)
-    kept = np.flatnonzero(plan.feasible)
-    rates = np.full(plan.unstrained_length.shape, np.nan)
-    if isinstance(plan.tension, Closest):
-        if kept.size:
-            rates[kept] = _followed(plan, near, kept)
-    else:
-        rates[kept] = _solved_again(plan, near)[kept]
+    near = instants(state.robot, path, state.wrench)
+    kept = np.flatnonzero(feasible)
+    rates = np.full(state.cables.shape, np.nan)
+    if not isinstance(tension, Closest):
+        rates[kept] = _solved_again(state, tension, near)[kept]
+    elif kept.size:
+        rates[kept] = _followed(state[kept], tension, near, kept)
     return locked(rates)
 
 
-def _solved_again(plan: Plan, near: Instants) -> Array:
+def _solved_again(state: Equilibrium, tension: TensionMethod, near: Instants) -> Array:
     """Rates of a method without memory; to one side, where the path leaves the feasible poses at the other."""
-    from sagline.kinematics.inverse import inverse  # which makes plans
-
-    state = plan.state
+    options = kernel_options(state.robot, state.cables.model, tension)
+    lengths = state.cables.unstrained_length
+    none = np.full(first_of(state.robot).cable_count, np.nan)
     before, after = (
-        inverse(state.robot, moment.pose, state.cables.model, plan.tension, moment.wrench).unstrained_length
+        solve_rows(state.robot, tension, options, pose_rows(moment.pose), locked(moment.wrench), none).results[
+            tables.LENGTH
+        ]
         for moment in (near.before, near.after)
     )
     sides = (after - before) / (2.0 * near.step)
-    ahead, behind = (after - plan.unstrained_length) / near.step, (plan.unstrained_length - before) / near.step
-    return np.where(np.isnan(sides), np.where(np.isnan(ahead), behind, ahead), sides)
+    ahead, behind = (after - lengths) / near.step, (lengths - before) / near.step
+    rates: Array = np.where(np.isnan(sides), np.where(np.isnan(ahead), behind, ahead), sides)
+    return rates
 
 
-def _followed(plan: Plan, near: Instants, kept: Indices) -> Array:
-    """Rates of `Closest`, at the samples that have an answer."""
-    state = plan.state[kept]
+def _followed(state: Equilibrium, tension: TensionMethod, near: Instants, kept: Indices) -> Array:
+    """Rates of `Closest`, at the samples that have an answer: the state is theirs."""
     before, after = (moment.part(kept) for moment in (near.before, near.after))
-    rates = closest_rates(state, plan.tension, before, after, near.step)
+    rates = closest_rates(state, tension, before, after, near.step)
     lengths = [
         placed(state, moment.pose, state.cables.chord_tension + h * rates).cables.unstrained_length
         for moment, h in ((before, -near.step), (after, near.step))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from sagline.arrays import Array, Codes
 from sagline.cables.status import CableStatus
+from sagline.kinematics.length_rate import length_rate
 from sagline.kinematics.status import PoseStatus
 from sagline.motion.path import Path
 from sagline.robot.equilibrium import Equilibrium
@@ -100,9 +101,7 @@ class Plan:
         The rate at which `unstrained_length` changes as the platform moves on and the load is shared anew; NaN where
         the plan has no answer. Worked out at each call. See docs/model.md, section 7.
         """
-        from sagline.kinematics.length_rate import length_rate  # which solves again, and so makes plans
-
-        return None if self.path is None else length_rate(self, self.path)
+        return None if self.path is None else length_rate(self.state, self.path, self.tension, self.feasible)
 
     @property
     def gaps(self) -> tuple[Gap, ...]:

@@ -9,15 +9,16 @@ from sagline.arrays import Array, Indices, locked
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
-from sagline.kernels import tables
-from sagline.kernels.inverse.pose_queries import polygon_of_pose
+from sagline.kernels.algebra import strips
+from sagline.kernels.inverse.queries import polygon_of_pose
+from sagline.kernels.memory import memory_for
 from sagline.kernels.sharing.polygon import SPARE_CORNERS
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.statics.tables import body_table, cable_table, pose_rows
+from sagline.statics.tables import pose_rows, robot_terms
 from sagline.tension.centroid import Centroid
 from sagline.tension.method import Variable
 from sagline.tension.minimum_norm import MinimumNorm
@@ -70,26 +71,22 @@ def tension_polygon(
             "pose", "one without a balance", "one that `inverse` can solve", PoseStatus(int(plan.status)).text
         )
     m, r = robot.cable_count, robot.cable_count - robot.degrees_of_freedom
-    work = np.full((tables.WORK_ROWS, m), np.nan)
+    scale, offset = np.empty(m), np.empty(m)
+    limits = np.empty((strips.STRIP_ROWS, m))
     null = np.empty((r, m))
     corners = np.empty((2 * m + SPARE_CORNERS, 2))
     labels = np.full(2 * m + SPARE_CORNERS, -1, dtype=np.int64)
     count = polygon_of_pose(
         *kernel_options(robot, model, MinimumNorm(variable)),
-        robot.freedom,
-        body_table(robot)[0],
-        cable_table(robot)[0],
+        robot_terms(robot),
         pose_rows(pose)[0],
         plan.state.wrench,
-        plan.chord_tension,
-        _pulls(plan),
-        work,
-        null,
-        corners,
-        labels,
+        (plan.chord_tension, _pulls(plan)),
+        memory_for(m),
+        (scale, offset, limits, null, corners, labels),
     )
-    origin, offset = work[tables.START], work[tables.OFFSET]
-    vertices, sides = _sides_of(count if plan.feasible else 0, null, work, corners, labels)
+    origin = limits[strips.START]
+    vertices, sides = _sides_of(count if plan.feasible else 0, null, limits, corners, labels)
     return TensionPolygon(
         vertices=locked(vertices),
         tensions=locked(_tensions(vertices, null, origin + offset)),
@@ -97,8 +94,8 @@ def tension_polygon(
         bounded=None not in sides,
         basis=locked(null),
         origin=locked(origin + offset),
-        scale=locked(work[tables.SCALE].copy()),
-        offset=locked(offset.copy()),
+        scale=locked(scale),
+        offset=locked(offset),
     )
 
 
@@ -109,11 +106,11 @@ def _pulls(plan: Plan) -> Array:
 
 
 def _sides_of(
-    count: int, null: Array, work: Array, corners: Array, labels: Indices
+    count: int, null: Array, limits: Array, corners: Array, labels: Indices
 ) -> tuple[Array, tuple[Side | None, ...]]:
     """Vertices (h, r) and what the sides are."""
     r, m = null.shape
-    origin, low, high = work[tables.START], work[tables.LOW], work[tables.HIGH]
+    origin, low, high = limits[strips.START], limits[strips.LOW], limits[strips.HIGH]
     if r == 0 or count == 0:
         return np.zeros((count, r)), ()
     if r == 1:

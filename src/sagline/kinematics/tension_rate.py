@@ -10,7 +10,7 @@ import numpy as np
 from sagline.arrays import Array, Flags
 from sagline.cables.model import CableState
 from sagline.kinematics.instants import Instant
-from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.equilibrium import Equilibrium, limited_tension
 from sagline.robot.pose import Pose
 from sagline.robot.several import anchors_of, bodies_of, first_of, limits_of
 from sagline.tension.method import TensionMethod
@@ -181,12 +181,12 @@ def _supplied(cables: Placed, tension: Array) -> Array:
 
 def _nearest_limits(here: Placed, state: Equilibrium, method: TensionMethod) -> tuple[Array, Callable[[Placed], Array]]:
     """How far each cable is from its nearest limit (N, m), and the function that gives that distance elsewhere."""
-    limits, shared = limits_of(state.robot), first_of(state.robot)
+    limits = limits_of(state.robot)
 
     def gaps(at: Placed) -> Array:
         """Distances to all limits (N, m, 2 or 3), positive within."""
         cables = at.cables
-        limited = cables.frame_end_tension if shared.tension_limits_of == "frame_end" else cables.chord_tension
+        limited = limited_tension(state.robot, cables)
         found = [limited - limits.low, limits.high - limited]
         if method.lowest_point_margin is not None:
             with np.errstate(divide="ignore", invalid="ignore"):  # a level cable has no such bound

@@ -9,8 +9,8 @@ import numpy as np
 
 from sagline.arrays import Array, locked
 from sagline.kernels.balance import geometry as rows
-from sagline.kernels.balance.geometry import cable_geometry
-from sagline.kernels.balance.statics import structure_matrix as fill_structure_matrix
+from sagline.kernels.balance.geometry import cable_geometries
+from sagline.kernels.balance.wrench import structure_matrices
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.robot.several import Robots, first_of, one_a_pose
@@ -31,11 +31,9 @@ class ArticleBalance(NamedTuple):
 
 def _geometry(robot: Robots, pose: Pose) -> Array:
     """Geometry rows of every pose, shape (N, GEOMETRY_ROWS, m)."""
-    cables, bodies, poses = cable_table(robot), body_table(robot), pose_rows(pose)
+    cables, poses = cable_table(robot), pose_rows(pose)
     out = np.empty((len(poses), rows.GEOMETRY_ROWS, cables.shape[1]))
-    rotation = np.empty((3, 3))
-    for i, (row, geometry) in enumerate(zip(poses, out, strict=True)):
-        cable_geometry(cables[i % len(cables)], bodies[i % len(bodies)], row, rotation, geometry)
+    cable_geometries(cables, body_table(robot), poses, np.empty((3, 3)), out)
     return out
 
 
@@ -59,8 +57,7 @@ def structure_matrix(robot: Robot | Sequence[Robot], pose: Pose) -> Array:
     shared = first_of(checked)
     geometry = _geometry(checked, pose)
     out = np.empty((len(geometry), 6, shared.cable_count))
-    for row, matrix in zip(geometry, out, strict=True):
-        fill_structure_matrix(row, matrix)
+    structure_matrices(geometry, out)
     return locked((shared.freedom @ out).reshape(*pose.shape, shared.degrees_of_freedom, shared.cable_count))
 
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from sagline.arrays import Array, locked
-from sagline.kernels.inverse.pose_queries import margins_of_poses
+from sagline.kernels.inverse.queries import margins_of_poses
+from sagline.kernels.memory import memory_for
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.several import first_of, limits_of
-from sagline.statics.tables import body_table, cable_table, pose_rows
+from sagline.statics.tables import pose_rows, robot_terms
 from sagline.tension.options import LIMITS_OF
 
 
@@ -61,16 +62,13 @@ def capacity_margin(state: Equilibrium) -> Array:
     pulls = np.atleast_2d(cables.vertical_force - cables.chord_tension * cables.rise / cables.chord)
     margins = np.empty(len(rows))
     margins_of_poses(
-        cables.model.code,
-        *cables.model.parameters,
-        LIMITS_OF[shared.tension_limits_of],
-        np.nan,
-        shared.freedom,
-        body_table(state.robot),
-        cable_table(state.robot),
+        (cables.model.code, *cables.model.parameters),
+        (LIMITS_OF[shared.tension_limits_of], np.nan),
+        robot_terms(state.robot),
         rows,
         np.atleast_2d(state.wrench),
         locked(np.ascontiguousarray(pulls)),
+        memory_for(shared.cable_count),
         margins,
     )
     return margins.reshape(state.pose.shape)

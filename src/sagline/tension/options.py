@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.arrays import locked
 from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
 from sagline.kernels import codes
+from sagline.kernels.inverse.poses import LimitTerms, ModelTerms, SharingTerms
 from sagline.robot.robot import Robot
 from sagline.robot.several import Robots, first_of
 from sagline.tension.method import TensionMethod
@@ -15,10 +18,22 @@ from sagline.tension.method import TensionMethod
 LIMITS_OF = {"chord": codes.LIMITS_OF_CHORD, "frame_end": codes.LIMITS_OF_FRAME_END}
 
 
-def kernel_options(
-    robot: Robots, model: CableModel, tension: TensionMethod
-) -> tuple[int, float, float, int, float, int, int, float, Array]:
-    """Model, method and limits as the kernels' leading codes and parameters.
+class Options(NamedTuple):
+    """Model, method and limits as kernels take them first.
+
+    Attributes:
+        model: Code, k_h, k_p.
+        sharing: Method, parameter, variable, root weights and goals of the cables.
+        limits: Which quantity is limited, and the article's T_adj [N] or NaN.
+    """
+
+    model: ModelTerms
+    sharing: SharingTerms
+    limits: LimitTerms
+
+
+def kernel_options(robot: Robots, model: CableModel, tension: TensionMethod) -> Options:
+    """Model, method and limits as kernels take them first.
 
     Args:
         robot: The robot, or several that fit together.
@@ -26,7 +41,7 @@ def kernel_options(
         tension: How the load is shared.
 
     Returns:
-        Code and parameters of the model, of the method, the limits, and the preferences among the cables.
+        Options; the preferences among the cables are in those of the sharing.
 
     Raises:
         InvalidValueError: If a robot's tensions cannot be determined, or not by this method.
@@ -37,16 +52,24 @@ def kernel_options(
     else:
         for index, one in enumerate(robot):
             check_sharing(one, tension, f"robot[{index}]")
-    return (
-        model.code,
-        *model.parameters,
-        tension.code,
-        tension.parameter,
-        tension.variable_code,
-        LIMITS_OF[shared.tension_limits_of],
-        tension.validity,
-        tension.preference(shared.cable_count),
+    weight, goal = (locked(row) for row in tension.preference(shared.cable_count))
+    return Options(
+        (model.code, *model.parameters),
+        (tension.code, tension.parameter, tension.variable_code, weight, goal),
+        (LIMITS_OF[shared.tension_limits_of], tension.validity),
     )
+
+
+def takes_default_kernel(tension: TensionMethod) -> bool:
+    """Whether a method shares nearest to a reference in a linear variable: what is compiled first.
+
+    Args:
+        tension: The method.
+
+    Returns:
+        Whether it does.
+    """
+    return tension.code <= codes.QUADRATIC_PROGRAM and tension.variable_code != codes.FRAME_END_TENSION
 
 
 def check_sharing(robot: Robot, tension: TensionMethod, name: str | None = None) -> None:

@@ -7,7 +7,7 @@ from typing import ClassVar, Literal, get_args
 
 from sagline.errors import InvalidValueError
 from sagline.kernels import codes
-from sagline.kernels.sharing.sharing_corners import WALK_CENTROID, WALK_NORM, WALK_SUM
+from sagline.kernels.sharing.on_polygon import WALK_CENTROID, WALK_NORM, WALK_SUM
 from sagline.tension.method import TensionMethod
 
 Optimum = Literal["1-norm", "2-norm", "centroid"]

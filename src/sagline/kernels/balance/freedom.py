@@ -5,7 +5,13 @@ from __future__ import annotations
 import math
 
 from sagline.arrays import Array
-from sagline.kernels.jit import kernel
+from sagline.kernels.jit import formula, kernel
+
+
+@formula
+def turns(freedom: Array, k: int) -> bool:
+    """Whether free motion k of the platform turns it; the others, which come first, are translations."""
+    return freedom[k, 3] * freedom[k, 3] + freedom[k, 4] * freedom[k, 4] + freedom[k, 5] * freedom[k, 5] > 0.5
 
 
 @kernel

@@ -1,133 +1,225 @@
-"""What is given at one pose: cables in place, their limits, and the balance factorized."""
+"""What is given at one pose: cables in place, their limits, and the balance factored.
+
+This is the one place that sets a pose up. The load is shared in a variable t that is scale times the chord tension plus
+offset: chord, horizontal or frame-end tensions, and weighted ones. Limits and minimum norm are those of t - offset.
+"""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from sagline.arrays import Array
 from sagline.kernels import tables
-from sagline.kernels.algebra.null_space import factorize, orthogonal_factor, pseudo_inverse
+from sagline.kernels.algebra.householder import factorize, minimum_norm, orthogonal_factor, pseudo_inverse
+from sagline.kernels.algebra.strips import HIGH, LOW, START, STRIP_ROWS
 from sagline.kernels.balance import geometry as g
-from sagline.kernels.balance.statics import restrict_rows, structure_matrix
+from sagline.kernels.balance.geometry import cable_geometry
+from sagline.kernels.balance.wrench import along_freedom, fill_structure_matrix, needed_wrench, rows_along_freedom
+from sagline.kernels.cable.cables import Cables, chord_of, material_of
 from sagline.kernels.cable.hanging import chord_tension_at_frame_end
 from sagline.kernels.cable.models import pull_of_shallow
-from sagline.kernels.cable.terms import Chord, Material, Model
+from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import (
-    CLOSEST,
     FRAME_END_TENSION,
     HORIZONTAL_TENSION,
     LIMITS_OF_FRAME_END,
-    QUADRATIC_PROGRAM,
+    POSE_NO_CHORD,
+    POSE_SINGULAR,
+    POSE_SOLVED,
 )
-from sagline.kernels.jit import formula
+from sagline.kernels.jit import glue
+from sagline.kernels.memory import Memory, block
 
 SHORTEST_CHORD = 1e-9  # [m]
 
 
-@formula
-def place_cables(
-    model: Model,
-    limits_of: int,
-    validity: float,
-    robot: Array,
-    geometry: Array,
-    work: Array,
-) -> bool:
-    """Fill material, first pulls and limits of the chord tensions at one pose; False where a cable has no chord.
+class Platform(NamedTuple):
+    """What is given at one pose.
 
-    validity: the article's T_adj of (54) [N], T_x > w D/(2 |tan phi|) + T_adj; NaN leaves the bound out.
+    Attributes:
+        freedom: Rows that pick the platform's free motions, translations first, (n, 6).
+        body: Row of the body_table, (BODY_COLUMNS,).
+        robot: Rows of the cable_table, (m, CABLE_COLUMNS).
+        pose: Row of the poses, (POSE_COLUMNS,).
+        wrench: External plus inertial, about the center of mass, (6,).
     """
+
+    freedom: Array
+    body: Array
+    robot: Array
+    pose: Array
+    wrench: Array
+
+
+class Limits(NamedTuple):
+    """What the tensions must keep.
+
+    Attributes:
+        quantity: Which tension the robot's limits name.
+        validity: The article's T_adj of (54) [N], T_x > w D/(2 |tan phi|) + T_adj; NaN leaves the bound out.
+    """
+
+    quantity: int
+    validity: float
+
+
+class Balance(NamedTuple):
+    """The balance of one pose, for m cables, n free motions and r = m - n redundant cables.
+
+    Attributes:
+        rotation: Platform -> world, (3, 3).
+        geometry: Rows of `cable_geometry`, (GEOMETRY_ROWS, m).
+        full: Structure matrix, (6, m).
+        matrix: Along the free motions, (n, m).
+        reduced: In the sharing's variable, then its reflections, (n, m).
+        diagonals: Of its factors, (2, n).
+        q: Orthogonal factor, and a row to work in, (m + 1, m).
+        inverse: Transposed pseudo-inverse in the sharing's variable, (n, m).
+        null: Orthonormal null-space basis in the sharing's variable, one vector a row, (r, m).
+        needed: Wrench that the chord tensions must supply, (6,).
+        right: Its components along the free motions, (n,).
+        scale: Of the sharing's variable, (m,).
+        offset: Of the sharing's variable [N], (m,).
+        strips: The minimum norm as START, and the limits, in the sharing's variable, (3, m).
+        tension: Shared tensions, in the sharing's variable less its offset [N], (m,).
+    """
+
+    rotation: Array
+    geometry: Array
+    full: Array
+    matrix: Array
+    reduced: Array
+    diagonals: Array
+    q: Array
+    inverse: Array
+    null: Array
+    needed: Array
+    right: Array
+    scale: Array
+    offset: Array
+    strips: Array
+    tension: Array
+
+
+@glue
+def new_balance(memory: Memory, m: int, n: int) -> tuple[Balance, Memory]:
+    """Room for m cables and n free motions, and the memory that is left."""
+    numbers = memory.numbers
+    rotation, at = block(numbers, 0, 3, 3)
+    geometry, at = block(numbers, at, g.GEOMETRY_ROWS, m)
+    full, at = block(numbers, at, 6, m)
+    matrix, at = block(numbers, at, n, m)
+    reduced, at = block(numbers, at, n, m)
+    diagonals, at = block(numbers, at, 2, n)
+    q, at = block(numbers, at, m + 1, m)
+    inverse, at = block(numbers, at, n, m)
+    null, at = block(numbers, at, m - n, m)
+    needed, at = block(numbers, at, 1, 6)
+    right, at = block(numbers, at, 1, n)
+    strips, at = block(numbers, at, STRIP_ROWS, m)
+    rows, at = block(numbers, at, 3, m)
+    balance = Balance(
+        rotation, geometry, full, matrix, reduced, diagonals, q, inverse, null,
+        needed[0], right[0], rows[0], rows[1], strips, rows[2],
+    )  # fmt: skip
+    return balance, Memory(numbers[at:], memory.counters)
+
+
+@glue
+def set_pose(
+    model: Model, limits: Limits, variable: int, weight: Array, platform: Platform, cables: Cables, balance: Balance
+) -> int:
+    """Fill cables, with the pulls of first order, and balance of one pose; returns POSE_SOLVED or why there is none.
+
+    weight: root weights of the cables in the sharing's variable, (m,).
+    """
+    cable_geometry(platform.robot, platform.body, platform.pose, balance.rotation, balance.geometry)
+    if not place_cables(model, limits, platform.robot, balance.geometry, cables):
+        return POSE_NO_CHORD
+    fill_structure_matrix(balance.geometry, balance.full)
+    rows_along_freedom(platform.freedom, balance.full, balance.matrix)
+    choose_variable(variable, weight, cables, balance)
+    return POSE_SOLVED if factor_balance(balance) else POSE_SINGULAR
+
+
+@glue
+def place_cables(model: Model, limits: Limits, robot: Array, geometry: Array, cables: Cables) -> bool:
+    """Fill chords, material, first pulls and limits of the chord tensions; False where a cable has no chord."""
     for i in range(robot.shape[0]):
-        chord, sine, cosine = geometry[g.CHORD, i], geometry[g.SINE, i], geometry[g.COSINE, i]
-        density, stiffness = robot[i, tables.DENSITY], robot[i, tables.STIFFNESS]
-        low, high = robot[i, tables.TENSION_MIN], robot[i, tables.TENSION_MAX]
+        chord, sine = geometry[g.CHORD, i], geometry[g.SINE, i]
         if not chord >= SHORTEST_CHORD:
             return False
-        work[tables.DENSITY_ROW, i] = density
-        work[tables.STIFFNESS_ROW, i] = stiffness
-        work[tables.HALF_WEIGHT, i] = 0.5 * density * model.gravity * chord
-        work[tables.PULL, i] = pull_of_shallow(model, chord, density)
-        if limits_of == LIMITS_OF_FRAME_END:
-            line, material = Chord(chord, sine, cosine), Material(density, stiffness)
-            low = chord_tension_at_frame_end(model, line, material, low)
-            high = chord_tension_at_frame_end(model, line, material, high)
-        if not math.isnan(validity):
-            low = max(low, work[tables.HALF_WEIGHT, i] / abs(sine) + validity / cosine)
-        work[tables.CHORD_LOW, i] = low
-        work[tables.CHORD_HIGH, i] = high
+        cables.chord[i] = chord
+        cables.sine[i] = sine
+        cables.cosine[i] = geometry[g.COSINE, i]
+        cables.density[i] = robot[i, tables.DENSITY]
+        cables.stiffness[i] = robot[i, tables.STIFFNESS]
+        cables.half_weight[i] = 0.5 * robot[i, tables.DENSITY] * model.gravity * chord
+        cables.pull[i] = pull_of_shallow(model, chord, robot[i, tables.DENSITY])
+        low, high = robot[i, tables.TENSION_MIN], robot[i, tables.TENSION_MAX]
+        if limits.quantity == LIMITS_OF_FRAME_END:
+            low = chord_tension_at_frame_end(model, chord_of(cables, i), material_of(cables, i), low)
+            high = chord_tension_at_frame_end(model, chord_of(cables, i), material_of(cables, i), high)
+        if not math.isnan(limits.validity):
+            low = max(low, cables.half_weight[i] / abs(sine) + limits.validity / cables.cosine[i])
+        cables.low[i] = low
+        cables.high[i] = high
     return True
 
 
-@formula
-def scale_tensions(variable: int, preference: Array, geometry: Array, work: Array) -> None:
-    """Fill SCALE, OFFSET, LOW and HIGH: the variable in which the load is shared, and its limits.
+@glue
+def choose_variable(variable: int, weight: Array, cables: Cables, balance: Balance) -> None:
+    """Fill scale, offset and limits of the variable in which the load is shared.
 
     The frame-end tension starts as tau - wD/2 sin phi, its first order.
     """
-    for i in range(work.shape[1]):
-        scale = preference[tables.ROOT_WEIGHT, i]
+    for i in range(weight.size):
+        scale = weight[i]
         offset = 0.0
         if variable == HORIZONTAL_TENSION:
-            scale *= geometry[g.COSINE, i]
+            scale *= cables.cosine[i]
         elif variable == FRAME_END_TENSION:
-            offset = -work[tables.HALF_WEIGHT, i] * geometry[g.SINE, i]
-        work[tables.OFFSET, i] = offset
-        limit_variable(scale, work, i)
+            offset = -cables.half_weight[i] * cables.sine[i]
+        balance.scale[i] = scale
+        balance.offset[i] = offset
+        scale_limits(cables, balance, i)
 
 
-@formula
-def limit_variable(scale: float, work: Array, i: int) -> None:
-    """Fill SCALE, LOW and HIGH of one cable."""
-    high = work[tables.CHORD_HIGH, i]
-    work[tables.SCALE, i] = scale
-    work[tables.LOW, i] = work[tables.CHORD_LOW, i] * scale
-    work[tables.HIGH, i] = high * scale if high < math.inf else math.inf
+@glue
+def scale_limits(cables: Cables, balance: Balance, i: int) -> None:
+    """Fill the limits of one cable in the sharing's variable."""
+    balance.strips[LOW, i] = cables.low[i] * balance.scale[i]
+    balance.strips[HIGH, i] = cables.high[i] * balance.scale[i] if cables.high[i] < math.inf else math.inf
 
 
-@formula
-def factor_balance(
-    freedom: Array,
-    geometry: Array,
-    work: Array,
-    full: Array,
-    matrix: Array,
-    reduced: Array,
-    balance: Array,
-    q: Array,
-    inverse: Array,
-    null: Array,
-) -> bool:
-    """Fill the structure matrix, its pseudo-inverse and null space in the sharing's variable; False if rank is lost."""
-    n, m = matrix.shape
-    structure_matrix(geometry, full)
-    restrict_rows(freedom, full, matrix)
+@glue
+def factor_balance(balance: Balance) -> bool:
+    """Fill pseudo-inverse and null space in the sharing's variable; False if rank is lost."""
+    n, m = balance.matrix.shape
+    matrix, reduced, q = balance.matrix, balance.reduced, balance.q
     for i in range(m):
-        back = 1.0 / work[tables.SCALE, i]
+        back = 1.0 / balance.scale[i]
         for k in range(n):
             reduced[k, i] = matrix[k, i] * back
-    if not factorize(reduced, balance):
+    if not factorize(reduced, balance.diagonals):
         return False
-    orthogonal_factor(reduced, balance, q)
-    pseudo_inverse(reduced, balance, q, inverse)
+    orthogonal_factor(reduced, balance.diagonals, q)
+    pseudo_inverse(reduced, balance.diagonals, q, balance.inverse)
     for k in range(m - n):
         for i in range(m):
-            null[k, i] = q[i, n + k]
+            balance.null[k, i] = q[i, n + k]
     return True
 
 
-@formula
-def refer(
-    method: int, variable: int, preference: Array, previous: Array, work: Array, null: Array, reference: Array
-) -> None:
-    """Fill the point of the null space that the shared tensions shall be nearest to, (r,)."""
-    for k in range(null.shape[0]):
-        reference[k] = 0.0
-    from_before = method == CLOSEST and not math.isnan(previous[0])
-    if not (from_before or method == QUADRATIC_PROGRAM or variable == FRAME_END_TENSION):
-        return
-    for k in range(null.shape[0]):
-        for i in range(null.shape[1]):
-            goal = preference[tables.GOAL, i]
-            if from_before:
-                goal = previous[i]
-            reference[k] += null[k, i] * preference[tables.ROOT_WEIGHT, i] * (goal - work[tables.OFFSET, i])
+@glue
+def need(platform: Platform, cables: Cables, balance: Balance) -> None:
+    """Fill the needed wrench with the present pulls."""
+    needed_wrench(balance.geometry, platform.body, platform.wrench, cables.pull, balance.needed)
+    along_freedom(platform.freedom, balance.needed, balance.right)
+
+
+@glue
+def start_from_minimum_norm(balance: Balance) -> None:
+    """Fill START of the strips with the tensions of least norm that supply the needed wrench."""
+    minimum_norm(balance.inverse, balance.right, balance.strips[START])

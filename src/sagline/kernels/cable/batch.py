@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from sagline.arrays import Array, Codes
 from sagline.kernels.cable.catenary import (
+    TAUT_STRAIN,
     catenary_end,
     is_ordinary,
     ordinary_length_ratio,
+    ordinary_length_ratio_near,
     ordinary_pull_ratio,
 )
 from sagline.kernels.cable.models import from_length, from_tension
 from sagline.kernels.cable.terms import Chord, Material, Model, Terms
 from sagline.kernels.codes import CABLE_SOLVED, CATENARY
-from sagline.kernels.jit import kernel
+from sagline.kernels.jit import entry, kernel
 
-CHUNK = 256  # cables at a time: ten buffers of this length stay in the fastest cache
+CHUNK = 256  # cables at a time: so many buffers of this length stay in the fastest cache
+BUFFERS = 11
 
 
 @kernel
@@ -32,7 +33,7 @@ def lift(source: Array, start: int, stop: int, target: Array) -> None:
             target[i] = source[start + i]
 
 
-@kernel
+@entry
 def batch_from_tension(
     terms: Terms,
     span: Array,
@@ -44,16 +45,19 @@ def batch_from_tension(
     horizontal_out: Array,
     vertical_out: Array,
     status_out: Codes,
+    buffer: Array,
 ) -> None:
     """Length, forces on the platform end and status of every cable at its chord tension.
 
     Ordinary catenaries are solved for a whole chunk in loops without branches; what is not ordinary
     is solved again, one by one. One result a loop: with more, the compiler gives up on vectorizing.
+    buffer is room, (BUFFERS, CHUNK).
     """
     model = Model(*terms)
     count = length_out.shape[0]
-    buffer = np.empty((11, CHUNK))
-    x, z, rho, ea, tau, chord, sine, cosine, half, ratio, pull = buffer
+    x, z, rho, ea, tau = buffer[0], buffer[1], buffer[2], buffer[3], buffer[4]
+    chord, sine, cosine, half = buffer[5], buffer[6], buffer[7], buffer[8]
+    ratio, pull = buffer[9], buffer[10]
     for start in range(0, count, CHUNK):
         stop = min(start + CHUNK, count)
         size = stop - start
@@ -73,6 +77,12 @@ def batch_from_tension(
         if model.code == CATENARY:
             for i in range(size):
                 ratio[i] = ordinary_length_ratio(half[i], sine[i], cosine[i], tau[i] / ea[i])
+            stretched = 0
+            for i in range(size):
+                stretched += 1 if tau[i] > TAUT_STRAIN * ea[i] else 0
+            if stretched > 0:
+                for i in range(size):
+                    ratio[i] = ordinary_length_ratio_near(half[i], sine[i], cosine[i], tau[i] / ea[i], ratio[i])
             for i in range(size):
                 pull[i] = ordinary_pull_ratio(half[i], sine[i], tau[i] / ea[i], ratio[i]) * tau[i]
             for i in range(size):
@@ -83,14 +93,15 @@ def batch_from_tension(
                 line = Chord(chord[i], sine[i], cosine[i])
                 ratio[i], pull[i], status = from_tension(model, line, Material(rho[i], ea[i]), tau[i])
             status_out[start + i] = status
-        length_out[start:stop] = ratio[:size]
+        for i in range(size):
+            length_out[start + i] = ratio[i]
         for i in range(size):
             horizontal_out[start + i] = tau[i] * cosine[i]
         for i in range(size):
             vertical_out[start + i] = tau[i] * sine[i] + pull[i]
 
 
-@kernel
+@entry
 def batch_from_length(
     terms: Terms,
     span: Array,
@@ -117,7 +128,7 @@ def batch_from_length(
         status_out[i] = status
 
 
-@kernel
+@entry
 def batch_end(
     horizontal: Array, vertical: Array, length: Array, weight: Array, stiffness: Array, x_out: Array, z_out: Array
 ) -> None:

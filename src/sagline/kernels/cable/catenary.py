@@ -24,7 +24,8 @@ from sagline.kernels.codes import CABLE_NOT_CONVERGED, CABLE_SLACK, CABLE_SOLVED
 from sagline.kernels.jit import formula, kernel
 
 RANGE = 500.0  # of X = wD/(2 tau): beyond it sinh X overflows and no cable hangs like this
-ORDINARY_STRAIN = 0.01  # of e = tau/EA: up to here two Newton steps reach the last digit
+TAUT_STRAIN = 0.01  # of e = tau/EA: up to here two Newton steps reach the last digit
+ORDINARY_STRAIN = 0.1  # and up to here three
 STEPS = 80
 # Relative steps after which no other counts: Newton squares what is left, Halley cubes it.
 SMALL_NEWTON_STEP = 1e-9
@@ -64,7 +65,7 @@ def catenary_end(
 
 @formula
 def is_ordinary(half_weight: float, strain: float) -> bool:
-    """Whether `ordinary_length_ratio` is exact here: X <= 2 and e <= 0.01."""
+    """Whether the ordinary steps lead to the last digit: X <= 2 and e <= 0.1."""
     return half_weight * half_weight <= POLYNOMIAL_LIMIT and strain <= ORDINARY_STRAIN
 
 
@@ -85,7 +86,7 @@ def ordinary_newton_step(ratio: float, square: float, cosine2: float, sine2: flo
 
 @formula
 def ordinary_length_ratio(half_weight: float, sine: float, cosine: float, strain: float) -> float:
-    """P3 by two Newton steps: L/D for X = wD/(2 tau) <= 2 and e = tau/EA <= 0.01.
+    """P3 by two Newton steps: L/D for X = wD/(2 tau) <= 2 and e = tau/EA <= 0.01; up to 0.1 it wants a third.
 
     Free of branches, so that a loop over cables vectorizes: two calls, not a loop, for the same reason.
     """
@@ -101,7 +102,7 @@ def ordinary_length_ratio(half_weight: float, sine: float, cosine: float, strain
 
 @formula
 def ordinary_length_ratio_near(half_weight: float, sine: float, cosine: float, strain: float, ratio: float) -> float:
-    """The same by one Newton step from the ratio at a tension less than a thousandth away."""
+    """One Newton step more, from a ratio close by: that of a tension less than a thousandth away, or of two steps."""
     return ordinary_newton_step(ratio, half_weight * half_weight, cosine * cosine, sine * sine, strain)
 
 
@@ -109,7 +110,10 @@ def ordinary_length_ratio_near(half_weight: float, sine: float, cosine: float, s
 def length_ratio(half_weight: float, sine: float, cosine: float, strain: float) -> tuple[float, int]:
     """P3 anywhere: L/D and a status, by Newton steps kept inside a bracket."""
     if is_ordinary(half_weight, strain):
-        return ordinary_length_ratio(half_weight, sine, cosine, strain), CABLE_SOLVED
+        ratio = ordinary_length_ratio(half_weight, sine, cosine, strain)
+        if strain > TAUT_STRAIN:
+            ratio = ordinary_length_ratio_near(half_weight, sine, cosine, strain, ratio)
+        return ratio, CABLE_SOLVED
     if not half_weight < RANGE:
         return math.nan, CABLE_TOO_SLACK
     cosine2 = cosine * cosine

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from sagline.arrays import Array, Codes
-from sagline.kernels import tables as t
-from sagline.kernels.balance import geometry as g
+from sagline.arrays import Codes
+from sagline.kernels.cable.cables import Cables, chord_of, material_of
 from sagline.kernels.cable.catenary import (
+    TAUT_STRAIN,
     is_ordinary,
     ordinary_length_ratio,
     ordinary_length_ratio_near,
@@ -16,62 +16,58 @@ from sagline.kernels.cable.catenary import (
 from sagline.kernels.cable.models import from_tension
 from sagline.kernels.cable.terms import Chord, Material, Model
 from sagline.kernels.codes import CABLE_SOLVED, CATENARY, ELASTIC, STRAIGHT
-from sagline.kernels.jit import formula, kernel
+from sagline.kernels.jit import glue, kernel
 
 NEAR = 1e-3  # relative change of tension within which one Newton step from the last ratio is exact
 LIMIT_STEPS = 30
 LIMIT_PRECISION = 1e-13  # relative
 
 
-@formula
-def hang_cables(model: Model, geometry: Array, work: Array, statuses: Codes, near: bool) -> int:
-    """Fill SLACKNESS, STRAIN, RATIO and PULL of work, and the statuses (m,), at one pose's chord tensions TAU.
+@glue
+def hang_cables(model: Model, cables: Cables, near: bool, statuses: Codes) -> int:
+    """Fill slackness, strain, ratio and pull of all cables, and the statuses (m,), at their chord tensions.
 
     Ordinary catenaries go through loops without branches, which vectorize; the others follow one by one.
 
     Args:
         model: Cable model.
-        geometry: Rows of `cable_geometry`.
-        work: Rows of one pose's cables.
+        cables: The cables of one pose.
+        near: Whether their ratios are the answer at tensions less than NEAR away.
         statuses: Filled.
-        near: Whether RATIO holds the answer at tensions less than NEAR away.
 
     Returns:
         The gravest status.
     """
-    m = work.shape[1]
+    m = cables.tau.size
     for i in range(m):
-        work[t.SLACKNESS, i] = work[t.HALF_WEIGHT, i] / work[t.TAU, i]
+        cables.slackness[i] = cables.half_weight[i] / cables.tau[i]
     for i in range(m):
-        work[t.STRAIN, i] = work[t.TAU, i] / work[t.STIFFNESS_ROW, i]
+        cables.strain[i] = cables.tau[i] / cables.stiffness[i]
     if model.code == CATENARY:
-        if near:
+        stretched = 0
+        if not near:
             for i in range(m):
-                work[t.RATIO, i] = ordinary_length_ratio_near(
-                    work[t.SLACKNESS, i],
-                    geometry[g.SINE, i],
-                    geometry[g.COSINE, i],
-                    work[t.STRAIN, i],
-                    work[t.RATIO, i],
+                cables.ratio[i] = ordinary_length_ratio(
+                    cables.slackness[i], cables.sine[i], cables.cosine[i], cables.strain[i]
                 )
-        else:
             for i in range(m):
-                work[t.RATIO, i] = ordinary_length_ratio(
-                    work[t.SLACKNESS, i], geometry[g.SINE, i], geometry[g.COSINE, i], work[t.STRAIN, i]
+                stretched += 1 if cables.strain[i] > TAUT_STRAIN else 0
+        if near or stretched > 0:
+            for i in range(m):
+                cables.ratio[i] = ordinary_length_ratio_near(
+                    cables.slackness[i], cables.sine[i], cables.cosine[i], cables.strain[i], cables.ratio[i]
                 )
         for i in range(m):
-            work[t.PULL, i] = work[t.TAU, i] * ordinary_pull_ratio(
-                work[t.SLACKNESS, i], geometry[g.SINE, i], work[t.STRAIN, i], work[t.RATIO, i]
+            cables.pull[i] = cables.tau[i] * ordinary_pull_ratio(
+                cables.slackness[i], cables.sine[i], cables.strain[i], cables.ratio[i]
             )
     gravest = CABLE_SOLVED
     for i in range(m):
         statuses[i] = CABLE_SOLVED
-        if model.code != CATENARY or not is_ordinary(work[t.SLACKNESS, i], work[t.STRAIN, i]):
-            chord = Chord(geometry[g.CHORD, i], geometry[g.SINE, i], geometry[g.COSINE, i])
-            material = Material(work[t.DENSITY_ROW, i], work[t.STIFFNESS_ROW, i])
-            length, pull, status = from_tension(model, chord, material, work[t.TAU, i])
-            work[t.RATIO, i] = length / geometry[g.CHORD, i]
-            work[t.PULL, i] = pull
+        if model.code != CATENARY or not is_ordinary(cables.slackness[i], cables.strain[i]):
+            length, pull, status = from_tension(model, chord_of(cables, i), material_of(cables, i), cables.tau[i])
+            cables.ratio[i] = length / cables.chord[i]
+            cables.pull[i] = pull
             statuses[i] = status
             gravest = max(gravest, status)
     return gravest

@@ -21,7 +21,7 @@ from sagline.kernels.codes import CABLE_NO_TENSION, FORWARD_FITTED, FORWARD_NO_L
 from sagline.kernels.forward.forward import ENERGY, ITERATIONS, fill_scales
 from sagline.kernels.forward.platform import moved_pose
 from sagline.kernels.forward.problem import Problem, Space, new_space
-from sagline.kernels.jit import kernel
+from sagline.kernels.jit import entry_with_memory, kernel
 
 FIT_STEPS = 200
 FIRST_DAMPING = 1e-3  # of the largest diagonal element
@@ -106,7 +106,7 @@ def fit_pose(problem: Problem, pose: Array, space: Space):  # type: ignore[no-un
     return cost, FIT_STEPS, False
 
 
-@kernel
+@entry_with_memory
 def fit_poses(
     chained: bool,
     freedom: Array,

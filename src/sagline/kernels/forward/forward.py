@@ -29,7 +29,7 @@ from sagline.kernels.codes import (
 from sagline.kernels.forward.descent import BALANCED, descend, polish
 from sagline.kernels.forward.platform import platform_energy, unbalance
 from sagline.kernels.forward.problem import Problem, Space, new_space
-from sagline.kernels.jit import kernel
+from sagline.kernels.jit import entry_with_memory, kernel
 
 UNIT_SHARE = 0.2  # of the mean length: the displacement that counts as much as a rotation by 1 rad
 FLAT = 1e-9  # of the largest stiffness: smaller ones are none
@@ -124,7 +124,7 @@ def solve_pose(problem: Problem, energy_problem: Problem, pose: Array, arc: Arra
     return verdict(problem, space, size, low, high)
 
 
-@kernel
+@entry_with_memory
 def forward_poses(
     code: int,
     k_h: float,

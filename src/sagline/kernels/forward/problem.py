@@ -11,7 +11,7 @@ from sagline.kernels import tables
 from sagline.kernels.balance import geometry as g
 from sagline.kernels.cable.forces import FORCE_ROWS
 from sagline.kernels.cable.terms import Model
-from sagline.kernels.jit import kernel
+from sagline.kernels.jit import glue
 
 
 class Problem(NamedTuple):
@@ -55,7 +55,7 @@ class Space(NamedTuple):
     trial: Array  # (7,)
 
 
-@kernel
+@glue
 def new_space(m: int, n: int) -> Space:
     """Working memory for m cables and n free motions."""
     return Space(

@@ -17,7 +17,7 @@ from sagline.kernels.cable.terms import Material, Model
 from sagline.kernels.codes import CATENARY, ELASTIC, STRAIGHT
 from sagline.kernels.forward.platform import end_stiffness, platform_stiffness, unbalance
 from sagline.kernels.forward.problem import Problem, new_space
-from sagline.kernels.jit import kernel
+from sagline.kernels.jit import entry_with_memory, glue, kernel
 
 # which datum changes
 BY_LENGTH, BY_DENSITY, BY_STIFFNESS = 0, 1, 2
@@ -81,7 +81,7 @@ def elastic_force_slopes(span: float, rise: float, length: float, tension: float
     return (by_length * span, by_length * rise), (0.0, 0.0), (by_stiffness * span, by_stiffness * rise)
 
 
-@kernel
+@glue
 def describe_state(problem: Problem, pose: Array, matrix: Array, blocks: Array, slopes: Array, levers: Array) -> None:
     """Fill the platform's stiffness (6, 6) and what every cable does, in world axes.
 
@@ -126,7 +126,7 @@ def describe_state(problem: Problem, pose: Array, matrix: Array, blocks: Array, 
             slopes[q, i, 2] = z
 
 
-@kernel
+@entry_with_memory
 def describe_states(
     code: int,
     k_h: float,

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from sagline.arrays import Array, Codes, Indices
-from sagline.kernels import tables
-from sagline.kernels.algebra.null_space import minimum_norm
-from sagline.kernels.balance import geometry as g
-from sagline.kernels.balance.statics import needed_wrench, restrict_needed
+from sagline.arrays import Array, Codes
+from sagline.kernels.balance.setting import Balance, Platform, need, start_from_minimum_norm
+from sagline.kernels.cable.cables import Cables, chord_of, material_of
 from sagline.kernels.cable.hanging import NEAR, frame_end_tension, hang_cables
-from sagline.kernels.cable.terms import Chord, Material, Model
+from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import (
     CABLE_NOT_CONVERGED,
     CABLE_TOO_SLACK,
     CATENARY,
-    CLOSEST,
     FRAME_END_TENSION,
     HORIZONTAL_TENSION,
     POSE_NOT_CONVERGED,
@@ -21,103 +18,116 @@ from sagline.kernels.codes import (
     POSE_SOLVED,
     POSE_TOO_SLACK,
 )
-from sagline.kernels.inverse.frame_end import STILL, relinearize
-from sagline.kernels.jit import formula, kernel
-from sagline.kernels.sharing.sharing import share_load
+from sagline.kernels.inverse.frame_end import STILL, linearize_ends
+from sagline.kernels.jit import glue
+from sagline.kernels.sharing.nearest import Nearness, Sharing, is_nearest, refer, share_nearest
+from sagline.kernels.sharing.otherwise import share_otherwise
+from sagline.kernels.sharing.room import Room, forget
 
 ROUNDS = 30
 FREE_ROUNDS = 8  # then a choice that jumps with the last digits of the pulls is held where it is
 SETTLED = 1e-10  # [N]; pulls that change by less, or by 1e-15 of the largest tension, have settled
 
 
-@formula
-def remember(model: Model, variable: int, geometry: Array, work: Array, previous: Array) -> None:
+@glue
+def share_and_hang(
+    model: Model, sharing: Sharing, platform: Platform, cables: Cables, balance: Balance, previous: Array,
+    near: Nearness, room: Room | None, statuses: Codes,
+) -> int:  # fmt: skip
+    """Share the load and hang the cables until their pulls stand still; returns the pose's status.
+
+    Args:
+        model: Cable model.
+        sharing: How the load is shared.
+        platform: What is given at the pose.
+        cables: Those of `set_pose`; tensions, ratios and pulls are filled.
+        balance: That of `set_pose`.
+        previous: Tensions in the sharing's variable to stay close to (m,), NaN for none.
+        near: Room for the nearest tensions.
+        room: Room for the ways of sharing that are no nearest ones, and for frame-end tensions; None leaves them out.
+        statuses: Filled: status of each cable, (m,).
+    """
+    near.held.labels[0] = 0
+    if room is not None:
+        forget(room)
+    refer(sharing, previous, balance.offset, balance.null, near.reference)
+    hung = False
+    status = POSE_NOT_CONVERGED
+    for k in range(ROUNDS):
+        need(platform, cables, balance)
+        start_from_minimum_norm(balance)
+        if room is None:
+            status = share_nearest(balance.strips, balance.null, near, balance.tension)
+        elif is_nearest(sharing) or k >= FREE_ROUNDS:
+            if k >= FREE_ROUNDS and not is_nearest(sharing):
+                stay(balance, near)
+            status = share_nearest(balance.strips, balance.null, near, balance.tension)
+        else:
+            status = share_otherwise(sharing, balance.strips, balance.offset, balance.null, near, room, balance.tension)
+        if status != POSE_SOLVED:
+            break
+        moved, largest = take_tensions(cables, balance)
+        gravest = hang_cables(model, cables, hung and moved < NEAR, statuses)
+        if gravest == CABLE_TOO_SLACK or gravest == CABLE_NOT_CONVERGED:
+            status = POSE_TOO_SLACK if gravest == CABLE_TOO_SLACK else POSE_NOT_CONVERGED
+            break
+        status = POSE_NOT_CONVERGED
+        stands = model.code != CATENARY or pull_change(cables) <= SETTLED + 1e-15 * largest
+        if room is None or sharing.variable != FRAME_END_TENSION:
+            if stands:
+                status = POSE_SOLVED
+                break
+        else:
+            if stands and hung and moved <= STILL:
+                status = POSE_SOLVED
+                break
+            if not linearize_ends(model, sharing, cables, balance):
+                status = POSE_SINGULAR
+                break
+            refer(sharing, previous, balance.offset, balance.null, near.reference)
+            forget(room)
+        hung = True
+    return status
+
+
+@glue
+def stay(balance: Balance, near: Nearness) -> None:
+    """Let the tensions to be near to be those just shared."""
+    for k in range(balance.null.shape[0]):
+        near.reference[k] = 0.0
+        for i in range(balance.null.shape[1]):
+            near.reference[k] += balance.null[k, i] * balance.tension[i]
+
+
+@glue
+def take_tensions(cables: Cables, balance: Balance) -> tuple[float, float]:
+    """Give the cables the tensions just shared; returns the largest relative change and the largest tension [N]."""
+    largest = 0.0
+    moved = 0.0
+    for i in range(cables.tau.size):
+        new = balance.tension[i] / balance.scale[i]
+        moved = max(moved, abs(new - cables.tau[i]) / new)
+        largest = max(largest, new)
+        cables.tau[i] = new
+        cables.last_pull[i] = cables.pull[i]
+    return moved, largest
+
+
+@glue
+def pull_change(cables: Cables) -> float:
+    """Largest change of a pull in this round [N]."""
+    change = 0.0
+    for i in range(cables.tau.size):
+        change = max(change, abs(cables.pull[i] - cables.last_pull[i]))
+    return change
+
+
+@glue
+def remember(model: Model, sharing: Sharing, cables: Cables, room: Room | None, previous: Array) -> None:
     """Keep the tensions, in the variable they were shared in, for the pose that follows."""
     for i in range(previous.size):
-        tau = work[tables.TAU, i]
-        previous[i] = tau
-        if variable == HORIZONTAL_TENSION:
-            previous[i] = tau * geometry[g.COSINE, i]
-        elif variable == FRAME_END_TENSION:
-            previous[i] = frame_end_tension(
-                model,
-                Chord(geometry[g.CHORD, i], geometry[g.SINE, i], geometry[g.COSINE, i]),
-                Material(work[tables.DENSITY_ROW, i], work[tables.STIFFNESS_ROW, i]),
-                tau,
-            )
-
-
-@kernel
-def keep_near(work: Array, null: Array, reference: Array) -> None:
-    """Let the point to be near to be that of the tensions just shared."""
-    for k in range(null.shape[0]):
-        reference[k] = 0.0
-        for i in range(null.shape[1]):
-            reference[k] += null[k, i] * work[tables.SHARED, i]
-
-
-@formula
-def settle(
-    model: Model,
-    method: int,
-    parameter: float,
-    variable: int,
-    freedom: Array,
-    preference: Array,
-    previous: Array,
-    body: Array,
-    wrench: Array,
-    geometry: Array,
-    work: Array,
-    full: Array,
-    matrix: Array,
-    reduced: Array,
-    balance: Array,
-    q: Array,
-    inverse: Array,
-    null: Array,
-    reference: Array,
-    corners: Array,
-    labels: Indices,
-    statuses: Codes,
-) -> int:
-    """Share the load and hang the cables until their pulls stand still; returns the pose's status."""
-    m = work.shape[1]
-    near = False
-    way = method
-    for k in range(ROUNDS):
-        if k >= FREE_ROUNDS and method > CLOSEST:
-            way = CLOSEST
-            keep_near(work, null, reference)
-        needed_wrench(geometry, body, wrench, work, balance)
-        restrict_needed(freedom, balance)
-        minimum_norm(inverse, balance, work)
-        status = share_load(way, parameter, work, null, reference, corners, labels)
-        if status != POSE_SOLVED:
-            return status
-        largest = 0.0
-        moved = 0.0
-        for i in range(m):
-            new = work[tables.SHARED, i] / work[tables.SCALE, i]
-            moved = max(moved, abs(new - work[tables.TAU, i]) / new)
-            largest = max(largest, new)
-            work[tables.TAU, i] = new
-            work[tables.LAST_PULL, i] = work[tables.PULL, i]
-        gravest = hang_cables(model, geometry, work, statuses, near and moved < NEAR)
-        if gravest == CABLE_TOO_SLACK:
-            return POSE_TOO_SLACK
-        if gravest == CABLE_NOT_CONVERGED:
-            return POSE_NOT_CONVERGED
-        change = 0.0
-        for i in range(m):
-            change = max(change, abs(work[tables.PULL, i] - work[tables.LAST_PULL, i]))
-        stands = model.code != CATENARY or change <= SETTLED + 1e-15 * largest
-        if stands and (variable != FRAME_END_TENSION or (near and moved <= STILL)):
-            return POSE_SOLVED
-        near = True
-        if variable == FRAME_END_TENSION and not relinearize(
-            model, method, freedom, preference, previous,
-            geometry, work, full, matrix, reduced, balance, q, inverse, null, reference,
-        ):  # fmt: skip
-            return POSE_SINGULAR
-    return POSE_NOT_CONVERGED
+        previous[i] = cables.tau[i]
+        if sharing.variable == HORIZONTAL_TENSION:
+            previous[i] = cables.tau[i] * cables.cosine[i]
+        elif room is not None and sharing.variable == FRAME_END_TENSION:
+            previous[i] = frame_end_tension(model, chord_of(cables, i), material_of(cables, i), cables.tau[i])

@@ -1,17 +1,19 @@
-"""Points in the middle of the feasible tensions: centroid, analytic center and deepest point."""
+"""The analytic center of the feasible tensions: the largest product of the distances to all limits."""
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from sagline.arrays import Array
 from sagline.kernels.algebra.cholesky import factor_positive, solve_lower, solve_upper
-from sagline.kernels.algebra.linear import LP_EMPTY, LP_SOLVED, limit_rows, lowest_point
+from sagline.kernels.algebra.linear_program import LP_SOLVED, lowest_point
+from sagline.kernels.algebra.strips import HIGH, LOW, START, STRIP_ROWS, TOLERANCE, largest_number
+from sagline.kernels.codes import POSE_INFEASIBLE, POSE_NOT_CONVERGED, POSE_SOLVED, POSE_UNBOUNDED
 from sagline.kernels.jit import kernel
-from sagline.kernels.sharing.polygon import TOLERANCE, box_radius, largest_tension
-from sagline.kernels.tables import HIGH, LOW, START
+from sagline.kernels.memory import Memory, block
+from sagline.kernels.sharing.on_polygon import centroid, feasible_corners
+from sagline.kernels.sharing.programs import status_of
+from sagline.kernels.sharing.room import Room
 
 THIN = 1e-9  # of the largest tension: a set thinner than this has no inside worth centering in
 NEWTON_STEPS = 200
@@ -19,67 +21,77 @@ CENTERED = 1e-18  # square of the Newton decrement at which the center is found
 
 
 @kernel
-def centroid(corners: Array, count: int) -> tuple[float, float]:
-    """Centroid of a convex polygon; the middle of its corners where it has no area."""
-    x0 = corners[0, 0]
-    y0 = corners[0, 1]
-    area = 0.0
-    x = 0.0
-    y = 0.0
-    size = 0.0
-    for k in range(1, count - 1):
-        ax = corners[k, 0] - x0
-        ay = corners[k, 1] - y0
-        bx = corners[k + 1, 0] - x0
-        by = corners[k + 1, 1] - y0
-        cross = ax * by - ay * bx
-        area += cross
-        x += cross * (ax + bx)
-        y += cross * (ay + by)
-        size = max(size, ax * ax + ay * ay, bx * bx + by * by)
-    if area > 1e-12 * size:
-        return x0 + x / (3.0 * area), y0 + y / (3.0 * area)
-    x = 0.0
-    y = 0.0
-    for k in range(count):
-        x += corners[k, 0] / count
-        y += corners[k, 1] / count
-    return x, y
+def share_at_center(strips: Array, null: Array, point: Array, room: Room) -> int:
+    """Move the point (r,) to the analytic center, from that of the round before if there was one."""
+    corners, labels, known = room.corners, room.labels, room.known
+    if known[0] > 0 and is_inside(strips, null, point) and analytic_center(strips, null, room.rest, point):
+        return POSE_SOLVED
+    known[0] = 0
+    r, m = null.shape
+    if r > 2:
+        status = deepest_point(strips, null, room, point)
+        if status != POSE_SOLVED:
+            return status
+    else:
+        count = feasible_corners(strips, null, corners, labels)
+        if count == 0:
+            return POSE_INFEASIBLE
+        for k in range(count):
+            if labels[k] >= 2 * m:
+                return POSE_UNBOUNDED
+        x, y = centroid(corners, count)
+        point[0] = x
+        if r == 2:
+            point[1] = y
+    if not analytic_center(strips, null, room.rest, point):
+        return POSE_NOT_CONVERGED
+    known[0] = 1
+    return POSE_SOLVED
 
 
 @kernel
-def deepest_point(work: Array, null: Array, point: Array) -> int:
-    """Fill the point (r,) whose tensions keep farthest from their nearest limits; returns the LP's outcome."""
+def is_inside(strips: Array, null: Array, point: Array) -> bool:
+    """Whether a point keeps all limits by more than counts as thin."""
+    slack = THIN * largest_number(strips)
+    for i in range(null.shape[1]):
+        tension = strips[START, i]
+        for k in range(point.size):
+            tension += null[k, i] * point[k]
+        if not min(tension - strips[LOW, i], strips[HIGH, i] - tension) > slack:
+            return False
+    return True
+
+
+@kernel
+def deepest_point(strips: Array, null: Array, room: Room, point: Array) -> int:
+    """Fill the point (r,) whose tensions keep farthest from their nearest limits; returns the pose's status."""
     r, m = null.shape
-    rows = np.zeros((2 * m + r + 1, r + 1))
-    sides = np.empty(2 * m + r + 1)
-    labels = np.empty(2 * m, dtype=np.int64)
-    count = limit_rows(work, null, rows, sides, labels)
-    for k in range(count):
-        rows[k, r] = -1.0
-    cost = np.zeros(r + 1)
+    rows, at = block(room.rest.numbers, 0, r + 1, 2 * m)
+    halves, at = block(
+        room.rest.numbers, at, STRIP_ROWS, 2 * m
+    )  # every side one of its own, which depth makes narrower
+    vectors, at = block(room.rest.numbers, at, 2, r + 1)
+    cost, found = vectors[0], vectors[1]
+    for i in range(m):
+        for k in range(r):
+            rows[k, i], rows[k, m + i] = null[k, i], -null[k, i]
+        rows[r, i] = rows[r, m + i] = -1.0
+        halves[START, i], halves[LOW, i], halves[HIGH, i] = strips[START, i], strips[LOW, i], math.inf
+        halves[START, m + i], halves[LOW, m + i] = -strips[START, i], -strips[HIGH, i]
+        halves[HIGH, m + i] = math.inf
+    for k in range(r):
+        cost[k] = 0.0
     cost[r] = -1.0
-    found = np.empty(r + 1)
-    largest = largest_tension(work)
-    outcome = lowest_point(
-        rows,
-        sides,
-        count,
-        cost,
-        box_radius(largest, work),
-        TOLERANCE * largest,
-        found,
-        np.empty((r + 1, r + 1)),
-        np.empty(r + 2, dtype=np.int64),
-        np.empty(r + 2),
-    )
+    slack = TOLERANCE * largest_number(strips)
+    room.basis.labels[0] = -1
+    outcome = lowest_point(rows, halves, cost, slack, room.basis, found)
     for k in range(r):
         point[k] = found[k]
-    return LP_EMPTY if outcome == LP_SOLVED and found[r] < -TOLERANCE * largest else outcome
+    return POSE_INFEASIBLE if outcome == LP_SOLVED and found[r] < -slack else status_of(outcome)
 
 
 @kernel
-def analytic_center(work: Array, null: Array, point: Array) -> bool:
+def analytic_center(strips: Array, null: Array, memory: Memory, point: Array) -> bool:
     """Move a point inside the feasible set (r,) to the one of largest product of distances to all limits.
 
     Newton's method with damped steps on the barrier, which is self-concordant; infinite limits do not count. A set
@@ -89,25 +101,27 @@ def analytic_center(work: Array, null: Array, point: Array) -> bool:
         Whether the center was found.
     """
     r, m = null.shape
-    slope = np.empty(r)
-    step = np.empty(r)
-    curve = np.empty((r, r))
-    largest = largest_tension(work)
+    vectors, at = block(memory.numbers, 0, 2, r)
+    curve, at = block(memory.numbers, at, r, r)
+    slope, step = vectors[0], vectors[1]
+    largest = largest_number(strips)
     for _ in range(NEWTON_STEPS):
         for k in range(r):
             slope[k] = 0.0
             for j in range(k + 1):
                 curve[k, j] = 0.0
         for i in range(m):
-            tension = work[START, i]
+            tension = strips[START, i]
             for k in range(r):
                 tension += null[k, i] * point[k]
-            below = tension - work[LOW, i]
-            above = work[HIGH, i] - tension
+            below = tension - strips[LOW, i]
+            above = strips[HIGH, i] - tension
             if not min(below, above) > THIN * largest:
                 return True
-            push = 1.0 / above - 1.0 / below
-            weight = 1.0 / (below * below) + 1.0 / (above * above)
+            below = 1.0 / below
+            above = 1.0 / above
+            push = above - below
+            weight = below * below + above * above
             for k in range(r):
                 slope[k] += push * null[k, i]
                 for j in range(k + 1):

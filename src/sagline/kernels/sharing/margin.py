@@ -14,10 +14,9 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from sagline.arrays import Array, Indices
 from sagline.kernels.jit import kernel
+from sagline.kernels.memory import Memory, block
 
 MOST_FACES = 1 << 40  # more than there can be
 RANK = 1e-10  # a pivot below this share of the largest entry says that columns are parallel
@@ -95,7 +94,7 @@ def support(matrix: Array, low: Array, high: Array, normal: Array, sign: float) 
 
 
 @kernel
-def capacity_margin(matrix: Array, needed: Array, low: Array, high: Array, translations: int) -> float:
+def capacity_margin(matrix: Array, needed: Array, low: Array, high: Array, translations: int, memory: Memory) -> float:
     """Largest force [N] in any direction that can be added to the needed wrench; negative where it is not feasible.
 
     Args:
@@ -104,12 +103,15 @@ def capacity_margin(matrix: Array, needed: Array, low: Array, high: Array, trans
         low: Least tensions (m,).
         high: Largest tensions (m,), may be infinite.
         translations: How many of the rows are forces.
+        memory: To work in.
     """
     n, m = matrix.shape
-    chosen = np.arange(n - 1)
-    rows = np.empty((n, n))
-    order = np.empty(n, dtype=np.int64)
-    normal = np.empty(n)
+    rows, at = block(memory.numbers, 0, n, n)
+    normal = memory.numbers[at : at + n]
+    chosen = memory.counters[: n - 1]
+    order = memory.counters[n : 2 * n]
+    for c in range(n - 1):
+        chosen[c] = c
     least = math.inf
     for _ in range(MOST_FACES):
         if normal_of(matrix, chosen, rows, order, normal):

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from sagline.arrays import Array
+from sagline.arrays import Array, Indices
 from sagline.kernels.algebra.cholesky import factor_positive, solve_lower, solve_upper
-from sagline.kernels.algebra.linear import limit_rows
-from sagline.kernels.algebra.projection import project
-from sagline.kernels.jit import kernel
-from sagline.kernels.sharing.polygon import TOLERANCE, largest_tension, nearest_point
-from sagline.kernels.tables import HIGH, LOW, OFFSET, START
+from sagline.kernels.algebra.nearest_point import nearest_point
+from sagline.kernels.algebra.strips import START, TOLERANCE, largest_number, most_missed
+from sagline.kernels.codes import POSE_INFEASIBLE, POSE_NOT_CONVERGED, POSE_SOLVED
+from sagline.kernels.jit import formula, glue, kernel
+from sagline.kernels.memory import Memory, block
+from sagline.kernels.sharing.nearest import Nearness
 
 STEPS = 200
 HALVINGS = 40
@@ -21,26 +20,61 @@ STILL = 1e-12  # of the largest tension: a step shorter than this ends the searc
 
 
 @kernel
-def tension_at(work: Array, null: Array, point: Array, i: int) -> float:
+def share_by_norm(
+    p: float, strips: Array, offset: Array, null: Array, near: Nearness, known: Indices, memory: Memory
+) -> int:
+    """Fill the point (r,) of near whose tensions have the least p-norm.
+
+    known: whether that point is the answer of a round before, (1,), from which the search then starts.
+    """
+    point = near.point
+    slack = TOLERANCE * largest_number(strips)
+    if known[0] > 0:
+        last = memory.numbers[: point.size]
+        for k in range(point.size):
+            last[k] = point[k]
+        kept = nearest_point(null, strips, last, slack, near.held, point)
+        if kept and lowest_p_norm(p, p, strips, offset, null, near, memory):
+            return POSE_SOLVED
+    known[0] = 0
+    near.held.labels[0] = 0
+    if not nearest_point(null, strips, near.reference, slack, near.held, point):
+        return POSE_INFEASIBLE
+    if not lowest_p_norm(min(4.0, p), p, strips, offset, null, near, memory):
+        return POSE_NOT_CONVERGED
+    known[0] = 1
+    return POSE_SOLVED
+
+
+@formula
+def tension_at(strips: Array, null: Array, point: Array, i: int) -> float:
     """Tension of cable i at a point of the null space, in the sharing's variable without its offset."""
-    tension = work[START, i]
+    tension = strips[START, i]
     for k in range(point.size):
         tension += null[k, i] * point[k]
     return tension
 
 
-@kernel
-def size_of(work: Array, null: Array, point: Array, p: float, scale: float) -> float:
+@formula
+def size_of(strips: Array, offset: Array, null: Array, point: Array, p: float, scale: float) -> float:
     """Sum of the p-th powers of the tensions over a scale."""
     total = 0.0
     for i in range(null.shape[1]):
-        total += abs((tension_at(work, null, point, i) + work[OFFSET, i]) / scale) ** p
+        total += abs((tension_at(strips, null, point, i) + offset[i]) / scale) ** p
     return total
 
 
-@kernel
+@glue
 def newton_target(
-    work: Array, null: Array, point: Array, p: float, scale: float, slope: Array, curve: Array, target: Array
+    strips: Array,
+    offset: Array,
+    null: Array,
+    point: Array,
+    p: float,
+    scale: float,
+    slope: Array,
+    curve: Array,
+    target: Array,
 ) -> None:
     """Fill slope, Cholesky factor of the curvature, and the point that Newton's step leads to without limits."""
     r, m = null.shape
@@ -49,7 +83,7 @@ def newton_target(
         for j in range(k + 1):
             curve[k, j] = 0.0
     for i in range(m):
-        size = abs(tension_at(work, null, point, i) + work[OFFSET, i]) / scale
+        size = abs(tension_at(strips, null, point, i) + offset[i]) / scale
         power = max(size, 1e-9) ** (p - 2.0)
         for k in range(r):
             slope[k] += power * size * null[k, i] * scale
@@ -69,97 +103,69 @@ def newton_target(
         target[k] += point[k]
 
 
-@kernel
-def keeps_limits(work: Array, null: Array, point: Array) -> bool:
-    """Whether the tensions at a point are within their limits."""
-    for i in range(null.shape[1]):
-        if not work[LOW, i] <= tension_at(work, null, point, i) <= work[HIGH, i]:
-            return False
-    return True
-
-
-@kernel
-def project_on_corners(corners: Array, count: int, curve: Array, target: Array, turned: Array) -> None:
-    """Replace the target by the polygon's point nearest to it in the metric L L^T, for r = 1 or 2."""
-    r = target.size
-    across = curve[1, 0] if r == 2 else 0.0
-    second = curve[1, 1] if r == 2 else 1.0
-    for k in range(count):
-        turned[k, 0] = curve[0, 0] * corners[k, 0] + across * corners[k, 1]
-        turned[k, 1] = second * corners[k, 1]
-    y = target[1] if r == 2 else 0.0
-    u, v = nearest_point(turned, count, curve[0, 0] * target[0] + across * y, second * y)
-    if r == 2:
-        target[1] = v / second
-        target[0] = (u - across * target[1]) / curve[0, 0]
-    else:
-        target[0] = u / curve[0, 0]
-
-
-@kernel
-def project_on_rows(work: Array, null: Array, curve: Array, target: Array, point: Array) -> bool:
-    """Replace the target by the feasible point nearest to it in the metric L L^T, for any r."""
+@glue
+def turn(null: Array, curve: Array, target: Array, turned: Array, goal: Array) -> None:
+    """Fill null space (r, m) and target (r,) in coordinates in which the metric L L^T is the ordinary one."""
     r, m = null.shape
-    rows = np.empty((2 * m, r))
-    sides = np.empty(2 * m)
-    count = limit_rows(work, null, rows, sides, np.empty(2 * m, dtype=np.int64))
-    size = math.sqrt(curve[0, 0])
-    for k in range(count):
-        solve_lower(curve, rows[k])
-    turned = np.zeros(r)
     for k in range(r):
+        goal[k] = 0.0
         for j in range(k, r):
-            turned[k] += curve[j, k] * target[j]
-    if not project(rows, sides, count, turned, TOLERANCE * largest_tension(work) * max(size, 1.0), target):
-        return False
-    solve_upper(curve, target)
-    for k in range(r):
-        if not math.isfinite(target[k]):
-            target[k] = point[k]
-    return True
+            goal[k] += curve[j, k] * target[j]
+        for i in range(m):
+            turned[k, i] = null[k, i]
+        for j in range(k):
+            for i in range(m):
+                turned[k, i] -= curve[k, j] * turned[j, i]
+        for i in range(m):
+            turned[k, i] /= curve[k, k]
 
 
 @kernel
-def lowest_p_norm(work: Array, null: Array, p: float, corners: Array, count: int, point: Array) -> bool:
-    """Move a feasible point (r,), best that of least 2-norm, to the feasible one of least p-norm.
+def lowest_p_norm(
+    first: float, p: float, strips: Array, offset: Array, null: Array, near: Nearness, memory: Memory
+) -> bool:
+    """Move the feasible point (r,) of near to that of least p-norm.
 
-    The exponent doubles from 4 as the steps become short until it is p, so that Newton starts near. corners and count
-    are those of the feasible polygon or interval, for r <= 2.
+    The exponent doubles from the first as the steps become short until it is p, so that Newton starts near.
 
     Returns:
         Whether it was found.
     """
     r, m = null.shape
-    slope = np.empty(r)
-    target = np.empty(r)
-    trial = np.empty(r)
-    curve = np.empty((r, r))
-    turned = np.empty_like(corners)
-    largest = largest_tension(work)
-    exponent = min(4.0, p)
+    point = near.point
+    vectors, at = block(memory.numbers, 0, 4, r)
+    slope, target, trial, goal = vectors[0], vectors[1], vectors[2], vectors[3]
+    curve, at = block(memory.numbers, at, r, r)
+    turned, at = block(memory.numbers, at, r, m)
+    largest = largest_number(strips)
+    slack = TOLERANCE * largest
+    exponent = first
     for _ in range(STEPS):
         scale = 0.0
         for i in range(m):
-            scale = max(scale, abs(tension_at(work, null, point, i) + work[OFFSET, i]))
+            scale = max(scale, abs(tension_at(strips, null, point, i) + offset[i]))
         if scale == 0.0:
             return True
-        newton_target(work, null, point, exponent, scale, slope, curve, target)
-        if not keeps_limits(work, null, target):
-            if r <= 2:
-                project_on_corners(corners, count, curve, target, turned)
-            elif not project_on_rows(work, null, curve, target, point):
+        newton_target(strips, offset, null, point, exponent, scale, slope, curve, target)
+        if most_missed(null, strips, target, 0.0, True) >= 0:
+            turn(null, curve, target, turned, goal)
+            if not nearest_point(turned, strips, goal, slack * max(curve[0, 0], 1.0), near.held, target):
                 return False
+            solve_upper(curve, target)
+            for k in range(r):
+                if not math.isfinite(target[k]):
+                    target[k] = point[k]
         length = 0.0
         gain = 0.0
         for k in range(r):
             length = max(length, abs(target[k] - point[k]))
             gain -= slope[k] * (target[k] - point[k])
-        before = size_of(work, null, point, exponent, scale)
+        before = size_of(strips, offset, null, point, exponent, scale)
         share = 1.0
         for _half in range(HALVINGS):
             for k in range(r):
                 trial[k] = point[k] + share * (target[k] - point[k])
-            after = size_of(work, null, trial, exponent, scale)
+            after = size_of(strips, offset, null, trial, exponent, scale)
             least_gain = 1e-4 * share * exponent * gain / (scale * scale)
             if after <= before - least_gain + 1e-15 * before:
                 break

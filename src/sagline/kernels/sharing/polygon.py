@@ -1,8 +1,8 @@
 """The polygon of feasible tensions in the null space of two redundant cables; docs/model.md, section 5.
 
-Cable i allows low_i <= t0_i + N_i . lambda <= high_i: two half-planes. A polygon is kept as its corners,
-counter-clockwise, each with the label of the side that leaves it: 2i for the lower limit of cable i,
-2i + 1 for its upper limit, and from 2m on for the sides of the box that stands in for infinity.
+Cable i allows low_i <= t0_i + N_i . lambda <= high_i: a strip. A polygon is kept as its corners, counter-clockwise,
+each with the label of the side that leaves it: 2i for the lower limit of cable i, 2i + 1 for its upper limit, and from
+2m on for the sides of the box that stands in for infinity.
 """
 
 from __future__ import annotations
@@ -10,143 +10,185 @@ from __future__ import annotations
 import math
 
 from sagline.arrays import Array, Indices
-from sagline.kernels.jit import formula, kernel
-from sagline.kernels.tables import HIGH, LOW, START
+from sagline.kernels.algebra.strips import HIGH, LOW, START, TOLERANCE, box_radius, inward, largest_number, side_of
+from sagline.kernels.jit import formula, glue, kernel
 
-TOLERANCE = 1e-12  # of the largest tension at hand: a limit passed by less counts as met
 FLAT = 1e-12  # a null-space row shorter than this does not move the cable's tension
 SPARE_CORNERS = 6  # beyond two a cable: the box and the corner in the making
 
 
-@kernel
-def largest_tension(work: Array) -> float:
-    """The largest finite number at hand [N], by which tolerances are measured."""
-    largest = 0.0
-    for i in range(work.shape[1]):
-        largest = max(largest, abs(work[START, i]), abs(work[LOW, i]))
-        if work[HIGH, i] < math.inf:
-            largest = max(largest, abs(work[HIGH, i]))
-    return largest
-
-
-@kernel
-def box_radius(largest: float, work: Array) -> float:
-    """Radius [N] that holds the whole polygon where limits are finite, and the near part of it elsewhere."""
-    for i in range(work.shape[1]):
-        if work[HIGH, i] == math.inf:
-            return 1e4 * largest
-    return 2.0 * work.shape[1] * largest
-
-
-@kernel
-def cut(
-    corners: Array, labels: Indices, count: int, gx: float, gy: float, offset: float, label: int, slack: float
-) -> int:
-    """Keep the part of the polygon where gx x + gy y + offset >= 0; returns the number of corners left.
+@glue
+def cut(corners: Array, labels: Indices, count: int, x: float, y: float, side: float, label: int, slack: float) -> int:
+    """Keep the part of the polygon where (x, y) . corner >= side; returns the number of corners left.
 
     Works in place. A half-plane cuts a convex polygon at most twice, where it enters and where it leaves.
     """
     leaving = -1  # last corner inside before the first outside
     entering = -1  # first corner inside after the last outside
-    inside_count = 0
+    kept = 0
+    before = x * corners[count - 1, 0] + y * corners[count - 1, 1] - side >= -slack
     for k in range(count):
-        following = k + 1 if k + 1 < count else 0
-        here = gx * corners[k, 0] + gy * corners[k, 1] + offset >= -slack
-        there = gx * corners[following, 0] + gy * corners[following, 1] + offset >= -slack
-        if here:
-            inside_count += 1
-        if here and not there:
-            leaving = k
-        if there and not here:
-            entering = following
-    if inside_count == count or inside_count == 0:
-        return inside_count
-    # the new side runs from the leaving crossing to the entering one
-    after = leaving + 1 if leaving + 1 < count else 0
-    before = entering - 1 if entering > 0 else count - 1
-    d0 = gx * corners[leaving, 0] + gy * corners[leaving, 1] + offset
-    d1 = gx * corners[after, 0] + gy * corners[after, 1] + offset
-    share = min(max(d0 / (d0 - d1), 0.0), 1.0)
-    ax = corners[leaving, 0] + share * (corners[after, 0] - corners[leaving, 0])
-    ay = corners[leaving, 1] + share * (corners[after, 1] - corners[leaving, 1])
-    d0 = gx * corners[entering, 0] + gy * corners[entering, 1] + offset
-    d1 = gx * corners[before, 0] + gy * corners[before, 1] + offset
-    share = min(max(d0 / (d0 - d1), 0.0), 1.0)
-    bx = corners[entering, 0] + share * (corners[before, 0] - corners[entering, 0])
-    by = corners[entering, 1] + share * (corners[before, 1] - corners[entering, 1])
-    return splice(corners, labels, count, leaving, entering, inside_count, ax, ay, bx, by, label)
-
-
-@kernel
-def splice(
-    corners: Array,
-    labels: Indices,
-    count: int,
-    leaving: int,
-    entering: int,
-    kept: int,
-    ax: float,
-    ay: float,
-    bx: float,
-    by: float,
-    label: int,
-) -> int:
-    """Replace the corners outside by the two ends a, b of a new side; returns the new number of corners."""
-    entering_label = labels[entering - 1 if entering > 0 else count - 1]
-    if leaving < entering:  # the corners outside lie between the two: close or open the gap
-        gap = entering - leaving - 1
-        if gap == 1:
-            for k in range(count, entering, -1):
-                corners[k, 0], corners[k, 1], labels[k] = corners[k - 1, 0], corners[k - 1, 1], labels[k - 1]
-        else:
-            for k in range(entering, count):
-                corners[k - gap + 2, 0] = corners[k, 0]
-                corners[k - gap + 2, 1] = corners[k, 1]
-                labels[k - gap + 2] = labels[k]
-        place = leaving + 1
-    else:  # the corners inside lie between the two: move them to the front
-        for k in range(kept):
-            corners[k, 0], corners[k, 1], labels[k] = (
-                corners[entering + k, 0],
-                corners[entering + k, 1],
-                labels[entering + k],
-            )
-        place = kept
+        here = x * corners[k, 0] + y * corners[k, 1] - side >= -slack
+        kept += 1 if here else 0
+        if before and not here:
+            leaving = k - 1 if k > 0 else count - 1
+        if here and not before:
+            entering = k
+        before = here
+    if kept == count or kept == 0:
+        return kept
+    # the new side runs from where the polygon leaves the half-plane to where it enters it
+    ax, ay = crossing(corners, leaving, leaving + 1 if leaving + 1 < count else 0, x, y, side)
+    bx, by = crossing(corners, entering, entering - 1 if entering > 0 else count - 1, x, y, side)
+    last_label = labels[entering - 1 if entering > 0 else count - 1]
+    place = make_room(corners, labels, count, leaving, entering, kept)
     corners[place, 0], corners[place, 1], labels[place] = ax, ay, label
-    corners[place + 1, 0], corners[place + 1, 1], labels[place + 1] = bx, by, entering_label
+    corners[place + 1, 0], corners[place + 1, 1], labels[place + 1] = bx, by, last_label
     return kept + 2
 
 
+@formula
+def crossing(corners: Array, inside: int, outside: int, x: float, y: float, side: float) -> tuple[float, float]:
+    """Where the side between two corners, one on each side of it, meets the line (x, y) . corner = side."""
+    px, py = corners[inside, 0], corners[inside, 1]
+    qx, qy = corners[outside, 0], corners[outside, 1]
+    depth = x * px + y * py - side
+    share = min(max(depth / (depth - (x * qx + y * qy - side)), 0.0), 1.0)
+    return px + share * (qx - px), py + share * (qy - py)
+
+
 @kernel
-def feasible_polygon(work: Array, null: Array, corners: Array, labels: Indices) -> int:
+def make_room(corners: Array, labels: Indices, count: int, leaving: int, entering: int, kept: int) -> int:
+    """Remove the corners outside and make room for the two ends of a new side; returns the place of the first."""
+    if leaving >= entering:  # the corners inside lie between the two: move them to the front
+        for k in range(kept):
+            corners[k, 0], corners[k, 1] = corners[entering + k, 0], corners[entering + k, 1]
+            labels[k] = labels[entering + k]
+        return kept
+    gap = entering - leaving - 1  # the corners outside lie between the two: close or open the gap
+    if gap == 1:
+        for k in range(count, entering, -1):
+            corners[k, 0], corners[k, 1], labels[k] = corners[k - 1, 0], corners[k - 1, 1], labels[k - 1]
+    else:
+        for k in range(entering, count):
+            corners[k - gap + 2, 0], corners[k - gap + 2, 1] = corners[k, 0], corners[k, 1]
+            labels[k - gap + 2] = labels[k]
+    return leaving + 1
+
+
+@glue
+def widest_pair(null: Array) -> tuple[int, int, float]:
+    """Two cables whose rows span a large parallelogram, and its signed area.
+
+    One has the longest row; the other crosses it most.
+    """
+    m = null.shape[1]
+    first = second = 0
+    longest = 0.0
+    for i in range(m):
+        square = null[0, i] * null[0, i] + null[1, i] * null[1, i]
+        if square > longest:
+            longest, first = square, i
+    area = 0.0
+    for i in range(m):
+        cross = null[0, first] * null[1, i] - null[1, first] * null[0, i]
+        if abs(cross) > abs(area):
+            area, second = cross, i
+    return first, second, area
+
+
+@glue
+def start_polygon(strips: Array, null: Array, radius: float, corners: Array, labels: Indices) -> None:
+    """Fill the four corners that two crossing strips have in common; an infinite limit is as far out as a box."""
+    m = null.shape[1]
+    a, b, area = widest_pair(null)
+    for k in range(4):
+        # counter-clockwise where the area is positive: low a, low b, high a, high b each leave one corner
+        u = 2 * a + (0 if k == 0 or k == 3 else 1)
+        v = 2 * b + (0 if k < 2 else 1)
+        here = inward(u) * side_of(strips, u) if strips[HIGH, a] < math.inf or u == 2 * a else radius
+        there = inward(v) * side_of(strips, v) if strips[HIGH, b] < math.inf or v == 2 * b else radius
+        place = k if area > 0.0 else 3 - k
+        corners[place, 0] = (here * null[1, b] - there * null[1, a]) / area
+        corners[place, 1] = (there * null[0, a] - here * null[0, b]) / area
+    for k in range(4):
+        # counter-clockwise, the sides follow each other as low b, high a, high b, low a; clockwise turned round
+        if area > 0.0:
+            label = 2 * b if k == 0 else 2 * a + 1 if k == 1 else 2 * b + 1 if k == 2 else 2 * a
+        else:
+            label = 2 * b + 1 if k == 0 else 2 * a + 1 if k == 1 else 2 * b if k == 2 else 2 * a
+        labels[k] = label if strips[HIGH, label // 2] < math.inf or label % 2 == 0 else 2 * m + k
+
+
+@kernel
+def feasible_polygon(strips: Array, null: Array, corners: Array, labels: Indices) -> int:
     """Fill the corners (2m + SPARE_CORNERS, 2) and side labels of the feasible polygon; returns how many, 0 if empty.
 
-    work: rows START (minimum-norm tensions t0), LOW and HIGH; null: orthonormal basis, one vector a row, (2, m).
+    strips: minimum-norm tensions and limits (3, m); null: orthonormal basis, one vector a row, (2, m).
     """
-    m = work.shape[1]
-    largest = largest_tension(work)
-    radius = box_radius(largest, work)
+    m = null.shape[1]
+    largest = largest_number(strips)
     slack = TOLERANCE * largest
-    for k in range(4):
-        corners[k, 0] = radius if k == 0 or k == 3 else -radius
-        corners[k, 1] = radius if k < 2 else -radius
-        labels[k] = 2 * m + k
+    start_polygon(strips, null, box_radius(largest, strips), corners, labels)
     count = 4
     for i in range(m):
-        gx = null[0, i]
-        gy = null[1, i]
-        above = work[START, i] - work[LOW, i]
-        below = work[HIGH, i] - work[START, i]
-        if abs(gx) + abs(gy) < FLAT:
-            if above < -slack or below < -slack:
-                return 0
-            continue
-        count = cut(corners, labels, count, gx, gy, above, 2 * i, slack)
-        if count > 0 and below < math.inf:
-            count = cut(corners, labels, count, -gx, -gy, below, 2 * i + 1, slack)
-        if count == 0:
+        x, y = null[0, i], null[1, i]
+        least = most = x * corners[0, 0] + y * corners[0, 1]
+        for k in range(1, count):
+            here = x * corners[k, 0] + y * corners[k, 1]
+            least, most = min(least, here), max(most, here)
+        below, above = strips[LOW, i] - strips[START, i], strips[HIGH, i] - strips[START, i]
+        if least > above + slack or most < below - slack:
             return 0
+        if abs(x) + abs(y) < FLAT:
+            continue
+        for upper in range(2):
+            if least < below - slack if upper == 0 else most > above + slack:
+                sign = inward(upper)
+                label = 2 * i + upper
+                count = cut(corners, labels, count, sign * x, sign * y, side_of(strips, label), label, slack)
+                if count == 0:
+                    return 0
     return count
+
+
+@kernel
+def polygon_again(strips: Array, null: Array, corners: Array, labels: Indices, count: int) -> bool:
+    """Fill the corners of a polygon whose sides are known; False where limits have moved so far that they are others.
+
+    The corners are those of the feasible polygon if its sides still follow each other in this order and no limit cuts
+    one of them off.
+    """
+    m = null.shape[1]
+    slack = TOLERANCE * largest_number(strips)
+    for k in range(count):
+        if labels[k] >= 2 * m:
+            return False
+    for k in range(count):
+        u, v = labels[k - 1 if k > 0 else count - 1], labels[k]
+        ux, uy = inward(u) * null[0, u // 2], inward(u) * null[1, u // 2]
+        vx, vy = inward(v) * null[0, v // 2], inward(v) * null[1, v // 2]
+        cross = ux * vy - uy * vx
+        if not cross > FLAT:
+            return False
+        here, there = side_of(strips, u), side_of(strips, v)
+        corners[k, 0] = (here * vy - there * uy) / cross
+        corners[k, 1] = (there * ux - here * vx) / cross
+    for k in range(count):
+        following = k + 1 if k + 1 < count else 0
+        label = labels[k]
+        x, y = inward(label) * null[0, label // 2], inward(label) * null[1, label // 2]
+        # inside lies to the left of the way along a side, so the way is the inward normal turned to the right
+        way = y * (corners[following, 0] - corners[k, 0]) - x * (corners[following, 1] - corners[k, 1])
+        if not way > 0.0:
+            return False
+    for i in range(m):
+        below, above = strips[LOW, i] - strips[START, i], strips[HIGH, i] - strips[START, i]
+        for k in range(count):
+            here = null[0, i] * corners[k, 0] + null[1, i] * corners[k, 1]
+            if here < below - slack or here > above + slack:
+                return False
+    return True
 
 
 @formula
@@ -162,7 +204,7 @@ def nearest_on_side(ax: float, ay: float, bx: float, by: float, x: float, y: flo
 
 
 @kernel
-def nearest_point(corners: Array, count: int, x: float, y: float) -> tuple[float, float]:
+def nearest_corner_point(corners: Array, count: int, x: float, y: float) -> tuple[float, float]:
     """Projection of a point outside a convex polygon onto it."""
     best = math.inf
     best_x = x

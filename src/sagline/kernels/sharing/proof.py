@@ -9,59 +9,53 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from sagline.arrays import Array, Flags
-from sagline.kernels import tables
-from sagline.kernels.algebra.linear import LP_EMPTY, limit_rows, lowest_point
-from sagline.kernels.jit import kernel
-from sagline.kernels.sharing.polygon import box_radius, largest_tension
+from sagline.kernels.algebra.linear_program import LP_EMPTY, lowest_point, new_basis
+from sagline.kernels.algebra.strips import largest_number
+from sagline.kernels.jit import glue, kernel
+from sagline.kernels.memory import Memory, block
 
 CERTAIN = 1e-14  # of the largest tension: limits that contradict by less may do so by rounding
 SUPPORT = 1e-9  # of the largest weight: cables that weigh less take no part
 
 
 @kernel
-def prove_empty(work: Array, inverse: Array, null: Array, translations: int, balance: Array, blocking: Flags) -> bool:
-    """Fill the Farkas vector y (n,) in row FARKAS of balance, and which cables (m,) take part in it.
+def prove_empty(
+    strips: Array, inverse: Array, null: Array, translations: int, memory: Memory, farkas: Array, blocking: Flags
+) -> None:
+    """Fill the Farkas vector y (n,) and which cables (m,) take part in it.
 
     y . (needed - J t) > 0 for every t within the limits. Its force part has length 1, so that the gap is in newtons;
     if it has none, its moment part has. NaN, and no cables, where the limits do not contradict beyond rounding.
     """
     r, m = null.shape
-    n = inverse.shape[0]
-    rows = np.empty((2 * m + r, r))
-    sides = np.empty(2 * m + r)
-    labels = np.empty(2 * m, dtype=np.int64)
-    basis = np.empty(r + 1, dtype=np.int64)
-    weights = np.empty(r + 1)
-    count = limit_rows(work, null, rows, sides, labels)
-    cost = np.zeros(r)
+    basis, rest = new_basis(memory, r)
+    vectors, at = block(rest.numbers, 0, 2, r)
+    weights, at = block(rest.numbers, at, 1, m)
+    cost, point, z = vectors[0], vectors[1], weights[0]
     for k in range(r):
+        cost[k] = 0.0
         for i in range(m):
             cost[k] += null[k, i]
-    largest = largest_tension(work)
-    radius = box_radius(largest, work)
-    outcome = lowest_point(
-        rows, sides, count, cost, radius, CERTAIN * largest, np.empty(r), np.empty((r, r)), basis, weights
-    )
-    for k in range(n):
-        balance[tables.FARKAS, k] = math.nan
+    basis.labels[0] = -1
+    outcome = lowest_point(null, strips, cost, CERTAIN * largest_number(strips), basis, point)
+    for k in range(farkas.size):
+        farkas[k] = math.nan
     for i in range(m):
         blocking[i] = False
     if outcome != LP_EMPTY:
-        return False
-    z = np.zeros(m)
+        return
+    for i in range(m):
+        z[i] = 0.0
     for j in range(r + 1):
-        if basis[j] < count:
-            label = labels[basis[j]]
-            z[label // 2] += weights[j] if label % 2 == 1 else -weights[j]
-    write_vector(z, inverse, translations, balance, blocking)
-    return True
+        label = basis.labels[j]
+        if label < 2 * m:
+            z[label // 2] += basis.weights[j] if label % 2 == 1 else -basis.weights[j]
+    write_vector(z, inverse, translations, farkas, blocking)
 
 
-@kernel
-def write_vector(z: Array, inverse: Array, translations: int, balance: Array, blocking: Flags) -> None:
+@glue
+def write_vector(z: Array, inverse: Array, translations: int, farkas: Array, blocking: Flags) -> None:
     """From the cables' weights to the wrench space, scaled."""
     n, m = inverse.shape
     force = 0.0
@@ -70,14 +64,16 @@ def write_vector(z: Array, inverse: Array, translations: int, balance: Array, bl
         total = 0.0
         for i in range(m):
             total += inverse[k, i] * z[i]
-        balance[tables.FARKAS, k] = total
+        farkas[k] = total
         if k < translations:
             force += total * total
         else:
             moment += total * total
     scale = math.sqrt(force) if force > 1e-18 * moment else math.sqrt(moment)
     for k in range(n):
-        balance[tables.FARKAS, k] /= scale
-    largest = np.abs(z).max()
+        farkas[k] /= scale
+    largest = 0.0
+    for i in range(m):
+        largest = max(largest, abs(z[i]))
     for i in range(m):
         blocking[i] = abs(z[i]) > SUPPORT * largest

@@ -13,26 +13,24 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from sagline.arrays import Array, Indices
+from sagline.kernels.algebra.strips import HIGH, LOW, START, TOLERANCE, largest_number
 from sagline.kernels.jit import kernel
-from sagline.kernels.sharing.polygon import TOLERANCE, largest_tension
-from sagline.kernels.tables import HIGH, LOW, START
+from sagline.kernels.memory import Memory, block
 
 PARALLEL = 1e-12
 
 
 @kernel
-def limit_lines(work: Array, null: Array, lines: Array) -> None:
+def limit_lines(strips: Array, null: Array, lines: Array) -> None:
     """Fill the limits 2i and 2i + 1 as rows gx, gy, offset of gx x + gy y + offset >= 0, (2m, 3)."""
     for i in range(null.shape[1]):
         lines[2 * i, 0] = null[0, i]
         lines[2 * i, 1] = null[1, i]
-        lines[2 * i, 2] = work[START, i] - work[LOW, i]
+        lines[2 * i, 2] = strips[START, i] - strips[LOW, i]
         lines[2 * i + 1, 0] = -null[0, i]
         lines[2 * i + 1, 1] = -null[1, i]
-        lines[2 * i + 1, 2] = work[HIGH, i] - work[START, i]
+        lines[2 * i + 1, 2] = strips[HIGH, i] - strips[START, i]
 
 
 @kernel
@@ -51,16 +49,16 @@ def most_independent(null: Array) -> tuple[int, int]:
 
 
 @kernel
-def walk_polygon(work: Array, null: Array, corners: Array, labels: Indices) -> int:
+def walk_polygon(strips: Array, null: Array, memory: Memory, corners: Array, labels: Indices) -> int:
     """Fill corners, counter-clockwise, and labels as `feasible_polygon` does; returns how many.
 
     0 if the polygon is empty, -1 if the walk lost its way. All limits must be finite.
     """
     m = null.shape[1]
-    slack = TOLERANCE * largest_tension(work)
-    lines = np.empty((2 * m, 3))
-    limit_lines(work, null, lines)
-    met = np.zeros(2 * m, dtype=np.bool_)
+    slack = TOLERANCE * largest_number(strips)
+    lines, _ = block(memory.numbers, 0, 2 * m, 3)
+    limit_lines(strips, null, lines)
+    met = memory.counters[: 2 * m]  # 1 for a limit that counts
     a, b = most_independent(null)
     line = 2 * a
     # the parallelogram's corner from which line a runs counter-clockwise: inside on its left
@@ -72,11 +70,11 @@ def walk_polygon(work: Array, null: Array, corners: Array, labels: Indices) -> i
     x = (-lines[line, 2] * lines[other, 1] + lines[other, 2] * lines[line, 1]) / cross
     y = (-lines[other, 2] * lines[line, 0] + lines[line, 2] * lines[other, 0]) / cross
     for k in range(2 * m):
-        met[k] = lines[k, 0] * x + lines[k, 1] * y + lines[k, 2] >= -slack
+        met[k] = 1 if lines[k, 0] * x + lines[k, 1] * y + lines[k, 2] >= -slack else 0
         if abs(lines[k, 0]) + abs(lines[k, 1]) < PARALLEL and lines[k, 2] < -slack:
             return 0
     for k in range(2):
-        met[2 * a + k] = met[2 * b + k] = True
+        met[2 * a + k] = met[2 * b + k] = 1
     first_line = line
     count = 0
     for _ in range(16 * m * m):
@@ -90,27 +88,28 @@ def walk_polygon(work: Array, null: Array, corners: Array, labels: Indices) -> i
             speed = lines[k, 0] * way_x + lines[k, 1] * way_y
             if k // 2 != line // 2 and abs(speed) > PARALLEL:
                 distance = -(lines[k, 0] * x + lines[k, 1] * y + lines[k, 2]) / speed
-                if met[k] and speed < 0.0 and max(distance, 0.0) < nearest:
+                if met[k] == 1 and speed < 0.0 and max(distance, 0.0) < nearest:
                     nearest, turn = max(distance, 0.0), k
-                elif not met[k] and speed > 0.0 and distance <= nearest and distance > 0.0:
+                elif met[k] == 0 and speed > 0.0 and distance <= nearest and distance > 0.0:
                     nearest, turn = distance, k
         if turn < 0:
             return -1
         x += nearest * way_x
         y += nearest * way_y
-        if met[turn]:
+        if met[turn] == 1:
             line = turn
             if line == first_line:
                 for k in range(2 * m):
-                    if not met[k]:
+                    if met[k] == 0:
                         return 0
                 return count
             if count + 1 >= corners.shape[0]:
                 return -1
         else:
             for k in range(2 * m):
-                met[k] = met[k] or lines[k, 0] * x + lines[k, 1] * y + lines[k, 2] >= -slack
-            met[turn] = True
+                if lines[k, 0] * x + lines[k, 1] * y + lines[k, 2] >= -slack:
+                    met[k] = 1
+            met[turn] = 1
             # its border ends here, where the walk goes on: it will be the last side to be passed
             first_line = line
             count = 0

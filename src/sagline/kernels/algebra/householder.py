@@ -11,17 +11,18 @@ import math
 
 from sagline.arrays import Array
 from sagline.kernels.jit import formula
-from sagline.kernels.tables import FACTORS, HEADS, RIGHT, START
+
+HEADS, FACTORS = 0, 1
 
 RANK = 1e-9  # a diagonal entry of R below this share of its row says that rank is lost
 
 
 @formula
-def factorize(reduced: Array, balance: Array) -> bool:
+def factorize(reduced: Array, diagonals: Array) -> bool:
     """QR in place; returns whether the matrix (n, m) has full rank.
 
     Row k of reduced then holds column k of R before its diagonal and the k-th reflection's vector from there
-    on; row HEADS of balance is the diagonal of R, row FACTORS the reflections' 2/|v|^2.
+    on; row HEADS of diagonals (2, n) is the diagonal of R, row FACTORS the reflections' 2/|v|^2.
     """
     n, m = reduced.shape
     for k in range(n):
@@ -37,8 +38,8 @@ def factorize(reduced: Array, balance: Array) -> bool:
         first = reduced[k, k]
         head = -math.copysign(norm, first)
         factor = 1.0 / (norm * (norm + abs(first)))
-        balance[HEADS, k] = head
-        balance[FACTORS, k] = factor
+        diagonals[HEADS, k] = head
+        diagonals[FACTORS, k] = factor
         reduced[k, k] = first - head
         for j in range(k + 1, n):
             total = 0.0
@@ -51,7 +52,7 @@ def factorize(reduced: Array, balance: Array) -> bool:
 
 
 @formula
-def orthogonal_factor(reduced: Array, balance: Array, q: Array) -> None:
+def orthogonal_factor(reduced: Array, diagonals: Array, q: Array) -> None:
     """Fill Q (m, m) from its reflections; a row m of q is working space."""
     n, m = reduced.shape
     for i in range(m):
@@ -65,13 +66,13 @@ def orthogonal_factor(reduced: Array, balance: Array, q: Array) -> None:
             for j in range(m):
                 q[m, j] += reduced[k, i] * q[i, j]
         for i in range(k, m):
-            share = balance[FACTORS, k] * reduced[k, i]
+            share = diagonals[FACTORS, k] * reduced[k, i]
             for j in range(m):
                 q[i, j] -= share * q[m, j]
 
 
 @formula
-def pseudo_inverse(reduced: Array, balance: Array, q: Array, inverse: Array) -> None:
+def pseudo_inverse(reduced: Array, diagonals: Array, q: Array, inverse: Array) -> None:
     """Fill the transposed pseudo-inverse (n, m): the minimum-norm solution is right . inverse."""
     n, m = reduced.shape
     for k in range(n - 1, -1, -1):
@@ -80,17 +81,17 @@ def pseudo_inverse(reduced: Array, balance: Array, q: Array, inverse: Array) -> 
         for j in range(k + 1, n):
             for i in range(m):
                 inverse[k, i] -= reduced[j, k] * inverse[j, i]
-        head = 1.0 / balance[HEADS, k]
+        head = 1.0 / diagonals[HEADS, k]
         for i in range(m):
             inverse[k, i] *= head
 
 
 @formula
-def minimum_norm(inverse: Array, balance: Array, work: Array) -> None:
-    """Fill row START of work with the shortest solution of matrix t = RIGHT of balance."""
+def minimum_norm(inverse: Array, right: Array, solution: Array) -> None:
+    """Fill the shortest solution (m,) of matrix solution = right (n,)."""
     n, m = inverse.shape
     for i in range(m):
-        work[START, i] = 0.0
+        solution[i] = 0.0
     for k in range(n):
         for i in range(m):
-            work[START, i] += balance[RIGHT, k] * inverse[k, i]
+            solution[i] += right[k] * inverse[k, i]

@@ -1,0 +1,171 @@
+"""Linear programs in few unknowns, over strips: the dual simplex method.
+
+It walks over points that are optimal for the sides they stand on until it meets one that keeps all strips, or a side
+that contradicts those it stands on: the proof that there is none. Where the same rows and cost are met again with other
+limits, the sides of the last answer are still optimal, and it starts from there.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from sagline.arrays import Array, Indices
+from sagline.kernels.algebra.strips import TOLERANCE, box_radius, inward, largest_number, most_missed, side_of
+from sagline.kernels.jit import formula, glue, kernel
+from sagline.kernels.memory import Memory, block
+
+LP_SOLVED, LP_EMPTY, LP_UNBOUNDED, LP_GAVE_UP = 0, 1, 2, 3
+PIVOTS = 2000
+CAREFUL = 60  # pivots after which ties are broken by label (Bland), which cannot cycle
+ROUNDING = 4e-16  # of a point's largest coordinate
+PIVOT = 1e-11  # smallest pivot, of the row's largest
+
+
+class Basis(NamedTuple):
+    """The sides an optimal point stands on; good for the next program with the same rows and cost.
+
+    Attributes:
+        labels: Of the sides, and of the one that contradicts them if the strips have nothing in common, (d + 1,);
+            labels[0] is -1 for no basis. From 2k on they name the sides of a box that stands in for infinity.
+        weights: What each of them weighs in the combination that proves the answer, (d + 1,), >= 0.
+        inverse: Inverse of their normals, (d, d).
+    """
+
+    labels: Indices
+    weights: Array
+    inverse: Array
+
+
+@glue
+def new_basis(memory: Memory, d: int) -> tuple[Basis, Memory]:
+    """Room for d unknowns, and the memory that is left."""
+    weights, at = block(memory.numbers, 0, 1, d + 1)
+    inverse, at = block(memory.numbers, at, d, d)
+    labels = memory.counters[: d + 1]
+    return Basis(labels, weights[0], inverse), Memory(memory.numbers[at:], memory.counters[d + 1 :])
+
+
+@formula
+def along(rows: Array, label: int, inverse: Array, j: int) -> float:
+    """How fast normal . x of a side grows along edge j of the present basis."""
+    total = 0.0
+    for i in range(inverse.shape[0]):
+        total += rows[i, label // 2] * inverse[i, j]
+    return inward(label) * total
+
+
+@formula
+def miss_of(rows: Array, strips: Array, label: int, radius: float, cost: Array, point: Array) -> float:
+    """By how much a point misses a side, or, from 2k on, a side of the box."""
+    box = label - 2 * rows.shape[1]
+    if box >= 0:
+        return -radius - (point[box] if cost[box] >= 0.0 else -point[box])
+    miss = side_of(strips, label)
+    for i in range(point.size):
+        miss -= inward(label) * rows[i, label // 2] * point[i]
+    return miss
+
+
+@glue
+def start_in_the_box(rows: Array, cost: Array, radius: float, basis: Basis, point: Array) -> None:
+    """Stand on the corner of the box at which the cost is least."""
+    labels, weights, inverse = basis
+    d = cost.size
+    for k in range(d):
+        sign = 1.0 if cost[k] >= 0.0 else -1.0
+        for j in range(d):
+            inverse[k, j] = 0.0
+        inverse[k, k] = sign
+        labels[k] = 2 * rows.shape[1] + k
+        weights[k] = abs(cost[k])
+        point[k] = -radius * sign
+
+
+@glue
+def exchange(rows: Array, entering: int, leaving: int, miss: float, basis: Basis, point: Array) -> None:
+    """Let a side that the point misses enter the basis in place of another, and move to the new point."""
+    labels, weights, inverse = basis
+    d = point.size
+    pivot = along(rows, entering, inverse, leaving)
+    ratio = weights[leaving] / pivot
+    for i in range(d):
+        point[i] += inverse[i, leaving] * (miss / pivot)
+    for j in range(d):
+        if j != leaving:
+            share = along(rows, entering, inverse, j)
+            weights[j] = max(weights[j] - ratio * share, 0.0)
+            for i in range(d):
+                inverse[i, j] -= share / pivot * inverse[i, leaving]
+    for i in range(d):
+        inverse[i, leaving] /= pivot
+    weights[leaving] = max(ratio, 0.0)
+    labels[leaving] = entering
+
+
+@glue
+def stand_on(rows: Array, strips: Array, cost: Array, radius: float, basis: Basis, point: Array) -> None:
+    """Move the point to where all sides of the basis meet: from anywhere, then twice by what they still miss."""
+    d = point.size
+    for _ in range(3):
+        for j in range(d):
+            miss = miss_of(rows, strips, basis.labels[j], radius, cost, point)
+            for i in range(d):
+                point[i] += basis.inverse[i, j] * miss
+
+
+@kernel
+def lowest_point(rows: Array, strips: Array, cost: Array, slack: float, basis: Basis, point: Array) -> int:
+    """Fill the point (d,) of least cost . x that keeps all strips up to a slack; returns the outcome.
+
+    A slack of 0 stands for the usual tolerance. A solution as far out as the box is infinitely far.
+    """
+    labels, weights, inverse = basis
+    d = cost.size
+    largest = largest_number(strips)
+    radius = box_radius(largest, strips)
+    if slack == 0.0:
+        slack = TOLERANCE * largest
+    if labels[0] < 0:
+        start_in_the_box(rows, cost, radius, basis, point)
+    else:
+        for k in range(d):
+            point[k] = 0.0
+        stand_on(rows, strips, cost, radius, basis, point)
+    for pivots in range(PIVOTS):
+        careful = pivots > CAREFUL
+        far = 0.0
+        for k in range(d):
+            far = max(far, abs(point[k]))
+        seen = max(slack, ROUNDING * d * far)  # far out, rounding hides more than the slack
+        entering = most_missed(rows, strips, point, seen, careful)
+        if entering < 0:
+            stand_on(rows, strips, cost, radius, basis, point)  # the rounding of many pivots is gone
+            entering = most_missed(rows, strips, point, seen, careful)
+        if entering < 0:
+            outcome = LP_SOLVED
+            for j in range(d):
+                if labels[j] >= 2 * rows.shape[1] and weights[j] > 0.0:
+                    outcome = LP_UNBOUNDED
+            return outcome
+        largest_share = 0.0
+        for j in range(d):
+            largest_share = max(largest_share, abs(along(rows, entering, inverse, j)))
+        leaving = -1
+        pivot = 0.0
+        least = math.inf
+        for j in range(d):
+            share = along(rows, entering, inverse, j)
+            if share > PIVOT * largest_share:
+                ratio = weights[j] / share
+                tied = leaving >= 0 and ratio == least
+                if ratio < least or (tied and (labels[j] < labels[leaving] if careful else share > pivot)):
+                    least, leaving, pivot = ratio, j, share
+        if leaving < 0:
+            for j in range(d):
+                weights[j] = max(-along(rows, entering, inverse, j), 0.0)
+            labels[d] = entering
+            weights[d] = 1.0
+            return LP_EMPTY
+        exchange(rows, entering, leaving, miss_of(rows, strips, entering, radius, cost, point), basis, point)
+    return LP_GAVE_UP

@@ -1,0 +1,165 @@
+"""The point nearest to a target that keeps all strips, for any number of unknowns: a dual active-set method.
+
+Starting from the target itself, sides that are missed are added one by one, and sides that push the wrong way are
+dropped, until all are kept; docs/model.md, section 5. It starts from the sides that a similar problem was left with,
+which most often are the answer.
+
+Source:
+    Goldfarb & Idnani 1983, "A numerically stable dual method for solving strictly convex quadratic programs", with
+    the identity as its matrix.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from sagline.arrays import Array, Indices
+from sagline.kernels.algebra.gram_schmidt import keep, take_out
+from sagline.kernels.algebra.strips import inward, most_missed, side_of
+from sagline.kernels.jit import glue, kernel
+from sagline.kernels.memory import Memory, block
+
+EXCHANGES = 2000
+DEPENDENT = 1e-10  # a side that leaves less than this of itself outside the span of others depends on them
+
+# rows of the pushes
+PUSH, SHARE = 0, 1  # how hard each held side pushes; how the one that enters is made of them
+
+
+class Held(NamedTuple):
+    """The sides a nearest point stands on, and the memory to find them in.
+
+    Attributes:
+        labels: How many, then their labels, (d + 2,).
+        frame: Their orthonormal frame, and a row for the one that enters, (d + 1, d).
+        triangle: What makes them of it, (d + 1, d + 1).
+        pushes: Rows PUSH and SHARE, (2, d + 1).
+    """
+
+    labels: Indices
+    frame: Array
+    triangle: Array
+    pushes: Array
+
+
+@glue
+def new_held(memory: Memory, d: int) -> tuple[Held, Memory]:
+    """Room for d unknowns, and the memory that is left."""
+    frame, at = block(memory.numbers, 0, d + 1, d)
+    triangle, at = block(memory.numbers, at, d + 1, d + 1)
+    pushes, at = block(memory.numbers, at, 2, d + 1)
+    labels = memory.counters[: d + 2]
+    return Held(labels, frame, triangle, pushes), Memory(memory.numbers[at:], memory.counters[d + 2 :])
+
+
+@glue
+def stand_on_held(rows: Array, strips: Array, held: Held, target: Array, point: Array) -> bool:
+    """Fill the point of the held sides' common edge that is nearest to the target; False if that is not optimal."""
+    labels, frame, triangle, pushes = held
+    count, d = labels[0], point.size
+    for k in range(d):
+        point[k] = target[k]
+    for c in range(count):  # how far the edge is from the target along row c of the frame
+        label = labels[1 + c]
+        miss = side_of(strips, label)
+        size = 0.0
+        for k in range(d):
+            frame[c, k] = inward(label) * rows[k, label // 2]
+            size += frame[c, k] * frame[c, k]
+            miss -= frame[c, k] * target[k]
+        square = take_out(frame, c, triangle)
+        if not square > DEPENDENT * size:
+            return False
+        keep(frame, c, triangle, square)
+        for b in range(c):
+            miss -= triangle[b, c] * pushes[SHARE, b]
+        pushes[SHARE, c] = miss / triangle[c, c]
+        for k in range(d):
+            point[k] += pushes[SHARE, c] * frame[c, k]
+    for c in range(count - 1, -1, -1):
+        push = pushes[SHARE, c]
+        for b in range(c + 1, count):
+            push -= triangle[c, b] * pushes[PUSH, b]
+        pushes[PUSH, c] = push / triangle[c, c]
+        if pushes[PUSH, c] < 0.0:
+            return False
+    return True
+
+
+@glue
+def drop(rows: Array, held: Held, leaving: int) -> None:
+    """Let go of the held side at a place, and make the frame of the others anew."""
+    labels, frame, triangle, pushes = held
+    count = labels[0] - 1
+    labels[0] = count
+    for c in range(leaving, count):
+        labels[1 + c] = labels[2 + c]
+        pushes[PUSH, c] = pushes[PUSH, c + 1]
+    for c in range(leaving, count):
+        for k in range(rows.shape[0]):
+            frame[c, k] = inward(labels[1 + c]) * rows[k, labels[1 + c] // 2]
+        keep(frame, c, triangle, take_out(frame, c, triangle))
+
+
+@kernel
+def nearest_point(rows: Array, strips: Array, target: Array, slack: float, held: Held, point: Array) -> bool:
+    """Fill the point (d,) nearest to the target (d,) that keeps all strips up to a slack; False where there is none.
+
+    held: what a similar problem left, or labels[0] = 0; filled with what this point stands on.
+    """
+    labels, frame, triangle, pushes = held
+    d = target.size
+    if labels[0] > 0 and not stand_on_held(rows, strips, held, target, point):
+        labels[0] = 0
+    if labels[0] == 0:
+        for k in range(d):
+            point[k] = target[k]
+    for exchange in range(EXCHANGES):
+        entering = most_missed(rows, strips, point, slack, exchange > EXCHANGES // 2)
+        if entering < 0:
+            return True
+        push = 0.0
+        for _ in range(d + 1):
+            count = labels[0]
+            size = 0.0
+            for k in range(d):
+                frame[count, k] = inward(entering) * rows[k, entering // 2]
+                size += frame[count, k] * frame[count, k]
+            square = take_out(frame, count, triangle)
+            first = math.inf
+            leaving = -1
+            for c in range(count - 1, -1, -1):
+                share = triangle[c, count]
+                for b in range(c + 1, count):
+                    share -= triangle[c, b] * pushes[SHARE, b]
+                pushes[SHARE, c] = share / triangle[c, c]
+            for c in range(count):
+                if pushes[SHARE, c] > 0.0 and pushes[PUSH, c] / pushes[SHARE, c] < first:
+                    first = pushes[PUSH, c] / pushes[SHARE, c]
+                    leaving = c
+            full = math.inf
+            if count < d and square > DEPENDENT * DEPENDENT * size:
+                miss = side_of(strips, entering)
+                for k in range(d):
+                    miss -= inward(entering) * rows[k, entering // 2] * point[k]
+                full = max(miss, 0.0) / square
+            step = min(first, full)
+            if step == math.inf:
+                labels[0] = 0
+                return False
+            for c in range(count):
+                pushes[PUSH, c] -= step * pushes[SHARE, c]
+            push += step
+            if full < math.inf:
+                for k in range(d):
+                    point[k] += step * frame[count, k]
+            if full <= first:
+                labels[1 + count] = entering
+                pushes[PUSH, count] = push
+                keep(frame, count, triangle, square)
+                labels[0] = count + 1
+                break
+            drop(rows, held, leaving)
+    labels[0] = 0
+    return False

@@ -1,0 +1,132 @@
+"""Inverse kinematics of a batch of poses: tensions that balance the platform, and the lengths to wind.
+
+docs/model.md, sections 4 and 5. For the exact cable the pulls T_z - tau sin phi depend on the tensions: the balance is
+solved again with the pulls of the last round until they stand still.
+"""
+
+from __future__ import annotations
+
+import math
+
+from sagline.arrays import Array, Codes, Indices
+from sagline.kernels import tables
+from sagline.kernels.balance import geometry as g
+from sagline.kernels.balance.freedom import turns
+from sagline.kernels.balance.setting import Balance, Limits, Platform, need, new_balance, set_pose
+from sagline.kernels.cable.cables import Cables, new_cables
+from sagline.kernels.cable.terms import Model
+from sagline.kernels.codes import CABLE_SOLVED, CLOSEST, POSE_NO_CHORD, POSE_SINGULAR, POSE_SOLVED
+from sagline.kernels.inverse.rounds import remember, share_and_hang
+from sagline.kernels.jit import entry, glue
+from sagline.kernels.memory import Memory
+from sagline.kernels.sharing.nearest import Sharing, new_nearness
+from sagline.kernels.sharing.room import new_room
+
+FORCE, MOMENT = 0, 1  # columns of the residuals
+
+# as they come from Python, which passes plain tuples fastest
+ModelTerms = tuple[int, float, float]  # code, k_h, k_p
+SharingTerms = tuple[int, float, int, Array, Array]  # Sharing
+LimitTerms = tuple[int, float]  # Limits
+Robots = tuple[Array, Array, Array]  # freedom, bodies, robots
+Answers = tuple[Array, Codes, Array, Array, Codes]  # results, statuses, residuals, needed, pose_statuses
+
+
+@entry
+def inverse_poses(
+    model_terms: ModelTerms,
+    sharing_terms: SharingTerms,
+    limit_terms: LimitTerms,
+    robot_terms: Robots,
+    poses: Array,
+    wrenches: Array,
+    previous: Array,
+    room: tuple[Array, Indices],
+    otherwise: bool | None,
+    answers: Answers,
+    first: int,
+    last: int,
+) -> None:
+    """Solve part of a batch, pose by pose; with CLOSEST each feasible pose's tensions are the reference of the next.
+
+    Args:
+        model_terms: Cable model: code, k_h, k_p.
+        sharing_terms: How the load is shared: `Sharing`.
+        limit_terms: What tensions must keep: `Limits`.
+        robot_terms: Rows of the structure matrix that count, translations first, (n, 6); body_table, (1 or N,
+            BODY_COLUMNS); cable_table, (1 or N, m, CABLE_COLUMNS).
+        poses: Rows (N, POSE_COLUMNS).
+        wrenches: External plus inertial, about the center of mass, (1 or N, 6).
+        previous: Tensions in the sharing's variable (m,) to stay close to, NaN for the minimum norm; with CLOSEST the
+            last feasible ones on return.
+        room: `memory_for` as many cables.
+        otherwise: None for the ways of sharing nearest to a reference, in chord or horizontal tensions: all others are
+            then left out of the machine code. True for any.
+        answers: Filled: span, rise, length, T_x, T_z, tau, (RESULT_ROWS, N, m); status of each cable, (N, m); norms of
+            the unbalanced force [N] and moment [N m] along the free motions, (N, 2); the wrench that J tau had to
+            supply, along them, (N, n); status of each pose, (N,).
+        first: Pose to begin with.
+        last: Pose to end before.
+    """
+    sharing = Sharing(*sharing_terms)
+    limits = Limits(*limit_terms)
+    freedom, bodies, robots = robot_terms
+    results, statuses, residuals, needed, pose_statuses = answers
+    m = statuses.shape[1]
+    n = freedom.shape[0]
+    cables, rest = new_cables(Memory(*room), m)
+    balance, rest = new_balance(rest, m, n)
+    near, rest = new_nearness(rest, m - n)
+    others = None if otherwise is None else new_room(sharing.method, rest, m, m - n)
+    for p in range(first, last):
+        body = bodies[min(p, bodies.shape[0] - 1)]
+        wrench = wrenches[min(p, wrenches.shape[0] - 1)]
+        platform = Platform(freedom, body, robots[min(p, robots.shape[0] - 1)], poses[p], wrench)
+        model = Model(model_terms[0], model_terms[1], model_terms[2], body[tables.GRAVITY])
+        for i in range(m):
+            statuses[p, i] = CABLE_SOLVED
+        status = set_pose(model, limits, sharing.variable, sharing.weight, platform, cables, balance)
+        if status == POSE_SOLVED:
+            status = share_and_hang(model, sharing, platform, cables, balance, previous, near, others, statuses[p])
+        if status == POSE_SOLVED:
+            measure_balance(platform, cables, balance, residuals[p])
+            if sharing.method == CLOSEST:
+                remember(model, sharing, cables, others, previous)
+        else:
+            residuals[p, FORCE] = residuals[p, MOMENT] = math.nan
+        for k in range(n):
+            supplied = status != POSE_NO_CHORD and status != POSE_SINGULAR
+            needed[p, k] = balance.right[k] if supplied else math.nan
+        pose_statuses[p] = status
+        write(status == POSE_SOLVED, cables, balance, results, p)
+
+
+@glue
+def measure_balance(platform: Platform, cables: Cables, balance: Balance, residuals: Array) -> None:
+    """Fill the norms of the unbalanced force [N] and moment [N m] along the platform's free motions."""
+    need(platform, cables, balance)
+    force = 0.0
+    moment = 0.0
+    for k in range(balance.right.size):
+        total = -balance.right[k]
+        for i in range(cables.tau.size):
+            total += balance.matrix[k, i] * cables.tau[i]
+        if turns(platform.freedom, k):
+            moment += total * total
+        else:
+            force += total * total
+    residuals[FORCE] = math.sqrt(force)
+    residuals[MOMENT] = math.sqrt(moment)
+
+
+@glue
+def write(solved: bool, cables: Cables, balance: Balance, results: Array, p: int) -> None:
+    """Write one pose's answer; no plausible numbers where there is none: span and rise stay, the rest is NaN."""
+    for i in range(cables.tau.size):
+        tension = cables.tau[i] if solved else math.nan
+        results[tables.SPAN, p, i] = balance.geometry[g.SPAN, i]
+        results[tables.RISE, p, i] = balance.geometry[g.RISE, i]
+        results[tables.LENGTH, p, i] = cables.ratio[i] * cables.chord[i] if solved else math.nan
+        results[tables.HORIZONTAL, p, i] = tension * cables.cosine[i]
+        results[tables.VERTICAL, p, i] = tension * cables.sine[i] + cables.pull[i]
+        results[tables.TENSION, p, i] = tension

@@ -1,0 +1,129 @@
+"""Questions about poses beside their inverse: the polygon of feasible tensions, and margins."""
+
+from __future__ import annotations
+
+import math
+
+from sagline.arrays import Array, Indices
+from sagline.kernels import tables
+from sagline.kernels.algebra.strips import STRIP_ROWS
+from sagline.kernels.balance.freedom import turns
+from sagline.kernels.balance.setting import (
+    Limits,
+    Platform,
+    need,
+    new_balance,
+    set_pose,
+    start_from_minimum_norm,
+)
+from sagline.kernels.cable.cables import new_cables
+from sagline.kernels.cable.terms import Model
+from sagline.kernels.codes import CHORD_TENSION, FRAME_END_TENSION, POSE_NO_CHORD
+from sagline.kernels.inverse.frame_end import linearize_ends
+from sagline.kernels.inverse.poses import LimitTerms, ModelTerms, Robots, SharingTerms
+from sagline.kernels.jit import entry
+from sagline.kernels.memory import Memory
+from sagline.kernels.sharing.margin import capacity_margin
+from sagline.kernels.sharing.nearest import Sharing
+from sagline.kernels.sharing.on_polygon import feasible_interval
+from sagline.kernels.sharing.polygon import feasible_polygon
+
+
+@entry
+def polygon_of_pose(
+    model_terms: ModelTerms,
+    sharing_terms: SharingTerms,
+    limit_terms: LimitTerms,
+    robot_terms: Robots,
+    pose: Array,
+    wrench: Array,
+    carried: tuple[Array, Array],
+    room: tuple[Array, Indices],
+    polygon: tuple[Array, Array, Array, Array, Array, Indices],
+) -> int:
+    """The feasible set of one pose with the pulls that its cables have at given chord tensions; number of corners.
+
+    Args:
+        model_terms: As in `inverse_poses`.
+        sharing_terms: As in `inverse_poses`; its variable counts.
+        limit_terms: As in `inverse_poses`.
+        robot_terms: As in `inverse_poses`, of one robot.
+        pose: Row (POSE_COLUMNS,).
+        wrench: External plus inertial, about the center of mass, (6,).
+        carried: Chord tensions and pulls of the cables, (m,) each; NaN for pulls of first order.
+        room: `memory_for` as many cables.
+        polygon: Filled: scale and offset of the variable, (m,) each; minimum norm and limits, (3, m); null space
+            (r, m); for r = 2 corners and labels as `feasible_polygon`; for r = 1 corners[0, 0] and corners[1, 0] are
+            the ends of the interval (infinite where it has none); for r = 0 nothing more.
+    """
+    sharing = Sharing(*sharing_terms)
+    freedom, bodies, robots = robot_terms
+    tensions, pulls = carried
+    scale, offset, strips, null, corners, labels = polygon
+    r, m = null.shape
+    cables, rest = new_cables(Memory(*room), m)
+    balance, rest = new_balance(rest, m, freedom.shape[0])
+    platform = Platform(freedom, bodies[0], robots[0], pose, wrench)
+    model = Model(model_terms[0], model_terms[1], model_terms[2], bodies[0, tables.GRAVITY])
+    set_pose(model, Limits(*limit_terms), sharing.variable, sharing.weight, platform, cables, balance)
+    if not math.isnan(tensions[0]):
+        for i in range(m):
+            cables.tau[i] = tensions[i]
+            cables.pull[i] = pulls[i]
+        if sharing.variable == FRAME_END_TENSION:
+            linearize_ends(model, sharing, cables, balance)
+    need(platform, cables, balance)
+    start_from_minimum_norm(balance)
+    for i in range(m):
+        scale[i] = balance.scale[i]
+        offset[i] = balance.offset[i]
+        for row in range(STRIP_ROWS):
+            strips[row, i] = balance.strips[row, i]
+        for k in range(r):
+            null[k, i] = balance.null[k, i]
+    count = 1
+    if r == 1:
+        corners[0, 0], corners[1, 0] = feasible_interval(strips, null)
+        count = 2
+    elif r == 2:
+        count = feasible_polygon(strips, null, corners, labels)
+    return count
+
+
+@entry
+def margins_of_poses(
+    model_terms: ModelTerms,
+    limit_terms: LimitTerms,
+    robot_terms: Robots,
+    poses: Array,
+    wrenches: Array,
+    pulls: Array,
+    room: tuple[Array, Indices],
+    margins: Array,
+) -> None:
+    """Fill the capacity margins [N] (N,) of poses whose cables have given pulls (N, m); NaN where they have none."""
+    limits = Limits(*limit_terms)
+    freedom, bodies, robots = robot_terms
+    count, m = pulls.shape
+    n = freedom.shape[0]
+    cables, rest = new_cables(Memory(*room), m)
+    balance, rest = new_balance(rest, m, n)
+    weight = rest.numbers[:m]
+    rest = Memory(rest.numbers[m:], rest.counters)
+    for i in range(m):
+        weight[i] = 1.0
+    translations = 0
+    for k in range(n):
+        translations += 0 if turns(freedom, k) else 1
+    for p in range(count):
+        margins[p] = math.nan
+        body = bodies[min(p, bodies.shape[0] - 1)]
+        wrench = wrenches[min(p, wrenches.shape[0] - 1)]
+        platform = Platform(freedom, body, robots[min(p, robots.shape[0] - 1)], poses[p], wrench)
+        model = Model(model_terms[0], model_terms[1], model_terms[2], body[tables.GRAVITY])
+        placed = set_pose(model, limits, CHORD_TENSION, weight, platform, cables, balance) != POSE_NO_CHORD
+        if placed and not math.isnan(pulls[p, 0]):
+            for i in range(m):
+                cables.pull[i] = pulls[p, i]
+            need(platform, cables, balance)
+            margins[p] = capacity_margin(balance.matrix, balance.right, cables.low, cables.high, translations, rest)

@@ -1,0 +1,48 @@
+"""What the ways of sharing that are no nearest ones work in, and keep from round to round of one pose."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from sagline.arrays import Array, Indices
+from sagline.kernels.algebra.linear_program import Basis, new_basis
+from sagline.kernels.codes import LOWEST_SUM
+from sagline.kernels.jit import glue
+from sagline.kernels.memory import Memory, block
+from sagline.kernels.sharing.polygon import SPARE_CORNERS
+
+
+class Room(NamedTuple):
+    """Memory with a meaning.
+
+    Attributes:
+        corners: Of the feasible polygon, (2m + SPARE_CORNERS, 2).
+        labels: Of its sides, (2m + SPARE_CORNERS,).
+        known: How many corners the polygon of the last round had, (1,); 0 for none.
+        basis: Of the linear program of the last round.
+        rest: Memory that keeps nothing.
+    """
+
+    corners: Array
+    labels: Indices
+    known: Indices
+    basis: Basis
+    rest: Memory
+
+
+@glue
+def new_room(method: int, memory: Memory, m: int, r: int) -> Room:
+    """Room for m cables, r of them redundant."""
+    corner_count = 2 * m + SPARE_CORNERS
+    corners, at = block(memory.numbers, 0, corner_count, 2)
+    labels = memory.counters[1 : 1 + corner_count]
+    rest = Memory(memory.numbers[at:], memory.counters[1 + corner_count :])
+    basis, rest = new_basis(rest, r if method == LOWEST_SUM else r + 1)
+    return Room(corners, labels, memory.counters[:1], basis, rest)
+
+
+@glue
+def forget(room: Room) -> None:
+    """A new pose: nothing is known from the one before."""
+    room.known[0] = 0
+    room.basis.labels[0] = -1
