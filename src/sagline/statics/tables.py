@@ -20,15 +20,7 @@ def cable_table(robot: Robots) -> Array:
         Array of shape (1 or N, m, CABLE_COLUMNS).
     """
     robots = (robot,) if isinstance(robot, Robot) else robot
-    columns = (
-        np.stack([one.frame_anchors for one in robots]),
-        np.stack([one.platform_anchors for one in robots]),
-        np.stack([one.cables.linear_density for one in robots])[..., None],
-        np.stack([one.cables.axial_stiffness for one in robots])[..., None],
-        np.stack([one.tension_min for one in robots])[..., None],
-        np.stack([one.tension_max for one in robots])[..., None],
-    )
-    return locked(np.concatenate(columns, axis=-1))
+    return locked(np.array([_cable_rows(one) for one in robots]))
 
 
 def body_table(robot: Robots) -> Array:
@@ -48,3 +40,16 @@ def pose_rows(pose: Pose) -> Array:
     """Positions and quaternions of a pose or a batch, shape (N, POSE_COLUMNS); N = 1 for a single pose."""
     rows = np.concatenate((np.atleast_2d(pose.position), np.atleast_2d(pose.quaternion)), axis=1)
     return locked(rows)
+
+
+def _cable_rows(robot: Robot) -> Array:
+    """One robot's rows of `cable_table`, (m, CABLE_COLUMNS)."""
+    columns = (
+        robot.frame_anchors,
+        robot.platform_anchors,
+        robot.cables.linear_density[:, None],
+        robot.cables.axial_stiffness[:, None],
+        robot.tension_min[:, None],
+        robot.tension_max[:, None],
+    )
+    return np.hstack(columns)
