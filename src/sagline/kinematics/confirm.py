@@ -61,6 +61,14 @@ def confirm(plan: Plan) -> Confirmation:
 
     Returns:
         The plan with the poses found.
+
+    Examples:
+        >>> import numpy as np
+        >>> import sagline as sl
+        >>> path = sl.quintic_path([(0, 0, 2), (2, 1, 2.5)], durations=4.0)
+        >>> proof = sl.confirm(sl.inverse(sl.load_robot("cogiro"), path, model=sl.Elastic()))
+        >>> print(f"{1e3 * np.linalg.norm(proof.position_error, axis=1).max():.2f} mm off")
+        0.23 mm off
     """
     state, lengths = plan.state, plan.unstrained_length
     if not state.pose.shape:
@@ -68,8 +76,8 @@ def confirm(plan: Plan) -> Confirmation:
         return Confirmation(plan, found.pose, found.status, found.wrench_residual)
     blocks = []
     for first in range(0, len(lengths), BLOCK):
-        part = slice(first, first + BLOCK)
-        found = forward(state.robot, lengths[part], start=state.pose[part], wrench=state.wrench[part])
+        part = state[first : first + BLOCK]
+        found = forward(part.robot, part.cables.unstrained_length, start=part.pose, wrench=part.wrench)
         blocks.append((found.pose.position, found.pose.quaternion, found.status, found.wrench_residual))
     position, quaternion, status, residual = (locked(np.concatenate(parts)) for parts in zip(*blocks, strict=True))
     return Confirmation(plan, Pose._adopt(position, quaternion), status, residual)

@@ -15,7 +15,7 @@ from sagline.kinematics.forward_solution import ForwardSolution
 from sagline.kinematics.forward_status import STABLE
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
-from sagline.robot.robot import Robot
+from sagline.robot.several import Robots, cables_of, first_of
 from sagline.statics.tables import body_table, cable_table
 
 
@@ -29,7 +29,13 @@ class Found(NamedTuple):
     pose_status: Codes
 
     def keep(self, samples: Indices, other: Found, which: Indices) -> None:
-        """Replace the answers of some samples by some of another's."""
+        """Replace the answers of some samples by some of another's.
+
+        Args:
+            samples: Which to replace (k,).
+            other: The answers to take from.
+            which: Which of those to take (k,).
+        """
         self.poses[samples] = other.poses[which]
         self.results[:, samples] = other.results[:, which]
         self.cable_status[samples] = other.cable_status[which]
@@ -37,7 +43,14 @@ class Found(NamedTuple):
         self.pose_status[samples] = other.pose_status[which]
 
     def part(self, samples: Indices) -> Found:
-        """The answers of some samples."""
+        """The answers of some samples.
+
+        Args:
+            samples: Which (k,).
+
+        Returns:
+            Copies of their answers.
+        """
         return Found(
             self.poses[samples],
             self.results[:, samples],
@@ -48,7 +61,15 @@ class Found(NamedTuple):
 
     @classmethod
     def empty(cls, count: int, cables: int) -> Found:
-        """Room for a batch."""
+        """Room for a batch.
+
+        Args:
+            count: Number of samples N.
+            cables: Number of cables m.
+
+        Returns:
+            Arrays to be filled.
+        """
         return cls(
             np.empty((count, tables.POSE_COLUMNS)),
             np.empty((tables.RESULT_ROWS, count, cables)),
@@ -62,13 +83,22 @@ class Found(NamedTuple):
         """Whether each sample is a stable equilibrium, (N,)."""
         return np.isin(self.pose_status, STABLE)
 
-    def cables(self, robot: Robot, model: CableModel, shape: tuple[int, ...]) -> CableState:
-        """The cables of the batch in the caller's shape, () or (N,)."""
-        wide = (*shape, robot.cable_count)
+    def cables(self, robot: Robots, model: CableModel, shape: tuple[int, ...]) -> CableState:
+        """The cables of the batch in the caller's shape.
+
+        Args:
+            robot: The robot, or one a sample.
+            model: Cable model.
+            shape: () for a single sample, (N,) for a batch.
+
+        Returns:
+            State with fields of shape (m,) or (N, m).
+        """
+        wide = (*shape, self.cable_status.shape[1])
         return CableState(
             model=model,
-            cable=robot.cables,
-            gravity=robot.gravity,
+            cable=cables_of(robot),
+            gravity=first_of(robot).gravity,
             span=locked(self.results[tables.SPAN].reshape(wide)),
             rise=locked(self.results[tables.RISE].reshape(wide)),
             unstrained_length=locked(self.results[tables.LENGTH].reshape(wide)),
@@ -80,13 +110,24 @@ class Found(NamedTuple):
 
     def solution(
         self,
-        robot: Robot,
+        robot: Robots,
         model: CableModel,
         load: Array,
         shape: tuple[int, ...],
         covariance: Array | None = None,
     ) -> ForwardSolution:
-        """The batch in the caller's shape, () or (N,)."""
+        """The batch in the caller's shape, () or (N,).
+
+        Args:
+            robot: The robot, or one a sample.
+            model: Cable model.
+            load: External plus inertial wrench, shape (6,) or (N, 6).
+            shape: () for a single sample, (N,) for a batch.
+            covariance: Of the poses, shape (N, 6, 6), or None.
+
+        Returns:
+            ForwardSolution around these arrays.
+        """
         pose = Pose._adopt(self.poses[:, :3].reshape(*shape, 3), self.poses[:, 3:].reshape(*shape, 4))
         whole = locked(np.ascontiguousarray(np.broadcast_to(load, (*shape, 6))))
         residuals = self.numbers[:, [kernel.FORCE_RESIDUAL, kernel.MOMENT_RESIDUAL]]
@@ -102,7 +143,7 @@ class Found(NamedTuple):
 
 
 def solve_rows(
-    robot: Robot,
+    robot: Robots,
     model: CableModel,
     lengths: Array,
     starts: Array,
@@ -114,16 +155,19 @@ def solve_rows(
     """Run the kernel over samples.
 
     Args:
-        robot: The robot.
+        robot: The robot, or one a sample.
         model: Cable model; straight cables are fitted.
         lengths: Unstrained lengths (N, m).
         starts: Pose rows (1 or N, POSE_COLUMNS).
         wrenches: External plus inertial (1 or N, 6).
         chained: Whether each sample starts where the last one ended.
         freedom: Motions to allow (n, 6); None for those of the robot.
+
+    Returns:
+        The answers.
     """
     found = Found.empty(*lengths.shape)
-    allowed = robot.freedom if freedom is None else freedom
+    allowed = first_of(robot).freedom if freedom is None else freedom
     given = (allowed, body_table(robot), cable_table(robot), lengths, starts, wrenches)
     filled: tuple[Any, ...] = found
     if model.code == codes.STRAIGHT:

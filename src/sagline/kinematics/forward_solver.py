@@ -102,6 +102,9 @@ class ForwardSolver:
     def reset(self, start: Pose | None = None) -> None:
         """Forget the last pose: the next step begins at a start, or searches.
 
+        Args:
+            start: Where the next step begins; None: it searches.
+
         Raises:
             InvalidValueError: If start is a batch.
         """

@@ -17,7 +17,7 @@ from sagline.kernels import codes, tables
 from sagline.kernels.inverse.poses import inverse_poses
 from sagline.kernels.jit import machine_code
 from sagline.kernels.memory import memory_for
-from sagline.kinematics.inverse import Found, explained
+from sagline.kinematics.inverse_rows import Found, explained
 from sagline.kinematics.status import PoseStatus
 from sagline.robot.robot import Robot
 from sagline.statics.tables import robot_terms
@@ -55,6 +55,13 @@ class InverseSolver:
 
     It owns its working memory and, for `Closest`, the last feasible tensions: `reset` forgets them. One solver
     serves one control loop; it is not to be shared between threads.
+
+    Examples:
+        >>> import sagline as sl
+        >>> solver = sl.InverseSolver(sl.load_robot("cogiro"))
+        >>> step = solver.step((1.0, 1.0, 2.0), (0.0, 0.0, 0.0, 1.0))
+        >>> print(step.status.name, step.unstrained_length[:3].round(3))
+        SOLVED [11.049 10.542  9.674]
     """
 
     def __init__(self, robot: Robot, model: CableModel | None = None, tension: TensionMethod | None = None) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from sagline.arrays import Array, locked
 from sagline.kernels.forward.sensitivity import BY_DENSITY, BY_LENGTH, BY_STIFFNESS, describe_states
 from sagline.robot.equilibrium import Equilibrium
-from sagline.robot.robot import Robot
+from sagline.robot.several import bodies_of, first_of
 from sagline.statics.tables import body_table, cable_table, pose_rows
 
 _SINGULAR = 1e-14  # determinant, at diagonal elements of 1
@@ -103,7 +103,7 @@ def stiffness(state: Equilibrium) -> Stiffness:
         docs/model.md, section 6.
     """
     slopes = cable_slopes(state)
-    compliance = _compliance(state.robot, slopes.matrix)
+    compliance = _compliance(first_of(state.robot).freedom, slopes.matrix)
     return Stiffness(
         state=state,
         matrix=locked(slopes.matrix),
@@ -130,7 +130,7 @@ def modes(state: Equilibrium) -> Modes:
         >>> print(sl.modes(plan.state).frequency.round(2), "Hz")
         [ 4.38  5.31  6.93  8.05 10.88 13.17] Hz
     """
-    freedom = state.robot.freedom
+    freedom = first_of(state.robot).freedom
     matrix = freedom @ cable_slopes(state).matrix @ freedom.T
     lower = np.linalg.cholesky(freedom @ _mass_matrix(state) @ freedom.T)
     inverse = np.linalg.inv(lower)
@@ -152,8 +152,8 @@ def cable_slopes(state: Equilibrium) -> CableSlopes:
     Returns:
         The slopes; NaN where the state has no lengths.
     """
-    robot, cables = state.robot, state.cables
-    shape, m = state.pose.shape, robot.cable_count
+    shared, cables = first_of(state.robot), state.cables
+    shape, m = state.pose.shape, shared.cable_count
     lengths = np.atleast_2d(cables.unstrained_length)
     count = len(lengths)
     matrices = np.empty((count, 6, 6))
@@ -163,9 +163,9 @@ def cable_slopes(state: Equilibrium) -> CableSlopes:
     describe_states(
         cables.model.code,
         *cables.model.parameters,
-        robot.freedom,
-        body_table(robot),
-        cable_table(robot),
+        shared.freedom,
+        body_table(state.robot),
+        cable_table(state.robot),
         locked(lengths.view()),
         pose_rows(state.pose),
         locked(np.atleast_2d(state.wrench).view()),
@@ -197,9 +197,8 @@ def on_platform(forces: Array, levers: Array) -> Array:
     return np.swapaxes(np.concatenate((forces, np.cross(levers, forces)), axis=-1), -1, -2)
 
 
-def _compliance(robot: Robot, matrix: Array) -> Array:
+def _compliance(freedom: Array, matrix: Array) -> Array:
     """Inverse on the free motions, zero on the others; NaN where it is singular."""
-    freedom = robot.freedom
     return freedom.T @ _inverse(freedom @ matrix @ freedom.T) @ freedom
 
 
@@ -218,7 +217,8 @@ def _inverse(matrix: Array) -> Array:
 def _mass_matrix(state: Equilibrium) -> Array:
     """Mass and inertia about the center of mass in world axes, shape (..., 6, 6)."""
     rotation = state.pose.matrix
+    body = bodies_of(state.robot)
     mass = np.zeros((*state.pose.shape, 6, 6))
-    mass[..., :3, :3] = state.robot.mass * np.eye(3)
-    mass[..., 3:, 3:] = rotation @ state.robot.inertia @ np.swapaxes(rotation, -1, -2)
+    mass[..., :3, :3] = body.mass[..., None, None] * np.eye(3)
+    mass[..., 3:, 3:] = rotation @ body.inertia @ np.swapaxes(rotation, -1, -2)
     return mass

@@ -59,7 +59,14 @@ class TensionMethod:
         return 0.0
 
     def preference(self, cables: int) -> Array:
-        """Root weights and goals [N] of the cables as kernels know them, shape (PREFERENCE_ROWS, m)."""
+        """Root weights and goals of the cables as kernels know them.
+
+        Args:
+            cables: Number of cables m.
+
+        Returns:
+            Array of shape (PREFERENCE_ROWS, m); goals in N.
+        """
         rows = np.zeros((tables.PREFERENCE_ROWS, cables))
         rows[tables.ROOT_WEIGHT] = 1.0
         return locked(rows)

@@ -41,7 +41,17 @@ class QuadraticProgram(TensionMethod):
         object.__setattr__(self, "target", checked(self.target, "target", "N", low=0.0))
 
     def preference(self, cables: int) -> Array:
-        """Root weights, and targets times them."""
+        """Root weights, and targets times them.
+
+        Args:
+            cables: Number of cables m.
+
+        Returns:
+            Array of shape (PREFERENCE_ROWS, m).
+
+        Raises:
+            InvalidValueError: If there are weights or targets for another number of cables.
+        """
         rows = np.empty((tables.PREFERENCE_ROWS, cables))
         for row, name, values in (
             (tables.ROOT_WEIGHT, "weights", np.sqrt(np.asarray(self.weights))),
