@@ -26,7 +26,3 @@ POSE_COLUMNS = 7
 # rows of the result of one pose, each of m values
 SPAN, RISE, LENGTH, HORIZONTAL, VERTICAL, TENSION = 0, 1, 2, 3, 4, 5
 RESULT_ROWS = 6
-
-# rows of the preferences among cables
-ROOT_WEIGHT, GOAL = 0, 1  # square root of a cable's weight; tension to be near [N]
-PREFERENCE_ROWS = 2

@@ -9,7 +9,7 @@ import numpy as np
 
 from sagline.arrays import Array, checked, locked
 from sagline.errors import InvalidValueError
-from sagline.kernels import codes, tables
+from sagline.kernels import codes
 
 Variable = Literal["chord", "horizontal", "frame_end"]
 VARIABLES = {
@@ -17,6 +17,10 @@ VARIABLES = {
     "horizontal": codes.HORIZONTAL_TENSION,
     "frame_end": codes.FRAME_END_TENSION,
 }
+
+# rows of the preferences among cables
+ROOT_WEIGHT, GOAL = 0, 1  # square root of a cable's weight; tension to be near [N]
+PREFERENCE_ROWS = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,8 +71,8 @@ class TensionMethod:
         Returns:
             Array of shape (PREFERENCE_ROWS, m); goals in N.
         """
-        rows = np.zeros((tables.PREFERENCE_ROWS, cables))
-        rows[tables.ROOT_WEIGHT] = 1.0
+        rows = np.zeros((PREFERENCE_ROWS, cables))
+        rows[ROOT_WEIGHT] = 1.0
         return locked(rows)
 
     @property

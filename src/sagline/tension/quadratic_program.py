@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from sagline.arrays import Array, checked, locked
 from sagline.errors import InvalidValueError
-from sagline.kernels import codes, tables
-from sagline.tension.method import TensionMethod, Variable
+from sagline.kernels import codes
+from sagline.tension.method import GOAL, PREFERENCE_ROWS, ROOT_WEIGHT, TensionMethod, Variable
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,10 +52,10 @@ class QuadraticProgram(TensionMethod):
         Raises:
             InvalidValueError: If there are weights or targets for another number of cables.
         """
-        rows = np.empty((tables.PREFERENCE_ROWS, cables))
+        rows = np.empty((PREFERENCE_ROWS, cables))
         for row, name, values in (
-            (tables.ROOT_WEIGHT, "weights", np.sqrt(np.asarray(self.weights))),
-            (tables.GOAL, "target", np.asarray(self.target)),
+            (ROOT_WEIGHT, "weights", np.sqrt(np.asarray(self.weights))),
+            (GOAL, "target", np.asarray(self.target)),
         ):
             if values.shape not in ((), (cables,)):
                 raise InvalidValueError(name, f"of shape {values.shape}", f"() or ({cables},)", "Give one a cable.")
