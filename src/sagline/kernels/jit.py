@@ -10,7 +10,7 @@ import hashlib
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 from numba import config, njit
 from platformdirs import user_cache_path
@@ -32,23 +32,36 @@ def cache_folder() -> Path:
 FOLDER = cache_folder()
 
 
+def entry(function: F) -> F:
+    """A kernel that Python calls: compiled on first call, kept on disk; it runs without Python's global lock."""
+    return _compiled(function, nogil=True)
+
+
 def kernel(function: F) -> F:
-    """Compile on first call, keep the machine code on disk; a division by zero gives inf or NaN as in NumPy."""
-    return _compiled(function, forceinline=False)
+    """A kernel that only kernels call."""
+    return _compiled(function, **INNER)
 
 
 def formula(function: F) -> F:
-    """A kernel that is always inlined into its callers, so that their loops over it vectorize."""
-    return _compiled(function, forceinline=True)
+    """A kernel that the machine code of its callers contains, so that their loops over it vectorize."""
+    return _compiled(function, forceinline=True, **INNER)
 
 
-def _compiled(function: F, *, forceinline: bool) -> F:
+def glue(function: F) -> F:
+    """A kernel that becomes part of its callers before they are compiled: what it passes on costs nothing."""
+    return _compiled(function, inline="always")
+
+
+INNER = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # what Python would need, and takes time to compile
+
+
+def _compiled(function: F, **options: Any) -> F:
+    """Machine code is kept on disk; a division by zero gives inf or NaN as in NumPy."""
     # numba reads its cache folder while it decorates: set for that moment only, other users of numba keep theirs.
     before = getattr(config, "CACHE_DIR")  # noqa: B009 - set by numba at run time, unknown to type checkers
     setattr(config, "CACHE_DIR", str(FOLDER))  # noqa: B010
     try:
-        decorate = njit(cache=True, error_model="numpy", forceinline=forceinline)
-        return cast("F", decorate(function))
+        return cast("F", njit(cache=True, error_model="numpy", **options)(function))
     finally:
         setattr(config, "CACHE_DIR", before)  # noqa: B010
 

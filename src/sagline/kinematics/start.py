@@ -7,7 +7,7 @@ import numpy as np
 from sagline.arrays import Array, Flags, Indices, locked
 from sagline.cables.model import CableModel
 from sagline.kernels import codes, tables
-from sagline.kernels.forward import forward as kernel
+from sagline.kernels.forward.problem import ENERGY
 from sagline.kinematics.forward_rows import Found, solve_rows
 from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.pose import Pose
@@ -106,7 +106,7 @@ def _is_plausible(robot: Robot, found: Found) -> Flags:
 
 def _rank(robot: Robot, found: Found) -> Array:
     """Rows (status, cables outside their limits, energy) of which the smaller is the better, (N, 3)."""
-    energy = np.nan_to_num(found.numbers[:, kernel.ENERGY], nan=0.0)
+    energy = np.nan_to_num(found.numbers[:, ENERGY], nan=0.0)
     return np.stack((_POOR[found.pose_status].astype(np.float64), outside_limits(robot, found), energy), axis=1)
 
 

@@ -70,8 +70,9 @@ def _pose_of(robot: Robot, pose: Pose | None) -> Pose:
 def _cable_lines(robot: Robot, pose: Pose) -> tuple[Array, bool]:
     """Points of the cables in the world [m], shape (m, POINTS, 3), and whether tensions carry the platform."""
     plan = inverse(robot, pose)
-    table = np.empty((geometry.GEOMETRY_ROWS, robot.cable_count))
-    geometry.cable_geometry(cable_table(robot)[0], body_table(robot)[0], pose_rows(pose)[0], np.empty((3, 3)), table)
+    tables = np.empty((1, geometry.GEOMETRY_ROWS, robot.cable_count))
+    geometry.cable_geometries(cable_table(robot), body_table(robot), pose_rows(pose), tables)
+    table = tables[0]
     if plan.feasible:
         along, up = np.moveaxis(plan.state.cables.points(POINTS), -1, 0)
     else:

@@ -8,8 +8,8 @@ import numpy as np
 
 from sagline.arrays import Array, locked
 from sagline.kernels.balance import geometry as rows
-from sagline.kernels.balance.geometry import cable_geometry
-from sagline.kernels.balance.statics import structure_matrix as fill_structure_matrix
+from sagline.kernels.balance.geometry import cable_geometries
+from sagline.kernels.balance.statics import structure_matrices
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.tables import body_table, cable_table, pose_rows
@@ -29,11 +29,9 @@ class ArticleBalance(NamedTuple):
 
 def _geometry(robot: Robot, pose: Pose) -> Array:
     """Geometry rows of every pose, shape (N, GEOMETRY_ROWS, m)."""
-    cables, body, poses = cable_table(robot)[0], body_table(robot)[0], pose_rows(pose)
+    poses = pose_rows(pose)
     out = np.empty((len(poses), rows.GEOMETRY_ROWS, robot.cable_count))
-    rotation = np.empty((3, 3))
-    for row, geometry in zip(poses, out, strict=True):
-        cable_geometry(cables, body, row, rotation, geometry)
+    cable_geometries(cable_table(robot), body_table(robot), poses, out)
     return out
 
 
@@ -52,8 +50,7 @@ def structure_matrix(robot: Robot, pose: Pose) -> Array:
     """
     geometry = _geometry(robot, pose)
     out = np.empty((len(geometry), 6, robot.cable_count))
-    for row, matrix in zip(geometry, out, strict=True):
-        fill_structure_matrix(row, matrix)
+    structure_matrices(geometry, out)
     return locked((robot.freedom @ out).reshape(*pose.shape, robot.degrees_of_freedom, robot.cable_count))
 
 

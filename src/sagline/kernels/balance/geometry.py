@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from sagline.arrays import Array
 from sagline.kernels import tables
-from sagline.kernels.jit import formula
+from sagline.kernels.jit import entry, formula
 
 # docs/model.md, section 1. Rows of a geometry array, each of m values.
 SPAN, RISE, CHORD, SINE, COSINE = 0, 1, 2, 3, 4  # x_B, z_B, D, sin phi, cos phi
@@ -56,3 +58,13 @@ def cable_geometry(cables: Array, body: Array, pose: Array, rotation: Array, geo
         geometry[LEVER_X, i] = rotation[0, 0] * bx + rotation[0, 1] * by + rotation[0, 2] * bz
         geometry[LEVER_Y, i] = rotation[1, 0] * bx + rotation[1, 1] * by + rotation[1, 2] * bz
         geometry[LEVER_Z, i] = rotation[2, 0] * bx + rotation[2, 1] * by + rotation[2, 2] * bz
+
+
+@entry
+def cable_geometries(robots: Array, bodies: Array, poses: Array, geometries: Array) -> None:
+    """Fill the geometry rows of N poses, (N, GEOMETRY_ROWS, m); tables and poses as in `sagline.kernels.tables`."""
+    rotation = np.empty((3, 3))
+    for p in range(poses.shape[0]):
+        robot = robots[min(p, robots.shape[0] - 1)]
+        body = bodies[min(p, bodies.shape[0] - 1)]
+        cable_geometry(robot, body, poses[p], rotation, geometries[p])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from sagline.arrays import Array
 from sagline.kernels import tables
 from sagline.kernels.balance import geometry as g
-from sagline.kernels.jit import formula
+from sagline.kernels.jit import entry, formula
 
 
 @formula
@@ -74,3 +74,10 @@ def restrict_needed(freedom: Array, balance: Array) -> None:
             for j in range(6):
                 total += freedom[k, j] * balance[tables.NEEDED, j]
             balance[tables.RIGHT, k] = total
+
+
+@entry
+def structure_matrices(geometries: Array, matrices: Array) -> None:
+    """Fill J (N, 6, m) of the geometry rows of N poses."""
+    for p in range(geometries.shape[0]):
+        structure_matrix(geometries[p], matrices[p])

@@ -16,7 +16,7 @@ from sagline.kernels.cable.catenary import (
 from sagline.kernels.cable.models import from_length, from_tension
 from sagline.kernels.cable.terms import Chord, Material, Model, Terms
 from sagline.kernels.codes import CABLE_SOLVED, CATENARY
-from sagline.kernels.jit import kernel
+from sagline.kernels.jit import entry, kernel
 
 CHUNK = 256  # cables at a time: ten buffers of this length stay in the fastest cache
 
@@ -32,7 +32,7 @@ def lift(source: Array, start: int, stop: int, target: Array) -> None:
             target[i] = source[start + i]
 
 
-@kernel
+@entry
 def batch_from_tension(
     terms: Terms,
     span: Array,
@@ -90,7 +90,7 @@ def batch_from_tension(
             vertical_out[start + i] = tau[i] * sine[i] + pull[i]
 
 
-@kernel
+@entry
 def batch_from_length(
     terms: Terms,
     span: Array,
@@ -117,7 +117,7 @@ def batch_from_length(
         status_out[i] = status
 
 
-@kernel
+@entry
 def batch_end(
     horizontal: Array, vertical: Array, length: Array, weight: Array, stiffness: Array, x_out: Array, z_out: Array
 ) -> None:

@@ -10,7 +10,7 @@ from sagline.kernels.cable.models import sag_of_shallow
 from sagline.kernels.cable.shallow import shallow_length_ratio
 from sagline.kernels.cable.terms import Model, Terms
 from sagline.kernels.codes import CATENARY, ELASTIC, EMPIRICAL, STRAIGHT
-from sagline.kernels.jit import kernel
+from sagline.kernels.jit import entry, kernel
 
 
 @kernel
@@ -22,7 +22,7 @@ def catenary_point(
     return catenary_end(horizontal, vertical - weight * (length - part), part, weight, stiffness)
 
 
-@kernel
+@entry
 def shape_points(
     terms: Terms,
     span: Array,
@@ -77,7 +77,7 @@ def catenary_sag(
     return max(min(0.0, rise) - z, 0.0)
 
 
-@kernel
+@entry
 def sags(
     terms: Terms,
     span: Array,
@@ -100,7 +100,7 @@ def sags(
             sag_out[i] = shallow_drop(0.5, model, span[i], rise[i], vertical[i], tension[i])
 
 
-@kernel
+@entry
 def closures(
     terms: Terms,
     span: Array,

@@ -7,6 +7,7 @@ import math
 from sagline.arrays import Array, Flags
 from sagline.kernels import tables
 from sagline.kernels.balance import geometry as g
+from sagline.kernels.balance.freedom import turns
 from sagline.kernels.balance.statics import needed_wrench, restrict_needed
 from sagline.kernels.jit import formula, kernel
 from sagline.kernels.sharing.proof import prove_empty
@@ -15,12 +16,6 @@ from sagline.kernels.sharing.shortfall import wrench_shortfall
 # columns of the numbers that describe one pose's solution
 SHORTFALL, FORCE_RESIDUAL, MOMENT_RESIDUAL = 0, 1, 2
 POSE_NUMBERS = 3
-
-
-@formula
-def is_rotation(freedom: Array, k: int) -> bool:
-    """Whether free motion k of the platform turns it; the others, which come first, are translations."""
-    return freedom[k, 3] * freedom[k, 3] + freedom[k, 4] * freedom[k, 4] + freedom[k, 5] * freedom[k, 5] > 0.5
 
 
 @formula
@@ -44,7 +39,7 @@ def measure_balance(
         total = -balance[tables.RIGHT, k]
         for i in range(matrix.shape[1]):
             total += matrix[k, i] * work[tables.TAU, i]
-        if is_rotation(freedom, k):
+        if turns(freedom, k):
             moment += total * total
         else:
             force += total * total
@@ -60,7 +55,7 @@ def explain(
     n = freedom.shape[0]
     translations = 0
     for k in range(n):
-        translations += 0 if is_rotation(freedom, k) else 1
+        translations += 0 if turns(freedom, k) else 1
     prove_empty(work, inverse, null, translations, balance, blocking)
     return wrench_shortfall(
         matrix, balance[tables.RIGHT, :n], work[tables.CHORD_LOW], work[tables.CHORD_HIGH], translations

@@ -31,11 +31,11 @@ from sagline.kernels.inverse.answer import (
     store,
 )
 from sagline.kernels.inverse.rounds import remember, settle
-from sagline.kernels.jit import kernel
+from sagline.kernels.jit import entry
 from sagline.kernels.sharing.polygon import SPARE_CORNERS
 
 
-@kernel
+@entry
 def inverse_poses(
     code: int,
     k_h: float,

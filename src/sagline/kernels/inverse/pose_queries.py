@@ -10,6 +10,7 @@ from sagline.arrays import Array, Indices
 from sagline.kernels import tables
 from sagline.kernels.algebra.null_space import minimum_norm
 from sagline.kernels.balance import geometry as g
+from sagline.kernels.balance.freedom import turns
 from sagline.kernels.balance.geometry import cable_geometry
 from sagline.kernels.balance.setting import factor_balance, place_cables, scale_tensions
 from sagline.kernels.balance.statics import needed_wrench, restrict_needed, restrict_rows, structure_matrix
@@ -17,17 +18,14 @@ from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import (
     FRAME_END_TENSION,
 )
-from sagline.kernels.inverse.answer import (
-    is_rotation,
-)
 from sagline.kernels.inverse.frame_end import linearize_ends
-from sagline.kernels.jit import kernel
+from sagline.kernels.jit import entry
 from sagline.kernels.sharing.feasible_set import feasible_interval
 from sagline.kernels.sharing.margin import capacity_margin
 from sagline.kernels.sharing.polygon import feasible_polygon
 
 
-@kernel
+@entry
 def polygon_of_pose(
     code: int,
     k_h: float,
@@ -89,7 +87,7 @@ def polygon_of_pose(
     return feasible_polygon(work, null, corners, labels)
 
 
-@kernel
+@entry
 def margins_of_poses(
     code: int,
     k_h: float,
@@ -114,7 +112,7 @@ def margins_of_poses(
     matrix = np.empty((n, m))
     translations = 0
     for k in range(n):
-        translations += 0 if is_rotation(freedom, k) else 1
+        translations += 0 if turns(freedom, k) else 1
     for p in range(count):
         margins[p] = math.nan
         robot = robots[min(p, robots.shape[0] - 1)]
