@@ -17,7 +17,7 @@ FREEDOMS = {
 turns = from_python(kernels.turns)
 components_along = from_python(kernels.components_along)
 symmetric_part = from_python(kernels.symmetric_part)
-rows_along = from_python(kernels.rows_along)
+matrix_along = from_python(kernels.matrix_along)
 spread = from_python(kernels.spread)
 
 
@@ -25,17 +25,18 @@ spread = from_python(kernels.spread)
 def test_parts_and_motions(pattern: str) -> None:
     freedom, rng = FREEDOMS[pattern], np.random.default_rng(3)
     n = len(freedom)
-    scale, full, stiff = rng.uniform(0.5, 2.0, n), rng.normal(size=6), rng.normal(size=(6, 6))
+    unit, full, stiff = rng.uniform(0.5, 2.0, n), rng.normal(size=6), rng.normal(size=(6, 6))
+    free = unit[:, None] * freedom
     part, motion, matrix = np.empty(n), np.empty(6), np.empty((n, n))
-    assert components_along(freedom, full, scale, part) == pytest.approx(np.linalg.norm(part), rel=1e-14)
-    np.testing.assert_allclose(part, scale * (freedom @ full), rtol=1e-13, atol=1e-15)
-    spread(freedom, part, scale, motion)
-    np.testing.assert_allclose(motion, freedom.T @ (scale * part), rtol=1e-13, atol=1e-15)
-    scaled = np.diag(scale) @ freedom @ stiff @ freedom.T @ np.diag(scale)
-    rows_along(freedom, stiff, scale, matrix)
-    np.testing.assert_allclose(matrix, scaled, atol=1e-13)
-    symmetric_part(freedom, stiff, scale, matrix)
-    np.testing.assert_allclose(matrix, 0.5 * (scaled + scaled.T), atol=1e-13)
+    assert components_along(free, full, part) == pytest.approx(np.linalg.norm(part), rel=1e-14)
+    np.testing.assert_allclose(part, unit * (freedom @ full), rtol=1e-13, atol=1e-15)
+    spread(free, part, motion)
+    np.testing.assert_allclose(motion, freedom.T @ (unit * part), rtol=1e-13, atol=1e-15)
+    along = np.diag(unit) @ freedom @ stiff @ freedom.T @ np.diag(unit)
+    matrix_along(free, stiff, matrix)
+    np.testing.assert_allclose(matrix, along, atol=1e-13)
+    symmetric_part(free, stiff, matrix)
+    np.testing.assert_allclose(matrix, 0.5 * (along + along.T), atol=1e-13)
 
 
 def test_which_motions_turn() -> None:

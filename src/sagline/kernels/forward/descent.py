@@ -1,7 +1,7 @@
 """To an equilibrium from far: downhill in the energy, by Newton's method with a trust region.
 
-docs/model.md, section 6. It ends in a stable equilibrium from almost any start. Steps are in units of the problem's
-scale.
+docs/model.md, section 6. It ends in a stable equilibrium from almost any start. Steps are in the problem's
+units.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from sagline.kernels.balance.freedom import components_along, norm, symmetric_pa
 from sagline.kernels.forward.newton import BALANCED, NEAR
 from sagline.kernels.forward.platform import platform_energy, platform_stiffness, take_step, unbalance
 from sagline.kernels.forward.problem import Problem, Space, copy_pose
-from sagline.kernels.jit import glue, kernel
+from sagline.kernels.jit import glue
 
 DESCENT_STEPS = 150
 FIRST_RADIUS = 0.5  # of the trust region, in these units
@@ -20,7 +20,7 @@ LARGEST_RADIUS = 1.0
 NOISE = 4e-15  # of the sum of an energy's parts: what rounding leaves of it
 
 
-@kernel
+@glue
 def descend(problem: Problem, pose: Array, space: Space, known: float) -> tuple[int, float]:
     """Move pose downhill until a full Newton step is short; a start in balance stays where it is, stable or not.
 
@@ -29,7 +29,7 @@ def descend(problem: Problem, pose: Array, space: Space, known: float) -> tuple[
 
     Returns the number of steps tried, and that sum at the pose; 0 where the last pose tried was another.
     """
-    model, freedom, cables, body, _, wrench, scale = problem
+    model, cables, body, wrench, free = problem.model, problem.cables, problem.body, problem.wrench, problem.free
     trial, motion, rotation, rows, gradient = space.trial, space.motion, space.rotation, space.rows, space.gradient
     matrix, part, step = space.matrix, space.part, space.step
     radius = FIRST_RADIUS
@@ -42,7 +42,7 @@ def descend(problem: Problem, pose: Array, space: Space, known: float) -> tuple[
         new_energy, new_size = platform_energy(model, cables, body, wrench, trial, rotation, rows)
         fresh = True
         if iteration == 0:
-            if components_along(freedom, gradient, scale, part) <= BALANCED * tensions * norm(scale):
+            if components_along(free, gradient, part) <= BALANCED * tensions * problem.unit:
                 steps = 0
                 break
         else:
@@ -70,12 +70,12 @@ def descend(problem: Problem, pose: Array, space: Space, known: float) -> tuple[
             energy, size = new_energy, new_size
             if iteration > 0 or known == 0.0:
                 platform_stiffness(model, cables, rows, space.stiffness)
-                symmetric_part(freedom, space.stiffness, scale, matrix)
-            components_along(freedom, gradient, scale, part)
+                symmetric_part(free, space.stiffness, matrix)
+            components_along(free, gradient, part)
         shift = trust_step(matrix, part, radius, space.factor, motion, step)
         length = norm(step)
         promised = promised_gain(matrix, part, step)
-        take_step(freedom, scale, body, pose, step, motion, trial)
+        take_step(free, body, pose, step, motion, trial)
     return steps, tensions
 
 

@@ -31,7 +31,6 @@ from sagline.kernels.forward.problem import (
     Problem,
     Space,
     copy_pose,
-    fill_scales,
     leave_out,
     new_space,
     problem_at,
@@ -41,7 +40,7 @@ from sagline.kernels.jit import entry, glue, kernel
 
 FIT_STEPS = 200
 FIRST_DAMPING = 1e-3  # of the largest diagonal element
-SMALL_STEP = 1e-14  # in the units of the scale
+SMALL_STEP = 1e-14  # in the problem's units
 NOTHING = 1e-13  # share of the cost whose gain ends a fit
 
 
@@ -57,8 +56,8 @@ def misfit(cables: Array, body: Array, lengths: Array, pose: Array, rotation: Ar
 
 
 @glue
-def normal_equations(freedom: Array, scale: Array, lengths: Array, rows: Array, matrix: Array, part: Array) -> None:
-    """Fill matrix J^T J (n, n) and part J^T e (n,) of the length errors e, scaled."""
+def normal_equations(free: Array, lengths: Array, rows: Array, matrix: Array, part: Array) -> None:
+    """Fill matrix J^T J (n, n) and part J^T e (n,) of the length errors e along the free motions."""
     n = part.shape[0]
     full, row = np.empty(6), np.empty(n)
     for j in range(n):
@@ -69,7 +68,7 @@ def normal_equations(freedom: Array, scale: Array, lengths: Array, rows: Array, 
         for j in range(6):
             full[j] = 0.0
         add_force(rows, i, rows[g.COSINE, i], rows[g.SINE, i], full)
-        components_along(freedom, full, scale, row)
+        components_along(free, full, row)
         error = rows[g.CHORD, i] - lengths[i]
         for j in range(n):
             part[j] += row[j] * error
@@ -78,12 +77,12 @@ def normal_equations(freedom: Array, scale: Array, lengths: Array, rows: Array, 
 
 
 @glue
-def fit_pose(problem: Problem, pose: Array, space: Space) -> tuple[float, int, bool]:
+def fit_pose(problem: Problem, lengths: Array, pose: Array, space: Space) -> tuple[float, int, bool]:
     """Move pose to a least-squares fit; returns half the sum of squares [m^2], steps tried, and whether it is a fit."""
-    _, freedom, cables, body, lengths, _, scale = problem
+    cables, body, free = problem.cables, problem.body, problem.free
     rotation, rows = space.rotation, space.rows
     cost = misfit(cables, body, lengths, pose, rotation, rows)
-    normal_equations(freedom, scale, lengths, rows, space.matrix, space.part)
+    normal_equations(free, lengths, rows, space.matrix, space.part)
     largest = 0.0
     for j in range(space.part.shape[0]):
         largest = max(largest, space.matrix[j, j])
@@ -97,14 +96,14 @@ def fit_pose(problem: Problem, pose: Array, space: Space) -> tuple[float, int, b
         if length <= SMALL_STEP:
             steps, fitted = iteration, True
             break
-        take_step(freedom, scale, body, pose, space.step, space.motion, space.trial)
+        take_step(free, body, pose, space.step, space.motion, space.trial)
         new = misfit(cables, body, lengths, space.trial, rotation, rows)
         if new < cost:
             copy_pose(space.trial, pose)
             gain = cost - new
             cost = new
             damping = 0.1 * damping if damping > 1e-14 * largest else 0.0
-            normal_equations(freedom, scale, lengths, rows, space.matrix, space.part)
+            normal_equations(free, lengths, rows, space.matrix, space.part)
             fitted = gain <= NOTHING * cost
         else:
             fitted = length <= 1e-7  # squares of errors are rounded off at the root of the last digit
@@ -123,8 +122,8 @@ def fit_poses(chained: bool, given: GivenArrays, found: FoundArrays) -> None:
     count, m = batch.lengths.shape
     n = batch.freedom.shape[0]
     space = new_space(np.empty((CABLE_ROWS, m)), np.empty((n, n)))
-    scale = np.empty(n)
-    arc = np.empty(n)
+    free = np.empty((n, 6))
+    arcs = np.empty((n, 6))
     pose = np.empty(tables.POSE_COLUMNS)
     start = np.empty(tables.POSE_COLUMNS)
     copy_pose(batch.starts[0], start)
@@ -134,10 +133,11 @@ def fit_poses(chained: bool, given: GivenArrays, found: FoundArrays) -> None:
             continue
         if not chained:
             copy_pose(row_of(batch.starts, p), start)
-        problem = problem_at(Model(STRAIGHT, 0.0, 0.0, 0.0), batch, p, scale)
-        fill_scales(batch.freedom, problem.cables, problem.body, problem.lengths, scale, arc)
+        problem = problem_at(Model(STRAIGHT, 0.0, 0.0, 0.0), batch, p, free, arcs)
         copy_pose(start, pose)
-        answer.numbers[p, ENERGY], answer.numbers[p, ITERATIONS], fitted = fit_pose(problem, pose, space)
+        answer.numbers[p, ENERGY], answer.numbers[p, ITERATIONS], fitted = fit_pose(
+            problem, batch.lengths[p], pose, space
+        )
         answer.pose_statuses[p] = FORWARD_FITTED if fitted else FORWARD_NOT_CONVERGED
         copy_pose(pose, answer.poses[p])
         if fitted:
@@ -145,4 +145,4 @@ def fit_poses(chained: bool, given: GivenArrays, found: FoundArrays) -> None:
         for i in range(m):
             answer.results[tables.SPAN, p, i] = space.rows[g.SPAN, i]
             answer.results[tables.RISE, p, i] = space.rows[g.RISE, i]
-            answer.results[tables.LENGTH, p, i] = problem.lengths[i]
+            answer.results[tables.LENGTH, p, i] = batch.lengths[p, i]

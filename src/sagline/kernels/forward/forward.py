@@ -14,7 +14,7 @@ from sagline.kernels import tables
 from sagline.kernels.algebra.cholesky import factor_positive
 from sagline.kernels.algebra.eigenvalues import extreme_eigenvalues
 from sagline.kernels.balance import geometry as g
-from sagline.kernels.balance.freedom import components_along, norm, symmetric_part, turns
+from sagline.kernels.balance.freedom import components_along, symmetric_part, turns
 from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import (
@@ -47,13 +47,12 @@ from sagline.kernels.forward.problem import (
     Problem,
     Space,
     copy_pose,
-    fill_scales,
     leave_out,
     new_space,
     problem_at,
     row_of,
 )
-from sagline.kernels.jit import entry, glue, kernel
+from sagline.kernels.jit import entry, glue
 
 FLAT = 1e-9  # of the largest stiffness: smaller ones are none
 OVERSTRETCHED = 0.1  # strain that no cable survives
@@ -102,19 +101,17 @@ def fill_residuals(freedom: Array, gradient: Array, numbers: Array) -> None:
 
 @glue
 def find_pose(
-    problem: Problem, exact: Model, start: Array, memory: Memory, space: Space, pose: Array
+    problem: Problem, exact: Model, lengths: Array, start: Array, memory: Memory, space: Space, pose: Array
 ) -> tuple[int, float]:
     """Fill the equilibrium, by the first way that is beyond doubt; returns steps, and the sum of tensions there.
 
     On return space is that of the pose: unbalance, stiffness, and its factor, of which NaN at the first place says that
     there is none. exact: the model with an energy that leads to where the problem's own takes over.
     """
-    model, freedom, cables, body, lengths, wrench, scale = problem
+    model, cables, body, wrench, free = problem.model, problem.cables, problem.body, problem.wrench, problem.free
     steps, size, known = 0, 0.0, 0.0
     positive = False
-    predicted = predict(problem, start, memory.last, space, pose)
-    for i in range(lengths.shape[0]):
-        space.rows[t.LENGTH, i] = lengths[i]
+    predicted = predict(problem, lengths, start, memory.last, space, pose)
     for way in range(PREDICTION if predicted else FROM_START, DOWNHILL + 1):
         if way != PREDICTION:
             copy_pose(start, pose)
@@ -125,12 +122,12 @@ def find_pose(
                 continue
             platform_stiffness(model, cables, space.rows, space.stiffness)
         else:
-            downhill = Problem(exact, freedom, cables, body, lengths, wrench, scale)
+            downhill = Problem(exact, free, cables, body, wrench, problem.unit)
             steps, size = descend(downhill, pose, space, known)
             if size == 0.0 or model.code != exact.code:
                 size = unbalance(model, cables, body, wrench, pose, space.rotation, space.rows, space.gradient)
-            steps += polish(problem, pose, space, BALANCED * size * norm(scale))
-        symmetric_part(freedom, space.stiffness, scale, space.matrix)
+            steps += polish(problem, pose, space, BALANCED * size * problem.unit)
+        symmetric_part(free, space.stiffness, space.matrix)
         positive = factor_positive(space.matrix, 0.0, space.factor)
         if positive:
             break
@@ -139,20 +136,19 @@ def find_pose(
     return steps, size
 
 
-@kernel
-def describe(problem: Problem, pose: Array, arc: Array, size: float, space: Space, numbers: Array) -> int:
-    """Fill the numbers of the pose that space holds, but for the steps; returns the status."""
-    model, freedom, cables, body, _, wrench, scale = problem
-    numbers[ENERGY] = platform_energy(model, cables, body, wrench, pose, space.rotation, space.rows)[0]
-    fill_residuals(freedom, space.gradient, numbers)
-    symmetric_part(freedom, space.stiffness, arc, space.matrix)
+@glue
+def describe(problem: Problem, pose: Array, arcs: Array, size: float, space: Space, numbers: Array) -> int:
+    """Fill the numbers of the pose that space holds, but for residuals and steps; returns the status."""
+    model, cables, body = problem.model, problem.cables, problem.body
+    numbers[ENERGY] = platform_energy(model, cables, body, problem.wrench, pose, space.rotation, space.rows)[0]
+    symmetric_part(arcs, space.stiffness, space.matrix)
     low, high = extreme_eigenvalues(space.matrix, space.part, space.step, space.motion, FLAT)
     numbers[STIFFNESS_MIN] = low
     status = stability(low, high)
-    if not components_along(freedom, space.gradient, scale, space.part) <= BALANCED * size * norm(scale):
+    if not components_along(problem.free, space.gradient, space.part) <= BALANCED * size * problem.unit:
         status = FORWARD_NOT_CONVERGED
     elif status == FORWARD_SOLVED:
-        status = hold(model, cables, space.rows, freedom.shape[0])
+        status = hold(model, cables, space.rows, arcs.shape[0])
     return status
 
 
@@ -196,8 +192,8 @@ def forward_poses(
     count, m = batch.lengths.shape
     n = batch.freedom.shape[0]
     space = new_space(kept.rows, kept.factor)
-    scale = np.empty(n)
-    arc = np.empty(n)
+    free = np.empty((n, 6))
+    arcs = np.empty((n, 6))
     pose = np.empty(tables.POSE_COLUMNS)
     start = np.empty(tables.POSE_COLUMNS)
     copy_pose(batch.starts[0], start)
@@ -210,11 +206,11 @@ def forward_poses(
             kept.last[0] = math.nan
             for i in range(m):
                 kept.rows[t.PARAMETER, i] = math.nan
-        problem = problem_at(Model(code, k_h, k_p, 0.0), batch, p, scale)
+        problem = problem_at(Model(code, k_h, k_p, 0.0), batch, p, free, arcs)
         exact = Model(ELASTIC if code == ELASTIC else CATENARY, 0.0, 0.0, problem.model.gravity)
-        fill_scales(batch.freedom, problem.cables, problem.body, problem.lengths, scale, arc)
-        steps, size = find_pose(problem, exact, start, kept, space, pose)
-        status = describe(problem, pose, arc, size, space, answer.numbers[p])
+        steps, size = find_pose(problem, exact, batch.lengths[p], start, kept, space, pose)
+        status = describe(problem, pose, arcs, size, space, answer.numbers[p])
+        fill_residuals(batch.freedom, space.gradient, answer.numbers[p])
         answer.numbers[p, ITERATIONS] = steps
         answer.pose_statuses[p] = status
         copy_pose(pose, answer.poses[p])

@@ -147,9 +147,9 @@ def platform_stiffness(model: Model, cables: Array, rows: Array, stiffness: Arra
 
 
 @kernel
-def take_step(freedom: Array, scale: Array, body: Array, pose: Array, step: Array, motion: Array, moved: Array) -> None:
-    """Fill the pose after a step (n,) along the free motions, in their units, and that step as a motion (6,)."""
-    spread(freedom, step, scale, motion)
+def take_step(free: Array, body: Array, pose: Array, step: Array, motion: Array, moved: Array) -> None:
+    """Fill the pose after a step (n,) along the free motions, and that step as a motion (6,)."""
+    spread(free, step, motion)
     move(body, pose, motion, moved)
 
 

@@ -85,21 +85,19 @@ class Problem(NamedTuple):
 
     Attributes:
         model: Cable model.
-        freedom: Rows that pick the free motions, (n, 6).
+        free: Rows that pick the free motions, each times its unit: what counts as equally far, (n, 6).
         cables: Rows of the cable_table, (m, CABLE_COLUMNS).
         body: Row of the body_table, (BODY_COLUMNS,).
-        lengths: Unstrained lengths [m], (m,).
         wrench: External plus inertial, about the center of mass, (6,).
-        scale: Unit of each free motion [m or rad], (n,): what counts as equally far.
+        unit: Norm of the units, by which a sum of forces becomes one of components along the free motions.
     """
 
     model: Model
-    freedom: Array
+    free: Array
     cables: Array
     body: Array
-    lengths: Array
     wrench: Array
-    scale: Array
+    unit: float
 
 
 class Space(NamedTuple):
@@ -142,20 +140,20 @@ def row_of(array: Array, p: int) -> Array:
 
 
 @glue
-def problem_at(model: Model, given: Given, p: int, scale: Array) -> Problem:
-    """Sample p of a batch as a problem; the model's gravity becomes that of its body."""
-    body = row_of(given.bodies, p)
+def problem_at(model: Model, given: Given, p: int, free: Array, arcs: Array) -> Problem:
+    """Sample p of a batch as a problem; the model's gravity becomes that of its body. Fills the free motions."""
+    body, cables = row_of(given.bodies, p), row_of(given.robots, p)
     placed = Model(model.code, model.k_h, model.k_p, body[tables.GRAVITY])
-    cables, wrench = row_of(given.robots, p), row_of(given.wrenches, p)
-    return Problem(placed, given.freedom, cables, body, given.lengths[p], wrench, scale)
+    unit = fill_free(given.freedom, cables, body, given.lengths[p], free, arcs)
+    return Problem(placed, free, cables, body, row_of(given.wrenches, p), unit)
 
 
-@glue
-def fill_scales(freedom: Array, cables: Array, body: Array, lengths: Array, scale: Array, arc: Array) -> None:
-    """Fill the units of the free motions for the trust region, and those by which stiffnesses are compared.
+@kernel
+def fill_free(freedom: Array, cables: Array, body: Array, lengths: Array, free: Array, arcs: Array) -> float:
+    """Fill the free motions in the units of steps, and in those by which stiffnesses are compared, (n, 6) each.
 
     In the latter a rotation counts by the arc it makes at the platform ends' root mean square distance from the
-    center of mass, so that every stiffness is in N/m.
+    center of mass, so that every stiffness is in N/m. Returns the norm of the former units.
     """
     m = lengths.shape[0]
     total = 0.0
@@ -166,10 +164,16 @@ def fill_scales(freedom: Array, cables: Array, body: Array, lengths: Array, scal
             lever = cables[i, tables.PLATFORM_X + k] - body[tables.CENTER_X + k]
             square += lever * lever
     radius = math.sqrt(square / m)
+    units = 0.0
     for j in range(freedom.shape[0]):
         turning = turns(freedom, j)
-        scale[j] = 1.0 if turning else UNIT_SHARE * total / m
-        arc[j] = 1.0 / radius if turning and radius > 0.0 else 1.0
+        unit = 1.0 if turning else UNIT_SHARE * total / m
+        arc = 1.0 / radius if turning and radius > 0.0 else 1.0
+        units += unit * unit
+        for a in range(6):
+            free[j, a] = freedom[j, a] * unit
+            arcs[j, a] = freedom[j, a] * arc
+    return math.sqrt(units)
 
 
 @kernel

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from sagline.arrays import Array
+from sagline.kernels import tables
 from sagline.kernels.balance import geometry as g
 from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.rows import CABLE_ROWS
@@ -15,7 +16,7 @@ from sagline.kernels.cable.stiffness import force_of, material_at, plane_of
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import STRAIGHT
 from sagline.kernels.forward.platform import end_stiffness, platform_stiffness, unbalance
-from sagline.kernels.forward.problem import Given, GivenArrays, problem_at
+from sagline.kernels.forward.problem import Given, GivenArrays, row_of
 from sagline.kernels.jit import entry, formula, glue
 
 # which datum changes
@@ -65,7 +66,6 @@ def describe_states(
     count, m = batch.lengths.shape
     rows = np.full((CABLE_ROWS, m), np.nan)
     rotation, gradient = np.empty((3, 3)), np.empty(6)
-    scale = np.ones(batch.freedom.shape[0])  # no unit is needed here
     for p in range(count):
         if code == STRAIGHT or math.isnan(batch.lengths[p, 0]):
             matrices[p] = math.nan
@@ -73,12 +73,11 @@ def describe_states(
             slopes[p] = math.nan
             levers[p] = math.nan
             continue
-        problem = problem_at(Model(code, k_h, k_p, 0.0), batch, p, scale)
+        body, cables = row_of(batch.bodies, p), row_of(batch.robots, p)
+        placed = Model(code, k_h, k_p, body[tables.GRAVITY])
         for i in range(m):
-            rows[t.LENGTH, i] = problem.lengths[i]
-        unbalance(
-            problem.model, problem.cables, problem.body, problem.wrench, batch.starts[p], rotation, rows, gradient
-        )
-        platform_stiffness(problem.model, problem.cables, rows, matrices[p])
+            rows[t.LENGTH, i] = batch.lengths[p, i]
+        unbalance(placed, cables, body, row_of(batch.wrenches, p), batch.starts[p], rotation, rows, gradient)
+        platform_stiffness(placed, cables, rows, matrices[p])
         for i in range(m):
-            describe_cable(problem.model, problem.cables, rows, i, blocks[p, i], slopes[p], levers[p, i])
+            describe_cable(placed, cables, rows, i, blocks[p, i], slopes[p], levers[p, i])
