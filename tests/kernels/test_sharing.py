@@ -5,12 +5,22 @@ import pytest
 from scipy.optimize import linprog
 
 from sagline.kernels import tables
-from sagline.kernels.algebra.linear import LP_EMPTY, LP_SOLVED, LP_UNBOUNDED, lowest_point
-from sagline.kernels.algebra.null_space import factorize, minimum_norm, orthogonal_factor, pseudo_inverse
-from sagline.kernels.algebra.projection import project
-from sagline.kernels.sharing.polygon import SPARE_CORNERS, feasible_polygon, nearest_point
-from sagline.kernels.sharing.shortfall import wrench_shortfall
-from sagline.kernels.sharing.walk import walk_polygon
+from sagline.kernels.algebra import linear, null_space, projection
+from sagline.kernels.algebra.linear import LP_EMPTY, LP_SOLVED, LP_UNBOUNDED
+from sagline.kernels.sharing import polygon, shortfall, walk
+from sagline.kernels.sharing.polygon import SPARE_CORNERS
+from tests.kernels.compiled import from_python
+
+lowest_point = from_python(linear.lowest_point)
+factorize = from_python(null_space.factorize)
+minimum_norm = from_python(null_space.minimum_norm)
+orthogonal_factor = from_python(null_space.orthogonal_factor)
+pseudo_inverse = from_python(null_space.pseudo_inverse)
+project = from_python(projection.project)
+feasible_polygon = from_python(polygon.feasible_polygon)
+nearest_point = from_python(polygon.nearest_point)
+wrench_shortfall = from_python(shortfall.wrench_shortfall)
+walk_polygon = from_python(walk.walk_polygon)
 
 
 @pytest.mark.parametrize(("n", "m"), [(6, 8), (6, 7), (6, 6), (2, 4), (3, 9)])
