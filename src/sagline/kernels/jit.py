@@ -37,10 +37,6 @@ def entry(function: F) -> F:
     return _compiled(function, nogil=True)
 
 
-def entry_with_memory(function: F) -> F:
-    return _compiled(function, nogil=True, _nrt=True)
-
-
 def kernel(function: F) -> F:
     """A kernel that only kernels call."""
     return _compiled(function, **INNER)

@@ -2,15 +2,28 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from sagline.arrays import Array, Codes, Flags, Indices, locked
 from sagline.cables.model import CableModel, CableState
 from sagline.kernels import codes, tables
-from sagline.kernels.forward import forward as kernel
+from sagline.kernels.cable.rows import CABLE_ROWS
 from sagline.kernels.forward.fit import fit_poses
+from sagline.kernels.forward.forward import forward_poses
+from sagline.kernels.forward.problem import (
+    ENERGY,
+    FORCE_RESIDUAL,
+    FORWARD_NUMBERS,
+    ITERATIONS,
+    LAST_COLUMNS,
+    MOMENT_RESIDUAL,
+    STIFFNESS_MIN,
+    ChainArrays,
+    FoundArrays,
+)
+from sagline.kernels.memory import memory_for
 from sagline.kinematics.forward_solution import ForwardSolution
 from sagline.kinematics.forward_status import STABLE
 from sagline.robot.equilibrium import Equilibrium
@@ -59,6 +72,11 @@ class Found(NamedTuple):
             self.pose_status[samples],
         )
 
+    @property
+    def arrays(self) -> FoundArrays:
+        """A plain tuple: kernels know those the fastest."""
+        return self.poses, self.results, self.cable_status, self.numbers, self.pose_status
+
     @classmethod
     def empty(cls, count: int, cables: int) -> Found:
         """Room for a batch.
@@ -74,7 +92,7 @@ class Found(NamedTuple):
             np.empty((count, tables.POSE_COLUMNS)),
             np.empty((tables.RESULT_ROWS, count, cables)),
             np.empty((count, cables), dtype=np.int8),
-            np.empty((count, kernel.FORWARD_NUMBERS)),
+            np.empty((count, FORWARD_NUMBERS)),
             np.empty(count, dtype=np.int8),
         )
 
@@ -130,14 +148,14 @@ class Found(NamedTuple):
         """
         pose = Pose._adopt(self.poses[:, :3].reshape(*shape, 3), self.poses[:, 3:].reshape(*shape, 4))
         whole = locked(np.ascontiguousarray(np.broadcast_to(load, (*shape, 6))))
-        residuals = self.numbers[:, [kernel.FORCE_RESIDUAL, kernel.MOMENT_RESIDUAL]]
+        residuals = self.numbers[:, [FORCE_RESIDUAL, MOMENT_RESIDUAL]]
         return ForwardSolution(
             state=Equilibrium(robot, pose, whole, self.cables(robot, model, shape)),
             status=locked(self.pose_status.reshape(shape)),
-            stiffness_min=locked(self.numbers[:, kernel.STIFFNESS_MIN].reshape(shape)),
-            energy=locked(self.numbers[:, kernel.ENERGY].reshape(shape)),
+            stiffness_min=locked(self.numbers[:, STIFFNESS_MIN].reshape(shape)),
+            energy=locked(self.numbers[:, ENERGY].reshape(shape)),
             wrench_residual=locked(residuals.reshape(*shape, 2)),
-            iterations=locked(self.numbers[:, kernel.ITERATIONS].astype(np.int64).reshape(shape)),
+            iterations=locked(self.numbers[:, ITERATIONS].astype(np.int64).reshape(shape)),
             covariance=None if covariance is None else locked(covariance.reshape(*shape, 6, 6)),
         )
 
@@ -169,9 +187,18 @@ def solve_rows(
     found = Found.empty(*lengths.shape)
     allowed = first_of(robot).freedom if freedom is None else freedom
     given = (allowed, body_table(robot), cable_table(robot), lengths, starts, wrenches)
-    filled: tuple[Any, ...] = found
+    chain, memory = new_chain(lengths.shape[1], len(allowed)), memory_for(lengths.shape[1])
     if model.code == codes.STRAIGHT:
-        fit_poses(chained, *given, *filled)
+        fit_poses(chained, given, chain, memory, found.arrays)
     else:
-        kernel.forward_poses(model.code, *model.parameters, chained, *given, *filled)
+        forward_poses((model.code, *model.parameters), chained, given, chain, memory, found.arrays)
     return found
+
+
+def new_chain(cables: int, freedoms: int) -> ChainArrays:
+    """What a chain of samples remembers, before the first: nothing."""
+    return (
+        np.full((CABLE_ROWS, cables), np.nan),
+        np.full((freedoms, freedoms), np.nan),
+        np.full(LAST_COLUMNS, np.nan),
+    )

@@ -7,7 +7,7 @@ import numpy as np
 from sagline.arrays import Array, Flags, Indices, locked
 from sagline.cables.model import CableModel
 from sagline.kernels import codes
-from sagline.kernels.forward import forward as kernel
+from sagline.kernels.forward.problem import ENERGY
 from sagline.kinematics.forward_rows import Found, solve_rows
 from sagline.robot.equilibrium import limited_tension
 from sagline.robot.pattern import PLANAR, ROTATING
@@ -159,7 +159,7 @@ def _is_plausible(robot: Robots, model: CableModel, found: Found) -> Flags:
 
 def _rank(robot: Robots, model: CableModel, found: Found) -> Array:
     """Rows (status, cables outside their limits, energy) of which the smaller is the better, (N, 3)."""
-    energy = np.nan_to_num(found.numbers[:, kernel.ENERGY], nan=0.0)
+    energy = np.nan_to_num(found.numbers[:, ENERGY], nan=0.0)
     return np.stack((_POOR[found.pose_status].astype(np.float64), outside_limits(robot, model, found), energy), axis=1)
 
 

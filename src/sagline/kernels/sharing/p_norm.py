@@ -92,7 +92,7 @@ def newton_target(
         largest = max(largest, curve[k, k])
     for k in range(r):
         curve[k, k] += 1e-13 * largest
-    factor_positive(curve)
+    factor_positive(curve, 0.0, curve)
     for k in range(r):
         target[k] = -slope[k]
     solve_lower(curve, target)
