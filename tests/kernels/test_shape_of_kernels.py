@@ -1,0 +1,30 @@
+"""How many arguments kernels take: a signature between a command and a formula reads like a sentence."""
+
+import ast
+from pathlib import Path
+
+from sagline import kernels
+
+MOST = 8
+MANY = 6  # more than so many are for few
+SHARE_OF_MANY = 0.10
+
+
+def inner_kernels() -> dict[str, int]:
+    """Argument counts of all kernels that only kernels call."""
+    found = {}
+    for source in Path(kernels.__file__).parent.rglob("*.py"):
+        for node in ast.parse(source.read_text()).body:
+            if isinstance(node, ast.FunctionDef):
+                decorators = {name.id for name in node.decorator_list if isinstance(name, ast.Name)}
+                if decorators & {"kernel", "formula", "glue"}:
+                    found[f"{source.parent.name}/{source.name}: {node.name}"] = len(node.args.args)
+    return found
+
+
+def test_no_kernel_takes_more_arguments_than_one_can_read() -> None:
+    counts = inner_kernels()
+    assert len(counts) > 100
+    assert {name: count for name, count in counts.items() if count > MOST} == {}
+    many = [name for name, count in counts.items() if count > MANY]
+    assert len(many) <= SHARE_OF_MANY * len(counts), many
