@@ -75,6 +75,7 @@ def _compiled(function: F, **options: Any) -> F:
         setattr(config, "CACHE_DIR", before)  # noqa: B010
 
 
-def is_cold() -> bool:
-    """Whether nothing is compiled yet, so that the first call will take a minute rather than a moment."""
-    return not any(FOLDER.glob("**/*.nbi"))
+def is_compiled(function: Callable[..., object], versions: int = 1) -> bool:
+    """Whether the machine code of an entry is on disk, in at least so many versions for different types."""
+    name = f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}"
+    return sum(1 for _ in FOLDER.rglob(f"{name}-*.nbc")) >= versions

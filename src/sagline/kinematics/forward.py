@@ -9,6 +9,7 @@ from sagline.arrays import Array, locked
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
+from sagline.kinematics.blocks import Progress
 from sagline.kinematics.forward_rows import solve_rows
 from sagline.kinematics.forward_solution import ForwardSolution
 from sagline.kinematics.measured import MeasuredTension, corrected
@@ -28,6 +29,8 @@ def forward(
     model: CableModel = _CATENARY,
     wrench: ArrayLike | None = None,
     tension_measured: MeasuredTension | None = None,
+    *,
+    progress: Progress | None = None,
 ) -> ForwardSolution:
     """The pose in which the platform rests on cables of given unstrained lengths.
 
@@ -44,6 +47,7 @@ def forward(
             gravity: force [N], then moment [N m], shape (6,) or (N, 6). None for none.
         tension_measured: Readings of load cells: then lengths count as measured too, both are corrected within their
             deviations to fit each other, and the answer carries the covariance of the pose.
+        progress: Called every tenth of a second or so: how many samples are solved, of how many.
 
     Returns:
         ForwardSolution, single or with a leading axis N.
@@ -60,10 +64,11 @@ def forward(
     load = external_wrench(wrench, shape[0] if shape else None)
     samples, loads = np.atleast_2d(lengths), np.atleast_2d(load)
     if start is None:
-        found = search(robot, model, samples, loads)
+        found = search(robot, model, samples, loads, progress)
     else:
         chained = bool(shape) and not start.shape
-        found = solve_rows(robot, model, samples, start_rows(start, lengths), loads, chained=chained)
+        starts = start_rows(start, lengths)
+        found = solve_rows(robot, model, samples, starts, loads, chained=chained, progress=progress)
     covariance = None
     if tension_measured is not None:
         covariance = corrected(robot, model, found, loads, tension_measured)

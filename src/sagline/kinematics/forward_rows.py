@@ -11,12 +11,15 @@ from sagline.cables.model import CableModel, CableState
 from sagline.kernels import codes, tables
 from sagline.kernels.forward import forward as kernel
 from sagline.kernels.forward.fit import fit_poses
+from sagline.kinematics.blocks import Progress, blocks, rows_of
 from sagline.kinematics.forward_solution import ForwardSolution
 from sagline.kinematics.forward_status import STABLE
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.tables import body_table, cable_table
+
+BLOCK = 1 << 13  # cables solved at once: from a few to some 130 ms, after which an interrupt is heard
 
 
 class Found(NamedTuple):
@@ -28,7 +31,7 @@ class Found(NamedTuple):
     numbers: Array
     pose_status: Codes
 
-    def keep(self, samples: Indices, other: Found, which: Indices) -> None:
+    def keep(self, samples: Indices | slice, other: Found, which: Indices | slice = slice(None)) -> None:
         """Replace the answers of some samples by some of another's."""
         self.poses[samples] = other.poses[which]
         self.results[:, samples] = other.results[:, which]
@@ -61,6 +64,12 @@ class Found(NamedTuple):
     def stable(self) -> Flags:
         """Whether each sample is a stable equilibrium, (N,)."""
         return np.isin(self.pose_status, STABLE)
+
+    def last_pose(self, before: Array) -> Array:
+        """Row (1, POSE_COLUMNS) at which a sample after these starts; the one before if none of these was solved."""
+        solved = ~np.isin(self.pose_status, (codes.FORWARD_NOT_CONVERGED, codes.FORWARD_NO_LENGTHS))
+        which = np.flatnonzero(solved)[-1:]
+        return locked(self.poses[which]) if which.size else before
 
     def cables(self, robot: Robot, model: CableModel, shape: tuple[int, ...]) -> CableState:
         """The cables of the batch in the caller's shape, () or (N,)."""
@@ -110,8 +119,9 @@ def solve_rows(
     *,
     chained: bool = False,
     freedom: Array | None = None,
+    progress: Progress | None = None,
 ) -> Found:
-    """Run the kernel over samples.
+    """Run the kernel over samples, in blocks.
 
     Args:
         robot: The robot.
@@ -121,13 +131,20 @@ def solve_rows(
         wrenches: External plus inertial (1 or N, 6).
         chained: Whether each sample starts where the last one ended.
         freedom: Motions to allow (n, 6); None for those of the robot.
+        progress: Told after each block how many samples are done, of how many.
     """
-    found = Found.empty(*lengths.shape)
     allowed = robot.freedom if freedom is None else freedom
-    given = (allowed, body_table(robot), cable_table(robot), lengths, starts, wrenches)
-    filled: tuple[Any, ...] = found
-    if model.code == codes.STRAIGHT:
-        fit_poses(chained, *given, *filled)
-    else:
-        kernel.forward_poses(model.code, *model.parameters, chained, *given, *filled)
+    bodies, cables = body_table(robot), cable_table(robot)
+    found = Found.empty(*lengths.shape)
+    for part in blocks(len(lengths), max(1, BLOCK // robot.cable_count), progress):
+        block = Found.empty(*lengths[part].shape)
+        given = (rows_of(bodies, part), rows_of(cables, part), lengths[part], rows_of(starts, part))
+        arguments: tuple[Any, ...] = (allowed, *given, rows_of(wrenches, part), *block)
+        if model.code == codes.STRAIGHT:
+            fit_poses(chained, *arguments)
+        else:
+            kernel.forward_poses(model.code, *model.parameters, chained, *arguments)
+        found.keep(part, block)
+        if chained:
+            starts = block.last_pose(starts)
     return found

@@ -15,6 +15,7 @@ from sagline.kernels import codes, tables
 from sagline.kernels.inverse.explain import explain_poses
 from sagline.kernels.inverse.poses import Answers, inverse_poses
 from sagline.kernels.memory import memory_for
+from sagline.kinematics.blocks import Progress, blocks
 from sagline.kinematics.plan import Plan
 from sagline.motion.path import Path
 from sagline.robot.equilibrium import Equilibrium
@@ -39,6 +40,8 @@ def inverse(
     tension: TensionMethod = _CLOSEST,
     wrench: ArrayLike | None = None,
     previous: Plan | None = None,
+    *,
+    progress: Progress | None = None,
 ) -> Plan:
     """Tensions that balance the platform within their limits, and the unstrained lengths that produce them.
 
@@ -51,6 +54,8 @@ def inverse(
         wrench: External wrench on the platform about its center of mass in world axes, without gravity and
             inertia: force [N], then moment [N m], shape (6,) or (N, 6). None for none.
         previous: A plan that this one continues: `Closest` starts from its last feasible tensions.
+        progress: Called every few hundredths of a second: how many poses are solved, or known not to be feasible and
+            why, of how many.
 
     Returns:
         Plan with fields of shape (m,) for a single pose, (N, m) otherwise. A pose without an answer is not
@@ -77,10 +82,14 @@ def inverse(
     otherwise = None if takes_default_kernel(method) else True
     memory = memory_for(robot.cable_count)
     given = (*options, robot_terms(robot), rows, np.atleast_2d(load), reference, memory, otherwise, found.answers)
-    for first in range(0, count, BLOCK):
-        inverse_poses(*given, first, min(first + BLOCK, count))
+    done = 0
+    for part in blocks(count, BLOCK):
+        inverse_poses(*given, part.start, part.stop)
+        done += int(np.count_nonzero(found.pose_status[part] != codes.POSE_INFEASIBLE))
+        if progress is not None:
+            progress(done, count)
     _refuse_missing_chords(found.pose_status, found.results)
-    shortfall, farkas, blocking = explained(robot, options, rows, found)
+    shortfall, farkas, blocking = explained(robot, options, rows, found, progress)
     cables = CableState(
         model=model,
         cable=robot.cables,
@@ -137,7 +146,9 @@ class Found(NamedTuple):
         return locked(self.results[row].reshape(*pose.shape, -1))
 
 
-def explained(robot: Robot, options: Options, rows: Array, found: Found) -> tuple[Array, Array, Flags]:
+def explained(
+    robot: Robot, options: Options, rows: Array, found: Found, progress: Progress | None = None
+) -> tuple[Array, Array, Flags]:
     """Shortfall [N] (N,), Farkas vectors along the free motions (N, n) and blocking cables (N, m) of a batch."""
     count, n = found.needed.shape
     solved = found.pose_status == codes.POSE_SOLVED
@@ -146,17 +157,19 @@ def explained(robot: Robot, options: Options, rows: Array, found: Found) -> tupl
     blocking = np.zeros((count, robot.cable_count), dtype=np.bool_)
     which = np.flatnonzero(found.pose_status == codes.POSE_INFEASIBLE)
     memory = memory_for(robot.cable_count)
-    for first in range(0, which.size, BLOCK):
+    for part in blocks(which.size, BLOCK):
         explain_poses(
             options.model,
             options.limits,
             robot_terms(robot),
             rows,
             found.needed,
-            which[first : first + BLOCK],
+            which[part],
             memory,
             (shortfall, farkas, blocking),
         )
+        if progress is not None:
+            progress(count - which.size + part.stop, count)
     return shortfall, farkas, blocking
 
 

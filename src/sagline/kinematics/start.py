@@ -8,7 +8,8 @@ from sagline.arrays import Array, Flags, Indices, locked
 from sagline.cables.model import CableModel
 from sagline.kernels import codes
 from sagline.kernels.forward import forward as kernel
-from sagline.kinematics.forward_rows import Found, solve_rows
+from sagline.kinematics.blocks import Progress, blocks, rows_of
+from sagline.kinematics.forward_rows import BLOCK, Found, solve_rows
 from sagline.robot.equilibrium import limited_tension
 from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.pose import Pose
@@ -21,7 +22,7 @@ _LIMIT_SLACK = 0.01  # a measured tension may miss its limit by this share
 _POOR = np.array([0, 1, 2, 3, 4, 5, 6, 0])  # how little each status is worth; fitted is as good as solved
 
 
-def search(robot: Robot, model: CableModel, lengths: Array, wrenches: Array) -> Found:
+def search(robot: Robot, model: CableModel, lengths: Array, wrenches: Array, progress: Progress | None = None) -> Found:
     """Forward kinematics without a start, sample by sample.
 
     With its orientation held, the platform has a single equilibrium, because the energy is convex in the position:
@@ -34,7 +35,15 @@ def search(robot: Robot, model: CableModel, lengths: Array, wrenches: Array) -> 
         model: Cable model.
         lengths: Unstrained lengths (N, m), rows of NaN are left out.
         wrenches: External plus inertial (1 or N, 6).
+        progress: Told after each block how many samples are done, of how many.
     """
+    found = Found.empty(*lengths.shape)
+    for part in blocks(len(lengths), max(1, BLOCK // robot.cable_count), progress):
+        found.keep(part, _search_block(robot, model, lengths[part], rows_of(wrenches, part)))
+    return found
+
+
+def _search_block(robot: Robot, model: CableModel, lengths: Array, wrenches: Array) -> Found:
     found = Found.empty(*lengths.shape)
     open_samples = np.arange(len(lengths))
     for round_, quaternion in enumerate(start_quaternions(robot)):
