@@ -71,7 +71,7 @@ def tension_polygon(
 def polygon_at(
     robot: Robot, pose: Pose, options: Options, wrench: Array, tension: Array, pulls: Array, feasible: bool
 ) -> TensionPolygon:
-    """The polygon around chord tensions [N] that balance the platform, (m,), for the pulls of their cables [N], (m,)."""
+    """The polygon around chord tensions [N] that balance the platform, (m,), given the cables' pulls [N], (m,)."""
     m, r = robot.cable_count, robot.cable_count - robot.degrees_of_freedom
     scale, offset = np.empty(m), np.empty(m)
     limits = np.empty((strips.STRIP_ROWS, m))
