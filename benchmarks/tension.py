@@ -9,7 +9,6 @@ import time
 from collections.abc import Iterator
 from functools import partial
 
-import numba
 import numpy as np
 from rich.console import Console
 from rich.progress import track
@@ -17,9 +16,13 @@ from rich.progress import track
 import sagline as sl
 from benchmarks.measure import Row, best_seconds, one_core, show
 from sagline.arrays import Array
-from sagline.kernels import tables
-from sagline.kernels.sharing.polygon import SPARE_CORNERS
-from sagline.kernels.sharing.sharing import share_load
+from sagline.kernels.algebra.strips import HIGH, LOW, START, STRIP_ROWS
+from sagline.kernels.jit import entry
+from sagline.kernels.memory import Memory, block, memory_for
+from sagline.kernels.sharing.nearest import Sharing, new_nearness, share_nearest
+from sagline.kernels.sharing.otherwise import share_otherwise
+from sagline.kernels.sharing.room import forget, new_room
+from sagline.tension.options import kernel_options, takes_default_kernel
 from tests.tension.reference import presets, random_poses
 from tests.tension.test_verdicts import sampled, unproved
 
@@ -43,47 +46,68 @@ METHODS: dict[str, sl.TensionMethod] = {
 }
 LINES = ("article-mixed", "article-suspended", "cogiro", "ipanema-1")
 JUMPING = ("LowestSum", "LowestMaximum", "ImprovedClosedForm", "Puncture")
-SLOW = ("PNorm(p=4)", "PNorm(p=16)", "AnalyticCenter", "LowestMaximum")
+ALONE = {"PNorm(p=4)": 8, "PNorm(p=16)": 8, "AnalyticCenter": 8, "LowestMaximum": 2.5}  # us a pose
+SAG = {"PNorm(p=4)": 5, "PNorm(p=16)": 5, "AnalyticCenter": 5}  # us more
 
 
-@numba.njit
-def share_batch(method, parameter, works, nulls, references, corners, labels, statuses):  # type: ignore[no-untyped-def]
-    """The sharing alone, of many poses that are already factored."""
-    for p in range(works.shape[0]):
-        statuses[p] = share_load(method, parameter, works[p], nulls[p], references[p], corners, labels)
+@entry
+def share_batch(  # type: ignore[no-untyped-def]
+    sharing_terms, strips, nulls, references, room, previous, otherwise, statuses
+):
+    """The sharing alone, of many poses that are already factored; otherwise as in `inverse_poses`."""
+    sharing = Sharing(*sharing_terms)
+    r, m = nulls[0].shape
+    near, rest = new_nearness(Memory(*room), previous, r)
+    rows, at = block(rest.numbers, 0, 2, m)
+    tension, offset = rows[0], rows[1]
+    rest = Memory(rest.numbers[at:], rest.counters)
+    others = None if otherwise is None else new_room(sharing.method, rest, m, r)
+    for i in range(m):
+        offset[i] = 0.0
+    for p in range(strips.shape[0]):
+        near.held.labels[0] = 0
+        for k in range(r):
+            near.reference[k] = references[p, k]
+        if others is None:
+            statuses[p] = share_nearest(strips[p], nulls[p], near, tension)
+        else:
+            forget(others)
+            statuses[p] = share_otherwise(sharing, strips[p], offset, nulls[p], near, others, tension)
 
 
 def factored(robot: sl.Robot, poses: sl.Pose) -> tuple[Array, Array]:
-    """Working rows and null spaces of poses with weightless cables."""
+    """Strips and null spaces of poses with weightless cables."""
     m = robot.cable_count
-    works = np.zeros((len(poses), tables.WORK_ROWS, m))
+    limits = np.zeros((len(poses), STRIP_ROWS, m))
     nulls = np.empty((len(poses), m - 6, m))
     right = np.array([0, 0, robot.mass * robot.gravity, 0, 0, 0])
     for p, matrix in enumerate(sl.structure_matrix(robot, poses)):
-        works[p, tables.START] = np.linalg.pinv(matrix) @ right
+        limits[p, START] = np.linalg.pinv(matrix) @ right
         nulls[p] = np.linalg.svd(matrix)[2][6:]
-        works[p, tables.LOW], works[p, tables.HIGH] = robot.tension_min, robot.tension_max
-    return works, nulls
+        limits[p, LOW], limits[p, HIGH] = robot.tension_min, robot.tension_max
+    return limits, nulls
 
 
 def times() -> Iterator[Row]:
     """Time of each method: the sharing alone, and a whole inverse with straight and with exact cables."""
     robot = sl.load_robot("article-mixed")
     poses = random_poses(robot, POSES, np.random.default_rng(0))
-    works, nulls = factored(robot, poses)
+    limits, nulls = factored(robot, poses)
     references = np.zeros((POSES, 2))
-    corners, labels = np.empty((2 * 8 + SPARE_CORNERS, 2)), np.empty(2 * 8 + SPARE_CORNERS, dtype=np.int64)
     statuses = np.empty(POSES, dtype=np.int64)
     for name, method in METHODS.items():
         goal = references + 200.0 if name == "QuadraticProgram" else references
-        given = (method.code, method.parameter, works, nulls, goal, corners, labels, statuses)
+        sharing = kernel_options(robot, sl.Catenary(), method).sharing
+        otherwise = None if takes_default_kernel(method) else True
+        previous = np.full(robot.cable_count, np.nan)
+        given = (sharing, limits, nulls, goal, memory_for(robot.cable_count), previous, otherwise, statuses)
         alone = best_seconds(partial(share_batch, *given), 60)
         straight = best_seconds(partial(sl.inverse, robot, poses, sl.Straight(), method), 30)
         exact = best_seconds(partial(sl.inverse, robot, poses, sl.Catenary(), method), 30)
         to_us = 1e6 / POSES
         yield Row(
             f"{name}, 8 cables",
-            f"<= {8 if name in SLOW[:3] else 1.5} us a pose; sag <= 4 us more",
+            f"<= {ALONE.get(name, 1.5):g} us a pose; sag <= {SAG.get(name, 2):g} us more",
             f"{alone * to_us:.2f} us; whole inverse, straight cables {straight * to_us:.1f} us, "
             f"exact {exact * to_us:.1f} us, sag {(exact - straight) * to_us:+.1f} us",
         )

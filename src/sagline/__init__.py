@@ -29,7 +29,7 @@ from sagline.kinematics.polygon import tension_polygon
 from sagline.kinematics.status import PoseStatus
 from sagline.motion.path import Path
 from sagline.motion.planar import article_path
-from sagline.motion.quintic import quintic_path
+from sagline.motion.rest_to_rest import quintic_path, septic_path
 from sagline.motion.sampled import path_from_samples
 from sagline.robot.catalogue import robot_names
 from sagline.robot.equilibrium import Equilibrium
@@ -150,6 +150,7 @@ __all__ = [
     "quintic_path",
     "robot_names",
     "save_plan",
+    "septic_path",
     "stiffness",
     "structure_matrix",
     "tension_polygon",

@@ -55,6 +55,19 @@ waypoints: [{position: [0, 0, 1]}, {position: [1, 0, 1], euler: {alpha: 3 deg}},
     assert path.time[1] == 0.01
 
 
+def test_the_profile_is_quintic_unless_the_file_says_septic(tmp_path: FilePath) -> None:
+    plain, named, smooth = (
+        load_path(write(tmp_path, "tour.yaml", line + WAYPOINTS))
+        for line in ("", "profile: quintic\n", "profile: septic\n")
+    )
+    np.testing.assert_array_equal(plain.twist, named.twist)
+    middle = 50  # of the first segment: 15/8 and 35/16 of the mean speed
+    np.testing.assert_allclose(smooth.twist[middle], 7 / 6 * plain.twist[middle], rtol=1e-12)
+    assert plain.twist[middle].any()
+    with pytest.raises(FileError, match=r"profile is 'cubic'; allowed: 'quintic' or 'septic'"):
+        load_path(write(tmp_path, "tour.yaml", "profile: cubic\n" + WAYPOINTS))
+
+
 @pytest.mark.parametrize(
     ("limits", "duration"),
     [

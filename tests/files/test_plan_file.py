@@ -43,7 +43,7 @@ PLACES = (
     *("state.pose.position", "state.pose.quaternion", "state.wrench"),
     *("status", "shortfall", "wrench_residual", "blocking", "farkas", "needed"),
 )
-PATH_PLACES = ("path.time", "path.twist", "path.twist_rate", "path.pose.position", "path.pose.quaternion")
+PATH_PLACES = ("path.time", "path.twist", "path.twist_rate", "path.jerk", "path.pose.position", "path.pose.quaternion")
 
 
 def assert_same(plan: sl.Plan, other: sl.Plan) -> None:
@@ -54,7 +54,7 @@ def assert_same(plan: sl.Plan, other: sl.Plan) -> None:
         assert not theirs.flags.writeable
     assert plan.tension == other.tension
     assert plan.state.cables.model == other.state.cables.model
-    assert dump_robot(plan.state.robot) == dump_robot(other.state.robot)
+    assert dump_robot(plan.state.one_robot) == dump_robot(other.state.one_robot)
     assert (plan.path is None) == (other.path is None)
 
 
@@ -99,6 +99,17 @@ def test_what_a_reader_finds(saved: FilePath) -> None:
         assert [data.attrs[name] for name in kept] == ["Empirical", 4.845, 4.1, "Closest", "horizontal", 0.1]
         assert data.attrs["source"] == f"sagline {sl.__version__}"
         assert "name: article-suspended" in data.attrs["robot"]
+
+
+def test_a_path_without_jerk_comes_back_without(tmp_path: FilePath) -> None:
+    sampled = sl.path_from_samples(OUTSIDE.time, OUTSIDE.pose)
+    sl.inverse(SUSPENDED, sampled).save(tmp_path / "run.nc")
+    with xr.open_dataset(tmp_path / "run.nc", engine="h5netcdf") as data:
+        assert "jerk" not in data
+    loaded = sl.load_plan(tmp_path / "run.nc").path
+    assert loaded is not None
+    assert loaded.jerk is None
+    np.testing.assert_array_equal(loaded.twist_rate, sampled.twist_rate)
 
 
 def test_infeasible_poses_are_kept_and_marked(saved: FilePath) -> None:

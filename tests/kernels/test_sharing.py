@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from sagline.kernels.algebra.projection import project
 from scipy.optimize import linprog
 
 from sagline.kernels import tables
-from sagline.kernels.algebra.linear_program import LP_EMPTY, LP_SOLVED, LP_UNBOUNDED, lowest_point
 from sagline.kernels.algebra.householder import factorize, minimum_norm, orthogonal_factor, pseudo_inverse
-from sagline.kernels.algebra.projection import project
+from sagline.kernels.algebra.linear_program import LP_EMPTY, LP_SOLVED, LP_UNBOUNDED, lowest_point
 from sagline.kernels.sharing.polygon import SPARE_CORNERS, feasible_polygon, nearest_point
 from sagline.kernels.sharing.shortfall import wrench_shortfall
 from sagline.kernels.sharing.walk import walk_polygon

@@ -55,7 +55,7 @@ def center(pose: sl.Pose, robot: sl.Robot) -> Array:
 
 def motion_between(before: sl.ForwardSolution, after: sl.ForwardSolution) -> Array:
     """Displacement of the center of mass and rotation vector, world axes."""
-    robot = before.state.robot
+    robot = before.state.one_robot
     first, last = (Rotation.from_quat(s.pose.quaternion.copy()) for s in (before, after))
     turn: Array = (last * first.inv()).as_rotvec()
     shift = center(after.pose, robot) - center(before.pose, robot)

@@ -97,6 +97,48 @@ def test_a_trajectory_follows_from_its_first_start() -> None:
     assert found.iterations[1:].max() <= 5
 
 
+@pytest.mark.parametrize("model", MODELS, ids=lambda m: type(m).__name__)
+def test_a_chain_answers_what_each_sample_would_from_the_pose_before(model: sl.CableModel) -> None:
+    plan = feasible_plan(COGIRO, 1, seed=24, model=model)
+    rng = np.random.default_rng(25)
+    steps = rng.normal(scale=np.geomspace(1e-6, 3e-2, 40)[:, None], size=(40, 8))  # from nothing to jumps
+    lengths = np.insert(plan.unstrained_length[0] + steps, [3, 20], np.nan, axis=0)  # two samples without an answer
+    loads = rng.normal(scale=np.tile([0.0, 40.0], 21)[:, None], size=(42, 6))
+    chain = sl.forward(COGIRO, lengths, plan.state.pose[0], model, loads)
+    at = plan.state.pose[0]
+    for i in range(len(lengths)):
+        alone = sl.forward(COGIRO, lengths[i], at, model, loads[i])
+        assert alone.status == chain.status[i]
+        if alone.status != Status.NO_LENGTHS:
+            at = chain.pose[i]
+            assert position_error(alone, at) < 1e-11
+            assert angle_error(alone, at) < 1e-11
+            np.testing.assert_allclose(chain.stiffness_min[i], alone.stiffness_min, rtol=1e-7)
+    assert chain.wrench_residual[chain.stable].max() < 1e-8
+
+
+def test_a_step_of_a_trajectory_takes_two_newton_steps() -> None:
+    start = feasible_plan(COGIRO, 1, seed=27).state.pose[0]
+    position = start.position + 2e-3 * np.arange(30)[:, None] * np.array([0.6, 0.0, 0.8])
+    turn = Rotation.from_rotvec(1e-3 * np.arange(30)[:, None] * np.array([0.0, 0.0, 1.0]))
+    pose = sl.Pose(position, turn * Rotation.from_quat(start.quaternion.copy()))
+    plan = sl.inverse(COGIRO, pose, tension=sl.MinimumNorm())
+    assert plan.feasible.all()
+    found = sl.forward(COGIRO, plan.unstrained_length, pose[0])
+    assert found.iterations.max() <= 2  # three without the first-order answer to the new lengths
+    assert position_error(found, pose).max() < 1e-12
+
+
+def test_the_smallest_stiffness_is_an_eigenvalue() -> None:
+    plan = feasible_plan(COGIRO, 20, seed=26)
+    found = sl.forward(COGIRO, plan.unstrained_length, plan.state.pose)
+    levers = COGIRO.platform_anchors - COGIRO.center_of_mass
+    arc = np.repeat([1.0, 1.0 / np.sqrt((levers**2).sum(axis=1).mean())], 3)
+    scaled = arc[:, None] * sl.stiffness(found.state).matrix * arc
+    expected = np.linalg.eigvalsh(0.5 * (scaled + np.swapaxes(scaled, 1, 2)))
+    np.testing.assert_allclose(found.stiffness_min, expected[:, 0], atol=1e-13 * expected.max())
+
+
 def test_samples_of_a_batch_do_not_depend_on_each_other() -> None:
     plan = feasible_plan(COGIRO, 20, seed=14)
     together = sl.forward(COGIRO, plan.unstrained_length)

@@ -71,6 +71,18 @@ def test_a_lost_step_does_not_lose_the_pose() -> None:
     np.testing.assert_allclose(solver.step(lengths).position, plan.state.pose.position[0], atol=1e-9)
 
 
+def test_what_it_remembers_does_not_outlive_a_reset_or_a_loss() -> None:
+    plan = feasible_plan(COGIRO, 2, seed=4)
+    (first, second), lengths = plan.state.pose, plan.unstrained_length
+    solver = sl.ForwardSolver(COGIRO, start=first)
+    np.testing.assert_allclose(solver.step(lengths[0]).position, first.position, atol=1e-11)
+    solver.reset(second)
+    np.testing.assert_allclose(solver.step(lengths[1]).position, second.position, atol=1e-11)
+    solver.step(np.full(8, 1e-3))  # too short to meet
+    solver.reset(first)
+    np.testing.assert_allclose(solver.step(lengths[0]).position, first.position, atol=1e-11)
+
+
 def test_bad_input() -> None:
     solver = sl.ForwardSolver(COGIRO)
     with pytest.raises(sl.InvalidValueError, match=r"unstrained_length\[2\]"):

@@ -16,7 +16,7 @@ from sagline.kinematics.inverse import inverse
 from sagline.kinematics.inverse_solver import InverseSolver
 from sagline.kinematics.status import PoseStatus
 from sagline.motion.planar import article_path
-from sagline.motion.quintic import quintic_path
+from sagline.motion.rest_to_rest import quintic_path
 from sagline.robot.catalogue import robot_names
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot

@@ -5,7 +5,6 @@ import pytest
 
 import sagline as sl
 from sagline.arrays import Array
-from sagline.kinematics.measured import frame_end_slopes
 from tests.kinematics.feasible import feasible_plan, motion_between, position_error
 
 COGIRO = sl.load_robot("cogiro")
@@ -57,7 +56,7 @@ def test_exact_readings_correct_wrong_lengths() -> None:
 def test_the_slopes_of_the_frame_end_tensions_are_those_of_the_forward_solution() -> None:
     lengths, pose = PLAN.unstrained_length[0], PLAN.state.pose[0]
     state = sl.forward(COGIRO, lengths, pose).state
-    found = frame_end_slopes(state, sl.stiffness(state).length_sensitivity)
+    found = sl.stiffness(state).tension_sensitivity
 
     def tensions(change: Array) -> Array:
         return sl.forward(COGIRO, lengths + change, pose).state.cables.frame_end_tension

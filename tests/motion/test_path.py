@@ -38,6 +38,20 @@ def test_pickling_keeps_every_field() -> None:
     assert not path.twist.flags.writeable
 
 
+def test_a_path_may_know_its_jerk_or_not() -> None:
+    twist = np.arange(12.0).reshape(2, 6)
+    without = Path([0.0, 1.0], still(2), twist, -twist)
+    assert without.jerk is None
+    assert pickle.loads(pickle.dumps(without)).jerk is None
+    path = pickle.loads(pickle.dumps(Path([0.0, 1.0], still(2), twist, -twist, jerk=2.0 * twist)))
+    np.testing.assert_array_equal(path.jerk, 2.0 * twist)
+    assert not path.jerk.flags.writeable
+    for jerk, item in ((np.zeros((3, 6)), "jerk"), (np.full((2, 6), np.nan), "jerk[0, 0]")):
+        with pytest.raises(InvalidValueError) as caught:
+            Path([0.0, 1.0], still(2), twist, twist, jerk)
+        assert caught.value.item == item
+
+
 @pytest.mark.parametrize(
     ("time", "item"),
     [

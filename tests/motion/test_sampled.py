@@ -4,7 +4,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 
 from sagline.errors import InvalidValueError
-from sagline.motion.quintic import quintic_path
+from sagline.motion.rest_to_rest import quintic_path
 from sagline.motion.sampled import path_from_samples
 from sagline.robot.pose import Pose
 

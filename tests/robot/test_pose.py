@@ -130,3 +130,38 @@ def test_a_million_poses_take_no_python_loop() -> None:
     poses = Pose.from_euler(position, *angles)
     assert time.perf_counter() - start < 5.0  # seen: 0.2 s; a loop in Python takes more than 10 s
     np.testing.assert_allclose(poses[-1].matrix, euler_matrix(*angles[:, -1]), atol=2e-15)
+
+
+@given(st.integers(1, 4), st.integers(1, 3), st.integers(0, 2**32 - 1))
+def test_points_go_with_every_pose_as_scipy_turns_them(count: int, points: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    poses = Pose(rng.uniform(-9, 9, (count, 3)), Rotation.random(count, rng))
+    given_points = rng.uniform(-3, 3, (2, points, 3))
+    for local in (given_points, given_points[0], given_points[0, 0]):
+        expected = np.stack(
+            [
+                one.rotation.apply(local.reshape(-1, 3).copy()).reshape(local.shape) + one.position.copy()
+                for one in poses
+            ]
+        )
+        found = poses.transform(local)
+        assert found.shape == (count, *local.shape)
+        np.testing.assert_allclose(found, expected, atol=1e-14)
+        np.testing.assert_array_equal(poses[0].transform(local).shape, local.shape)
+        np.testing.assert_allclose(poses[0].transform(local), expected[0], atol=1e-14)
+    assert not poses.transform(given_points).flags.writeable
+
+
+def test_as_many_points_as_poses_still_go_with_every_pose() -> None:
+    poses = Pose.from_euler([[1.0, 0, 0], [0, 5.0, 0]], [0.0, np.pi / 2], 0.0, 0.0)
+    expected = [[[2, 0, 0], [1, 2, 0]], [[0, 6, 0], [-2, 5, 0]]]  # by hand
+    np.testing.assert_allclose(poses.transform([[1, 0, 0], [0, 2, 0]]), expected, atol=1e-15)
+
+
+def test_points_are_checked_and_a_lost_pose_has_none() -> None:
+    with pytest.raises(InvalidValueError, match="points"):
+        Pose([0, 0, 0], np.eye(3)).transform([1.0, 2.0])
+    with pytest.raises(InvalidValueError, match=r"points\[0\]"):
+        Pose([0, 0, 0], np.eye(3)).transform([np.nan, 0.0, 0.0])
+    lost = Pose._adopt(np.full((1, 3), np.nan), np.full((1, 4), np.nan))
+    assert np.isnan(lost.transform([1.0, 0.0, 0.0])).all()

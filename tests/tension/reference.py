@@ -56,7 +56,7 @@ def needed(robot: Robot, wrench: np.ndarray) -> np.ndarray:
 
 def unbalanced(plan: Plan) -> np.ndarray:
     """Force and moment left over at every pose (N, 6), from the cables' forces and anchors alone."""
-    robot, state = plan.state.robot, plan.state.cables
+    robot, state = plan.state.one_robot, plan.state.cables
     pose = plan.state.pose
     turn = pose.rotation.as_matrix().reshape(-1, 3, 3)
     ends = pose.position.reshape(-1, 1, 3) + robot.platform_anchors @ np.swapaxes(turn, 1, 2)

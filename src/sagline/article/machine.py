@@ -170,7 +170,7 @@ def _exits(robot: Robot, pose: Pose, radius: float) -> tuple[Array, Array]:
     The cable enters at the frame anchor going up, bends over the pulley toward the platform, and leaves along the line
     to the platform end.
     """
-    ends = pose.position + robot.platform_anchors @ pose.matrix.T
+    ends = pose.transform(robot.platform_anchors)
     along = ends - robot.frame_anchors
     span = np.hypot(along[:, 0], along[:, 1])
     outward = np.stack((along[:, 0] / span, along[:, 1] / span, np.zeros_like(span)), axis=1)

@@ -18,7 +18,8 @@ from sagline.cables.empirical import Empirical
 from sagline.files.robot_file import load_robot
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan
-from sagline.motion.quintic import PEAK_SPEED, quintic_path
+from sagline.motion.profile import QUINTIC
+from sagline.motion.rest_to_rest import quintic_path
 from sagline.robot.pose import Pose
 from sagline.tension.minimum_norm import MinimumNorm
 
@@ -180,7 +181,7 @@ def tour(rate: float = 10.0) -> Tour:
     path = quintic_path(stops, speed=TOUR_SPEED, rate=rate)
     plan = inverse(load_robot("article-prototype"), path, Empirical(), METHOD)
     way = np.linalg.norm(np.diff(np.asarray(stops), axis=0), axis=1)
-    return Tour(plan, locked(np.cumsum(way * PEAK_SPEED / TOUR_SPEED)[:-1]))
+    return Tour(plan, locked(np.cumsum(way * QUINTIC.peak_speed / TOUR_SPEED)[:-1]))
 
 
 def _planned(machine: Machine, positions: Array) -> Plan:

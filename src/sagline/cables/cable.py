@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from sagline.arrays import Array, checked, locked
 from sagline.errors import InvalidValueError
@@ -82,6 +83,17 @@ class Cable:
         modulus = checked(youngs_modulus, "youngs_modulus", "Pa", above=0.0)
         area = checked(section_area, "section_area", "m^2", above=0.0)
         return cls(linear_density, modulus * area)
+
+    def _part(self, index: int | slice | NDArray[Any], shape: tuple[int, ...]) -> Cable:
+        """The material of a part of a batch of that shape; one without the batch's first axis stays what it is."""
+        own = self.linear_density.shape
+        if len(own) < len(shape):
+            return self
+        part = object.__new__(Cable)
+        for name in ("linear_density", "axial_stiffness"):
+            field = np.broadcast_to(getattr(self, name), (shape[0], *own[1:]))
+            object.__setattr__(part, name, locked(field[index, ...]))
+        return part
 
     def __reduce__(self) -> tuple[type[Cable], tuple[Array, Array]]:
         """Pickle through the constructor, so that a loaded cable is checked and locked too."""

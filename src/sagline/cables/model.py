@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from sagline.arrays import Array, Codes, checked, kernel_input, locked
 from sagline.cables.cable import Cable
@@ -14,6 +15,16 @@ from sagline.cables.problem import Problem
 from sagline.errors import InvalidValueError
 from sagline.kernels.cable import batch, shape
 from sagline.kernels.cable.terms import Terms
+
+_ARRAYS = (
+    "span",
+    "rise",
+    "unstrained_length",
+    "horizontal_tension",
+    "vertical_force",
+    "chord_tension",
+    "status",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,7 +176,8 @@ class CableModel:
 class CableState:
     """Where a cable's ends are, what it carries and how long it is: results of a cable model.
 
-    Every array has shape (...), one entry a cable. Forces act on the cable at its platform end.
+    Every array has shape (...), one entry a cable. Forces act on the cable at its platform end. A batch is indexed
+    along its first axis, by a number, a slice, or an array of numbers or booleans; slices share its memory.
 
     Attributes:
         model: The cable model that was solved.
@@ -195,6 +207,31 @@ class CableState:
     def shape(self) -> tuple[int, ...]:
         """Shape of every array."""
         return self.unstrained_length.shape
+
+    def __len__(self) -> int:
+        """Length of the first axis."""
+        if not self.shape:
+            raise TypeError("the state of a single cable has no length")
+        return self.shape[0]
+
+    def __getitem__(self, index: int | slice | NDArray[Any]) -> CableState:
+        """The state of a part of the cables, along the first axis.
+
+        Args:
+            index: A number, which may count from the end; a slice; or an array of numbers or booleans.
+
+        Raises:
+            TypeError: If the state is that of a single cable.
+            IndexError: If there is no such entry.
+        """
+        if not self.shape:
+            raise TypeError("the state of a single cable cannot be indexed")
+        arrays: dict[str, Any] = {name: locked(getattr(self, name)[index, ...]) for name in _ARRAYS}
+        return replace(self, cable=self.cable._part(index, self.shape), **arrays)
+
+    def __iter__(self) -> Iterator[CableState]:
+        """The entries along the first axis, one by one."""
+        return (self[i] for i in range(len(self)))
 
     @property
     def chord(self) -> Array:

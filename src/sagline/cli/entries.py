@@ -65,7 +65,7 @@ def _verdicts() -> None:
 
     import sagline as sl
     from sagline.kernels.codes import POSE_INFEASIBLE
-    from sagline.kinematics.inverse import Found, explained
+    from sagline.kinematics.inverse_rows import Found, explained
     from sagline.statics.tables import pose_rows
     from sagline.tension.options import kernel_options
 
@@ -98,10 +98,10 @@ def _polygon() -> None:
     from sagline.kinematics.polygon import polygon_at
     from sagline.tension.options import kernel_options
 
-    state = _unknown_state()
-    options = kernel_options(state.robot, sl.Catenary(), sl.MinimumNorm())
+    robot, state = sl.load_robot(ROBOT), _unknown_state()
+    options = kernel_options(robot, sl.Catenary(), sl.MinimumNorm())
     unknown = state.cables.chord_tension
-    polygon_at(state.robot, state.pose, options, state.wrench, unknown, unknown, feasible=False)
+    polygon_at(robot, state.pose, options, state.wrench, unknown, unknown, feasible=False)
 
 
 def _vibration() -> None:

@@ -59,7 +59,7 @@ def _listed(files: Sequence[Path]) -> str:
 
 def _complaints(run: Run) -> int:
     """Say where the path cannot be followed; the exit code of this run."""
-    name, gaps, plan = run.plan.state.robot.name, run.plan.gaps, run.plan
+    name, gaps, plan = run.plan.state.one_robot.name, run.plan.gaps, run.plan
     for gap in gaps[:MOST_GAPS]:
         note(f"{name}: ", f"the path leaves the feasible region {gap_text(gap, plan)}", style="bold red")
     if len(gaps) > MOST_GAPS:
@@ -76,7 +76,7 @@ def _record(run: Run) -> dict[str, Any]:
     plan = run.plan
     clock = plan.path.time if plan.path is not None else None
     return {
-        "robot": plan.state.robot.name,
+        "robot": plan.state.one_robot.name,
         "model": type(plan.state.cables.model).__name__,
         "tension": type(plan.tension).__name__,
         "tension_variable": plan.tension.variable,

@@ -47,7 +47,7 @@ class Run(NamedTuple):
     @property
     def name(self) -> str:
         """Robot and model, as files are named: letters, digits, dots and hyphens."""
-        words = f"{self.plan.state.robot.name} {type(self.plan.state.cables.model).__name__.lower()}"
+        words = f"{self.plan.state.one_robot.name} {type(self.plan.state.cables.model).__name__.lower()}"
         return "-".join("".join(c if c.isalnum() or c in "._-" else " " for c in words).split()).lstrip(".-")
 
     @property
@@ -119,7 +119,7 @@ def gap_text(gap: Gap, plan: Plan) -> str:
     when = f"from {plan.path.time[gap.first]:g} s to {plan.path.time[gap.last]:g} s"
     if np.isnan(gap.shortfall):
         return f"{when}: {gap.status.text}"
-    count = plan.state.robot.cable_count
+    count = plan.state.one_robot.cable_count
     cables = "all cables" if len(gap.cables) == count else f"cables {', '.join(map(str, gap.cables))}"
     if np.isinf(gap.shortfall):
         return f"{when}: no change of the force alone would do; limits of {cables}"

@@ -37,7 +37,7 @@ def summary_table(runs: Sequence[Run]) -> Table:
     table = plain_table()
     table.add_column("", no_wrap=True)
     for run in runs:
-        name = fill(run.plan.state.robot.name, NARROW if len(runs) > 2 else WIDE)
+        name = fill(run.plan.state.one_robot.name, NARROW if len(runs) > 2 else WIDE)
         table.add_column(Text(f"{name}\n{type(run.plan.state.cables.model).__name__}"), justify="right", no_wrap=True)
     numbers: list[Summary] = [summary(run) for run in runs]
     for field, (label, form) in ROWS.items():

@@ -40,7 +40,7 @@ def serve(robot: Robot, run: Path | None, host: str, port: int, *, browser: bool
             f"package {error.name}", "is not installed", 'The viewer needs it: pip install "sagline[viewer]"'
         ) from None
     course = None if run is None else _run(robot, run)
-    machine = robot if course is None else course.plan.state.robot
+    machine = robot if course is None else course.plan.state.one_robot
     server = web.started(host, port, machine.name)
     try:
         address = web.url(server, host)
@@ -64,7 +64,7 @@ def _run(robot: Robot, file: Path) -> Run:
     from sagline.viewer.run import Run
 
     plan = load_plan(file)
-    made_for = plan.state.robot.name
+    made_for = plan.state.one_robot.name
     if made_for != robot.name:
         raise FileError(
             file, f"is a run of {made_for}, not of {robot.name}", f"View it as: sagline view {made_for} {file}"

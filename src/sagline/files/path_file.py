@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path as FilePath
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from sagline.files.quantity import in_si
 from sagline.files.schema import Entry, validated
 from sagline.files.text import parse_mapping, read_text
 from sagline.motion.path import Path
-from sagline.motion.quintic import quintic_path
+from sagline.motion.rest_to_rest import quintic_path, septic_path
 from sagline.robot.pose import Pose
 
 TIMING_UNITS = {
@@ -26,6 +26,7 @@ TIMING_UNITS = {
     "angular_speed": "rad/s",
     "angular_acceleration": "rad/s^2",
 }
+PROFILES = {"quintic": quintic_path, "septic": septic_path}
 
 
 def load_path(file: str | os.PathLike[str]) -> Path:
@@ -35,6 +36,7 @@ def load_path(file: str | os.PathLike[str]) -> Path:
     (lengths in m, angles in rad) or a text with its unit:
 
         rate: 100                             # samples per second, 100 if left out
+        profile: septic                       # continuous jerk (see `septic_path`); quintic if left out
         durations: [5 s, 8 s]                 # or one for all; or limits instead:
         # speed: 1.5 m/s                      # and acceleration, angular_speed, angular_acceleration
         waypoints:
@@ -92,6 +94,7 @@ class _Waypoints(Entry):
     acceleration: Any = None
     angular_speed: Any = None
     angular_acceleration: Any = None
+    profile: Literal["quintic", "septic"] = "quintic"
     waypoints: list[_Waypoint]
 
 
@@ -102,7 +105,7 @@ def _path_from_yaml(path: FilePath, text: str) -> Path:
         for name, unit in TIMING_UNITS.items()
         if getattr(entry, name) is not None
     }
-    return quintic_path([_pose(w, f"waypoints[{k}]") for k, w in enumerate(entry.waypoints)], **timing)
+    return PROFILES[entry.profile]([_pose(w, f"waypoints[{k}]") for k, w in enumerate(entry.waypoints)], **timing)
 
 
 def _pose(waypoint: _Waypoint, item: str) -> Pose:

@@ -19,7 +19,7 @@ from sagline.cables.model import CableModel, CableState
 from sagline.cables.parabolic import Parabolic
 from sagline.cables.straight import Straight
 from sagline.errors import FileError, InvalidValueError
-from sagline.files.plan_layout import MOTION, PARTS, PROOF, QUANTITIES, TIME, Quantity
+from sagline.files.plan_layout import JERK, MOTION, PARTS, PROOF, QUANTITIES, TIME, Quantity
 from sagline.files.robot_file import dump_robot, parse_robot
 from sagline.files.whole import written_whole
 from sagline.kinematics.plan import Plan
@@ -48,10 +48,11 @@ def save_plan(plan: Plan, file: os.PathLike[str] | str) -> None:
     an answer are kept, with their status, shortfall, blocking cables and proof, and NaN lengths and forces.
 
     Args:
-        plan: The plan.
+        plan: The plan, of one robot.
         file: The file, "run.nc" for instance; one that exists is replaced.
 
     Raises:
+        InvalidValueError: If the plan is of several robots, one a pose.
         FileError: If the file cannot be written; what was there before is untouched.
     """
     data = _dataset(plan)
@@ -101,10 +102,12 @@ def _dataset(plan: Plan) -> Dataset:
         return (*rows, *quantity.parts), quantity.of(plan), quantity.attributes
 
     proof = tuple(quantity for quantity in PROOF if quantity.of(plan) is not None)
-    quantities = QUANTITIES + proof + (() if plan.path is None else MOTION)
+    motion = () if plan.path is None else MOTION if plan.path.jerk is None else (*MOTION, JERK)
+    quantities = QUANTITIES + proof + motion
     used = {part for quantity in quantities for part in quantity.parts} & PARTS.keys()
     coordinates: dict[str, Any] = {part: (part, list(PARTS[part])) for part in sorted(used)}
-    coordinates["cable"] = ("cable", np.arange(plan.state.robot.cable_count), {"long_name": "cable, counted from 0"})
+    cables = np.arange(plan.state.one_robot.cable_count)
+    coordinates["cable"] = ("cable", cables, {"long_name": "cable, counted from 0"})
     if plan.path is not None:
         coordinates["time"] = variable(TIME)
     labels = Coordinates(coordinates, indexes={})  # whoever reads the file builds what indexes they need
@@ -113,12 +116,12 @@ def _dataset(plan: Plan) -> Dataset:
 
 def _attributes(plan: Plan) -> dict[str, Any]:
     return {
-        "title": f"Cable lengths and tensions of {plan.state.robot.name}",
+        "title": f"Cable lengths and tensions of {plan.state.one_robot.name}",
         "source": f"sagline {version('sagline')}",
         "sagline_format": FORMAT,
         **_written("model", plan.state.cables.model),
         **_written("tension", plan.tension),
-        "robot": dump_robot(plan.state.robot),
+        "robot": dump_robot(plan.state.one_robot),
     }
 
 
@@ -189,9 +192,13 @@ def _plan(path: FilePath, data: Dataset, robot: Robot) -> Plan:
         **{name: values(name) for name in STATE_ARRAYS},
         status=values("cable_status"),
     )
+    motion = None
+    if "time" in data.coords:
+        jerk = values("jerk") if "jerk" in data else None
+        motion = Path(values("time"), pose, values("twist"), values("twist_rate"), jerk)
     return Plan(
         state=Equilibrium(robot, pose, values("wrench"), cables),
-        path=Path(values("time"), pose, values("twist"), values("twist_rate")) if "time" in data.coords else None,
+        path=motion,
         tension=_read(path, data, "tension", METHODS),
         status=values("pose_status"),
         shortfall=values("shortfall"),

@@ -135,3 +135,5 @@ MOTION = (
         "acceleration of the platform origin, angular acceleration",
     ),
 )
+# of a path whose jerk is known
+JERK = Quantity("jerk", "path.jerk", ("twist_part",), "m/s^3, rad/s^3", "rate of twist_rate")

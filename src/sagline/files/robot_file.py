@@ -42,6 +42,12 @@ def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
     Raises:
         FileError: If the file cannot be read, or says something wrong; the message names the key and the value.
         InvalidValueError: If there is no such preset.
+
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("cogiro")  # or "my_robot.yaml"
+        >>> robot.cable_count, robot.mass, robot.motion_pattern
+        (8, 91.058, '3R3T')
     """
     path = Path(name_or_path)
     if isinstance(name_or_path, str) and _is_name(name_or_path, path):

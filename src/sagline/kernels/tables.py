@@ -26,22 +26,3 @@ POSE_COLUMNS = 7
 # rows of the result of one pose, each of m values
 SPAN, RISE, LENGTH, HORIZONTAL, VERTICAL, TENSION = 0, 1, 2, 3, 4, 5
 RESULT_ROWS = 6
-
-# rows of the working array of one pose's cables, each of m values; LOW, HIGH, START and SHARED are in the
-# variable in which the load is shared, which is SCALE chord tensions
-DENSITY_ROW, STIFFNESS_ROW, HALF_WEIGHT = 0, 1, 2  # [kg/m], [N], wD/2 [N]
-CHORD_LOW, CHORD_HIGH = 3, 4  # limits of the chord tension [N]
-SCALE, LOW, HIGH, START, SHARED = 5, 6, 7, 8, 9
-TAU, SLACKNESS, STRAIN, RATIO = 10, 11, 12, 13  # chord tension [N], X = wD/(2 tau), e = tau/EA, L/D
-PULL, LAST_PULL = 14, 15  # T_z - tau sin phi [N], now and in the round before
-OFFSET = 16  # the sharing's variable is SCALE tau + OFFSET before weighting; zero but for the frame-end tension [N]
-WORK_ROWS = 17
-
-# rows of the preferences among cables
-ROOT_WEIGHT, GOAL = 0, 1  # square root of a cable's weight; tension to be near [N]
-PREFERENCE_ROWS = 2
-
-# rows of the working array of one pose's balance, each of six values of which n count
-NEEDED, RIGHT, FARKAS = 0, 1, 2  # wrench to supply; along the free motions: its components, proof of an empty set
-HEADS, FACTORS = 3, 4  # diagonal of R and 2/|v|^2 of the reflections
-BALANCE_ROWS = 5

@@ -63,19 +63,25 @@ def confirm(plan: Plan, *, progress: Progress | None = None) -> Confirmation:
 
     Returns:
         The plan with the poses found.
+
+    Examples:
+        >>> import numpy as np
+        >>> import sagline as sl
+        >>> path = sl.quintic_path([(0, 0, 2), (2, 1, 2.5)], durations=4.0)
+        >>> proof = sl.confirm(sl.inverse(sl.load_robot("cogiro"), path, model=sl.Elastic()))
+        >>> print(f"{1e3 * np.linalg.norm(proof.position_error, axis=1).max():.2f} mm off")
+        0.23 mm off
     """
     state, lengths = plan.state, plan.unstrained_length
     if not state.pose.shape:
         found = forward(state.robot, lengths, start=state.pose, wrench=state.wrench, progress=progress)
         return Confirmation(plan, found.pose, found.status, found.wrench_residual)
-    found_of_blocks = []
-    for part in blocks(len(lengths), BLOCK):
-        told = None if progress is None else _from(part.start, len(lengths), progress)
-        found = forward(state.robot, lengths[part], start=state.pose[part], wrench=state.wrench[part], progress=told)
-        found_of_blocks.append((found.pose.position, found.pose.quaternion, found.status, found.wrench_residual))
-    position, quaternion, status, residual = (
-        locked(np.concatenate(parts)) for parts in zip(*found_of_blocks, strict=True)
-    )
+    parts = []
+    for rows in blocks(len(lengths), BLOCK):
+        part, told = state[rows], None if progress is None else _from(rows.start, len(lengths), progress)
+        found = forward(part.robot, part.cables.unstrained_length, part.pose, wrench=part.wrench, progress=told)
+        parts.append((found.pose.position, found.pose.quaternion, found.status, found.wrench_residual))
+    position, quaternion, status, residual = (locked(np.concatenate(each)) for each in zip(*parts, strict=True))
     return Confirmation(plan, Pose._adopt(position, quaternion), status, residual)
 
 

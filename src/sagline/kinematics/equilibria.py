@@ -11,7 +11,7 @@ from sagline.arrays import Array, Indices, locked
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
-from sagline.kernels.forward import forward as kernel
+from sagline.kernels.forward.problem import ENERGY
 from sagline.kinematics.forward import checked_lengths
 from sagline.kinematics.forward_rows import Found
 from sagline.kinematics.forward_solution import ForwardSolution
@@ -123,7 +123,7 @@ def _distinct(found: Found, length: float) -> tuple[Indices, Indices]:
         else:
             chosen.append(int(index))
             counts.append(1)
-    energy = np.nan_to_num(found.numbers[chosen, kernel.ENERGY], nan=0.0)
+    energy = np.nan_to_num(found.numbers[chosen, ENERGY], nan=0.0)
     order = np.lexsort((-np.array(counts, dtype=np.int64), energy))
     return np.array(chosen, dtype=np.int64)[order], np.array(counts, dtype=np.int64)[order]
 

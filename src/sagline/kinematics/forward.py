@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -16,6 +18,7 @@ from sagline.kinematics.measured import MeasuredTension, corrected
 from sagline.kinematics.start import search
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
+from sagline.robot.several import check_count, first_of, together
 from sagline.statics.tables import pose_rows
 from sagline.statics.wrench import external_wrench
 
@@ -23,7 +26,7 @@ _CATENARY = Catenary()
 
 
 def forward(
-    robot: Robot,
+    robot: Robot | Sequence[Robot],
     unstrained_length: ArrayLike,
     start: Pose | None = None,
     model: CableModel = _CATENARY,
@@ -35,7 +38,8 @@ def forward(
     """The pose in which the platform rests on cables of given unstrained lengths.
 
     Args:
-        robot: The robot, with m cables.
+        robot: The robot, with m cables. Or a sequence of N robots, one a sample, that differ in anything but number of
+            cables, motion pattern with its plane, kind of tension limits and gravity.
         unstrained_length: L [m], > 0, shape (m,) for one sample or (N, m). A row of NaN, as a plan has it at an
             infeasible pose, is answered by the status NO_LENGTHS.
         start: Where to begin. A batch of N poses: one a sample. A single pose with N samples: a trajectory, the
@@ -54,29 +58,47 @@ def forward(
 
     Raises:
         InvalidValueError: If a length is not positive or single lengths of a sample are NaN (the message names the
-            cable), or an argument is of the wrong shape.
+            cable), several robots do not fit together (it names which), or an argument is of the wrong shape.
 
     Source:
         docs/model.md, section 6.
+
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("cogiro")
+        >>> plan = sl.inverse(robot, sl.Pose.from_euler([1, 1, 2], 0, 0, 0))
+        >>> found = sl.forward(robot, plan.unstrained_length)
+        >>> print(found.solved, found.pose.position.round(9))
+        True [1. 1. 2.]
     """
-    lengths = checked_lengths(robot, unstrained_length)
+    robots = together(robot)
+    lengths = checked_lengths(first_of(robots), unstrained_length)
     shape = lengths.shape[:-1]
-    load = external_wrench(wrench, shape[0] if shape else None)
+    count = shape[0] if shape else None
+    check_count(robots, count)
+    load = external_wrench(wrench, count)
     samples, loads = np.atleast_2d(lengths), np.atleast_2d(load)
     if start is None:
-        found = search(robot, model, samples, loads, progress)
+        found = search(robots, model, samples, loads, progress)
     else:
         chained = bool(shape) and not start.shape
         starts = start_rows(start, lengths)
-        found = solve_rows(robot, model, samples, starts, loads, chained=chained, progress=progress)
+        found = solve_rows(robots, model, samples, starts, loads, chained=chained, progress=progress)
     covariance = None
     if tension_measured is not None:
-        covariance = corrected(robot, model, found, loads, tension_measured)
-    return found.solution(robot, model, load, shape, covariance)
+        covariance = corrected(robots, model, found, loads, tension_measured)
+    return found.solution(robots, model, load, shape, covariance)
 
 
 def checked_lengths(robot: Robot, lengths: ArrayLike) -> Array:
     """The caller's lengths, shape (m,) or (N, m), positive or whole rows of NaN.
+
+    Args:
+        robot: Gives the number of cables, and its name to messages.
+        lengths: What the caller gave [m].
+
+    Returns:
+        Write-locked array of shape (m,) or (N, m).
 
     Raises:
         InvalidValueError: If they are not; the message names the cable and, of many, the sample.
@@ -110,7 +132,14 @@ def checked_lengths(robot: Robot, lengths: ArrayLike) -> Array:
 
 
 def start_rows(start: Pose, lengths: Array) -> Array:
-    """Pose rows (1 or N, POSE_COLUMNS) to begin at.
+    """Pose rows to begin at.
+
+    Args:
+        start: One pose, or one a sample.
+        lengths: The samples, shape (m,) or (N, m).
+
+    Returns:
+        Array of shape (1 or N, POSE_COLUMNS).
 
     Raises:
         InvalidValueError: If the counts of poses and samples differ.

@@ -12,13 +12,10 @@ from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
 from sagline.kernels import codes, tables
-from sagline.kernels.forward.forward import (
-    FORCE_RESIDUAL,
-    FORWARD_NUMBERS,
-    MOMENT_RESIDUAL,
-    STIFFNESS_MIN,
-    forward_poses,
-)
+from sagline.kernels.forward.forward import forward_poses
+from sagline.kernels.forward.problem import FORCE_RESIDUAL, FORWARD_NUMBERS, MOMENT_RESIDUAL, STIFFNESS_MIN
+from sagline.kernels.memory import memory_for
+from sagline.kinematics.forward_rows import new_chain
 from sagline.kinematics.forward_status import STABLE, ForwardStatus
 from sagline.kinematics.start import search
 from sagline.robot.pose import Pose
@@ -81,18 +78,17 @@ class ForwardSolver:
         self._numbers = np.empty((1, FORWARD_NUMBERS))
         self._status: Codes = np.empty(1, dtype=np.int8)
         self._arguments: tuple[Any, ...] = (
-            self._model.code,
-            *self._model.parameters,
-            False,
-            robot.freedom,
-            body_table(robot),
-            cable_table(robot),
-            *(locked(array.view()) for array in (self._lengths, self._start, self._wrench)),
-            self._pose,
-            self._results,
-            np.empty((1, m), dtype=np.int8),
-            self._numbers,
-            self._status,
+            (self._model.code, *self._model.parameters),
+            True,  # a chain goes on from what it remembers of the last equilibrium
+            (
+                robot.freedom,
+                body_table(robot),
+                cable_table(robot),
+                *(locked(array.view()) for array in (self._lengths, self._start, self._wrench)),
+            ),
+            new_chain(m, robot.degrees_of_freedom),
+            memory_for(m),
+            (self._pose, self._results, np.empty((1, m), dtype=np.int8), self._numbers, self._status),
         )
         self._start[0, 6] = 1.0
         self._lengths[0] = np.nan  # compiles, solves nothing
@@ -101,6 +97,9 @@ class ForwardSolver:
 
     def reset(self, start: Pose | None = None) -> None:
         """Forget the last pose: the next step begins at a start, or searches.
+
+        Args:
+            start: Where the next step begins; None: it searches.
 
         Raises:
             InvalidValueError: If start is a batch.

@@ -2,39 +2,36 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array, Codes, Flags, locked
+from sagline.arrays import Array, Codes, locked
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel, CableState
 from sagline.errors import CableGeometryError, InvalidValueError
 from sagline.kernels import codes, tables
-from sagline.kernels.inverse.explain import explain_poses
-from sagline.kernels.inverse.poses import Answers, inverse_poses
-from sagline.kernels.memory import memory_for
-from sagline.kinematics.blocks import Progress, blocks
+from sagline.kinematics.blocks import Progress
+from sagline.kinematics.inverse_rows import explained, solve_rows
 from sagline.kinematics.plan import Plan
 from sagline.motion.path import Path
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.statics.tables import pose_rows, robot_terms
+from sagline.robot.several import cables_of, first_of, one_a_pose
+from sagline.statics.tables import pose_rows
 from sagline.statics.wrench import external_wrench, inertial_wrench
 from sagline.tension.closest import Closest
 from sagline.tension.method import TensionMethod, Variable
-from sagline.tension.options import Options, kernel_options, takes_default_kernel
-
-BLOCK = 1 << 12  # poses solved at once: less than 0.2 s, after which an interrupt is heard
+from sagline.tension.options import kernel_options
 
 _CATENARY = Catenary()
 _CLOSEST = Closest()
 
 
 def inverse(
-    robot: Robot,
+    robot: Robot | Sequence[Robot],
     motion: Path | Pose,
     model: CableModel = _CATENARY,
     tension: TensionMethod = _CLOSEST,
@@ -46,7 +43,8 @@ def inverse(
     """Tensions that balance the platform within their limits, and the unstrained lengths that produce them.
 
     Args:
-        robot: The robot, with m cables and n degrees of freedom, m >= n.
+        robot: The robot, with m cables and n degrees of freedom, m >= n. Or a sequence of N robots, one a pose, that
+            differ in anything but number of cables, motion pattern with its plane, kind of tension limits and gravity.
         motion: A path of N samples, whose inertia is included; or a pose or batch of N poses at rest.
         model: Cable model; the default is exact.
         tension: How the load is shared among redundant cables. `Closest` carries its reference along a
@@ -62,38 +60,39 @@ def inverse(
         feasible there, says why, and holds NaN.
 
     Raises:
-        InvalidValueError: If the robot has fewer cables than degrees of freedom, the method cannot share among
-            its cables, or an argument is of the wrong shape.
+        InvalidValueError: If a robot has fewer cables than degrees of freedom, the method cannot share among
+            its cables, several robots do not fit together (the message names which), or an argument is of the
+            wrong shape.
         CableGeometryError: If a cable has no length at some pose.
 
     Source:
         Gia Luan & Truong Thinh 2020, figure 16; made exact in docs/model.md, section 5.
+
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("cogiro")
+        >>> plan = sl.inverse(robot, sl.Pose.from_euler([1, 1, 2], 0, 0, 0))
+        >>> print(plan.feasible, plan.unstrained_length.round(3))
+        True [11.049 10.542  9.674  9.829  8.49   7.85   9.453  9.402]
     """
     method = tension if isinstance(motion, Path) or previous is not None else tension.alone
-    options = kernel_options(robot, model, method)
     pose = motion.pose if isinstance(motion, Path) else motion
+    robots = one_a_pose(robot, len(pose) if pose.shape else None)
+    shared = first_of(robots)
+    options = kernel_options(robots, model, method)
     rows = pose_rows(pose)
     count = len(rows)
     load = external_wrench(wrench, count if pose.shape else None)
     if isinstance(motion, Path):
-        load = locked(inertial_wrench(robot, pose, motion.twist, motion.twist_rate) + load)
-    reference = _reference(robot, previous, tension.variable)
-    found = Found.empty(count, robot.cable_count, robot.degrees_of_freedom)
-    otherwise = None if takes_default_kernel(method) else True
-    memory = memory_for(robot.cable_count)
-    given = (*options, robot_terms(robot), rows, np.atleast_2d(load), reference, memory, otherwise, found.answers)
-    done = 0
-    for part in blocks(count, BLOCK):
-        inverse_poses(*given, part.start, part.stop)
-        done += int(np.count_nonzero(found.pose_status[part] != codes.POSE_INFEASIBLE))
-        if progress is not None:
-            progress(done, count)
+        load = locked(inertial_wrench(robots, pose, motion.twist, motion.twist_rate) + load)
+    reference = _reference(shared, previous, tension.variable)
+    found = solve_rows(robots, method, options, rows, np.atleast_2d(load), reference, progress)
     _refuse_missing_chords(found.pose_status, found.results)
-    shortfall, farkas, blocking = explained(robot, options, rows, found, progress)
+    shortfall, farkas, blocking = explained(robots, options, rows, found, progress)
     cables = CableState(
         model=model,
-        cable=robot.cables,
-        gravity=robot.gravity,
+        cable=cables_of(robots),
+        gravity=shared.gravity,
         span=found.row(tables.SPAN, pose),
         rise=found.row(tables.RISE, pose),
         unstrained_length=found.row(tables.LENGTH, pose),
@@ -104,73 +103,16 @@ def inverse(
     )
     whole = locked(np.ascontiguousarray(np.broadcast_to(load, (*pose.shape, 6))))
     return Plan(
-        state=Equilibrium(robot, pose, whole, cables),
+        state=Equilibrium(robots, pose, whole, cables),
         path=motion if isinstance(motion, Path) else None,
         tension=tension,
         status=locked(found.pose_status.reshape(pose.shape)),
         shortfall=locked(shortfall.reshape(pose.shape)),
         wrench_residual=locked(found.residuals.reshape(*pose.shape, 2)),
         blocking=locked(blocking.reshape(*pose.shape, -1)),
-        farkas=locked((farkas @ robot.freedom).reshape(*pose.shape, 6)),
-        needed=locked((found.needed @ robot.freedom).reshape(*pose.shape, 6)),
+        farkas=locked((farkas @ shared.freedom).reshape(*pose.shape, 6)),
+        needed=locked((found.needed @ shared.freedom).reshape(*pose.shape, 6)),
     )
-
-
-class Found(NamedTuple):
-    """What the kernel fills, in its order; arrays lead with the N poses but for results (RESULT_ROWS, N, m)."""
-
-    results: Array
-    cable_status: Codes
-    residuals: Array
-    needed: Array
-    pose_status: Codes
-
-    @classmethod
-    def empty(cls, count: int, cables: int, freedoms: int) -> Found:
-        """Room for a batch."""
-        return cls(
-            np.empty((tables.RESULT_ROWS, count, cables)),
-            np.empty((count, cables), dtype=np.int8),
-            np.empty((count, 2)),
-            np.empty((count, freedoms)),
-            np.empty(count, dtype=np.int8),
-        )
-
-    @property
-    def answers(self) -> Answers:
-        """As the kernel takes it: a plain tuple."""
-        return self.results, self.cable_status, self.residuals, self.needed, self.pose_status
-
-    def row(self, row: int, pose: Pose) -> Array:
-        """One row of the results in the caller's shape."""
-        return locked(self.results[row].reshape(*pose.shape, -1))
-
-
-def explained(
-    robot: Robot, options: Options, rows: Array, found: Found, progress: Progress | None = None
-) -> tuple[Array, Array, Flags]:
-    """Shortfall [N] (N,), Farkas vectors along the free motions (N, n) and blocking cables (N, m) of a batch."""
-    count, n = found.needed.shape
-    solved = found.pose_status == codes.POSE_SOLVED
-    shortfall = np.where(solved, 0.0, np.nan)
-    farkas = np.full((count, n), np.nan)
-    blocking = np.zeros((count, robot.cable_count), dtype=np.bool_)
-    which = np.flatnonzero(found.pose_status == codes.POSE_INFEASIBLE)
-    memory = memory_for(robot.cable_count)
-    for part in blocks(which.size, BLOCK):
-        explain_poses(
-            options.model,
-            options.limits,
-            robot_terms(robot),
-            rows,
-            found.needed,
-            which[part],
-            memory,
-            (shortfall, farkas, blocking),
-        )
-        if progress is not None:
-            progress(count - which.size + part.stop, count)
-    return shortfall, farkas, blocking
 
 
 def _reference(robot: Robot, previous: Plan | None, variable: Variable) -> Array:

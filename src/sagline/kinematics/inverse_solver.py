@@ -15,8 +15,9 @@ from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
 from sagline.kernels import codes, tables
 from sagline.kernels.inverse.poses import inverse_poses
+from sagline.kernels.jit import machine_code
 from sagline.kernels.memory import memory_for
-from sagline.kinematics.inverse import Found, explained
+from sagline.kinematics.inverse_rows import Found, explained
 from sagline.kinematics.status import PoseStatus
 from sagline.robot.robot import Robot
 from sagline.statics.tables import robot_terms
@@ -54,6 +55,13 @@ class InverseSolver:
 
     It owns its working memory and, for `Closest`, the last feasible tensions: `reset` forgets them. One solver
     serves one control loop; it is not to be shared between threads.
+
+    Examples:
+        >>> import sagline as sl
+        >>> solver = sl.InverseSolver(sl.load_robot("cogiro"))
+        >>> step = solver.step((1.0, 1.0, 2.0), (0.0, 0.0, 0.0, 1.0))
+        >>> print(step.status.name, step.unstrained_length[:3].round(3))
+        SOLVED [11.049 10.542  9.674]
     """
 
     def __init__(self, robot: Robot, model: CableModel | None = None, tension: TensionMethod | None = None) -> None:
@@ -73,14 +81,16 @@ class InverseSolver:
         self._options = kernel_options(robot, model or Catenary(), method)
         self._pose = np.zeros((1, tables.POSE_COLUMNS))
         self._pose[0, 6] = 1.0
+        self._position, self._quaternion = self._pose[0, :3], self._pose[0, 3:]
         self._wrench = np.zeros((1, 6))
         self._reference = np.full(m, np.nan)
         self._found = Found.empty(1, m, n)
+        self._status = self._found.pose_status.data  # read five times faster than an array of one
+        self._loaded = False  # whether the wrench of the last step was more than zero
         self._lengths = self._found.results[tables.LENGTH, 0]
         # the views are read-only: kernels are compiled for read-only inputs, and writing goes through the owner
         self._rows = locked(self._pose.view())
-        self._solve = partial(
-            inverse_poses,
+        arguments = (
             *self._options,
             robot_terms(robot),
             self._rows,
@@ -92,7 +102,7 @@ class InverseSolver:
             0,
             1,
         )
-        self._solve()
+        self._solve = partial(machine_code(inverse_poses, arguments), *arguments)
         explained(robot, self._options, self._rows, self._found._replace(pose_status=_INFEASIBLE))
         self.reset()
 
@@ -141,12 +151,16 @@ class InverseSolver:
         Returns:
             The status of the pose.
         """
-        self._pose[0, :3] = position
-        self._pose[0, 3:] = quaternion
-        self._wrench[0] = 0.0 if wrench is None else wrench
+        self._position[:] = position
+        self._quaternion[:] = quaternion
+        if wrench is not None:
+            self._wrench[0] = wrench
+        elif self._loaded:
+            self._wrench.fill(0.0)
+        self._loaded = wrench is not None
         self._solve()
         out[:] = self._lengths
-        status: PoseStatus = _STATUSES[self._found.pose_status[0]]
+        status: PoseStatus = _STATUSES[self._status[0]]
         return status
 
     def _shortfall(self, status: PoseStatus) -> float:

@@ -13,14 +13,13 @@ from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
 from sagline.kernels import codes, tables
 from sagline.kinematics.forward_rows import Found, solve_rows
-from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.robot import Robot
-from sagline.statics.stiffness import cable_slopes, stiffness
+from sagline.robot.several import Robots, robot_at
+from sagline.statics.stiffness import stiffness
 
 _STEPS = 100
 _HALVINGS = 20
 _SETTLED = 1e-8  # of the sum of squares: a step that promises less is within 1e-4 standard deviations of the best
-_TINY = 1e-300
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,6 +39,11 @@ class MeasuredTension:
     def __init__(self, frame_end_tension: ArrayLike, tension_deviation: ArrayLike, length_deviation: ArrayLike) -> None:
         """Check the three.
 
+        Args:
+            frame_end_tension: Readings [N], shape (m,) or (N, m); NaN for a cable without a cell.
+            tension_deviation: Standard deviation of a reading [N], > 0.
+            length_deviation: Standard deviation of a length [m], > 0.
+
         Raises:
             InvalidValueError: If a reading is negative or infinite, or a deviation is not positive.
         """
@@ -53,14 +57,14 @@ class MeasuredTension:
             object.__setattr__(self, name, checked(value, name, unit, above=0.0))
 
 
-def corrected(robot: Robot, model: CableModel, found: Found, loads: Array, measured: MeasuredTension) -> Array:
+def corrected(robot: Robots, model: CableModel, found: Found, loads: Array, measured: MeasuredTension) -> Array:
     """Replace equilibria at measured lengths by those that fit lengths and tensions best; their poses' covariance.
 
     Every sample by itself: Gauss-Newton in the lengths, L_true, that minimize
     sum ((L_true - L)/sigma_L)^2 + sum ((T_A - reading)/sigma_T)^2 while the platform stays in equilibrium.
 
     Args:
-        robot: The robot.
+        robot: The robot, or one a sample.
         model: Cable model with forces.
         found: Equilibria at the measured lengths (N samples), where the search begins; changed in place.
         loads: External plus inertial wrenches (1 or N, 6).
@@ -83,7 +87,8 @@ def corrected(robot: Robot, model: CableModel, found: Found, loads: Array, measu
     covariance = np.full((len(lengths), 6, 6), np.nan)
     for i in range(len(lengths)):
         sample = np.array([i])
-        fit = _Fit(robot, model, lengths[i].copy(), locked(loads[i % len(loads)].copy()), readings[i], *deviations)
+        one = robot_at(robot, i)
+        fit = _Fit(one, model, lengths[i].copy(), locked(loads[i % len(loads)].copy()), readings[i], *deviations)
         answer = found.part(sample)
         if answer.stable[0]:
             answer, covariance[i] = fit.best(answer)
@@ -116,9 +121,9 @@ class _Fit(NamedTuple):
         known = ~np.isnan(self.readings)
         covariance = np.full((6, 6), np.nan)
         for _ in range(_STEPS):
-            state = found.solution(self.robot, self.model, self.load, ()).state
-            by_length = stiffness(state).length_sensitivity
-            misread = frame_end_slopes(state, by_length) / self.tension_deviation[:, None]
+            stiff = stiffness(found.solution(self.robot, self.model, self.load, ()).state)
+            by_length = stiff.length_sensitivity
+            misread = stiff.tension_sensitivity / self.tension_deviation[:, None]
             matrix = np.concatenate((np.diag(1.0 / self.length_deviation), misread[known]))
             inverse = np.linalg.inv(matrix.T @ matrix)
             downhill = -matrix.T @ self.misfit(found)
@@ -154,22 +159,3 @@ class _Fit(NamedTuple):
                     return new
             step = 0.5 * step
         return None
-
-
-def frame_end_slopes(state: Equilibrium, motion_by_length: Array) -> Array:
-    """d(tension at the frame end of cable i)/dL_j while the platform keeps its balance, shape (m, m) [N/m]."""
-    robot, cables = state.robot, state.cables
-    slopes = cable_slopes(state)
-    # the platform end moves by dp + dphi x r
-    turned = np.cross(motion_by_length[3:].T[None], slopes.levers[:, None], axis=-1)
-    forces = slopes.blocks @ (motion_by_length[None, :3] + turned.transpose(0, 2, 1))
-    index = np.arange(robot.cable_count)
-    forces[index, :, index] += slopes.by_length
-    if not cables.model.weightless:
-        forces[index, 2, index] -= robot.cables.linear_density * robot.gravity
-    reach = state.pose.position + robot.platform_anchors @ state.pose.matrix.T - robot.frame_anchors
-    level = reach[:, :2] / np.maximum(cables.span, _TINY)[:, None]  # a vertical cable pulls nowhere sideways
-    pull = np.column_stack((level * cables.horizontal_tension[:, None], cables.vertical_force - cables.cable_weight))
-    direction = pull / np.maximum(np.linalg.norm(pull, axis=1), _TINY)[:, None]  # and one without force, nowhere
-    slope: Array = np.einsum("ik,ikj->ij", direction, forces)
-    return slope

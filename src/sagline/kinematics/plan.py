@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from sagline.arrays import Array, Codes
 from sagline.cables.status import CableStatus
+from sagline.kinematics.length_rate import length_rate
 from sagline.kinematics.status import PoseStatus
 from sagline.motion.path import Path
 from sagline.robot.equilibrium import Equilibrium
@@ -94,6 +95,15 @@ class Plan:
         return self.state.cables.chord_tension
 
     @property
+    def length_rate(self) -> Array | None:
+        """dL/dt: how fast to wind [m/s], shape (N, m), along the path; None for poses without a path.
+
+        The rate at which `unstrained_length` changes as the platform moves on and the load is shared anew; NaN where
+        the plan has no answer. Worked out at each call. See docs/model.md, section 7.
+        """
+        return None if self.path is None else length_rate(self.state, self.path, self.tension, self.feasible)
+
+    @property
     def gaps(self) -> tuple[Gap, ...]:
         """The runs of consecutive poses without an answer, in order; a single pose counts as a batch of one."""
         lost = ~np.atleast_1d(self.feasible)
@@ -134,6 +144,7 @@ class Plan:
             file: The file, "run.nc" for instance; one that exists is replaced. `load_plan` reads it.
 
         Raises:
+            InvalidValueError: If the plan is of several robots, one a pose: to save those, solve them one by one.
             FileError: If the file cannot be written; what was there before is untouched.
         """
         from sagline.files.plan_file import save_plan  # the one call outward: a plan knows how to leave

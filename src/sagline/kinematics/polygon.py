@@ -55,6 +55,12 @@ def tension_polygon(
 
     Source:
         Gia Luan & Truong Thinh 2020, (53)-(55); Gouttefarde et al. 2015; docs/model.md, section 5.
+
+    Examples:
+        >>> import sagline as sl
+        >>> polygon = sl.tension_polygon(sl.load_robot("cogiro"), sl.Pose.from_euler([1, 1, 2], 0, 0, 0))
+        >>> print(len(polygon.vertices), "corners, the first side:", polygon.sides[0])
+        4 corners, the first side: Side(cable=1, limit='min')
     """
     check_sharing(robot, Centroid())
     if pose.shape:

@@ -22,15 +22,26 @@ class Path:
         twist: Velocity of the platform's origin [m/s], then its angular velocity [rad/s], in world axes, shape (N, 6).
         twist_rate: Acceleration of the platform's origin [m/s^2], then its angular acceleration [rad/s^2],
             in world axes, shape (N, 6).
+        jerk: d(twist_rate)/dt [m/s^3, rad/s^3], shape (N, 6); None where it is not known, as of sampled poses.
     """
 
     time: Array
     pose: Pose
     twist: Array
     twist_rate: Array
+    jerk: Array | None
 
-    def __init__(self, time: ArrayLike, pose: Pose, twist: ArrayLike, twist_rate: ArrayLike) -> None:
-        """Check the four fields against each other.
+    def __init__(
+        self, time: ArrayLike, pose: Pose, twist: ArrayLike, twist_rate: ArrayLike, jerk: ArrayLike | None = None
+    ) -> None:
+        """Check the fields against each other.
+
+        Args:
+            time: Time of each sample [s], shape (N,), strictly increasing.
+            pose: A batch of N poses.
+            twist: Velocity [m/s] and angular velocity [rad/s], shape (N, 6).
+            twist_rate: Their rates [m/s^2, rad/s^2], shape (N, 6).
+            jerk: Their second rates [m/s^3, rad/s^3], shape (N, 6), or None.
 
         Raises:
             InvalidValueError: If the times do not increase, a number is not finite, or the lengths differ.
@@ -41,10 +52,9 @@ class Path:
             raise _length_error("pose", f"of shape {pose.shape}", samples)
         object.__setattr__(self, "time", clock)
         object.__setattr__(self, "pose", pose)
-        for name, value, unit in (
-            ("twist", twist, "m/s or rad/s"),
-            ("twist_rate", twist_rate, "m/s^2 or rad/s^2"),
-        ):
+        object.__setattr__(self, "jerk", None)
+        rates = [("twist", twist, "m/s or rad/s"), ("twist_rate", twist_rate, "m/s^2 or rad/s^2")]
+        for name, value, unit in [*rates, *([] if jerk is None else [("jerk", jerk, "m/s^3 or rad/s^3")])]:
             array = checked(value, name, unit, shape=(None, 6))
             if array.shape != (samples, 6):
                 raise _length_error(name, f"of shape {array.shape}", samples)
@@ -59,13 +69,19 @@ class Path:
         """Time from the first sample to the last [s]."""
         return float(self.time[-1] - self.time[0])
 
-    def __reduce__(self) -> tuple[type[Path], tuple[Array, Pose, Array, Array]]:
+    def __reduce__(self) -> tuple[type[Path], tuple[Array, Pose, Array, Array, Array | None]]:
         """Pickle through the constructor, so that a loaded path is checked and locked too."""
-        return Path, (self.time, self.pose, self.twist, self.twist_rate)
+        return Path, (self.time, self.pose, self.twist, self.twist_rate, self.jerk)
 
 
 def checked_time(time: ArrayLike) -> Array:
     """A locked copy of the sample times [s], strictly increasing, shape (N,) with N >= 1.
+
+    Args:
+        time: What a caller gave.
+
+    Returns:
+        The times, float64, write-locked.
 
     Raises:
         InvalidValueError: If they are no such times; it names the first sample that is wrong.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sagline.motion.path import Path
-from sagline.motion.quintic import quintic_path
+from sagline.motion.rest_to_rest import quintic_path
 
 HEIGHT = 1.5  # m, as in the article
 STOPS = ((0.0, 0.0), (5.0, 3.5), (-5.0, 3.5), (-5.0, -3.5), (5.0, -3.5), (5.0, 3.5), (0.0, 0.0))  # x, y [m]
@@ -19,6 +19,12 @@ def article_path(rate: float = 100.0) -> Path:
 
     Args:
         rate: Samples per second [1/s], > 0; 100 gives 6,001 poses.
+
+    Returns:
+        Path of 60 s.
+
+    Raises:
+        InvalidValueError: If the rate is not positive.
 
     Source:
         Gia Luan & Truong Thinh, Appl. Sci. 2020, 10(15), 5318, section 7.

@@ -27,10 +27,18 @@ def path_from_samples(time: ArrayLike, pose: Pose) -> Path:
         pose: The N poses; from one to the next the platform turns by less than 180 degrees.
 
     Returns:
-        Path with the given times and poses.
+        Path with the given times and poses; its jerk is None, as a cubic spline has none to speak of.
 
     Raises:
         InvalidValueError: If the times do not increase, there are fewer than two, or the number of poses differs.
+
+    Examples:
+        >>> import numpy as np
+        >>> import sagline as sl
+        >>> time = np.linspace(0.0, 2.0, 21)
+        >>> path = sl.path_from_samples(time, sl.Pose.from_euler(np.outer(time**2, [1, 0, 2]), 0, 0, 0))
+        >>> print(path.twist[-1, :3].round(6), path.twist_rate[0, :3].round(6))
+        [4. 0. 8.] [2. 0. 4.]
     """
     clock = checked_time(time)
     if clock.size < 2 or pose.shape != (clock.size,):
@@ -40,14 +48,22 @@ def path_from_samples(time: ArrayLike, pose: Pose) -> Path:
             "as many poses as times, at least two",
             "Give one pose for each time.",
         )
-    velocity, acceleration = _spline_rates(clock, pose.position)
+    velocity, acceleration = spline_rates(clock, pose.position)
     angular_velocity, angular_acceleration = _angular_rates(clock, _without_sign_changes(pose.quaternion))
     twist = np.hstack((velocity, angular_velocity))
     return Path(clock, pose, twist, np.hstack((acceleration, angular_acceleration)))
 
 
-def _spline_rates(time: Array, values: Array) -> tuple[Array, Array]:
-    """First and second derivative, at its knots, of the cubic spline through the values."""
+def spline_rates(time: Array, values: Array) -> tuple[Array, Array]:
+    """First and second derivative, at its knots, of the cubic spline through the values.
+
+    Args:
+        time: Times of the knots, strictly increasing, shape (N,), N >= 2.
+        values: Shape (N, ...).
+
+    Returns:
+        Two arrays of the shape of the values.
+    """
     from scipy.interpolate import CubicSpline  # takes longer to load than all the rest of motion
 
     spline = CubicSpline(time, values, bc_type="not-a-knot")
@@ -71,7 +87,7 @@ def _angular_rates(time: Array, quaternion: Array) -> tuple[Array, Array]:
     scipy's RotationSpline is not used: it starts and ends with the mean velocity of the outermost steps, which leaves
     an error in the acceleration there that smaller steps do not cure.
     """
-    rate, curvature = _spline_rates(time, quaternion)
+    rate, curvature = spline_rates(time, quaternion)
     velocity = 2.0 * _vector_of_product_with_conjugate(rate, quaternion)
     growth = np.sum(quaternion * rate, axis=1, keepdims=True)  # of the norm, which a spline does not keep at 1
     return velocity, 2.0 * _vector_of_product_with_conjugate(curvature, quaternion) - 2.0 * growth * velocity

@@ -48,7 +48,7 @@ def errors(*confirmations: Confirmation) -> Figure:
     panels = figure.subplots(1, len(confirmations), sharey=True, squeeze=False)[0]
     for ax, confirmation in zip(panels, confirmations, strict=True):
         _draw(ax, confirmation)
-        ax.set_title(confirmation.plan.state.robot.name, fontsize=TICK)
+        ax.set_title(confirmation.plan.state.one_robot.name, fontsize=TICK)
         ax.label_outer()
     handles = {label: line for ax in panels for line, label in zip(*ax.get_legend_handles_labels(), strict=True)}
     figure.legend(handles.values(), handles.keys(), loc="outside right upper", fontsize=TICK, frameon=False)

@@ -56,7 +56,7 @@ def _robots(study: Simulation, draw: Drawings) -> Finding:
         figure = Sheet(figsize=(WIDTH, 3.4))
         figure.subplots_adjust(left=0.0, right=1.0, bottom=0.0, top=1.0)
         ax = figure.add_subplot(projection="3d")
-        draw_robot(run.plan.state.robot, Pose.from_euler(CORNER, 0.0, 0.0, 0.0), ax)
+        draw_robot(run.plan.state.one_robot, Pose.from_euler(CORNER, 0.0, 0.0, 0.0), ax)
         ax.set_title("")
         panels.append(draw.panel(figure, caption))
     return Finding(
@@ -198,7 +198,7 @@ def _error_panel(run: Confirmation, path: Path, caption: str, draw: Drawings) ->
 
 def _comparison(study: Simulation) -> Finding:
     suspended, mixed = study.of(Empirical)
-    robot = mixed.plan.state.robot
+    robot = mixed.plan.state.one_robot
     lower = robot.frame_anchors[:, 2] < robot.frame_anchors[:, 2].mean()
     near = float(np.mean(mixed.plan.chord_tension[:, lower] <= NEAR * robot.tension_min[lower]))
     rows = [

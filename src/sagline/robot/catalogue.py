@@ -11,7 +11,16 @@ _PRESETS = files("sagline.robot") / "presets"
 
 
 def robot_names() -> tuple[str, ...]:
-    """Names of the presets, in alphabetical order."""
+    """Names of the presets.
+
+    Returns:
+        In alphabetical order.
+
+    Examples:
+        >>> import sagline as sl
+        >>> sl.robot_names()[:3]
+        ('article-mixed', 'article-prototype', 'article-suspended')
+    """
     return tuple(
         sorted(entry.name.removesuffix(".yaml") for entry in _PRESETS.iterdir() if entry.name.endswith(".yaml"))
     )
@@ -19,6 +28,12 @@ def robot_names() -> tuple[str, ...]:
 
 def preset_text(name: str) -> str:
     """Text of a preset's robot file.
+
+    Args:
+        name: One of `robot_names`.
+
+    Returns:
+        YAML, as `load_robot` reads it.
 
     Raises:
         InvalidValueError: If there is no such preset; the message suggests the nearest.

@@ -17,19 +17,59 @@ _SYMMETRY = 1e-9  # largest difference of mirrored elements, relative to the lar
 
 
 def choice(value: Any, item: str, allowed: tuple[str, ...]) -> Any:
-    """One of a few words."""
+    """One of a few words.
+
+    Args:
+        value: What was given.
+        item: The name a message uses.
+        allowed: The words.
+
+    Returns:
+        The value.
+
+    Raises:
+        InvalidValueError: If it is none of them.
+    """
     if value not in allowed:
         raise InvalidValueError(item, repr(value), ", ".join(allowed), f"Choose one of them as {item}.")
     return value
 
 
 def number(value: Any, item: str, unit: str, *, low: float = -np.inf, above: float = -np.inf) -> float:
-    """A single finite number."""
+    """A single finite number.
+
+    Args:
+        value: What was given.
+        item: The name a message uses.
+        unit: Its unit, for the message.
+        low: Smallest allowed value.
+        above: The value must be strictly larger than this.
+
+    Returns:
+        The number.
+
+    Raises:
+        InvalidValueError: If it is not; the message names the item.
+    """
     return float(exactly(value, item, unit, (), low=low, above=above))
 
 
 def exactly(value: ArrayLike, item: str, unit: str, shape: tuple[int, ...], **limits: Any) -> Array:
-    """An array of exactly one shape: a robot's numbers have no batch axes."""
+    """An array of exactly one shape: a robot's numbers have no batch axes.
+
+    Args:
+        value: What was given.
+        item: The name a message uses.
+        unit: Its unit, for the message.
+        shape: The whole shape.
+        **limits: As of `arrays.checked`.
+
+    Returns:
+        Array of that shape, write-locked.
+
+    Raises:
+        InvalidValueError: If the shape is another, or a value is out of range.
+    """
     array = checked(value, item, unit, **limits)
     if array.shape != shape:
         raise InvalidValueError(
@@ -39,7 +79,18 @@ def exactly(value: ArrayLike, item: str, unit: str, shape: tuple[int, ...], **li
 
 
 def anchors(frame: ArrayLike, platform: ArrayLike) -> tuple[Array, Array]:
-    """Frame and platform anchors of shape (m, 3), one pair a cable, no pair twice."""
+    """Frame and platform anchors of shape (m, 3), one pair a cable, no pair twice.
+
+    Args:
+        frame: Frame ends [m].
+        platform: Platform ends [m].
+
+    Returns:
+        Both, shape (m, 3), write-locked.
+
+    Raises:
+        InvalidValueError: If they are no such points, their counts differ, or two cables have the same ends.
+    """
     pair = []
     for value, item in ((frame, "frame_anchors"), (platform, "platform_anchors")):
         array = checked(value, item, "m", shape=(None, 3))
@@ -72,7 +123,18 @@ def _refuse_twins(ends: Array) -> None:
 
 
 def cables(given: Cable, count: int) -> Cable:
-    """The cables' material, one value a cable; each weighs something."""
+    """The cables' material, one value a cable; each weighs something.
+
+    Args:
+        given: Material of all cables, or one for all.
+        count: Number of cables m.
+
+    Returns:
+        Cable with fields of shape (m,).
+
+    Raises:
+        InvalidValueError: If it is no Cable, has another count, or a cable weighs nothing.
+    """
     if not isinstance(given, Cable):
         raise InvalidValueError("cables", repr(given), "a Cable", "Give Cable(linear_density, axial_stiffness).")
     density = per_cable(given.linear_density, "cables: linear_density", count)
@@ -88,7 +150,18 @@ def cables(given: Cable, count: int) -> Cable:
 
 
 def inertia(given: ArrayLike | None, pattern: str) -> Array:
-    """Inertia about the center of mass, symmetric and positive definite; zero will do for a body that cannot turn."""
+    """Inertia about the center of mass, symmetric and positive definite; zero will do for a body that cannot turn.
+
+    Args:
+        given: Inertia [kg m^2], or None.
+        pattern: The motion pattern, which says whether the platform turns.
+
+    Returns:
+        Matrix of shape (3, 3).
+
+    Raises:
+        InvalidValueError: If it is missing for a platform that turns, not symmetric, or not positive definite.
+    """
     if given is None and pattern in ROTATING:
         raise InvalidValueError(
             "inertia",
@@ -120,7 +193,18 @@ def inertia(given: ArrayLike | None, pattern: str) -> Array:
 
 
 def plane_normal(given: ArrayLike | None, pattern: str) -> Array | None:
-    """Unit normal of the plane a planar platform moves in; none for the others."""
+    """Unit normal of the plane a planar platform moves in; none for the others.
+
+    Args:
+        given: A vector of any length but zero, or None.
+        pattern: The motion pattern, which says whether there is a plane.
+
+    Returns:
+        Unit vector, shape (3,), or None.
+
+    Raises:
+        InvalidValueError: If it is missing, given where there is no plane, or zero.
+    """
     if (given is None) == (pattern in PLANAR):
         has = "not given" if given is None else "given"
         allowed = "a vector of three numbers" if given is None else "nothing"
@@ -136,7 +220,19 @@ def plane_normal(given: ArrayLike | None, pattern: str) -> Array | None:
 
 
 def tension_limits(low: ArrayLike, high: ArrayLike, count: int) -> tuple[Array, Array]:
-    """Lower and upper tension limit of each cable, shape (m,)."""
+    """Lower and upper tension limit of each cable, shape (m,).
+
+    Args:
+        low: Lower limits [N], one or one a cable.
+        high: Upper limits [N], which may be infinite.
+        count: Number of cables m.
+
+    Returns:
+        Lower and upper limits [N], shape (m,).
+
+    Raises:
+        InvalidValueError: If one is negative, or a lower limit above its upper one.
+    """
     lower = per_cable(checked(low, "tension_min", "N", low=0.0), "tension_min", count)
     upper = per_cable(checked(high, "tension_max", "N", low=0.0, infinite=True), "tension_max", count)
     crossed = np.flatnonzero(lower > upper)
@@ -152,12 +248,35 @@ def tension_limits(low: ArrayLike, high: ArrayLike, count: int) -> tuple[Array, 
 
 
 def per_cable(array: Array, item: str, count: int) -> Array:
-    """One value a cable, shape (m,), from that or from one value for all."""
+    """One value a cable, shape (m,), from that or from one value for all.
+
+    Args:
+        array: One value, or m of them.
+        item: The name a message uses.
+        count: Number of cables m.
+
+    Returns:
+        Array of shape (m,).
+
+    Raises:
+        InvalidValueError: If the shape is another.
+    """
     if array.shape not in ((), (1,), (count,)):
         raise InvalidValueError(item, f"of shape {array.shape}", f"shape () or ({count},)", "Give one value a cable.")
     return array if array.shape == (count,) else locked(np.full(count, array))
 
 
 def size(given: ArrayLike | None, item: str) -> Array | None:
-    """Edge lengths for drawing, or None."""
+    """Edge lengths for drawing, or None.
+
+    Args:
+        given: Edges along x, y, z [m], or None.
+        item: The name a message uses.
+
+    Returns:
+        Array of shape (3,), or None.
+
+    Raises:
+        InvalidValueError: If they are not three positive numbers.
+    """
     return None if given is None else exactly(given, item, "m", (3,), above=0.0)

@@ -61,6 +61,16 @@ class Design:
     ) -> None:
         """Check what the robot itself would not, or would say in other words.
 
+        Args:
+            name: What the robot is called.
+            frame: Edges of the frame [m], shape (3,).
+            platform: Edges of the platform [m], shape (3,), smaller.
+            mass: Mass of the platform with its load [kg].
+            rope: Name in the catalogue of ropes.
+            diameter: Diameter of the rope [m], 0.3 mm to 80 mm.
+            cables: Number of cables, 6 to 8.
+            layout: "top" or "mixed".
+
         Raises:
             InvalidValueError: If a size is not positive, the platform does not fit, the layout cannot carry a load,
                 or there is no such rope.
@@ -93,6 +103,9 @@ class Design:
 
     def robot(self) -> Robot:
         """The robot, its limits from its weight and its ropes.
+
+        Returns:
+            Robot; what was assumed is marked as such.
 
         Raises:
             InvalidValueError: If the ropes are too weak for any tension between the limits, or a number is wrong.
@@ -127,7 +140,14 @@ class Design:
         )
 
     def placed(self, share: float) -> PoseBox:
-        """The middle of the frame, a share of each of its edges."""
+        """The middle of the frame, a share of each of its edges.
+
+        Args:
+            share: Of each edge of the frame that the platform leaves free, 0 to 1.
+
+        Returns:
+            PoseBox without tilt.
+        """
         middle = np.array([0.0, 0.0, 0.5 * self.frame[2]])
         half = 0.5 * share * (self.frame - self.platform)
         return PoseBox(middle - half, middle + half)

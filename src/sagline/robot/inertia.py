@@ -8,11 +8,30 @@ from sagline.arrays import Array
 
 
 def box_inertia(mass: float, x: float, y: float, z: float) -> Array:
-    """A solid box of a mass [kg] with edges x, y, z [m] along the platform's axes, shape (3, 3)."""
+    """A solid box, its edges along the platform's axes.
+
+    Args:
+        mass: [kg].
+        x: Edge along x [m].
+        y: Edge along y [m].
+        z: Edge along z [m].
+
+    Returns:
+        Inertia about the center of mass [kg m^2], shape (3, 3).
+    """
     return np.diag([y * y + z * z, x * x + z * z, x * x + y * y]) * (mass / 12.0)
 
 
 def cylinder_inertia(mass: float, radius: float, height: float) -> Array:
-    """A solid cylinder of a mass [kg], radius and height [m], its axis along the platform's z, shape (3, 3)."""
+    """A solid cylinder, its axis along the platform's z.
+
+    Args:
+        mass: [kg].
+        radius: [m].
+        height: [m].
+
+    Returns:
+        Inertia about the center of mass [kg m^2], shape (3, 3).
+    """
     across = (3.0 * radius * radius + height * height) / 12.0
     return np.diag([across, across, 0.5 * radius * radius]) * mass

@@ -55,6 +55,9 @@ class Pose:
             beta: Angle about y [rad], a number or shape (N,).
             gamma: Angle about x [rad], a number or shape (N,).
 
+        Returns:
+            Pose, single or a batch of N.
+
         Raises:
             InvalidValueError: If a number is not finite or the counts differ.
 
@@ -83,6 +86,9 @@ class Pose:
         Args:
             position: Position of the platform frame's origin [m], shape (3,) or (N, 3).
             quaternion: Of length 1 to 1e-6 (what is left is normalized away), shape (4,) or (N, 4).
+
+        Returns:
+            Pose, single or a batch of N.
 
         Raises:
             InvalidValueError: If a number is not finite, a length is not 1, or the counts differ.
@@ -130,6 +136,34 @@ class Pose:
             (2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)),
         )
         return locked(np.stack([np.stack(row, axis=-1) for row in rows], axis=-2))
+
+    def transform(self, points: ArrayLike) -> Array:
+        """Points of the platform frame in the world.
+
+        Every point is taken along by every pose. Points that differ from pose to pose are transformed pose by pose:
+        `pose[i].transform(points[i])`.
+
+        Args:
+            points: Coordinates in the platform frame [m], shape (..., 3).
+
+        Returns:
+            Coordinates in the world [m]: shape (..., 3) for a single pose, (N, ..., 3) for a batch of N. NaN for a pose
+            that was not found.
+
+        Raises:
+            InvalidValueError: If a coordinate is not finite, or the last axis is not x, y, z.
+
+        Examples:
+            >>> import numpy as np
+            >>> import sagline as sl
+            >>> pose = sl.Pose.from_euler([1, 2, 3], alpha=np.pi / 2, beta=0, gamma=0)
+            >>> pose.transform([[1, 0, 0], [0, 1, 0]]).round(12)
+            array([[1., 3., 3.],
+                   [0., 2., 3.]])
+        """
+        given = checked(points, "points", "m", shape=(3,))
+        turned = given.reshape(-1, 3) @ np.swapaxes(self.matrix, -1, -2)
+        return locked((turned + self.position[..., None, :]).reshape(*self.shape, *given.shape))
 
     @property
     def shape(self) -> tuple[int, ...]:

@@ -28,6 +28,11 @@ class PoseBox:
     def __init__(self, low: ArrayLike, high: ArrayLike, tilt: float = 0.0) -> None:
         """Check the three.
 
+        Args:
+            low: Lowest position [m], shape (3,).
+            high: Highest position [m], shape (3,).
+            tilt: Largest angle of rotation [rad], >= 0.
+
         Raises:
             InvalidValueError: If a number is not finite, a corner has not three numbers, or high is below low.
         """

@@ -91,10 +91,44 @@ class Robot:
     ) -> None:
         """Check every field once; values for all cables at once are spread over the cables.
 
-        The plane normal may have any length but zero. The inertia may be left out where the platform cannot turn.
+        Args:
+            name: What the robot is called.
+            frame_anchors: Frame ends of the cables in the world [m], z up, shape (m, 3).
+            platform_anchors: Platform ends in the platform frame [m], shape (m, 3).
+            cables: Material of the cables, one for all or one a cable.
+            mass: Mass of the platform [kg], > 0.
+            inertia: About the center of mass in the platform frame [kg m^2], shape (3, 3); may be left out where the
+                platform cannot turn.
+            center_of_mass: In the platform frame [m], shape (3,).
+            gravity: Acceleration along -z [m/s^2], >= 0.
+            motion_pattern: "3R3T", "3T", "1R2T" or "2T".
+            plane_normal: Normal of the plane of a planar pattern, of any length but zero; None for the others.
+            tension_min: Lower limits [N], >= 0, one for all or one a cable.
+            tension_max: Upper limits [N], which may be infinite, one for all or one a cable.
+            tension_limits_of: The tension that is limited, "chord" or "frame_end".
+            platform_size: Edges of the platform, for drawing [m], shape (3,), or None.
+            frame_size: Edges of the frame, for drawing [m], shape (3,), or None.
+            test_box: Poses of which nearly all are wrench-feasible, or None.
+            source: Where the numbers were read.
+            assumed: Field name -> why, for values that the source does not give.
+            notes: What else a user should know.
 
         Raises:
             InvalidValueError: If a field is wrong; the message names it, with its index.
+
+        Examples:
+            >>> import numpy as np
+            >>> import sagline as sl
+            >>> tripod = sl.Robot(
+            ...     "tripod",
+            ...     frame_anchors=[[3, 0, 3], [-2, 2, 3], [-2, -2, 3]],
+            ...     platform_anchors=np.zeros((3, 3)),
+            ...     cables=sl.Cable(linear_density=0.05, axial_stiffness=5e4),
+            ...     mass=10.0,
+            ...     motion_pattern="3T",
+            ... )
+            >>> sl.inverse(tripod, sl.Pose([0, 0, 1], np.eye(3))).chord_tension.round(1)
+            array([72.6, 52.3, 52.3])
         """
         frame, platform = checks.anchors(frame_anchors, platform_anchors)
         checks.choice(motion_pattern, "motion_pattern", MOTION_PATTERNS)

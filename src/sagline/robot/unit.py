@@ -14,6 +14,12 @@ def unit(vectors: Array) -> Array:
     """Scale vectors along the last axis to length 1; those that have it to rounding keep every bit.
 
     Files, pickles and copies pass here again and must not drift. Zero vectors give NaN: check lengths first.
+
+    Args:
+        vectors: Shape (..., k).
+
+    Returns:
+        Array of the same shape; the same array where nothing was to be done.
     """
     length = np.sqrt(np.einsum("...i,...i->...", vectors, vectors))[..., np.newaxis]
     if (np.abs(length - 1.0) <= _ROUNDING).all():

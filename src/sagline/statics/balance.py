@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from sagline.kernels.balance.geometry import cable_geometries
 from sagline.kernels.balance.wrench import structure_matrices
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
+from sagline.robot.several import Robots, first_of, one_a_pose
 from sagline.statics.tables import body_table, cable_table, pose_rows
 
 
@@ -27,31 +29,36 @@ class ArticleBalance(NamedTuple):
     b: Array
 
 
-def _geometry(robot: Robot, pose: Pose) -> Array:
+def _geometry(robot: Robots, pose: Pose) -> Array:
     """Geometry rows of every pose, shape (N, GEOMETRY_ROWS, m)."""
-    poses = pose_rows(pose)
-    out = np.empty((len(poses), rows.GEOMETRY_ROWS, robot.cable_count))
-    cable_geometries(cable_table(robot), body_table(robot), poses, np.empty((3, 3)), out)
+    cables, poses = cable_table(robot), pose_rows(pose)
+    out = np.empty((len(poses), rows.GEOMETRY_ROWS, cables.shape[1]))
+    cable_geometries(cables, body_table(robot), poses, np.empty((3, 3)), out)
     return out
 
 
-def structure_matrix(robot: Robot, pose: Pose) -> Array:
+def structure_matrix(robot: Robot | Sequence[Robot], pose: Pose) -> Array:
     """J: the wrench of unit chord tensions, about the center of mass, in world axes.
 
     Args:
-        robot: The robot.
+        robot: The robot; or a sequence of N that fit together (see `inverse`), one a pose.
         pose: One pose or a batch of N.
 
     Returns:
         Columns (u_i; r_i x u_i) along the platform's free motions, shape (n, m) or (N, n, m).
 
+    Raises:
+        InvalidValueError: If several robots are not one a pose, or do not fit together.
+
     Source:
         docs/model.md, section 1.
     """
-    geometry = _geometry(robot, pose)
-    out = np.empty((len(geometry), 6, robot.cable_count))
+    checked = one_a_pose(robot, len(pose) if pose.shape else None)
+    shared = first_of(checked)
+    geometry = _geometry(checked, pose)
+    out = np.empty((len(geometry), 6, shared.cable_count))
     structure_matrices(geometry, out)
-    return locked((robot.freedom @ out).reshape(*pose.shape, robot.degrees_of_freedom, robot.cable_count))
+    return locked((shared.freedom @ out).reshape(*pose.shape, shared.degrees_of_freedom, shared.cable_count))
 
 
 def article_balance(robot: Robot, pose: Pose, k_h: float = 4.845) -> ArticleBalance:

@@ -3,37 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from sagline.arrays import Array, locked
-from sagline.kernels.forward.sensitivity import BY_DENSITY, BY_LENGTH, BY_STIFFNESS, describe_states
 from sagline.robot.equilibrium import Equilibrium
-from sagline.robot.robot import Robot
-from sagline.statics.tables import body_table, cable_table, pose_rows
+from sagline.robot.several import bodies_of, first_of
+from sagline.statics.slopes import CableSlopes, cable_slopes, on_platform
 
 _SINGULAR = 1e-14  # determinant, at diagonal elements of 1
-
-
-class CableSlopes(NamedTuple):
-    """How every cable's force on its platform end changes, world axes.
-
-    Attributes:
-        matrix: Derivative of the platform's unbalance by its motion, shape (..., 6, 6).
-        blocks: dT/dB, shape (..., m, 3, 3) [N/m].
-        by_length: dT/dL, shape (..., m, 3) [N/m].
-        by_density: dT/d(rho), shape (..., m, 3) [N m/kg].
-        by_stiffness: dT/d(EA), shape (..., m, 3) [1].
-        levers: From the center of mass to the platform ends, shape (..., m, 3) [m].
-    """
-
-    matrix: Array
-    blocks: Array
-    by_length: Array
-    by_density: Array
-    by_stiffness: Array
-    levers: Array
+_TINY = 1e-300
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,6 +31,16 @@ class Stiffness:
         length_sensitivity: d(motion)/dL of each cable, shape (..., 6, m) [m/m, rad/m].
         density_sensitivity: d(motion)/d(linear density) of each cable, shape (..., 6, m) [m^2/kg, rad m/kg].
         stiffness_sensitivity: d(motion)/d(axial stiffness) of each cable, shape (..., 6, m) [m/N, rad/N].
+        cable_stiffness: dT/dB of each cable, T the force on its platform end, B that end's position, world axes, shape
+            (..., m, 3, 3) [N/m].
+        frame_anchor_sensitivity: d(motion)/d(frame anchor, world axes) at fixed lengths, shape (..., 6, m, 3)
+            [m/m, rad/m].
+        platform_anchor_sensitivity: d(motion)/d(platform anchor, platform frame) at fixed lengths, shape (..., 6, m, 3)
+            [m/m, rad/m].
+        tension_sensitivity: d(tension at the frame end of cable i)/dL_j while the platform keeps its balance, shape
+            (..., m, m) [N/m].
+        null_lengths: Changes of length that do not move the platform, to first order: orthonormal columns, shape
+            (..., m, m - n), n the number of free motions; no columns if m <= n.
     """
 
     state: Equilibrium
@@ -60,6 +49,11 @@ class Stiffness:
     length_sensitivity: Array
     density_sensitivity: Array
     stiffness_sensitivity: Array
+    cable_stiffness: Array
+    frame_anchor_sensitivity: Array
+    platform_anchor_sensitivity: Array
+    tension_sensitivity: Array
+    null_lengths: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,15 +97,66 @@ def stiffness(state: Equilibrium) -> Stiffness:
         docs/model.md, section 6.
     """
     slopes = cable_slopes(state)
-    compliance = _compliance(state.robot, slopes.matrix)
+    freedom = first_of(state.robot).freedom
+    compliance = _compliance(freedom, slopes.matrix)
+    by_length = -compliance @ on_platform(slopes.by_length, slopes.levers)
     return Stiffness(
         state=state,
         matrix=locked(slopes.matrix),
         compliance=locked(compliance),
-        length_sensitivity=locked(-compliance @ on_platform(slopes.by_length, slopes.levers)),
+        length_sensitivity=locked(by_length),
         density_sensitivity=locked(-compliance @ on_platform(slopes.by_density, slopes.levers)),
         stiffness_sensitivity=locked(-compliance @ on_platform(slopes.by_stiffness, slopes.levers)),
+        cable_stiffness=locked(slopes.blocks),
+        frame_anchor_sensitivity=locked(_by_frame_anchor(slopes, compliance)),
+        platform_anchor_sensitivity=locked(_by_platform_anchor(state, slopes, compliance)),
+        tension_sensitivity=locked(_tension_by_length(state, slopes, by_length)),
+        null_lengths=locked(_null_space(freedom @ by_length)),
     )
+
+
+def _by_frame_anchor(slopes: CableSlopes, compliance: Array) -> Array:
+    """A frame end moved by da changes its cable as the platform end moved by -da would, shape (..., 6, m, 3)."""
+    columns = [compliance @ on_platform(slopes.blocks[..., k], slopes.levers) for k in range(3)]
+    return np.stack(columns, axis=-1)
+
+
+def _by_platform_anchor(state: Equilibrium, slopes: CableSlopes, compliance: Array) -> Array:
+    """An anchor moved by db moves the platform end by Q db, and so the point its force acts on, (..., 6, m, 3)."""
+    rotation = state.pose.matrix[..., None, :, :]
+    columns = []
+    for k in range(3):
+        end = np.broadcast_to(rotation[..., k], slopes.levers.shape)
+        wrench = on_platform((slopes.blocks @ end[..., None])[..., 0], slopes.levers)
+        wrench[..., 3:, :] += np.swapaxes(np.cross(end, slopes.force), -1, -2)
+        columns.append(-compliance @ wrench)
+    return np.stack(columns, axis=-1)
+
+
+def _tension_by_length(state: Equilibrium, slopes: CableSlopes, by_length: Array) -> Array:
+    """d(tension at the frame end of cable i)/dL_j of the platform in equilibrium, shape (..., m, m)."""
+    cables = state.cables
+    motion = np.swapaxes(by_length, -1, -2)[..., None, :, :]  # of wound cable j, beside the ends of cable i
+    ends = motion[..., :3] + np.cross(motion[..., 3:], slopes.levers[..., :, None, :])
+    forces = ends @ np.swapaxes(slopes.blocks, -1, -2)
+    index = np.arange(forces.shape[-2])
+    forces[..., index, index, :] += slopes.by_length
+    at_frame = slopes.force.copy()
+    at_frame[..., 2] -= cables.cable_weight
+    if not cables.model.weightless:
+        forces[..., index, index, 2] -= cables.cable.linear_density * cables.gravity
+    # a cable without force pulls nowhere
+    direction = at_frame / np.maximum(np.linalg.norm(at_frame, axis=-1, keepdims=True), _TINY)
+    slope: Array = np.einsum("...ik,...ijk->...ij", direction, forces)
+    return slope
+
+
+def _null_space(matrix: Array) -> Array:
+    """Orthonormal columns that matrices (..., n, m) take to zero, (..., m, m - n); NaN for a matrix with NaN."""
+    n, m = matrix.shape[-2:]
+    lost = np.isnan(matrix).any(axis=(-1, -2), keepdims=True)
+    rows: Array = np.linalg.svd(np.where(lost, 0.0, matrix), full_matrices=True)[2][..., min(n, m) :, :]
+    return np.where(lost, np.nan, np.swapaxes(rows, -1, -2))
 
 
 def modes(state: Equilibrium) -> Modes:
@@ -130,7 +175,7 @@ def modes(state: Equilibrium) -> Modes:
         >>> print(sl.modes(plan.state).frequency.round(2), "Hz")
         [ 4.38  5.31  6.93  8.05 10.88 13.17] Hz
     """
-    freedom = state.robot.freedom
+    freedom = first_of(state.robot).freedom
     matrix = freedom @ cable_slopes(state).matrix @ freedom.T
     lower = np.linalg.cholesky(freedom @ _mass_matrix(state) @ freedom.T)
     inverse = np.linalg.inv(lower)
@@ -143,63 +188,8 @@ def modes(state: Equilibrium) -> Modes:
     return Modes(state, locked(frequency), locked(np.where(absent, np.nan, shape)))
 
 
-def cable_slopes(state: Equilibrium) -> CableSlopes:
-    """How the cables' forces change with the platform's motion and with their own data.
-
-    Args:
-        state: An equilibrium, single or N of them.
-
-    Returns:
-        The slopes; NaN where the state has no lengths.
-    """
-    robot, cables = state.robot, state.cables
-    shape, m = state.pose.shape, robot.cable_count
-    lengths = np.atleast_2d(cables.unstrained_length)
-    count = len(lengths)
-    matrices = np.empty((count, 6, 6))
-    blocks = np.empty((count, m, 3, 3))
-    slopes = np.empty((count, 3, m, 3))
-    levers = np.empty((count, m, 3))
-    describe_states(
-        cables.model.code,
-        *cables.model.parameters,
-        robot.freedom,
-        body_table(robot),
-        cable_table(robot),
-        locked(lengths.view()),
-        pose_rows(state.pose),
-        locked(np.atleast_2d(state.wrench).view()),
-        matrices,
-        blocks,
-        slopes,
-        levers,
-    )
-    return CableSlopes(
-        matrices.reshape(*shape, 6, 6),
-        blocks.reshape(*shape, m, 3, 3),
-        slopes[:, BY_LENGTH].reshape(*shape, m, 3),
-        slopes[:, BY_DENSITY].reshape(*shape, m, 3),
-        slopes[:, BY_STIFFNESS].reshape(*shape, m, 3),
-        levers.reshape(*shape, m, 3),
-    )
-
-
-def on_platform(forces: Array, levers: Array) -> Array:
-    """Forces at the platform ends as wrenches about the center of mass.
-
-    Args:
-        forces: Of each cable, world axes [N] or N by something, shape (..., m, 3).
-        levers: From the center of mass to the platform ends [m], shape (..., m, 3).
-
-    Returns:
-        Columns of force and moment, shape (..., 6, m).
-    """
-    return np.swapaxes(np.concatenate((forces, np.cross(levers, forces)), axis=-1), -1, -2)
-
-
-def _compliance(robot: Robot, matrix: Array) -> Array:
+def _compliance(freedom: Array, matrix: Array) -> Array:
     """Inverse on the free motions, zero on the others; NaN where it is singular."""
-    freedom = robot.freedom
     return freedom.T @ _inverse(freedom @ matrix @ freedom.T) @ freedom
 
 
@@ -218,7 +208,8 @@ def _inverse(matrix: Array) -> Array:
 def _mass_matrix(state: Equilibrium) -> Array:
     """Mass and inertia about the center of mass in world axes, shape (..., 6, 6)."""
     rotation = state.pose.matrix
+    body = bodies_of(state.robot)
     mass = np.zeros((*state.pose.shape, 6, 6))
-    mass[..., :3, :3] = state.robot.mass * np.eye(3)
-    mass[..., 3:, 3:] = rotation @ state.robot.inertia @ np.swapaxes(rotation, -1, -2)
+    mass[..., :3, :3] = body.mass[..., None, None] * np.eye(3)
+    mass[..., 3:, 3:] = rotation @ body.inertia @ np.swapaxes(rotation, -1, -2)
     return mass

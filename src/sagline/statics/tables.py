@@ -1,4 +1,4 @@
-"""A robot and its poses in the form in which kernels take them."""
+"""Robots and their poses in the form in which kernels take them."""
 
 from __future__ import annotations
 
@@ -7,38 +7,33 @@ import numpy as np
 from sagline.arrays import Array, locked
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
+from sagline.robot.several import Robots, first_of
 
 
-def cable_table(robot: Robot) -> Array:
-    """Anchors, material and limits of the cables.
-
-    Args:
-        robot: The robot.
-
-    Returns:
-        Shape (1, m, CABLE_COLUMNS); columns as in kernels.tables.
-    """
-    columns = (
-        robot.frame_anchors,
-        robot.platform_anchors,
-        robot.cables.linear_density[:, None],
-        robot.cables.axial_stiffness[:, None],
-        robot.tension_min[:, None],
-        robot.tension_max[:, None],
-    )
-    return locked(np.hstack(columns)[None])
-
-
-def body_table(robot: Robot) -> Array:
-    """Mass, gravity and center of mass of the platform.
+def cable_table(robot: Robots) -> Array:
+    """Anchors, material and limits of the cables, columns as in kernels.tables.
 
     Args:
-        robot: The robot.
+        robot: One robot for all poses, or a tuple of N that fit together, one a pose.
 
     Returns:
-        Shape (1, BODY_COLUMNS); columns as in kernels.tables.
+        Array of shape (1 or N, m, CABLE_COLUMNS).
     """
-    return locked(np.array([[robot.mass, robot.gravity, *robot.center_of_mass]]))
+    robots = (robot,) if isinstance(robot, Robot) else robot
+    return locked(np.array([_cable_rows(one) for one in robots]))
+
+
+def body_table(robot: Robots) -> Array:
+    """Mass, gravity and center of mass of the platform, columns as in kernels.tables.
+
+    Args:
+        robot: One robot for all poses, or a tuple of N that fit together, one a pose.
+
+    Returns:
+        Array of shape (1 or N, BODY_COLUMNS).
+    """
+    robots = (robot,) if isinstance(robot, Robot) else robot
+    return locked(np.array([[one.mass, one.gravity, *one.center_of_mass] for one in robots]))
 
 
 def pose_rows(pose: Pose) -> Array:
@@ -54,6 +49,26 @@ def pose_rows(pose: Pose) -> Array:
     return locked(rows)
 
 
-def robot_terms(robot: Robot) -> tuple[Array, Array, Array]:
-    """Free motions (n, 6), body_table and cable_table, as kernels take a robot."""
-    return robot.freedom, body_table(robot), cable_table(robot)
+def robot_terms(robot: Robots) -> tuple[Array, Array, Array]:
+    """A robot, or several, as kernels take it.
+
+    Args:
+        robot: One robot for all poses, or a tuple of N that fit together, one a pose.
+
+    Returns:
+        Free motions (n, 6), body_table and cable_table.
+    """
+    return first_of(robot).freedom, body_table(robot), cable_table(robot)
+
+
+def _cable_rows(robot: Robot) -> Array:
+    """One robot's rows of `cable_table`, (m, CABLE_COLUMNS)."""
+    columns = (
+        robot.frame_anchors,
+        robot.platform_anchors,
+        robot.cables.linear_density[:, None],
+        robot.cables.axial_stiffness[:, None],
+        robot.tension_min[:, None],
+        robot.tension_max[:, None],
+    )
+    return np.hstack(columns)

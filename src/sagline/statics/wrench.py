@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -9,13 +11,14 @@ from sagline.arrays import Array, checked, locked
 from sagline.errors import InvalidValueError
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
+from sagline.robot.several import bodies_of, one_a_pose
 
 
-def inertial_wrench(robot: Robot, pose: Pose, twist: Array, twist_rate: Array) -> Array:
+def inertial_wrench(robot: Robot | Sequence[Robot], pose: Pose, twist: Array, twist_rate: Array) -> Array:
     """The d'Alembert wrench of a motion: what the platform's inertia does to it.
 
     Args:
-        robot: Gives mass, center of mass and inertia.
+        robot: Gives mass, center of mass and inertia; one robot, or a sequence of N, one a pose.
         pose: A batch of N poses.
         twist: Velocity of the platform origin [m/s] and angular velocity [rad/s], world axes, shape (N, 6).
         twist_rate: Their rates [m/s^2, rad/s^2], shape (N, 6).
@@ -23,21 +26,25 @@ def inertial_wrench(robot: Robot, pose: Pose, twist: Array, twist_rate: Array) -
     Returns:
         Force -M p_c'' [N] and moment -(Gamma w' + w x Gamma w) [N m] about the center of mass, shape (N, 6).
 
+    Raises:
+        InvalidValueError: If several robots are not one a pose, or do not fit together.
+
     Source:
         Newton and Euler; docs/model.md, section 4. With the angular velocity itself, not Euler-angle rates.
     """
+    body = bodies_of(one_a_pose(robot, len(pose)))
     spin, spin_rate = twist[:, 3:], twist_rate[:, 3:]
     wrench = np.empty((len(twist), 6))
     wrench[:, :3] = twist_rate[:, :3]
     wrench[:, 3:] = 0.0
     if np.any(spin) or np.any(spin_rate):
         rotation = pose.matrix
-        lever = rotation @ robot.center_of_mass
+        lever = (rotation @ body.center_of_mass[..., None])[..., 0]
         wrench[:, :3] += np.cross(spin_rate, lever) + np.cross(spin, np.cross(spin, lever))
-        inertia = rotation @ robot.inertia @ np.swapaxes(rotation, 1, 2)
+        inertia = rotation @ body.inertia @ np.swapaxes(rotation, 1, 2)
         momentum = np.einsum("nij,nj->ni", inertia, spin)
         wrench[:, 3:] = -np.einsum("nij,nj->ni", inertia, spin_rate) - np.cross(spin, momentum)
-    wrench[:, :3] *= -robot.mass
+    wrench[:, :3] *= -body.mass[..., None]
     return locked(wrench)
 
 
@@ -50,6 +57,13 @@ def external_wrench(wrench: ArrayLike | None, count: int | None) -> Array:
 
     Returns:
         Zeros for None, shape (6,) for all poses or (N, 6).
+
+    Args:
+        wrench: What the caller gave: force [N], then moment [N m], or None.
+        count: Number of poses; None for a single one.
+
+    Returns:
+        Array of shape (6,) or (N, 6).
 
     Raises:
         InvalidValueError: If it is no wrench, or its count is not that of the poses (None: a single pose).

@@ -8,6 +8,7 @@ from sagline.arrays import Array, locked
 from sagline.kernels.inverse.queries import margins_of_poses
 from sagline.kernels.memory import memory_for
 from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.several import first_of, limits_of
 from sagline.statics.tables import pose_rows, robot_terms
 from sagline.tension.options import LIMITS_OF
 
@@ -16,7 +17,7 @@ def limit_margin(state: Equilibrium) -> Array:
     """Distance of each pose's tensions to their nearest limit.
 
     Args:
-        state: Robot and cables, `plan.state` for instance.
+        state: Robot or robots, and cables, `plan.state` for instance.
 
     Returns:
         Smallest distance [N] of the quantity that the robot's limits name, shape () or (N,): 0 where a cable is at its
@@ -30,14 +31,14 @@ def cable_margins(state: Equilibrium) -> Array:
     """Distance of each cable's tension to its nearest limit: what `limit_margin` takes the smallest of.
 
     Args:
-        state: Robot and cables, `plan.state` for instance.
+        state: Robot or robots, and cables, `plan.state` for instance.
 
     Returns:
         Distance [N] of the quantity that the robot's limits name, shape (m,) or (N, m); NaN where there are no
         tensions.
     """
-    tension, robot = state.limited_tension, state.robot
-    margins: Array = np.minimum(tension - robot.tension_min, robot.tension_max - tension)
+    tension, limits = state.limited_tension, limits_of(state.robot)
+    margins: Array = np.minimum(tension - limits.low, limits.high - tension)
     return margins
 
 
@@ -48,7 +49,7 @@ def capacity_margin(state: Equilibrium) -> Array:
     binomial of m over n - 1: 56 faces for eight cables, some microseconds a pose.
 
     Args:
-        state: Robot, poses, wrench and cables, `plan.state` for instance.
+        state: Robot or robots, poses, wrench and cables, `plan.state` for instance.
 
     Returns:
         Force [N], shape () or (N,), whatever the way of sharing; infinite where no force alone can make the pose fail,
@@ -57,17 +58,17 @@ def capacity_margin(state: Equilibrium) -> Array:
     Source:
         Bouchard, Gosselin & Moore 2010; Guay, Cardou, Cruz-Ruiz & Caro 2014.
     """
-    robot, cables, rows = state.robot, state.cables, pose_rows(state.pose)
+    shared, cables, rows = first_of(state.robot), state.cables, pose_rows(state.pose)
     pulls = np.atleast_2d(cables.vertical_force - cables.chord_tension * cables.rise / cables.chord)
     margins = np.empty(len(rows))
     margins_of_poses(
         (cables.model.code, *cables.model.parameters),
-        (LIMITS_OF[robot.tension_limits_of], np.nan),
-        robot_terms(robot),
+        (LIMITS_OF[shared.tension_limits_of], np.nan),
+        robot_terms(state.robot),
         rows,
         np.atleast_2d(state.wrench),
         locked(np.ascontiguousarray(pulls)),
-        memory_for(robot.cable_count),
+        memory_for(shared.cable_count),
         margins,
     )
     return margins.reshape(state.pose.shape)

@@ -9,7 +9,7 @@ import numpy as np
 
 from sagline.arrays import Array, checked, locked
 from sagline.errors import InvalidValueError
-from sagline.kernels import codes, tables
+from sagline.kernels import codes
 
 Variable = Literal["chord", "horizontal", "frame_end"]
 VARIABLES = {
@@ -17,6 +17,10 @@ VARIABLES = {
     "horizontal": codes.HORIZONTAL_TENSION,
     "frame_end": codes.FRAME_END_TENSION,
 }
+
+# rows of the preferences among cables
+ROOT_WEIGHT, GOAL = 0, 1  # square root of a cable's weight; tension to be near [N]
+PREFERENCE_ROWS = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,9 +63,16 @@ class TensionMethod:
         return 0.0
 
     def preference(self, cables: int) -> Array:
-        """Root weights and goals [N] of the cables as kernels know them, shape (PREFERENCE_ROWS, m)."""
-        rows = np.zeros((tables.PREFERENCE_ROWS, cables))
-        rows[tables.ROOT_WEIGHT] = 1.0
+        """Root weights and goals of the cables as kernels know them.
+
+        Args:
+            cables: Number of cables m.
+
+        Returns:
+            Array of shape (PREFERENCE_ROWS, m); goals in N.
+        """
+        rows = np.zeros((PREFERENCE_ROWS, cables))
+        rows[ROOT_WEIGHT] = 1.0
         return locked(rows)
 
     @property

@@ -12,6 +12,7 @@ from sagline.errors import InvalidValueError
 from sagline.kernels import codes
 from sagline.kernels.inverse.poses import LimitTerms, ModelTerms, SharingTerms
 from sagline.robot.robot import Robot
+from sagline.robot.several import Robots, first_of
 from sagline.tension.method import TensionMethod
 
 LIMITS_OF = {"chord": codes.LIMITS_OF_CHORD, "frame_end": codes.LIMITS_OF_FRAME_END}
@@ -31,44 +32,70 @@ class Options(NamedTuple):
     limits: LimitTerms
 
 
-def kernel_options(robot: Robot, model: CableModel, tension: TensionMethod) -> Options:
+def kernel_options(robot: Robots, model: CableModel, tension: TensionMethod) -> Options:
     """Model, method and limits as kernels take them first.
 
+    Args:
+        robot: The robot, or several that fit together.
+        model: Cable model.
+        tension: How the load is shared.
+
+    Returns:
+        Options; the preferences among the cables are in those of the sharing.
+
     Raises:
-        InvalidValueError: If the robot's tensions cannot be determined, or not by this method.
+        InvalidValueError: If a robot's tensions cannot be determined, or not by this method.
     """
-    check_sharing(robot, tension)
-    weight, goal = (locked(row) for row in tension.preference(robot.cable_count))
+    shared = first_of(robot)
+    if isinstance(robot, Robot):
+        check_sharing(robot, tension)
+    else:
+        for index, one in enumerate(robot):
+            check_sharing(one, tension, f"robot[{index}]")
+    weight, goal = (locked(row) for row in tension.preference(shared.cable_count))
     return Options(
         (model.code, *model.parameters),
         (tension.code, tension.parameter, tension.variable_code, weight, goal),
-        (LIMITS_OF[robot.tension_limits_of], tension.validity),
+        (LIMITS_OF[shared.tension_limits_of], tension.validity),
     )
 
 
 def takes_default_kernel(tension: TensionMethod) -> bool:
-    """Whether a method shares nearest to a reference in a linear variable: what is compiled first."""
+    """Whether a method shares nearest to a reference in a linear variable: what is compiled first.
+
+    Args:
+        tension: The method.
+
+    Returns:
+        Whether it does.
+    """
     return tension.code <= codes.QUADRATIC_PROGRAM and tension.variable_code != codes.FRAME_END_TENSION
 
 
-def check_sharing(robot: Robot, tension: TensionMethod) -> None:
+def check_sharing(robot: Robot, tension: TensionMethod, name: str | None = None) -> None:
     """Refuse a robot among whose cables a method cannot share the load.
+
+    Args:
+        robot: The robot.
+        tension: The method.
+        name: What a message calls the robot; None for its own name.
 
     Raises:
         InvalidValueError: If it has fewer cables than degrees of freedom, more redundant ones than the method can
             share among, or no upper limits where the method needs them.
     """
     n, m = robot.degrees_of_freedom, robot.cable_count
-    item = f"{robot.name}: number of cables"
+    called = name or robot.name
+    item = f"{called}: number of cables"
     if m < n:
         step = "Add cables, or choose a motion pattern with fewer freedoms."
         raise InvalidValueError(item, m, f">= {n} for {robot.motion_pattern}", step)
-    name = type(tension).__name__
+    method = type(tension).__name__
     most = tension.most_redundant
     if most is not None and m > n + most:
         step = "Choose AnalyticCenter or MinimumNorm, which share among any number."
-        raise InvalidValueError(item, m, f"{n} to {n + most} for {robot.motion_pattern} with {name}", step)
+        raise InvalidValueError(item, m, f"{n} to {n + most} for {robot.motion_pattern} with {method}", step)
     unlimited = np.isinf(robot.tension_max)
     if tension.needs_upper_limits and unlimited.any():
-        step = f"{name} needs an upper limit of every cable: give one, or choose MinimumNorm."
-        raise InvalidValueError(f"{robot.name}: tension_max[{int(np.argmax(unlimited))}]", "infinite", "finite", step)
+        step = f"{method} needs an upper limit of every cable: give one, or choose MinimumNorm."
+        raise InvalidValueError(f"{called}: tension_max[{int(np.argmax(unlimited))}]", "infinite", "finite", step)

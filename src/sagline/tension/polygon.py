@@ -55,10 +55,13 @@ class TensionPolygon:
     offset: Array
 
     def coordinates(self, chord_tension: ArrayLike) -> Array:
-        """Where tensions of this pose lie in the polygon, shape (..., r).
+        """Where tensions of this pose lie in the polygon.
 
         Args:
             chord_tension: Chord tensions that balance the pose [N], shape (..., m), as `Plan.chord_tension` has them.
+
+        Returns:
+            Coordinates in the null space [N], shape (..., r).
         """
         shared = self.scale * np.asarray(chord_tension, dtype=np.float64) + self.offset
         found: Array = (shared - self.origin) @ self.basis.T

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from sagline.arrays import Array, checked, locked
 from sagline.errors import InvalidValueError
-from sagline.kernels import codes, tables
-from sagline.tension.method import TensionMethod, Variable
+from sagline.kernels import codes
+from sagline.tension.method import GOAL, PREFERENCE_ROWS, ROOT_WEIGHT, TensionMethod, Variable
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,11 +41,21 @@ class QuadraticProgram(TensionMethod):
         object.__setattr__(self, "target", checked(self.target, "target", "N", low=0.0))
 
     def preference(self, cables: int) -> Array:
-        """Root weights, and targets times them."""
-        rows = np.empty((tables.PREFERENCE_ROWS, cables))
+        """Root weights, and targets times them.
+
+        Args:
+            cables: Number of cables m.
+
+        Returns:
+            Array of shape (PREFERENCE_ROWS, m).
+
+        Raises:
+            InvalidValueError: If there are weights or targets for another number of cables.
+        """
+        rows = np.empty((PREFERENCE_ROWS, cables))
         for row, name, values in (
-            (tables.ROOT_WEIGHT, "weights", np.sqrt(np.asarray(self.weights))),
-            (tables.GOAL, "target", np.asarray(self.target)),
+            (ROOT_WEIGHT, "weights", np.sqrt(np.asarray(self.weights))),
+            (GOAL, "target", np.asarray(self.target)),
         ):
             if values.shape not in ((), (cables,)):
                 raise InvalidValueError(name, f"of shape {values.shape}", f"() or ({cables},)", "Give one a cable.")

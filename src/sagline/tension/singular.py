@@ -36,6 +36,9 @@ def unresisted_motion(robot: Robot, pose: Pose) -> UnresistedMotion:
         robot: The robot.
         pose: One pose.
 
+    Returns:
+        UnresistedMotion: the twist, how much the cables still resist it, and the motion in words.
+
     Raises:
         InvalidValueError: If there is not one pose.
     """

@@ -14,7 +14,7 @@ POINTS = 41  # along a cable: an odd number, so that dashes end as they begin
 
 def chords(robot: Robot, pose: Pose) -> Array:
     """Frame end and platform end of every cable in the world [m], shape (m, 2, 3)."""
-    platform_ends = pose.position + robot.platform_anchors @ pose.matrix.T
+    platform_ends = pose.transform(robot.platform_anchors)
     return locked(np.stack((robot.frame_anchors, platform_ends), axis=1))
 
 

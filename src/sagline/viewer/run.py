@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from typing import Any
 
 import numpy as np
 
 from sagline.arrays import Array
-from sagline.cables.model import CableState
 from sagline.errors import InvalidValueError
 from sagline.kinematics.blocks import Progress
 from sagline.kinematics.confirm import Confirmation, confirm
 from sagline.kinematics.plan import Plan
-from sagline.robot.equilibrium import Equilibrium
 from sagline.viewer.snapshot import Snapshot
 
 
@@ -62,7 +59,7 @@ class Run:
         """One sample."""
         plan = _sample(self.plan, index)
         rest = self.confirmation.pose[index] if plan.feasible else None
-        return Snapshot(plan.state.robot, plan.state.pose, plan, rest)
+        return Snapshot(plan.state.one_robot, plan.state.pose, plan, rest)
 
     def traces(self, most: int, error_scale: float) -> tuple[Array, Array]:
         """Desired and actual positions (n, 3), n <= most, the error drawn some times as large; NaN in gaps."""
@@ -73,13 +70,6 @@ class Run:
 
 def _sample(plan: Plan, i: int) -> Plan:
     """The plan of one of its poses."""
-    state = plan.state
-    cables = replace(state.cables, **_entries(state.cables, i))
-    moment = Equilibrium(state.robot, state.pose[i], state.wrench[i], cables)
-    return replace(plan, state=moment, path=None, **_entries(plan, i))
-
-
-def _entries(batch: CableState | Plan, i: int) -> dict[str, Any]:
-    """Entry i of every array of a batch, by its field."""
-    values = {field.name: getattr(batch, field.name) for field in fields(batch)}
-    return {name: value[i] for name, value in values.items() if isinstance(value, np.ndarray)}
+    values = {field.name: getattr(plan, field.name) for field in fields(plan)}
+    entries = {name: value[i] for name, value in values.items() if isinstance(value, np.ndarray)}
+    return replace(plan, state=plan.state[i], path=None, **entries)

@@ -1,4 +1,7 @@
-"""Between the six motions of a body in space and the free ones of a platform, each in its own unit."""
+"""Between the six motions of a body in space and the free ones of a platform, each in its own unit.
+
+The rows `free` (n, 6) are the platform's freedom, each times the unit of its motion; of six each has one entry.
+"""
 
 from __future__ import annotations
 
@@ -15,23 +18,9 @@ def turns(freedom: Array, k: int) -> bool:
 
 
 @kernel
-def restricted(freedom: Array, full: Array, scale: Array, matrix: Array) -> None:
-    """Fill freedom K freedom^T (n, n) with rows and columns scaled."""
-    n = freedom.shape[0]
-    for j in range(n):
-        for k in range(n):
-            total = full[j, k]
-            if n != 6:
-                total = 0.0
-                for a in range(6):
-                    for b in range(6):
-                        total += freedom[j, a] * full[a, b] * freedom[k, b]
-            matrix[j, k] = total * scale[j] * scale[k]
-
-
-@kernel
-def make_symmetric(matrix: Array) -> None:
-    """Replace a matrix by its symmetric part."""
+def symmetric_part(free: Array, full: Array, matrix: Array) -> None:
+    """Fill the symmetric part of free K free^T (n, n)."""
+    matrix_along(free, full, matrix)
     for j in range(matrix.shape[0]):
         for k in range(j):
             mean = 0.5 * (matrix[j, k] + matrix[k, j])
@@ -39,34 +28,46 @@ def make_symmetric(matrix: Array) -> None:
             matrix[k, j] = mean
 
 
-@kernel
-def project(freedom: Array, full: Array, scale: Array, part: Array) -> None:
-    """Fill the scaled components (n,) of a wrench (6,) along the free motions."""
-    n = freedom.shape[0]
+@formula
+def matrix_along(free: Array, full: Array, matrix: Array) -> None:
+    """Fill free K free^T (n, n)."""
+    n = free.shape[0]
     for j in range(n):
-        total = full[j]
-        if n != 6:
+        for k in range(n):
+            if n == 6:
+                matrix[j, k] = full[j, k] * free[j, j] * free[k, k]
+                continue
             total = 0.0
             for a in range(6):
-                total += freedom[j, a] * full[a]
-        part[j] = total * scale[j]
+                for b in range(6):
+                    total += free[j, a] * full[a, b] * free[k, b]
+            matrix[j, k] = total
 
 
 @kernel
-def spread(freedom: Array, part: Array, scale: Array, motion: Array) -> None:
-    """Fill the motion (6,) that scaled components (n,) along the free motions stand for."""
-    n = freedom.shape[0]
+def components_along(free: Array, full: Array, part: Array) -> float:
+    """Fill the components (n,) of a wrench (6,) along the free motions; returns their norm."""
+    square = 0.0
+    for j in range(free.shape[0]):
+        total = 0.0
+        for a in range(6):
+            total += free[j, a] * full[a]
+        part[j] = total
+        square += total * total
+    return math.sqrt(square)
+
+
+@formula
+def spread(free: Array, part: Array, motion: Array) -> None:
+    """Fill the motion (6,) that components (n,) along the free motions stand for."""
     for a in range(6):
-        if n == 6:
-            motion[a] = part[a] * scale[a]
-        else:
-            total = 0.0
-            for j in range(n):
-                total += freedom[j, a] * part[j] * scale[j]
-            motion[a] = total
+        motion[a] = 0.0
+    for j in range(free.shape[0]):
+        for a in range(6):
+            motion[a] += free[j, a] * part[j]
 
 
-@kernel
+@formula
 def norm(vector: Array) -> float:
     """Euclidean length."""
     total = 0.0

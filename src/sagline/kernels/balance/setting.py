@@ -105,25 +105,25 @@ class Balance(NamedTuple):
 @glue
 def new_balance(memory: Memory, m: int, n: int) -> tuple[Balance, Memory]:
     """Room for m cables and n free motions, and the memory that is left."""
+    r = m - n
     numbers = memory.numbers
     rotation, at = block(numbers, 0, 3, 3)
-    geometry, at = block(numbers, at, g.GEOMETRY_ROWS, m)
-    full, at = block(numbers, at, 6, m)
-    matrix, at = block(numbers, at, n, m)
-    reduced, at = block(numbers, at, n, m)
     diagonals, at = block(numbers, at, 2, n)
-    q, at = block(numbers, at, m + 1, m)
-    inverse, at = block(numbers, at, n, m)
-    null, at = block(numbers, at, m - n, m)
-    needed, at = block(numbers, at, 1, 6)
-    right, at = block(numbers, at, 1, n)
-    strips, at = block(numbers, at, STRIP_ROWS, m)
-    rows, at = block(numbers, at, 3, m)
+    rows, at = block(numbers, at, g.GEOMETRY_ROWS + 6 + 3 * n + (m + 1) + r + STRIP_ROWS + 3, m)
+    full = rows[g.GEOMETRY_ROWS :]
+    matrix = full[6:]
+    reduced = matrix[n:]
+    inverse = reduced[n:]
+    q = inverse[n:]
+    null = q[m + 1 :]
+    strips = null[r:]
+    others = strips[STRIP_ROWS:]
     balance = Balance(
-        rotation, geometry, full, matrix, reduced, diagonals, q, inverse, null,
-        needed[0], right[0], rows[0], rows[1], strips, rows[2],
+        rotation, rows[: g.GEOMETRY_ROWS], full[:6], matrix[:n], reduced[:n], diagonals, q[: m + 1], inverse[:n],
+        null[:r], numbers[at : at + 6], numbers[at + 6 : at + 6 + n], others[0], others[1], strips[:STRIP_ROWS],
+        others[2],
     )  # fmt: skip
-    return balance, Memory(numbers[at:], memory.counters)
+    return balance, Memory(numbers[at + 6 + n :], memory.counters)
 
 
 @glue

@@ -9,13 +9,16 @@ from __future__ import annotations
 
 import math
 
-from sagline.kernels.cable.stiffness import series_excess
+from sagline.arrays import Array
+from sagline.kernels.balance import geometry as g
+from sagline.kernels.cable import rows as t
+from sagline.kernels.cable.stiffness import force_of, material_at, series_excess
 from sagline.kernels.cable.terms import Force, Material, Model
 from sagline.kernels.codes import CATENARY, ELASTIC
-from sagline.kernels.jit import kernel
+from sagline.kernels.jit import formula
 
 
-@kernel
+@formula
 def catenary_energy(span: float, rise: float, length: float, force: Force, weight: float, stiffness: float) -> float:
     """V = T.B - C(T) [J] of the exact cable, strain and height of its mass included, frame end at height 0."""
     horizontal, vertical, _ = force
@@ -33,13 +36,13 @@ def catenary_energy(span: float, rise: float, length: float, force: Force, weigh
     return horizontal * span + vertical * rise - 0.5 * length * (strain / stiffness + half_mean)
 
 
-@kernel
+@formula
 def elastic_energy(chord: float, length: float, tension: float, stiffness: float) -> float:
     """Strain energy [J] of the weightless cable; zero where it is slack."""
     return 0.5 * tension * (chord - length) if tension > 0.0 else 0.0
 
 
-@kernel
+@formula
 def cable_energy(model: Model, span: float, rise: float, material: Material, length: float, force: Force) -> float:
     """Energy [J] of a cable of the exact or the weightless model; NaN for the others."""
     weight = material.density * model.gravity
@@ -48,3 +51,21 @@ def cable_energy(model: Model, span: float, rise: float, material: Material, len
     if model.code in (CATENARY, ELASTIC) or weight == 0.0:
         return elastic_energy(math.sqrt(span * span + rise * rise), length, force.tension, material.stiffness)
     return math.nan
+
+
+@formula
+def energy_of_cables(model: Model, cables: Array, rows: Array) -> tuple[float, float]:
+    """Energy [J] of all cables of a pose, and the sum of the parts that cancel in it.
+
+    Args:
+        model: Cable model.
+        cables: Rows of the cable_table, (m, CABLE_COLUMNS).
+        rows: As in `sagline.kernels.cable.rows`, (CABLE_ROWS, m), after `cable_forces`.
+    """
+    energy = 0.0
+    size = 0.0
+    for i in range(cables.shape[0]):
+        span, rise, force = rows[g.SPAN, i], rows[g.RISE, i], force_of(rows, i)
+        energy += cable_energy(model, span, rise, material_at(cables, i), rows[t.LENGTH, i], force)
+        size += abs(force.horizontal * span) + abs(force.vertical * rise)
+    return energy, size

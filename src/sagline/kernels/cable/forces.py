@@ -1,29 +1,26 @@
 """Forces of all cables of one pose at their unstrained lengths.
 
 Most calls come from a pose close by. Ordinary catenaries therefore take two Halley steps from the parameter h they
-had there, in loops without branches, which vectorize; whoever is not settled by them is solved alone, from scratch.
+had there, in loops without branches, which vectorize; whoever has not arrived by then is solved alone, from scratch.
 """
 
 from __future__ import annotations
 
 import math
 
-from sagline.arrays import Array, Codes
+from sagline.arrays import Array
 from sagline.kernels import tables
 from sagline.kernels.algebra.hyperbolic import cosh_polynomial, sinh_excess_polynomial, sinhc_polynomial
 from sagline.kernels.balance import geometry as g
+from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.catenary import SMALL_HALLEY_STEP, relative_excess
 from sagline.kernels.cable.models import from_length
 from sagline.kernels.cable.terms import Material, Model
 from sagline.kernels.codes import CABLE_SOLVED, CATENARY
-from sagline.kernels.jit import formula, kernel
+from sagline.kernels.jit import formula, glue
 
 CLOSE = 0.1  # relative first step within which two Halley steps are trusted
 ORDINARY = 2.0  # of h: up to here the polynomials are exact
-
-# rows of the working memory, (FORCE_ROWS, m); PARAMETER is kept from pose to pose
-PARAMETER, KAPPA, EXCESS, FIRST, SECOND = 0, 1, 2, 3, 4
-FORCE_ROWS = 5
 
 
 @formula
@@ -50,73 +47,70 @@ def halley_step(h: float, xi2: float, zeta2: float, kappa: float, excess: float)
 
 
 @formula
-def share(part: float, length: float) -> float:
+def square_share(part: float, length: float) -> float:
     """(part/length)^2."""
     ratio = part / length
     return ratio * ratio
 
 
-@kernel
-def settle(gravity: float, cables: Array, lengths: Array, geometry: Array, memory: Array) -> None:
+@glue
+def step_twice(gravity: float, cables: Array, rows: Array) -> None:
     """Two Halley steps for every cable from the remembered parameter; one result a loop, so that each vectorizes."""
-    m = lengths.shape[0]
+    m = cables.shape[0]
     for i in range(m):
-        memory[KAPPA, i] = 0.5 * cables[i, tables.DENSITY] * gravity * lengths[i] / cables[i, tables.STIFFNESS]
+        rows[t.KAPPA, i] = 0.5 * cables[i, tables.DENSITY] * gravity * rows[t.LENGTH, i] / cables[i, tables.STIFFNESS]
     for i in range(m):
-        memory[EXCESS, i] = relative_excess(geometry[g.SPAN, i], geometry[g.RISE, i], lengths[i])
+        rows[t.EXCESS, i] = relative_excess(rows[g.SPAN, i], rows[g.RISE, i], rows[t.LENGTH, i])
     for i in range(m):
-        xi2 = share(geometry[g.SPAN, i], lengths[i])
-        zeta2 = share(geometry[g.RISE, i], lengths[i])
-        memory[FIRST, i] = halley_step(memory[PARAMETER, i], xi2, zeta2, memory[KAPPA, i], memory[EXCESS, i])
+        xi2 = square_share(rows[g.SPAN, i], rows[t.LENGTH, i])
+        zeta2 = square_share(rows[g.RISE, i], rows[t.LENGTH, i])
+        rows[t.FIRST, i] = halley_step(rows[t.PARAMETER, i], xi2, zeta2, rows[t.KAPPA, i], rows[t.EXCESS, i])
     for i in range(m):
-        xi2 = share(geometry[g.SPAN, i], lengths[i])
-        zeta2 = share(geometry[g.RISE, i], lengths[i])
-        memory[SECOND, i] = halley_step(memory[FIRST, i], xi2, zeta2, memory[KAPPA, i], memory[EXCESS, i])
+        xi2 = square_share(rows[g.SPAN, i], rows[t.LENGTH, i])
+        zeta2 = square_share(rows[g.RISE, i], rows[t.LENGTH, i])
+        rows[t.SECOND, i] = halley_step(rows[t.FIRST, i], xi2, zeta2, rows[t.KAPPA, i], rows[t.EXCESS, i])
 
 
-@kernel
-def is_settled(before: float, first: float, second: float, kappa: float) -> bool:
+@formula
+def has_arrived(rows: Array, i: int) -> bool:
     """Whether the second step's answer is exact; false for NaN."""
-    near = abs(first - before) <= CLOSE * (first + kappa)
+    first, second, kappa = rows[t.FIRST, i], rows[t.SECOND, i], rows[t.KAPPA, i]
+    near = abs(first - rows[t.PARAMETER, i]) <= CLOSE * (first + kappa)
     return near and abs(second - first) <= SMALL_HALLEY_STEP * (second + kappa) and 0.0 < second < ORDINARY
 
 
-@kernel
-def cable_forces(
-    model: Model,
-    cables: Array,
-    lengths: Array,
-    geometry: Array,
-    memory: Array,
-    result: Array,
-    statuses: Codes,
-) -> None:
-    """Fill the rows T_x, T_z and tau of the result and the statuses (m,) after `cable_geometry`."""
-    m = lengths.shape[0]
-    if model.code == CATENARY:
-        settle(model.gravity, cables, lengths, geometry, memory)
-    for i in range(m):
-        kappa = memory[KAPPA, i]
-        h = memory[SECOND, i]
-        span, rise, chord = geometry[g.SPAN, i], geometry[g.RISE, i], geometry[g.CHORD, i]
+@formula
+def cable_forces(model: Model, cables: Array, rows: Array) -> None:
+    """Fill T_x, T_z, tau and status of every cable of a pose from its geometry and length.
+
+    Args:
+        model: Cable model.
+        cables: Rows of the cable_table, (m, CABLE_COLUMNS).
+        rows: As in `sagline.kernels.cable.rows`, (CABLE_ROWS, m).
+    """
+    exact = model.code == CATENARY
+    if exact:
+        step_twice(model.gravity, cables, rows)
+    for i in range(cables.shape[0]):
+        span, rise, chord, length = rows[g.SPAN, i], rows[g.RISE, i], rows[g.CHORD, i], rows[t.LENGTH, i]
         density = cables[i, tables.DENSITY]
         weight = density * model.gravity
-        if model.code == CATENARY and is_settled(memory[PARAMETER, i], memory[FIRST, i], h, kappa):
+        if exact and has_arrived(rows, i):
+            h, kappa = rows[t.SECOND, i], rows[t.KAPPA, i]
             half = 0.5 * weight / (h + kappa)
             y = h * h
             tangent = h * sinhc_polynomial(y) / cosh_polynomial(y)
-            result[tables.HORIZONTAL, i] = half * span
-            result[tables.VERTICAL, i] = 0.5 * weight * (lengths[i] + rise / (tangent + kappa))
-            result[tables.TENSION, i] = half * chord
-            statuses[i] = CABLE_SOLVED
-            memory[PARAMETER, i] = h
+            rows[t.HORIZONTAL, i] = half * span
+            rows[t.VERTICAL, i] = 0.5 * weight * (length + rise / (tangent + kappa))
+            rows[t.TENSION, i] = half * chord
+            rows[t.STATUS, i] = CABLE_SOLVED
+            rows[t.PARAMETER, i] = h
             continue
-        material = Material(density, cables[i, tables.STIFFNESS])
-        force, status = from_length(model, span, rise, material, lengths[i])
-        tension = force.tension
-        result[tables.HORIZONTAL, i] = force.horizontal
-        result[tables.VERTICAL, i] = force.vertical
-        result[tables.TENSION, i] = tension
-        statuses[i] = status
+        force, status = from_length(model, span, rise, Material(density, cables[i, tables.STIFFNESS]), length)
+        rows[t.HORIZONTAL, i] = force.horizontal
+        rows[t.VERTICAL, i] = force.vertical
+        rows[t.TENSION, i] = force.tension
+        rows[t.STATUS, i] = status
         # h back from tau = wD/(2 (h + kappa)), for the next pose
-        memory[PARAMETER, i] = 0.5 * weight * chord / tension - kappa if tension > 0.0 else math.nan
+        h = 0.5 * weight * chord / force.tension - rows[t.KAPPA, i] if force.tension > 0.0 else math.nan
+        rows[t.PARAMETER, i] = h

@@ -1,20 +1,56 @@
 """Stiffness dT/dB of one cable at fixed unstrained length, for every cable model.
 
-In the vertical plane of the cable it is a 2 x 2 matrix (xx, xz, zx, zz), rows force, columns
-displacement of the platform end; normal to that plane it is T_x/x_B = tau/D, regular on a vertical chord.
+In the vertical plane of the cable it is a 2 x 2 matrix; normal to that plane it is T_x/x_B = tau/D, regular on a
+vertical chord.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
+from sagline.arrays import Array
+from sagline.kernels import tables
 from sagline.kernels.algebra.hyperbolic import atanhc_excess
+from sagline.kernels.balance import geometry as g
+from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.catenary import slack_series
 from sagline.kernels.cable.models import pull_of_shallow, sag_of_shallow
 from sagline.kernels.cable.shallow import stretching_tension
 from sagline.kernels.cable.terms import Force, Material, Model
 from sagline.kernels.codes import CATENARY, ELASTIC, EMPIRICAL, STRAIGHT
 from sagline.kernels.jit import formula, kernel
+
+
+class PlaneStiffness(NamedTuple):
+    """Stiffness of a cable's platform end in the cable's vertical plane [N/m]: rows force, columns displacement."""
+
+    xx: float
+    xz: float
+    zx: float
+    zz: float
+
+
+class ShallowSlopes(NamedTuple):
+    """How tau of a shallow cable follows x_B, z_B [N/m], L [N/m], rho [N m/kg] and EA [1]."""
+
+    by_x: float
+    by_z: float
+    by_length: float
+    by_density: float
+    by_stiffness: float
+
+
+@formula
+def force_of(rows: Array, i: int) -> Force:
+    """What acts on the platform end of one cable of a pose."""
+    return Force(rows[t.HORIZONTAL, i], rows[t.VERTICAL, i], rows[t.TENSION, i])
+
+
+@formula
+def material_at(cables: Array, i: int) -> Material:
+    """What one cable of the cable_table is made of."""
+    return Material(cables[i, tables.DENSITY], cables[i, tables.STIFFNESS])
 
 
 @formula
@@ -28,9 +64,11 @@ def series_excess(
     return slack_series(horizontal, vertical_a, vertical, tension_a, tension_b) - 1.0
 
 
-@kernel
-def catenary_stiffness(horizontal: float, vertical: float, length: float, weight: float, stiffness: float):  # type: ignore[no-untyped-def]
-    """In-plane stiffness (xx, xz, zz) [N/m] of the exact cable: the inverse of dB/dT of P1, without cancellation.
+@formula
+def catenary_stiffness(
+    horizontal: float, vertical: float, length: float, weight: float, stiffness: float
+) -> PlaneStiffness:
+    """In-plane stiffness of the exact cable: the inverse of dB/dT of P1, without cancellation.
 
     With p, q the parts of dx/dT_x, dz/dT_z that go with length/(T_A + T_B), and c that of -dx/dT_z,
     p + q = 2 and p q = c^2 hold exactly, so that the determinant is a sum of positive terms.
@@ -44,7 +82,7 @@ def catenary_stiffness(horizontal: float, vertical: float, length: float, weight
     stretch = 1.0 / stiffness
     turn = 1.0 / (tension_a + tension_b)
     if product == 0.0:  # an end without force
-        return 0.0, 0.0, 1.0 / (length * (stretch + turn))
+        return PlaneStiffness(0.0, 0.0, 0.0, 1.0 / (length * (stretch + turn)))
     c = horizontal * (vertical_a + vertical) / product
     level = (square - vertical_a * vertical) / product
     if level >= 0.0:
@@ -55,18 +93,19 @@ def catenary_stiffness(horizontal: float, vertical: float, length: float, weight
         q = c * c / p
     zz = stretch + turn * q
     if excess == math.inf:  # a fold does not resist a first sideways motion
-        return 0.0, 0.0, 1.0 / (length * zz)
+        return PlaneStiffness(0.0, 0.0, 0.0, 1.0 / (length * zz))
     xx = stretch + turn * (2.0 * excess + p)
     determinant = stretch * (stretch + 2.0 * turn * (1.0 + excess)) + 2.0 * turn * turn * q * excess
     inverse = 1.0 / (length * determinant)
-    return zz * inverse, c * turn * inverse, xx * inverse
+    across = c * turn * inverse
+    return PlaneStiffness(zz * inverse, across, across, xx * inverse)
 
 
-@kernel
-def elastic_stiffness(span: float, rise: float, length: float, tension: float, stiffness: float):  # type: ignore[no-untyped-def]
-    """In-plane stiffness (xx, xz, zz) [N/m] of the weightless cable; zero where it is slack."""
+@formula
+def elastic_stiffness(span: float, rise: float, length: float, tension: float, stiffness: float) -> PlaneStiffness:
+    """In-plane stiffness of the weightless cable; zero where it is slack."""
     if tension == 0.0:
-        return 0.0, 0.0, 0.0
+        return PlaneStiffness(0.0, 0.0, 0.0, 0.0)
     chord = math.sqrt(span * span + rise * rise)
     cosine = span / chord
     sine = rise / chord
@@ -74,14 +113,15 @@ def elastic_stiffness(span: float, rise: float, length: float, tension: float, s
     across = tension / chord
     xx = along * cosine * cosine + across * sine * sine
     zz = along * sine * sine + across * cosine * cosine
-    return xx, (along - across) * sine * cosine, zz
+    mixed = (along - across) * sine * cosine
+    return PlaneStiffness(xx, mixed, mixed, zz)
 
 
 @kernel
-def shallow_slopes(  # type: ignore[no-untyped-def]
+def shallow_slopes(
     model: Model, span: float, rise: float, material: Material, length: float, tension: float
-):
-    """How tau of a shallow cable follows x_B, z_B, L, rho and EA: five partial derivatives.
+) -> ShallowSlopes:
+    """How tau of a shallow cable follows its chord and its own data.
 
     From L (1 + s/EA) = D (1 + S/tau^2), S = k (rho x_B)^2, s = |T| (empirical) or tau (parabolic).
     """
@@ -106,39 +146,57 @@ def shallow_slopes(  # type: ignore[no-untyped-def]
     slope_length = -(1.0 + stretch / stiffness) / by_tension
     slope_density = (2.0 * chord * share - length * by_pull * pull / stiffness) / (density * by_tension)
     slope_stiffness = length * stretch / (stiffness * stiffness * by_tension)
-    return slope_x, slope_z, slope_length, slope_density, slope_stiffness
+    return ShallowSlopes(slope_x, slope_z, slope_length, slope_density, slope_stiffness)
 
 
-@kernel
-def shallow_stiffness(  # type: ignore[no-untyped-def]
+@formula
+def shallow_stiffness(
     model: Model, span: float, rise: float, material: Material, length: float, tension: float
-):
-    """In-plane stiffness (xx, xz, zx, zz) [N/m] of a shallow cable, not symmetric: its forces are no gradient."""
-    slope_x, slope_z, _, _, _ = shallow_slopes(model, span, rise, material, length, tension)
+) -> PlaneStiffness:
+    """In-plane stiffness of a shallow cable, not symmetric: its forces are no gradient."""
+    slopes = shallow_slopes(model, span, rise, material, length, tension)
     chord = math.sqrt(span * span + rise * rise)
     cosine = span / chord
     sine = rise / chord
     across = tension / chord
     unit_pull = pull_of_shallow(model, 1.0, material.density)
-    xx = slope_x * cosine + across * sine * sine
-    xz = slope_z * cosine - across * sine * cosine
-    zx = slope_x * sine - across * sine * cosine + unit_pull * cosine
-    zz = slope_z * sine + across * cosine * cosine + unit_pull * sine
-    return xx, xz, zx, zz
+    return PlaneStiffness(
+        slopes.by_x * cosine + across * sine * sine,
+        slopes.by_z * cosine - across * sine * cosine,
+        slopes.by_x * sine - across * sine * cosine + unit_pull * cosine,
+        slopes.by_z * sine + across * cosine * cosine + unit_pull * sine,
+    )
 
 
-@kernel
-def cable_stiffness(  # type: ignore[no-untyped-def]
+@formula
+def cable_stiffness(
     model: Model, span: float, rise: float, material: Material, length: float, force: Force
-):
-    """In-plane stiffness (xx, xz, zx, zz) [N/m] of a cable of any model; NaN for the straight one, which has none."""
+) -> PlaneStiffness:
+    """In-plane stiffness of a cable of any model; NaN for the straight one, which has none."""
     if model.code == STRAIGHT:
-        return math.nan, math.nan, math.nan, math.nan
+        return PlaneStiffness(math.nan, math.nan, math.nan, math.nan)
     weight = material.density * model.gravity
     if model.code == CATENARY and weight > 0.0:
-        xx, xz, zz = catenary_stiffness(force.horizontal, force.vertical, length, weight, material.stiffness)
-        return xx, xz, xz, zz
+        return catenary_stiffness(force.horizontal, force.vertical, length, weight, material.stiffness)
     if model.code in (CATENARY, ELASTIC) or weight == 0.0:
-        xx, xz, zz = elastic_stiffness(span, rise, length, force.tension, material.stiffness)
-        return xx, xz, xz, zz
+        return elastic_stiffness(span, rise, length, force.tension, material.stiffness)
     return shallow_stiffness(model, span, rise, material, length, force.tension)
+
+
+@formula
+def stiffnesses_in_plane(model: Model, cables: Array, rows: Array) -> None:
+    """Fill the in-plane stiffness of every cable of a pose, after `cable_forces`."""
+    for i in range(cables.shape[0]):
+        plane = cable_stiffness(
+            model, rows[g.SPAN, i], rows[g.RISE, i], material_at(cables, i), rows[t.LENGTH, i], force_of(rows, i)
+        )
+        rows[t.XX, i] = plane.xx
+        rows[t.XZ, i] = plane.xz
+        rows[t.ZX, i] = plane.zx
+        rows[t.ZZ, i] = plane.zz
+
+
+@formula
+def plane_of(rows: Array, i: int) -> PlaneStiffness:
+    """In-plane stiffness of one cable of a pose."""
+    return PlaneStiffness(rows[t.XX, i], rows[t.XZ, i], rows[t.ZX, i], rows[t.ZZ, i])

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from sagline.arrays import Array, Codes
+from sagline.arrays import Array, Codes, Indices
 from sagline.kernels import tables
-from sagline.kernels.algebra.dense import extreme_eigenvalues
+from sagline.kernels.algebra.cholesky import factor_positive
+from sagline.kernels.algebra.eigenvalues import extreme_eigenvalues
 from sagline.kernels.balance import geometry as g
-from sagline.kernels.balance.freedom import make_symmetric, norm, project, restricted
+from sagline.kernels.balance.freedom import components_along, symmetric_part, turns
+from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import (
     CATENARY,
@@ -26,58 +26,72 @@ from sagline.kernels.codes import (
     FORWARD_SOLVED,
     FORWARD_UNSTABLE,
 )
-from sagline.kernels.forward.descent import BALANCED, descend, polish
-from sagline.kernels.forward.platform import platform_energy, unbalance
-from sagline.kernels.forward.problem import Problem, Space, new_space
-from sagline.kernels.jit import entry_with_memory, kernel
+from sagline.kernels.forward.descent import descend
+from sagline.kernels.forward.newton import BALANCED, approach, polish, predict
+from sagline.kernels.forward.platform import platform_energy, platform_stiffness, unbalance
+from sagline.kernels.forward.problem import (
+    ENERGY,
+    FORCE_RESIDUAL,
+    ITERATIONS,
+    LAST_WRENCH,
+    MOMENT_RESIDUAL,
+    STIFFNESS_MIN,
+    Chain,
+    ChainArrays,
+    Found,
+    FoundArrays,
+    Given,
+    GivenArrays,
+    Problem,
+    Space,
+    copy_pose,
+    leave_out,
+    new_motions,
+    new_space,
+    problem_at,
+    row_of,
+)
+from sagline.kernels.jit import entry, glue
+from sagline.kernels.memory import Memory
 
-UNIT_SHARE = 0.2  # of the mean length: the displacement that counts as much as a rotation by 1 rad
 FLAT = 1e-9  # of the largest stiffness: smaller ones are none
 OVERSTRETCHED = 0.1  # strain that no cable survives
-
-# columns of the numbers that describe one solution
-ENERGY, FORCE_RESIDUAL, MOMENT_RESIDUAL, STIFFNESS_MIN, ITERATIONS = 0, 1, 2, 3, 4
-FORWARD_NUMBERS = 5
+PREDICTION, FROM_START, DOWNHILL = 0, 1, 2  # ways to the equilibrium, the later where the earlier is in doubt
 
 
-@kernel
-def verdict(problem: Problem, space: Space, size: float, low: float, high: float) -> int:
-    """What kind of solution space holds; size is the sum of tensions, low and high the extreme stiffnesses."""
-    cables, result = problem.cables, space.result
-    gravity = problem.model.gravity
-    m = cables.shape[0]
-    n = problem.freedom.shape[0]
-    project(problem.freedom, space.gradient, problem.scale, space.part)
-    if not norm(space.part) <= BALANCED * size * norm(problem.scale):
-        return FORWARD_NOT_CONVERGED
+@glue
+def stability(low: float, high: float) -> int:
+    """What the extreme stiffnesses say of an equilibrium."""
     if low < -FLAT * high:
         return FORWARD_UNSTABLE
-    if not low > FLAT * high:
-        return FORWARD_SINGULAR
+    return FORWARD_SOLVED if low > FLAT * high else FORWARD_SINGULAR
+
+
+@glue
+def hold(model: Model, cables: Array, rows: Array, needed: int) -> int:
+    """How the cables hold a stable platform; needed: how many must pull."""
     taut = 0
     strain = 0.0
-    for i in range(m):
-        tension = result[tables.TENSION, i]
-        half_weight = 0.0 if problem.model.code == ELASTIC else 0.5 * cables[i, tables.DENSITY] * gravity
-        taut += 1 if tension > half_weight * space.geometry[g.CHORD, i] else 0
+    for i in range(cables.shape[0]):
+        tension = rows[t.TENSION, i]
+        half_weight = 0.0 if model.code == ELASTIC else 0.5 * cables[i, tables.DENSITY] * model.gravity
+        taut += 1 if tension > half_weight * rows[g.CHORD, i] else 0
         strain = max(strain, tension / cables[i, tables.STIFFNESS])
     if strain > OVERSTRETCHED:
         return FORWARD_OVERSTRETCHED
-    return FORWARD_LOOSE if taut < min(n, m) else FORWARD_SOLVED
+    return FORWARD_LOOSE if taut < min(needed, cables.shape[0]) else FORWARD_SOLVED
 
 
-@kernel
-def fill_residuals(problem: Problem, space: Space, numbers: Array) -> None:
+@glue
+def fill_residuals(freedom: Array, gradient: Array, numbers: Array) -> None:
     """Fill the norms of the unbalanced force [N] and moment [N m] along the free motions."""
     force = 0.0
     moment = 0.0
-    for j in range(problem.freedom.shape[0]):
+    for j in range(freedom.shape[0]):
         total = 0.0
-        turns = 0.0
         for a in range(6):
-            total += problem.freedom[j, a] * space.gradient[a]
-            turns += abs(problem.freedom[j, a]) if a >= 3 else 0.0
-        if turns > 0.0:
+            total += freedom[j, a] * gradient[a]
+        if turns(freedom, j):
             moment += total * total
         else:
             force += total * total
@@ -85,118 +99,126 @@ def fill_residuals(problem: Problem, space: Space, numbers: Array) -> None:
     numbers[MOMENT_RESIDUAL] = math.sqrt(moment)
 
 
-@kernel
-def fill_scales(freedom: Array, cables: Array, body: Array, lengths: Array, scale: Array, arc: Array) -> None:
-    """Fill the units of the free motions for the trust region, and those by which stiffnesses are compared.
+@glue
+def find_pose(
+    problem: Problem, exact: Model, lengths: Array, start: Array, chain: Chain, space: Space, pose: Array
+) -> tuple[int, float]:
+    """Fill the equilibrium, by the first way that is beyond doubt; returns steps, and the sum of tensions there.
 
-    In the latter a rotation counts by the arc it makes at the platform ends' root mean square distance from the
-    center of mass, so that every stiffness is in N/m.
+    On return space is that of the pose: unbalance, stiffness, and its factor, of which NaN at the first place says that
+    there is none. exact: the model with an energy that leads to where the problem's own takes over.
     """
-    m = lengths.shape[0]
-    mean = 0.0
-    square = 0.0
-    for i in range(m):
-        mean += lengths[i] / m
-        for k in range(3):
-            lever = cables[i, tables.PLATFORM_X + k] - body[tables.CENTER_X + k]
-            square += lever * lever / m
-    radius = math.sqrt(square)
-    for j in range(freedom.shape[0]):
-        turns = abs(freedom[j, 3]) + abs(freedom[j, 4]) + abs(freedom[j, 5]) > 0.0
-        scale[j] = 1.0 if turns else UNIT_SHARE * mean
-        arc[j] = 1.0 / radius if turns and radius > 0.0 else 1.0
+    model, cables, body, wrench, free = problem.model, problem.cables, problem.body, problem.wrench, problem.free
+    steps, size, known = 0, 0.0, 0.0
+    positive = False
+    predicted = predict(problem, lengths, start, chain.last, space, pose)
+    for way in range(PREDICTION if predicted else FROM_START, DOWNHILL + 1):
+        if way != PREDICTION:
+            copy_pose(start, pose)
+        if way != DOWNHILL:
+            steps, size = approach(problem, pose, space)
+            known = size if steps == 0 and way == FROM_START and model.code == exact.code else 0.0
+            if steps <= 0:
+                continue
+            platform_stiffness(model, cables, space.rows, space.stiffness)
+        else:
+            downhill = Problem(exact, free, cables, body, wrench, problem.unit)
+            steps, size = descend(downhill, pose, space, known)
+            if size == 0.0 or model.code != exact.code:
+                size = unbalance(model, cables, body, wrench, pose, space.rotation, space.rows, space.gradient)
+            steps += polish(problem, pose, space, BALANCED * size * problem.unit)
+        symmetric_part(free, space.stiffness, space.matrix)
+        positive = factor_positive(space.matrix, 0.0, space.factor)
+        if positive:
+            break
+    if not positive:
+        space.factor[0, 0] = math.nan
+    return steps, size
 
 
-@kernel
-def solve_pose(problem: Problem, energy_problem: Problem, pose: Array, arc: Array, space: Space, numbers: Array) -> int:
-    """Move pose to the equilibrium and fill the numbers; returns the status."""
-    steps, size = descend(energy_problem, pose, space)
-    if size == 0.0 or problem.model.code != energy_problem.model.code:
-        size = unbalance(problem, pose, space)
-    steps += polish(problem, pose, space, size * norm(problem.scale))
-    numbers[ENERGY] = platform_energy(problem, pose, space)[0]
-    numbers[ITERATIONS] = steps
-    fill_residuals(problem, space, numbers)
-    restricted(problem.freedom, space.stiffness, arc, space.matrix)
-    make_symmetric(space.matrix)
-    low, high = extreme_eigenvalues(space.matrix, space.part, space.work, space.step, space.motion)
+@glue
+def describe(problem: Problem, pose: Array, arcs: Array, size: float, space: Space, numbers: Array) -> int:
+    """Fill the numbers of the pose that space holds, but for residuals and steps; returns the status."""
+    model, cables, body = problem.model, problem.cables, problem.body
+    numbers[ENERGY] = platform_energy(model, cables, body, problem.wrench, pose, space.rotation, space.rows)[0]
+    symmetric_part(arcs, space.stiffness, space.matrix)
+    low, high = extreme_eigenvalues(space.matrix, space.part, space.step, space.motion, FLAT)
     numbers[STIFFNESS_MIN] = low
-    return verdict(problem, space, size, low, high)
+    status = stability(low, high)
+    if not components_along(problem.free, space.gradient, space.part) <= BALANCED * size * problem.unit:
+        status = FORWARD_NOT_CONVERGED
+    elif status == FORWARD_SOLVED:
+        status = hold(model, cables, space.rows, arcs.shape[0])
+    return status
 
 
-@entry_with_memory
+@glue
+def remember(chain: Chain, pose: Array, wrench: Array) -> None:
+    """Keep a pose as the last equilibrium, if its stiffness was factored."""
+    if not math.isnan(chain.factor[0, 0]):
+        copy_pose(pose, chain.last)
+        for k in range(6):
+            chain.last[LAST_WRENCH + k] = wrench[k]
+
+
+@glue
+def store(rows: Array, p: int, results: Array, statuses: Codes) -> None:
+    """Write one sample's cables."""
+    for i in range(rows.shape[1]):
+        statuses[p, i] = int(rows[t.STATUS, i])
+        results[tables.SPAN, p, i] = rows[g.SPAN, i]
+        results[tables.RISE, p, i] = rows[g.RISE, i]
+    for k in range(tables.RESULT_ROWS - tables.LENGTH):  # length and forces follow each other in both
+        for i in range(rows.shape[1]):
+            results[tables.LENGTH + k, p, i] = rows[t.LENGTH + k, i]
+
+
+@entry
 def forward_poses(
-    code: int,
-    k_h: float,
-    k_p: float,
+    model: tuple[int, float, float],
     chained: bool,
-    freedom: Array,
-    bodies: Array,
-    robots: Array,
-    lengths: Array,
-    starts: Array,
-    wrenches: Array,
-    poses: Array,
-    results: Array,
-    statuses: Codes,
-    numbers: Array,
-    pose_statuses: Codes,
+    given: GivenArrays,
+    chain: ChainArrays,
+    room: tuple[Array, Indices],
+    found: FoundArrays,
 ) -> None:
     """Solve every sample in turn.
 
     Args:
-        code: Cable model; the shallow ones go downhill as exact cables and are polished as what they are.
-        k_h: The empirical model's constant.
-        k_p: The empirical model's constant.
+        model: Cable model and the empirical one's constants; the shallow ones go downhill as exact cables and are
+            polished as what they are.
         chained: Whether each sample starts where the last solved one ended, the first at starts[0].
-        freedom: Rows that pick the free motions, (n, 6).
-        bodies: body_table, (1 or N, BODY_COLUMNS).
-        robots: cable_table, (1 or N, m, CABLE_COLUMNS).
-        lengths: Unstrained lengths [m], (N, m); a row of NaN is left out.
-        starts: Pose rows (1 or N, POSE_COLUMNS).
-        wrenches: External plus inertial, about the center of mass, (1 or N, 6).
-        poses: Filled: pose rows (N, POSE_COLUMNS).
-        results: Filled: span, rise, length, T_x, T_z, tau, (RESULT_ROWS, N, m).
-        statuses: Filled: status of each cable, (N, m).
-        numbers: Filled: energy, residuals, smallest stiffness, iterations, (N, FORWARD_NUMBERS).
-        pose_statuses: Filled, (N,).
+        given: `Given`.
+        chain: `Chain`; a chain of samples continues from it where it starts at the remembered pose.
+        room: `memory_for` as many cables.
+        found: `Found`, filled.
     """
-    count, m = lengths.shape
-    n = freedom.shape[0]
-    space = new_space(m, n)
-    scale = np.empty(n)
-    arc = np.empty(n)
-    pose = np.empty(tables.POSE_COLUMNS)
-    last = starts[0].copy()
-    energy_code = ELASTIC if code == ELASTIC else CATENARY
+    batch, answer, kept = Given(*given), Found(*found), Chain(*chain)
+    code, k_h, k_p = model
+    count, m = batch.lengths.shape
+    space, rest = new_space(Memory(*room), kept.rows, kept.factor)
+    motions, rest = new_motions(rest, batch.freedom.shape[0])
+    free, arcs, start, pose = motions
+    copy_pose(batch.starts[0], start)
     for p in range(count):
-        cables = robots[min(p, robots.shape[0] - 1)]
-        body = bodies[min(p, bodies.shape[0] - 1)]
-        wrench = wrenches[min(p, wrenches.shape[0] - 1)]
-        if math.isnan(lengths[p, 0]):
-            poses[p, :] = math.nan
-            results[:, p] = math.nan
-            statuses[p, :] = 0
-            numbers[p, :] = math.nan
-            numbers[p, ITERATIONS] = 0.0
-            pose_statuses[p] = FORWARD_NO_LENGTHS
+        if math.isnan(batch.lengths[p, 0]):
+            leave_out(answer, p, FORWARD_NO_LENGTHS, 0)
             continue
-        for k in range(tables.POSE_COLUMNS):
-            pose[k] = last[k] if chained else starts[min(p, starts.shape[0] - 1), k]
         if not chained:  # an answer must not depend on the sample before
-            space.memory[:] = math.nan
-        fill_scales(freedom, cables, body, lengths[p], scale, arc)
-        model = Model(code, k_h, k_p, body[tables.GRAVITY])
-        exact = Model(energy_code, 0.0, 0.0, body[tables.GRAVITY])
-        problem = Problem(model, freedom, cables, body, lengths[p], wrench, scale)
-        energy_problem = Problem(exact, freedom, cables, body, lengths[p], wrench, scale)
-        status = solve_pose(problem, energy_problem, pose, arc, space, numbers[p])
-        pose_statuses[p] = status
-        for k in range(tables.POSE_COLUMNS):
-            poses[p, k] = pose[k]
-            if status != FORWARD_NOT_CONVERGED:
-                last[k] = pose[k]
-        for i in range(m):
-            statuses[p, i] = space.statuses[i]
-            for row in range(tables.RESULT_ROWS):
-                results[row, p, i] = space.result[row, i]
+            copy_pose(row_of(batch.starts, p), start)
+            kept.last[0] = math.nan
+            for i in range(m):
+                kept.rows[t.PARAMETER, i] = math.nan
+        problem = problem_at(Model(code, k_h, k_p, 0.0), batch, p, free, arcs)
+        exact = Model(ELASTIC if code == ELASTIC else CATENARY, 0.0, 0.0, problem.model.gravity)
+        steps, size = find_pose(problem, exact, batch.lengths[p], start, kept, space, pose)
+        status = describe(problem, pose, arcs, size, space, answer.numbers[p])
+        fill_residuals(batch.freedom, space.gradient, answer.numbers[p])
+        answer.numbers[p, ITERATIONS] = steps
+        answer.pose_statuses[p] = status
+        copy_pose(pose, answer.poses[p])
+        store(kept.rows, p, answer.results, answer.statuses)
+        kept.last[0] = math.nan
+        if status != FORWARD_NOT_CONVERGED:
+            copy_pose(pose, start)
+            remember(kept, pose, problem.wrench)

@@ -11,88 +11,81 @@ import math
 from sagline.arrays import Array
 from sagline.kernels import tables
 from sagline.kernels.balance import geometry as g
+from sagline.kernels.balance.freedom import spread
 from sagline.kernels.balance.geometry import cable_geometry
-from sagline.kernels.cable.energy import cable_energy
+from sagline.kernels.cable import rows as t
+from sagline.kernels.cable.energy import energy_of_cables
 from sagline.kernels.cable.forces import cable_forces
-from sagline.kernels.cable.stiffness import cable_stiffness
-from sagline.kernels.cable.terms import Force, Material
-from sagline.kernels.forward.problem import Problem, Space
+from sagline.kernels.cable.stiffness import plane_of, stiffnesses_in_plane
+from sagline.kernels.cable.terms import Model
 from sagline.kernels.jit import formula, kernel
 
 Triple = tuple[float, float, float]
+Six = tuple[float, float, float, float, float, float]
 
 
 @kernel
-def unbalance(problem: Problem, pose: Array, space: Space) -> float:
-    """Fill geometry, cable results and statuses, and the unbalance (6,) as gradient, at a pose.
+def unbalance(
+    model: Model, cables: Array, body: Array, wrench: Array, pose: Array, rotation: Array, rows: Array, gradient: Array
+) -> float:
+    """Fill rotation, geometry, cable forces and statuses, and the unbalance (6,) as gradient, at a pose.
 
-    Returns the sum of the tensions and the platform's weight [N]: what the unbalance is to be compared with.
+    The rows know the lengths already. Returns the sum of the tensions and the platform's weight [N]: what the unbalance
+    is to be compared with.
     """
-    cables, body, wrench = problem.cables, problem.body, problem.wrench
-    geometry, result, gradient = space.geometry, space.result, space.gradient
-    cable_geometry(cables, body, pose, space.rotation, geometry)
-    cable_forces(problem.model, cables, problem.lengths, geometry, space.memory, result, space.statuses)
-    weight = body[tables.MASS] * problem.model.gravity
+    cable_geometry(cables, body, pose, rotation, rows)
+    cable_forces(model, cables, rows)
+    weight = body[tables.MASS] * model.gravity
     for k in range(6):
         gradient[k] = -wrench[k]
     gradient[2] += weight
-    scale: float = weight + abs(wrench[0]) + abs(wrench[1]) + abs(wrench[2])
+    size = weight + abs(wrench[0]) + abs(wrench[1]) + abs(wrench[2])
     for i in range(cables.shape[0]):
-        result[tables.SPAN, i] = geometry[g.SPAN, i]
-        result[tables.RISE, i] = geometry[g.RISE, i]
-        result[tables.LENGTH, i] = problem.lengths[i]
-        horizontal = result[tables.HORIZONTAL, i]
-        z = result[tables.VERTICAL, i]
-        x = horizontal * geometry[g.AZIMUTH_X, i]
-        y = horizontal * geometry[g.AZIMUTH_Y, i]
-        rx, ry, rz = geometry[g.LEVER_X, i], geometry[g.LEVER_Y, i], geometry[g.LEVER_Z, i]
-        gradient[0] += x
-        gradient[1] += y
-        gradient[2] += z
-        gradient[3] += ry * z - rz * y
-        gradient[4] += rz * x - rx * z
-        gradient[5] += rx * y - ry * x
-        scale += horizontal + abs(z)
-    return scale
+        add_force(rows, i, rows[t.HORIZONTAL, i], rows[t.VERTICAL, i], gradient)
+        size += rows[t.HORIZONTAL, i] + abs(rows[t.VERTICAL, i])
+    return size
+
+
+@formula
+def add_force(rows: Array, i: int, horizontal: float, vertical: float, wrench: Array) -> None:
+    """Add to a wrench (6,) what a force in the plane of cable i does at its platform end."""
+    x = horizontal * rows[g.AZIMUTH_X, i]
+    y = horizontal * rows[g.AZIMUTH_Y, i]
+    rx, ry, rz = rows[g.LEVER_X, i], rows[g.LEVER_Y, i], rows[g.LEVER_Z, i]
+    wrench[0] += x
+    wrench[1] += y
+    wrench[2] += vertical
+    wrench[3] += ry * vertical - rz * y
+    wrench[4] += rz * x - rx * vertical
+    wrench[5] += rx * y - ry * x
 
 
 @kernel
-def platform_energy(problem: Problem, pose: Array, space: Space):  # type: ignore[no-untyped-def]
-    """Energy [J] of cables, weight and given force after `unbalance`, and the size of what was added up.
+def platform_energy(
+    model: Model, cables: Array, body: Array, wrench: Array, pose: Array, rotation: Array, rows: Array
+) -> tuple[float, float]:
+    """Energy [J] after `unbalance` at the pose, and the sum of its parts' magnitudes, by which rounding is judged.
 
-    The work of a given moment is left out: constant in world axes, it has none but along a motion.
+    Cables, weight and given force; NaN where the model has none. The work of a given moment is left out: constant in
+    world axes, it has none but along a motion.
     """
-    cables, body, wrench = problem.cables, problem.body, problem.wrench
-    rotation, result = space.rotation, space.result
-    energy = 0.0
-    size = 0.0
+    energy, size = energy_of_cables(model, cables, rows)
     for k in range(3):
         center = pose[k]
         for j in range(3):
             center += rotation[k, j] * body[tables.CENTER_X + j]
-        given = wrench[k] - (body[tables.MASS] * problem.model.gravity if k == 2 else 0.0)
+        given = wrench[k] - (body[tables.MASS] * model.gravity if k == 2 else 0.0)
         energy -= given * center
         size += abs(given * center)
-    for i in range(cables.shape[0]):
-        span, rise = result[tables.SPAN, i], result[tables.RISE, i]
-        material = Material(cables[i, tables.DENSITY], cables[i, tables.STIFFNESS])
-        force = Force(result[tables.HORIZONTAL, i], result[tables.VERTICAL, i], result[tables.TENSION, i])
-        energy += cable_energy(problem.model, span, rise, material, result[tables.LENGTH, i], force)
-        size += abs(force.horizontal * span) + abs(force.vertical * rise)
     return energy, size
 
 
-@kernel
-def end_stiffness(problem: Problem, space: Space, i: int):  # type: ignore[no-untyped-def]
-    """Stiffness of cable i against displacements of its platform end in world axes, row by row: nine numbers [N/m]."""
-    cables, geometry, result = problem.cables, space.geometry, space.result
-    material = Material(cables[i, tables.DENSITY], cables[i, tables.STIFFNESS])
-    force = Force(result[tables.HORIZONTAL, i], result[tables.VERTICAL, i], result[tables.TENSION, i])
-    xx, xz, zx, zz = cable_stiffness(
-        problem.model, geometry[g.SPAN, i], geometry[g.RISE, i], material, result[tables.LENGTH, i], force
-    )
-    across = force.tension / geometry[g.CHORD, i]
-    c, s = geometry[g.AZIMUTH_X, i], geometry[g.AZIMUTH_Y, i]
+@formula
+def end_stiffness(rows: Array, i: int) -> tuple[Triple, Triple, Triple]:
+    """Stiffness of cable i against displacements of its platform end in world axes [N/m], row by row."""
+    xx, xz, zx, zz = plane_of(rows, i)
+    across = rows[t.TENSION, i] / rows[g.CHORD, i]
+    c, s = rows[g.AZIMUTH_X, i], rows[g.AZIMUTH_Y, i]
     mixed = (xx - across) * c * s
     return (
         (xx * c * c + across * s * s, mixed, xz * c),
@@ -102,41 +95,46 @@ def end_stiffness(problem: Problem, space: Space, i: int):  # type: ignore[no-un
 
 
 @formula
-def add_column(stiffness: Array, j: int, r: Triple, a: float, b: float, c: float) -> None:
-    """Add to column j what the change (a, b, c) of a cable's force at lever r does to the platform."""
-    stiffness[0, j] += a
-    stiffness[1, j] += b
-    stiffness[2, j] += c
-    stiffness[3, j] += r[1] * c - r[2] * b
-    stiffness[4, j] += r[2] * a - r[0] * c
-    stiffness[5, j] += r[0] * b - r[1] * a
+def add_row(target: Array, share: float, row: Six) -> None:
+    """Add a share of six numbers to a row (6,)."""
+    target[0] += share * row[0]
+    target[1] += share * row[1]
+    target[2] += share * row[2]
+    target[3] += share * row[3]
+    target[4] += share * row[4]
+    target[5] += share * row[5]
 
 
 @kernel
-def platform_stiffness(problem: Problem, space: Space) -> None:
+def platform_stiffness(model: Model, cables: Array, rows: Array, stiffness: Array) -> None:
     """Fill the derivative (6, 6) of the unbalance after `unbalance`: elastic, sag and geometric stiffness together.
 
     Its skew part is half the moment of the cables' forces: zero in an equilibrium without a given moment.
     """
-    geometry, result, stiffness = space.geometry, space.result, space.stiffness
+    stiffnesses_in_plane(model, cables, rows)
     for j in range(6):
         for k in range(6):
             stiffness[j, k] = 0.0
-    for i in range(geometry.shape[1]):
-        (kxx, kxy, kxz), (kyx, kyy, kyz), (kzx, kzy, kzz) = end_stiffness(problem, space, i)
-        x, y, z = geometry[g.LEVER_X, i], geometry[g.LEVER_Y, i], geometry[g.LEVER_Z, i]
-        r = (x, y, z)
-        add_column(stiffness, 0, r, kxx, kyx, kzx)
-        add_column(stiffness, 1, r, kxy, kyy, kzy)
-        add_column(stiffness, 2, r, kxz, kyz, kzz)
+    for i in range(cables.shape[0]):
+        (kxx, kxy, kxz), (kyx, kyy, kyz), (kzx, kzy, kzz) = end_stiffness(rows, i)
+        x, y, z = rows[g.LEVER_X, i], rows[g.LEVER_Y, i], rows[g.LEVER_Z, i]
         # a rotation about an axis e moves the platform end by e x r
-        add_column(stiffness, 3, r, kxz * y - kxy * z, kyz * y - kyy * z, kzz * y - kzy * z)
-        add_column(stiffness, 4, r, kxx * z - kxz * x, kyx * z - kyz * x, kzx * z - kzz * x)
-        add_column(stiffness, 5, r, kxy * x - kxx * y, kyy * x - kyx * y, kzy * x - kzx * y)
+        by_x = (kxx, kxy, kxz, kxz * y - kxy * z, kxx * z - kxz * x, kxy * x - kxx * y)
+        by_y = (kyx, kyy, kyz, kyz * y - kyy * z, kyx * z - kyz * x, kyy * x - kyx * y)
+        by_z = (kzx, kzy, kzz, kzz * y - kzy * z, kzx * z - kzz * x, kzy * x - kzx * y)
+        add_row(stiffness[0], 1.0, by_x)
+        add_row(stiffness[1], 1.0, by_y)
+        add_row(stiffness[2], 1.0, by_z)
+        add_row(stiffness[3], y, by_z)
+        add_row(stiffness[3], -z, by_y)
+        add_row(stiffness[4], z, by_x)
+        add_row(stiffness[4], -x, by_z)
+        add_row(stiffness[5], x, by_y)
+        add_row(stiffness[5], -y, by_x)
         # the force keeps its direction while r turns: r T^T - (r.T) 1
-        tx = result[tables.HORIZONTAL, i] * geometry[g.AZIMUTH_X, i]
-        ty = result[tables.HORIZONTAL, i] * geometry[g.AZIMUTH_Y, i]
-        tz = result[tables.VERTICAL, i]
+        tx = rows[t.HORIZONTAL, i] * rows[g.AZIMUTH_X, i]
+        ty = rows[t.HORIZONTAL, i] * rows[g.AZIMUTH_Y, i]
+        tz = rows[t.VERTICAL, i]
         stiffness[3, 3] -= y * ty + z * tz
         stiffness[3, 4] += x * ty
         stiffness[3, 5] += x * tz
@@ -149,7 +147,14 @@ def platform_stiffness(problem: Problem, space: Space) -> None:
 
 
 @kernel
-def moved_pose(body: Array, pose: Array, motion: Array, moved: Array) -> None:
+def take_step(free: Array, body: Array, pose: Array, step: Array, motion: Array, moved: Array) -> None:
+    """Fill the pose after a step (n,) along the free motions, and that step as a motion (6,)."""
+    spread(free, step, motion)
+    move(body, pose, motion, moved)
+
+
+@formula
+def move(body: Array, pose: Array, motion: Array, moved: Array) -> None:
     """Fill the pose after a motion (6,): the center of mass displaced, the platform turned about it."""
     angle2 = motion[3] * motion[3] + motion[4] * motion[4] + motion[5] * motion[5]
     angle = math.sqrt(angle2)
@@ -171,7 +176,7 @@ def moved_pose(body: Array, pose: Array, motion: Array, moved: Array) -> None:
         moved[k] = pose[k] + (motion[k] + (before[k] - after[k]))
 
 
-@kernel
+@formula
 def turned(pose: Array, x: float, y: float, z: float) -> Triple:
     """A vector of the platform frame in world axes."""
     qx, qy, qz, qw = pose[3], pose[4], pose[5], pose[6]

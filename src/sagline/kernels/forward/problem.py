@@ -1,17 +1,82 @@
-"""What the forward kernels pass to each other: the pose to find, and the memory to work in."""
+"""What the forward kernels pass to each other: a batch given and found, one pose to find, and memory to work in."""
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
-
-import numpy as np
 
 from sagline.arrays import Array, Codes
 from sagline.kernels import tables
-from sagline.kernels.balance import geometry as g
-from sagline.kernels.cable.forces import FORCE_ROWS
+from sagline.kernels.balance.freedom import turns
 from sagline.kernels.cable.terms import Model
-from sagline.kernels.jit import glue
+from sagline.kernels.jit import glue, kernel
+from sagline.kernels.memory import Memory, block
+
+UNIT_SHARE = 0.2  # of the mean length: the displacement that counts as much as a rotation by 1 rad
+
+# columns of the numbers that describe one solution
+ENERGY, FORCE_RESIDUAL, MOMENT_RESIDUAL, STIFFNESS_MIN, ITERATIONS = 0, 1, 2, 3, 4
+FORWARD_NUMBERS = 5
+
+# columns of what a chain of samples remembers of the platform: pose, then wrench
+LAST_WRENCH = tables.POSE_COLUMNS
+LAST_COLUMNS = LAST_WRENCH + 6
+
+GivenArrays = tuple[Array, Array, Array, Array, Array, Array]  # as they come from Python: exact tuples are fastest
+FoundArrays = tuple[Array, Array, Codes, Array, Codes]
+ChainArrays = tuple[Array, Array, Array]
+
+
+class Given(NamedTuple):
+    """A batch of N samples to solve.
+
+    Attributes:
+        freedom: Rows that pick the free motions, (n, 6).
+        bodies: body_table, (1 or N, BODY_COLUMNS).
+        robots: cable_table, (1 or N, m, CABLE_COLUMNS).
+        lengths: Unstrained lengths [m], (N, m); a row of NaN is left out.
+        starts: Pose rows (1 or N, POSE_COLUMNS).
+        wrenches: External plus inertial, about the center of mass, (1 or N, 6).
+    """
+
+    freedom: Array
+    bodies: Array
+    robots: Array
+    lengths: Array
+    starts: Array
+    wrenches: Array
+
+
+class Found(NamedTuple):
+    """What is filled of a batch.
+
+    Attributes:
+        poses: Pose rows (N, POSE_COLUMNS).
+        results: Span, rise, length, T_x, T_z, tau, (RESULT_ROWS, N, m).
+        statuses: Status of each cable, (N, m).
+        numbers: Energy, residuals, smallest stiffness, iterations, (N, FORWARD_NUMBERS).
+        pose_statuses: How each sample ended, (N,).
+    """
+
+    poses: Array
+    results: Array
+    statuses: Codes
+    numbers: Array
+    pose_statuses: Codes
+
+
+class Chain(NamedTuple):
+    """What a chain of samples remembers of its last equilibrium, from one call to the next; NaN: nothing.
+
+    Attributes:
+        rows: Of the cables, (CABLE_ROWS, m).
+        factor: Cholesky factor of the stiffness, scaled, (n, n).
+        last: Pose and wrench, (LAST_COLUMNS,).
+    """
+
+    rows: Array
+    factor: Array
+    last: Array
 
 
 class Problem(NamedTuple):
@@ -19,58 +84,135 @@ class Problem(NamedTuple):
 
     Attributes:
         model: Cable model.
-        freedom: Rows that pick the free motions, (n, 6).
+        free: Rows that pick the free motions, each times its unit: what counts as equally far, (n, 6).
         cables: Rows of the cable_table, (m, CABLE_COLUMNS).
         body: Row of the body_table, (BODY_COLUMNS,).
-        lengths: Unstrained lengths [m], (m,).
         wrench: External plus inertial, about the center of mass, (6,).
-        scale: Unit of each free motion [m or rad], (n,): what counts as equally far.
+        unit: Norm of the units, by which a sum of forces becomes one of components along the free motions.
     """
 
     model: Model
-    freedom: Array
+    free: Array
     cables: Array
     body: Array
-    lengths: Array
     wrench: Array
-    scale: Array
+    unit: float
 
 
 class Space(NamedTuple):
     """Working memory for m cables and n free motions; `unbalance` and `platform_stiffness` say what they fill."""
 
+    rows: Array  # (CABLE_ROWS, m)
     rotation: Array  # (3, 3)
-    geometry: Array  # (GEOMETRY_ROWS, m)
-    result: Array  # (RESULT_ROWS, m)
-    memory: Array  # (FORCE_ROWS, m)
-    statuses: Codes  # (m,)
     gradient: Array  # (6,)
     stiffness: Array  # (6, 6)
     matrix: Array  # (n, n)
     factor: Array  # (n, n)
     part: Array  # (n,)
-    work: Array  # (n,)
     step: Array  # (n,)
     motion: Array  # (6,)
     trial: Array  # (7,)
 
 
 @glue
-def new_space(m: int, n: int) -> Space:
-    """Working memory for m cables and n free motions."""
-    return Space(
-        np.empty((3, 3)),
-        np.empty((g.GEOMETRY_ROWS, m)),
-        np.empty((tables.RESULT_ROWS, m)),
-        np.full((FORCE_ROWS, m), np.nan),
-        np.empty(m, dtype=np.int8),
-        np.empty(6),
-        np.empty((6, 6)),
-        np.empty((n, n)),
-        np.empty((n, n)),
-        np.empty(n),
-        np.empty(n),
-        np.empty(n),
-        np.empty(6),
-        np.empty(7),
-    )
+def new_space(memory: Memory, rows: Array, factor: Array) -> tuple[Space, Memory]:
+    """Working memory, of which rows and factor are remembered, and the memory that is left."""
+    n = factor.shape[0]
+    numbers = memory.numbers
+    rotation, at = block(numbers, 0, 3, 3)
+    sixes, at = block(numbers, at, 8, 6)
+    matrix, at = block(numbers, at, n, n)
+    part, step = numbers[at : at + n], numbers[at + n : at + 2 * n]
+    at += 2 * n
+    trial = numbers[at : at + tables.POSE_COLUMNS]
+    space = Space(rows, rotation, sixes[0], sixes[1:7], matrix, factor, part, step, sixes[7], trial)
+    return space, Memory(numbers[at + tables.POSE_COLUMNS :], memory.counters)
+
+
+class Motions(NamedTuple):
+    """The free motions of the sample at hand, and the poses on its way.
+
+    Attributes:
+        free: In the units of steps, (n, 6).
+        arcs: In those by which stiffnesses are compared, (n, 6).
+        start: Pose row to begin at.
+        pose: Pose row that is found.
+    """
+
+    free: Array
+    arcs: Array
+    start: Array
+    pose: Array
+
+
+@glue
+def new_motions(memory: Memory, n: int) -> tuple[Motions, Memory]:
+    """Room for n free motions, and the memory that is left."""
+    rows, at = block(memory.numbers, 0, 2 * n, 6)
+    poses, at = block(memory.numbers, at, 2, tables.POSE_COLUMNS)
+    return Motions(rows[:n], rows[n:], poses[0], poses[1]), Memory(memory.numbers[at:], memory.counters)
+
+
+@glue
+def row_of(array: Array, p: int) -> Array:
+    """Row p of an array with a leading axis of 1 or N."""
+    return array[min(p, array.shape[0] - 1)]
+
+
+@glue
+def problem_at(model: Model, given: Given, p: int, free: Array, arcs: Array) -> Problem:
+    """Sample p of a batch as a problem; the model's gravity becomes that of its body. Fills the free motions."""
+    body, cables = row_of(given.bodies, p), row_of(given.robots, p)
+    placed = Model(model.code, model.k_h, model.k_p, body[tables.GRAVITY])
+    unit = fill_free(given.freedom, cables, body, given.lengths[p], free, arcs)
+    return Problem(placed, free, cables, body, row_of(given.wrenches, p), unit)
+
+
+@kernel
+def fill_free(freedom: Array, cables: Array, body: Array, lengths: Array, free: Array, arcs: Array) -> float:
+    """Fill the free motions in the units of steps, and in those by which stiffnesses are compared, (n, 6) each.
+
+    In the latter a rotation counts by the arc it makes at the platform ends' root mean square distance from the
+    center of mass, so that every stiffness is in N/m. Returns the norm of the former units.
+    """
+    m = lengths.shape[0]
+    total = 0.0
+    square = 0.0
+    for i in range(m):
+        total += lengths[i]
+        for k in range(3):
+            lever = cables[i, tables.PLATFORM_X + k] - body[tables.CENTER_X + k]
+            square += lever * lever
+    radius = math.sqrt(square / m)
+    units = 0.0
+    for j in range(freedom.shape[0]):
+        turning = turns(freedom, j)
+        unit = 1.0 if turning else UNIT_SHARE * total / m
+        arc = 1.0 / radius if turning and radius > 0.0 else 1.0
+        units += unit * unit
+        for a in range(6):
+            free[j, a] = freedom[j, a] * unit
+            arcs[j, a] = freedom[j, a] * arc
+    return math.sqrt(units)
+
+
+@kernel
+def copy_pose(source: Array, target: Array) -> None:
+    """Fill a pose row."""
+    for k in range(tables.POSE_COLUMNS):
+        target[k] = source[k]
+
+
+@glue
+def leave_out(found: Found, p: int, status: int, cable_status: int) -> None:
+    """Fill the answer of a sample that has none yet: NaN, no steps."""
+    for k in range(tables.POSE_COLUMNS):
+        found.poses[p, k] = math.nan
+    for i in range(found.statuses.shape[1]):
+        found.statuses[p, i] = cable_status
+        for row in range(tables.RESULT_ROWS):
+            found.results[row, p, i] = math.nan
+    for k in range(FORWARD_NUMBERS):
+        found.numbers[p, k] = math.nan
+    found.numbers[p, ITERATIONS] = 0.0
+    found.pose_statuses[p] = status

@@ -76,7 +76,7 @@ def inverse_poses(
     n = freedom.shape[0]
     cables, rest = new_cables(Memory(*room), m)
     balance, rest = new_balance(rest, m, n)
-    near, rest = new_nearness(rest, m - n)
+    near, rest = new_nearness(rest, previous, m - n)
     others = None if otherwise is None else new_room(sharing.method, rest, m, m - n)
     for p in range(first, last):
         body = bodies[min(p, bodies.shape[0] - 1)]
@@ -87,11 +87,11 @@ def inverse_poses(
             statuses[p, i] = CABLE_SOLVED
         status = set_pose(model, limits, sharing.variable, sharing.weight, platform, cables, balance)
         if status == POSE_SOLVED:
-            status = share_and_hang(model, sharing, platform, cables, balance, previous, near, others, statuses[p])
+            status = share_and_hang(model, sharing, platform, cables, balance, near, others, statuses[p])
         if status == POSE_SOLVED:
             measure_balance(platform, cables, balance, residuals[p])
             if sharing.method == CLOSEST:
-                remember(model, sharing, cables, others, previous)
+                remember(model, sharing, cables, others, near)
         else:
             residuals[p, FORCE] = residuals[p, MOMENT] = math.nan
         for k in range(n):

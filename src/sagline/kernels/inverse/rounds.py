@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sagline.arrays import Array, Codes
+from sagline.arrays import Codes
 from sagline.kernels.balance.setting import Balance, Platform, need, start_from_minimum_norm
 from sagline.kernels.cable.cables import Cables, chord_of, material_of
 from sagline.kernels.cable.hanging import NEAR, frame_end_tension, hang_cables
@@ -31,7 +31,7 @@ SETTLED = 1e-10  # [N]; pulls that change by less, or by 1e-15 of the largest te
 
 @glue
 def share_and_hang(
-    model: Model, sharing: Sharing, platform: Platform, cables: Cables, balance: Balance, previous: Array,
+    model: Model, sharing: Sharing, platform: Platform, cables: Cables, balance: Balance,
     near: Nearness, room: Room | None, statuses: Codes,
 ) -> int:  # fmt: skip
     """Share the load and hang the cables until their pulls stand still; returns the pose's status.
@@ -42,15 +42,14 @@ def share_and_hang(
         platform: What is given at the pose.
         cables: Those of `set_pose`; tensions, ratios and pulls are filled.
         balance: That of `set_pose`.
-        previous: Tensions in the sharing's variable to stay close to (m,), NaN for none.
-        near: Room for the nearest tensions.
+        near: What the tensions are to be near to.
         room: Room for the ways of sharing that are no nearest ones, and for frame-end tensions; None leaves them out.
         statuses: Filled: status of each cable, (m,).
     """
     near.held.labels[0] = 0
     if room is not None:
         forget(room)
-    refer(sharing, previous, balance.offset, balance.null, near.reference)
+    refer(sharing, balance.offset, balance.null, near)
     hung = False
     status = POSE_NOT_CONVERGED
     for k in range(ROUNDS):
@@ -84,7 +83,7 @@ def share_and_hang(
             if not linearize_ends(model, sharing, cables, balance):
                 status = POSE_SINGULAR
                 break
-            refer(sharing, previous, balance.offset, balance.null, near.reference)
+            refer(sharing, balance.offset, balance.null, near)
             forget(room)
         hung = True
     return status
@@ -123,11 +122,11 @@ def pull_change(cables: Cables) -> float:
 
 
 @glue
-def remember(model: Model, sharing: Sharing, cables: Cables, room: Room | None, previous: Array) -> None:
+def remember(model: Model, sharing: Sharing, cables: Cables, room: Room | None, near: Nearness) -> None:
     """Keep the tensions, in the variable they were shared in, for the pose that follows."""
-    for i in range(previous.size):
-        previous[i] = cables.tau[i]
+    for i in range(cables.tau.size):
+        near.previous[i] = cables.tau[i]
         if sharing.variable == HORIZONTAL_TENSION:
-            previous[i] = cables.tau[i] * cables.cosine[i]
+            near.previous[i] = cables.tau[i] * cables.cosine[i]
         elif room is not None and sharing.variable == FRAME_END_TENSION:
-            previous[i] = frame_end_tension(model, chord_of(cables, i), material_of(cables, i), cables.tau[i])
+            near.previous[i] = frame_end_tension(model, chord_of(cables, i), material_of(cables, i), cables.tau[i])

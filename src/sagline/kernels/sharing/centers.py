@@ -126,7 +126,7 @@ def analytic_center(strips: Array, null: Array, memory: Memory, point: Array) ->
                 slope[k] += push * null[k, i]
                 for j in range(k + 1):
                     curve[k, j] += weight * null[k, i] * null[j, i]
-        if not factor_positive(curve):
+        if not factor_positive(curve, 0.0, curve):
             return False
         for k in range(r):
             step[k] = -slope[k]

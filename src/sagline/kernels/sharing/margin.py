@@ -15,82 +15,83 @@ from __future__ import annotations
 import math
 
 from sagline.arrays import Array, Indices
-from sagline.kernels.jit import kernel
+from sagline.kernels.algebra.gram_schmidt import keep, take_out
+from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block
 
 MOST_FACES = 1 << 40  # more than there can be
-RANK = 1e-10  # a pivot below this share of the largest entry says that columns are parallel
+ALONG = 1e-13  # of a unit normal and a column: a column in the face itself
+DEPENDENT = 1e-20  # share of a column's square outside the span of others below which it depends on them
 
 
-@kernel
-def next_choice(chosen: Indices, m: int) -> bool:
-    """The next combination in order, in place; False after the last."""
+@glue
+def next_choice(chosen: Indices, m: int) -> int:
+    """The next combination in order, in place; returns the first place that changed, -1 after the last."""
     count = chosen.size
-    for k in range(count - 1, -1, -1):
+    place = -1
+    for k in range(count):
         if chosen[k] < m - count + k:
-            chosen[k] += 1
-            for j in range(k + 1, count):
-                chosen[j] = chosen[j - 1] + 1
-            return True
-    return False
+            place = k
+    if place >= 0:
+        chosen[place] += 1
+        for j in range(place + 1, count):
+            chosen[j] = chosen[j - 1] + 1
+    return place
 
 
-@kernel
-def normal_of(matrix: Array, chosen: Indices, rows: Array, order: Indices, normal: Array) -> bool:
-    """Fill the vector (n,) perpendicular to n - 1 columns, by elimination; False where they are dependent."""
+@glue
+def extend(matrix: Array, chosen: Indices, first: int, frame: Array, triangle: Array) -> int:
+    """Add the chosen columns from a place on to the orthonormal frame (n, n); returns how many it then has.
+
+    Fewer than were chosen where a column depends on those before it.
+    """
     n = matrix.shape[0]
-    for k in range(n):
-        order[k] = k
-        for c in range(n - 1):
-            rows[c, k] = matrix[k, chosen[c]]
-    for c in range(n - 1):
-        best = 0.0
-        at_row = c
-        at_column = c
-        for b in range(c, n - 1):
-            for k in range(c, n):
-                if abs(rows[b, k]) > best:
-                    best = abs(rows[b, k])
-                    at_row = b
-                    at_column = k
-        if best < RANK:
-            return False
+    held = first
+    for c in range(first, chosen.size):
+        size = 0.0
         for k in range(n):
-            rows[c, k], rows[at_row, k] = rows[at_row, k], rows[c, k]
-        for b in range(n - 1):
-            rows[b, c], rows[b, at_column] = rows[b, at_column], rows[b, c]
-        order[c], order[at_column] = order[at_column], order[c]
-        for b in range(c + 1, n - 1):
-            share = rows[b, c] / rows[c, c]
-            for k in range(c, n):
-                rows[b, k] -= share * rows[c, k]
-    normal[order[n - 1]] = 1.0
-    for c in range(n - 2, -1, -1):
-        total = rows[c, n - 1]
-        for k in range(c + 1, n - 1):
-            total += rows[c, k] * normal[order[k]]
-        normal[order[c]] = -total / rows[c, c]
-    return True
+            frame[c, k] = matrix[k, chosen[c]]
+            size += frame[c, k] * frame[c, k]
+        square = take_out(frame, c, triangle)
+        if not square > DEPENDENT * size:
+            break
+        keep(frame, c, triangle, square)
+        held = c + 1
+    return held
 
 
-@kernel
-def support(matrix: Array, low: Array, high: Array, normal: Array, sign: float) -> float:
-    """The largest sign normal . J t over all t within their limits; may be infinite."""
-    n, m = matrix.shape
-    total = 0.0
-    size = 0.0
+@glue
+def complete(frame: Array, triangle: Array) -> None:
+    """Fill the last row of a frame (n, n): what is perpendicular to all others."""
+    n = frame.shape[0]
+    best = 0
+    least = math.inf
     for k in range(n):
-        size += abs(normal[k])
+        covered = 0.0
+        for b in range(n - 1):
+            covered += frame[b, k] * frame[b, k]
+        if covered < least:
+            least, best = covered, k
+    for k in range(n):
+        frame[n - 1, k] = 1.0 if k == best else 0.0
+    keep(frame, n - 1, triangle, take_out(frame, n - 1, triangle))
+
+
+@formula
+def reach(matrix: Array, low: Array, high: Array, normal: Array) -> tuple[float, float]:
+    """Largest normal . J t, and largest -normal . J t, over all t within their limits; may be infinite."""
+    n, m = matrix.shape
+    forward = 0.0
+    backward = 0.0
     for i in range(m):
         along = 0.0
         for k in range(n):
             along += normal[k] * matrix[k, i]
-        along *= sign
-        if along > 1e-13 * size:
-            total += along * high[i]
-        else:
-            total += along * low[i]
-    return total
+        least = along * low[i]
+        most = along * high[i] if abs(along) > ALONG else least
+        forward += max(least, most)
+        backward -= min(least, most)
+    return forward, backward
 
 
 @kernel
@@ -106,27 +107,30 @@ def capacity_margin(matrix: Array, needed: Array, low: Array, high: Array, trans
         memory: To work in.
     """
     n, m = matrix.shape
-    rows, at = block(memory.numbers, 0, n, n)
-    normal = memory.numbers[at : at + n]
+    frame, at = block(memory.numbers, 0, n, n)
+    triangle, at = block(memory.numbers, at, n, n)
     chosen = memory.counters[: n - 1]
-    order = memory.counters[n : 2 * n]
     for c in range(n - 1):
         chosen[c] = c
+    normal = frame[n - 1]
     least = math.inf
+    held = 0  # columns of the choice in the frame
     for _ in range(MOST_FACES):
-        if normal_of(matrix, chosen, rows, order, normal):
+        held = extend(matrix, chosen, held, frame, triangle)
+        if held == n - 1:
+            complete(frame, triangle)
             force = 0.0
             along = 0.0
-            size = 0.0
             for k in range(n):
                 along += normal[k] * needed[k]
-                size += normal[k] * normal[k]
                 if k < translations:
                     force += normal[k] * normal[k]
-            if force > 1e-18 * size:
+            if force > 1e-18:
                 force = math.sqrt(force)
-                least = min(least, (support(matrix, low, high, normal, 1.0) - along) / force)
-                least = min(least, (support(matrix, low, high, normal, -1.0) + along) / force)
-        if not next_choice(chosen, m):
+                forward, backward = reach(matrix, low, high, normal)
+                least = min(least, (forward - along) / force, (backward + along) / force)
+        changed = next_choice(chosen, m)
+        if changed < 0:
             break
+        held = min(held, changed)
     return least

@@ -39,36 +39,38 @@ class Nearness(NamedTuple):
     """What the shared tensions are to be near to, in coordinates of the null space.
 
     Attributes:
+        previous: Tensions in the sharing's variable to stay close to (m,), NaN for none.
         reference: lambda_ref, (r,).
         held: The limits that the last projection met.
         point: The last projection, (r,).
     """
 
+    previous: Array
     reference: Array
     held: Held
     point: Array
 
 
 @glue
-def new_nearness(memory: Memory, r: int) -> tuple[Nearness, Memory]:
+def new_nearness(memory: Memory, previous: Array, r: int) -> tuple[Nearness, Memory]:
     """Room for r redundant cables, and the memory that is left."""
     rows, at = block(memory.numbers, 0, 2, r)
     held, rest = new_held(Memory(memory.numbers[at:], memory.counters), r)
-    return Nearness(rows[0], held, rows[1]), rest
+    return Nearness(previous, rows[0], held, rows[1]), rest
 
 
 @glue
-def refer(sharing: Sharing, previous: Array, offset: Array, null: Array, reference: Array) -> None:
-    """Fill the point of the null space that the shared tensions shall be nearest to, (r,).
+def refer(sharing: Sharing, offset: Array, null: Array, near: Nearness) -> None:
+    """Fill the point of the null space that the shared tensions shall be nearest to.
 
-    previous: tensions in the sharing's variable to stay close to (m,), NaN for none; offset: of that variable (m,).
+    offset: of the sharing's variable (m,).
     """
-    from_before = sharing.method == CLOSEST and not math.isnan(previous[0])
+    from_before = sharing.method == CLOSEST and not math.isnan(near.previous[0])
     for k in range(null.shape[0]):
-        reference[k] = 0.0
+        near.reference[k] = 0.0
         for i in range(null.shape[1]):
-            goal = previous[i] if from_before else sharing.goal[i]
-            reference[k] += null[k, i] * sharing.weight[i] * (goal - offset[i])
+            goal = near.previous[i] if from_before else sharing.goal[i]
+            near.reference[k] += null[k, i] * sharing.weight[i] * (goal - offset[i])
 
 
 @formula

@@ -66,18 +66,16 @@ def size_of(strips: Array, offset: Array, null: Array, point: Array, p: float, s
 
 @glue
 def newton_target(
-    strips: Array,
-    offset: Array,
-    null: Array,
-    point: Array,
-    p: float,
-    scale: float,
-    slope: Array,
-    curve: Array,
-    target: Array,
-) -> None:
-    """Fill slope, Cholesky factor of the curvature, and the point that Newton's step leads to without limits."""
+    strips: Array, offset: Array, null: Array, point: Array, p: float, slope: Array, curve: Array, target: Array
+) -> float:
+    """Fill slope, Cholesky factor of the curvature, and the point that Newton's step leads to without limits.
+
+    Returns the largest tension [N], in which both are measured; where it is 0 there is nothing to do.
+    """
     r, m = null.shape
+    scale = 0.0
+    for i in range(m):
+        scale = max(scale, abs(tension_at(strips, null, point, i) + offset[i]))
     for k in range(r):
         slope[k] = 0.0
         for j in range(k + 1):
@@ -94,13 +92,14 @@ def newton_target(
         largest = max(largest, curve[k, k])
     for k in range(r):
         curve[k, k] += 1e-13 * largest
-    factor_positive(curve)
+    factor_positive(curve, 0.0, curve)
     for k in range(r):
         target[k] = -slope[k]
     solve_lower(curve, target)
     solve_upper(curve, target)
     for k in range(r):
         target[k] += point[k]
+    return scale
 
 
 @glue
@@ -141,12 +140,9 @@ def lowest_p_norm(
     slack = TOLERANCE * largest
     exponent = first
     for _ in range(STEPS):
-        scale = 0.0
-        for i in range(m):
-            scale = max(scale, abs(tension_at(strips, null, point, i) + offset[i]))
+        scale = newton_target(strips, offset, null, point, exponent, slope, curve, target)
         if scale == 0.0:
             return True
-        newton_target(strips, offset, null, point, exponent, scale, slope, curve, target)
         if most_missed(null, strips, target, 0.0, True) >= 0:
             turn(null, curve, target, turned, goal)
             if not nearest_point(turned, strips, goal, slack * max(curve[0, 0], 1.0), near.held, target):

@@ -1,4 +1,5 @@
 import tracemalloc
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -6,10 +7,12 @@ from scipy.spatial.transform import Rotation
 
 from sagline.errors import InvalidValueError
 from sagline.motion.path import Path
-from sagline.motion.quintic import quintic_path
+from sagline.motion.profile import QUINTIC, SEPTIC, Profile
+from sagline.motion.rest_to_rest import quintic_path, septic_path
 from sagline.robot.pose import Pose
 from tests.motion.differences import angular_velocity, slope
 
+Maker = Callable[..., Path]
 CORNERS = np.array([[0.0, 0.0, 1.0], [3.0, 4.0, 1.0], [3.0, 4.0, 3.0], [-1.0, 2.0, 0.5]])
 ANGLES = np.radians([[0.0, 0.0, 0.0], [40.0, -30.0, 20.0], [-70.0, 10.0, 60.0], [15.0, 50.0, -25.0]])
 
@@ -49,6 +52,86 @@ def test_twist_and_its_rate_are_the_derivatives_of_the_pose() -> None:
     np.testing.assert_allclose(path.twist_rate[1:-1], slope(path.twist, step), atol=0.15)
     inner = np.all([np.abs(path.time[1:-1] - t) > 2 * step for t in (1.0, 3.0)], axis=0)
     np.testing.assert_allclose(path.twist_rate[1:-1][inner], slope(path.twist, step)[inner], atol=3e-4)
+
+
+@pytest.mark.parametrize(("make", "fifth"), [(quintic_path, 720.0), (septic_path, 10_080.0)])
+def test_jerk_is_the_derivative_of_the_twist_rate(make: Maker, fifth: float) -> None:
+    step = 1e-3
+    most = 1.02 * step**2 / 6.0 * fifth * 5.0  # what differences miss: by the share's fifth derivative, of 5 m in 1 s
+    path = make(tour(), durations=[1.0, 2.0, 1.5], rate=1.0 / step)
+    assert path.jerk is not None
+    inner = np.all([np.abs(path.time[1:-1] - t) > 2 * step for t in (1.0, 3.0)], axis=0)
+    np.testing.assert_allclose(path.jerk[1:-1][inner], slope(path.twist_rate, step)[inner], atol=most)
+    assert np.abs(path.jerk).max() > 50.0
+    # a tenth of the step: a hundredth of the error
+    fine = make(tour()[:2], durations=1.0, rate=10.0 / step)
+    assert fine.jerk is not None
+    np.testing.assert_allclose(fine.jerk[1:-1], slope(fine.twist_rate, 0.1 * step), atol=most / 100)
+
+
+def test_the_septic_is_the_published_polynomial_and_its_twist_the_derivative() -> None:
+    path = septic_path([(0.0, 0.0, 0.0), (2.0, -4.0, 1.0)], durations=4.0, rate=4.0)
+    # 35 s^4 - 84 s^5 + 70 s^6 - 20 s^7 at s = 1/4 and 3/4, by hand: 289/4096 and 3807/4096
+    np.testing.assert_allclose(path.pose.position[4], np.array([2.0, -4.0, 1.0]) * 289 / 4096, rtol=1e-14)
+    np.testing.assert_allclose(path.pose.position[12], np.array([2.0, -4.0, 1.0]) * 3807 / 4096, rtol=1e-14)
+    step = 1e-3
+    path = septic_path(tour(), durations=[1.0, 2.0, 1.5], rate=1.0 / step)
+    np.testing.assert_allclose(path.twist[1:-1, :3], slope(path.pose.position, step), atol=3e-4)
+    np.testing.assert_allclose(path.twist[1:-1, 3:], angular_velocity(path.pose.quaternion, step), atol=3e-4)
+    np.testing.assert_allclose(path.twist_rate[1:-1], slope(path.twist, step), atol=5e-3)  # at the joints too
+
+
+def test_the_jerk_of_a_septic_path_is_continuous_and_that_of_a_quintic_jumps() -> None:
+    jumps = []
+    for make in (quintic_path, septic_path):
+        path = make(tour(), durations=[1.0, 2.0, 1.5], rate=1e4)
+        assert path.jerk is not None
+        jumps.append(np.abs(np.diff(path.jerk, axis=0)).max())
+    assert jumps[0] > 100.0  # 60 way/T^3 at either side of a waypoint
+    assert jumps[1] < 0.5  # 840 way/T^4 a second
+    path = septic_path(tour(), durations=[1.0, 2.0, 1.5], rate=100.0)
+    stops = np.array([0, 100, 300, 450])
+    for rates in (path.twist, path.twist_rate, path.jerk):
+        assert rates is not None
+        np.testing.assert_allclose(rates[stops], 0.0, atol=1e-11)
+    np.testing.assert_allclose(path.pose.position[stops], CORNERS, atol=1e-15)
+
+
+def test_at_a_waypoint_the_jerk_of_a_quintic_is_that_of_the_segment_that_begins() -> None:
+    path = quintic_path([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 2.0, 0.0)], durations=[2.0, 4.0], rate=10.0)
+    assert path.jerk is not None
+    np.testing.assert_allclose(path.jerk[20, :3], [0.0, 60.0 * 2.0 / 4.0**3, 0.0], rtol=1e-13)
+
+
+@pytest.mark.parametrize(("make", "profile"), [(quintic_path, QUINTIC), (septic_path, SEPTIC)])
+def test_peaks_and_derivatives_of_a_profile(make: Maker, profile: Profile) -> None:
+    path = make([(0.0, 0.0, 0.0), (3.0, 4.0, 0.0)], durations=2.0, rate=5000.0)
+    assert peak(path, "twist", slice(3)) == pytest.approx(profile.peak_speed * 5.0 / 2.0, rel=1e-12)
+    assert peak(path, "twist_rate", slice(3)) == pytest.approx(profile.peak_acceleration * 5.0 / 4.0, rel=1e-6)
+    published = {2: (15 / 8, 10 / np.sqrt(3.0)), 3: (35 / 16, 84 * np.sqrt(5.0) / 25)}[profile.order]
+    assert (profile.peak_speed, profile.peak_acceleration) == pytest.approx(published, rel=1e-15)
+    s = np.linspace(0.0, 1.0, 101)
+    power = np.polynomial.Polynomial([0.0] * (profile.order + 1) + list(profile.tail))
+    np.testing.assert_allclose(profile.share(s), power(s), atol=1e-14)
+    for order, rates in enumerate(profile.rates(s), start=1):
+        np.testing.assert_allclose(rates, power.deriv(order)(s), atol=1e-11)
+        if order <= profile.order:
+            np.testing.assert_array_equal(rates[[0, -1]], 0.0)
+
+
+@pytest.mark.parametrize(
+    ("limits", "expected"),
+    [
+        ({"speed": 1.5}, 35 / 16 * 5.0 / 1.5),
+        ({"acceleration": 0.5}, np.sqrt(84 / (5 * np.sqrt(5.0)) * 5.0 / 0.5)),
+    ],
+)
+def test_limits_of_a_septic_path(limits: dict[str, float], expected: float) -> None:
+    path = septic_path([(0.0, 0.0, 0.0), (3.0, 4.0, 0.0)], **limits, rate=2000.0)
+    assert path.duration == pytest.approx(expected, rel=1e-15)
+    reached = {"speed": peak(path, "twist", slice(3)), "acceleration": peak(path, "twist_rate", slice(3))}
+    for name, limit in limits.items():
+        assert limit * (1 - 1e-5) <= reached[name] <= limit * (1 + 1e-12)
 
 
 def test_difference_error_falls_with_the_square_of_the_step() -> None:
@@ -175,12 +258,20 @@ def test_memory_beyond_the_path_itself_is_that_of_one_copy() -> None:
     path = quintic_path(stops, durations=[1.0, 2.0, 1.5], rate=100_000.0)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    size = sum(a.nbytes for a in (path.time, path.pose.position, path.pose.quaternion, path.twist, path.twist_rate))
-    assert size == 450_001 * 160
+    assert path.jerk is not None
+    rates = (path.twist, path.twist_rate, path.jerk)
+    size = sum(a.nbytes for a in (path.time, path.pose.position, path.pose.quaternion, *rates))
+    assert size == 450_001 * 208
     assert peak < 2.5 * size
 
 
 TWO = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)]
+
+
+def test_both_profiles_refuse_the_same() -> None:
+    for make in (quintic_path, septic_path):
+        with pytest.raises(InvalidValueError, match="the timing of the path"):
+            make(TWO)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,105 @@
+"""The smallest eigenvalue of a small symmetric matrix, and how large the others are."""
+
+from __future__ import annotations
+
+import math
+
+from sagline.arrays import Array
+from sagline.kernels.jit import formula, kernel
+
+STEPS = 100
+STILL = 1e-16  # of the largest eigenvalue: a step that rounding hides
+
+
+@formula
+def tridiagonalize(matrix: Array, diagonal: Array, beside: Array, vector: Array) -> None:
+    """Householder: fill diagonal (n,) and beside (n,), last entry 0, of a similar matrix; matrix is destroyed."""
+    n = matrix.shape[0]
+    product = diagonal  # which is filled at the end
+    for k in range(n - 2):
+        square = 0.0
+        for i in range(k + 1, n):
+            vector[i] = matrix[i, k]
+            square += vector[i] * vector[i]
+        rest = square - vector[k + 1] * vector[k + 1]
+        if rest == 0.0:
+            beside[k] = vector[k + 1]
+            continue
+        head = -math.copysign(math.sqrt(square), vector[k + 1])
+        beside[k] = head
+        vector[k + 1] -= head
+        factor = 2.0 / (rest + vector[k + 1] * vector[k + 1])
+        along = 0.0
+        for i in range(k + 1, n):
+            total = 0.0
+            for j in range(k + 1, n):
+                total += matrix[i, j] * vector[j]
+            product[i] = factor * total
+            along += product[i] * vector[i]
+        for i in range(k + 1, n):
+            product[i] -= 0.5 * factor * along * vector[i]
+        for i in range(k + 1, n):
+            for j in range(k + 1, n):
+                matrix[i, j] -= vector[i] * product[j] + product[i] * vector[j]
+    for k in range(n):
+        diagonal[k] = matrix[k, k]
+    if n > 1:
+        beside[n - 2] = matrix[n - 1, n - 2]
+    beside[n - 1] = 0.0
+
+
+@formula
+def circle(diagonal: Array, beside: Array, sign: float) -> float:
+    """Lower bound of the eigenvalues of sign times a tridiagonal matrix, by Gershgorin's circles."""
+    low = math.inf
+    before = 0.0
+    for k in range(diagonal.shape[0]):
+        after = abs(beside[k])
+        low = min(low, sign * diagonal[k] - before - after)
+        before = after
+    return low
+
+
+@kernel
+def lowest_root(diagonal: Array, beside: Array, sign: float) -> float:
+    """Smallest eigenvalue of sign times a tridiagonal matrix, by Laguerre's iteration from below.
+
+    The pivots q of the shifted matrix have the characteristic polynomial as their product, and are positive below:
+    the iteration never passes the root.
+    """
+    n = diagonal.shape[0]
+    root = circle(diagonal, beside, sign)
+    size = max(abs(root), abs(circle(diagonal, beside, -sign)))
+    for _ in range(STEPS):
+        first, second = 0.0, 0.0  # sums of 1/(l - root), 1/(l - root)^2 over the eigenvalues l
+        carried, slope, bend = 0.0, 0.0, 0.0  # b^2/q; q'/q and q''/q by the shift
+        for k in range(n):
+            pivot = sign * diagonal[k] - root - carried
+            if not pivot > 0.0:
+                return root
+            inverse = 1.0 / pivot
+            bend = carried * (bend - 2.0 * slope * slope) * inverse
+            slope = (carried * slope - 1.0) * inverse
+            first -= slope
+            second += slope * slope - bend
+            carried = beside[k] * beside[k] * inverse
+        change = n / (first + math.sqrt(max((n - 1.0) * (n * second - first * first), 0.0)))
+        root += change
+        if not change > STILL * size:
+            break
+    return root
+
+
+@kernel
+def extreme_eigenvalues(matrix: Array, diagonal: Array, beside: Array, work: Array, flat: float) -> tuple[float, float]:
+    """Smallest and largest eigenvalue of a symmetric matrix (n, n), which is destroyed; the other arrays are room.
+
+    The largest only where the smallest is within a share flat of it: else a bound above it, at most three times as
+    large, which takes less time.
+    """
+    tridiagonalize(matrix, diagonal, beside, work)
+    low = lowest_root(diagonal, beside, 1.0)
+    bound = -circle(diagonal, beside, -1.0)
+    if abs(low) > flat * abs(bound):
+        return low, bound
+    return low, -lowest_root(diagonal, beside, -1.0)

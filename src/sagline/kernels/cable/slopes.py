@@ -1,0 +1,121 @@
+"""How a cable's force on its platform end follows its own data, the ends held: by L, rho and EA, in its plane."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from sagline.kernels.algebra.hyperbolic import atanhc_excess
+from sagline.kernels.cable.catenary import slack_series
+from sagline.kernels.cable.models import pull_of_shallow
+from sagline.kernels.cable.stiffness import PlaneStiffness, shallow_slopes
+from sagline.kernels.cable.terms import Force, Material, Model
+from sagline.kernels.codes import CATENARY, ELASTIC
+from sagline.kernels.jit import formula
+
+
+class Pair(NamedTuple):
+    """Horizontal and vertical part in the cable's plane."""
+
+    x: float
+    z: float
+
+
+class ForceSlopes(NamedTuple):
+    """Derivatives of the force on the platform end: dT/dL [N/m], dT/d(rho) [N m/kg], dT/d(EA) [1]."""
+
+    by_length: Pair
+    by_density: Pair
+    by_stiffness: Pair
+
+
+@formula
+def gives_way(plane: PlaneStiffness, end: Pair) -> Pair:
+    """Change of force where the free end would move so and is held: minus stiffness times motion."""
+    return Pair(-(plane.xx * end.x + plane.xz * end.z), -(plane.zx * end.x + plane.zz * end.z))
+
+
+@formula
+def catenary_by_length(horizontal: float, vertical: float, length: float, weight: float, stiffness: float) -> Pair:
+    """Motion of P1's end for a meter of cable at fixed force: it enters at the frame end, along the tangent there."""
+    vertical_a = vertical - weight * length
+    grown = 1.0 / math.sqrt(horizontal * horizontal + vertical_a * vertical_a) + 1.0 / stiffness
+    return Pair(grown * horizontal, grown * vertical_a)
+
+
+@formula
+def catenary_by_weight(horizontal: float, vertical: float, length: float, weight: float, stiffness: float) -> Pair:
+    """Motion of P1's end by the weight per length at fixed force [m^2/N]."""
+    vertical_a = vertical - weight * length
+    tension_a = math.hypot(horizontal, vertical_a)
+    total = tension_a + math.hypot(horizontal, vertical)
+    u = weight * length / total
+    if u <= 0.5:
+        excess = atanhc_excess(u)
+    else:
+        excess = slack_series(horizontal, vertical_a, vertical, tension_a, total - tension_a) - 1.0
+    total_w = -length * vertical_a / tension_a
+    u_w = (length - u * total_w) / total
+    x_w = 0.0
+    if horizontal != 0.0:
+        bend = (u * u / (1.0 - u * u) - excess) / u if u > 1e-8 else 2.0 / 3.0 * u
+        x_w = 2.0 * horizontal * length * (bend * u_w - (1.0 + excess) * total_w / total) / total
+    middle = vertical - 0.5 * weight * length
+    z_w = -0.5 * length * length * (1.0 / stiffness + 2.0 / total) - 2.0 * middle * length * total_w / (total * total)
+    return Pair(x_w, z_w)
+
+
+@formula
+def force_by_length(
+    model: Model, span: float, rise: float, material: Material, length: float, force: Force, plane: PlaneStiffness
+) -> Pair:
+    """dT/dL [N/m] of a cable of the exact or the weightless model; zero where a weightless one is slack."""
+    weight = material.density * model.gravity
+    if model.code == CATENARY and weight > 0.0:
+        end = catenary_by_length(force.horizontal, force.vertical, length, weight, material.stiffness)
+        return gives_way(plane, end)
+    if force.tension == 0.0:
+        return Pair(0.0, 0.0)
+    along = -material.stiffness / (length * length)  # of tau, over the chord's x and z
+    return Pair(along * span, along * rise)
+
+
+@formula
+def shallow_force_slopes(
+    model: Model, span: float, rise: float, material: Material, length: float, tension: float
+) -> ForceSlopes:
+    """The three of a shallow cable."""
+    slopes = shallow_slopes(model, span, rise, material, length, tension)
+    chord = math.hypot(span, rise)
+    cosine = span / chord
+    sine = rise / chord
+    pull = pull_of_shallow(model, chord, 1.0)
+    return ForceSlopes(
+        Pair(slopes.by_length * cosine, slopes.by_length * sine),
+        Pair(slopes.by_density * cosine, slopes.by_density * sine + pull),
+        Pair(slopes.by_stiffness * cosine, slopes.by_stiffness * sine),
+    )
+
+
+@formula
+def force_slopes(
+    model: Model, span: float, rise: float, material: Material, length: float, force: Force, plane: PlaneStiffness
+) -> ForceSlopes:
+    """The three of a cable of any model but the straight one."""
+    horizontal, vertical, tension = force
+    stiffness = material.stiffness
+    weight = material.density * model.gravity
+    if model.code not in (CATENARY, ELASTIC) and weight > 0.0:
+        return shallow_force_slopes(model, span, rise, material, length, tension)
+    by_length = force_by_length(model, span, rise, material, length, force, plane)
+    if model.code == CATENARY and weight > 0.0:
+        by_weight = gives_way(plane, catenary_by_weight(horizontal, vertical, length, weight, stiffness))
+        soft = -length / (stiffness * stiffness)
+        stretched = Pair(soft * horizontal, soft * (vertical - 0.5 * weight * length))
+        return ForceSlopes(
+            by_length,
+            Pair(model.gravity * by_weight.x, model.gravity * by_weight.z),
+            gives_way(plane, stretched),
+        )
+    along = tension / (stiffness * math.hypot(span, rise))
+    return ForceSlopes(by_length, Pair(0.0, 0.0), Pair(along * span, along * rise))

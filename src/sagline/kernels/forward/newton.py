@@ -1,0 +1,182 @@
+"""Newton's method on the wrench balance: from near, and to the last digit.
+
+docs/model.md, section 6. From a start so near that the platform cannot mean another equilibrium no energy is needed:
+the first-order step from the last equilibrium of a chain, then full Newton steps that get shorter and shorter. Where
+that is in doubt, `descend` goes downhill and what follows here is careful. Steps are in the
+problem's units.
+"""
+
+from __future__ import annotations
+
+import math
+
+from sagline.arrays import Array
+from sagline.kernels import tables
+from sagline.kernels.algebra.cholesky import factor_positive, solve_lower, solve_upper
+from sagline.kernels.algebra.elimination import solve_general
+from sagline.kernels.balance import geometry as g
+from sagline.kernels.balance.freedom import components_along, matrix_along, norm, symmetric_part
+from sagline.kernels.cable import rows as t
+from sagline.kernels.cable.slopes import force_by_length
+from sagline.kernels.cable.stiffness import force_of, material_at, plane_of
+from sagline.kernels.cable.terms import Model
+from sagline.kernels.codes import CATENARY, ELASTIC
+from sagline.kernels.forward.platform import add_force, platform_stiffness, take_step, unbalance
+from sagline.kernels.forward.problem import LAST_WRENCH, Problem, Space, copy_pose
+from sagline.kernels.jit import glue, kernel
+
+POLISH_STEPS = 30
+SHORTENINGS = 10
+NEAR_STEPS = 6
+NEAR = 3e-3  # a full Newton step shorter than this leaves the rest to Newton's method
+PREDICTED = 0.03  # the longest first-order step that is tried
+SHRINKING = 0.3  # of the step before: longer ones are in doubt
+FRESH = 1e-4  # so far a factor of the stiffness serves
+BALANCED = 1e-9  # of the sum of tensions and weight: an unbalance that counts as none
+LAST_DIGIT = 1e-15  # a step that rounding hides
+
+
+@glue
+def add_wound(model: Model, cables: Array, lengths: Array, rows: Array, wrench: Array) -> None:
+    """Add to a wrench (6,) what new lengths (m,) do to the cables' forces, to first order."""
+    for i in range(cables.shape[0]):
+        span, rise, length = rows[g.SPAN, i], rows[g.RISE, i], rows[t.LENGTH, i]
+        slope = force_by_length(model, span, rise, material_at(cables, i), length, force_of(rows, i), plane_of(rows, i))
+        wound = lengths[i] - length
+        add_force(rows, i, wound * slope.x, wound * slope.z, wrench)
+
+
+@kernel
+def solve_step(factor: Array, part: Array, step: Array) -> float:
+    """Fill the step (n,) that takes away an unbalance (n,), by the factor of the stiffness; returns its length."""
+    for j in range(part.shape[0]):
+        step[j] = -part[j]
+    solve_lower(factor, step)
+    solve_upper(factor, step)
+    return norm(step)
+
+
+@glue
+def predict(problem: Problem, lengths: Array, start: Array, last: Array, space: Space, pose: Array) -> bool:
+    """Fill the first-order answer to new lengths and wrench; False without a memory of an equilibrium at the start.
+
+    The rows know the new lengths afterwards.
+    """
+    known = problem.model.code == CATENARY or problem.model.code == ELASTIC
+    for k in range(tables.POSE_COLUMNS):
+        known = known and last[k] == start[k]
+    if known:
+        for k in range(6):
+            space.gradient[k] = last[LAST_WRENCH + k] - problem.wrench[k]
+        add_wound(problem.model, problem.cables, lengths, space.rows, space.gradient)
+        components_along(problem.free, space.gradient, space.part)
+        known = solve_step(space.factor, space.part, space.step) <= PREDICTED
+    if known:
+        take_step(problem.free, problem.body, start, space.step, space.motion, pose)
+    for i in range(lengths.shape[0]):
+        space.rows[t.LENGTH, i] = lengths[i]
+    return known
+
+
+@glue
+def approach(problem: Problem, pose: Array, space: Space) -> tuple[int, float]:
+    """Full Newton steps from near by the symmetric stiffness; returns how many, and the sum of tensions at the pose.
+
+    0 steps where that is in doubt: the stiffness is not positive definite, or the first step is not short; the pose has
+    not moved then and matrix is its stiffness. -1 where the steps do not shrink as they should. On return space is that
+    of the pose, but for the stiffness. The skew part, half a given moment, is left out: it takes a step more.
+    """
+    model, cables, body, wrench, free = problem.model, problem.cables, problem.body, problem.wrench, problem.free
+    rotation, rows, gradient = space.rotation, space.rows, space.gradient
+    part, step = space.part, space.step
+    best, before = math.inf, NEAR / SHRINKING
+    age = math.inf  # how far away the stiffness was factored
+    steps = -1
+    size = 0.0
+    last = False
+    for iteration in range(NEAR_STEPS + 1):
+        size = unbalance(model, cables, body, wrench, pose, rotation, rows, gradient)
+        rest = components_along(free, gradient, part)
+        if last:
+            steps = iteration if rest <= BALANCED * size * problem.unit else -1
+            break
+        if not rest <= best:
+            break
+        best = rest
+        if age > FRESH:
+            platform_stiffness(model, cables, rows, space.stiffness)
+            symmetric_part(free, space.stiffness, space.matrix)
+            age = 0.0
+            if not factor_positive(space.matrix, 0.0, space.factor):
+                steps = -min(iteration, 1)
+                break
+        length = solve_step(space.factor, part, step)
+        if length <= LAST_DIGIT:
+            steps = max(iteration, 1)
+            break
+        if not length <= SHRINKING * before:
+            steps = -min(iteration, 1)
+            break
+        last = length * length <= LAST_DIGIT * before  # each step is a share of the one before, as that was
+        before = length
+        age += length
+        take_step(free, body, pose, step, space.motion, space.trial)
+        copy_pose(space.trial, pose)
+    return steps, size
+
+
+@glue
+def improve(problem: Problem, pose: Array, space: Space, best: float, good: float) -> tuple[float, float]:
+    """One Newton step on the wrench balance, shortened until the unbalance is below best; needs the stiffness.
+
+    Returns the new unbalance and the length of the step; length 0 and an unchanged pose where no step is better.
+    Close to balance (good) only the full step is tried: what it cannot improve is rounding.
+    """
+    model, cables, body, wrench, free = problem.model, problem.cables, problem.body, problem.wrench, problem.free
+    step, trial, part = space.step, space.trial, space.part
+    matrix_along(free, space.stiffness, space.matrix)
+    components_along(free, space.gradient, step)
+    better = False
+    new, length = best, 0.0
+    if solve_general(space.matrix, step):
+        length = norm(step)
+    if length > LAST_DIGIT:
+        share = -1.0
+        for shortening in range(SHORTENINGS + 1):
+            last = shortening == SHORTENINGS or (shortening > 0 and best <= good)
+            if last:  # nothing is better: back to where it was
+                copy_pose(pose, trial)
+            else:
+                for j in range(step.shape[0]):
+                    step[j] *= share
+                take_step(free, body, pose, step, space.motion, trial)
+            unbalance(model, cables, body, wrench, trial, space.rotation, space.rows, space.gradient)
+            new = components_along(free, space.gradient, part)
+            better = new < best and not last
+            if better or last:
+                break
+            share = 0.25
+        length = norm(step)
+        copy_pose(trial, pose)
+    return (new, length) if better else (best, 0.0)
+
+
+@glue
+def polish(problem: Problem, pose: Array, space: Space, good: float) -> int:
+    """Newton on the wrench balance while it gets better, to the last digit; returns the number of steps.
+
+    good: an unbalance that counts as none. Before and on return space is that of the pose; the stiffness may be that of
+    a pose a rounding error away.
+    """
+    best = components_along(problem.free, space.gradient, space.part)
+    before = 0.0
+    steps = POLISH_STEPS
+    for iteration in range(POLISH_STEPS):
+        platform_stiffness(problem.model, problem.cables, space.rows, space.stiffness)
+        best, length = improve(problem, pose, space, best, good)
+        # each step is as long as the error before it: the next would be about length^3/before^2
+        if length == 0.0 or length * length * length <= LAST_DIGIT * before * before:
+            steps = iteration + 1
+            break
+        before = length
+    return steps

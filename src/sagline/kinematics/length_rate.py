@@ -1,0 +1,78 @@
+"""How fast a plan's winches wind: the time derivative of its unstrained lengths."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sagline.arrays import Array, Flags, Indices, locked
+from sagline.kernels import tables
+from sagline.kinematics.instants import Instants, instants
+from sagline.kinematics.inverse_rows import solve_rows
+from sagline.kinematics.tension_rate import closest_rates, placed
+from sagline.motion.path import Path
+from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.several import first_of
+from sagline.statics.tables import pose_rows
+from sagline.tension.closest import Closest
+from sagline.tension.method import TensionMethod
+from sagline.tension.options import kernel_options
+
+
+def length_rate(state: Equilibrium, path: Path, tension: TensionMethod, feasible: Flags) -> Array:
+    """Rate of the unstrained lengths while the platform follows the path and the load is shared as planned.
+
+    Geometry and tensions both change: L(t) = L(pose(t), tau(t)). A method that depends on the pose alone is solved
+    again an instant before and after each sample, where the path's twist, its rate and its jerk lead; `Closest` follows
+    the tensions it has, so that its tensions' rates are solved for: of all that keep the balance, the smallest, with
+    cables held at the limits that they would cross.
+
+    Args:
+        state: Robot, poses, wrench and cables along the path.
+        path: The path; where it knows no jerk, a spline through its accelerations gives it.
+        tension: How the load was shared.
+        feasible: Which samples have an answer, shape (N,).
+
+    Returns:
+        dL/dt [m/s], shape (N, m): good to 1e-8 of its largest value; NaN where the plan has no answer. Where the rate
+        jumps, as where a cable reaches a limit, it is one of the two sides'.
+
+    Source:
+        docs/model.md, section 7.
+    """
+    near = instants(state.robot, path, state.wrench)
+    kept = np.flatnonzero(feasible)
+    rates = np.full(state.cables.shape, np.nan)
+    if not isinstance(tension, Closest):
+        rates[kept] = _solved_again(state, tension, near)[kept]
+    elif kept.size:
+        rates[kept] = _followed(state[kept], tension, near, kept)
+    return locked(rates)
+
+
+def _solved_again(state: Equilibrium, tension: TensionMethod, near: Instants) -> Array:
+    """Rates of a method without memory; to one side, where the path leaves the feasible poses at the other."""
+    options = kernel_options(state.robot, state.cables.model, tension)
+    lengths = state.cables.unstrained_length
+    none = np.full(first_of(state.robot).cable_count, np.nan)
+    before, after = (
+        solve_rows(state.robot, tension, options, pose_rows(moment.pose), locked(moment.wrench), none).results[
+            tables.LENGTH
+        ]
+        for moment in (near.before, near.after)
+    )
+    sides = (after - before) / (2.0 * near.step)
+    ahead, behind = (after - lengths) / near.step, (lengths - before) / near.step
+    rates: Array = np.where(np.isnan(sides), np.where(np.isnan(ahead), behind, ahead), sides)
+    return rates
+
+
+def _followed(state: Equilibrium, tension: TensionMethod, near: Instants, kept: Indices) -> Array:
+    """Rates of `Closest`, at the samples that have an answer: the state is theirs."""
+    before, after = (moment.part(kept) for moment in (near.before, near.after))
+    rates = closest_rates(state, tension, before, after, near.step)
+    lengths = [
+        placed(state, moment.pose, state.cables.chord_tension + h * rates).cables.unstrained_length
+        for moment, h in ((before, -near.step), (after, near.step))
+    ]
+    found: Array = (lengths[1] - lengths[0]) / (2.0 * near.step)
+    return found

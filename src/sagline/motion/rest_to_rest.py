@@ -1,0 +1,183 @@
+"""Rest-to-rest motion through waypoints by polynomials of 5th or 7th order."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import cast
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sagline.arrays import Array, checked
+from sagline.errors import InvalidValueError
+from sagline.motion.path import Path
+from sagline.motion.profile import QUINTIC, SEPTIC, Profile
+from sagline.motion.segments import Segments, positive
+from sagline.robot.pose import Pose
+
+LIMITS = ("speed", "acceleration", "angular_speed", "angular_acceleration")
+MOST_SAMPLES = 100_000_000  # 21 GB of path: beyond it a duration or the rate has the wrong unit
+
+
+def quintic_path(
+    waypoints: Pose | Sequence[Pose] | ArrayLike,
+    *,
+    durations: ArrayLike | None = None,
+    speed: float | None = None,
+    acceleration: float | None = None,
+    angular_speed: float | None = None,
+    angular_acceleration: float | None = None,
+    rate: float = 100.0,
+) -> Path:
+    """Move from waypoint to waypoint, each time from rest to rest.
+
+    Within a segment of duration T the share 10 s^3 - 15 s^4 + 6 s^5 (s = time/T) of the way is done: the position moves
+    along the straight line, the orientation turns about one fixed axis, and velocity and acceleration vanish at both
+    ends; the jerk does not (see `septic_path`). A turn of exactly 180 degrees has two equally short ways; the one of
+    scipy's `Rotation.as_rotvec` is taken.
+
+    Time is given either by `durations` or by limits. With limits, each segment takes the shortest time in which all of
+    them hold, the slower of translation and turn deciding for both.
+
+    The samples lie at 0, 1/rate, 2/rate, ... and at the very end, whatever the step before it. A waypoint between two
+    of those times is passed between two samples.
+
+    Args:
+        waypoints: At least two poses, as a batch or a sequence; or positions [m] of shape (N, 3), orientation identity.
+        durations: Time of each segment [s], shape () or (N - 1,), > 0. A waypoint given twice is a dwell.
+        speed: Limit of the origin's speed [m/s], > 0.
+        acceleration: Limit of the origin's acceleration [m/s^2], > 0.
+        angular_speed: Limit of the angular speed [rad/s], > 0.
+        angular_acceleration: Limit of the angular acceleration [rad/s^2], > 0.
+        rate: Samples per second [1/s], > 0.
+
+    Returns:
+        Path that starts at time 0. Its jerk jumps at every waypoint, where it is that of the segment that begins.
+
+    Raises:
+        InvalidValueError: If a value is out of range, both or neither of durations and limits are given, a segment
+            moves or turns without a limit on it, or two consecutive waypoints are the same while limits are given.
+
+    Source:
+        docs/model.md, section 7.
+
+    Examples:
+        >>> import sagline as sl
+        >>> path = sl.quintic_path([(0, 0, 1.5), (4, 3, 1.5)], speed=1.5)  # 5 m: 15/8 5/1.5 s
+        >>> print(f"{path.duration} s, {len(path)} samples, peak {path.twist[:, :3].max():.1f} m/s along x")
+        6.25 s, 626 samples, peak 1.2 m/s along x
+    """
+    limits = (speed, acceleration, angular_speed, angular_acceleration)
+    return _rest_to_rest(QUINTIC, waypoints, durations, limits, rate)
+
+
+def septic_path(
+    waypoints: Pose | Sequence[Pose] | ArrayLike,
+    *,
+    durations: ArrayLike | None = None,
+    speed: float | None = None,
+    acceleration: float | None = None,
+    angular_speed: float | None = None,
+    angular_acceleration: float | None = None,
+    rate: float = 100.0,
+) -> Path:
+    """Move from waypoint to waypoint, each time from rest to rest, with continuous jerk.
+
+    As `quintic_path`, but the share of the way is 35 s^4 - 84 s^5 + 70 s^6 - 20 s^7: velocity, acceleration and jerk
+    vanish at both ends of each segment, so that cables and winches are not struck at the waypoints. For the same
+    duration its peak speed is 7/6 and its peak acceleration 1.30 of the quintic's.
+
+    Args:
+        waypoints: At least two poses, as a batch or a sequence; or positions [m] of shape (N, 3), orientation identity.
+        durations: Time of each segment [s], shape () or (N - 1,), > 0. A waypoint given twice is a dwell.
+        speed: Limit of the origin's speed [m/s], > 0.
+        acceleration: Limit of the origin's acceleration [m/s^2], > 0.
+        angular_speed: Limit of the angular speed [rad/s], > 0.
+        angular_acceleration: Limit of the angular acceleration [rad/s^2], > 0.
+        rate: Samples per second [1/s], > 0.
+
+    Returns:
+        Path that starts at time 0.
+
+    Raises:
+        InvalidValueError: As `quintic_path`.
+
+    Source:
+        docs/model.md, section 7.
+
+    Examples:
+        >>> import numpy as np
+        >>> import sagline as sl
+        >>> path = sl.septic_path([(0, 0, 1.5), (4, 3, 1.5)], durations=6.25)
+        >>> print(path.jerk[[0, -1]].any(), f"{np.linalg.norm(path.twist[:, :3], axis=1).max():.2f} m/s")
+        False 1.75 m/s
+    """
+    limits = (speed, acceleration, angular_speed, angular_acceleration)
+    return _rest_to_rest(SEPTIC, waypoints, durations, limits, rate)
+
+
+def _rest_to_rest(
+    profile: Profile,
+    waypoints: Pose | Sequence[Pose] | ArrayLike,
+    durations: ArrayLike | None,
+    limits: tuple[float | None, float | None, float | None, float | None],
+    rate: float,
+) -> Path:
+    """A path of segments of one profile, timed by durations or by the limits in the order of `LIMITS`."""
+    segments = Segments.between(_as_pose(waypoints), profile)
+    given = [name for name, value in zip(LIMITS, limits, strict=True) if value is not None]
+    if (durations is None) == (not given):
+        raise InvalidValueError(
+            "the timing of the path",
+            f"given by durations and {given[0]}" if given else "missing",
+            "either durations, or limits of speed and acceleration",
+            "Leave one of them out." if given else "Give durations=... or speed=...",
+        )
+    times = segments.durations_within(*limits) if durations is None else _checked_durations(durations, len(segments))
+    ends = np.cumsum(times)
+    return segments.sampled(_time_grid(float(ends[-1]), rate), ends, times)
+
+
+def _as_pose(waypoints: Pose | Sequence[Pose] | ArrayLike) -> Pose:
+    if isinstance(waypoints, Pose):
+        stops = waypoints
+    elif isinstance(waypoints, list | tuple) and waypoints and all(isinstance(w, Pose) for w in waypoints):
+        position = np.vstack([w.position for w in waypoints])
+        stops = Pose.from_quaternion(position, np.vstack([w.quaternion for w in waypoints]))
+    else:
+        position = checked(cast(ArrayLike, waypoints), "waypoints", "m", shape=(None, 3))
+        stops = Pose.from_euler(position, 0.0, 0.0, 0.0)
+    if stops.shape < (2,):
+        raise InvalidValueError(
+            "waypoints", f"of shape {stops.shape}", "shape (N,), N >= 2", "Give at least two poses."
+        )
+    return stops
+
+
+def _checked_durations(durations: ArrayLike, segments: int) -> Array:
+    given = checked(durations, "durations", "s", above=0.0)
+    if given.shape not in ((), (segments,)):
+        raise InvalidValueError(
+            "durations",
+            f"of shape {given.shape}",
+            f"one number, or one for each of the {segments} segments",
+            "Give one duration from each waypoint to the next.",
+        )
+    return np.broadcast_to(given, (segments,))
+
+
+def _time_grid(total: float, rate: float) -> Array:
+    """Times k/rate from 0 to the total time, and the total itself as the last [s]."""
+    steps = total * positive(rate, "rate", "1/s")
+    if steps > MOST_SAMPLES:
+        raise InvalidValueError(
+            "the number of samples",
+            f"{steps:.3g} ({total:g} s at {rate:g} 1/s)",
+            f"<= {MOST_SAMPLES:g}",
+            "Check the units of durations, limits and rate.",
+        )
+    # A total within rounding of a multiple of 1/rate gets no extra sample.
+    last = round(steps) if abs(steps - round(steps)) <= 1e-9 * steps else int(np.ceil(steps))
+    time = np.arange(last + 1) / rate
+    time[-1] = total
+    return time

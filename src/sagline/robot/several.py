@@ -1,0 +1,241 @@
+"""One robot for all poses, or one robot a pose: what the robots of a batch share, and how to take some of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sagline.arrays import Array
+from sagline.cables.cable import Cable
+from sagline.errors import InvalidValueError
+from sagline.robot.robot import Robot
+
+Robots: TypeAlias = Robot | tuple[Robot, ...]  # `together` makes it from what a caller gives
+Index: TypeAlias = int | slice | NDArray[Any]  # of a batch
+
+_ALIKE = {"cable_count": "", "motion_pattern": "", "tension_limits_of": "", "gravity": " m/s^2"}  # and their units
+
+
+def together(robot: Robot | Sequence[Robot]) -> Robots:
+    """The one robot of all poses as it is, or several as a tuple, checked against each other.
+
+    Several robots may differ in anything but what a batch has once: number of cables, motion pattern with its plane,
+    the tension that is limited, and gravity.
+
+    Args:
+        robot: A robot, or a sequence of them.
+
+    Returns:
+        The robot, or a tuple.
+
+    Raises:
+        InvalidValueError: If there is none, or one of them (the message names it) cannot stand in a batch with the
+            first.
+    """
+    if isinstance(robot, Robot):
+        return robot
+    robots = tuple(robot)
+    first = first_of(robots)
+    for index, other in enumerate(robots):
+        _check_alike(first, other, index)
+    return robots
+
+
+def check_count(robot: Robots, poses: int | None) -> None:
+    """Refuse several robots that are not one a pose.
+
+    Args:
+        robot: The robot or robots.
+        poses: How many poses (or samples) there are; None for a single one, without batch axis.
+
+    Raises:
+        InvalidValueError: If the counts differ.
+    """
+    if isinstance(robot, Robot) or len(robot) == poses:
+        return
+    allowed = "one robot" if poses is None else f"one robot, or a sequence of {poses}"
+    step = "Give one robot a pose; where the pose is the same for all, repeat it."
+    raise InvalidValueError("robot", f"a sequence of {len(robot)} robots", allowed, step)
+
+
+def one_a_pose(robot: Robot | Sequence[Robot], poses: int | None) -> Robots:
+    """`together` and `check_count` in one.
+
+    Args:
+        robot: A robot, or a sequence of them.
+        poses: How many poses there are; None for a single one.
+
+    Returns:
+        The robot, or a tuple of one a pose.
+
+    Raises:
+        InvalidValueError: As those two.
+    """
+    robots = together(robot)
+    check_count(robots, poses)
+    return robots
+
+
+def first_of(robot: Robots) -> Robot:
+    """The robot, or the first of several: for what all of them share.
+
+    Args:
+        robot: The robot or robots.
+
+    Returns:
+        One robot.
+
+    Raises:
+        InvalidValueError: If there is none, as in a selection that chose no pose.
+    """
+    if isinstance(robot, Robot):
+        return robot
+    if not robot:
+        raise InvalidValueError("robot", "an empty sequence", "at least one robot", "Give or select at least one.")
+    return robot[0]
+
+
+def robots_at(robot: Robots, index: Index) -> Robots:
+    """The robot of all poses, or of several those of the poses that an index names.
+
+    Args:
+        robot: The robot or robots.
+        index: As of a batch.
+
+    Returns:
+        One robot, or a tuple.
+    """
+    if isinstance(robot, Robot):
+        return robot
+    chosen = np.arange(len(robot))[index]
+    return robot[int(chosen)] if np.ndim(chosen) == 0 else tuple(robot[i] for i in chosen)
+
+
+def robot_at(robot: Robots, pose: int) -> Robot:
+    """The robot of one pose.
+
+    Args:
+        robot: The robot or robots.
+        pose: Index of the pose.
+
+    Returns:
+        One robot.
+    """
+    return robot if isinstance(robot, Robot) else robot[pose]
+
+
+def cables_of(robot: Robots) -> Cable:
+    """Material of the cables.
+
+    Args:
+        robot: The robot or robots.
+
+    Returns:
+        Cable with fields of shape (m,), or (N, m) for several robots.
+    """
+    if isinstance(robot, Robot):
+        return robot.cables
+    materials = [one.cables for one in robot]
+    return Cable([c.linear_density for c in materials], [c.axial_stiffness for c in materials])
+
+
+class Bodies(NamedTuple):
+    """What moves: the platform's inertia, once for all poses or, for several robots, with a leading axis N.
+
+    Attributes:
+        mass: [kg], shape () or (N,).
+        center_of_mass: In the platform frame [m], shape (3,) or (N, 3).
+        inertia: About the center of mass in the platform frame [kg m^2], shape (3, 3) or (N, 3, 3).
+    """
+
+    mass: Array
+    center_of_mass: Array
+    inertia: Array
+
+
+def bodies_of(robot: Robots) -> Bodies:
+    """Mass, center of mass and inertia of the platform or platforms.
+
+    Args:
+        robot: The robot or robots.
+
+    Returns:
+        Bodies, with a leading axis N for several robots.
+    """
+    if isinstance(robot, Robot):
+        return Bodies(np.asarray(robot.mass), robot.center_of_mass, robot.inertia)
+    return Bodies(
+        np.array([one.mass for one in robot]),
+        np.stack([one.center_of_mass for one in robot]),
+        np.stack([one.inertia for one in robot]),
+    )
+
+
+class Anchors(NamedTuple):
+    """Where the cables are fixed.
+
+    Attributes:
+        frame: Frame anchors in the world [m], shape (m, 3) or, for several robots, (N, m, 3).
+        platform: Platform anchors in the platform frame [m], of the same shape.
+    """
+
+    frame: Array
+    platform: Array
+
+
+def anchors_of(robot: Robots) -> Anchors:
+    """Anchors of the robot or robots.
+
+    Args:
+        robot: The robot or robots.
+
+    Returns:
+        Anchors, with a leading axis N for several robots.
+    """
+    if isinstance(robot, Robot):
+        return Anchors(robot.frame_anchors, robot.platform_anchors)
+    return Anchors(np.stack([one.frame_anchors for one in robot]), np.stack([one.platform_anchors for one in robot]))
+
+
+class Limits(NamedTuple):
+    """Tension limits of the cables.
+
+    Attributes:
+        low: Lower limits [N], shape (m,) or, for several robots, (N, m).
+        high: Upper limits [N], of the same shape.
+    """
+
+    low: Array
+    high: Array
+
+
+def limits_of(robot: Robots) -> Limits:
+    """Tension limits of the robot or robots.
+
+    Args:
+        robot: The robot or robots.
+
+    Returns:
+        Limits, with a leading axis N for several robots.
+    """
+    if isinstance(robot, Robot):
+        return Limits(robot.tension_min, robot.tension_max)
+    return Limits(np.stack([one.tension_min for one in robot]), np.stack([one.tension_max for one in robot]))
+
+
+def _check_alike(first: Robot, other: Robot, index: int) -> None:
+    if not isinstance(other, Robot):
+        raise InvalidValueError(f"robot[{index}]", repr(other), "a Robot", "Give robots only.")
+    if other is first:
+        return
+    step = "Robots of one batch share it; solve those that differ in a batch of their own."
+    for name, unit in _ALIKE.items():
+        value, wanted = getattr(other, name), getattr(first, name)
+        if value != wanted:
+            raise InvalidValueError(f"robot[{index}]: {name}", f"{value}{unit}", f"{wanted}{unit}, as robot[0]", step)
+    normal, wanted = other.plane_normal, first.plane_normal  # both or neither: the pattern says which
+    if normal is not None and wanted is not None and not np.array_equal(normal, wanted):
+        raise InvalidValueError(f"robot[{index}]: plane_normal", normal, f"{wanted}, as robot[0]", step)

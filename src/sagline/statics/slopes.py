@@ -1,0 +1,95 @@
+"""How the cables of an equilibrium answer to motions of the platform and to changes of their own data."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sagline.arrays import Array, locked
+from sagline.kernels import tables
+from sagline.kernels.forward.sensitivity import BY_DENSITY, BY_LENGTH, BY_STIFFNESS, describe_states
+from sagline.kernels.memory import memory_for
+from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.several import first_of
+from sagline.statics.tables import body_table, cable_table, pose_rows
+
+_TINY = 1e-300
+
+
+class CableSlopes(NamedTuple):
+    """How every cable's force on its platform end changes, world axes.
+
+    Attributes:
+        matrix: Derivative of the platform's unbalance by its motion, shape (..., 6, 6).
+        blocks: dT/dB, shape (..., m, 3, 3) [N/m].
+        by_length: dT/dL, shape (..., m, 3) [N/m].
+        by_density: dT/d(rho), shape (..., m, 3) [N m/kg].
+        by_stiffness: dT/d(EA), shape (..., m, 3) [1].
+        levers: From the center of mass to the platform ends, shape (..., m, 3) [m].
+        force: T, on the platform ends, shape (..., m, 3) [N].
+    """
+
+    matrix: Array
+    blocks: Array
+    by_length: Array
+    by_density: Array
+    by_stiffness: Array
+    levers: Array
+    force: Array
+
+
+def cable_slopes(state: Equilibrium) -> CableSlopes:
+    """How the cables' forces change with the platform's motion and with their own data.
+
+    Args:
+        state: An equilibrium, single or N of them.
+
+    Returns:
+        The slopes; NaN where the state has no lengths.
+    """
+    shared, cables = first_of(state.robot), state.cables
+    bodies, robots = body_table(state.robot), cable_table(state.robot)
+    poses, lengths = pose_rows(state.pose), np.atleast_2d(cables.unstrained_length)
+    shape, (count, m) = state.pose.shape, lengths.shape
+    matrices = np.empty((count, 6, 6))
+    blocks = np.empty((count, m, 3, 3))
+    slopes = np.empty((count, 3, m, 3))
+    levers = np.empty((count, m, 3))
+    given = (shared.freedom, bodies, robots, locked(lengths.view()), poses, locked(np.atleast_2d(state.wrench).view()))
+    describe_states(
+        (cables.model.code, *cables.model.parameters), given, memory_for(m), matrices, blocks, slopes, levers
+    )
+    centers = poses[:, :3] + _turned(state, bodies[:, tables.CENTER_X :])
+    reach = (centers[:, None] + levers - robots[:, :, : tables.PLATFORM_X]).reshape(*shape, m, 3)
+    # a vertical cable pulls nowhere sideways
+    level = reach[..., :2] / np.maximum(np.hypot(reach[..., 0], reach[..., 1]), _TINY)[..., None]
+    sideways = level * cables.horizontal_tension[..., None]
+    return CableSlopes(
+        matrices.reshape(*shape, 6, 6),
+        blocks.reshape(*shape, m, 3, 3),
+        slopes[:, BY_LENGTH].reshape(*shape, m, 3),
+        slopes[:, BY_DENSITY].reshape(*shape, m, 3),
+        slopes[:, BY_STIFFNESS].reshape(*shape, m, 3),
+        levers.reshape(*shape, m, 3),
+        np.concatenate((sideways, cables.vertical_force[..., None]), axis=-1),
+    )
+
+
+def _turned(state: Equilibrium, vectors: Array) -> Array:
+    """Vectors of the platform frame (1 or N, 3) in world axes, (N, 3)."""
+    turned: Array = (state.pose.matrix.reshape(-1, 3, 3) @ vectors[..., None])[..., 0]
+    return turned
+
+
+def on_platform(forces: Array, levers: Array) -> Array:
+    """Forces at the platform ends as wrenches about the center of mass.
+
+    Args:
+        forces: Of each cable, world axes [N] or N by something, shape (..., m, 3).
+        levers: From the center of mass to the platform ends [m], shape (..., m, 3).
+
+    Returns:
+        Columns of force and moment, shape (..., 6, m).
+    """
+    return np.swapaxes(np.concatenate((forces, np.cross(levers, forces)), axis=-1), -1, -2)
