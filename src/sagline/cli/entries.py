@@ -139,11 +139,11 @@ ENTRIES = {
         Entry(INVERSE, "inverse.poses.inverse_poses", 39, 14.0, _inverse),
         Entry(SHARING, "inverse.poses.inverse_poses", 39, 47.0, _other_sharing, version=2),
         Entry(VERDICTS, "inverse.explain.explain_poses", 45, 16.0, _verdicts),
-        Entry(FORWARD, "forward.forward.forward_poses", 68, 14.0, _forward),
-        Entry(FIT, "forward.fit.fit_poses", 15, 5.0, lambda: _forward(straight=True)),
+        Entry(FORWARD, "forward.forward.forward_poses", 71, 14.0, _forward),
+        Entry(FIT, "forward.fit.fit_poses", 19, 5.0, lambda: _forward(straight=True)),
         Entry(MARGINS, "inverse.queries.margins_of_poses", 33, 5.0, _margins),
         Entry(POLYGON, "inverse.queries.polygon_of_pose", 38, 6.0, _polygon),
-        Entry(VIBRATION, "forward.sensitivity.describe_states", 45, 10.0, _vibration),
+        Entry(VIBRATION, "forward.sensitivity.describe_states", 48, 10.0, _vibration),
     )
 }
 
