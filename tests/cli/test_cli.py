@@ -249,6 +249,7 @@ def test_a_cold_start_says_what_it_compiles(monkeypatch: pytest.MonkeyPatch) -> 
         with event.trigger_event("numba:compile", data={"dispatcher": inverse_poses, "args": ()}):
             pass
 
+    sagline("track", "article-suspended", "inside.yaml", "--no-figures")  # whatever it needs is compiled then
     monkeypatch.setattr("sagline.cli.line.compile_all", compile_all)
     result = sagline("track", "article-suspended", "inside.yaml", "--no-figures", "--json")
     assert result.stderr == "First run: compiling inverse kinematics ...\n"
