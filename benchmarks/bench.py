@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -110,6 +112,21 @@ def inverse_kinematics() -> Iterator[Row]:
     yield Row("InverseSolver.step; .step_into", "<= 20 us; <= 10 us", f"{step:.1f} us; {into:.1f} us")
 
 
+def two_threads() -> Iterator[Row]:
+    """Two threads on two cores, half of the poses each, against one thread; before this process keeps to one core."""
+    cores = len(os.sched_getaffinity(0))
+    if cores < 2:
+        return
+    robot, rng = sl.load_robot("article-suspended"), np.random.default_rng(2)
+    count = 1_000_000
+    pose = sl.Pose(rng.uniform((-4, -3, 1), (4, 3, 3), (count, 3)), np.broadcast_to(np.eye(3), (count, 3, 3)))
+    halves = pose[: count // 2], pose[count // 2 :]
+    with ThreadPoolExecutor(2) as threads:
+        one = best_seconds(lambda: sl.inverse(robot, pose), 3)
+        two = best_seconds(lambda: list(threads.map(lambda half: sl.inverse(robot, half), halves)), 3)
+    yield Row("inverse of 10^6 poses in two threads", ">= 1.8 x one", f"{one / two:.2f} x; {two:.2f} s")
+
+
 def whole_processes() -> Iterator[Row]:
     """Memory of a long plan, and what a user waits for."""
     memory = process_peak_memory(
@@ -132,9 +149,9 @@ def whole_processes() -> Iterator[Row]:
 
 def main() -> None:
     """Measure and print."""
-    one_core()
     console = Console()
-    rows: list[Row] = []
+    rows: list[Row] = [*two_threads()]
+    one_core()
     for part in (accuracy_of_cables, speed_of_cables, inverse_kinematics, whole_processes):
         Console(stderr=True).print(f"[dim]{part.__doc__}[/dim]")
         rows.extend(part())

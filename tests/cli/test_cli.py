@@ -12,10 +12,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numba.core import event
 from typer.testing import CliRunner
 
 import sagline as sl
 from sagline.cli.main import app
+from sagline.kernels.inverse.poses import inverse_poses
 
 OUTSIDE = "durations: 5\nrate: 20\nwaypoints: [{position: [0, 0, 1.5]}, {position: [7.2, 3, 1.5]}]\n"
 INSIDE = "durations: 5\nrate: 20\nwaypoints: [{position: [0, 0, 1.5]}, {position: [4, 3, 1.5]}]\n"
@@ -241,11 +243,16 @@ def test_ctrl_c_during_a_long_run_leaves_nothing_half_done(folder: FilePath) -> 
     assert not [name for name in left if name.endswith(".part")]
 
 
-def test_a_cold_start_says_that_it_compiles(monkeypatch: pytest.MonkeyPatch) -> None:
-    answers = iter([True, False])  # after the first stage the kernels are there
-    monkeypatch.setattr("sagline.kernels.jit.is_cold", lambda: next(answers))
+def test_a_cold_start_says_what_it_compiles(monkeypatch: pytest.MonkeyPatch) -> None:
+    def compile_all(names: list[str], tell: object) -> None:
+        assert list(names) == ["inverse kinematics", "forward kinematics"]
+        with event.trigger_event("numba:compile", data={"dispatcher": inverse_poses, "args": ()}):
+            pass
+
+    sagline("track", "article-suspended", "inside.yaml", "--no-figures")  # whatever it needs is compiled then
+    monkeypatch.setattr("sagline.cli.line.compile_all", compile_all)
     result = sagline("track", "article-suspended", "inside.yaml", "--no-figures", "--json")
-    assert result.stderr == "First run: compiling the numerical core, about a minute; later runs start at once.\n"
+    assert result.stderr == "First run: compiling inverse kinematics ...\n"
     assert json.loads(result.stdout)["runs"][0]["poses"] == 101
 
 

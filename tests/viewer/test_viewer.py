@@ -1,5 +1,6 @@
 """The viewer with clients that drag, set, leave and talk nonsense."""
 
+import re
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -12,7 +13,7 @@ import sagline as sl
 from sagline.viewer.run import Run
 from sagline.viewer.server import Server, started, stop
 from sagline.viewer.stage import Stage
-from sagline.viewer.viewer import Viewer
+from sagline.viewer.viewer import Reading, Viewer
 from tests.viewer.client import Client, clients
 
 ROBOT = sl.load_robot("article-suspended")
@@ -224,3 +225,55 @@ def test_a_run_plays_pauses_and_is_left_by_a_drag(film: Shown) -> None:
         assert follow.value is False
         client.set(play._impl.uuid, True)
         await_that(lambda: follow.value and film.position[2] == 1.5)
+
+
+def test_cables_verdict_and_table_come_before_what_is_not_ready(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*arguments: object) -> None:
+        raise AssertionError("asked before it is ready")
+
+    ready: set[Reading] = set()
+    kernels = (
+        "sagline.tension.margin.margins_of_poses",
+        "sagline.statics.stiffness.describe_states",
+        "sagline.kinematics.polygon.polygon_of_pose",
+        "sagline.kinematics.forward_rows.kernel.forward_poses",
+    )
+    server = started(port=0)
+    viewer = Viewer(server, ROBOT, ready=ready.__contains__)
+    thread = threading.Thread(target=viewer.serve)
+
+    def texts() -> str:
+        panel = viewer._panel
+        return panel._verdict.content + panel._numbers.content + panel._polygon.content
+
+    try:
+        with monkeypatch.context() as patched:
+            for kernel in kernels:
+                patched.setattr(kernel, refuse)
+            thread.start()
+            assert viewer.shown.wait(300.0)
+            assert "Feasible" in texts()
+            assert texts().count("ompiling …") == 3
+            cells = re.findall(r"<td.*?>(?:<span.*?</span> )?([\d.]+)</td>", viewer._panel._numbers.content)
+            assert len(cells) == 6 * ROBOT.cable_count
+            handle(Shown(server, viewer, thread), "Cable model").value = "empirical (the article's)"
+            updates = viewer.updates
+            viewer.refresh()
+            await_that(lambda: viewer.updates > updates)
+            assert viewer.view is not None
+            assert viewer.view.snapshot.rest is None
+        for reading, text in (
+            (Reading.MARGIN, "more in any direction"),
+            (Reading.FREQUENCIES, " Hz</div>"),
+            (Reading.POLYGON, "<polygon"),
+            (Reading.REST, "really rests"),
+        ):
+            assert text not in texts()
+            ready.add(reading)
+            viewer.refresh()
+            await_that(lambda text=text: text in texts(), seconds=300.0)  # type: ignore[misc]
+        assert "ompiling" not in texts()
+    finally:
+        viewer.stop()
+        thread.join(timeout=30.0)
+        stop(server)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from sagline.cables.catenary import Catenary
 from sagline.cables.empirical import Empirical
+from sagline.cli.entries import FORWARD, INVERSE
 from sagline.cli.results import tell, write_figures, write_plans
 from sagline.cli.study import Run, run_along
 from sagline.cli.terminal import show, working
@@ -34,10 +35,9 @@ def run_article(folder: Path, *, as_json: bool) -> int:
     """
     check_folder(folder)
     path, runs = article_path(), []
-    for robot in map(load_robot, ROBOTS):
-        for model in (Empirical(), Catenary()):
-            with working(f"{robot.name}: planning with {type(model).__name__}, confirming with exact cables"):
-                runs.append(run_along(robot, path, model, TENSION))
+    with working("planning and confirming the article's path", INVERSE, FORWARD) as line:
+        for robot in map(load_robot, ROBOTS):
+            runs += [run_along(robot, path, model, TENSION, line) for model in (Empirical(), Catenary())]
     with working("writing runs and figures"):
         files = write_plans(runs, folder)
         files += write_figures(_figures(*(run for run in runs if _is_empirical(run))), folder)

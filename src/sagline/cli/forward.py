@@ -9,6 +9,7 @@ import numpy as np
 from rich.table import Table
 
 from sagline.cli.choices import Model
+from sagline.cli.entries import FIT, FORWARD
 from sagline.cli.tables import plain_table
 from sagline.cli.terminal import OUTSIDE, note, show, show_json, working
 from sagline.files.lengths_file import Lengths, load_lengths
@@ -36,10 +37,11 @@ def forward(name: str, file: Path, model: Model, folder: Path, *, as_json: bool)
     robot = load_robot(name)
     lengths = load_lengths(file, robot.cable_count)
     check_folder(folder)
-    with working(f"{robot.name}: finding {len(lengths.unstrained_length):,} poses"):
+    entry = FIT if model is Model.STRAIGHT else FORWARD
+    with working(f"{robot.name}: finding {len(lengths.unstrained_length):,} poses", entry) as line:
         first = solve(robot, lengths.unstrained_length[0], model=model.build())
         start = first.pose if np.isfinite(first.pose.position).all() else None
-        found = solve(robot, lengths.unstrained_length, start=start, model=model.build())
+        found = solve(robot, lengths.unstrained_length, start=start, model=model.build(), progress=line.progress)
     target = made_folder(folder) / f"{robot.name}-poses.csv"
     rows = _rows(lengths, found)
     with written_whole(target) as partial, partial.open("w", newline="", encoding="utf-8") as stream:

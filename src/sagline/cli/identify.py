@@ -11,7 +11,7 @@ import numpy as np
 from sagline.article.identify import EmpiricalFit, identify_empirical
 from sagline.article.identify_cable import UNITS, CableFit, TensionAt, identify_cable
 from sagline.cli.tables import plain_table, written
-from sagline.cli.terminal import note, show, show_json
+from sagline.cli.terminal import note, show, show_json, working
 from sagline.files.measurements import Measurements, load_measurements
 
 STEPS = 25  # along each axis of the working range
@@ -33,10 +33,11 @@ def identify(
         SaglineError: If the file or a value is wrong.
     """
     data = load_measurements(file)
-    cable = identify_cable(
-        *data, length_error=length_error, tension_error=tension_error, tension_at=tension_at, unknowns=unknowns
-    )
-    model = _model(cable, data)
+    with working(f"{file.name}: identifying"):
+        cable = identify_cable(
+            *data, length_error=length_error, tension_error=tension_error, tension_at=tension_at, unknowns=unknowns
+        )
+        model = _model(cable, data)
     if as_json:
         show_json(_record(cable, model))
         return

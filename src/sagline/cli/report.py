@@ -6,7 +6,9 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
+from sagline.cli.entries import FORWARD, INVERSE
 from sagline.cli.terminal import counting, note, show_json
+from sagline.files.whole import check_folder
 from sagline.report.article import write_article
 
 
@@ -16,7 +18,9 @@ def write_report(folder: Path, parts: Sequence[str], *, as_json: bool) -> None:
     Raises:
         SaglineError: If a part is unknown or the folder cannot be written; then nothing has been.
     """
-    with counting("redoing the article") as progress:
+    check_folder(folder)
+    needed = () if parts else (INVERSE, FORWARD)  # single parts need neither, or one
+    with counting("redoing the article", *needed) as progress:
         report = write_article(folder, parts, progress)
     if as_json:
         show_json(report.numbers)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from time import perf_counter
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from sagline.arrays import Array
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
+from sagline.kinematics.blocks import Progress
 from sagline.kinematics.confirm import Confirmation, confirm
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Gap, Plan
@@ -18,6 +19,13 @@ from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 
 SAME_PLACE = 1e-6  # m: far above rounding, far below any second equilibrium
+
+
+class Stages(Protocol):
+    """Told of each part of the work, it gives what to call with how much of it is done."""
+
+    def stage(self, what: str) -> Progress:
+        """A new part begins."""
 
 
 class Run(NamedTuple):
@@ -66,8 +74,15 @@ class Summary(NamedTuple):
     inverse_us_per_pose: float
 
 
-def run_along(robot: Robot, path: Path, model: CableModel, tension: TensionMethod) -> Run:
+def run_along(robot: Robot, path: Path, model: CableModel, tension: TensionMethod, line: Stages) -> Run:
     """Plan a path, and confirm the plan with exact cables.
+
+    Args:
+        robot: The robot.
+        path: The path.
+        model: Cable model the lengths are planned with.
+        tension: How the load is shared.
+        line: Told of planning and confirming.
 
     Raises:
         InvalidValueError: If the robot's tensions cannot be determined.
@@ -75,9 +90,9 @@ def run_along(robot: Robot, path: Path, model: CableModel, tension: TensionMetho
     """
     inverse(robot, path.pose[:1], model, tension)  # loads the compiled kernels, so that the work alone is timed
     start = perf_counter()
-    plan = inverse(robot, path, model, tension)
+    plan = inverse(robot, path, model, tension, progress=line.stage(f"{robot.name}: planning {len(path):,} poses"))
     seconds = perf_counter() - start
-    return Run(confirm(plan), seconds)
+    return Run(confirm(plan, progress=line.stage(f"{robot.name}: confirming {len(path):,} poses")), seconds)
 
 
 def summary(run: Run) -> Summary:

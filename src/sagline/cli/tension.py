@@ -9,6 +9,7 @@ import numpy as np
 from rich.table import Table
 
 from sagline.cli.choices import Model, Variable
+from sagline.cli.entries import INVERSE, MARGINS, POLYGON, SHARING
 from sagline.cli.results import write_figures
 from sagline.cli.tables import plain_table
 from sagline.cli.terminal import OUTSIDE, note, show, show_json, working
@@ -45,7 +46,7 @@ def tension(
     drawn = figures and robot.cable_count == robot.degrees_of_freedom + 2
     if drawn:
         check_folder(folder)
-    with working(f"{robot.name}: sharing the load"):
+    with working(f"{robot.name}: sharing the load", INVERSE, SHARING, MARGINS, *[POLYGON] * drawn):
         plans = {title: _plan(robot, place, model, method(variable.value)) for title, method in ALONE.items()}
     least = plans[MinimumNorm.__name__]
     assert least is not None

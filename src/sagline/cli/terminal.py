@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 from rich.console import Console, RenderableType
@@ -12,6 +12,9 @@ from rich.text import Text
 
 from sagline.errors import SaglineError
 from sagline.files.json_text import json_text
+
+if TYPE_CHECKING:
+    from sagline.cli.line import Line
 
 OUTSIDE, BAD_INPUT, INTERRUPTED = 1, 2, 130
 
@@ -37,34 +40,30 @@ def reported() -> Iterator[None]:
 
 
 @contextmanager
-def working(what: str) -> Iterator[None]:
-    """Say what is being done while it is done, where a person watches; and the first time that it compiles."""
-    say_if_cold()
-    if not _err.is_terminal:
-        yield
-        return
-    with _err.status(f"{what} ..."):
-        yield
+def working(what: str, *needed: str) -> Iterator[Line]:
+    """Say what is being done while it is done, where a person watches; and what is compiled, whoever watches.
 
+    Args:
+        what: What is being done.
+        needed: Entries of the kernels (`sagline.cli.entries`) that it needs: compiled before it begins.
+    """
+    from sagline.cli.line import shown
 
-def say_if_cold() -> None:
-    """Say that the first run compiles, where nothing is compiled yet."""
-    from sagline.kernels.jit import is_cold
-
-    if is_cold():
-        note("First run: ", "compiling the numerical core, about a minute; later runs start at once.", style="bold")
+    with shown(_err, what) as line:
+        line.compile(needed)
+        yield line
 
 
 @contextmanager
-def counting(what: str) -> Iterator[Callable[[int, int, str], None]]:
-    """A progress bar, where a person watches; it is told how much of how much is done, and what comes next."""
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+def counting(what: str, *needed: str) -> Iterator[Callable[[int, int, str], None]]:
+    """The same for parts that have names: how many of how many are done, and which one comes next."""
+    with working(what, *needed) as line:
 
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed}/{task.total}"))
-    say_if_cold()
-    with Progress(*columns, TimeElapsedColumn(), console=_err, transient=True, disable=not _err.is_terminal) as bar:
-        task = bar.add_task(what, total=None)
-        yield lambda done, total, name: bar.update(task, completed=done, total=total, description=f"{what}: {name}")
+        def tell(done: int, total: int, name: str) -> None:
+            line.name(f"{what}: {name}")
+            line.progress(done, total)
+
+        yield tell
 
 
 def note(head: str, text: str, style: str = "") -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sagline.cli.choices import Model, Tension, Variable
+from sagline.cli.entries import FORWARD, needed_for
 from sagline.cli.results import tell, write_figures, write_plans
 from sagline.cli.study import Run, run_along
 from sagline.cli.terminal import working
@@ -38,8 +39,9 @@ def track(
     machine = load_robot(robot)
     way = article_path() if path is None else load_path(path)
     check_folder(folder)
-    with working(f"{machine.name}: planning and confirming {len(way):,} poses"):
-        run = run_along(machine, way, model.build(), tension.build(variable))
+    shared = tension.build(variable)
+    with working(f"{machine.name}: planning and confirming {len(way):,} poses", *needed_for(shared), FORWARD) as line:
+        run = run_along(machine, way, model.build(), shared, line)
     with working("writing"):
         files = write_plans([run], folder)
         if figures:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import sys
 import webbrowser
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sagline.cli.terminal import note, say_if_cold, show, working
+from sagline.cli.entries import FORWARD
+from sagline.cli.terminal import note, show, working
 from sagline.errors import FileError
 from sagline.files.plan_file import load_plan
 from sagline.files.robot_file import load_robot
@@ -30,6 +32,7 @@ def view(robot: str, run: Path | None, host: str, port: int, *, browser: bool) -
 def serve(robot: Robot, run: Path | None, host: str, port: int, *, browser: bool) -> int:
     """Serve a robot until Ctrl-C; returns the exit code."""
     try:
+        from sagline.cli.readings import Readings
         from sagline.viewer import server as web
         from sagline.viewer.viewer import Viewer
     except ModuleNotFoundError as error:
@@ -40,15 +43,16 @@ def serve(robot: Robot, run: Path | None, host: str, port: int, *, browser: bool
     machine = robot if course is None else course.plan.state.one_robot
     server = web.started(host, port, machine.name)
     try:
-        say_if_cold()
         address = web.url(server, host)
         show(f"{machine.name} is at {address}   (Ctrl-C stops it)")
         if host not in ("127.0.0.1", "::1", "localhost"):
             note("Note: ", "everyone who can reach this machine can look at it and drag it.", style="bold")
-        viewer = Viewer(server, machine, course)
+        readings = Readings()
+        viewer = Viewer(server, machine, course, readings.ready)
         if browser and _has_display():
             webbrowser.open(address)
-        viewer.serve()
+        with working("") if readings.cold else nullcontext(), readings.compiled_beside(viewer):
+            viewer.serve()
     except KeyboardInterrupt:
         note("", "Stopped.")
     finally:
@@ -65,8 +69,10 @@ def _run(robot: Robot, file: Path) -> Run:
         raise FileError(
             file, f"is a run of {made_for}, not of {robot.name}", f"View it as: sagline view {made_for} {file}"
         )
-    with working(f"{made_for}: confirming {len(plan.state.pose) if plan.state.pose.shape else 1:,} poses"):
-        return Run.of(plan)
+    with working(
+        f"{made_for}: confirming {len(plan.state.pose) if plan.state.pose.shape else 1:,} poses", FORWARD
+    ) as line:
+        return Run.of(plan, line.progress)
 
 
 def _has_display() -> bool:

@@ -83,6 +83,7 @@ def machine_code(compiled: Callable[..., object], arguments: tuple[object, ...])
     return cast("Callable[..., object]", dispatcher.get_overload(signature))
 
 
-def is_cold() -> bool:
-    """Whether nothing is compiled yet, so that the first call will take a minute rather than a moment."""
-    return not any(FOLDER.glob("**/*.nbi"))
+def is_compiled(function: Callable[..., object], versions: int = 1) -> bool:
+    """Whether the machine code of an entry is on disk, in at least so many versions for different types."""
+    name = f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}"
+    return sum(1 for _ in FOLDER.rglob(f"{name}-*.nbc")) >= versions

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from sagline.arrays import Array, Codes, Flags, locked
+from sagline.kinematics.blocks import Progress, blocks
 from sagline.kinematics.forward import forward
 from sagline.kinematics.forward_status import ForwardStatus
 from sagline.kinematics.plan import Plan
 from sagline.robot.pose import Pose
 
-BLOCK = 1 << 14  # poses solved at once: half a second, after which an interrupt is heard, and little memory
+BLOCK = 1 << 14  # poses whose cables are kept at once: little memory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,13 +52,14 @@ class Confirmation:
         return locked(np.asarray(2.0 * np.arctan2(sine, cosine)))
 
 
-def confirm(plan: Plan) -> Confirmation:
+def confirm(plan: Plan, *, progress: Progress | None = None) -> Confirmation:
     """Wind a plan's lengths onto exact catenaries and find where the platform rests.
 
     Inertia and external wrench are the plan's; the search starts from the planned poses.
 
     Args:
         plan: A plan of any cable model: the errors are that model's. Those of the exact one are of rounding alone.
+        progress: Called every tenth of a second or so: how many poses are confirmed, of how many.
 
     Returns:
         The plan with the poses found.
@@ -72,12 +74,17 @@ def confirm(plan: Plan) -> Confirmation:
     """
     state, lengths = plan.state, plan.unstrained_length
     if not state.pose.shape:
-        found = forward(state.robot, lengths, start=state.pose, wrench=state.wrench)
+        found = forward(state.robot, lengths, start=state.pose, wrench=state.wrench, progress=progress)
         return Confirmation(plan, found.pose, found.status, found.wrench_residual)
-    blocks = []
-    for first in range(0, len(lengths), BLOCK):
-        part = state[first : first + BLOCK]
-        found = forward(part.robot, part.cables.unstrained_length, start=part.pose, wrench=part.wrench)
-        blocks.append((found.pose.position, found.pose.quaternion, found.status, found.wrench_residual))
-    position, quaternion, status, residual = (locked(np.concatenate(parts)) for parts in zip(*blocks, strict=True))
+    parts = []
+    for rows in blocks(len(lengths), BLOCK):
+        part, told = state[rows], None if progress is None else _from(rows.start, len(lengths), progress)
+        found = forward(part.robot, part.cables.unstrained_length, part.pose, wrench=part.wrench, progress=told)
+        parts.append((found.pose.position, found.pose.quaternion, found.status, found.wrench_residual))
+    position, quaternion, status, residual = (locked(np.concatenate(each)) for each in zip(*parts, strict=True))
     return Confirmation(plan, Pose._adopt(position, quaternion), status, residual)
+
+
+def _from(first: int, count: int, progress: Progress) -> Progress:
+    """Tells of a part that begins at a pose as of the whole."""
+    return lambda done, _: progress(first + done, count)

@@ -11,6 +11,7 @@ from sagline.arrays import Array, locked
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
+from sagline.kinematics.blocks import Progress
 from sagline.kinematics.forward_rows import solve_rows
 from sagline.kinematics.forward_solution import ForwardSolution
 from sagline.kinematics.measured import MeasuredTension, corrected
@@ -31,6 +32,8 @@ def forward(
     model: CableModel = _CATENARY,
     wrench: ArrayLike | None = None,
     tension_measured: MeasuredTension | None = None,
+    *,
+    progress: Progress | None = None,
 ) -> ForwardSolution:
     """The pose in which the platform rests on cables of given unstrained lengths.
 
@@ -48,6 +51,7 @@ def forward(
             gravity: force [N], then moment [N m], shape (6,) or (N, 6). None for none.
         tension_measured: Readings of load cells: then lengths count as measured too, both are corrected within their
             deviations to fit each other, and the answer carries the covariance of the pose.
+        progress: Called every tenth of a second or so: how many samples are solved, of how many.
 
     Returns:
         ForwardSolution, single or with a leading axis N.
@@ -75,10 +79,11 @@ def forward(
     load = external_wrench(wrench, count)
     samples, loads = np.atleast_2d(lengths), np.atleast_2d(load)
     if start is None:
-        found = search(robots, model, samples, loads)
+        found = search(robots, model, samples, loads, progress)
     else:
         chained = bool(shape) and not start.shape
-        found = solve_rows(robots, model, samples, start_rows(start, lengths), loads, chained=chained)
+        starts = start_rows(start, lengths)
+        found = solve_rows(robots, model, samples, starts, loads, chained=chained, progress=progress)
     covariance = None
     if tension_measured is not None:
         covariance = corrected(robots, model, found, loads, tension_measured)

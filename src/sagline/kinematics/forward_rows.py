@@ -24,12 +24,15 @@ from sagline.kernels.forward.problem import (
     FoundArrays,
 )
 from sagline.kernels.memory import memory_for
+from sagline.kinematics.blocks import Progress, blocks, rows_of
 from sagline.kinematics.forward_solution import ForwardSolution
 from sagline.kinematics.forward_status import STABLE
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.several import Robots, cables_of, first_of
 from sagline.statics.tables import body_table, cable_table
+
+BLOCK = 1 << 13  # cables solved at once: from a few to some 130 ms, after which an interrupt is heard
 
 
 class Found(NamedTuple):
@@ -41,13 +44,13 @@ class Found(NamedTuple):
     numbers: Array
     pose_status: Codes
 
-    def keep(self, samples: Indices, other: Found, which: Indices) -> None:
+    def keep(self, samples: Indices | slice, other: Found, which: Indices | slice = slice(None)) -> None:
         """Replace the answers of some samples by some of another's.
 
         Args:
             samples: Which to replace (k,).
             other: The answers to take from.
-            which: Which of those to take (k,).
+            which: Which of those to take (k,); all unless told otherwise.
         """
         self.poses[samples] = other.poses[which]
         self.results[:, samples] = other.results[:, which]
@@ -71,6 +74,19 @@ class Found(NamedTuple):
             self.numbers[samples],
             self.pose_status[samples],
         )
+
+    def last_pose(self, before: Array) -> Array:
+        """Where a sample that follows these starts.
+
+        Args:
+            before: Pose row at which these started, (1, POSE_COLUMNS).
+
+        Returns:
+            The last pose that was found, (1, POSE_COLUMNS); the one before if none was.
+        """
+        found = ~np.isin(self.pose_status, (codes.FORWARD_NOT_CONVERGED, codes.FORWARD_NO_LENGTHS))
+        which = np.flatnonzero(found)[-1:]
+        return locked(self.poses[which]) if which.size else before
 
     @property
     def arrays(self) -> FoundArrays:
@@ -169,8 +185,9 @@ def solve_rows(
     *,
     chained: bool = False,
     freedom: Array | None = None,
+    progress: Progress | None = None,
 ) -> Found:
-    """Run the kernel over samples.
+    """Run the kernel over samples, in blocks.
 
     Args:
         robot: The robot, or one a sample.
@@ -180,18 +197,27 @@ def solve_rows(
         wrenches: External plus inertial (1 or N, 6).
         chained: Whether each sample starts where the last one ended.
         freedom: Motions to allow (n, 6); None for those of the robot.
+        progress: Told after each block how many samples are done, of how many.
 
     Returns:
         The answers.
     """
-    found = Found.empty(*lengths.shape)
+    count, m = lengths.shape
     allowed = first_of(robot).freedom if freedom is None else freedom
-    given = (allowed, body_table(robot), cable_table(robot), lengths, starts, wrenches)
-    chain, memory = new_chain(lengths.shape[1], len(allowed)), memory_for(lengths.shape[1])
-    if model.code == codes.STRAIGHT:
-        fit_poses(chained, given, chain, memory, found.arrays)
-    else:
-        forward_poses((model.code, *model.parameters), chained, given, chain, memory, found.arrays)
+    bodies, cables = body_table(robot), cable_table(robot)
+    chain, memory = new_chain(m, len(allowed)), memory_for(m)  # the chain goes on from block to block
+    found = Found.empty(count, m)
+    for part in blocks(count, max(1, BLOCK // m), progress):
+        block = Found.empty(part.stop - part.start, m)
+        per_sample = (rows_of(bodies, part), rows_of(cables, part), lengths[part], rows_of(starts, part))
+        given = (allowed, *per_sample, rows_of(wrenches, part))
+        if model.code == codes.STRAIGHT:
+            fit_poses(chained, given, chain, memory, block.arrays)
+        else:
+            forward_poses((model.code, *model.parameters), chained, given, chain, memory, block.arrays)
+        found.keep(part, block)
+        if chained:
+            starts = block.last_pose(starts)
     return found
 
 

@@ -12,6 +12,7 @@ from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel, CableState
 from sagline.errors import CableGeometryError, InvalidValueError
 from sagline.kernels import codes, tables
+from sagline.kinematics.blocks import Progress
 from sagline.kinematics.inverse_rows import explained, solve_rows
 from sagline.kinematics.plan import Plan
 from sagline.motion.path import Path
@@ -36,6 +37,8 @@ def inverse(
     tension: TensionMethod = _CLOSEST,
     wrench: ArrayLike | None = None,
     previous: Plan | None = None,
+    *,
+    progress: Progress | None = None,
 ) -> Plan:
     """Tensions that balance the platform within their limits, and the unstrained lengths that produce them.
 
@@ -49,6 +52,8 @@ def inverse(
         wrench: External wrench on the platform about its center of mass in world axes, without gravity and
             inertia: force [N], then moment [N m], shape (6,) or (N, 6). None for none.
         previous: A plan that this one continues: `Closest` starts from its last feasible tensions.
+        progress: Called every few hundredths of a second: how many poses are solved, or known not to be feasible and
+            why, of how many.
 
     Returns:
         Plan with fields of shape (m,) for a single pose, (N, m) otherwise. A pose without an answer is not
@@ -81,9 +86,9 @@ def inverse(
     if isinstance(motion, Path):
         load = locked(inertial_wrench(robots, pose, motion.twist, motion.twist_rate) + load)
     reference = _reference(shared, previous, tension.variable)
-    found = solve_rows(robots, method, options, rows, np.atleast_2d(load), reference)
+    found = solve_rows(robots, method, options, rows, np.atleast_2d(load), reference, progress)
     _refuse_missing_chords(found.pose_status, found.results)
-    shortfall, farkas, blocking = explained(robots, options, rows, found)
+    shortfall, farkas, blocking = explained(robots, options, rows, found, progress)
     cables = CableState(
         model=model,
         cable=cables_of(robots),

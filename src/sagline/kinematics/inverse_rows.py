@@ -11,6 +11,7 @@ from sagline.kernels import codes, tables
 from sagline.kernels.inverse.explain import explain_poses
 from sagline.kernels.inverse.poses import Answers, inverse_poses
 from sagline.kernels.memory import memory_for
+from sagline.kinematics.blocks import Progress, blocks
 from sagline.robot.pose import Pose
 from sagline.robot.several import Robots, first_of
 from sagline.statics.tables import robot_terms
@@ -68,7 +69,13 @@ class Found(NamedTuple):
 
 
 def solve_rows(
-    robot: Robots, method: TensionMethod, options: Options, rows: Array, loads: Array, reference: Array
+    robot: Robots,
+    method: TensionMethod,
+    options: Options,
+    rows: Array,
+    loads: Array,
+    reference: Array,
+    progress: Progress | None = None,
 ) -> Found:
     """Run the kernel over poses.
 
@@ -79,6 +86,7 @@ def solve_rows(
         rows: Pose rows (N, POSE_COLUMNS).
         loads: External plus inertial wrenches (1 or N, 6).
         reference: Tensions that `Closest` starts from, in its variable (m,), or NaN; the last feasible ones on return.
+        progress: Told after each block how many poses are solved, without the infeasible ones, of how many.
 
     Returns:
         The answers.
@@ -88,12 +96,18 @@ def solve_rows(
     otherwise = None if takes_default_kernel(method) else True
     memory = memory_for(shared.cable_count)
     given = (*options, robot_terms(robot), rows, loads, reference, memory, otherwise, found.answers)
-    for first in range(0, len(rows), BLOCK):
-        inverse_poses(*given, first, min(first + BLOCK, len(rows)))
+    done = 0
+    for part in blocks(len(rows), BLOCK):
+        inverse_poses(*given, part.start, part.stop)
+        if progress is not None:
+            done += int(np.count_nonzero(found.pose_status[part] != codes.POSE_INFEASIBLE))
+            progress(done, len(rows))
     return found
 
 
-def explained(robot: Robots, options: Options, rows: Array, found: Found) -> tuple[Array, Array, Flags]:
+def explained(
+    robot: Robots, options: Options, rows: Array, found: Found, progress: Progress | None = None
+) -> tuple[Array, Array, Flags]:
     """Why poses are infeasible.
 
     Args:
@@ -101,6 +115,7 @@ def explained(robot: Robots, options: Options, rows: Array, found: Found) -> tup
         options: Of `kernel_options`.
         rows: Pose rows (N, POSE_COLUMNS).
         found: The answers.
+        progress: Told after each block how many poses are done, the feasible ones among them, of how many.
 
     Returns:
         Shortfall [N] (N,), Farkas vectors along the free motions (N, n) and blocking cables (N, m).
@@ -113,15 +128,17 @@ def explained(robot: Robots, options: Options, rows: Array, found: Found) -> tup
     blocking = np.zeros((count, m), dtype=np.bool_)
     which = np.flatnonzero(found.pose_status == codes.POSE_INFEASIBLE)
     terms, memory = robot_terms(robot), memory_for(m)
-    for first in range(0, which.size, BLOCK):
+    for part in blocks(which.size, BLOCK):
         explain_poses(
             options.model,
             options.limits,
             terms,
             rows,
             found.needed,
-            which[first : first + BLOCK],
+            which[part],
             memory,
             (shortfall, farkas, blocking),
         )
+        if progress is not None:
+            progress(count - which.size + part.stop, count)
     return shortfall, farkas, blocking

@@ -22,7 +22,7 @@ from sagline.statics.tables import pose_rows, robot_terms
 from sagline.tension.centroid import Centroid
 from sagline.tension.method import Variable
 from sagline.tension.minimum_norm import MinimumNorm
-from sagline.tension.options import check_sharing, kernel_options
+from sagline.tension.options import Options, check_sharing, kernel_options
 from sagline.tension.polygon import Side, TensionPolygon
 
 MERGED = 1e-10  # of the largest tension: corners closer than this are one
@@ -70,6 +70,14 @@ def tension_polygon(
         raise InvalidValueError(
             "pose", "one without a balance", "one that `inverse` can solve", PoseStatus(int(plan.status)).text
         )
+    options = kernel_options(robot, model, MinimumNorm(variable))
+    return polygon_at(robot, pose, options, plan.state.wrench, plan.chord_tension, _pulls(plan), bool(plan.feasible))
+
+
+def polygon_at(
+    robot: Robot, pose: Pose, options: Options, wrench: Array, tension: Array, pulls: Array, feasible: bool
+) -> TensionPolygon:
+    """The polygon around chord tensions [N] that balance the platform, (m,), given the cables' pulls [N], (m,)."""
     m, r = robot.cable_count, robot.cable_count - robot.degrees_of_freedom
     scale, offset = np.empty(m), np.empty(m)
     limits = np.empty((strips.STRIP_ROWS, m))
@@ -77,16 +85,16 @@ def tension_polygon(
     corners = np.empty((2 * m + SPARE_CORNERS, 2))
     labels = np.full(2 * m + SPARE_CORNERS, -1, dtype=np.int64)
     count = polygon_of_pose(
-        *kernel_options(robot, model, MinimumNorm(variable)),
+        *options,
         robot_terms(robot),
         pose_rows(pose)[0],
-        plan.state.wrench,
-        (plan.chord_tension, _pulls(plan)),
+        wrench,
+        (tension, pulls),
         memory_for(m),
         (scale, offset, limits, null, corners, labels),
     )
     origin = limits[strips.START]
-    vertices, sides = _sides_of(count if plan.feasible else 0, null, limits, corners, labels)
+    vertices, sides = _sides_of(count if feasible else 0, null, limits, corners, labels)
     return TensionPolygon(
         vertices=locked(vertices),
         tensions=locked(_tensions(vertices, null, origin + offset)),

@@ -8,7 +8,8 @@ from sagline.arrays import Array, Flags, Indices, locked
 from sagline.cables.model import CableModel
 from sagline.kernels import codes
 from sagline.kernels.forward.problem import ENERGY
-from sagline.kinematics.forward_rows import Found, solve_rows
+from sagline.kinematics.blocks import Progress, blocks, rows_of
+from sagline.kinematics.forward_rows import BLOCK, Found, solve_rows
 from sagline.robot.equilibrium import limited_tension
 from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.pose import Pose
@@ -22,7 +23,9 @@ _LIMIT_SLACK = 0.01  # a measured tension may miss its limit by this share
 _POOR = np.array([0, 1, 2, 3, 4, 5, 6, 0])  # how little each status is worth; fitted is as good as solved
 
 
-def search(robot: Robots, model: CableModel, lengths: Array, wrenches: Array) -> Found:
+def search(
+    robot: Robots, model: CableModel, lengths: Array, wrenches: Array, progress: Progress | None = None
+) -> Found:
     """Forward kinematics without a start, sample by sample.
 
     With its orientation held, the platform has a single equilibrium, because the energy is convex in the position:
@@ -35,10 +38,20 @@ def search(robot: Robots, model: CableModel, lengths: Array, wrenches: Array) ->
         model: Cable model.
         lengths: Unstrained lengths (N, m), rows of NaN are left out.
         wrenches: External plus inertial (1 or N, 6).
+        progress: Told after each block how many samples are done, of how many.
 
     Returns:
         The best answer to each sample.
     """
+    count, m = lengths.shape
+    found = Found.empty(count, m)
+    for part in blocks(count, max(1, BLOCK // m), progress):
+        robots = robots_at(robot, part)
+        found.keep(part, _search_block(robots, model, lengths[part], rows_of(wrenches, part)))
+    return found
+
+
+def _search_block(robot: Robots, model: CableModel, lengths: Array, wrenches: Array) -> Found:
     found = Found.empty(*lengths.shape)
     open_samples = np.arange(len(lengths))
     for round_, quaternion in enumerate(start_quaternions(first_of(robot))):

@@ -71,6 +71,10 @@ class Panel:
         self._numbers.content = numbers
         self._polygon.content = polygon
 
+    def wait(self, what: str) -> None:
+        """Say what the numbers wait for."""
+        self._verdict.content = readout.waiting(what)
+
     def refuse(self, message: str) -> None:
         """Say why a setting cannot be had."""
         self._verdict.content = readout.refused(message)

@@ -30,6 +30,11 @@ def polygon_figure(snapshot: Snapshot) -> str:
     return _interval(polygon.vertices[:, 0], float(point[0])) if redundant == 1 else _drawing(polygon, point)
 
 
+def polygon_later() -> str:
+    """HTML: that the polygon is not there yet."""
+    return _sentence("Compiling …")
+
+
 def _polygon(snapshot: Snapshot) -> TensionPolygon | None:
     if snapshot.plan is None:
         return None

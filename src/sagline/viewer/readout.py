@@ -17,11 +17,16 @@ FONT = "font-family:system-ui,sans-serif;font-size:12px;line-height:1.45;color:#
 _CELL = "padding:1px 0 1px 10px;text-align:right;font-variant-numeric:tabular-nums"
 
 
-def verdict(snapshot: Snapshot) -> str:
-    """Feasible or not, in one colored box; where not, why."""
+def verdict(snapshot: Snapshot, *, capacity: bool = True) -> str:
+    """Feasible or not, in one colored box; where not, why.
+
+    Args:
+        snapshot: What is shown.
+        capacity: Whether the margin to any load can be computed already.
+    """
     color = GOOD if snapshot.feasible else BAD
     head = "Feasible" if snapshot.feasible else "Not feasible"
-    text = _summary(snapshot) if snapshot.feasible else escape(snapshot.reason)
+    text = _summary(snapshot, capacity=capacity) if snapshot.feasible else escape(snapshot.reason)
     return (
         f'<div style="{FONT};border-left:5px solid {color};background:{color}14;padding:6px 10px;margin:2px 8px">'
         f'<b style="color:{color};font-size:14px">{head}</b><br>{text}</div>'
@@ -36,21 +41,23 @@ def refused(message: str) -> str:
     )
 
 
-def waiting() -> str:
-    """What stands there until the first numbers do: at the first run the numerical core is compiled before them."""
+def waiting(what: str = "The first run on a machine compiles the numerical core; later ones start at once.") -> str:
+    """What stands there until the numbers do: at the first run the numerical core is compiled before them."""
     return (
         f'<div style="{FONT};border-left:5px solid {QUIET};background:{QUIET}14;padding:6px 10px;margin:2px 8px">'
         f'<b style="color:{QUIET};font-size:14px">Getting ready</b><br>'
-        "The first run on a machine compiles the numerical core, one to two minutes; later ones start at once.</div>"
+        f"{escape(what)}</div>"
     )
 
 
-def numbers(snapshot: Snapshot, scale: TensionScale, frequencies: Array | None) -> str:
-    """The pose, the numbers of every cable, and the platform's natural frequencies."""
+def numbers(
+    snapshot: Snapshot, scale: TensionScale, frequencies: Array | None, *, frequencies_later: bool = False
+) -> str:
+    """The pose, the numbers of every cable, and the platform's natural frequencies, or that they come later."""
     parts = (
         _pose_line(snapshot),
         _cable_table(snapshot, scale),
-        _frequency_line(frequencies),
+        _frequencies_later() if frequencies_later else _frequency_line(frequencies),
         _material_line(snapshot),
     )
     return f'<div style="{FONT};padding:2px 14px">{"".join(parts)}</div>'
@@ -85,14 +92,16 @@ def _spaced(scale: TensionScale) -> list[tuple[float, float]]:
     return kept
 
 
-def _summary(snapshot: Snapshot) -> str:
+def _summary(snapshot: Snapshot, *, capacity: bool) -> str:
     tension, margin = snapshot.tension, snapshot.margin
     nearest = int(np.argmin(margin))
     parts = [
         f"tensions {tension.min():.4g} to {tension.max():.4g} N",
         f"margin {_number(margin[nearest], '.1f')} N (cable {nearest})",
     ]
-    if snapshot.plan is not None:
+    if snapshot.plan is not None and not capacity:
+        parts.append("margin in any direction: compiling …")
+    elif snapshot.plan is not None:
         extra = float(capacity_margin(snapshot.plan.state))
         parts.append(f"takes {_number(extra, '.1f')} N more in any direction")
     if (error := snapshot.error) is not None:
@@ -134,6 +143,10 @@ def _frequency_line(frequencies: Array | None) -> str:
         return ""
     listed = ", ".join(_number(value, ".2f") for value in frequencies)
     return f'<div style="margin-top:4px"><b>Natural frequencies</b> {listed} Hz</div>'
+
+
+def _frequencies_later() -> str:
+    return '<div style="margin-top:4px"><b>Natural frequencies</b> compiling …</div>'
 
 
 def _material_line(snapshot: Snapshot) -> str:

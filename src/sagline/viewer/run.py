@@ -8,6 +8,7 @@ import numpy as np
 
 from sagline.arrays import Array
 from sagline.errors import InvalidValueError
+from sagline.kinematics.blocks import Progress
 from sagline.kinematics.confirm import Confirmation, confirm
 from sagline.kinematics.plan import Plan
 from sagline.viewer.snapshot import Snapshot
@@ -28,8 +29,12 @@ class Run:
     time: Array
 
     @classmethod
-    def of(cls, plan: Plan) -> Run:
+    def of(cls, plan: Plan, progress: Progress | None = None) -> Run:
         """The run of a plan.
+
+        Args:
+            plan: The plan.
+            progress: Told how many of its poses are confirmed, of how many.
 
         Raises:
             InvalidValueError: If it is the plan of a single pose.
@@ -39,7 +44,7 @@ class Run:
                 "run", "a plan of a single pose", "a plan of poses in a row", "Save a plan of a path."
             )
         time = np.arange(len(plan.state.pose), dtype=np.float64) if plan.path is None else plan.path.time
-        return cls(plan, confirm(plan), time - time[0])
+        return cls(plan, confirm(plan, progress=progress), time - time[0])
 
     @property
     def duration(self) -> float:

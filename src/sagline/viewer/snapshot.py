@@ -100,7 +100,9 @@ class Snapshot:
         return None if error is None else self.pose.position + error_scale * error
 
 
-def taken_at(robot: Robot, pose: Pose, settings: Settings, previous: Plan | None) -> Snapshot:
+def taken_at(
+    robot: Robot, pose: Pose, settings: Settings, previous: Plan | None, *, confirmed: bool = True
+) -> Snapshot:
     """A robot, already changed by the settings, held at rest at a pose.
 
     Args:
@@ -108,11 +110,12 @@ def taken_at(robot: Robot, pose: Pose, settings: Settings, previous: Plan | None
         pose: One pose.
         settings: Model and method.
         previous: The plan before, whose tensions `Closest` stays near to.
+        confirmed: Whether to find where the platform really rests, if the model is approximate.
     """
     reference = previous if isinstance(settings.tension, Closest) else None
     try:
         plan = inverse(robot, pose, settings.model, settings.tension, previous=reference)
     except CableGeometryError:
         return Snapshot(robot, pose, None, None)
-    approximate = not isinstance(settings.model, Catenary) and bool(plan.feasible)
+    approximate = confirmed and not isinstance(settings.model, Catenary) and bool(plan.feasible)
     return Snapshot(robot, pose, plan, confirm(plan).pose if approximate else None)

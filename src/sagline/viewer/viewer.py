@@ -6,6 +6,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from enum import Enum
 
 import numpy as np
 import viser
@@ -19,7 +20,7 @@ from sagline.statics.stiffness import modes
 from sagline.viewer import readout, solids
 from sagline.viewer.export_panel import ExportPanel
 from sagline.viewer.panel import Panel
-from sagline.viewer.polygon_figure import polygon_figure
+from sagline.viewer.polygon_figure import polygon_figure, polygon_later
 from sagline.viewer.run import Run
 from sagline.viewer.run_panel import RunPanel
 from sagline.viewer.settings import Settings
@@ -34,20 +35,38 @@ TRACE_POINTS = 600
 IDLE = 0.5  # s: how long Ctrl-C may go unheard where waiting cannot be interrupted
 
 
+class Reading(Enum):
+    """What can come after the cables."""
+
+    MARGIN = "capacity margin"
+    POLYGON = "polygon of feasible tensions"
+    FREQUENCIES = "natural frequencies"
+    REST = "where the platform rests if the model is approximate"
+
+
 class Viewer:
     """A robot, perhaps with a run, on a server that the caller has started and will stop.
 
     All its state belongs to the thread in `serve`; other threads only leave messages.
     """
 
-    def __init__(self, server: viser.ViserServer, robot: Robot, run: Run | None = None) -> None:
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        robot: Robot,
+        run: Run | None = None,
+        ready: Callable[[Reading], bool] = lambda _: True,
+    ) -> None:
         """Build the page.
 
         Args:
             server: A running server with nothing on it.
             robot: The robot; that of the run, if there is one.
             run: A plan along a path, to play.
+            ready: Whether a reading can be had without waiting; until then the page says that it comes. `refresh`
+                when one has become ready.
         """
+        self._ready = ready
         self._server = server
         self._robot = robot
         self._run = run
@@ -68,6 +87,7 @@ class Viewer:
         self._previous: Plan | None = None
         self._traced = 0.0
         self.updates = 0
+        self.shown = threading.Event()  # set when the first view stands
         self.view: View | None = None
 
     def serve(self) -> None:
@@ -88,6 +108,14 @@ class Viewer:
                 self._work_off()
                 self._update()
             last = now
+
+    def refresh(self) -> None:
+        """Show everything once more; from any thread."""
+        self._wake.set()
+
+    def wait(self, what: str) -> None:
+        """Say what the numbers wait for; from any thread."""
+        self._panel.wait(what)
 
     def stop(self) -> None:
         """Let `serve` return; from any thread."""
@@ -162,7 +190,13 @@ class Viewer:
     def _from_gizmo(self, settings: Settings) -> Snapshot:
         if self._changed is None or self._changed[0] != settings:
             self._changed = (settings, settings.applied(self._robot))
-        snapshot = taken_at(self._changed[1], self._stage.dragged_pose(), settings, self._previous)
+        snapshot = taken_at(
+            self._changed[1],
+            self._stage.dragged_pose(),
+            settings,
+            self._previous,
+            confirmed=self._ready(Reading.REST),
+        )
         if snapshot.feasible:
             self._previous = snapshot.plan
         return snapshot
@@ -177,12 +211,18 @@ class Viewer:
                 self._traced = settings.error_scale
                 self._stage.show_traces(*self._run.traces(TRACE_POINTS, settings.error_scale))
         self._panel.read_out(
-            readout.verdict(snapshot),
-            readout.numbers(snapshot, self._scale, _frequencies(snapshot)),
-            polygon_figure(snapshot),
+            readout.verdict(snapshot, capacity=self._ready(Reading.MARGIN)),
+            self._numbers(snapshot),
+            polygon_figure(snapshot) if self._ready(Reading.POLYGON) else polygon_later(),
         )
         self.view = view
         self.updates += 1
+        self.shown.set()
+
+    def _numbers(self, snapshot: Snapshot) -> str:
+        if not self._ready(Reading.FREQUENCIES):
+            return readout.numbers(snapshot, self._scale, None, frequencies_later=snapshot.feasible)
+        return readout.numbers(snapshot, self._scale, _frequencies(snapshot))
 
 
 def home_pose(robot: Robot) -> Pose:

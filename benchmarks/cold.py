@@ -1,0 +1,98 @@
+"""What a first run costs, with nothing compiled yet; on all cores there are: `python -m benchmarks.cold`."""
+
+from __future__ import annotations
+
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from rich.console import Console
+
+from benchmarks.measure import Row, show
+
+SAGLINE = (sys.executable, "-m", "sagline.cli")
+VIEW = """
+import sys, threading, time
+import sagline as sl
+from sagline.cli.readings import Readings
+from sagline.viewer.server import started, stop
+from sagline.viewer.viewer import Reading, Viewer
+
+begun = float(sys.argv[1])
+server = started(port=0)
+readings = Readings()
+viewer = Viewer(server, sl.load_robot("cogiro"), None, readings.ready)
+
+def watch():
+    viewer.shown.wait()
+    print(time.time() - begun, flush=True)
+    while not all(map(readings.ready, Reading)):
+        time.sleep(0.05)
+    updates = viewer.updates
+    viewer.refresh()
+    while viewer.updates == updates:
+        time.sleep(0.01)
+    print(time.time() - begun, flush=True)
+    viewer.stop()
+
+threading.Thread(target=watch, daemon=True).start()
+with readings.compiled_beside(viewer):
+    viewer.serve()
+stop(server)
+"""
+
+
+def cold(arguments: Sequence[str]) -> tuple[float, float, str]:
+    """Wall seconds, processor seconds of the process and its children, and stdout, of a process with an empty cache."""
+    with tempfile.TemporaryDirectory() as folder:
+        environment = {**os.environ, "NUMBA_CACHE_DIR": folder}
+        before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+        done = subprocess.run(
+            arguments, env=environment, check=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+        )
+        wall, after = time.perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
+    return wall, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, done.stdout
+
+
+def commands() -> Iterator[Row]:
+    """A robot along a path, and the article's test."""
+    with tempfile.TemporaryDirectory() as folder:
+        out = ("--out", str(Path(folder) / "out"))
+        track = (*SAGLINE, "track", "cogiro", "--no-figures", *out)
+        alone = ("taskset", "-c", str(min(os.sched_getaffinity(0))), *track)
+        wall, seconds, _ = cold(alone)
+        yield Row(
+            "sagline track, no figures, cold, one core", "<= 30 s of processor", f"{seconds:.1f} s; wall {wall:.1f} s"
+        )
+        for name, reach, command in (
+            ("track, no figures", "", track),
+            ("run", "<= 30 s", (*SAGLINE, "run", *out)),
+        ):
+            wall, seconds, _ = cold(command)
+            yield Row(f"sagline {name}, cold, all cores", reach, f"wall {wall:.1f} s; {seconds:.1f} s of processor")
+
+
+def viewer() -> Iterator[Row]:
+    """The viewer, until the cables can be dragged, and until all readings are there."""
+    _, seconds, told = cold((sys.executable, "-c", VIEW, str(time.time())))
+    first, everything = map(float, told.split())
+    yield Row("sagline view, cold: cables, verdict and table", "<= 25 s", f"{first:.1f} s")
+    yield Row("all readings, all models", "", f"{everything:.1f} s; {seconds:.1f} s of processor")
+
+
+def main() -> None:
+    """Measure and print."""
+    rows: list[Row] = []
+    for part in (commands, viewer):
+        Console(stderr=True).print(f"[dim]{part.__doc__}[/dim]")
+        rows.extend(part())
+    show(f"The first run, {len(os.sched_getaffinity(0))} cores", rows, Console())
+
+
+if __name__ == "__main__":
+    main()

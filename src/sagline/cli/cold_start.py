@@ -1,0 +1,184 @@
+"""The first run: what a command needs is compiled before it begins, on two cores side by side.
+
+numba compiles under one lock, so a second process is needed. It compiles into a folder of its own, because two
+processes that write the same index may mix up their files; what it has finished is moved over, entry by entry.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+
+from sagline.cli.compiling import Stage, heard
+from sagline.cli.entries import ENTRIES
+
+PREFIX = "compiling-"
+
+
+def cold(names: Sequence[str]) -> list[str]:
+    """Those of some entries that are not compiled yet."""
+    return [name for name in names if not ENTRIES[name].is_compiled]
+
+
+def cores() -> int:
+    """Processors that this process may use."""
+    with suppress(AttributeError):  # not on every system
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def shares(names: Sequence[str]) -> tuple[list[str], list[str]]:
+    """What to compile here, and what beside: about the same time for both. Second versions follow their first here."""
+    here = [name for name in names if ENTRIES[name].version > 1]
+    paths = {ENTRIES[name].path for name in here}
+    here = [name for name in names if ENTRIES[name].path in paths]
+    beside: list[str] = []
+    rest = (name for name in names if name not in here)
+    for name in sorted(rest, key=lambda name: -ENTRIES[name].seconds):
+        (here if _seconds(here) <= _seconds(beside) else beside).append(name)
+    return here, beside
+
+
+def compile_all(names: Sequence[str], tell: Callable[[Stage], None]) -> None:
+    """Have entries compiled and return when all are, with two cores side by side; nothing is left if interrupted.
+
+    Args:
+        names: Words of the entries; those that are compiled take no time.
+        tell: Told what the other process compiles, from a thread of its own.
+    """
+    waiting = cold(names)
+    here, beside = shares(waiting) if cores() > 1 else (waiting, [])
+    if not beside:
+        for name in here:
+            ENTRIES[name].compile()
+        return
+    with suppress(OSError), Side(beside) as side:
+
+        def listen() -> None:
+            for stage in side.stages():
+                tell(stage)
+
+        listener = threading.Thread(target=listen, daemon=True)
+        listener.start()
+        for name in here:
+            ENTRIES[name].compile()
+        while listener.is_alive():
+            listener.join(0.1)  # an interrupt is heard in between
+        side.take_over()
+    for name in cold(waiting):  # the other process failed
+        ENTRIES[name].compile()
+
+
+class Side:
+    """Another process that compiles entries; it ends with the block, and with this process, whatever ends that."""
+
+    def __init__(self, names: Sequence[str]) -> None:
+        """Start it.
+
+        Args:
+            names: Words of the entries.
+
+        Raises:
+            OSError: If it cannot be started.
+        """
+        from sagline.kernels.jit import FOLDER
+
+        FOLDER.parent.mkdir(parents=True, exist_ok=True)
+        self._folder = Path(tempfile.mkdtemp(prefix=PREFIX, dir=FOLDER.parent))
+        try:
+            self._process = self._started(names)
+        except OSError:
+            shutil.rmtree(self._folder, ignore_errors=True)
+            raise
+
+    def _started(self, names: Sequence[str]) -> subprocess.Popen[str]:
+        return subprocess.Popen(
+            [sys.executable, "-m", "sagline.cli.cold_start", *names],
+            env={**os.environ, "NUMBA_CACHE_DIR": str(self._folder)},
+            stdin=subprocess.PIPE,  # its end of file tells that this process has ended
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+            start_new_session=True,  # Ctrl-C is for this process, which then ends that one
+        )
+
+    def __enter__(self) -> Side:
+        """It runs already."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """End it, if it has not ended."""
+        self.kill()
+        self._process.wait()
+        for stream in (self._process.stdin, self._process.stdout):
+            assert stream is not None
+            with suppress(OSError, ValueError):
+                stream.close()
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+    def kill(self) -> None:
+        """End it at once; from any thread."""
+        self._process.kill()
+
+    def stages(self) -> Iterator[Stage]:
+        """What it says, until it ends."""
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            words, done, expected, finished = line.rstrip("\n").split("\t")
+            yield Stage(words, int(done), int(expected), finished == "1")
+
+    def take_over(self) -> None:
+        """Move what it has compiled to where this process looks, if nothing is there; waits while this one compiles."""
+        from numba.core.compiler_lock import global_compiler_lock
+
+        from sagline.kernels.jit import FOLDER
+
+        made = self._folder / FOLDER.name
+        with global_compiler_lock:
+            for index in made.rglob("*.nbi"):
+                target = FOLDER / index.relative_to(made)
+                if target.exists():
+                    continue
+                target.parent.mkdir(parents=True, exist_ok=True)
+                for code in index.parent.glob(f"{index.stem}.*.nbc"):
+                    os.replace(code, target.parent / code.name)
+                os.replace(index, target)
+
+
+def main(names: Sequence[str]) -> None:
+    """Compile entries and say how far it is, a line for every kernel; what the other process runs."""
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    with heard(_say):
+        for name in names:
+            ENTRIES[name].compile()
+
+
+def _say(stage: Stage) -> None:
+    print(stage.words, stage.done, stage.expected, int(stage.finished), sep="\t", flush=True)
+
+
+def _end_with_parent() -> None:
+    from sagline.kernels.jit import FOLDER
+
+    os.read(0, 1)  # nothing is ever written: it returns when the other process has ended
+    if FOLDER.parent.name.startswith(PREFIX):
+        shutil.rmtree(FOLDER.parent, ignore_errors=True)
+    os._exit(1)
+
+
+def _seconds(names: Sequence[str]) -> float:
+    return sum(ENTRIES[name].seconds for name in names)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,155 @@
+"""What is compiled when it is first asked for: in words, how large it is, and how to have it compiled."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+if TYPE_CHECKING:
+    from sagline.robot.equilibrium import Equilibrium
+    from sagline.tension.method import TensionMethod
+
+KERNELS = "sagline.kernels."
+
+
+class Entry(NamedTuple):
+    """An entry of the kernels.
+
+    Attributes:
+        words: What it is for.
+        path: Module below `sagline.kernels`, and function.
+        kernels: How many kernels are compiled for it where nothing is compiled yet.
+        seconds: How long that takes one core of an ordinary machine [s]; only the proportions matter.
+        compile: Has it compiled, by solving as little as can be.
+        version: Which of the versions for different types: the second is compiled after the first.
+    """
+
+    words: str
+    path: str
+    kernels: int
+    seconds: float
+    compile: Callable[[], object]
+    version: int = 1
+
+    @property
+    def function(self) -> Callable[..., object]:
+        """The compiled function."""
+        module, _, name = (KERNELS + self.path).rpartition(".")
+        found: Callable[..., object] = getattr(import_module(module), name)
+        return found
+
+    @property
+    def is_compiled(self) -> bool:
+        """Whether its machine code is on disk."""
+        from sagline.kernels.jit import is_compiled
+
+        return is_compiled(self.function, self.version)
+
+
+def _inverse() -> None:
+    import sagline as sl
+
+    sl.inverse(sl.load_robot(ROBOT), sl.Pose(PLACE, LEVEL))
+
+
+def _other_sharing() -> None:
+    import sagline as sl
+
+    _inverse()
+    sl.inverse(sl.load_robot(ROBOT), sl.Pose(PLACE, LEVEL), tension=sl.Centroid())
+
+
+def _verdicts() -> None:
+    import numpy as np
+
+    import sagline as sl
+    from sagline.kernels.codes import POSE_INFEASIBLE
+    from sagline.kinematics.inverse_rows import Found, explained
+    from sagline.statics.tables import pose_rows
+    from sagline.tension.options import kernel_options
+
+    robot = sl.load_robot(ROBOT)
+    found = Found.empty(1, robot.cable_count, robot.degrees_of_freedom)
+    found.needed[:] = 0.0
+    found = found._replace(pose_status=np.full(1, POSE_INFEASIBLE, dtype=np.int8))
+    options = kernel_options(robot, sl.Catenary(), sl.MinimumNorm())
+    explained(robot, options, pose_rows(sl.Pose(PLACE, LEVEL)), found)
+
+
+def _forward(straight: bool = False) -> None:
+    import numpy as np
+
+    import sagline as sl
+
+    robot = sl.load_robot(ROBOT)
+    model = sl.Straight() if straight else sl.Catenary()
+    sl.forward(robot, np.full(robot.cable_count, np.nan), sl.Pose(PLACE, LEVEL), model)
+
+
+def _margins() -> None:
+    import sagline as sl
+
+    sl.capacity_margin(_unknown_state())
+
+
+def _polygon() -> None:
+    import sagline as sl
+    from sagline.kinematics.polygon import polygon_at
+    from sagline.tension.options import kernel_options
+
+    robot, state = sl.load_robot(ROBOT), _unknown_state()
+    options = kernel_options(robot, sl.Catenary(), sl.MinimumNorm())
+    unknown = state.cables.chord_tension
+    polygon_at(robot, state.pose, options, state.wrench, unknown, unknown, feasible=False)
+
+
+def _vibration() -> None:
+    import sagline as sl
+
+    sl.modes(_unknown_state())
+
+
+def _unknown_state() -> Equilibrium:
+    """Cables of which nothing is known: whatever is asked of them is soon answered."""
+    import numpy as np
+
+    import sagline as sl
+    from sagline.arrays import locked
+
+    robot = sl.load_robot(ROBOT)
+    unknown: Any = locked(np.full(robot.cable_count, np.nan))
+    status = locked(np.zeros(robot.cable_count, dtype=np.int8))
+    geometry, forces = (unknown, unknown, unknown), (unknown, unknown, unknown)
+    cables = sl.CableState(sl.Catenary(), robot.cables, robot.gravity, *geometry, *forces, status)
+    return sl.Equilibrium(robot, sl.Pose(PLACE, LEVEL), locked(np.zeros(6)), cables)
+
+
+ROBOT = "article-suspended"
+PLACE = (0.0, 0.0, 2.0)
+LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+INVERSE, SHARING, VERDICTS = "inverse kinematics", "further ways of sharing", "verdicts of infeasible poses"
+FORWARD, FIT = "forward kinematics", "fit of straight cables"
+MARGINS, POLYGON, VIBRATION = "margins", "tension polygon", "stiffness and vibration"
+
+ENTRIES = {
+    entry.words: entry
+    for entry in (
+        Entry(INVERSE, "inverse.poses.inverse_poses", 39, 14.0, _inverse),
+        Entry(SHARING, "inverse.poses.inverse_poses", 39, 47.0, _other_sharing, version=2),
+        Entry(VERDICTS, "inverse.explain.explain_poses", 45, 16.0, _verdicts),
+        Entry(FORWARD, "forward.forward.forward_poses", 71, 14.0, _forward),
+        Entry(FIT, "forward.fit.fit_poses", 19, 5.0, lambda: _forward(straight=True)),
+        Entry(MARGINS, "inverse.queries.margins_of_poses", 33, 5.0, _margins),
+        Entry(POLYGON, "inverse.queries.polygon_of_pose", 38, 6.0, _polygon),
+        Entry(VIBRATION, "forward.sensitivity.describe_states", 48, 10.0, _vibration),
+    )
+}
+
+
+def needed_for(tension: TensionMethod) -> tuple[str, ...]:
+    """Entries that the inverse kinematics need with a way of sharing."""
+    from sagline.tension.options import takes_default_kernel
+
+    return (INVERSE,) if takes_default_kernel(tension) else (INVERSE, SHARING)

@@ -1,0 +1,24 @@
+"""Long work in blocks: between them an interrupt is heard, and somebody may be told how far it is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TypeAlias
+
+from sagline.arrays import Array
+
+Progress: TypeAlias = Callable[[int, int], None]  # told after each block: how many are done, of how many
+
+
+def blocks(count: int, size: int, progress: Progress | None = None) -> Iterator[slice]:
+    """Slices of at most `size` of `count` rows, one after the other; each is told when it is done."""
+    for first in range(0, count, size):
+        part = slice(first, min(first + size, count))
+        yield part
+        if progress is not None:
+            progress(part.stop, count)
+
+
+def rows_of(array: Array, part: slice) -> Array:
+    """A block of an array with one row for all or one row each."""
+    return array if len(array) == 1 else array[part]

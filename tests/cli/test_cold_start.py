@@ -1,0 +1,210 @@
+"""The first run: what is compiled, side by side, and what is said about it."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from io import StringIO
+from pathlib import Path as FilePath
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from numba.core import event
+from rich.console import Console
+
+from sagline.cli import cold_start
+from sagline.cli.compiling import Stage, first_run_text, heard
+from sagline.cli.entries import ENTRIES, FORWARD, INVERSE, MARGINS, POLYGON, SHARING, VIBRATION
+from sagline.cli.line import shown
+from sagline.kernels.forward.forward import forward_poses
+from sagline.kernels.inverse.poses import inverse_poses, measure_balance
+from sagline.kernels.jit import FOLDER, is_compiled
+from sagline.kernels.sharing.nearest import new_nearness
+
+
+def process(code: str, folder: FilePath) -> "subprocess.Popen[str]":
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder)}
+    return subprocess.Popen([sys.executable, "-c", code], env=environment, stdout=subprocess.PIPE, text=True)
+
+
+def compiling(function: Any, types: Any = ()) -> Any:
+    """As numba tells of it."""
+    return event.trigger_event("numba:compile", data={"dispatcher": function, "args": types})
+
+
+def test_an_entry_is_compiled_when_its_machine_code_is_there(
+    tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sagline.kernels.jit.FOLDER", tmp_path)
+    (tmp_path / "inverse").mkdir()
+    for name in ("poses.inverse_poses-35.py311.nbi", "poses.inverse_poses_too-35.py311.1.nbc", "other.nbc"):
+        (tmp_path / "inverse" / name).touch()
+    assert not is_compiled(inverse_poses)
+    (tmp_path / "inverse" / "poses.inverse_poses-35.py311.1.nbc").touch()
+    assert is_compiled(inverse_poses)
+    assert not is_compiled(inverse_poses, 2)
+    assert cold_start.cold([INVERSE, SHARING, FORWARD]) == [SHARING, FORWARD]
+
+
+def test_every_entry_names_a_compiled_function() -> None:
+    for entry in ENTRIES.values():
+        assert callable(entry.function)
+        assert entry.function.__module__.startswith("sagline.kernels.")
+    assert ENTRIES[INVERSE].function is inverse_poses
+
+
+def test_two_cores_share_the_work_and_second_versions_follow_their_first() -> None:
+    assert cold_start.shares([FORWARD, INVERSE]) in (([INVERSE], [FORWARD]), ([FORWARD], [INVERSE]))
+    here, beside = cold_start.shares([SHARING, VIBRATION, INVERSE, MARGINS])
+    assert here == [SHARING, INVERSE]
+    assert sorted(beside) == sorted([VIBRATION, MARGINS])
+    assert cold_start.shares([MARGINS]) == ([MARGINS], [])
+
+
+def test_what_is_compiled_is_named_and_counted() -> None:
+    stages: list[Stage] = []
+    with heard(stages.append), compiling(inverse_poses, ("int64", "none")):
+        with compiling(measure_balance), compiling(new_nearness):
+            pass
+        with compiling(SimpleNamespace(py_func=os.getcwd)):  # numba's own are not counted
+            pass
+    assert [(stage.words, stage.done, stage.finished) for stage in stages] == [
+        (INVERSE, 0, False), (INVERSE, 1, False), (INVERSE, 2, False), (INVERSE, 3, True),
+    ]  # fmt: skip
+    stages.clear()
+    with heard(stages.append), compiling(inverse_poses, ("int64", "bool")):
+        pass
+    assert stages[-1].words == SHARING
+    stages.clear()
+    with heard(stages.append), compiling(forward_poses, ("int64", "bool")):
+        pass
+    assert stages[-1].words == FORWARD
+    with heard(stages.append), compiling(measure_balance):
+        pass
+    assert stages[-1].words == "measure balance"
+    with compiling(inverse_poses):
+        pass
+    assert len(stages) == 4  # nobody listens any more
+
+
+def test_the_line_says_how_far_it_is() -> None:
+    assert first_run_text([Stage("a", 0, 9), Stage("b", 0, 0)]) == "First run: compiling a and b ..."
+    assert first_run_text([Stage("a", 3, 9), Stage("b", 12, 9)]) == "First run: compiling a 3 of 9, b 12 kernels ..."
+
+
+def test_in_a_file_each_entry_is_told_once() -> None:
+    text = StringIO()
+    with shown(Console(file=text), "working") as line:
+        for done in range(3):
+            line.hear(Stage("one", done, 3, done == 2))
+            line.hear(Stage("other", done, 3, done == 2))
+        line.progress(1, 2)
+    assert text.getvalue() == "First run: compiling one ...\nFirst run: compiling other ...\n"
+
+
+def test_on_a_terminal_the_line_lives() -> None:
+    text = StringIO()
+    with shown(Console(file=text, force_terminal=True, width=100), "working") as line:
+        line.hear(Stage("one", 31, 42))
+        line._bar.refresh()
+        line.hear(Stage("one", 42, 42, finished=True))
+        line._bar.refresh()
+        line.progress(1, 10)
+        line._bar.refresh()
+        soon = text.getvalue()
+        line._bar.tasks[0].start_time = time.monotonic() - 60.0
+        line.progress(5, 10)
+        line._bar.refresh()
+    assert "First run: compiling one 31 of 42 kernels ..." in soon
+    assert "working" in soon.rpartition("kernels")[2]
+    assert "━" not in soon
+    assert "━" in text.getvalue()[len(soon) :]
+
+
+class Counted:
+    """An entry that only counts."""
+
+    version = 1
+
+    def __init__(self, words: str, seconds: float) -> None:
+        self.words, self.path, self.seconds = words, words, seconds
+        self.is_compiled = False
+
+    def compile(self) -> None:
+        self.is_compiled = True
+
+
+def test_without_the_other_process_all_is_compiled_here(monkeypatch: pytest.MonkeyPatch, tmp_path: FilePath) -> None:
+    monkeypatch.setattr("sagline.kernels.jit.FOLDER", tmp_path / "kernels")
+    for program in ("/bin/false", str(tmp_path / "missing")):
+        entries = {name: Counted(name, 1.0) for name in "abc"}
+        monkeypatch.setattr(cold_start, "ENTRIES", entries)
+        monkeypatch.setattr(cold_start, "cores", lambda: 2)
+        monkeypatch.setattr(sys, "executable", program)
+        cold_start.compile_all("abc", lambda stage: None)
+        assert all(entry.is_compiled for entry in entries.values())
+        assert os.listdir(tmp_path) == []
+
+
+def test_on_one_core_no_other_process_is_started(monkeypatch: pytest.MonkeyPatch) -> None:
+    entries = {name: Counted(name, 1.0) for name in "abc"}
+    monkeypatch.setattr(cold_start, "ENTRIES", entries)
+    monkeypatch.setattr(cold_start, "cores", lambda: 1)
+    monkeypatch.setattr(cold_start, "Side", None)
+    cold_start.compile_all("abc", lambda stage: None)
+    assert all(entry.is_compiled for entry in entries.values())
+
+
+COMPILE = """
+import sys
+from sagline.cli import cold_start
+from sagline.cli.compiling import heard
+cold_start.cores = lambda: 2
+def say(stage):
+    print(stage.words, stage.done, stage.expected, int(stage.finished), sep="\\t", flush=True)
+with heard(say):
+    cold_start.compile_all(sys.argv[1:] or {names!r}, say)
+"""
+
+
+def test_two_processes_compile_what_this_one_then_loads(tmp_path: FilePath) -> None:
+    names = [MARGINS, POLYGON]
+    code = COMPILE.format(names=names)
+    first, second = (process(code, tmp_path).communicate(timeout=600)[0] for _ in range(2))
+    assert second == ""  # nothing is compiled twice
+    assert [path.name for path in tmp_path.iterdir()] == [FOLDER.name]
+    ends = [line.split("\t") for line in first.splitlines() if line.endswith("\t1")]
+    assert sorted(words for words, *_ in ends) == sorted(names)
+    for words, done, expected, _ in ends:
+        assert int(done) == pytest.approx(int(expected), rel=0.25), words
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("name", [name for name in ENTRIES if name not in (MARGINS, POLYGON)])
+def test_as_many_kernels_are_compiled_as_the_table_says(name: str, tmp_path: FilePath) -> None:
+    said, _ = process(COMPILE.format(names=[name]), tmp_path).communicate(timeout=900)
+    ends = {line.split("\t")[0]: line.split("\t")[1:] for line in said.splitlines() if line.endswith("\t1")}
+    done, expected, _ = ends[name]
+    assert int(done) == pytest.approx(int(expected), rel=0.25)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
+@pytest.mark.parametrize("way", [signal.SIGINT, signal.SIGKILL])
+def test_however_the_command_ends_the_other_process_ends_too(way: signal.Signals, tmp_path: FilePath) -> None:
+    parent = process(COMPILE.format(names=[INVERSE, FORWARD]), tmp_path)
+    children = FilePath(f"/proc/{parent.pid}/task/{parent.pid}/children")
+    while not (found := children.read_text().split()):
+        assert parent.poll() is None
+        time.sleep(0.02)
+    (child,) = found
+    assert parent.stdout is not None
+    parent.stdout.readline()  # compiling
+    parent.send_signal(way)
+    assert parent.wait(timeout=60.0) != 0
+    parent.stdout.close()
+    end = time.monotonic() + 60.0
+    while FilePath(f"/proc/{child}").exists() or any(tmp_path.glob("compiling-*")):
+        assert time.monotonic() < end, "the other process is still there"
+        time.sleep(0.05)
