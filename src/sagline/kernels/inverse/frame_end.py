@@ -6,14 +6,14 @@ from sagline.kernels.balance.setting import Balance, factor_balance, scale_limit
 from sagline.kernels.cable.cables import Cables, chord_of, material_of
 from sagline.kernels.cable.hanging import frame_end_tension
 from sagline.kernels.cable.terms import Model
-from sagline.kernels.jit import glue
+from sagline.kernels.jit import kernel
 from sagline.kernels.sharing.nearest import Sharing
 
 STILL = 1e-9  # relative change of tension at which a sharing in frame-end tensions stands still
 SLOPE_STEP = 1e-4  # relative step of the central difference of the frame-end tension
 
 
-@glue
+@kernel
 def linearize_ends(model: Model, sharing: Sharing, cables: Cables, balance: Balance) -> bool:
     """Set the balance up again, in frame-end tensions as they run near the present chord tensions; False: rank lost."""
     for i in range(cables.tau.size):

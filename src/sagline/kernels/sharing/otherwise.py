@@ -17,7 +17,7 @@ from sagline.kernels.codes import (
     POSE_SOLVED,
     PUNCTURE,
 )
-from sagline.kernels.jit import glue
+from sagline.kernels.jit import kernel
 from sagline.kernels.sharing.centers import share_at_center
 from sagline.kernels.sharing.closed_form import share_near_middle
 from sagline.kernels.sharing.nearest import Nearness, Sharing, set_point, share_nearest, within_limits
@@ -27,7 +27,7 @@ from sagline.kernels.sharing.programs import share_lowest_maximum, share_lowest_
 from sagline.kernels.sharing.room import Room
 
 
-@glue
+@kernel
 def share_otherwise(
     sharing: Sharing, strips: Array, offset: Array, null: Array, near: Nearness, room: Room, tension: Array
 ) -> int:
