@@ -234,9 +234,9 @@ def test_cables_verdict_and_table_come_before_what_is_not_ready(monkeypatch: pyt
     ready: set[Reading] = set()
     kernels = (
         "sagline.tension.margin.margins_of_poses",
-        "sagline.statics.stiffness.describe_states",
+        "sagline.statics.slopes.describe_states",
         "sagline.kinematics.polygon.polygon_of_pose",
-        "sagline.kinematics.forward_rows.kernel.forward_poses",
+        "sagline.kinematics.forward_rows.forward_poses",
     )
     server = started(port=0)
     viewer = Viewer(server, ROBOT, ready=ready.__contains__)
@@ -275,5 +275,6 @@ def test_cables_verdict_and_table_come_before_what_is_not_ready(monkeypatch: pyt
         assert "ompiling" not in texts()
     finally:
         viewer.stop()
-        thread.join(timeout=30.0)
+        if thread.ident is not None:
+            thread.join(timeout=30.0)
         stop(server)

@@ -110,9 +110,15 @@ def inverse(
         shortfall=locked(shortfall.reshape(pose.shape)),
         wrench_residual=locked(found.residuals.reshape(*pose.shape, 2)),
         blocking=locked(blocking.reshape(*pose.shape, -1)),
-        farkas=locked((farkas @ shared.freedom).reshape(*pose.shape, 6)),
-        needed=locked((found.needed @ shared.freedom).reshape(*pose.shape, 6)),
+        farkas=locked(_in_world(farkas, shared).reshape(*pose.shape, 6)),
+        needed=locked(_in_world(found.needed, shared).reshape(*pose.shape, 6)),
     )
+
+
+def _in_world(components: Array, robot: Robot) -> Array:
+    """Wrenches (N, 6) of components along the free motions (N, n); einsum is faster than a thin product."""
+    wrench: Array = np.einsum("pi,ij->pj", components, robot.freedom)
+    return wrench
 
 
 def _reference(robot: Robot, previous: Plan | None, variable: Variable) -> Array:
