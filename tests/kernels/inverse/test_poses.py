@@ -10,7 +10,7 @@ import pytest
 
 from sagline.arrays import Array, Codes, locked
 from sagline.kernels import codes, tables
-from sagline.kernels.cable import hanging
+from sagline.kernels.cable import hanging, models
 from sagline.kernels.cable.terms import Chord, Material, Model
 from sagline.kernels.codes import (
     CATENARY,
@@ -35,6 +35,7 @@ from tests.kernels.balance.robots import A_POINT, EVERY_MOTION, GRAVITY, IN_A_PL
 from tests.kernels.compiled import from_python
 
 frame_end_tension = from_python(hanging.frame_end_tension)
+from_tension = from_python(models.from_tension)
 
 OTHERWISE = range(codes.LOWEST_SUM, codes.POLYGON_WALK + 1)
 
@@ -152,6 +153,12 @@ def test_the_platform_is_in_balance(m: int, freedom: Array, otherwise: bool | No
         np.testing.assert_allclose(answer.results[tables.SPAN, p], np.hypot(chords[:, 0], chords[:, 1]), rtol=1e-14)
         np.testing.assert_allclose(answer.results[tables.RISE, p], chords[:, 2], rtol=1e-12)
         assert (answer.statuses[p] == codes.CABLE_SOLVED).all()
+        length = np.linalg.norm(chords, axis=1)
+        for i in range(m):  # and each cable is as long as one that is hung at its tension from scratch
+            chord = Chord(length[i], chords[i, 2] / length[i], np.hypot(chords[i, 0], chords[i, 1]) / length[i])
+            material = Material(case.robot[i, tables.DENSITY], case.robot[i, tables.STIFFNESS])
+            expected = from_tension(Model(CATENARY, 0.0, 0.0, GRAVITY), chord, material, tau[i])[0]
+            assert answer.results[tables.LENGTH, p, i] == pytest.approx(expected, rel=2e-14)
     assert answer.poses[0] == POSE_SOLVED
 
 
