@@ -39,4 +39,4 @@ def block(numbers: Array, at: int, rows: int, columns: int) -> tuple[Array, int]
 @glue
 def counters(memory: Memory, at: int, count: int) -> tuple[Indices, int]:
     """So many counters from a place on, and the place that follows them."""
-    return memory.counters[at : at + count], at + count
+    return memory.counters[at : at + count].reshape((count,)), at + count  # which tells when there are too few

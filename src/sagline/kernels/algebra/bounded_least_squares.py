@@ -7,7 +7,7 @@ import math
 from sagline.arrays import Array, Indices
 from sagline.kernels.algebra.gram_schmidt import keep, take_out
 from sagline.kernels.jit import glue, kernel
-from sagline.kernels.memory import Memory, block
+from sagline.kernels.memory import Memory, block, counters
 
 STEPS = 200
 AT_LOW, AT_HIGH, FREE = 0, 1, 2
@@ -19,8 +19,9 @@ def solve_free(matrix: Array, right: Array, side: Indices, held: Array, memory: 
     n, m = matrix.shape
     frame, at = block(memory.numbers, 0, n + 1, n)
     triangle, at = block(memory.numbers, at, n + 1, n + 1)
-    residual = memory.numbers[at : at + n]
-    columns = memory.counters[:n]
+    residuals, at = block(memory.numbers, at, 1, n)
+    residual = residuals[0]
+    columns, _ = counters(memory, 0, n)
     count = 0
     for k in range(n):
         residual[k] = right[k]
@@ -73,8 +74,8 @@ def bounded_least_squares(
     n, m = matrix.shape
     vectors, at = block(memory.numbers, 0, 2, m)
     gradient, solution = vectors[0], vectors[1]
-    side = memory.counters[:m]
-    rest = Memory(memory.numbers[at:], memory.counters[m:])
+    side, after = counters(memory, 0, m)
+    rest = Memory(memory.numbers[at:], memory.counters[after:])
     for i in range(m):
         x[i] = low[i]
         side[i] = AT_LOW

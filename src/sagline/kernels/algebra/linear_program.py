@@ -13,7 +13,7 @@ from typing import NamedTuple
 from sagline.arrays import Array, Indices
 from sagline.kernels.algebra.strips import TOLERANCE, box_radius, inward, largest_number, most_missed, side_of
 from sagline.kernels.jit import formula, glue, kernel
-from sagline.kernels.memory import Memory, block
+from sagline.kernels.memory import Memory, block, counters
 
 LP_SOLVED, LP_EMPTY, LP_UNBOUNDED, LP_GAVE_UP = 0, 1, 2, 3
 PIVOTS = 2000
@@ -24,6 +24,8 @@ PIVOT = 1e-11  # smallest pivot, of the row's largest
 
 class Basis(NamedTuple):
     """The sides an optimal point stands on; good for the next program with the same rows and cost.
+
+    A limit that was finite must then still be so: a side at infinity is no side to stand on.
 
     Attributes:
         labels: Of the sides, and of the one that contradicts them if the strips have nothing in common, (d + 1,);
@@ -42,8 +44,8 @@ def new_basis(memory: Memory, d: int) -> tuple[Basis, Memory]:
     """Room for d unknowns, and the memory that is left."""
     weights, at = block(memory.numbers, 0, 1, d + 1)
     inverse, at = block(memory.numbers, at, d, d)
-    labels = memory.counters[: d + 1]
-    return Basis(labels, weights[0], inverse), Memory(memory.numbers[at:], memory.counters[d + 1 :])
+    labels, after = counters(memory, 0, d + 1)
+    return Basis(labels, weights[0], inverse), Memory(memory.numbers[at:], memory.counters[after:])
 
 
 @formula

@@ -18,7 +18,7 @@ from sagline.arrays import Array, Indices
 from sagline.kernels.algebra.gram_schmidt import keep, take_out
 from sagline.kernels.algebra.strips import inward, most_missed, side_of
 from sagline.kernels.jit import glue, kernel
-from sagline.kernels.memory import Memory, block
+from sagline.kernels.memory import Memory, block, counters
 
 EXCHANGES = 2000
 DEPENDENT = 1e-10  # a side that leaves less than this of itself outside the span of others depends on them
@@ -49,8 +49,8 @@ def new_held(memory: Memory, d: int) -> tuple[Held, Memory]:
     frame, at = block(memory.numbers, 0, d + 1, d)
     triangle, at = block(memory.numbers, at, d + 1, d + 1)
     pushes, at = block(memory.numbers, at, 2, d + 1)
-    labels = memory.counters[: d + 2]
-    return Held(labels, frame, triangle, pushes), Memory(memory.numbers[at:], memory.counters[d + 2 :])
+    labels, after = counters(memory, 0, d + 2)
+    return Held(labels, frame, triangle, pushes), Memory(memory.numbers[at:], memory.counters[after:])
 
 
 @glue

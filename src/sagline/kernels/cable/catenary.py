@@ -102,7 +102,7 @@ def ordinary_length_ratio(half_weight: float, sine: float, cosine: float, strain
 
 @formula
 def ordinary_length_ratio_near(half_weight: float, sine: float, cosine: float, strain: float, ratio: float) -> float:
-    """One Newton step more, from a ratio close by: that of a tension less than a thousandth away, or of two steps."""
+    """One Newton step more, from a ratio close by: that of a tension nearby, or of two steps."""
     return ordinary_newton_step(ratio, half_weight * half_weight, cosine * cosine, sine * sine, strain)
 
 

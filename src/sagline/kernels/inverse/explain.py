@@ -11,7 +11,7 @@ from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import CHORD_TENSION
 from sagline.kernels.inverse.poses import LimitTerms, ModelTerms, Robots
 from sagline.kernels.jit import entry
-from sagline.kernels.memory import Memory
+from sagline.kernels.memory import Memory, block
 from sagline.kernels.sharing.proof import prove_empty
 from sagline.kernels.sharing.shortfall import wrench_shortfall
 
@@ -47,10 +47,11 @@ def explain_poses(
     m = blocking.shape[1]
     cables, rest = new_cables(Memory(*room), m)
     balance, rest = new_balance(rest, m, n)
-    weight = rest.numbers[:m]
+    weights, at = block(rest.numbers, 0, 1, m)
+    weight = weights[0]
     for i in range(m):
         weight[i] = 1.0
-    rest = Memory(rest.numbers[m:], rest.counters)
+    rest = Memory(rest.numbers[at:], rest.counters)
     translations = 0
     for k in range(n):
         translations += 0 if turns(freedom, k) else 1

@@ -22,7 +22,7 @@ from sagline.kernels.codes import CHORD_TENSION, FRAME_END_TENSION, POSE_NO_CHOR
 from sagline.kernels.inverse.frame_end import linearize_ends
 from sagline.kernels.inverse.poses import LimitTerms, ModelTerms, Robots, SharingTerms
 from sagline.kernels.jit import entry
-from sagline.kernels.memory import Memory
+from sagline.kernels.memory import Memory, block
 from sagline.kernels.sharing.margin import capacity_margin
 from sagline.kernels.sharing.nearest import Sharing
 from sagline.kernels.sharing.on_polygon import feasible_interval
@@ -108,8 +108,9 @@ def margins_of_poses(
     n = freedom.shape[0]
     cables, rest = new_cables(Memory(*room), m)
     balance, rest = new_balance(rest, m, n)
-    weight = rest.numbers[:m]
-    rest = Memory(rest.numbers[m:], rest.counters)
+    weights, at = block(rest.numbers, 0, 1, m)
+    weight = weights[0]
+    rest = Memory(rest.numbers[at:], rest.counters)
     for i in range(m):
         weight[i] = 1.0
     translations = 0

@@ -91,7 +91,8 @@ def share_and_hang(
 
 @glue
 def stay(balance: Balance, near: Nearness) -> None:
-    """Let the tensions to be near to be those just shared."""
+    """Let the tensions to be near to be those just shared; the strip of a tie, which may be held, is gone."""
+    near.held.labels[0] = 0
     for k in range(balance.null.shape[0]):
         near.reference[k] = 0.0
         for i in range(balance.null.shape[1]):

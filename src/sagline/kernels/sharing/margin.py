@@ -17,7 +17,7 @@ import math
 from sagline.arrays import Array, Indices
 from sagline.kernels.algebra.gram_schmidt import keep, take_out
 from sagline.kernels.jit import formula, glue, kernel
-from sagline.kernels.memory import Memory, block
+from sagline.kernels.memory import Memory, block, counters
 
 MOST_FACES = 1 << 40  # more than there can be
 ALONG = 1e-13  # of a unit normal and a column: a column in the face itself
@@ -109,7 +109,7 @@ def capacity_margin(matrix: Array, needed: Array, low: Array, high: Array, trans
     n, m = matrix.shape
     frame, at = block(memory.numbers, 0, n, n)
     triangle, at = block(memory.numbers, at, n, n)
-    chosen = memory.counters[: n - 1]
+    chosen, _ = counters(memory, 0, n - 1)
     for c in range(n - 1):
         chosen[c] = c
     normal = frame[n - 1]

@@ -30,7 +30,8 @@ def share_by_norm(
     point = near.point
     slack = TOLERANCE * largest_number(strips)
     if known[0] > 0:
-        last = memory.numbers[: point.size]
+        lasts, _ = block(memory.numbers, 0, 1, point.size)
+        last = lasts[0]
         for k in range(point.size):
             last[k] = point[k]
         kept = nearest_point(null, strips, last, slack, near.held, point)

@@ -98,8 +98,11 @@ def widest_pair(null: Array) -> tuple[int, int, float]:
 
 
 @glue
-def start_polygon(strips: Array, null: Array, radius: float, corners: Array, labels: Indices) -> None:
-    """Fill the four corners that two crossing strips have in common; an infinite limit is as far out as a box."""
+def start_polygon(strips: Array, null: Array, radius: float, corners: Array, labels: Indices) -> tuple[int, int]:
+    """Fill the four corners that two crossing strips have in common; an infinite limit is as far out as a box.
+
+    Returns the two strips.
+    """
     m = null.shape[1]
     a, b, area = widest_pair(null)
     for k in range(4):
@@ -118,6 +121,7 @@ def start_polygon(strips: Array, null: Array, radius: float, corners: Array, lab
         else:
             label = 2 * b + 1 if k == 0 else 2 * a + 1 if k == 1 else 2 * b if k == 2 else 2 * a
         labels[k] = label if strips[HIGH, label // 2] < math.inf or label % 2 == 0 else 2 * m + k
+    return a, b
 
 
 @kernel
@@ -129,7 +133,7 @@ def feasible_polygon(strips: Array, null: Array, corners: Array, labels: Indices
     m = null.shape[1]
     largest = largest_number(strips)
     slack = TOLERANCE * largest
-    start_polygon(strips, null, box_radius(largest, strips), corners, labels)
+    a, b = start_polygon(strips, null, box_radius(largest, strips), corners, labels)
     count = 4
     for i in range(m):
         x, y = null[0, i], null[1, i]
@@ -138,9 +142,9 @@ def feasible_polygon(strips: Array, null: Array, corners: Array, labels: Indices
             here = x * corners[k, 0] + y * corners[k, 1]
             least, most = min(least, here), max(most, here)
         below, above = strips[LOW, i] - strips[START, i], strips[HIGH, i] - strips[START, i]
-        if least > above + slack or most < below - slack:
+        if least > above + slack or most < below - slack or below > above + slack:
             return 0
-        if abs(x) + abs(y) < FLAT:
+        if abs(x) + abs(y) < FLAT or i == a or i == b:  # those two were kept from the start, up to rounding far out
             continue
         for upper in range(2):
             if least < below - slack if upper == 0 else most > above + slack:

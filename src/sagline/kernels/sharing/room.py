@@ -8,7 +8,7 @@ from sagline.arrays import Array, Indices
 from sagline.kernels.algebra.linear_program import Basis, new_basis
 from sagline.kernels.codes import LOWEST_SUM
 from sagline.kernels.jit import glue
-from sagline.kernels.memory import Memory, block
+from sagline.kernels.memory import Memory, block, counters
 from sagline.kernels.sharing.polygon import SPARE_CORNERS
 
 
@@ -35,10 +35,11 @@ def new_room(method: int, memory: Memory, m: int, r: int) -> Room:
     """Room for m cables, r of them redundant."""
     corner_count = 2 * m + SPARE_CORNERS
     corners, at = block(memory.numbers, 0, corner_count, 2)
-    labels = memory.counters[1 : 1 + corner_count]
-    rest = Memory(memory.numbers[at:], memory.counters[1 + corner_count :])
+    known, after = counters(memory, 0, 1)
+    labels, after = counters(memory, after, corner_count)
+    rest = Memory(memory.numbers[at:], memory.counters[after:])
     basis, rest = new_basis(rest, r if method == LOWEST_SUM else r + 1)
-    return Room(corners, labels, memory.counters[:1], basis, rest)
+    return Room(corners, labels, known, basis, rest)
 
 
 @glue

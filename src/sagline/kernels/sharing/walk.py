@@ -16,7 +16,7 @@ import math
 from sagline.arrays import Array, Indices
 from sagline.kernels.algebra.strips import HIGH, LOW, START, TOLERANCE, largest_number
 from sagline.kernels.jit import kernel
-from sagline.kernels.memory import Memory, block
+from sagline.kernels.memory import Memory, block, counters
 
 PARALLEL = 1e-12
 
@@ -58,7 +58,7 @@ def walk_polygon(strips: Array, null: Array, memory: Memory, corners: Array, lab
     slack = TOLERANCE * largest_number(strips)
     lines, _ = block(memory.numbers, 0, 2 * m, 3)
     limit_lines(strips, null, lines)
-    met = memory.counters[: 2 * m]  # 1 for a limit that counts
+    met, _ = counters(memory, 0, 2 * m)  # 1 for a limit that counts
     a, b = most_independent(null)
     line = 2 * a
     # the parallelogram's corner from which line a runs counter-clockwise: inside on its left

@@ -10,6 +10,7 @@ import sagline as sl
 from sagline.arrays import Array
 from sagline.kernels.cable import catenary, energy, stiffness
 from sagline.kernels.cable.terms import Force, Material, Model
+from tests.kernels.cable.exact import exact_end
 from tests.kernels.compiled import from_python
 
 catenary_from_length = from_python(catenary.catenary_from_length)
@@ -30,18 +31,6 @@ CABLES = {
     "soft": (900.0, 700.0, 5.0, 3.0, 2e3),
     "steep": (1e-3, 300.0, 8.0, 0.66, 44e3),
 }
-
-
-def asinh(v: Decimal) -> Decimal:
-    return ((abs(v) + (v * v + 1).sqrt()).ln()).copy_sign(v)
-
-
-def exact_end(t_x: Decimal, t_z: Decimal, length: Decimal, w: Decimal, ea: Decimal) -> tuple[Decimal, Decimal]:
-    """(1)-(4) of the article, as printed, at s = L."""
-    low = t_z - w * length
-    x = t_x * length / ea + t_x / w * (asinh(t_z / t_x) - asinh(low / t_x))
-    z = t_z * length / ea - w * length**2 / (2 * ea) + ((t_x**2 + t_z**2).sqrt() - (t_x**2 + low**2).sqrt()) / w
-    return x, z
 
 
 @pytest.mark.parametrize("case", CABLES.values(), ids=CABLES.keys())

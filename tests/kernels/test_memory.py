@@ -1,0 +1,84 @@
+"""Memory: blocks lie beside each other, there is enough of it, and too little is told."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sagline.arrays import Array, Indices
+from sagline.kernels.balance.setting import new_balance
+from sagline.kernels.cable.cables import new_cables
+from sagline.kernels.codes import LOWEST_MAXIMUM, LOWEST_SUM
+from sagline.kernels.memory import Memory, block, memory_for
+from sagline.kernels.sharing.nearest import new_nearness
+from sagline.kernels.sharing.room import new_room
+from tests.kernels.compiled import from_python, memory
+
+take_block = from_python(block)
+room_for_cables = from_python(new_cables)
+room_for_balance = from_python(new_balance)
+room_for_nearness = from_python(new_nearness)
+room_otherwise = from_python(new_room)
+
+
+def parts_of(words: object) -> list[Array]:
+    """All arrays of nested NamedTuples, memory that is left over not counted."""
+    if isinstance(words, np.ndarray):
+        return [words]
+    if isinstance(words, Memory):
+        return []
+    assert isinstance(words, tuple)
+    return [part for word in words for part in parts_of(word)]
+
+
+@pytest.mark.parametrize("method", [LOWEST_SUM, LOWEST_MAXIMUM])
+@pytest.mark.parametrize(("m", "n"), [(2, 1), (4, 2), (6, 6), (8, 6), (24, 6)])
+def test_blocks_do_not_overlap_and_are_all_inside(m: int, n: int, method: int) -> None:
+    numbers, counters = memory_for(m)
+    cables, rest = room_for_cables(Memory(numbers, counters), m)
+    balance, rest = room_for_balance(rest, m, n)
+    near, rest = room_for_nearness(rest, np.zeros(m), m - n)
+    room = room_otherwise(method, rest, m, m - n)
+    parts = parts_of((cables, balance, near[1:], room))  # the tensions before come from Python
+    for value, part in enumerate(parts):
+        part[...] = value
+    for value, part in enumerate(parts):
+        assert (part == value).all()
+    used = sum(part.size for part in parts if part.dtype == np.float64)
+    assert used == numbers.size - room.rest.numbers.size
+    assert sum(part.size for part in parts if part.dtype == np.int64) == counters.size - room.rest.counters.size
+    room.rest.numbers[:], room.rest.counters[:] = -1.0, -1
+    for value, part in enumerate(parts):
+        assert (part == value).all()
+    shapes: dict[str, tuple[Array | Indices, tuple[int, ...]]] = {
+        "matrix": (balance.matrix, (n, m)),
+        "null": (balance.null, (m - n, m)),
+        "q": (balance.q, (m + 1, m)),
+        "strips": (balance.strips, (3, m)),
+        "labels": (room.labels, (2 * m + 6,)),
+        "held": (near.held.labels, (m - n + 2,)),
+        "basis": (room.basis.inverse, (m - n + (method == LOWEST_MAXIMUM),) * 2),
+    }
+    for name, (array, shape) in shapes.items():
+        assert array.shape == shape, name
+
+
+def test_a_block_and_the_place_that_follows() -> None:
+    numbers = np.arange(20.0)
+    rows, at = take_block(numbers, 3, 2, 4)
+    np.testing.assert_array_equal(rows, np.arange(3.0, 11.0).reshape(2, 4))
+    assert at == 11
+    with pytest.raises(ValueError, match="total size"):
+        take_block(numbers, 13, 2, 4)
+
+
+def test_too_little_memory_is_told() -> None:
+    with pytest.raises(ValueError, match="total size"):
+        room_for_cables(memory(14 * 8 - 1, 100), 8)
+    with pytest.raises(ValueError, match="total size"):
+        room_for_balance(memory(300, 100), 8, 6)
+    with pytest.raises(ValueError, match="total size"):
+        room_for_nearness(memory(1000, 3), np.zeros(8), 2)
+    for counters in (1 + 22 - 1, 1 + 22 + 2):
+        with pytest.raises(ValueError, match="total size"):
+            room_otherwise(LOWEST_SUM, memory(1000, counters), 8, 2)
