@@ -31,7 +31,7 @@ article: env ## the article's figures, tables and errata redone, as one page in 
 	$(BIN)/sagline article --out $(OUT)
 
 test: env check ## all checks, then the whole test suite with its coverage
-	$(BIN)/python -m pytest --cov
+	$(BIN)/python -m pytest --cov --numprocesses auto --dist loadfile
 
 check: env ## style, types and the direction of imports
 	$(BIN)/ruff check .

@@ -55,16 +55,20 @@ def test_other_users_of_numba_keep_their_cache_folder() -> None:
     assert str(jit.FOLDER) != getattr(numba.config, "CACHE_DIR")  # noqa: B009
 
 
-def test_a_cache_without_an_index_is_cold(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(jit, "FOLDER", tmp_path / "none")
-    assert jit.is_cold()
+def test_an_entry_is_compiled_when_its_own_machine_code_is_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from sagline.kernels.cable.batch import batch_end
+
     monkeypatch.setattr(jit, "FOLDER", tmp_path)
-    assert jit.is_cold()
-    (tmp_path / "sharing").mkdir()
-    (tmp_path / "sharing" / "polygon.nbc").touch()
-    assert jit.is_cold()
-    (tmp_path / "sharing" / "polygon.nbi").touch()
-    assert not jit.is_cold()
+    (tmp_path / "cable").mkdir()
+    (tmp_path / "cable" / "batch.batch_from_length-9.py311.1.nbc").touch()  # another's
+    assert not jit.is_compiled(batch_end)
+    (tmp_path / "cable" / "batch.batch_end-9.py311.nbi").touch()  # an index without code
+    assert not jit.is_compiled(batch_end)
+    (tmp_path / "cable" / "batch.batch_end-9.py311.1.nbc").touch()
+    assert jit.is_compiled(batch_end)
+    assert not jit.is_compiled(batch_end, versions=2)
 
 
 def test_inner_kernels_have_no_wrapper_for_python_and_entries_have() -> None:

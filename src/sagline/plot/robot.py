@@ -10,7 +10,7 @@ from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 from sagline.errors import InvalidValueError
-from sagline.kernels.balance import geometry
+from sagline.kernels.cable import geometry
 from sagline.kinematics.inverse import inverse
 from sagline.plot.sheet import BLUE, LABEL, TICK, VERMILLION, sheet
 from sagline.robot.pose import Pose

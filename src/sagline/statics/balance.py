@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from sagline.arrays import Array, locked
-from sagline.kernels.balance import geometry as rows
-from sagline.kernels.balance.geometry import cable_geometries
 from sagline.kernels.balance.wrench import structure_matrices
+from sagline.kernels.cable import geometry as rows
+from sagline.kernels.cable.geometry import cable_geometries
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.robot.several import Robots, first_of, one_a_pose

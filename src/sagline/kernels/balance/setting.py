@@ -13,10 +13,10 @@ from sagline.arrays import Array
 from sagline.kernels import tables
 from sagline.kernels.algebra.householder import factorize, minimum_norm, orthogonal_factor, pseudo_inverse
 from sagline.kernels.algebra.strips import HIGH, LOW, START, STRIP_ROWS
-from sagline.kernels.balance import geometry as g
-from sagline.kernels.balance.geometry import cable_geometry
 from sagline.kernels.balance.wrench import along_freedom, fill_structure_matrix, needed_wrench, rows_along_freedom
+from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.cables import Cables, chord_of, material_of
+from sagline.kernels.cable.geometry import cable_geometry
 from sagline.kernels.cable.hanging import chord_tension_at_frame_end
 from sagline.kernels.cable.models import pull_of_shallow
 from sagline.kernels.cable.terms import Model

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from sagline.arrays import Array
-from sagline.kernels.balance import geometry as g
+from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.stiffness import force_of, material_at, series_excess
 from sagline.kernels.cable.terms import Force, Material, Model

@@ -11,7 +11,7 @@ import math
 from sagline.arrays import Array
 from sagline.kernels import tables
 from sagline.kernels.algebra.hyperbolic import cosh_polynomial, sinh_excess_polynomial, sinhc_polynomial
-from sagline.kernels.balance import geometry as g
+from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.catenary import SMALL_HALLEY_STEP, relative_excess
 from sagline.kernels.cable.models import from_length

@@ -1,11 +1,11 @@
 """Rows of the array that holds all cables of one pose, (CABLE_ROWS, m): geometry first, so that it is one too.
 
-What `cable_geometry` fills is named in `sagline.kernels.balance.geometry`.
+What `cable_geometry` fills is named in `sagline.kernels.cable.geometry`.
 """
 
 from __future__ import annotations
 
-from sagline.kernels.balance.geometry import GEOMETRY_ROWS
+from sagline.kernels.cable.geometry import GEOMETRY_ROWS
 
 LENGTH = GEOMETRY_ROWS  # unstrained length [m]
 HORIZONTAL, VERTICAL, TENSION = LENGTH + 1, LENGTH + 2, LENGTH + 3  # T_x, T_z, tau [N]

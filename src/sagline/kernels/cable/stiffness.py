@@ -12,7 +12,7 @@ from typing import NamedTuple
 from sagline.arrays import Array
 from sagline.kernels import tables
 from sagline.kernels.algebra.hyperbolic import atanhc_excess
-from sagline.kernels.balance import geometry as g
+from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.catenary import slack_series
 from sagline.kernels.cable.models import pull_of_shallow, sag_of_shallow

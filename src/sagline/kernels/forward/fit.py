@@ -11,9 +11,9 @@ import math
 from sagline.arrays import Array, Indices
 from sagline.kernels import tables
 from sagline.kernels.algebra.cholesky import factor_positive
-from sagline.kernels.balance import geometry as g
 from sagline.kernels.balance.freedom import components_along
-from sagline.kernels.balance.geometry import cable_geometry
+from sagline.kernels.cable import geometry as g
+from sagline.kernels.cable.geometry import cable_geometry
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import CABLE_NO_TENSION, FORWARD_FITTED, FORWARD_NO_LENGTHS, FORWARD_NOT_CONVERGED, STRAIGHT
 from sagline.kernels.forward.newton import solve_step

@@ -11,8 +11,8 @@ from sagline.arrays import Array, Codes, Indices
 from sagline.kernels import tables
 from sagline.kernels.algebra.cholesky import factor_positive
 from sagline.kernels.algebra.eigenvalues import extreme_eigenvalues
-from sagline.kernels.balance import geometry as g
 from sagline.kernels.balance.freedom import components_along, symmetric_part, turns
+from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import (

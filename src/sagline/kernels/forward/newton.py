@@ -14,8 +14,8 @@ from sagline.arrays import Array
 from sagline.kernels import tables
 from sagline.kernels.algebra.cholesky import factor_positive, solve_lower, solve_upper
 from sagline.kernels.algebra.elimination import solve_general
-from sagline.kernels.balance import geometry as g
 from sagline.kernels.balance.freedom import components_along, matrix_along, norm, symmetric_part
+from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.slopes import force_by_length
 from sagline.kernels.cable.stiffness import force_of, material_at, plane_of

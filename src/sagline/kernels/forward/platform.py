@@ -10,12 +10,12 @@ import math
 
 from sagline.arrays import Array
 from sagline.kernels import tables
-from sagline.kernels.balance import geometry as g
 from sagline.kernels.balance.freedom import spread
-from sagline.kernels.balance.geometry import cable_geometry
+from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.energy import energy_of_cables
 from sagline.kernels.cable.forces import cable_forces
+from sagline.kernels.cable.geometry import cable_geometry
 from sagline.kernels.cable.stiffness import plane_of, stiffnesses_in_plane
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.jit import formula, kernel

@@ -6,7 +6,7 @@ import math
 
 from sagline.arrays import Array, Indices
 from sagline.kernels import tables
-from sagline.kernels.balance import geometry as g
+from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.rows import CABLE_ROWS
 from sagline.kernels.cable.slopes import Pair, force_slopes

@@ -10,9 +10,9 @@ import math
 
 from sagline.arrays import Array, Codes, Indices
 from sagline.kernels import tables
-from sagline.kernels.balance import geometry as g
 from sagline.kernels.balance.freedom import turns
 from sagline.kernels.balance.setting import Balance, Limits, Platform, need, new_balance, set_pose
+from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.cables import Cables, new_cables
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import CABLE_SOLVED, CLOSEST, POSE_NO_CHORD, POSE_SINGULAR, POSE_SOLVED

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from sagline.kernels.balance import geometry as g
+from sagline.kernels.cable import geometry as g
 from tests.kernels.balance.robots import random_case
 
 
