@@ -7,16 +7,19 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
 import pytest
+import typer
 from numba.core import event
 from typer.testing import CliRunner
 
 import sagline as sl
 from sagline.cli.main import app
+from sagline.cli.terminal import reported
 from sagline.kernels.inverse.poses import inverse_poses
 
 OUTSIDE = "durations: 5\nrate: 20\nwaypoints: [{position: [0, 0, 1.5]}, {position: [7.2, 3, 1.5]}]\n"
@@ -43,7 +46,13 @@ def numbers(*words: str) -> Any:
 
 def spawned(*words: str) -> subprocess.Popen[str]:
     command = [sys.executable, "-m", "sagline.cli", *words]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+    def hear_interrupts() -> None:  # whoever runs the tests in the background has told them not to
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+    return subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=hear_interrupts
+    )
 
 
 def test_track_says_and_writes_what_the_library_finds(folder: FilePath) -> None:
@@ -237,10 +246,23 @@ def test_ctrl_c_during_a_long_run_leaves_nothing_half_done(folder: FilePath) -> 
     time.sleep(3.0)  # a second of loading, then 200,000 poses and figures of them
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=120)
-    assert process.returncode == 130
+    assert process.returncode == 130, errors
     assert errors.endswith("Interrupted. What has been written is whole.\n")
     left = os.listdir("out") if FilePath("out").exists() else []
     assert not [name for name in left if name.endswith(".part")]
+
+
+def test_a_lost_interrupt_ends_the_command_all_the_same(capsys: pytest.CaptureFixture[str]) -> None:
+    """Python prints and forgets an interrupt that comes while it finalizes an object."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(typer.Exit) as ended, reported(), suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert ended.value.exit_code == 130
+    assert capsys.readouterr().err == "Interrupted. What has been written is whole.\n"
 
 
 def test_a_cold_start_says_what_it_compiles(monkeypatch: pytest.MonkeyPatch) -> None:

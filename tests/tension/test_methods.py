@@ -25,6 +25,7 @@ from sagline.tension.improved_closed_form import ImprovedClosedForm
 from sagline.tension.lowest_maximum import LowestMaximum
 from sagline.tension.lowest_sum import LowestSum
 from sagline.tension.method import TensionMethod
+from sagline.tension.methods import METHODS
 from sagline.tension.minimum_norm import MinimumNorm
 from sagline.tension.p_norm import PNorm
 from sagline.tension.polygon_walk import PolygonWalk
@@ -387,3 +388,13 @@ def test_slsqp_agrees_with_p_norm() -> None:
     start = polygon.vertices.mean(axis=0)
     best = minimize(size, start, method="SLSQP", constraints={"type": "ineq", "fun": gaps}, options={"ftol": 1e-15})
     assert size(polygon.coordinates(found)) <= best.fun * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("method", METHODS.values())
+def test_a_limit_at_infinity_is_no_feasible_pose(method: type[TensionMethod]) -> None:
+    """The article's (54) asks a level cable for an infinite tension: whatever the way of sharing, that is a verdict."""
+    robot = load_robot("article-suspended").replace(tension_max=1e9)
+    anchor, end = robot.frame_anchors[0], robot.platform_anchors[0]
+    level = Pose.from_euler([0.0, 0.0, float(anchor[2] - end[2])], 0.0, 0.0, 0.0)
+    plan = inverse(robot, level, tension=method(lowest_point_margin=0.0))
+    assert plan.status == PoseStatus.INFEASIBLE

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import signal
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -30,13 +33,41 @@ def reported() -> Iterator[None]:
         typer.Exit: With BAD_INPUT for an error that sagline raised on purpose, INTERRUPTED for Ctrl-C.
     """
     try:
-        yield
+        with _interrupts_heard():
+            yield
     except SaglineError as error:
         note("Error: ", str(error), style="bold red")
         raise typer.Exit(BAD_INPUT) from None
     except KeyboardInterrupt:
         note("", "Interrupted. What has been written is whole.")
         raise typer.Exit(INTERRUPTED) from None
+
+
+@contextmanager
+def _interrupts_heard() -> Iterator[None]:
+    """Ctrl-C ends what is inside even where Python loses it, as it does in a finalizer.
+
+    Raises:
+        KeyboardInterrupt: At the moment of Ctrl-C, or, if that one was lost, at the end.
+    """
+    heard = False
+
+    def hear(number: int, frame: FrameType | None) -> None:
+        nonlocal heard
+        heard = True
+        signal.default_int_handler(number, frame)
+
+    ours = threading.current_thread() is threading.main_thread()
+    if not ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield
+        return
+    signal.signal(signal.SIGINT, hear)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    if heard:
+        raise KeyboardInterrupt
 
 
 @contextmanager

@@ -23,7 +23,7 @@ def largest_number(strips: Array) -> float:
     start = low = high = 0.0  # three, so that none waits for the others
     for i in range(strips.shape[1]):
         start = max(start, abs(strips[START, i]))
-        low = max(low, abs(strips[LOW, i]))
+        low = max(low, abs(strips[LOW, i]) if abs(strips[LOW, i]) < math.inf else 0.0)
         high = max(high, abs(strips[HIGH, i]) if strips[HIGH, i] < math.inf else 0.0)
     return max(start, low, high)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from sagline.arrays import Codes
 from sagline.kernels.balance.setting import Balance, Platform, need, start_from_minimum_norm
 from sagline.kernels.cable.cables import Cables, chord_of, material_of
@@ -13,6 +15,7 @@ from sagline.kernels.codes import (
     CATENARY,
     FRAME_END_TENSION,
     HORIZONTAL_TENSION,
+    POSE_INFEASIBLE,
     POSE_NOT_CONVERGED,
     POSE_SINGULAR,
     POSE_SOLVED,
@@ -51,9 +54,10 @@ def share_and_hang(
         forget(room)
     refer(sharing, balance.offset, balance.null, near)
     hung = False
-    status = POSE_NOT_CONVERGED
-    for k in range(ROUNDS):
-        need(platform, cables, balance)
+    need(platform, cables, balance)
+    possible = limits_leave_room(cables)
+    status = POSE_NOT_CONVERGED if possible else POSE_INFEASIBLE
+    for k in range(ROUNDS if possible else 0):
         start_from_minimum_norm(balance)
         if room is None:
             status = share_nearest(balance.strips, balance.null, near, balance.tension)
@@ -86,7 +90,17 @@ def share_and_hang(
             refer(sharing, balance.offset, balance.null, near)
             forget(room)
         hung = True
+        need(platform, cables, balance)
     return status
+
+
+@glue
+def limits_leave_room(cables: Cables) -> bool:
+    """Whether every cable has a tension within its limits; by the article's (54) a level one has none."""
+    for i in range(cables.low.size):
+        if not (cables.low[i] <= cables.high[i] and cables.low[i] < math.inf):
+            return False
+    return True
 
 
 @glue
