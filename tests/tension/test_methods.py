@@ -1,6 +1,7 @@
 """Every way of sharing, on linear (weightless) balances, against independent programs and brute force."""
 
 import pickle
+from typing import Any
 
 import numpy as np
 import pytest
@@ -398,3 +399,41 @@ def test_a_limit_at_infinity_is_no_feasible_pose(method: type[TensionMethod]) ->
     level = Pose.from_euler([0.0, 0.0, float(anchor[2] - end[2])], 0.0, 0.0, 0.0)
     plan = inverse(robot, level, tension=method(lowest_point_margin=0.0))
     assert plan.status == PoseStatus.INFEASIBLE
+
+
+def point_mass() -> Robot:
+    """Four cables that hang a point mass; the first one hangs plumb where x and y are 0."""
+    frame = [(0.0, 0.0, 6.0), (4.0, 0.0, 6.0), (-2.0, 3.5, 6.0), (-2.0, -3.5, 6.0)]
+    return Robot("point", frame, np.zeros((4, 3)), Cable(np.full(4, 1.0), np.full(4, 1e6)), 50.0, motion_pattern="3T")
+
+
+def test_a_plumb_cable_keeps_the_bound_of_its_neighborhood() -> None:
+    """(54) without a margin: tau > wD/(2 |sin phi|) holds for a plumb cable as for one a nanometer beside it."""
+    method = MinimumNorm(lowest_point_margin=0.0)
+    plumb, beside = (
+        inverse(point_mass(), Pose.from_euler([x, 0.0, 2.0], 0.0, 0.0, 0.0), tension=method) for x in (0.0, 1e-9)
+    )
+    assert plumb.status == beside.status
+    assert plumb.chord_tension[0] >= 0.5 * 9.81 * 4.0 * (1.0 - 1e-12)
+    np.testing.assert_allclose(plumb.chord_tension, beside.chord_tension, rtol=1e-6)
+
+
+def test_weightless_cables_without_tension_have_a_frame_end_tension() -> None:
+    robot = point_mass()
+    pose = Pose.from_euler(np.column_stack((np.linspace(0.0, 1.0, 21), np.zeros(21), np.full(21, 2.0))), 0.0, 0.0, 0.0)
+    chord, end = (inverse(robot, pose, Elastic(), method) for method in (LowestSum("chord"), LowestSum("frame_end")))
+    assert (chord.chord_tension == 0.0).any()
+    np.testing.assert_array_equal(end.status, chord.status)
+    np.testing.assert_array_equal(end.chord_tension, chord.chord_tension)
+
+
+def test_a_batch_of_no_poses_is_answered_by_none() -> None:
+    plan = inverse(point_mass(), Pose.from_euler(np.zeros((0, 3)), 0.0, 0.0, 0.0))
+    assert plan.unstrained_length.shape == (0, 4)
+    assert plan.feasible.shape == (0,)
+
+
+@pytest.mark.parametrize("robot", [None, 5, "cogiro", [], ["cogiro"]])
+def test_what_is_no_robot_is_named(robot: Any) -> None:
+    with pytest.raises(InvalidValueError, match="allowed: a Robot, or a sequence of them"):
+        inverse(robot, Pose.from_euler([0.0, 0.0, 2.0], 0.0, 0.0, 0.0))

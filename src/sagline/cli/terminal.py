@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -55,6 +56,7 @@ def _interrupts_heard() -> Iterator[None]:
     def hear(number: int, frame: FrameType | None) -> None:
         nonlocal heard
         heard = True
+        sys.unraisablehook = lambda _: None  # what half-made objects say when they are thrown away helps nobody
         signal.default_int_handler(number, frame)
 
     ours = threading.current_thread() is threading.main_thread()

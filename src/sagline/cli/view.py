@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 import webbrowser
 from contextlib import nullcontext
@@ -51,6 +52,8 @@ def serve(robot: Robot, run: Path | None, host: str, port: int, *, browser: bool
         viewer = Viewer(server, machine, course, readings.ready)
         if browser and _has_display():
             webbrowser.open(address)
+        if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+            signal.signal(signal.SIGINT, signal.default_int_handler)  # here Ctrl-C is how one ends, and no failure
         with working("") if readings.cold else nullcontext(), readings.compiled_beside(viewer):
             viewer.serve()
     except KeyboardInterrupt:

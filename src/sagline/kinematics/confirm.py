@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sagline.arrays import Array, Codes, Flags, locked
-from sagline.kinematics.blocks import Progress, blocks
+from sagline.blocks import Progress, blocks
 from sagline.kinematics.forward import forward
 from sagline.kinematics.forward_status import ForwardStatus
 from sagline.kinematics.plan import Plan

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sagline.arrays import Array, Codes, Flags, Indices, locked
+from sagline.blocks import Progress, blocks, rows_of
 from sagline.cables.model import CableModel, CableState
 from sagline.kernels import codes, tables
 from sagline.kernels.cable.rows import CABLE_ROWS
@@ -24,7 +25,6 @@ from sagline.kernels.forward.problem import (
     FoundArrays,
 )
 from sagline.kernels.memory import memory_for
-from sagline.kinematics.blocks import Progress, blocks, rows_of
 from sagline.kinematics.forward_solution import ForwardSolution
 from sagline.kinematics.forward_status import STABLE
 from sagline.robot.equilibrium import Equilibrium

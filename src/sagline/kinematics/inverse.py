@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.arrays import Array, Codes, locked
+from sagline.blocks import Progress
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel, CableState
 from sagline.errors import CableGeometryError, InvalidValueError
 from sagline.kernels import codes, tables
-from sagline.kinematics.blocks import Progress
 from sagline.kinematics.inverse_rows import explained, solve_rows
 from sagline.kinematics.plan import Plan
 from sagline.motion.path import Path
@@ -99,7 +99,7 @@ def inverse(
         horizontal_tension=found.row(tables.HORIZONTAL, pose),
         vertical_force=found.row(tables.VERTICAL, pose),
         chord_tension=found.row(tables.TENSION, pose),
-        status=locked(found.cable_status.reshape(*pose.shape, -1)),
+        status=locked(found.cable_status.reshape(*pose.shape, shared.cable_count)),
     )
     whole = locked(np.ascontiguousarray(np.broadcast_to(load, (*pose.shape, 6))))
     return Plan(
@@ -109,7 +109,7 @@ def inverse(
         status=locked(found.pose_status.reshape(pose.shape)),
         shortfall=locked(shortfall.reshape(pose.shape)),
         wrench_residual=locked(found.residuals.reshape(*pose.shape, 2)),
-        blocking=locked(blocking.reshape(*pose.shape, -1)),
+        blocking=locked(blocking.reshape(*pose.shape, shared.cable_count)),
         farkas=locked(_in_world(farkas, shared).reshape(*pose.shape, 6)),
         needed=locked(_in_world(found.needed, shared).reshape(*pose.shape, 6)),
     )

@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from sagline.arrays import Array, Codes, Flags, locked
+from sagline.blocks import Progress, blocks
 from sagline.kernels import codes, tables
 from sagline.kernels.inverse.explain import explain_poses
 from sagline.kernels.inverse.poses import Answers, inverse_poses
 from sagline.kernels.memory import memory_for
-from sagline.kinematics.blocks import Progress, blocks
 from sagline.robot.pose import Pose
 from sagline.robot.several import Robots, first_of
 from sagline.statics.tables import robot_terms
@@ -65,7 +65,7 @@ class Found(NamedTuple):
         Returns:
             Array of shape (m,) or (N, m), write-locked.
         """
-        return locked(self.results[row].reshape(*pose.shape, -1))
+        return locked(self.results[row].reshape(*pose.shape, self.results.shape[2]))
 
 
 def solve_rows(

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from sagline.arrays import Array, Flags, Indices, locked
+from sagline.blocks import Progress, blocks, rows_of
 from sagline.cables.model import CableModel
 from sagline.kernels import codes
 from sagline.kernels.forward.problem import ENERGY
-from sagline.kinematics.blocks import Progress, blocks, rows_of
 from sagline.kinematics.forward_rows import BLOCK, Found, solve_rows
 from sagline.robot.equilibrium import limited_tension
 from sagline.robot.pattern import PLANAR, ROTATING

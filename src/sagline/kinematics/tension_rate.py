@@ -192,7 +192,8 @@ def _nearest_limits(here: Placed, state: Equilibrium, method: TensionMethod) -> 
             with np.errstate(divide="ignore", invalid="ignore"):  # a level cable has no such bound
                 weight = 0.5 * cables.cable.linear_density * cables.gravity * cables.chord
                 bound = weight * cables.chord / np.abs(cables.rise)
-                bound += method.lowest_point_margin * cables.chord / cables.span
+                if method.lowest_point_margin > 0.0:  # on a vertical cable a bound of zero is zero
+                    bound += method.lowest_point_margin * cables.chord / cables.span
             found.append(np.where(cables.rise == 0.0, np.inf, cables.chord_tension - bound))
         return np.stack(found, axis=-1)
 

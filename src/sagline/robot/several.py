@@ -37,7 +37,11 @@ def together(robot: Robot | Sequence[Robot]) -> Robots:
     """
     if isinstance(robot, Robot):
         return robot
-    robots = tuple(robot)
+    given: object = robot
+    robots = tuple(robot) if isinstance(given, Sequence | np.ndarray) and not isinstance(given, str) else ()
+    if not robots or not all(isinstance(one, Robot) for one in robots):
+        step = 'Load one by its name or file: load_robot("cogiro").'
+        raise InvalidValueError("robot", f"{given!r:.60}", "a Robot, or a sequence of them", step)
     first = first_of(robots)
     for index, other in enumerate(robots):
         _check_alike(first, other, index)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sagline.arrays import Array, locked
+from sagline.blocks import blocks, rows_of
 from sagline.kernels import tables
 from sagline.kernels.forward.sensitivity import BY_DENSITY, BY_LENGTH, BY_STIFFNESS, describe_states
 from sagline.kernels.memory import memory_for
@@ -14,6 +15,7 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.several import first_of
 from sagline.statics.tables import body_table, cable_table, pose_rows
 
+BLOCK = 1 << 12  # samples at once: a tenth of a second, after which an interrupt is heard
 _TINY = 1e-300
 
 
@@ -53,13 +55,15 @@ def cable_slopes(state: Equilibrium) -> CableSlopes:
     poses, lengths = pose_rows(state.pose), np.atleast_2d(cables.unstrained_length)
     shape, (count, m) = state.pose.shape, lengths.shape
     matrices = np.empty((count, 6, 6))
-    blocks = np.empty((count, m, 3, 3))
+    stiffness = np.empty((count, m, 3, 3))
     slopes = np.empty((count, 3, m, 3))
     levers = np.empty((count, m, 3))
-    given = (shared.freedom, bodies, robots, locked(lengths.view()), poses, locked(np.atleast_2d(state.wrench).view()))
-    describe_states(
-        (cables.model.code, *cables.model.parameters), given, memory_for(m), matrices, blocks, slopes, levers
-    )
+    lengths, wrenches = locked(lengths.view()), locked(np.atleast_2d(state.wrench).view())
+    code, memory = (cables.model.code, *cables.model.parameters), memory_for(m)
+    for part in blocks(count, BLOCK):
+        own = (rows_of(bodies, part), rows_of(robots, part), lengths[part], poses[part], rows_of(wrenches, part))
+        found = (matrices[part], stiffness[part], slopes[part], levers[part])
+        describe_states(code, (shared.freedom, *own), memory, *found)
     centers = poses[:, :3] + _turned(state, bodies[:, tables.CENTER_X :])
     reach = (centers[:, None] + levers - robots[:, :, : tables.PLATFORM_X]).reshape(*shape, m, 3)
     # a vertical cable pulls nowhere sideways
@@ -67,7 +71,7 @@ def cable_slopes(state: Equilibrium) -> CableSlopes:
     sideways = level * cables.horizontal_tension[..., None]
     return CableSlopes(
         matrices.reshape(*shape, 6, 6),
-        blocks.reshape(*shape, m, 3, 3),
+        stiffness.reshape(*shape, m, 3, 3),
         slopes[:, BY_LENGTH].reshape(*shape, m, 3),
         slopes[:, BY_DENSITY].reshape(*shape, m, 3),
         slopes[:, BY_STIFFNESS].reshape(*shape, m, 3),

@@ -5,12 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from sagline.arrays import Array, locked
+from sagline.blocks import blocks, rows_of
 from sagline.kernels.inverse.queries import margins_of_poses
 from sagline.kernels.memory import memory_for
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.several import first_of, limits_of
 from sagline.statics.tables import pose_rows, robot_terms
 from sagline.tension.options import LIMITS_OF
+
+BLOCK = 1 << 12  # poses at once: a tenth of a second, after which an interrupt is heard
 
 
 def limit_margin(state: Equilibrium) -> Array:
@@ -46,7 +49,7 @@ def capacity_margin(state: Equilibrium) -> Array:
     """Extra load that each pose can take, whatever its direction, before no tensions within the limits balance it.
 
     The moment stays as it is. Exact for weightless cables; with sag the pulls stay those of the state. Grows with the
-    binomial of m over n - 1: 56 faces for eight cables, some microseconds a pose.
+    binomial of m over n - 1: 56 faces for eight cables, some twenty microseconds a pose.
 
     Args:
         state: Robot or robots, poses, wrench and cables, `plan.state` for instance.
@@ -61,14 +64,17 @@ def capacity_margin(state: Equilibrium) -> Array:
     shared, cables, rows = first_of(state.robot), state.cables, pose_rows(state.pose)
     pulls = np.atleast_2d(cables.vertical_force - cables.chord_tension * cables.rise / cables.chord)
     margins = np.empty(len(rows))
-    margins_of_poses(
-        (cables.model.code, *cables.model.parameters),
-        (LIMITS_OF[shared.tension_limits_of], np.nan),
-        robot_terms(state.robot),
-        rows,
-        np.atleast_2d(state.wrench),
-        locked(np.ascontiguousarray(pulls)),
-        memory_for(shared.cable_count),
-        margins,
-    )
+    wrenches, memory = np.atleast_2d(state.wrench), memory_for(shared.cable_count)
+    freedom, bodies, robots = robot_terms(state.robot)
+    for part in blocks(len(rows), BLOCK):
+        margins_of_poses(
+            (cables.model.code, *cables.model.parameters),
+            (LIMITS_OF[shared.tension_limits_of], np.nan),
+            (freedom, rows_of(bodies, part), rows_of(robots, part)),
+            rows[part],
+            rows_of(wrenches, part),
+            locked(np.ascontiguousarray(pulls[part])),
+            memory,
+            margins[part],
+        )
     return margins.reshape(state.pose.shape)

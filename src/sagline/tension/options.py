@@ -52,10 +52,13 @@ def kernel_options(robot: Robots, model: CableModel, tension: TensionMethod) -> 
     else:
         for index, one in enumerate(robot):
             check_sharing(one, tension, f"robot[{index}]")
+    # a weightless cable has one tension, which is linear even where it is zero
+    alike = model.weightless and tension.variable == "frame_end"
+    variable = codes.CHORD_TENSION if alike else tension.variable_code
     weight, goal = (locked(row) for row in tension.preference(shared.cable_count))
     return Options(
         (model.code, *model.parameters),
-        (tension.code, tension.parameter, tension.variable_code, weight, goal),
+        (tension.code, tension.parameter, variable, weight, goal),
         (LIMITS_OF[shared.tension_limits_of], tension.validity),
     )
 

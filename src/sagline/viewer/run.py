@@ -7,8 +7,8 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from sagline.arrays import Array
+from sagline.blocks import Progress
 from sagline.errors import InvalidValueError
-from sagline.kinematics.blocks import Progress
 from sagline.kinematics.confirm import Confirmation, confirm
 from sagline.kinematics.plan import Plan
 from sagline.viewer.snapshot import Snapshot
