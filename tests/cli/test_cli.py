@@ -21,6 +21,7 @@ import sagline as sl
 from sagline.cli.main import app
 from sagline.cli.terminal import reported
 from sagline.kernels.inverse.poses import inverse_poses
+from tests.cli import interrupts
 
 OUTSIDE = "durations: 5\nrate: 20\nwaypoints: [{position: [0, 0, 1.5]}, {position: [7.2, 3, 1.5]}]\n"
 INSIDE = "durations: 5\nrate: 20\nwaypoints: [{position: [0, 0, 1.5]}, {position: [4, 3, 1.5]}]\n"
@@ -47,11 +48,8 @@ def numbers(*words: str) -> Any:
 def spawned(*words: str) -> subprocess.Popen[str]:
     command = [sys.executable, "-m", "sagline.cli", *words]
 
-    def hear_interrupts() -> None:  # whoever runs the tests in the background has told them not to
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
-
     return subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=hear_interrupts
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=interrupts.heard
     )
 
 

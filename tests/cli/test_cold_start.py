@@ -22,11 +22,14 @@ from sagline.kernels.forward.forward import forward_poses
 from sagline.kernels.inverse.poses import inverse_poses, measure_balance
 from sagline.kernels.jit import FOLDER, is_compiled
 from sagline.kernels.sharing.nearest import new_nearness
+from tests.cli import interrupts
 
 
 def process(code: str, folder: FilePath) -> "subprocess.Popen[str]":
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder)}
-    return subprocess.Popen([sys.executable, "-c", code], env=environment, stdout=subprocess.PIPE, text=True)
+    return subprocess.Popen(
+        [sys.executable, "-c", code], env=environment, stdout=subprocess.PIPE, text=True, preexec_fn=interrupts.heard
+    )
 
 
 def compiling(function: Any, types: Any = ()) -> Any:

@@ -16,13 +16,16 @@ from typer.testing import CliRunner
 
 import sagline as sl
 from sagline.cli.main import app
+from tests.cli import interrupts
 from tests.viewer.client import Client
 
 
 @contextmanager
 def viewing(*words: str) -> Iterator[tuple[subprocess.Popen[str], int]]:
     command = [sys.executable, "-m", "sagline.cli", "view", *words, "--port", "0", "--no-browser"]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=interrupts.heard
+    )
     try:
         assert process.stdout is not None
         found = re.search(r"http://127\.0\.0\.1:(\d+)", process.stdout.readline())
