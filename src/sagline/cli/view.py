@@ -43,6 +43,8 @@ def serve(robot: Robot, run: Path | None, host: str, port: int, *, browser: bool
     course = None if run is None else _run(robot, run)
     machine = robot if course is None else course.plan.state.one_robot
     server = web.started(host, port, machine.name)
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # from here on Ctrl-C is how one ends, and no failure
     try:
         address = web.url(server, host)
         show(f"{machine.name} is at {address}   (Ctrl-C stops it)")
@@ -52,8 +54,6 @@ def serve(robot: Robot, run: Path | None, host: str, port: int, *, browser: bool
         viewer = Viewer(server, machine, course, readings.ready)
         if browser and _has_display():
             webbrowser.open(address)
-        if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
-            signal.signal(signal.SIGINT, signal.default_int_handler)  # here Ctrl-C is how one ends, and no failure
         with working("") if readings.cold else nullcontext(), readings.compiled_beside(viewer):
             viewer.serve()
     except KeyboardInterrupt:
