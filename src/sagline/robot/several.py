@@ -37,11 +37,15 @@ def together(robot: Robot | Sequence[Robot]) -> Robots:
     """
     if isinstance(robot, Robot):
         return robot
-    given: object = robot
-    robots = tuple(robot) if isinstance(given, Sequence | np.ndarray) and not isinstance(given, str) else ()
-    if not robots or not all(isinstance(one, Robot) for one in robots):
+    given: Any = robot  # a caller without types gives anything
+    robots: tuple[Any, ...] = ()
+    if isinstance(given, Sequence | np.ndarray) and not isinstance(given, str):
+        robots = tuple(given)
+    wrong = [index for index, one in enumerate(robots) if not isinstance(one, Robot)]
+    if wrong or not robots:
+        item, value = (f"robot[{wrong[0]}]", robots[wrong[0]]) if wrong else ("robot", given)
         step = 'Load one by its name or file: load_robot("cogiro").'
-        raise InvalidValueError("robot", f"{given!r:.60}", "a Robot, or a sequence of them", step)
+        raise InvalidValueError(item, f"{value!r:.60}", "a Robot, or a sequence of them", step)
     first = first_of(robots)
     for index, other in enumerate(robots):
         _check_alike(first, other, index)
