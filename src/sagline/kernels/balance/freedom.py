@@ -8,7 +8,16 @@ from __future__ import annotations
 import math
 
 from sagline.arrays import Array
-from sagline.kernels.jit import formula, kernel
+from sagline.kernels.jit import formula, glue, kernel
+
+
+@glue
+def translations_of(freedom: Array) -> int:
+    """How many of the free motions, the first ones, do not turn the platform."""
+    count = 0
+    for k in range(freedom.shape[0]):
+        count += 0 if turns(freedom, k) else 1
+    return count
 
 
 @formula

@@ -162,9 +162,9 @@ def place_cables(model: Model, limits: Limits, robot: Array, geometry: Array, ca
             low = chord_tension_at_frame_end(model, chord_of(cables, i), material_of(cables, i), low)
             high = chord_tension_at_frame_end(model, chord_of(cables, i), material_of(cables, i), high)
         if not math.isnan(limits.validity):
-            low = max(low, cables.half_weight[i] / abs(sine))
-            if limits.validity > 0.0:  # on a vertical cable T_x is zero, and so is a bound of zero
-                low = max(low, cables.half_weight[i] / abs(sine) + limits.validity / cables.cosine[i])
+            # on a vertical cable T_x is zero, and so is a margin of zero
+            margin = limits.validity / cables.cosine[i] if limits.validity > 0.0 else 0.0
+            low = max(low, cables.half_weight[i] / abs(sine) + margin)
         cables.low[i] = low
         cables.high[i] = high
     return True

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sagline.arrays import Array, Flags, Indices
 from sagline.kernels import tables
-from sagline.kernels.balance.freedom import turns
+from sagline.kernels.balance.freedom import translations_of
 from sagline.kernels.balance.setting import Limits, Platform, new_balance, set_pose, start_from_minimum_norm
 from sagline.kernels.cable.cables import new_cables
 from sagline.kernels.cable.terms import Model
@@ -52,9 +52,7 @@ def explain_poses(
     for i in range(m):
         weight[i] = 1.0
     rest = Memory(rest.numbers[at:], rest.counters)
-    translations = 0
-    for k in range(n):
-        translations += 0 if turns(freedom, k) else 1
+    translations = translations_of(freedom)
     for p in which:
         body = bodies[min(p, bodies.shape[0] - 1)]
         # the wrench is in what is needed

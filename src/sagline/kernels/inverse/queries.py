@@ -7,7 +7,7 @@ import math
 from sagline.arrays import Array, Indices
 from sagline.kernels import tables
 from sagline.kernels.algebra.strips import STRIP_ROWS
-from sagline.kernels.balance.freedom import turns
+from sagline.kernels.balance.freedom import translations_of
 from sagline.kernels.balance.setting import (
     Limits,
     Platform,
@@ -113,9 +113,7 @@ def margins_of_poses(
     rest = Memory(rest.numbers[at:], rest.counters)
     for i in range(m):
         weight[i] = 1.0
-    translations = 0
-    for k in range(n):
-        translations += 0 if turns(freedom, k) else 1
+    translations = translations_of(freedom)
     for p in range(count):
         margins[p] = math.nan
         body = bodies[min(p, bodies.shape[0] - 1)]
