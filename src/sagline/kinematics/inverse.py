@@ -13,7 +13,8 @@ from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel, CableState
 from sagline.errors import CableGeometryError, InvalidValueError
 from sagline.kernels import codes, tables
-from sagline.kinematics.inverse_rows import explained, solve_rows
+from sagline.kernels.inverse.verdicts import ENOUGH
+from sagline.kinematics.inverse_rows import decide_rows, solve_rows
 from sagline.kinematics.plan import Plan
 from sagline.motion.path import Path
 from sagline.robot.equilibrium import Equilibrium
@@ -86,9 +87,10 @@ def inverse(
     if isinstance(motion, Path):
         load = locked(inertial_wrench(robots, pose, motion.twist, motion.twist_rate) + load)
     reference = _reference(shared, previous, tension.variable)
-    found = solve_rows(robots, method, options, rows, np.atleast_2d(load), reference, progress)
+    loads = np.atleast_2d(load)
+    found = solve_rows(robots, method, options, rows, loads, reference, progress)
     _refuse_missing_chords(found.pose_status, found.results)
-    shortfall, farkas, blocking = explained(robots, options, rows, found, progress)
+    verdicts = decide_rows(robots, options, rows, loads, found, progress)
     cables = CableState(
         model=model,
         cable=cables_of(robots),
@@ -107,11 +109,13 @@ def inverse(
         path=motion if isinstance(motion, Path) else None,
         tension=tension,
         status=locked(found.pose_status.reshape(pose.shape)),
-        shortfall=locked(shortfall.reshape(pose.shape)),
+        shortfall=locked(verdicts.brackets[:, ENOUGH].reshape(pose.shape)),
         wrench_residual=locked(found.residuals.reshape(*pose.shape, 2)),
-        blocking=locked(blocking.reshape(*pose.shape, shared.cable_count)),
-        farkas=locked(_in_world(farkas, shared).reshape(*pose.shape, 6)),
+        blocking=locked(verdicts.blocking.reshape(*pose.shape, shared.cable_count)),
+        farkas=locked(_in_world(verdicts.farkas, shared).reshape(*pose.shape, 6)),
         needed=locked(_in_world(found.needed, shared).reshape(*pose.shape, 6)),
+        bracket=locked(verdicts.brackets.reshape(*pose.shape, 2)),
+        at_border=locked(verdicts.at_border.reshape(pose.shape)),
     )
 
 

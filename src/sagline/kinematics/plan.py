@@ -46,17 +46,25 @@ class Plan:
         tension: How the load was shared.
         status: Codes of `PoseStatus`, shape () or (N,).
         shortfall: Smallest change of the force on the platform that would make the pose feasible [N], shape () or
-            (N,): 0 where it is feasible, infinite where no force alone would do, NaN where that is not the reason.
+            (N,), reached by tensions within their limits: 0 where it is feasible, infinite where no force alone would
+            do, NaN where that is not the reason.
         wrench_residual: Norms of the unbalanced force [N] and moment [N m] in the platform's free motions,
             shape (2,) or (N, 2).
-        blocking: Cables whose limits stand against the needed wrench, at most one more than are redundant, shape (m,)
-            or (N, m).
-        farkas: Proof of each infeasible pose, shape (6,) or (N, 6), NaN elsewhere: with y = farkas and the structure
-            matrix J, y . J tau < y . needed for all chord tensions tau within their limits. Its force part has length
-            1, so that the gap is in newtons. NaN also where the limits contradict by no more than rounding. None for
-            a plan from a file that was written before files kept it.
+        blocking: Cables at a limit that stands against the needed wrench: a wider one lessens the shortfall, shape
+            (m,) or (N, m).
+        farkas: Proof of each infeasible pose, shape (6,) or (N, 6), NaN elsewhere: with y = farkas, what the cables
+            give along y, the sum of y . (J_i tau_i - G_i pull_i(tau_i)) with J the structure matrix and G_i what a
+            pull takes away, stays below y . (needed - the pulls in it) for all chord tensions within their limits, on
+            the cables' exact curves. Its force part has length 1, so that the gap is in newtons. NaN also where one
+            direction alone proves nothing and ranges of tensions were narrowed or split. None for a plan from a file
+            that was written before files kept it.
         needed: The wrench J tau that the chord tensions must supply, shape (6,) or (N, 6): weight, given wrench and
-            the cables' pulls T_z - tau sin phi of the last linearization; to that the proof refers. None as above.
+            the cables' pulls T_z - tau sin phi; where there is no answer, at the tensions that leave least of it.
+            None as above.
+        bracket: What is proved, and what suffices, of the shortfall [N], shape (2,) or (N, 2); the second is
+            `shortfall`. None as above.
+        at_border: Poses so near the border that the rounds of sharing found nothing: tensions were searched for on
+            the cables' exact curves, and the way of sharing had no say, shape () or (N,). None as above.
     """
 
     state: Equilibrium
@@ -68,6 +76,8 @@ class Plan:
     blocking: NDArray[np.bool_]
     farkas: Array | None = None
     needed: Array | None = None
+    bracket: Array | None = None
+    at_border: NDArray[np.bool_] | None = None
 
     @property
     def feasible(self) -> NDArray[np.bool_]:
@@ -112,12 +122,17 @@ class Plan:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What stands, but is to be taken with care: cables whose tension leaves the empirical model's range."""
+        """What stands, but is to be taken with care: tensions out of the empirical model's range, or at the border."""
+        at_border = 0 if self.at_border is None else int(np.count_nonzero(self.at_border))
+        border = (
+            f"{at_border} of {self.status.size} poses are at the border of what the limits allow: their tensions "
+            f"balance the platform, but {type(self.tension).__name__} had no say in them; widen the limits there",
+        )
         below = (
             np.atleast_2d(self.state.cables.status == CableStatus.BELOW_VALIDITY)
             & np.atleast_1d(self.feasible)[:, None]
         )
-        return tuple(
+        return border[: at_border > 0] + tuple(
             f"cable {cable}: at {count} of {len(below)} poses its tension is below w D/(2 |sin phi|), where the "
             "empirical model's lowest point enters the span; raise tension_min, set lowest_point_margin, or use "
             "Catenary()"

@@ -34,3 +34,8 @@ class PoseStatus(Status):
         codes.POSE_UNBOUNDED,
         "the feasible tensions have no upper end, and so no middle; give tension_max, or choose MinimumNorm",
     )
+    BORDERLINE = (
+        codes.POSE_BORDERLINE,
+        "so near the border that neither tensions nor a proof that there are none was found; move the platform, or "
+        "change the load by more than the shortfall's bracket",
+    )
