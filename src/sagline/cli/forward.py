@@ -13,6 +13,7 @@ from sagline.cli.entries import FIT, FORWARD
 from sagline.cli.tables import plain_table
 from sagline.cli.terminal import OUTSIDE, note, show, show_json, working
 from sagline.files.lengths_file import Lengths, load_lengths
+from sagline.files.names import file_stem
 from sagline.files.robot_file import load_robot
 from sagline.files.whole import check_folder, made_folder, written_whole
 from sagline.kinematics.forward import forward as solve
@@ -42,7 +43,7 @@ def forward(name: str, file: Path, model: Model, folder: Path, *, as_json: bool)
         first = solve(robot, lengths.unstrained_length[0], model=model.build())
         start = first.pose if np.isfinite(first.pose.position).all() else None
         found = solve(robot, lengths.unstrained_length, start=start, model=model.build(), progress=line.progress)
-    target = made_folder(folder) / f"{robot.name}-poses.csv"
+    target = made_folder(folder) / f"{file_stem(robot.name, 'poses')}.csv"
     rows = _rows(lengths, found)
     with written_whole(target) as partial, partial.open("w", newline="", encoding="utf-8") as stream:
         csv.writer(stream).writerows(rows)
