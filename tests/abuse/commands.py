@@ -7,8 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from click.testing import Result
-from typer.testing import CliRunner
+from typer.testing import CliRunner, Result
 
 import sagline as sl
 from sagline.cli.main import app
@@ -56,4 +55,7 @@ def _what(place: Path) -> str:
     mode = os.lstat(place).st_mode
     if stat.S_ISLNK(mode):
         return f"link to {os.readlink(place)}"
-    return hashlib.sha256(place.read_bytes()).hexdigest() if stat.S_ISREG(mode) else str(stat.S_IFMT(mode))
+    if not stat.S_ISREG(mode):
+        return f"kind {stat.S_IFMT(mode)}"
+    content = place.read_bytes()
+    return f"{len(content)} bytes {hashlib.sha256(content).hexdigest()}"

@@ -50,9 +50,9 @@ def device(place: Path) -> None:
     os.mknod(place, 0o20666, os.makedev(1, 3))  # as /dev/null; for root alone
 
 
-KINDS = (folder, full_folder, pipe, link_to_file, link_to_nothing, link_to_folder, link_to_itself, link_to_device)
+KINDS = [folder, full_folder, pipe, link_to_file, link_to_nothing, link_to_folder, link_to_itself, link_to_device]
 if hasattr(os, "getuid") and os.getuid() == 0:
-    KINDS += (device,)
+    KINDS.append(device)
 
 
 @pytest.mark.parametrize("kinds", [1, pytest.param(len(KINDS), marks=pytest.mark.soak)])
