@@ -1,5 +1,6 @@
 import hashlib
 import io
+import os
 import resource
 import warnings
 from dataclasses import replace
@@ -152,12 +153,17 @@ def test_files_that_are_no_plan(tmp_path: FilePath, saved: FilePath) -> None:
     half.write_bytes(saved.read_bytes()[:20_000])
     text.write_text("time,x,y,z\n")
     xr.Dataset({"a": ("b", [1.0, 2.0])}).to_netcdf(other, engine="h5netcdf")
+    os.mkfifo(tmp_path / "pipe.nc")
     reasons = {
         tmp_path / "missing.nc": "does not exist. Check its name",
         tmp_path: "cannot be read .Is a directory",
         half: "is no complete NetCDF file .*truncated.*it may have been cut off",
         text: "is no complete NetCDF file",
         other: "is no plan of sagline, it names no sagline_format",
+        tmp_path / "pipe.nc": "is no file. Check its name",  # opening it would wait for ever
+        FilePath("/dev/zero"): "is no file. Check its name",
+        tmp_path / "zero\0byte.nc": "cannot be read .embedded null byte",
+        tmp_path / ("x" * 300): "cannot be read .File name too long",
     }
     for file, reason in reasons.items():
         with pytest.raises(FileError, match=reason):
