@@ -148,6 +148,16 @@ def test_a_disk_that_fills_up_leaves_nothing(tmp_path: FilePath) -> None:
     assert [entry.name for entry in tmp_path.iterdir()] == ["other.nc"]
 
 
+def test_a_disk_that_fills_up_in_the_middle(tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise RuntimeError("Can't decrement id ref count (unable to close file, errno = 28)")
+
+    monkeypatch.setattr("xarray.Dataset.to_netcdf", fail)
+    with pytest.raises(FileError, match=r"run\.nc: cannot be written \(Can't decrement id ref count"):
+        a_plan().save(tmp_path / "run.nc")
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_files_that_are_no_plan(tmp_path: FilePath, saved: FilePath) -> None:
     half, text, other = tmp_path / "half.nc", tmp_path / "text.nc", tmp_path / "other.nc"
     half.write_bytes(saved.read_bytes()[:20_000])
@@ -181,6 +191,8 @@ def test_files_that_are_no_plan(tmp_path: FilePath, saved: FilePath) -> None:
         ("tension", "Guess", "tension is 'Guess'; allowed: Closest, MinimumNorm"),
         ("model_k_p", -1.0, r"k_p is -1 m\^2/s\^4; allowed: >= 0"),
         ("robot", "name: x", "run.nc, robot: .* is missing"),
+        ("robot", 3.0, "run.nc, robot: has no keys"),
+        ("model_k_p", "four", "k_p is"),
     ],
 )
 def test_edited_attributes(old: FilePath, attribute: str, value: object, reason: str) -> None:
