@@ -13,14 +13,17 @@ from sagline.files.whole import check_folder, made_folder, write_text
 from sagline.report.blocks import Chapter
 from sagline.report.page import page
 from sagline.report.parts import selection
+from sagline.report.result import picture
 
 TITLE = "The article, redone"
 LEAD = (
     "Gia Luan & Truong Thinh, “Empirical Quasi-Static and Inverse Kinematics of Cable-Driven Parallel Manipulators "
-    "Including Presence of Sagging”, Appl. Sci. 2020, 10(15), 5318, doi:10.3390/app10155318. What it says stands "
-    "beside what sagline computes, with exact elastic catenaries as the reference. Notation: z up, T acts on the "
-    "cable at its platform end, φ is the article's β. Every number on the computed side was computed when this page "
-    "was made."
+    "Including Presence of Sagging”, Appl. Sci. 2020, 10(15), 5318, doi:10.3390/app10155318, beside what sagline "
+    "computes with exact elastic catenaries."
+)
+NOTATION = (
+    "Notation: z up, T acts on the cable at its platform end, φ is the article's β. Every number on the computed side "
+    "was computed when this page was made; one that is rounding of the arithmetic alone is told as such."
 )
 
 Progress = Callable[[int, int, str], None]
@@ -72,5 +75,5 @@ def write_article(folder: Path | str, parts: Sequence[str] = (), progress: Progr
     place = made_folder(folder)
     report = ArticleReport(place / "article.html", place / "article.json", tuple(chapters), numbers)
     save_json(numbers, report.data)
-    write_text(report.page, page(TITLE, LEAD, chapters, made))
+    write_text(report.page, page(TITLE, LEAD, NOTATION, chapters, picture(chapters), made))
     return report
