@@ -67,7 +67,9 @@ def _result(chapters: Sequence[Chapter], picture: Panel | None) -> str:
         f'<li class="{CLASSES[verdict]}"><strong>{counts[verdict]}</strong> {_counted(verdict, counts[verdict])}</li>'
         for verdict in verdicts
     )
-    head = '<th scope="col">chapter</th>' + "".join(f'<th scope="col">{verdict}</th>' for verdict in verdicts)
+    head = '<th scope="col">chapter</th>' + "".join(
+        f'<th scope="col"><span>{verdict}</span></th>' for verdict in verdicts
+    )
     rows = ""
     for number, chapter in enumerate(chapters, start=1):
         found = Counter(finding.verdict for finding in chapter.findings)
