@@ -3,6 +3,7 @@
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path as FilePath
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -221,6 +222,30 @@ def outline(text: Text) -> OutlinePath:
     c, s = np.cos(np.radians(turned)), np.sin(np.radians(turned))
     center = 0.5 * (np.asarray(middle.min) + np.asarray(middle.max))
     return OutlinePath(center + corners @ np.array([(c, s), (-s, c)]))
+
+
+@pytest.mark.parametrize(
+    ("pattern", "size"), [("3T", (0.0, 0.0, 0.0)), ("2T", (0.3, 1e-9, 0.2)), ("2T", (0.0, 0.0, 0.0))]
+)
+def test_robots_without_width_are_drawn(pattern: Literal["3T", "2T"], size: tuple[float, float, float]) -> None:
+    corners = [(-4.0, 0.0, 3.0), (4.0, 0.0, 3.0), (4.0, 0.0, 0.0), (-4.0, 0.0, 0.0)]
+    frame = np.array(corners if pattern == "2T" else [*corners[:2], (0.0, 4.0, 3.0), (0.0, -4.0, 3.0)])
+    robot = sl.Robot(
+        name="flat",
+        frame_anchors=frame,
+        platform_anchors=np.zeros((4, 3)),
+        cables=sl.Cable(0.01, 1e5),
+        mass=10.0,
+        motion_pattern=pattern,
+        plane_normal=(0.0, 1.0, 0.0) if pattern == "2T" else None,
+        tension_min=1.0,
+        tension_max=1000.0,
+        platform_size=size if any(size) else None,
+    )
+    ax = plot.robot(robot, sl.Pose([0.2, 0.0, 1.5], np.eye(3)))
+    ax.figure.draw_without_rendering()
+    low, high = ax.get_ylim3d()
+    assert high - low >= 0.79  # a tenth of its length, so that it can be seen
 
 
 def test_the_platform_stands_over_its_shadow() -> None:

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
@@ -26,6 +28,15 @@ def test_polygon_shows_corners_limits_and_methods() -> None:
     (point,) = [line for line in ax.get_lines() if line.get_marker() != "None"]
     place = np.asarray(point.get_xydata())[0]
     np.testing.assert_allclose(shape.origin + place @ shape.basis, plan.chord_tension, atol=1e-8)
+
+
+def test_sides_without_length_have_names_too() -> None:
+    """Where three limits meet in one corner two of them have a side of no length; names must still not meet."""
+    shape = sl.tension_polygon(MIXED, POSE)
+    corner = shape.vertices[0]
+    vertices = np.vstack((corner, corner + 1e-12, corner, shape.vertices[1:]))  # one points where it should not
+    touched = replace(shape, vertices=vertices, sides=(shape.sides[0], shape.sides[0], *shape.sides))
+    check_names(plot.polygon(touched), touched, "three in a corner")
 
 
 def test_nothing_to_draw() -> None:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 MARKERS = "osD^v<>pPX*h"
 POINT = 1.0 / 72.0  # in
 TRIES, SPARE = 5, 0.03  # at axes in which all names are; what they grow by in excess, of their size
+SHORT = 1e-9  # of the longest side: one shorter has no direction
 GAP = 4.0  # pt between a side and its name
 
 
@@ -120,13 +121,12 @@ def _name_sides(ax: Axes, shape: TensionPolygon, corners: Array) -> None:
 def _names(shape: TensionPolygon, corners: Array, scale: float) -> list[_Name]:
     """Each name beyond its side, where a convex polygon has no other line; names that would meet move outward."""
     names: list[_Name] = []
+    normals = _normals(corners)
     for k, side in enumerate(shape.sides):
         if side is None:
             continue
-        first, last = corners[k], corners[(k + 1) % len(corners)]
-        along = last - first
-        out = np.array([along[1], -along[0]]) / (np.linalg.norm(along) or 1.0)  # corners are counter-clockwise
-        text, middle = f"cable {side.cable} {side.limit}", 0.5 * (first + last)
+        text, middle = f"cable {side.cable} {side.limit}", 0.5 * (corners[k] + corners[(k + 1) % len(corners)])
+        out = normals[k]
         half = 0.5 * np.array([TextPath((0.0, 0.0), text, size=TICK).get_extents().width + 4.0, 1.3 * TICK])
         away = least = GAP + half @ np.abs(out)  # then the whole box is beyond the line
         while any(
@@ -136,3 +136,19 @@ def _names(shape: TensionPolygon, corners: Array, scale: float) -> list[_Name]:
             away += 0.5 * TICK
         names.append(_Name(text, middle, away * out, half, bool(away > least)))
     return names
+
+
+def _normals(corners: Array) -> Array:
+    """Outward directions of the sides, shape (h, 2); a side without length has one between its neighbors'."""
+    along = np.roll(corners, -1, axis=0) - corners
+    lengths = np.linalg.norm(along, axis=1)
+    long = np.flatnonzero(lengths > SHORT * lengths.max())
+    if long.size == 0:
+        return np.tile((0.0, 1.0), (len(corners), 1))
+    normals = np.zeros_like(along)
+    normals[long] = np.column_stack((along[long, 1], -along[long, 0])) / lengths[long, None]  # counter-clockwise
+    for k in set(range(len(corners))) - set(long.tolist()):
+        place = int(np.searchsorted(long, k))
+        between = normals[long[place - 1]] + normals[long[place % long.size]]
+        normals[k] = between / (np.linalg.norm(between) or 1.0)
+    return normals

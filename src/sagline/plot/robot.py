@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 POINTS = 50  # along each cable
 FRAME_COLOR, FLOOR_COLOR, SHADOW_COLOR = "0.6", "0.955", "0.82"
+FLAT = 1e-6  # of the robot's size: a platform that is thinner casts a line
 NEAR = 0.04  # of the robot's size: anchors that are closer share a label
 HALO = [patheffects.withStroke(linewidth=2.0, foreground="white")]
 AWAY = 0.045  # of the robot's size: how far outside its anchor a label stands
@@ -135,7 +136,7 @@ def _draw_ground(ax: Axes3D, points: Array, platform: Array) -> None:
     height = min(0.0, float(low[2]))
     outline = _corners(0.5 * (low + high), high - low)[[0, 2, 6, 4], :2]
     shadow = platform[:, :2]
-    if np.linalg.matrix_rank(shadow - shadow[0]) == 2:
+    if np.linalg.matrix_rank(shadow - shadow[0], tol=FLAT * float(np.ptp(points))) == 2:
         shadow = shadow[ConvexHull(shadow).vertices]
     for place, color in ((outline, FLOOR_COLOR), (shadow, SHADOW_COLOR)):
         flat = np.column_stack((place, np.full(len(place), height)))
