@@ -23,6 +23,7 @@ import typer.main
 from sagline.cli.main import app
 
 ROOT = Path(__file__).parents[2]
+WIDTH = 80  # columns that a page shows without scrolling
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 BLOCK = re.compile(
     r"(?:^ *<!-- (?P<mark>not run|file): (?P<what>[^\n]+?) -->\n+)?"
@@ -98,3 +99,15 @@ def test_the_commands_exist(line: str) -> None:
 def test_the_pages_are_found_and_their_blocks_too() -> None:
     assert ROOT / "docs" / "model.md" in PAGES
     assert [block.kind for block in blocks(ROOT / "README.md")].count("python") == 2
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_no_line_of_code_is_wider_than_a_page(page: Path) -> None:
+    lines = [(block.line + i, line) for block in blocks(page) for i, line in enumerate(block.text.splitlines(), 1)]
+    assert [(number, line) for number, line in lines if len(line) > WIDTH] == []
+
+
+@pytest.mark.parametrize("file", sorted((ROOT / "examples").iterdir()), ids=name_of)
+def test_no_line_of_an_example_is_wider_than_a_page(file: Path) -> None:
+    lines = file.read_text(encoding="utf-8").splitlines() if file.suffix in (".py", ".yaml") else []
+    assert [line for line in lines if len(line) > WIDTH] == []

@@ -19,7 +19,7 @@ from mkdocs.structure.files import File, Files
 import sagline as sl
 from sagline.cli.main import app
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"
 WORK = ROOT / "build" / "gallery"
 RINGS = {  # package -> title and opening line of its page of reference
