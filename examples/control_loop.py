@@ -26,8 +26,8 @@ for position, quaternion, wrench in zip(
     if status != sl.PoseStatus.SOLVED:
         raise SystemExit(status.text)  # stop the winches
     wound.append(lengths.copy())
-difference = np.abs(
-    np.array(wound) - sl.inverse(robot, path).unstrained_length
-).max()
+plan = sl.inverse(robot, path)  # the same in one call
+difference = np.abs(np.array(wound) - plan.unstrained_length).max()
 print(f"{len(path)} set points; the planner's lengths to {difference:.0e} m")
 print(f"{1e6 * np.median(times):.1f} µs a pose, median")
+sl.plot.save(sl.plot.lengths(plan), "control_loop.png")

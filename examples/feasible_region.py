@@ -13,7 +13,7 @@ share = plan.feasible.mean()
 print(f"{share:.1%} of the plane y = 0 is wrench-feasible")
 lost = sl.PoseStatus(plan.status[0])
 print(
-    f"corner: {lost.text}; shortfall {plan.shortfall[0]:.0f} N,",
+    f"corner: {lost.name}, shortfall {plan.shortfall[0]:.0f} N,",
     f"cables {np.flatnonzero(plan.blocking[0])}",
 )
 

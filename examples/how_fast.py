@@ -17,5 +17,6 @@ for seconds in (6.0, 4.0, 3.0, 2.5, 2.0, 1.5, 1.0):
         )
         break
     fastest = seconds
+    sl.plot.save(sl.plot.tensions(plan), "how_fast.png")
     low, high = plan.chord_tension.min(), plan.chord_tension.max()
     print(f"{seconds} s: {low:.0f} to {high:.0f} N")

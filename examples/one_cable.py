@@ -20,10 +20,9 @@ worst = {}  # of the length, at 20 N
 for model in (sl.Parabolic(), sl.Empirical(), sl.Elastic(), sl.Straight()):
     length = model.from_tension(cable, 12.0, -4.0, tension).unstrained_length
     worst[type(model).__name__] = 1e3 * abs(length - exact.unstrained_length)[0]
-print(
-    "error of the length at 20 N:",
-    ", ".join(f"{name} {mm:.1f} mm" for name, mm in worst.items()),
-)
+print("error of the length at 20 N:")
+for name, millimeters in worst.items():
+    print(f"  {name:9} {millimeters:.1f} mm")
 
 figure = Figure(figsize=(6.0, 3.0), layout="constrained")
 ax = figure.subplots()

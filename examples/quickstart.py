@@ -6,12 +6,11 @@ import sagline as sl
 
 robot = sl.load_robot("article-suspended")
 path = sl.quintic_path([(0, 0, 1.5), (4, 3, 1.5), (-4, 3, 3)], speed=1.5)
-# tensions within the limits, and the lengths to wind
-plan = sl.inverse(robot, path)
-# where the platform really rests on exact cables of these lengths
-proof = sl.confirm(plan)
+plan = sl.inverse(robot, path)  # tensions within limits, lengths to wind
+proof = sl.confirm(plan)  # where the platform really rests on exact cables
 error = np.linalg.norm(proof.position_error, axis=1).max()
 shortest, longest = plan.unstrained_length.min(), plan.unstrained_length.max()
 print(f"{len(path)} poses, lengths {shortest:.2f} to {longest:.2f} m")
 print(f"largest position error {1e3 * error:.1e} mm")
 plan.save("run.nc")
+sl.plot.save(sl.plot.overview(plan), "quickstart.png")

@@ -27,10 +27,9 @@ for robot in map(sl.load_robot, ("article-suspended", "article-mixed")):
         for name, model in largest
         if name == robot.name
     }
-    print(
-        f"{robot.name:18}",
-        "  ".join(f"{model} {mm:.3g} mm" for model, mm in row.items()),
-    )
+    print(robot.name)
+    for name, millimeters in row.items():
+        print(f"  {name:9} {millimeters:.3g} mm")
     ax.semilogy(row.keys(), row.values(), "o-", label=robot.name)
 ax.set(ylabel="largest position error [mm]", ylim=(1e-12, None))
 ax.grid(axis="y")

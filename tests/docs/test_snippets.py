@@ -6,6 +6,8 @@ The blocks of a page run in order, in one namespace and one empty folder. A bloc
 - of any kind is written to a file first, if the line `<!-- file: name -->` stands before it;
 - of `text title="output"` must be what the blocks of Python before it printed since the last such block;
 - of `sh` is not run, but its lines that begin with `sagline` must be understood by the command.
+
+A line `<!-- drawn by: sagline ... -->` shows the figures that a command draws; it must be understood as well.
 """
 
 import contextlib
@@ -52,6 +54,7 @@ def blocks(page: Path) -> Iterator[Block]:
 
 
 def commands(page: Path) -> Iterator[str]:
+    yield from re.findall(r"^<!-- drawn by: (sagline .+) -->$", page.read_text(encoding="utf-8"), re.MULTILINE)
     for block in blocks(page):
         if block.kind == "sh":
             for line in block.text.replace("\\\n", " ").splitlines():
