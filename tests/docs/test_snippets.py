@@ -110,6 +110,14 @@ def test_no_line_of_code_is_wider_than_a_page(page: Path) -> None:
     assert [(number, line) for number, line in lines if len(line) > WIDTH] == []
 
 
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_a_list_begins_after_an_empty_line(page: Path) -> None:
+    prose = BLOCK.sub("", page.read_text(encoding="utf-8"))
+    item = re.compile(r"^ *(?:[-*]|\d+\.) ", re.MULTILINE)
+    paragraphs = [part.strip("\n") for part in re.split(r"\n\s*\n", prose)]
+    assert [part for part in paragraphs if item.search(part) and not item.match(part)] == []  # else it is no list
+
+
 @pytest.mark.parametrize("file", sorted((ROOT / "examples").iterdir()), ids=name_of)
 def test_no_line_of_an_example_is_wider_than_a_page(file: Path) -> None:
     lines = file.read_text(encoding="utf-8").splitlines() if file.suffix in (".py", ".yaml") else []
