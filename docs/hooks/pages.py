@@ -37,6 +37,26 @@ DRAWN = {  # command -> what is shown of it
     "tension": "<!-- drawn by: sagline tension article-mixed --pose 1,0.5,2.5 -->",
     "view": "![A robot in the viewer](../images/viewer.png)\n\n![A run in the viewer](../images/viewer-run.png)",
 }
+SCENE = """\
+robot = sl.load_robot("cogiro")
+path = sl.quintic_path([(0, 0, 1.5), (2, 1, 2.5), (-2, 1, 2.5)], speed=1.0)
+proof = sl.confirm(sl.inverse(robot, path, model=sl.Elastic()))
+again = sl.confirm(sl.inverse(robot, path, model=sl.Empirical()))
+pose = sl.Pose.from_euler((1.0, 1.0, 2.0), 0.0, 0.0, 0.0)
+shape = sl.tension_polygon(robot, pose)
+chosen = {"Closest": sl.inverse(robot, pose).chord_tension}
+"""
+FIGURES = {  # function of `sl.plot` -> a call that draws
+    "error": "error(proof)",
+    "errors": "errors(proof, again)",
+    "lengths": "lengths(proof.plan)",
+    "overview": "overview(proof.plan)",
+    "path": "path(path)",
+    "polygon": "polygon(shape, chosen)",
+    "robot": "robot(robot, pose)",
+    "tensions": "tensions(proof.plan)",
+    "velocity": "velocity(path)",
+}
 LOADED = re.compile(
     r"""<(?:script|img|iframe|source|video|audio)\b[^>]*\bsrc(?:set)?=["']?(?:https?:)?//|<link\b[^>]*\brel=["']?"""
     r"""(?:stylesheet|preload|preconnect|icon)["']?[^>]*\bhref=["']?(?:https?:)?//|@import\s+["'(]*(?:url\()?https?:"""
@@ -62,7 +82,10 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     files.append(File.generated(config, "gallery.md", content=gallery(files, config)))
     files.append(File.generated(config, "api/command.md", content=command_reference()))
     for ring, names in names_by_ring().items():
-        files.append(File.generated(config, f"api/{ring}.md", content=reference(ring, names)))
+        text = reference(ring, names)
+        files.append(File.generated(config, f"api/{ring}.md", content=with_figures(text) if ring == "plot" else text))
+    for name in FIGURES:
+        files.append(File.generated(config, f"api/plot-{name}.svg", abs_src_path=str(WORK / f"plot-{name}.svg")))
     return files
 
 
@@ -86,6 +109,21 @@ def reference(ring: str, names: list[str]) -> str:
     """One page of reference, filled by mkdocstrings."""
     title, opening = RINGS.get(ring, (ring.capitalize(), ""))
     return f"# {title}\n\n{opening}\n\n" + "\n\n".join(f"::: {name}" for name in names) + "\n"
+
+
+def with_figures(text: str) -> str:
+    """The reference of `sl.plot`, each function with a figure that it draws."""
+    calls = "".join(f'sl.plot.save(sl.plot.{call}, "plot-{name}.svg")\n' for name, call in FIGURES.items())
+    ran("-c", f"import sagline as sl\n{SCENE}{calls}")
+    head, *functions = text.split("::: ")
+    shown = [f"{head}The figures below are drawn of these:\n{fenced(SCENE, 'python')}"]
+    for function in functions:
+        name = function.strip().rsplit(".", 1)[1]
+        if name not in (*FIGURES, "save"):
+            raise PluginError(f"sl.plot.{name} has no figure in its reference; give it a call that draws one")
+        figure = f"`sl.plot.{FIGURES[name]}`:\n\n![sl.plot.{name}](plot-{name}.svg)\n" if name in FIGURES else ""
+        shown.append(f"::: {function.strip()}\n\n{figure}")
+    return "\n".join(shown)
 
 
 def gallery(files: Files, config: MkDocsConfig) -> str:
