@@ -171,3 +171,10 @@ def test_a_plane_needs_the_moment_about_its_normal_only() -> None:
     mass = np.zeros((3, 3))
     mujoco.mj_fullM(model, data, mass)
     np.testing.assert_allclose(np.sort(np.linalg.eigvalsh(mass)), [0.2, 6.0, 6.0], rtol=1e-9)
+
+
+def test_a_platform_end_at_its_frame_end_is_taken() -> None:
+    frame = np.array([(-1.0, -1.0, 2.0), (1.0, -1.0, 2.0), (0.0, 1.0, 2.0)])
+    bob = Robot("bob", frame, np.zeros((3, 3)), Cable(0.01, 2e4), 2.0, motion_pattern="3T")
+    model, data = opened(dump_mjcf(bob, Pose.from_euler(frame[0], 0.0, 0.0, 0.0), [1e-6, 2.0, 2.0]))
+    run(model, data, 0.01)

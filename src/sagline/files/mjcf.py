@@ -31,6 +31,7 @@ _LONGEST_STEP = 0.002  # MuJoCo's own [s]
 _STRETCH_DAMPING = 4.0  # half the bound of the frequencies, about the fastest there is, is damped critically
 _SWING_DAMPING = 0.4  # a fifth of critical
 _ROUNDING = 1e-12
+_SHORTEST = 1e-6  # of a cable [m]
 
 
 class _Dynamics(NamedTuple):
@@ -58,14 +59,14 @@ def dump_mjcf(robot: Robot, pose: Pose, unstrained_length: ArrayLike | None = No
     Args:
         robot: The robot.
         pose: A single pose, where the platform starts.
-        unstrained_length: L [m], > 0, shape (m,). None takes the lengths with which straight elastic cables hold the
-            platform at rest at this pose.
+        unstrained_length: L [m], >= 1e-6, shape (m,). None takes the lengths with which straight elastic cables hold
+            the platform at rest at this pose.
 
     Returns:
         The XML text.
 
     Raises:
-        InvalidValueError: If the pose is a batch, a length is not positive, or no tensions within the robot's limits
+        InvalidValueError: If the pose is a batch, a length is below 1e-6 m, or no tensions within the robot's limits
             hold the platform there.
     """
     if pose.shape:
@@ -113,9 +114,10 @@ def _dynamics(robot: Robot, pose: Pose, stiffness: Array) -> _Dynamics:
     step = min(_LONGEST_STEP, 2.0 * np.pi / (_STEPS * fastest))
     cables = pose.transform(robot.platform_anchors) - robot.frame_anchors
     distance = np.linalg.norm(cables, axis=1)
-    stretch = np.einsum("ik,ijk->ij", cables / distance[:, None], moved)
+    directions = cables / np.where(distance > 0.0, distance, 1.0)[:, None]
+    stretch = np.einsum("ik,ijk->ij", directions, moved)
     slowest = eigh((stretch.T * stiffness) @ stretch, masses, eigvals_only=True)[0]
-    swing = robot.gravity / distance.max()  # of a pendulum as long as the longest cable, squared
+    swing = robot.gravity / max(distance.max(), _SHORTEST)  # of a pendulum as long as the longest cable, squared
     drag = _SWING_DAMPING * robot.mass * np.sqrt(swing) if slowest < swing else 0.0
     return _Dynamics(step, _STRETCH_DAMPING / fastest, float(drag))
 
@@ -133,7 +135,7 @@ def _held(robot: Robot, pose: Pose) -> Array:
 
 
 def _checked(robot: Robot, lengths: ArrayLike) -> Array:
-    array = checked(lengths, "unstrained_length", "m", above=0.0)
+    array = checked(lengths, "unstrained_length", "m", low=_SHORTEST)
     if array.shape != (robot.cable_count,):
         raise InvalidValueError(
             "unstrained_length", f"of shape {array.shape}", f"shape ({robot.cable_count},)", "Give one length a cable."
@@ -189,7 +191,7 @@ def _add_joints(body: Element, robot: Robot, pose: Pose, drag: float) -> None:
         for k, row in enumerate(robot.freedom):
             kind, axis = ("slide", row[:3]) if row[:3].any() else ("hinge", row[3:])
             joints.append(SubElement(body, "joint", name=f"freedom_{k}", type=kind, axis=_text(axis @ pose.matrix)))
-    for joint in joints:
+    for joint in joints if drag > 0.0 else ():
         joint.set("damping", _text((drag,)))
 
 
