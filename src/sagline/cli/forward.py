@@ -35,7 +35,8 @@ def forward(name: str, file: Path, model: Model, folder: Path, *, as_json: bool)
         SaglineError: If an input is wrong or the folder cannot be written.
     """
     robot = load_robot(name)
-    lengths = load_lengths(file, robot.cable_count)
+    size = float(np.linalg.norm(np.ptp(robot.frame_anchors, axis=0)))
+    lengths = load_lengths(file, robot.cable_count, size)
     check_folder(folder)
     entry = FIT if model is Model.STRAIGHT else FORWARD
     with working(f"{robot.name}: finding {len(lengths.unstrained_length):,} poses", entry) as line:
