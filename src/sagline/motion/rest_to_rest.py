@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from sagline.arrays import Array, checked
 from sagline.errors import InvalidValueError
+from sagline.memory import check_memory
 from sagline.motion.path import Path
 from sagline.motion.profile import QUINTIC, SEPTIC, Profile
 from sagline.motion.segments import Segments, positive
@@ -17,6 +18,7 @@ from sagline.robot.pose import Pose
 
 LIMITS = ("speed", "acceleration", "angular_speed", "angular_acceleration")
 MOST_SAMPLES = 100_000_000  # 21 GB of path: beyond it a duration or the rate has the wrong unit
+_BYTES = 300.0  # of memory a sample needs while the path is made
 
 
 def quintic_path(
@@ -176,6 +178,7 @@ def _time_grid(total: float, rate: float) -> Array:
             f"<= {MOST_SAMPLES:g}",
             "Check the units of durations, limits and rate.",
         )
+    check_memory(steps, _BYTES, "samples", "Check the units of durations, limits and rate.")
     # A total within rounding of a multiple of 1/rate gets no extra sample.
     last = round(steps) if abs(steps - round(steps)) <= 1e-9 * steps else int(np.ceil(steps))
     time = np.arange(last + 1) / rate
