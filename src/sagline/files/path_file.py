@@ -106,7 +106,7 @@ def _path_from_yaml(path: FilePath, text: str) -> Path:
     timing: dict[str, Any] = {
         name: in_si(getattr(entry, name), unit, name)
         for name, unit in TIMING_UNITS.items()
-        if getattr(entry, name) is not None
+        if name in entry.model_fields_set
     }
     return PROFILES[entry.profile]([_pose(w, f"waypoints[{k}]") for k, w in enumerate(entry.waypoints)], **timing)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sagline.errors import InvalidValueError
-from sagline.files.quantity import LARGEST, plain_number
+from sagline.files.quantity import plain_number, within_reach
 from sagline.robot.pose import Pose
 
 
@@ -20,7 +20,7 @@ def parse_pose(text: str, item: str = "--pose") -> Pose:
         The pose.
 
     Raises:
-        InvalidValueError: If these are not three or six plain numbers, finite and no larger than 1e18.
+        InvalidValueError: If these are not three or six plain numbers within reach.
 
     Examples:
         >>> from sagline.files.pose_text import parse_pose
@@ -28,7 +28,7 @@ def parse_pose(text: str, item: str = "--pose") -> Pose:
         [1.  0.  1.5] [0.    0.    0.707 0.707]
     """
     numbers = [plain_number(part) for part in text.split(",", maxsplit=6)]
-    sound = [number for number in numbers if number is not None and abs(number) <= LARGEST]
+    sound = [number for number in numbers if number is not None and within_reach(number)]
     if len(sound) != len(numbers) or len(sound) not in (3, 6):
         step = f"Give meters, and degrees about z, y and x: {item} 1,0,1.5 or {item} 1,0,1.5,10,0,0."
         raise InvalidValueError(item, repr(text), "three or six numbers", step)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import reprlib
 from functools import cache, lru_cache
-from math import inf, isnan
+from math import isinf, isnan
 from sys import float_info
 from typing import TYPE_CHECKING, Any, Final
 
@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 
 Nested = float | list["Nested"]
 
-LARGEST: Final = 1e18  # in SI; no machine has anything beyond, and products of a few such numbers are still finite
+LARGEST: Final = 1e50  # in SI: the products of a few such numbers are still numbers
+REACH: Final = f"numbers up to {LARGEST:g}"
 _LONGEST: Final = 60  # letters of a number with its unit; a float64 takes 24
 
 _DECIMAL = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
@@ -51,6 +52,11 @@ def plain_number(text: str) -> float | None:
     return _capped(float(text))
 
 
+def within_reach(number: float) -> bool:
+    """Whether a number is finite, and of a size that products of a few do not take out of float64."""
+    return abs(number) <= LARGEST
+
+
 def in_si(value: object, unit: str, item: str) -> Nested:
     """A quantity, or nested lists of quantities, as numbers in an SI unit.
 
@@ -63,16 +69,16 @@ def in_si(value: object, unit: str, item: str) -> Nested:
         A number, or lists of numbers nested like the value. Infinities pass, ranges are the caller's to check.
 
     Raises:
-        InvalidValueError: If something is no quantity, is not a number (NaN), is beyond 1e18, or has another unit.
+        InvalidValueError: If something is no quantity, is not a number (NaN), is out of reach (see
+            `within_reach`), or has another unit.
     """
     if isinstance(value, list | tuple):
         return [in_si(element, unit, f"{item}[{i}]") for i, element in enumerate(value)]
     number = _from_text(value, unit) if isinstance(value, str) else _from_number(value)
     if number is None or isnan(number):
         raise _no_quantity(value, unit, item)
-    if LARGEST < abs(number) < inf:
-        allowed = f"numbers up to {LARGEST:g} {unit}".rstrip()
-        raise InvalidValueError(item, reprlib.repr(value), allowed, f"Correct {item}.")
+    if not (isinf(number) or within_reach(number)):
+        raise InvalidValueError(item, reprlib.repr(value), f"{REACH} {unit}".rstrip(), f"Correct {item}.")
     return number
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from sagline.arrays import Array
 from sagline.errors import FileError, InvalidValueError, nearest
-from sagline.files.quantity import LARGEST, in_si, plain_number
+from sagline.files.quantity import LARGEST, REACH, in_si, plain_number
 
 TABLE_LIMIT: Final = 64.0  # MB, about half a million rows
 _TOO_LONG: Final = 100.0  # times the size of what it belongs to: no length in m, but perhaps one in mm
@@ -75,12 +75,13 @@ class Table:
             raise FileError(path, f"no columns; allowed: {', '.join(units)}", "Give the names of the columns first.")
         values = np.array(numbers).reshape(len(lines), len(found))
         factors = [1.0 if factor is None else factor for factor in found.values()]
-        columns = {name: values[:, k] * factor for k, (name, factor) in enumerate(zip(found, factors, strict=True))}
+        with np.errstate(over="ignore"):  # what is too large is told below
+            columns = {name: values[:, k] * factor for k, (name, factor) in enumerate(zip(found, factors, strict=True))}
         plain = frozenset(name for name, factor in found.items() if factor is None)
         table = cls(path, columns, lines, header, plain)
         for name, column in columns.items():
-            wrong = ~(np.abs(column) <= LARGEST)
-            table.refuse(wrong, name, column, units[name], f"a finite number up to {LARGEST:g} {units[name]}".rstrip())
+            table.refuse(~np.isfinite(column), name, column, units[name], "a finite number")
+            table.refuse(np.abs(column) > LARGEST, name, column, units[name], f"{REACH} {units[name]}".rstrip())
         return table
 
     def refuse(self, wrong: NDArray[np.bool_], item: str, values: Array, unit: str, allowed: str) -> None:

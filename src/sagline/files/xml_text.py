@@ -12,7 +12,7 @@ import numpy as np
 
 from sagline.arrays import Array, locked
 from sagline.errors import FileError, InvalidValueError
-from sagline.files.quantity import LARGEST, plain_number
+from sagline.files.quantity import plain_number, within_reach
 from sagline.files.text import read_bytes
 
 _LIMIT: Final = 4.0  # MB; the largest of CASPR's files has 0.1
@@ -53,7 +53,7 @@ def read_xml(path: Path) -> Element:
 
 
 def numbers(text: str | None, count: int, item: str, unit: str) -> Array:
-    """As many finite numbers as wanted, between blanks.
+    """As many numbers as wanted, between blanks.
 
     Args:
         text: The text; None where the file has none.
@@ -68,12 +68,12 @@ def numbers(text: str | None, count: int, item: str, unit: str) -> Array:
         InvalidValueError: If the text is missing or says anything else; the message names the item.
     """
     found = [plain_number(word) for word in (text or "").split()[: count + 1]]
-    values = np.array([np.nan if number is None else number for number in found])
-    if len(values) != count or not (np.abs(values) <= LARGEST).all():
+    values = [number for number in found if number is not None and within_reach(number)]
+    if len(found) != count or len(values) != count:
         shown = "missing" if text is None or not text.strip() else repr(text.strip()[:60])
         wanted = "a number" if count == 1 else f"{count} numbers between blanks"
         raise InvalidValueError(item, shown, f"{wanted}{unit and f' in {unit}'}", f"Correct {item} in the file.")
-    return locked(values)
+    return locked(np.array(values))
 
 
 def number(text: str | None, item: str, unit: str) -> float:
