@@ -48,7 +48,7 @@ def dropped(rng: np.random.Generator, holder: Any, key: Any, tree: Any) -> None:
 
 
 def replaced(rng: np.random.Generator, holder: Any, key: Any, tree: Any) -> None:
-    holder[key] = STRANGE[int(rng.integers(len(STRANGE)))]
+    holder[key] = copy.deepcopy(STRANGE[int(rng.integers(len(STRANGE)))])
 
 
 def renamed(rng: np.random.Generator, holder: Any, key: Any, tree: Any) -> None:
