@@ -24,6 +24,7 @@ _DECIMAL = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
 _WORD = r"[-+]?\.?(?:inf|Inf|INF)|\.?(?:nan|NaN|NAN)"  # as YAML and Python write what no digits can
 _FACTOR = r"[A-Za-zµμΩÅ°_]+(?:[ \t]?(?:\^|\*\*)[ \t]?[-+]?[0-9]|[²³])?"  # no parentheses, pint trips over some
 _UNIT = rf"{_FACTOR}(?:(?:[ \t]?[*/·][ \t]?|[ \t]){_FACTOR}){{0,5}}"
+_BLANKS = re.compile("[ \t\r\n\u00a0\u202f]+")  # the last two are what typographers put before a unit
 _PLAIN = re.compile(rf"[ \t]*(?:({_DECIMAL})|{_WORD})[ \t]*")
 _WITH_UNIT = re.compile(rf"[ \t]*({_DECIMAL})([ \t]+1[ \t]?/[ \t]?{_UNIT}|[ \t]*{_UNIT})[ \t]*")
 
@@ -92,7 +93,7 @@ def _from_number(value: object) -> float | None:
 
 
 def _from_text(text: str, unit: str) -> float | None:
-    text = text.strip(" \t\r\n")
+    text = _BLANKS.sub(" ", text).strip()
     number = plain_number(text)
     if number is not None or not unit or len(text) > _LONGEST:
         return number
