@@ -36,7 +36,8 @@ def forward(name: str, file: Path, model: Model, folder: Path, *, as_json: bool)
         SaglineError: If an input is wrong or the folder cannot be written.
     """
     robot = load_robot(name)
-    lengths = load_lengths(file, robot.cable_count)
+    size = float(np.linalg.norm(np.ptp(robot.frame_anchors, axis=0)))
+    lengths = load_lengths(file, robot.cable_count, size)
     target = folder / f"{file_stem(robot.name, 'poses')}.csv"
     check_files(folder, [target.name])
     entry = FIT if model is Model.STRAIGHT else FORWARD

@@ -15,6 +15,7 @@ from sagline.cli.tables import plain_table
 from sagline.cli.terminal import OUTSIDE, note, show, show_json, working
 from sagline.errors import InvalidValueError
 from sagline.files.names import file_stem
+from sagline.files.pose_text import parse_pose
 from sagline.files.robot_file import load_robot
 from sagline.files.whole import check_files, made_folder
 from sagline.kinematics.inverse import inverse
@@ -89,14 +90,7 @@ def _pose(robot: Robot, text: str | None) -> Pose:
         if robot.test_box is None:
             raise InvalidValueError("--pose", "missing", "X,Y,Z or X,Y,Z,A,B,C", "This robot names no box of poses.")
         return Pose((robot.test_box.low + robot.test_box.high) / 2, np.eye(3))
-    try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
-        numbers = []
-    if len(numbers) not in (3, 6):
-        step = "Give meters, and degrees about z, y and x: --pose 1,0,1.5 or --pose 1,0,1.5,10,0,0."
-        raise InvalidValueError("--pose", repr(text), "three or six numbers", step)
-    return Pose.from_euler(numbers[:3], *np.radians(numbers[3:] or (0.0, 0.0, 0.0)))
+    return parse_pose(text)
 
 
 def _reason(robot: Robot, pose: Pose, plan: Plan) -> str:
