@@ -12,10 +12,11 @@ from typing import Literal
 import numpy as np
 import pytest
 import trimesh
-from PIL import Image
+from PIL import Image, ImageSequence
 from playwright.sync_api import Browser, ConsoleMessage, Error, Page, sync_playwright
 
 import sagline as sl
+from sagline.viewer import film
 from sagline.viewer.run import Run
 from sagline.viewer.server import started, stop
 from sagline.viewer.viewer import Viewer
@@ -130,6 +131,30 @@ def test_scene_and_picture_can_be_taken_away(browser: Browser, tmp_path: FilePat
         download.value.save_as(tmp_path / "picture.png")
         with Image.open(tmp_path / "picture.png") as picture:
             assert np.asarray(picture.convert("L")).std() > 2.0  # not blank
+
+
+def test_a_film_shows_the_run_and_leaves_the_scene_as_it_was(
+    browser: Browser, tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(film, "FRAMES", 3)
+    robot = sl.load_robot("article-suspended")
+    ends = sl.Pose(np.array([[-4.0, 0.0, 1.5], [4.0, 0.0, 1.5]]), np.stack([np.eye(3)] * 2))
+    run = Run.of(sl.inverse(robot, sl.quintic_path(ends, durations=[2.0], rate=20)))
+    with opened(browser, robot, run) as (page, viewer):
+        page.get_by_text("Take away").click()
+        with page.expect_download() as download:
+            page.get_by_role("button", name="Film of the run (GIF)").click()
+            page.get_by_text("Picture 1 of 3").wait_for()
+            assert page.get_by_label("Follow the run").is_checked()
+        download.value.save_as(tmp_path / "film.gif")
+        page.get_by_text("Picture 3 of 3").wait_for(state="detached")
+        with Image.open(tmp_path / "film.gif") as gif:
+            pictures = [np.asarray(frame.convert("RGB"), dtype=float) for frame in ImageSequence.Iterator(gif)]
+        assert len(pictures) == 3
+        cables = [np.argwhere((p[..., 0] > 150.0) & (p[..., 1] < 120.0) & (p[..., 2] > 120.0)) for p in pictures]
+        across = np.array([where[:, 1].mean() for where in cables]) / pictures[0].shape[1]
+        assert np.all(np.diff(across) > 0.015)  # they lead to the platform, which goes to the right
+        assert not next(iter(viewer._server.get_clients().values())).scene._handle_from_node_name
 
 
 def least_contrast(page: Page) -> float:

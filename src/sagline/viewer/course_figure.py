@@ -14,7 +14,7 @@ from sagline.viewer.wording import number
 WIDTH, HEIGHT = 340, 160  # px
 LEFT, RIGHT, TOP, BOTTOM = 44, 10, 20, 24  # px around the axes
 SAMPLES = 240  # of each line: more would not show
-MOST_TICKS = 5
+MOST_TICKS = 6
 # Cables by number, here and nowhere else: no color of the platform, of its path, of a tension or of a verdict.
 # Each holds 3 : 1 on the panels of both themes.
 COLORS = ("#0e9384", "#8a8a12", "#9a6f52", "#1897b8", "#5e9a3c", "#7d8794")

@@ -37,6 +37,7 @@ def filmed(client: viser.ClientHandle, run: Run, view: View) -> list[Picture]:
     settings, pictures = view.settings, []
     try:
         stage.show_traces(*run.traces(TRACE_POINTS, settings.error_scale))
+        client.get_render(height, width, transport_format="jpeg", timeout=PATIENCE)  # names come a picture late
         for i, moment in enumerate(np.linspace(0.0, run.duration, FRAMES)):
             note.body = f"Picture {i + 1} of {FRAMES}. Others see nothing of it."
             snapshot = run.snapshot(run.index_at(float(moment)))

@@ -138,7 +138,11 @@ class Panel:
             self._error_scale = self.watched(
                 gui.add_slider("Error drawn ×", 1.0, 200.0, 1.0, 1.0, hint="Position error of the orange platform.")
             )
-            self._ghost = self.watched(gui.add_checkbox("Straight cables beside", False))
+            self._ghost = self.watched(
+                gui.add_checkbox(
+                    "Straight cables beside", False, hint="Drawn where a cable hangs visibly apart from it."
+                )
+            )
 
 
 def mass_range(mass: float) -> tuple[float, float, float]:

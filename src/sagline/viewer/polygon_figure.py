@@ -81,9 +81,10 @@ def _side(polygon: TensionPolygon, k: int, start: tuple[float, float], end: tupl
         return ""
     x, y = 0.5 * (start[0] + end[0]), 0.5 * (start[1] + end[1])
     nx, ny = start[1] - end[1], end[0] - start[0]  # outward: corners go around counter-clockwise, and y points down
-    length = np.hypot(nx, ny)
-    x, y = x + 15.0 * nx / length, y + 9.0 * ny / length + 3.0
-    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="middle">{side.cable} {side.limit}</text>'
+    nx, ny = nx / np.hypot(nx, ny), ny / np.hypot(nx, ny)
+    anchor = "start" if nx > 0.35 else "end" if nx < -0.35 else "middle"  # the text leaves its side, not along it
+    x, y = x + 7.0 * nx, y + 9.0 * ny + 3.0
+    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{side.cable} {side.limit}</text>'
 
 
 def _interval(ends: Array, point: float) -> str:

@@ -36,10 +36,12 @@ def verdict(snapshot: Snapshot, *, capacity: bool = True) -> str:
 
 
 def headline(snapshot: Snapshot) -> str:
-    """The verdict in two words: proved infeasible, or without an answer."""
+    """The verdict in a word or two; what is neither feasible nor proved infeasible is named by its status."""
     if snapshot.feasible:
         return "Feasible"
-    return "Not feasible" if snapshot.status is PoseStatus.INFEASIBLE else "Not solved"
+    if snapshot.status is PoseStatus.INFEASIBLE:
+        return "Not feasible"
+    return snapshot.status.name.replace("_", " ").capitalize()
 
 
 def refused(message: str) -> str:

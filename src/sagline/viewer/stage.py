@@ -28,7 +28,7 @@ NEAR = 0.03  # of the robot's size: anchors this close share a label
 FAR = 5.0  # sizes of the robot from its middle: no gizmo is dragged there, only nonsense comes from there
 APART = 0.0035  # of the robot's size: a straight cable nearer to the hanging one would be drawn on it
 _ARM = 0.12  # longest arm of the axes, of the robot's size
-_GIZMO: Final = (0.07, 0.16)  # smallest and largest reach of the gizmo, of the robot's size
+_GIZMO: Final = (0.09, 0.16)  # smallest and largest reach of the gizmo, of the robot's size
 
 
 class Stage:

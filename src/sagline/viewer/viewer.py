@@ -78,7 +78,7 @@ class Viewer:
         self._home = home_pose(robot) if run is None else run.plan.state.pose[0]
         self._panel = Panel(server, robot, self._scale, self._wake.set, lambda: self._soon(self._forget))
         self._stage = Stage(server.scene, robot, self._home)
-        self._framing = Framing(server, *solids.bounds(robot))
+        self._framing = Framing(server, *solids.bounds_with_platform(robot, self._home))
         self._clock = Timeline(0.0 if run is None else run.duration)
         self._run_panel: RunPanel | None = None
         if run is not None:
