@@ -29,6 +29,7 @@ class ExportPanel:
             view: What is shown now.
             run: The run, if there is one.
         """
+        self._server = server
         self._view = view
         self._run = run
         self._filming: set[int] = set()  # clients
@@ -40,7 +41,7 @@ class ExportPanel:
             if run is not None:
                 buttons.append((server.gui.add_button("Film of the run (GIF)", icon=viser.Icon.MOVIE), self._send_film))
         for button, send in buttons:
-            button.on_click(partial(_sent, send))
+            button.on_click(partial(self._sent, send))
 
     def _send_picture(self, client: viser.ClientHandle) -> None:
         height, width = fitting(client, WIDTH, HEIGHT)
@@ -68,13 +69,15 @@ class ExportPanel:
         view = self._view()
         return "sagline" if view is None else "".join(c if c.isalnum() else "-" for c in view.snapshot.robot.name)
 
-
-def _sent(send: Send, event: viser.GuiEvent[Any]) -> None:
-    """Send something to the client that asked; one that has gone, or gives no picture, gets nothing."""
-    client = event.client
-    if client is None:
-        return
-    try:
-        send(client)
-    except (RuntimeError, TimeoutError) as error:
-        client.add_notification("Nothing to take away", str(error), with_close_button=True, auto_close_seconds=8.0)
+    def _sent(self, send: Send, event: viser.GuiEvent[Any]) -> None:
+        """Send something to the client that asked; one that has gone, or gives no picture, gets nothing."""
+        client = event.client
+        if client is None:
+            return
+        try:
+            send(client)
+        except (RuntimeError, TimeoutError) as error:
+            if client.client_id in self._server.get_clients():
+                client.add_notification(
+                    "Nothing to take away", str(error), with_close_button=True, auto_close_seconds=8.0
+                )

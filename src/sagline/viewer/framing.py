@@ -13,7 +13,7 @@ from sagline.arrays import Array
 
 TOWARD: Final = np.array([0.42, -0.86, 0.36]) / np.linalg.norm([0.42, -0.86, 0.36])  # from the box to the camera
 FIELD = 0.7  # rad, of view, upright: a longer lens than viser's bends less
-BORDER = 1.12  # of the box, for names and numbers around it
+BORDER = 1.06  # of the box, to stay off the edges
 _USUAL = 1.3  # width over height until a client has told its own
 _MOVED = 1e-3  # of the box: a camera farther from where it was put has been moved by hand
 _UP: Final = np.array([0.0, 0.0, 1.0])
@@ -63,6 +63,7 @@ class Framing:
 
     def __init__(self, server: viser.ViserServer, low: Array, high: Array) -> None:
         """Aim the cameras of a server's clients, those to come included."""
+        self._server = server
         self._low, self._high = low, high
         size = float(np.linalg.norm(high - low))
         self._near = _MOVED * size
@@ -86,16 +87,24 @@ class Framing:
 
     def _follow(self, camera: viser.CameraHandle) -> None:
         """Fit the box anew when the picture has other proportions, unless someone looks from elsewhere."""
-        if not camera.image_height or not (0.05 < camera.aspect < 20.0 and 0.05 < camera.fov < 3.0):
+        try:
+            shape = np.array([camera.image_width, camera.image_height, camera.fov], dtype=np.float64)
+            place = np.array(camera.position, dtype=np.float64).reshape(3)
+        except (TypeError, ValueError):
+            return  # nonsense
+        if not (np.all((shape > 0.0) & (shape < [1e5, 1e5, 3.0])) and 0.05 < shape[0] / shape[1] < 20.0):
             return  # a hidden window, or nonsense
         with self._lock:
-            places = self._places.setdefault(camera.client.client_id, [])
-            known = np.array([self._first, *places])
-            if places and not np.linalg.norm(known - camera.position, axis=1).min() < self._near:
-                return
-            position, target = fitted(self._low, self._high, camera.aspect, camera.fov)
-            if np.linalg.norm(position - camera.position) < self._near:
-                return
-            places.append(position)
-            with camera.client.atomic():
-                camera.position, camera.look_at = position, target
+            self._fit(camera, place, float(shape[0] / shape[1]), float(shape[2]))
+
+    def _fit(self, camera: viser.CameraHandle, place: Array, aspect: float, field: float) -> None:
+        places = self._places.setdefault(camera.client.client_id, [])
+        known = np.array([self._first, *places])
+        if places and not np.linalg.norm(known - place, axis=1).min() < self._near:
+            return
+        position, target = fitted(self._low, self._high, aspect, field)
+        if np.linalg.norm(position - place) < self._near or camera.client.client_id not in self._server.get_clients():
+            return
+        places.append(position)
+        with camera.client.atomic():
+            camera.position, camera.look_at = position, target

@@ -8,6 +8,7 @@ from typing import Any
 
 import viser
 
+from sagline.errors import InvalidValueError
 from sagline.robot.robot import Robot
 from sagline.viewer import readout
 from sagline.viewer.settings import METHODS, MODELS, Settings
@@ -61,13 +62,13 @@ class Panel:
             InvalidValueError: If a client sent what no slider gives.
         """
         return Settings(
-            mass=float(self._mass.value),
-            density=float(self._density.value),
-            stiffness=float(self._stiffness.value),
+            mass=_slid(self._mass),
+            density=_slid(self._density),
+            stiffness=_slid(self._stiffness),
             model=MODELS.get(self._model.value, next(iter(MODELS.values()))),
             tension=METHODS.get(self._method.value, next(iter(METHODS.values()))),
-            sag_scale=float(self._sag_scale.value),
-            error_scale=float(self._error_scale.value),
+            sag_scale=_slid(self._sag_scale),
+            error_scale=_slid(self._error_scale),
         )
 
     def show_what_if(self, shown: bool) -> None:
@@ -143,6 +144,18 @@ class Panel:
                     "Straight cables beside", False, hint="Drawn where a cable hangs visibly apart from it."
                 )
             )
+
+
+def _slid(slider: Any) -> float:
+    """The value of a slider.
+
+    Raises:
+        InvalidValueError: If a client sent one that the slider does not reach.
+    """
+    value, low, high = float(slider.value), float(slider.min), float(slider.max)
+    if not low <= value <= high:
+        raise InvalidValueError(slider.label, value, f"{low:g} to {high:g}", "Move the slider.")
+    return value
 
 
 def mass_range(mass: float) -> tuple[float, float, float]:

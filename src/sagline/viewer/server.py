@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import socket
+import warnings
 from contextlib import redirect_stdout
 from io import StringIO
 
@@ -42,8 +43,10 @@ def started(host: str = LOOPBACK, port: int = PORT, title: str = NAME) -> Server
         InvalidValueError: If nothing can listen there; viser itself would take the next port, or wait for ever.
     """
     _check(host, port)
-    # a client that says nonsense is cut off; that is no error of ours, and needs no traceback
-    logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
+    # a client that says nonsense is cut off or not heard, one that leaves gets no more; neither is news on the terminal
+    for name in ("websockets.server", "asyncio"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+    warnings.filterwarnings("ignore", message="Queued a .* on a closed connection")
     with redirect_stdout(StringIO()):
         server = Server(host, port, title)
     server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 from sagline.arrays import Array
-from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
 Faces = NDArray[np.int64]
@@ -52,12 +51,6 @@ def bounds(robot: Robot) -> tuple[Array, Array]:
         floor = 0.0 if robot.test_box is None else min(0.0, float(robot.test_box.low[2]))
         low = np.array([*low[:2], min(floor, low[2])])
     return low, high
-
-
-def bounds_with_platform(robot: Robot, pose: Pose) -> tuple[Array, Array]:
-    """Lowest and highest corner of the box around the robot with its platform at a pose [m]."""
-    corners = np.vstack((*bounds(robot), pose.transform(platform(robot).vertices)))
-    return corners.min(axis=0), corners.max(axis=0)
 
 
 def size_of(robot: Robot) -> float:

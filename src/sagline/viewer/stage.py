@@ -28,6 +28,8 @@ NEAR = 0.03  # of the robot's size: anchors this close share a label
 FAR = 5.0  # sizes of the robot from its middle: no gizmo is dragged there, only nonsense comes from there
 APART = 0.0035  # of the robot's size: a straight cable nearer to the hanging one would be drawn on it
 _ARM = 0.12  # longest arm of the axes, of the robot's size
+_BELOW: Final = np.array([0.02, 0.07, 0.03])  # room for the axes and their names around the robot, of its size
+_ABOVE: Final = np.array([0.02, 0.0, 0.08])  # room for the cables' names
 _GIZMO: Final = (0.09, 0.16)  # smallest and largest reach of the gizmo, of the robot's size
 
 
@@ -41,7 +43,7 @@ class Stage:
         self._low, self._high = solids.bounds(robot)
         self._size = solids.size_of(robot)
         self._build_surroundings(robot)
-        body = solids.platform(robot)
+        body = self._body = solids.platform(robot)
         self._gizmo: Any = (
             self._build_gizmo(robot, body) if draggable else scene.add_frame("/platform", show_axes=False)
         )
@@ -66,6 +68,11 @@ class Stage:
         """What is dragged, where something is."""
         gizmo: viser.TransformControlsHandle = self._gizmo
         return gizmo
+
+    def extent(self, pose: Pose) -> tuple[Array, Array]:
+        """Lowest and highest corner of what there is to see with the platform at a pose, names and axes too [m]."""
+        corners = np.vstack((self._low, self._high, pose.transform(self._body.vertices)))
+        return corners.min(axis=0) - _BELOW * self._size, corners.max(axis=0) + _ABOVE * self._size
 
     def dragged_pose(self) -> Pose:
         """Where the gizmo is.

@@ -12,7 +12,7 @@ import numpy as np
 import viser
 
 from sagline.arrays import Array
-from sagline.errors import InvalidValueError
+from sagline.errors import SaglineError
 from sagline.kinematics.plan import Plan
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
@@ -78,7 +78,7 @@ class Viewer:
         self._home = home_pose(robot) if run is None else run.plan.state.pose[0]
         self._panel = Panel(server, robot, self._scale, self._wake.set, lambda: self._soon(self._forget))
         self._stage = Stage(server.scene, robot, self._home)
-        self._framing = Framing(server, *solids.bounds_with_platform(robot, self._home))
+        self._framing = Framing(server, *self._stage.extent(self._home))
         self._clock = Timeline(0.0 if run is None else run.duration)
         self._run_panel: RunPanel | None = None
         if run is not None:
@@ -173,7 +173,7 @@ class Viewer:
             settings = self._panel.settings()
             following = self._run_panel is not None and self._run_panel.following
             snapshot = self._from_run() if following else self._from_gizmo(settings)
-        except InvalidValueError as error:
+        except SaglineError as error:
             self._panel.refuse(str(error))
             return
         if self._run_panel is not None:
