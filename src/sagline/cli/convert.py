@@ -5,14 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import typer
-
 from sagline.cables.cable import Cable
 from sagline.cli.choices import Format
-from sagline.cli.terminal import note
+from sagline.cli.terminal import note, show_data
+from sagline.cli.values import FARTHEST, numbers, quantity
 from sagline.errors import FileError, InvalidValueError
 from sagline.files.imported import Imported
-from sagline.files.quantity import in_si
 from sagline.files.robot_file import dump_robot, load_robot
 from sagline.files.whole import write_text
 from sagline.robot.pose import Pose
@@ -28,7 +26,7 @@ def convert(
     density: str | None,
     stiffness: str | None,
     cable_set: str | None,
-    at: tuple[float, float, float] | None,
+    at: tuple[str, str, str] | None,
 ) -> None:
     """Read, convert, write to a file or to stdout, and report on stderr.
 
@@ -37,10 +35,11 @@ def convert(
     """
     if out is not None and Path(source).exists() and out.resolve() == Path(source).resolve():
         raise FileError(out, "is the file to convert", "Name another file with --out.")
+    place = None if at is None else numbers(at, "--at", "m", FARTHEST)
     imported = _read(source, _material(density, stiffness), cable_set)
-    text = dump_robot(imported.robot) if form is Format.ROBOT else _mjcf(imported.robot, at)
+    text = dump_robot(imported.robot) if form is Format.ROBOT else _mjcf(imported.robot, place)
     if out is None:
-        typer.echo(text, nl=False)
+        show_data(text)
     else:
         write_text(out, text)
     _report(imported, out)
@@ -66,14 +65,10 @@ def _material(density: str | None, stiffness: str | None) -> Cable | None:
     if density is None or stiffness is None:
         missing = "--linear-density" if density is None else "--axial-stiffness"
         raise InvalidValueError(missing, "missing", "both or none of the two", f"Add {missing}.")
-    values = [
-        in_si(text, unit, item)
-        for text, unit, item in ((density, "kg/m", "--linear-density"), (stiffness, "N", "--axial-stiffness"))
-    ]
-    return Cable(*values)
+    return Cable(quantity(density, "--linear-density", "kg/m"), quantity(stiffness, "--axial-stiffness", "N"))
 
 
-def _mjcf(robot: Robot, at: tuple[float, float, float] | None) -> str:
+def _mjcf(robot: Robot, at: list[float] | None) -> str:
     from sagline.files.mjcf import dump_mjcf
 
     if at is None and robot.test_box is None:
