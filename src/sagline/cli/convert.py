@@ -35,6 +35,10 @@ def convert(
     """
     if out is not None and Path(source).exists() and out.resolve() == Path(source).resolve():
         raise FileError(out, "is the file to convert", "Name another file with --out.")
+    if at is not None and form is Format.ROBOT:
+        raise InvalidValueError(
+            "--at", "given for a robot file", "--format mjcf", "A robot file holds no pose: leave it out."
+        )
     place = None if at is None else numbers(at, "--at", "m", FARTHEST)
     imported = _read(source, _material(density, stiffness), cable_set)
     text = dump_robot(imported.robot) if form is Format.ROBOT else _mjcf(imported.robot, place)
@@ -47,11 +51,14 @@ def convert(
 
 def _read(source: str, cables: Cable | None, cable_set: str | None) -> Imported:
     path = Path(source)
+    is_caspr = path.suffix.lower() == ".xml" or path.is_dir()
+    if cable_set is not None and not is_caspr:
+        raise InvalidValueError("--cable-set", repr(cable_set), "none but for CASPR", "Leave it out.")
     if path.suffix.lower() == ".wcrfx":
         from sagline.files.wirex import load_wirex
 
         return load_wirex(path, cables)
-    if path.suffix.lower() == ".xml" or path.is_dir():
+    if is_caspr:
         from sagline.files.caspr import load_caspr
 
         return load_caspr(path, cables, cable_set)

@@ -64,10 +64,10 @@ def _finished(command: Callable[[], object]) -> int:
 def _told(error: BaseException, debug: bool) -> int:
     """Say what went wrong; the exit code."""
     _give_up_unwritable()
+    if isinstance(error, BrokenPipeError) or isinstance(error.__context__, BrokenPipeError):  # the latter by typer
+        return CUT_OFF
     if isinstance(error, SystemExit):
         return error.code if isinstance(error.code, int) else 0 if error.code is None else UNEXPECTED
-    if isinstance(error, BrokenPipeError):
-        return CUT_OFF
     if isinstance(error, KeyboardInterrupt):
         return _interrupted()
     if debug:

@@ -33,8 +33,8 @@ def write_examples(folder: Path, *, force: bool) -> None:
     for file in sources:
         with written_whole(folder / file.name) as partial:
             shutil.copyfile(file, partial)
-    show(f"In {folder.resolve()}: {', '.join(file.name for file in sources)}")
-    show(f"Try: cd {quote(str(folder))}; sagline track own_robot.yaml own_path.yaml")
+    show(f"In {folder.resolve()}: {', '.join(file.name for file in sources)}", whole=True)
+    show(f"Try: cd {quote(str(folder))}; sagline track own_robot.yaml own_path.yaml", whole=True)
 
 
 def example_files() -> list[Path]:

@@ -57,7 +57,7 @@ def forward(
         show_table(_grid(rows))
         if len(rows) - 1 > SHOWN:
             show(f"The first {SHOWN} of {len(rows) - 1:,} samples; the file has them all")
-        show(f"In {folder.resolve()}: {target.name}")
+        show(f"In {folder.resolve()}: {target.name}", whole=True)
     if not lost:
         return 0
     status = ForwardStatus(int(found.status[lost[0]]))

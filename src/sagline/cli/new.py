@@ -78,7 +78,7 @@ def new(file: Path, answers: dict[str, str | None], *, force: bool) -> Robot:
     write_text(file, text)
     _explain(made, design, middle)
     for what, command in (("Written", ""), ("Look at it", "sagline view "), ("Every value", "sagline show ")):
-        show(f"{what}: {command}{quote(str(file)) if command else file}")
+        show(f"{what}: {command}{quote(str(file)) if command else file}", whole=True)
     return made
 
 

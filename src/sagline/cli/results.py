@@ -47,7 +47,7 @@ def tell(runs: Sequence[Run], files: Sequence[Path], folder: Path, *, as_json: b
         show_json({"runs": [_record(run) for run in runs], "files": list(files)})
     else:
         show_table(summary_grid(runs))
-        show(f"In {folder.resolve()}: {_listed(files)}")
+        show(f"In {folder.resolve()}: {_listed(files)}", whole=True)
     return max((_complaints(run) for run in runs), default=0)
 
 

@@ -82,7 +82,7 @@ def tension(
     show_table(_grid(robot, plans))
     show(f"Extra force in the worst direction before no tensions balance it: {margin:.4g} N")
     if files:
-        show(f"In {folder.resolve()}: {', '.join(file.name for file in files)}")
+        show(f"In {folder.resolve()}: {', '.join(file.name for file in files)}", whole=True)
     return 0
 
 

@@ -60,19 +60,20 @@ def note(head: str, text: str, style: str = "") -> None:
         _err.print(Text.assemble((printable(head), style), printable(text)), soft_wrap=True)
 
 
-def show(what: str, indent: int = 0, style: str = "") -> None:
-    """A line of the result, for a person; or, indented, lines that are broken between words.
+def show(what: str, indent: int = 0, style: str = "", *, whole: bool = False) -> None:
+    """Part of the result, for a person; its lines are broken between words where the terminal ends.
 
     Args:
         what: The text.
-        indent: Columns before each line; 0 leaves one line whole, so that paths in it can be copied.
+        indent: Columns before each line.
         style: Of rich.
+        whole: Whether its line stays one, so that paths and commands in it can be copied.
     """
-    if indent:
-        text = Padding(Text(printable(what, "\n"), style), (0, 0, 0, indent), expand=False)
-        show_pieces(lambda console, width: [(text, 0)])
-    else:
+    if whole:
         _emit(Text(printable(what), style))
+    else:
+        text = Text(printable(what, "\n" if indent else ""), style)
+        show_pieces(lambda console, width: [(Padding(text, (0, 0, 0, indent), expand=False) if indent else text, 0)])
 
 
 def show_pieces(pieces: Callable[[Console, int], Iterable[tuple[RenderableType, int]]]) -> None:
@@ -116,7 +117,7 @@ def _fits(character: str) -> bool:
 def _emit(what: RenderableType, width: int | None = None) -> None:
     """Print in a width; None leaves lines whole."""
     console = _out if _out.is_terminal else _wide
-    with console.capture() as captured:
+    with _refused(), console.capture() as captured:
         console.print(what, width=width, soft_wrap=width is None, crop=False)
     _write(captured.get())
 

@@ -60,7 +60,7 @@ def serve(robot: Robot, run: Path | None, host: str, port: int, *, browser: bool
         signal.signal(signal.SIGINT, signal.default_int_handler)  # from here on Ctrl-C is how one ends, and no failure
     try:
         address = web.url(server, host)
-        show(f"{machine.name} is at {address}   (Ctrl-C stops it)")
+        show(f"{machine.name} is at {address}   (Ctrl-C stops it)", whole=True)
         if host not in ("127.0.0.1", "::1", "localhost"):
             note("Note: ", "everyone who can reach this machine can look at it and drag it.", style="bold")
         readings = Readings()
