@@ -1,8 +1,18 @@
-"""What sagline raises: one family of exceptions that carry their data."""
+"""What sagline raises: one family of exceptions that carry their data, each told in one line."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable
+from difflib import get_close_matches
 from pathlib import Path
+from typing import Final
+
+_LONGEST: Final = 299  # letters of a message; more is not read, and floods a terminal
+_KEPT: Final = 60  # letters that stay of each part of a message that is too long
+_UNPRINTABLE = re.compile(  # what moves a cursor, ends a line, turns the reading direction, or cannot be encoded
+    "[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ufeff\ud800-\udfff\ufffe\uffff]"
+)
 
 
 class SaglineError(Exception):
@@ -28,8 +38,8 @@ class InvalidValueError(SaglineError, ValueError):
         self.next_step = next_step
 
     def __str__(self) -> str:
-        """One sentence: item, value, allowed range, next step."""
-        return f"{self.item} is {self.value}; allowed: {self.allowed}. {self.next_step}"
+        """One line: item, value, allowed range, next step."""
+        return _line(self.item, " is ", str(self.value), "; allowed: ", self.allowed, ". ", self.next_step)
 
 
 class CableGeometryError(InvalidValueError):
@@ -52,6 +62,62 @@ class FileError(SaglineError):
         self.reason = reason
         self.next_step = next_step
 
+    @classmethod
+    def of(cls, path: Path | str, error: InvalidValueError) -> FileError:
+        """What is wrong with a value, told with the file that says it."""
+        return cls(path, f"{error.item} is {error.value}; allowed: {error.allowed}", error.next_step)
+
     def __str__(self) -> str:
-        """One sentence: file, reason, next step."""
-        return f"{self.path}: {self.reason}. {self.next_step}"
+        """One line: file, reason, next step."""
+        return _line(str(self.path), ": ", self.reason, ". ", self.next_step)
+
+
+def printable(text: str) -> str:
+    r"""A text as a terminal may be given it: nothing in it moves the cursor, hides a letter or cannot be written.
+
+    Args:
+        text: Any text, from a file for instance.
+
+    Returns:
+        The text, with control characters, line ends and lone surrogates written out as Python writes them.
+
+    Examples:
+        >>> from sagline.errors import printable
+        >>> print(printable("a\x1b[31m\nb"))
+        a\x1b[31m\nb
+    """
+    return _UNPRINTABLE.sub(lambda found: repr(found[0])[1:-1], text)
+
+
+def nearest(word: str, known: Iterable[str]) -> str | None:
+    """The known word that somebody may have meant, for "Did you mean".
+
+    Args:
+        word: What was given.
+        known: What would have done.
+
+    Returns:
+        The nearest known word; None where none is near.
+
+    Examples:
+        >>> from sagline.errors import nearest
+        >>> nearest("cogero", ["cogiro", "fast"]), nearest("nothere", ["cogiro", "fast"])
+        ('cogiro', None)
+    """
+    folded = {other.lower(): other for other in known}
+    near = get_close_matches(word[:_KEPT].lower(), folded, n=1)
+    return folded[near[0]] if near else None
+
+
+def _line(*parts: str) -> str:
+    """The parts as one line; where it is too long, the longest of them lose their middle."""
+    shown = [printable(part) for part in parts]
+    while (excess := sum(map(len, shown)) - _LONGEST) > 0:
+        k = max(range(len(shown)), key=lambda k: len(shown[k]))
+        shown[k] = _shortened(shown[k], max(_KEPT, len(shown[k]) - excess))
+    return "".join(shown)
+
+
+def _shortened(text: str, length: int) -> str:
+    end = length // 3
+    return f"{text[: length - end - 1]}…{text[-end:]}"

@@ -39,7 +39,8 @@ def forward(
     """
     load = wrench_of(wrench)
     robot = loaded(load_robot(name), payload)
-    lengths = load_lengths(file, robot.cable_count)
+    size = float(np.linalg.norm(np.ptp(robot.frame_anchors, axis=0)))
+    lengths = load_lengths(file, robot.cable_count, size)
     check_folder(folder)
     entry = FIT if model is Model.STRAIGHT else FORWARD
     with working(f"{robot.name}: finding {len(lengths.unstrained_length):,} poses", entry) as line:

@@ -14,8 +14,9 @@ from sagline.cli.entries import INVERSE, MARGINS, POLYGON, SHARING
 from sagline.cli.results import write_figures
 from sagline.cli.tables import Grid, show_table
 from sagline.cli.terminal import note, show, show_json, working
-from sagline.cli.values import loaded, middle_of, pose_of, wrench_of
+from sagline.cli.values import loaded, middle_of, wrench_of
 from sagline.errors import InvalidValueError
+from sagline.files.pose_text import parse_pose
 from sagline.files.robot_file import load_robot
 from sagline.files.whole import check_folder, made_folder
 from sagline.kinematics.inverse import inverse
@@ -52,7 +53,7 @@ def tension(
     Raises:
         SaglineError: If an input is wrong or the folder cannot be written.
     """
-    load, place = wrench_of(wrench), None if pose is None else pose_of(pose)
+    load, place = wrench_of(wrench), None if pose is None else parse_pose(pose)
     robot = loaded(load_robot(name), payload)
     place = middle_of(robot) if place is None else place
     drawn = figures and robot.cable_count == robot.degrees_of_freedom + 2

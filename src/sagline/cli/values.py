@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, cast
 
@@ -10,15 +9,13 @@ import numpy as np
 
 from sagline.arrays import Array, checked
 from sagline.errors import InvalidValueError
-from sagline.files.quantity import in_si
+from sagline.files.quantity import in_si, plain_number
 from sagline.robot.pose import Pose
 
 if TYPE_CHECKING:
     from sagline.robot.robot import Robot
 
 FARTHEST, STRONGEST, HEAVIEST = 1e6, 1e12, 1e12  # m; N and N m; kg: beyond all machines, far below what overflows
-TURN = 360.0  # degrees
-_DECIMAL = re.compile(r"\s*[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?\s*")
 
 
 def numbers(parts: Sequence[str], item: str, unit: str, largest: float) -> list[float]:
@@ -35,8 +32,8 @@ def numbers(parts: Sequence[str], item: str, unit: str, largest: float) -> list[
     """
     found = []
     for part in parts:
-        number = float(part) if _DECIMAL.fullmatch(part) else np.inf
-        if abs(number) > largest:
+        number = plain_number(part)
+        if number is None or abs(number) > largest:
             raise InvalidValueError(item, repr(part), f"decimal numbers up to {largest:g} {unit}", f"Correct {item}.")
         found.append(number)
     return found
@@ -59,21 +56,6 @@ def quantity(text: str, item: str, unit: str, *, low: float = -np.inf, above: fl
     if abs(number) > HEAVIEST:
         raise InvalidValueError(item, repr(text), f"up to {HEAVIEST:g} {unit}", f"Correct {item}.")
     return float(checked(number, item, unit, shape=(), low=low, above=above))
-
-
-def pose_of(text: str) -> Pose:
-    """A pose from "x,y,z" in m, or "x,y,z,a,b,c" with angles about z, y and x in degrees.
-
-    Raises:
-        InvalidValueError: If it is none.
-    """
-    parts = text.split(",")
-    if len(parts) not in (3, 6):
-        step = "Give meters, and degrees about z, y and x: --pose 1,0,1.5 or --pose 1,0,1.5,10,0,0."
-        raise InvalidValueError("--pose", repr(text), "three or six numbers", step)
-    place = numbers(parts[:3], "--pose", "m", FARTHEST)
-    angles = numbers(parts[3:] or ("0", "0", "0"), "--pose", "degrees", TURN)
-    return Pose.from_euler(place, *np.radians(angles))
 
 
 def middle_of(robot: Robot) -> Pose:

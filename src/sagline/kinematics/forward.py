@@ -16,6 +16,7 @@ from sagline.kinematics.forward_rows import solve_rows
 from sagline.kinematics.forward_solution import ForwardSolution
 from sagline.kinematics.measured import MeasuredTension, corrected
 from sagline.kinematics.start import search
+from sagline.memory import check_poses
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.robot.several import check_count, first_of, together
@@ -58,7 +59,8 @@ def forward(
 
     Raises:
         InvalidValueError: If a length is not positive or single lengths of a sample are NaN (the message names the
-            cable), several robots do not fit together (it names which), or an argument is of the wrong shape.
+            cable), several robots do not fit together (it names which), an argument is of the wrong shape, or so many
+            samples need more memory than is free.
 
     Source:
         docs/model.md, section 6.
@@ -76,6 +78,7 @@ def forward(
     shape = lengths.shape[:-1]
     count = shape[0] if shape else None
     check_count(robots, count)
+    check_poses(count or 1, lengths.shape[-1])
     load = external_wrench(wrench, count)
     samples, loads = np.atleast_2d(lengths), np.atleast_2d(load)
     if start is None:

@@ -15,6 +15,7 @@ from sagline.errors import CableGeometryError, InvalidValueError
 from sagline.kernels import codes, tables
 from sagline.kinematics.inverse_rows import explained, solve_rows
 from sagline.kinematics.plan import Plan
+from sagline.memory import check_poses
 from sagline.motion.path import Path
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
@@ -61,8 +62,8 @@ def inverse(
 
     Raises:
         InvalidValueError: If a robot has fewer cables than degrees of freedom, the method cannot share among
-            its cables, several robots do not fit together (the message names which), or an argument is of the
-            wrong shape.
+            its cables, several robots do not fit together (the message names which), an argument is of the wrong
+            shape, or so many poses need more memory than is free.
         CableGeometryError: If a cable has no length at some pose.
 
     Source:
@@ -82,6 +83,7 @@ def inverse(
     options = kernel_options(robots, model, method)
     rows = pose_rows(pose)
     count = len(rows)
+    check_poses(count, shared.cable_count)
     load = external_wrench(wrench, count if pose.shape else None)
     if isinstance(motion, Path):
         load = locked(inertial_wrench(robots, pose, motion.twist, motion.twist_rate) + load)

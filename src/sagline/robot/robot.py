@@ -29,8 +29,9 @@ class Robot:
         platform_anchors: Platform ends of the cables in the platform frame [m], shape (m, 3).
         cables: Material of the cables, fields of shape (m,).
         mass: Mass of the platform [kg], > 0.
-        inertia: Inertia about the center of mass in the platform frame [kg m^2], shape (3, 3), positive definite;
-            zero where the motion pattern has no rotation and none was given.
+        inertia: Inertia about the center of mass in the platform frame [kg m^2], shape (3, 3): positive
+            definite, no principal moment larger than the other two together. Only the moment about plane_normal need
+            be positive in a planar pattern, and none where the motion pattern has no rotation.
         center_of_mass: Center of mass in the platform frame [m], shape (3,).
         gravity: Gravitational acceleration along -z [m/s^2], >= 0.
         motion_pattern: "3R3T", "3T" (point mass), "1R2T" (planar) or "2T" (planar without rotation).
@@ -132,27 +133,28 @@ class Robot:
         """
         frame, platform = checks.anchors(frame_anchors, platform_anchors)
         checks.choice(motion_pattern, "motion_pattern", MOTION_PATTERNS)
+        normal = checks.plane_normal(plane_normal, motion_pattern)
         lower, upper = checks.tension_limits(tension_min, tension_max, len(frame))
         values = {
-            "name": name,
+            "name": checks.name(name),
             "frame_anchors": frame,
             "platform_anchors": platform,
             "cables": checks.cables(cables, len(frame)),
             "mass": checks.number(mass, "mass", "kg", above=0.0),
-            "inertia": checks.inertia(inertia, motion_pattern),
+            "inertia": checks.inertia(inertia, motion_pattern, normal),
             "center_of_mass": checks.exactly(center_of_mass, "center_of_mass", "m", (3,)),
             "gravity": checks.number(gravity, "gravity", "m/s^2", low=0.0),
             "motion_pattern": motion_pattern,
-            "plane_normal": checks.plane_normal(plane_normal, motion_pattern),
+            "plane_normal": normal,
             "tension_min": lower,
             "tension_max": upper,
             "tension_limits_of": checks.choice(tension_limits_of, "tension_limits_of", get_args(TensionLimitsOf)),
             "platform_size": checks.size(platform_size, "platform_size"),
             "frame_size": checks.size(frame_size, "frame_size"),
             "test_box": test_box,
-            "source": source,
+            "source": checks.text(source, "source"),
             "assumed": _known_fields(assumed),
-            "notes": notes,
+            "notes": checks.text(notes, "notes"),
         }
         for field, value in values.items():
             object.__setattr__(self, field, value)
@@ -208,4 +210,4 @@ def _known_fields(assumed: Mapping[str, str]) -> Mapping[str, str]:
     names = Robot.__slots__
     for field in assumed:
         checks.choice(field, "assumed: field", names)
-    return MappingProxyType({str(field): str(why) for field, why in assumed.items()})
+    return MappingProxyType({field: checks.text(why, f"assumed: {field}") for field, why in assumed.items()})
