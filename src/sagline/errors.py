@@ -19,6 +19,10 @@ class SaglineError(Exception):
     """Base of everything sagline raises on purpose; its text says what to do next."""
 
 
+class SaglineWarning(UserWarning):
+    """Something that stands, but is to be taken with care; its text says why and what to do."""
+
+
 class InvalidValueError(SaglineError, ValueError):
     """A value that cannot be worked with.
 

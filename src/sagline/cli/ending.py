@@ -78,6 +78,8 @@ def _told(error: BaseException, debug: bool) -> int:
 
     head, text, code = _message(error)
     note(head, shortened(text, LONGEST - len(head)), style="bold red")
+    for line in getattr(error, "__notes__", ()):
+        note("", line)
     return code
 
 

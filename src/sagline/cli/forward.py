@@ -14,6 +14,7 @@ from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.cli.values import loaded, wrench_of
 from sagline.files.lengths_file import Lengths, load_lengths
+from sagline.files.names import file_stem
 from sagline.files.robot_file import load_robot
 from sagline.files.whole import check_folder, made_folder, write_text
 from sagline.kinematics.forward import forward as solve
@@ -47,7 +48,7 @@ def forward(
         first = solve(robot, lengths.unstrained_length[0], model=model.build(), wrench=load)
         start = first.pose if np.isfinite(first.pose.position).all() else None
         found = solve(robot, lengths.unstrained_length, start, model.build(), load, progress=line.progress)
-    target = made_folder(folder) / f"{robot.name}-poses.csv"
+    target = made_folder(folder) / f"{file_stem(robot.name, 'poses')}.csv"
     rows = _rows(lengths, found)
     write_text(target, csv_text(rows))
     lost = [k for k, status in enumerate(found.status) if status not in FINE]

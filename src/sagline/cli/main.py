@@ -7,6 +7,7 @@ import sys
 from collections.abc import Sequence
 from importlib.metadata import version
 from inspect import cleandoc
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -18,8 +19,10 @@ from sagline.cli.commands.robots import convert, examples, new, robots, show
 from sagline.cli.commands.track import lengths, run, track
 from sagline.cli.commands.view import view
 from sagline.cli.ending import ended
+from sagline.files.whole import finished_files
 
 DEBUG = "--debug"
+MOST_NAMES = 6  # of files, told when something failed after them
 START = """\
 Cable robots whose cables sag: from a robot and a path to proven cable lengths.
 
@@ -60,9 +63,15 @@ class Group(TyperGroup):
         alone = extra.pop("standalone_mode", True)
 
         def command() -> Any:
-            return super(Group, self).main(
-                [word for word in words if word != DEBUG], *more, **{**extra, "standalone_mode": False}
-            )
+            with finished_files() as finished:
+                try:
+                    return super(Group, self).main(
+                        [word for word in words if word != DEBUG], *more, **{**extra, "standalone_mode": False}
+                    )
+                except Exception as error:
+                    if finished:
+                        error.add_note(_before(finished))
+                    raise
 
         return sys.exit(ended(command, debug=debug)) if alone else command()
 
@@ -74,6 +83,13 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+
+
+def _before(finished: Sequence[Path]) -> str:
+    """What was written before something failed."""
+    names = ", ".join(file.name for file in finished[:MOST_NAMES])
+    more = f" and {len(finished) - MOST_NAMES} more" if len(finished) > MOST_NAMES else ""
+    return f"Written before, and whole: {names}{more} in {finished[0].parent}"
 
 
 def _print_version(wanted: bool) -> None:

@@ -11,6 +11,7 @@ from sagline.arrays import Array
 from sagline.blocks import Progress
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
+from sagline.files.names import file_stem
 from sagline.kinematics.confirm import Confirmation, confirm
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Gap, Plan
@@ -46,9 +47,8 @@ class Run(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Robot and model, as files are named: letters, digits, dots and hyphens."""
-        words = f"{self.plan.state.one_robot.name} {type(self.plan.state.cables.model).__name__.lower()}"
-        return "-".join("".join(c if c.isalnum() or c in "._-" else " " for c in words).split()).lstrip(".-")
+        """Robot and model, as files are named."""
+        return file_stem(self.plan.state.one_robot.name, type(self.plan.state.cables.model).__name__.lower())
 
     @property
     def lost(self) -> int:

@@ -16,6 +16,7 @@ from sagline.cli.tables import Grid, show_table
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.cli.values import loaded, middle_of, wrench_of
 from sagline.errors import InvalidValueError
+from sagline.files.names import file_stem
 from sagline.files.pose_text import parse_pose
 from sagline.files.robot_file import load_robot
 from sagline.files.whole import check_folder, made_folder
@@ -73,7 +74,7 @@ def tension(
 
         shape = tension_polygon(robot, place, model.build(), variable=variable.value)
         points = {title: plan.chord_tension for title, plan in plans.items() if plan is not None}
-        files = write_figures({f"{robot.name}-tension": plot.polygon(shape, points)}, folder)
+        files = write_figures({file_stem(robot.name, "tension"): plot.polygon(shape, points)}, folder)
     margin = float(capacity_margin(least.state))
     if as_json:
         show_json(

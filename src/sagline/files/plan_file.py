@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Mapping
 from dataclasses import fields
 from importlib.metadata import version
@@ -18,9 +19,11 @@ from sagline.cables.empirical import Empirical
 from sagline.cables.model import CableModel, CableState
 from sagline.cables.parabolic import Parabolic
 from sagline.cables.straight import Straight
-from sagline.errors import FileError, InvalidValueError
+from sagline.errors import FileError, InvalidValueError, SaglineWarning
+from sagline.files.plan_checks import check_plan
 from sagline.files.plan_layout import JERK, MOTION, PARTS, PROOF, QUANTITIES, TIME, Quantity
 from sagline.files.robot_file import dump_robot, parse_robot
+from sagline.files.seal import Seal, seal, seal_of
 from sagline.files.whole import written_whole
 from sagline.kinematics.plan import Plan
 from sagline.motion.path import Path
@@ -33,9 +36,10 @@ from sagline.tension.methods import METHODS
 if TYPE_CHECKING:
     from xarray import Dataset
 
-FORMAT = 1  # raised whenever an older sagline could misread the file
+FORMAT = 2  # raised whenever an older sagline could misread the file; 2: with a digest
 MODELS = {model.__name__: model for model in (Straight, Elastic, Empirical, Parabolic, Catenary)}
-HEADERS = 1 << 18  # bytes, more than all names, attributes and the robot take
+HEADERS = 1 << 18  # bytes, more than all names and attributes take beside the robot
+INFLATION = 1000  # times the size of a file that its numbers may take in memory: nobody packs them so well
 STATE_ARRAYS = ("span", "rise", "unstrained_length", "horizontal_tension", "vertical_force", "chord_tension")
 
 Choice = TypeVar("Choice", CableModel, TensionMethod)
@@ -45,21 +49,25 @@ def save_plan(plan: Plan, file: os.PathLike[str] | str) -> None:
     """Write a plan to a NetCDF file, whole or not at all.
 
     Dimensions are pose (absent for a single pose) and cable; a path's times are a coordinate of pose. Poses without
-    an answer are kept, with their status, shortfall, blocking cables and proof, and NaN lengths and forces.
+    an answer are kept, with their status, shortfall, blocking cables and proof, and NaN lengths and forces. A digest
+    over all values and attributes stands at the end, behind what NetCDF reads, and shows when anything has changed.
 
     Args:
         plan: The plan, of one robot.
-        file: The file, "run.nc" for instance; one that exists is replaced.
+        file: The file, "run.nc" for instance; a regular file that exists is replaced, anything else is refused.
 
     Raises:
-        InvalidValueError: If the plan is of several robots, one a pose.
+        InvalidValueError: If the plan is of several robots, one a pose; of a cable model or a way of sharing that is
+            none of sagline's; or if its values are none that `inverse` gives.
         FileError: If the file cannot be written; what was there before is untouched.
     """
     data = _dataset(plan)
-    with written_whole(file, size=data.nbytes + HEADERS) as partial:
+    check_plan(data, plan.state.one_robot.cable_count)
+    with written_whole(file, size=data.nbytes + HEADERS + len(data.attrs["robot"].encode())) as partial:
         # _FillValue None: numbers are stored as they are, and NaN needs no second meaning
         encoding = {str(name): {"_FillValue": None} for name in data.variables}
         data.to_netcdf(partial, engine="h5netcdf", encoding=encoding)
+        seal(partial)
 
 
 def load_plan(file: os.PathLike[str] | str) -> Plan:
@@ -72,7 +80,11 @@ def load_plan(file: os.PathLike[str] | str) -> Plan:
         The plan; its proofs, `farkas` and `needed`, are None in a file that was written before files kept them.
 
     Raises:
-        FileError: If the file is missing, cut off, no NetCDF file, no plan, or of a newer format.
+        FileError: If the file is missing, cut off, no NetCDF file, no plan, of a newer format, or not as it was
+            written: its digest, shapes, units, status codes and signs are checked.
+
+    Warns:
+        SaglineWarning: If the file is from before files carried a digest.
 
     Examples:
         >>> import sagline as sl
@@ -83,8 +95,9 @@ def load_plan(file: os.PathLike[str] | str) -> Plan:
         cogiro (283, 8) True
     """
     path = FilePath(file)
+    found = _seal(path)
     data = _opened(path)
-    _check_format(path, data.attrs)
+    _check_format(path, data.attrs, found)
     try:
         return _plan(path, data, parse_robot(data.attrs["robot"], f"{path}, robot"))
     except KeyError as error:
@@ -116,17 +129,26 @@ def _dataset(plan: Plan) -> Dataset:
 
 def _attributes(plan: Plan) -> dict[str, Any]:
     return {
-        "title": f"Cable lengths and tensions of {plan.state.one_robot.name}",
+        "title": f"Cable lengths and tensions of {_printable(plan.state.one_robot.name)}",
         "source": f"sagline {version('sagline')}",
         "sagline_format": FORMAT,
-        **_written("model", plan.state.cables.model),
-        **_written("tension", plan.tension),
+        **_written("model", plan.state.cables.model, MODELS),
+        **_written("tension", plan.tension, METHODS),
         "robot": dump_robot(plan.state.one_robot),
     }
 
 
-def _written(key: str, choice: CableModel | TensionMethod) -> dict[str, Any]:
+def _printable(text: str) -> str:
+    """A text for people, as attributes can hold it: no zero bytes, no half characters."""
+    return "".join(c if c.isprintable() else "�" for c in text)
+
+
+def _written(
+    key: str, choice: CableModel | TensionMethod, choices: Mapping[str, type[CableModel] | type[TensionMethod]]
+) -> dict[str, Any]:
     """A model or method as attributes: its name, and each of its options that is set."""
+    if choices.get(type(choice).__name__) is not type(choice):
+        raise InvalidValueError(key, type(choice).__name__, ", ".join(choices), "Only these can be read back.")
     options = {f"{key}_{field.name}": getattr(choice, field.name) for field in fields(choice)}
     return {key: type(choice).__name__, **{name: value for name, value in options.items() if value is not None}}
 
@@ -138,7 +160,10 @@ def _read(path: FilePath, data: Dataset, key: str, choices: Mapping[str, type[Ch
         raise FileError(path, f"{key} is {name!r}; allowed: {', '.join(choices)}", "Read it with a newer sagline.")
     choice = choices[name]
     given = {field.name: data.attrs.get(f"{key}_{field.name}") for field in fields(choice)}
-    return choice(**{option: _plain(value) for option, value in given.items() if value is not None})
+    try:
+        return choice(**{option: _plain(value) for option, value in given.items() if value is not None})
+    except TypeError as error:  # a text where a number belongs
+        raise FileError(path, f"{key}: {error}", "Write it again; it was edited.") from None
 
 
 def _plain(value: Any) -> Any:
@@ -147,28 +172,47 @@ def _plain(value: Any) -> Any:
 
 def _opened(path: FilePath) -> Dataset:
     """The whole file, in memory."""
-    from xarray import load_dataset
+    from h5py import File
+    from xarray import open_dataset
 
+    size = path.stat().st_size
     try:
-        path.open("rb").close()
-        return load_dataset(path, engine="h5netcdf", decode_times=False, mask_and_scale=False)
-    except FileNotFoundError:
-        raise FileError(path, "does not exist", "Check its name.") from None
-    except (IsADirectoryError, PermissionError) as error:
-        raise FileError(path, f"cannot be read ({error.strerror})", "Check its name and its permissions.") from None
-    except (OSError, RuntimeError, ValueError, KeyError) as error:  # h5py has no error of its own for a damaged file
-        reason = str(error).splitlines()[0]
+        File(path).close()  # h5netcdf writes to stderr about a file that this cannot open
+        with open_dataset(path, engine="h5netcdf", decode_times=False, mask_and_scale=False) as data:
+            if data.nbytes > INFLATION * size:
+                raise ValueError(f"{size} bytes that say to hold {data.nbytes:.2g}")
+            return data.load()
+    except Exception as error:  # h5py, h5netcdf and xarray have no error of their own for a damaged file: any will do
+        reason = next(iter(str(error).splitlines()), type(error).__name__)
         raise FileError(
             path, f"is no complete NetCDF file ({reason})", "Write it again; it may have been cut off."
         ) from None
 
 
-def _check_format(path: FilePath, attributes: Mapping[str, Any]) -> None:
+def _seal(path: FilePath) -> Seal:
+    """What a file's end says, before anything else in it is believed."""
+    try:
+        if path.exists() and not path.is_file() and not path.is_dir():
+            raise FileError(path, "is no file", "Check its name.")  # opening a pipe would wait for its writer
+        found = seal_of(path)
+    except FileNotFoundError:
+        raise FileError(path, "does not exist", "Check its name.") from None
+    except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
+        reason = getattr(error, "strerror", None) or error
+        raise FileError(path, f"cannot be read ({reason})", "Check its name and its permissions.") from None
+    if found is Seal.BROKEN:
+        raise FileError(path, "is not as it was written: its digest differs", "Take it from its source again.")
+    return found
+
+
+def _check_format(path: FilePath, attributes: Mapping[str, Any], found_seal: Seal) -> None:
     found = attributes.get("sagline_format")
     if found is None:
         raise FileError(
             path, "is no plan of sagline, it names no sagline_format", "Check that this is the file you mean."
         )
+    if not isinstance(found, int | np.integer) or found < 1:
+        raise FileError(path, f"is of format {found!r}, which never was", "Write it again; it was edited, or damaged.")
     if found > FORMAT:
         raise FileError(
             path,
@@ -176,6 +220,11 @@ def _check_format(path: FilePath, attributes: Mapping[str, Any]) -> None:
             f"which reads up to {FORMAT}",
             "Install a newer sagline.",
         )
+    if found == 1:
+        text = f"{path} is from before plans carried a digest: damage to it need not show. Save it again to have one."
+        warnings.warn(text, SaglineWarning, stacklevel=3)
+    elif found_seal is Seal.MISSING:
+        raise FileError(path, "is not as it was written: its digest is missing", "Take it from its source again.")
 
 
 def _plan(path: FilePath, data: Dataset, robot: Robot) -> Plan:
@@ -184,6 +233,7 @@ def _plan(path: FilePath, data: Dataset, robot: Robot) -> Plan:
 
     if data.sizes["cable"] != robot.cable_count:
         raise FileError(path, f"has {data.sizes['cable']} cables, its robot {robot.cable_count}", "Write it again.")
+    check_plan(data, robot.cable_count)
     pose = Pose.from_quaternion(values("position"), values("quaternion"))
     cables = CableState(
         model=_read(path, data, "model", MODELS),
@@ -193,8 +243,8 @@ def _plan(path: FilePath, data: Dataset, robot: Robot) -> Plan:
         status=values("cable_status"),
     )
     motion = None
-    if "time" in data.coords:
-        jerk = values("jerk") if "jerk" in data else None
+    if TIME.name in data.variables:
+        jerk = values(JERK.name) if JERK.name in data.variables else None
         motion = Path(values("time"), pose, values("twist"), values("twist_rate"), jerk)
     return Plan(
         state=Equilibrium(robot, pose, values("wrench"), cables),
@@ -204,5 +254,5 @@ def _plan(path: FilePath, data: Dataset, robot: Robot) -> Plan:
         shortfall=values("shortfall"),
         wrench_residual=values("wrench_residual"),
         blocking=values("blocking"),
-        **{quantity.name: values(quantity.name) for quantity in PROOF if quantity.name in data},
+        **{quantity.name: values(quantity.name) for quantity in PROOF if quantity.name in data.variables},
     )
