@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from sagline.cables.cable import Cable
+from sagline.cables.elastic import Elastic
 from sagline.cli.choices import Format
-from sagline.cli.terminal import note, show_data
+from sagline.cli.entries import FORWARD, INVERSE
+from sagline.cli.terminal import note, show_data, working
 from sagline.cli.values import FARTHEST, numbers, quantity
 from sagline.errors import FileError, InvalidValueError
 from sagline.files.imported import Imported
 from sagline.files.robot_file import dump_robot, load_robot
 from sagline.files.whole import write_text
+from sagline.kinematics.confirm import confirm
+from sagline.kinematics.inverse import inverse
 from sagline.robot.pose import Pose
 
 if TYPE_CHECKING:
@@ -41,7 +48,11 @@ def convert(
         )
     place = None if at is None else numbers(at, "--at", "m", FARTHEST)
     imported = _read(source, _material(density, stiffness), cable_set)
-    text = dump_robot(imported.robot) if form is Format.ROBOT else _mjcf(imported.robot, place)
+    if form is Format.ROBOT:
+        text = dump_robot(imported.robot)
+    else:
+        text, straightness = _mjcf(imported.robot, place)
+        imported = replace(imported, lost=(*imported.lost, straightness))
     if out is None:
         show_data(text)
     else:
@@ -75,13 +86,21 @@ def _material(density: str | None, stiffness: str | None) -> Cable | None:
     return Cable(quantity(density, "--linear-density", "kg/m"), quantity(stiffness, "--axial-stiffness", "N"))
 
 
-def _mjcf(robot: Robot, at: list[float] | None) -> str:
+def _mjcf(robot: Robot, at: list[float] | None) -> tuple[str, str]:
+    """The model, and what it costs this robot that its tendons neither sag nor weigh."""
     from sagline.files.mjcf import dump_mjcf
 
     if at is None and robot.test_box is None:
         raise InvalidValueError("--at", "missing", "X Y Z in m", "Say where the platform starts.")
     position = at if at is not None else 0.5 * (robot.test_box.low + robot.test_box.high)  # type: ignore[union-attr]
-    return dump_mjcf(robot, Pose.from_euler(position, 0.0, 0.0, 0.0))
+    pose = Pose.from_euler(position, 0.0, 0.0, 0.0)
+    with working(f"{robot.name}: planning and confirming one pose", INVERSE, FORWARD):
+        text = dump_mjcf(robot, pose)
+        proof = confirm(inverse(robot, pose, model=Elastic()))
+    away = float(np.linalg.norm(proof.position_error))
+    distance = f"{away:.2g} m" if away >= 0.1 else f"{max(1e3 * away, 0.001):.2g} mm"
+    held = f"hold the platform {distance} away" if proof.held else "do not hold the platform near it"
+    return text, f"Sag and weight of the cables: sagging cables of these lengths {held}."
 
 
 def _report(imported: Imported, out: Path | None) -> None:

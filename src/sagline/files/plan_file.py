@@ -91,8 +91,8 @@ def load_plan(file: os.PathLike[str] | str) -> Plan:
         >>> path = sl.quintic_path([(0, 0, 1.5), (1, 1, 2)], speed=1.0)
         >>> sl.inverse(sl.load_robot("cogiro"), path).save("run.nc")
         >>> plan = sl.load_plan("run.nc")
-        >>> print(plan.state.robot.name, plan.unstrained_length.shape, plan.feasible.all())
-        cogiro (283, 8) True
+        >>> print(plan.state.robot.name, plan.unstrained_length.shape)
+        cogiro (283, 8)
     """
     path = FilePath(file)
     found = _seal(path)

@@ -66,8 +66,9 @@ def quintic_path(
 
     Examples:
         >>> import sagline as sl
-        >>> path = sl.quintic_path([(0, 0, 1.5), (4, 3, 1.5)], speed=1.5)  # 5 m: 15/8 5/1.5 s
-        >>> print(f"{path.duration} s, {len(path)} samples, peak {path.twist[:, :3].max():.1f} m/s along x")
+        >>> path = sl.quintic_path([(0, 0, 1.5), (4, 3, 1.5)], speed=1.5)  # 5 m
+        >>> peak = path.twist[:, :3].max()
+        >>> print(f"{path.duration} s, {len(path)} samples, peak {peak:.1f} m/s along x")
         6.25 s, 626 samples, peak 1.2 m/s along x
     """
     limits = (speed, acceleration, angular_speed, angular_acceleration)
@@ -112,7 +113,8 @@ def septic_path(
         >>> import numpy as np
         >>> import sagline as sl
         >>> path = sl.septic_path([(0, 0, 1.5), (4, 3, 1.5)], durations=6.25)
-        >>> print(path.jerk[[0, -1]].any(), f"{np.linalg.norm(path.twist[:, :3], axis=1).max():.2f} m/s")
+        >>> peak = np.linalg.norm(path.twist[:, :3], axis=1).max()
+        >>> print(path.jerk[[0, -1]].any(), f"{peak:.2f} m/s")
         False 1.75 m/s
     """
     limits = (speed, acceleration, angular_speed, angular_acceleration)

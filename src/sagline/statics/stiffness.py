@@ -86,7 +86,8 @@ def stiffness(state: Equilibrium) -> Stiffness:
 
         >>> import numpy as np
         >>> import sagline as sl
-        >>> plan = sl.inverse(sl.load_robot("cogiro"), sl.Pose((1.0, 0.5, 1.5), np.eye(3)))
+        >>> pose = sl.Pose((1.0, 0.5, 1.5), np.eye(3))
+        >>> plan = sl.inverse(sl.load_robot("cogiro"), pose)
         >>> found = sl.stiffness(plan.state)
         >>> print(f"{1e3 * 100.0 * found.compliance[2, 2]:.3f} mm")
         1.438 mm
@@ -171,7 +172,8 @@ def modes(state: Equilibrium) -> Modes:
     Examples:
         >>> import numpy as np
         >>> import sagline as sl
-        >>> plan = sl.inverse(sl.load_robot("cogiro"), sl.Pose((1.0, 0.5, 1.5), np.eye(3)))
+        >>> pose = sl.Pose((1.0, 0.5, 1.5), np.eye(3))
+        >>> plan = sl.inverse(sl.load_robot("cogiro"), pose)
         >>> print(sl.modes(plan.state).frequency.round(2), "Hz")
         [ 4.38  5.31  6.93  8.05 10.88 13.17] Hz
     """

@@ -5,23 +5,19 @@ The gallery runs the examples, the reference lists what `sagline.__all__` lists,
 
 from __future__ import annotations
 
-import os
-import shutil
-import subprocess
-import sys
+import re
 from pathlib import Path
+from typing import Any
 
 import typer.main
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File, Files
+from running import EXAMPLES, WORK, fresh_folder, ran
 
 import sagline as sl
 from sagline.cli.main import app
 
-ROOT = Path(__file__).parents[1]
-EXAMPLES = ROOT / "examples"
-WORK = ROOT / "build" / "gallery"
 RINGS = {  # package -> title and opening line of its page of reference
     "cables": ("Cables", "One cable: its material, its models, its state."),
     "robot": ("Robots", "Where cables are fixed, what they carry, and where the platform is."),
@@ -34,6 +30,18 @@ RINGS = {  # package -> title and opening line of its page of reference
     "plot": ("Figures", "`sl.plot`: figures for papers, on Matplotlib."),
     "errors": ("Errors", "What sagline raises."),
 }
+DRAWN = {  # command -> what is shown of it
+    "track": "<!-- drawn by: sagline track own_robot.yaml own_path.yaml --model empirical -->",
+    "run": "<!-- drawn by: sagline run -->",
+    "article": "<!-- drawn by: sagline article figures 6-9 -->",
+    "tension": "<!-- drawn by: sagline tension article-mixed --pose 1,0.5,2.5 -->",
+    "view": "![A robot in the viewer](../images/viewer.png)\n\n![A run in the viewer](../images/viewer-run.png)",
+}
+LOADED = re.compile(
+    r"""<(?:script|img|iframe|source|video|audio)\b[^>]*\bsrc(?:set)?=["']?(?:https?:)?//|<link\b[^>]*\brel=["']?"""
+    r"""(?:stylesheet|preload|preconnect|icon)["']?[^>]*\bhref=["']?(?:https?:)?//|@import\s+["'(]*(?:url\()?https?:"""
+    r"""|url\(["']?https?:"""
+)
 
 
 def on_config(config: MkDocsConfig) -> MkDocsConfig:
@@ -50,11 +58,7 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add the pages and figures that are made here."""
-    shutil.rmtree(WORK, ignore_errors=True)
-    WORK.mkdir(parents=True)
-    for file in EXAMPLES.iterdir():
-        if file.is_file():
-            shutil.copy(file, WORK)
+    fresh_folder()
     files.append(File.generated(config, "gallery.md", content=gallery(files, config)))
     files.append(File.generated(config, "api/command.md", content=command_reference()))
     for ring, names in names_by_ring().items():
@@ -85,46 +89,61 @@ def reference(ring: str, names: list[str]) -> str:
 
 
 def gallery(files: Files, config: MkDocsConfig) -> str:
-    """Source, output and figures of every example; quickstart first."""
+    """Source, output and figures of every example, quickstart first; above them all figures, small."""
     scripts = sorted(EXAMPLES.glob("*.py"), key=lambda script: (script.stem != "quickstart", script.stem))
-    head = "# Gallery\n\nThe scripts are in the folder `examples`; output and figures were made with this page.\n"
-    return head + "".join(example(script, files, config) for script in scripts)
+    head = "# Gallery\n\nThe scripts are in the folder `examples`; output and figures were made with this page.\n\n"
+    examples = [example(script, files, config) for script in scripts]
+    cards = "\n".join(card for card, _ in examples)
+    return f'{head}<div class="cards" markdown>\n{cards}\n</div>\n' + "".join(text for _, text in examples)
 
 
-def example(script: Path, files: Files, config: MkDocsConfig) -> str:
-    """One example: its docstring as title and opening line, its code, what it prints, what it draws."""
+def example(script: Path, files: Files, config: MkDocsConfig) -> tuple[str, str]:
+    """A card for one example, and the example: title and opening line, its figures, its code, what it prints."""
     before = set(WORK.iterdir())
-    output = ran([sys.executable, script.name])
+    output = ran(script.name)
     source = script.read_text(encoding="utf-8")
     opening, code = source.removeprefix('"""').split('"""', 1)
-    title, _, rest = opening.removesuffix(".").partition(":")
+    title, _, rest = re.sub(r"\s+", " ", opening).strip().removesuffix(".").partition(":")
     what = f"`{script.name}`" + (f": {rest.strip()}." if rest else "")
-    text = f"\n## {title}\n\n{what}\n" + fenced(code.strip(), "python") + fenced(output, "text")
-    for figure in sorted(file for file in set(WORK.iterdir()) - before if file.suffix == ".png"):
+    figures = sorted(file for file in set(WORK.iterdir()) - before if file.suffix == ".png")
+    if not figures:
+        raise PluginError(f"{script.name} draws nothing that its card could show")
+    for figure in figures:
         files.append(File.generated(config, f"gallery/{figure.name}", abs_src_path=str(figure)))
-        text += f"\n![{title}](gallery/{figure.name}){{ width=720 }}\n"
-    return text
+    shown = "\n\n".join(f"![{title}](gallery/{figure.name})" for figure in figures)
+    card = f"[![](gallery/{figures[0].name}){{ loading=lazy }} {title}](#{script.stem})"
+    text = f"\n## {title} {{ #{script.stem} }}\n\n{what}\n\n{shown}\n"
+    return card, text + fenced(code.strip(), "python") + fenced(output, "text")
 
 
 def command_reference() -> str:
-    """The help of `sagline` and of each of its commands."""
-    names = list(typer.main.get_command(app).commands)  # type: ignore[attr-defined]
-    text = "# The command\n"
-    for arguments in ([], *([name] for name in names)):
-        title = " ".join(["sagline", *arguments])
-        text += f"\n## {title}\n" + fenced(ran([sys.executable, "-m", "sagline.cli", *arguments, "--help"]), "text")
+    """The help of `sagline` and of each of its commands, with the figures that it draws."""
+    text = ran("-m", "typer", "sagline.cli.main", "utils", "docs", "--name", "sagline")
+    commands = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+    lines = [f"- [`sagline {name}`](#sagline-{name}): {first_line(command.help)}" for name, command in commands.items()]
+    text = text.replace("# `sagline`\n", "# The command\n", 1)
+    text = re.sub(r"\*\*Commands\*\*:\n\n(?:\* .*\n)+", "**Commands**:\n\n" + "\n".join(lines) + "\n", text)
+    text = re.sub(r"^```console\n\$ ", "```\n", text, flags=re.MULTILINE)
+    text = re.sub(r"^\* `--help`: .*\n", "", text, flags=re.MULTILINE)
+    for name, shown in DRAWN.items():
+        text = re.sub(
+            rf"(## `sagline {name}`\n.*?)(?=\n## |\Z)", lambda m, what=shown: f"{m[1]}\n{what}\n", text, flags=re.S
+        )
     return text
 
 
-def ran(command: list[str]) -> str:
-    """What a command prints; a failure stops the build."""
-    environment = {**os.environ, "PYTHONPATH": str(ROOT / "src"), "TERMINAL_WIDTH": "88", "NO_COLOR": "1"}
-    done = subprocess.run(command, cwd=WORK, env=environment, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        raise PluginError(f"{' '.join(command)} failed:\n{done.stderr}")
-    return done.stdout
+def first_line(text: str | None) -> str:
+    """The summary of a command."""
+    return (text or "").strip().split("\n\n")[0].replace("\n", " ")
 
 
 def fenced(text: str, language: str) -> str:
     """A block of code."""
     return f"\n```{language}\n{text.rstrip()}\n```\n"
+
+
+def on_post_page(output: str, page: Any, **_: Any) -> str:
+    """Make sure that a page loads nothing from elsewhere."""
+    if found := LOADED.search(output):
+        raise PluginError(f"{page.file.src_uri} loads something from elsewhere: {found[0]}")
+    return output
