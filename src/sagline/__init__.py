@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from importlib import import_module
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -69,7 +68,7 @@ if TYPE_CHECKING:
     from sagline.tension.quadratic_program import QuadraticProgram
     from sagline.tension.singular import unresisted_motion
 
-__version__ = version("sagline")
+__version__: str
 
 __all__ = [
     "AnalyticCenter",
@@ -246,6 +245,8 @@ _HOMES = {
 
 def __getattr__(name: str) -> Any:
     """Load a name the first time it is asked for, and keep it."""
+    if name == "__version__":
+        return import_module("importlib.metadata").version("sagline")
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     module = import_module(_HOMES[name])

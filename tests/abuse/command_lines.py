@@ -33,8 +33,8 @@ VALUES = (
     "nan", "-nan", "inf", "-inf", "1e308", "-1e308", "1e999", "1e-400", "0x10", "010", "1_000", "1:30", "1,5", "1.5.2",
     "٣", "１", "½", "-1", "0", "-0", "1", "7", "True", "None", "+", "-", ".", "..", "e", "--",
     # lists
-    "1,2", "1,2,3,4", "1,2,3,4,5,6,7", "1;2;3", "1 2 3", "nan,nan,nan", "1e308,0,0", "0,0,1e308", "1,2,", ",,", "[1,2,3]",
-    "0,0,2,1e308,0,0", "0,0,2,400,0,0", "1_0,0,0",
+    "1,2", "1,2,3,4", "1,2,3,4,5,6,7", "1;2;3", "1 2 3", "nan,nan,nan", "1e308,0,0", "0,0,1e308", "1,2,", ",,",
+    "[1,2,3]", "0,0,2,1e308,0,0", "0,0,2,400,0,0", "1_0,0,0",
     # units
     "1 kg", "1 m", "12 kg/m*", "5 parsec", "1 kg kg kg", "-3 mm", "1e400 kg", "m", "3 m/", "1 " + "m*" * 500 + "m",
     "6 x 4 x 3 m", "6 x 4", "0 x 0 x 0", "nan x nan x nan", "1e308 x 1e308 x 1e308 m", "axbxc", "×××",
@@ -43,9 +43,11 @@ VALUES = (
     "folder/", "folder.yaml", "own_robot.yaml/x", "../../evil", "/proc/nothere/x", "/", "~", "x/" * 200, "broken.nc",
     "broken.yaml", "empty.csv", "link.yaml", "*", "con", "-x",
     # what a terminal, a shell, a format or an encoding would take for something
-    "\x1b[31mred", "a\x1b]0;title\x07", "\x9b2J", "\u202eevil", "\udcff", "a\rb", "%s%n", "{}", "$(x)", "`x`", "[red]", ":smile:",
+    "\x1b[31mred", "a\x1b]0;title\x07", "\x9b2J", "\u202eevil", "\udcff", "a\rb", "%s%n", "{}", "$(x)",
+    "`x`", "[red]", ":smile:",
     # words
-    "catenery", "Catenary", "closest ", "nothere", "cogiro", "COGIRO", "mixed", "steel", "robot", "3-1", "0-99", "errata",
+    "catenery", "Catenary", "closest ", "nothere", "cogiro", "COGIRO", "mixed", "steel", "robot", "3-1", "0-99",
+    "errata",
 )  # fmt: skip
 
 

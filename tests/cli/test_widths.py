@@ -93,7 +93,7 @@ def printed(words: list[str], width: int | None, monkeypatch: pytest.MonkeyPatch
 
 
 def words_of(text: str) -> Counter[str]:
-    """Everything between blanks, rules apart; words that were broken behind a hyphen, or in a head, are put together."""
+    """Everything between blanks, rules apart; words that were broken behind a hyphen are put together."""
     whole = re.sub(r"(?<=\w-)\n\s*", "", text)
     return Counter(word for word in whole.split() if not set(word) <= set("─"))
 

@@ -41,7 +41,7 @@ def ended(command: Callable[[], object], *, debug: bool = False, last: bool = Fa
         interrupts.deafen()
         if not interrupts.heard:
             code = _told(error, debug)
-    if interrupts.heard:
+    if interrupts.heard or code == INTERRUPTED:
         code = _interrupted()
     if not last:
         interrupts.restore()
@@ -69,7 +69,7 @@ def _told(error: BaseException, debug: bool) -> int:
     if isinstance(error, SystemExit):
         return error.code if isinstance(error.code, int) else 0 if error.code is None else UNEXPECTED
     if isinstance(error, KeyboardInterrupt):
-        return _interrupted()
+        return INTERRUPTED
     if debug:
         import traceback
 
