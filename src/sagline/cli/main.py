@@ -28,16 +28,16 @@ Cable robots whose cables sag: from a robot and a path to proven cable lengths.
 
 Start here:
 
-  sagline run                          the article's test, with its figures
-  sagline robots                       the robots that come with it
-  sagline show ipanema-1               all values of one of them
-  sagline examples --out DIR           files to try the commands with
-  sagline track cogiro own_path.yaml   a robot along a path of your own
-  sagline forward cogiro lengths.csv   from measured lengths to poses
-  sagline tension cogiro               every way of sharing the load of a pose
-  sagline article                      the article redone, as one page
-  sagline view cogiro                  drag a robot's platform in the browser
-  sagline new my_robot.yaml            a robot of your own, by a few questions
+    sagline run                          the article's test, with its figures
+    sagline robots                       the robots that come with it
+    sagline show ipanema-1               all values of one of them
+    sagline examples --out DIR           files to try the commands with
+    sagline track cogiro own_path.yaml   a robot along a path of your own
+    sagline forward cogiro lengths.csv   from measured lengths to poses
+    sagline tension cogiro               every way of sharing a load
+    sagline article                      the article redone, as one page
+    sagline view cogiro                  drag a platform in the browser
+    sagline new my_robot.yaml            a robot of your own, by questions
 """
 
 

@@ -33,7 +33,7 @@ def numbers(parts: Sequence[str], item: str, unit: str, largest: float) -> list[
     found = []
     for part in parts:
         number = plain_number(part)
-        if number is None or abs(number) > largest:
+        if number is None or not abs(number) <= largest:  # NaN neither
             raise InvalidValueError(item, repr(part), f"decimal numbers up to {largest:g} {unit}", f"Correct {item}.")
         found.append(number)
     return found

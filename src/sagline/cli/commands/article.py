@@ -29,9 +29,9 @@ def article(
 
     For example:
 
-      sagline article
-      sagline article figures 6-9 --out results
-      sagline article errata table 2
+        sagline article
+        sagline article figures 6-9 --out results
+        sagline article errata table 2
     """
     from sagline.cli.report import write_report
 
@@ -63,8 +63,8 @@ def identify(
 
     For example:
 
-      sagline identify cable.csv
-      sagline identify cable.csv --length-error "2 mm" --tension-at platform-end --offset
+        sagline identify cable.csv
+        sagline identify cable.csv --length-error "2 mm" --tension-at platform-end --offset
     """
     from sagline.cli.identify import identify as run
 

@@ -37,7 +37,7 @@ def forward(
 
     For example:
 
-      sagline forward cogiro lengths.csv --out poses
+        sagline forward cogiro lengths.csv --out poses
     """
     from sagline.cli.forward import forward as run
 
@@ -65,8 +65,8 @@ def tension(
 
     For example:
 
-      sagline tension article-mixed --pose 1,0.5,2.5
-      sagline tension cogiro --pose 0,0,2,10,0,0 --variable frame_end --no-figures
+        sagline tension article-mixed --pose 1,0.5,2.5
+        sagline tension cogiro --pose 0,0,2,10,0,0 --variable frame_end --no-figures
     """
     from sagline.cli.tension import tension as run
 

@@ -23,8 +23,8 @@ def show(robot: RobotArgument, as_json: JsonOption = False) -> None:
 
     For example:
 
-      sagline show ipanema-1
-      sagline show own_robot.yaml --json
+        sagline show ipanema-1
+        sagline show own_robot.yaml --json
     """
     from sagline.cli.robots import show_robot
 
@@ -56,9 +56,9 @@ def new(
 
     For example:
 
-      sagline new my_robot.yaml
-      sagline new my_robot.yaml --frame "15 x 11 x 6 m" --mass "50 kg" \
-          --rope steel-6x19 --diameter "3 mm"
+        sagline new my_robot.yaml
+        sagline new my_robot.yaml --frame "15 x 11 x 6 m" --mass "50 kg" \
+            --rope steel-6x19 --diameter "3 mm"
     """
     from sagline.cli.new import new as make
 
@@ -109,10 +109,10 @@ def convert(
 
     For example:
 
-      sagline convert robot.wcrfx --out robot.yaml
-      sagline convert robot.wcrfx --out my_robot.yaml \
-          --linear-density "20 g/m" --axial-stiffness "50 kN"
-      sagline convert cogiro --format mjcf --out cogiro.xml
+        sagline convert robot.wcrfx --out robot.yaml
+        sagline convert robot.wcrfx --out my_robot.yaml \
+            --linear-density "20 g/m" --axial-stiffness "50 kN"
+        sagline convert cogiro --format mjcf --out cogiro.xml
     """
     from sagline.cli.convert import convert as run
 
@@ -129,9 +129,9 @@ def examples(
 
     For example:
 
-      sagline examples --out DIR
-      cd DIR
-      sagline track own_robot.yaml own_path.yaml
+        sagline examples --out DIR
+        cd DIR
+        sagline track own_robot.yaml own_path.yaml
     """
     from sagline.cli.examples import write_examples
 

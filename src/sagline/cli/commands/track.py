@@ -54,9 +54,9 @@ def track(
 
     For example:
 
-      sagline track article-suspended
-      sagline track own_robot.yaml own_path.yaml --model empirical --out results
-      sagline track cogiro own_samples.csv --payload 20 --csv
+        sagline track article-suspended
+        sagline track own_robot.yaml own_path.yaml --model empirical --out results
+        sagline track cogiro own_samples.csv --payload 20 --csv
     """
     from sagline.cli.track import track as run
 
@@ -87,7 +87,7 @@ def lengths(
 
     For example:
 
-      sagline lengths output/cogiro-catenary.nc --out lengths.csv
+        sagline lengths output/cogiro-catenary.nc --out lengths.csv
     """
     from sagline.cli.lengths import write_lengths
 

@@ -29,10 +29,10 @@ def view(
 
     For example:
 
-      sagline view cogiro
-      sagline view own_robot.yaml --payload "5 kg" --port 9000
-      sagline track article-mixed --model empirical
-      sagline view article-mixed output/article-mixed-empirical.nc
+        sagline view cogiro
+        sagline view own_robot.yaml --payload "5 kg" --port 9000
+        sagline track article-mixed --model empirical
+        sagline view article-mixed output/article-mixed-empirical.nc
     """
     from sagline.cli.view import view as serve
 
