@@ -41,7 +41,7 @@ VALUES = (
     # paths
     "missing.yaml", "missing.csv", "missing.nc", "own_robot.yaml", "cable.csv", "lengths.csv", "run.nc", "folder",
     "folder/", "folder.yaml", "own_robot.yaml/x", "../../evil", "/proc/nothere/x", "/", "~", "x/" * 200, "broken.nc",
-    "broken.yaml", "empty.csv", "link.yaml", "*", "con", "-x",
+    "pipe.yaml", "/dev/null", "/dev/zero", "/dev/full", "broken.yaml", "empty.csv", "link.yaml", "*", "con", "-x",
     # what a terminal, a shell, a format or an encoding would take for something
     "\x1b[31mred", "a\x1b]0;title\x07", "\x9b2J", "\u202eevil", "\udcff", "a\rb", "%s%n", "{}", "$(x)",
     "`x`", "[red]", ":smile:",

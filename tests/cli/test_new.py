@@ -151,6 +151,7 @@ def test_a_wrong_answer_is_told_at_once_and_asked_again(folder: FilePath) -> Non
     assert code == 0, said
     robot = sl.load_robot(folder / "mine.yaml")
     assert (robot.cable_count, robot.mass) == (6, 20.0)
+    assert robot.frame_size is not None
     np.testing.assert_allclose(robot.frame_size, [4.0, 4.0, 3.0])
     wrong = re.findall(r"No: (\S+)", said)
     assert wrong == [
