@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from sagline.cables.parabolic import Parabolic
     from sagline.cables.status import CableStatus
     from sagline.cables.straight import Straight
-    from sagline.errors import CableGeometryError, FileError, InvalidValueError, SaglineError
+    from sagline.errors import CableGeometryError, FileError, InvalidValueError, SaglineError, SaglineWarning
     from sagline.files.caspr import load_caspr
     from sagline.files.imported import Imported
     from sagline.files.measurements import load_measurements
@@ -117,6 +117,7 @@ __all__ = [
     "QuadraticProgram",
     "Robot",
     "SaglineError",
+    "SaglineWarning",
     "Side",
     "Stiffness",
     "Straight",
@@ -204,6 +205,7 @@ _HOMES = {
     "QuadraticProgram": "sagline.tension.quadratic_program",
     "Robot": "sagline.robot.robot",
     "SaglineError": "sagline.errors",
+    "SaglineWarning": "sagline.errors",
     "Side": "sagline.tension.polygon",
     "Stiffness": "sagline.statics.stiffness",
     "Straight": "sagline.cables.straight",

@@ -3,7 +3,6 @@ import io
 import resource
 import warnings
 from dataclasses import replace
-from operator import attrgetter
 from pathlib import Path as FilePath
 
 import h5py
@@ -14,15 +13,10 @@ import xarray as xr
 import sagline as sl
 from sagline.errors import FileError, SaglineWarning
 from sagline.files.robot_file import dump_robot
+from tests.files.plans import OUTSIDE, SUSPENDED, a_plan, assert_same
 
-SUSPENDED = sl.load_robot("article-suspended")
 SEAL = len("\nsagline sha256 \n") + 64  # bytes at the end
 NOTICE = "run.nc is from before plans carried a digest: damage to it need not show. Save it again to have one"
-OUTSIDE = sl.quintic_path([(0.0, 0.0, 1.5), (7.2, 3.0, 1.5)], durations=5.0, rate=8.0)  # ends outside
-
-
-def a_plan() -> sl.Plan:
-    return sl.inverse(SUSPENDED, OUTSIDE, sl.Empirical(k_p=4.1), sl.Closest("horizontal", 0.1))
 
 
 @pytest.fixture(scope="module")
@@ -47,30 +41,6 @@ def old(saved: FilePath) -> FilePath:
     with h5py.File(saved, "r+") as file:
         file.attrs["sagline_format"] = 1
     return saved
-
-
-PLACES = (
-    *(
-        f"state.cables.{name}"
-        for name in ("unstrained_length", "chord_tension", "horizontal_tension", "vertical_force")
-    ),
-    *(f"state.cables.{name}" for name in ("span", "rise", "status")),
-    *("state.pose.position", "state.pose.quaternion", "state.wrench"),
-    *("status", "shortfall", "wrench_residual", "blocking", "farkas", "needed"),
-)
-PATH_PLACES = ("path.time", "path.twist", "path.twist_rate", "path.jerk", "path.pose.position", "path.pose.quaternion")
-
-
-def assert_same(plan: sl.Plan, other: sl.Plan) -> None:
-    for place in PLACES + (() if plan.path is None else PATH_PLACES):
-        mine, theirs = (np.asarray(attrgetter(place)(p)) for p in (plan, other))
-        assert (mine.dtype, mine.shape) == (theirs.dtype, theirs.shape), place
-        assert mine.tobytes() == theirs.tobytes(), place
-        assert not theirs.flags.writeable
-    assert plan.tension == other.tension
-    assert plan.state.cables.model == other.state.cables.model
-    assert dump_robot(plan.state.one_robot) == dump_robot(other.state.one_robot)
-    assert (plan.path is None) == (other.path is None)
 
 
 @pytest.mark.parametrize("model", [sl.Catenary(), sl.Empirical(k_h=4.9, k_p=4.1), sl.Straight()])

@@ -16,7 +16,7 @@ from sagline.cli.values import loaded, wrench_of
 from sagline.files.lengths_file import Lengths, load_lengths
 from sagline.files.names import file_stem
 from sagline.files.robot_file import load_robot
-from sagline.files.whole import check_folder, made_folder, write_text
+from sagline.files.whole import check_files, made_folder, write_text
 from sagline.kinematics.forward import forward as solve
 from sagline.kinematics.forward_solution import ForwardSolution
 from sagline.kinematics.forward_status import ForwardStatus
@@ -42,13 +42,14 @@ def forward(
     robot = loaded(load_robot(name), payload)
     size = float(np.linalg.norm(np.ptp(robot.frame_anchors, axis=0)))
     lengths = load_lengths(file, robot.cable_count, size)
-    check_folder(folder)
+    target = folder / f"{file_stem(robot.name, 'poses')}.csv"
+    check_files(folder, [target.name])
     entry = FIT if model is Model.STRAIGHT else FORWARD
     with working(f"{robot.name}: finding {len(lengths.unstrained_length):,} poses", entry) as line:
         first = solve(robot, lengths.unstrained_length[0], model=model.build(), wrench=load)
         start = first.pose if np.isfinite(first.pose.position).all() else None
         found = solve(robot, lengths.unstrained_length, start, model.build(), load, progress=line.progress)
-    target = made_folder(folder) / f"{file_stem(robot.name, 'poses')}.csv"
+    made_folder(folder)
     rows = _rows(lengths, found)
     write_text(target, csv_text(rows))
     lost = [k for k, status in enumerate(found.status) if status not in FINE]

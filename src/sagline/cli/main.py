@@ -63,7 +63,9 @@ class Group(TyperGroup):
         alone = extra.pop("standalone_mode", True)
 
         def command() -> Any:
-            with finished_files() as finished:
+            from sagline.cli.terminal import notices
+
+            with notices(), finished_files() as finished:
                 try:
                     return super(Group, self).main(
                         [word for word in words if word != DEBUG], *more, **{**extra, "standalone_mode": False}

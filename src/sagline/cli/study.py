@@ -48,7 +48,7 @@ class Run(NamedTuple):
     @property
     def name(self) -> str:
         """Robot and model, as files are named."""
-        return file_stem(self.plan.state.one_robot.name, type(self.plan.state.cables.model).__name__.lower())
+        return run_name(self.plan.state.one_robot, self.plan.state.cables.model)
 
     @property
     def lost(self) -> int:
@@ -72,6 +72,11 @@ class Summary(NamedTuple):
     adjusting_length_max_mm: float
     feasible_share_percent: float
     inverse_us_per_pose: float
+
+
+def run_name(robot: Robot, model: CableModel) -> str:
+    """How the files of a run are named, without a suffix."""
+    return file_stem(robot.name, type(model).__name__.lower())
 
 
 def run_along(

@@ -11,7 +11,7 @@ from sagline.arrays import Array
 from sagline.cli.choices import Model, Variable
 from sagline.cli.ending import OUTSIDE
 from sagline.cli.entries import INVERSE, MARGINS, POLYGON, SHARING
-from sagline.cli.results import write_figures
+from sagline.cli.results import figure_files, write_figures
 from sagline.cli.tables import Grid, show_table
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.cli.values import loaded, middle_of, wrench_of
@@ -19,7 +19,7 @@ from sagline.errors import InvalidValueError
 from sagline.files.names import file_stem
 from sagline.files.pose_text import parse_pose
 from sagline.files.robot_file import load_robot
-from sagline.files.whole import check_folder, made_folder
+from sagline.files.whole import check_files, made_folder
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.polygon import tension_polygon
 from sagline.kinematics.status import PoseStatus
@@ -58,8 +58,9 @@ def tension(
     robot = loaded(load_robot(name), payload)
     place = middle_of(robot) if place is None else place
     drawn = figures and robot.cable_count == robot.degrees_of_freedom + 2
+    name_of_figure = file_stem(robot.name, "tension")
     if drawn:
-        check_folder(folder)
+        check_files(folder, figure_files([name_of_figure]))
     with working(f"{robot.name}: sharing the load", INVERSE, SHARING, MARGINS, *[POLYGON] * drawn):
         plans = {title: _plan(robot, place, model, method(variable.value), load) for title, method in ALONE.items()}
     least = plans[MinimumNorm.__name__]
@@ -74,7 +75,7 @@ def tension(
 
         shape = tension_polygon(robot, place, model.build(), variable=variable.value)
         points = {title: plan.chord_tension for title, plan in plans.items() if plan is not None}
-        files = write_figures({file_stem(robot.name, "tension"): plot.polygon(shape, points)}, folder)
+        files = write_figures({name_of_figure: plot.polygon(shape, points)}, folder)
     margin = float(capacity_margin(least.state))
     if as_json:
         show_json(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import sys
+import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any
@@ -14,7 +15,7 @@ from rich.padding import Padding
 from rich.text import Text
 
 from sagline.cli.printable import is_seen, printable
-from sagline.errors import FileError
+from sagline.errors import FileError, SaglineWarning
 from sagline.files.json_text import json_text
 
 if TYPE_CHECKING:
@@ -52,6 +53,23 @@ def counting(what: str, *needed: str) -> Iterator[Callable[[int, int, str], None
             line.progress(done, total)
 
         yield tell
+
+
+@contextmanager
+def notices() -> Iterator[None]:
+    """While inside, what sagline warns of is a note on stderr."""
+    with warnings.catch_warnings():
+        others = warnings.showwarning
+
+        def tell(message: Warning | str, category: type[Warning], *where: Any) -> None:
+            if issubclass(category, SaglineWarning):
+                note("Note: ", str(message), style="bold")
+            else:
+                others(message, category, *where)
+
+        warnings.simplefilter("always", SaglineWarning)
+        warnings.showwarning = tell
+        yield
 
 
 def note(head: str, text: str, style: str = "") -> None:

@@ -8,18 +8,20 @@ from typing import TYPE_CHECKING
 from sagline.cli.choices import Model, Tension, Variable
 from sagline.cli.entries import FORWARD, needed_for
 from sagline.cli.lengths import plan_text
-from sagline.cli.results import tell, write_figures, write_plans
-from sagline.cli.study import Run, run_along
+from sagline.cli.results import figure_files, tell, write_figures, write_plans
+from sagline.cli.study import Run, run_along, run_name
 from sagline.cli.terminal import working
 from sagline.cli.values import loaded, wrench_of
 from sagline.files.path_file import load_path
 from sagline.files.robot_file import load_robot
-from sagline.files.whole import check_folder, write_text
+from sagline.files.whole import check_files, write_text
 from sagline.motion.planar import article_path
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+FIGURES = ("path", "velocity", "cables", "error")
 
 
 def track(
@@ -44,28 +46,27 @@ def track(
     load = wrench_of(wrench)
     machine = loaded(load_robot(robot), payload)
     way = article_path() if path is None else load_path(path)
-    check_folder(folder)
+    cable = model.build()
+    name = run_name(machine, cable)
+    drawn = [f"{name}-{figure}" for figure in FIGURES] if figures else []
+    check_files(folder, [f"{name}.nc", *[f"{name}.csv"] * table, *figure_files(drawn)])
     shared = tension.build(variable)
     with working(f"{machine.name}: planning and confirming {len(way):,} poses", *needed_for(shared), FORWARD) as line:
-        run = run_along(machine, way, model.build(), shared, line, load)
+        run = run_along(machine, way, cable, shared, line, load)
     with working("writing"):
         files = write_plans([run], folder)
         if table:
-            files.append(folder / f"{run.name}.csv")
+            files.append(folder / f"{name}.csv")
             write_text(files[-1], plan_text(run.plan))
         if figures:
-            files += write_figures(_figures(run), folder)
+            files += write_figures(dict(zip(drawn, _figures(run), strict=True)), folder)
     return tell([run], files, folder, as_json=as_json)
 
 
-def _figures(run: Run) -> dict[str, Figure | Axes]:
+def _figures(run: Run) -> tuple[Figure | Axes, ...]:
+    """In the order of FIGURES."""
     from sagline import plot
 
     way = run.plan.path
     assert way is not None
-    return {
-        f"{run.name}-path": plot.path(way),
-        f"{run.name}-velocity": plot.velocity(way),
-        f"{run.name}-cables": plot.overview(run.plan),
-        f"{run.name}-error": plot.error(run.confirmation),
-    }
+    return plot.path(way), plot.velocity(way), plot.overview(run.plan), plot.error(run.confirmation)

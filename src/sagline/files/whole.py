@@ -11,7 +11,7 @@ from __future__ import annotations
 import os
 import shutil
 import stat
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
@@ -169,6 +169,21 @@ def check_file(file: os.PathLike[str] | str) -> Path:
     if not os.access(target, os.W_OK):
         raise FileError(target, "is write-protected", "Change its permissions, or give another name.")
     return target
+
+
+def check_files(folder: os.PathLike[str] | str, names: Iterable[str]) -> None:
+    """Refuse files that could not be written to a folder, without touching anything.
+
+    Args:
+        folder: The folder; it need not exist.
+        names: Names of the files to be.
+
+    Raises:
+        FileError: If the folder cannot be written to, or a name is taken by something that is no file.
+    """
+    check_folder(folder)
+    for name in names:
+        check_file(Path(folder) / name)
 
 
 def check_folder(folder: os.PathLike[str] | str) -> None:

@@ -135,10 +135,13 @@ def save(drawing: Figure | Axes, file: os.PathLike[str] | str) -> None:
     figure = drawing if isinstance(drawing, Figure) else cast(Figure, drawing.get_figure(root=True))
     path = FilePath(file)
     kind = path.suffix.lstrip(".").lower()
-    known = figure.canvas.get_supported_filetypes()
+    known = sorted(figure.canvas.get_supported_filetypes().keys() - {"pgf"})  # text for LaTeX, which may be missing
     if kind not in known:
-        raise FileError(path, f"the suffix is {path.suffix or 'missing'}", f"Choose one of {', '.join(sorted(known))}.")
+        raise FileError(path, f"the suffix is {path.suffix or 'missing'}", f"Choose one of {', '.join(known)}.")
     # the same figure gives the same bytes: no date, no random names
     metadata = {"Date": None} if kind == "svg" else None
-    with written_whole(path) as partial, matplotlib.rc_context({"svg.hashsalt": "sagline"}):
-        figure.savefig(partial, format=kind, dpi=RESOLUTION, metadata=metadata)
+    drawn = BytesIO()  # matplotlib leaves a file open that it cannot write to
+    with matplotlib.rc_context({"svg.hashsalt": "sagline"}):
+        figure.savefig(drawn, format=kind, dpi=RESOLUTION, metadata=metadata)
+    with written_whole(path) as partial:
+        partial.write_bytes(drawn.getbuffer())

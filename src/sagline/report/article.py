@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from sagline.files.json_text import json_text, plain
-from sagline.files.whole import check_file, check_folder, made_folder, written_together
+from sagline.files.whole import check_files, made_folder, written_together
 from sagline.report.blocks import Chapter
 from sagline.report.page import page
 from sagline.report.parts import selection
@@ -60,9 +60,7 @@ def write_article(folder: Path | str, parts: Sequence[str] = (), progress: Progr
         FileError: If the folder cannot be written; then nothing has been.
     """
     wanted = selection(parts)
-    check_folder(folder)
-    for name in NAMES:
-        check_file(Path(folder) / name)
+    check_files(folder, NAMES)
     chapters = []
     for done, part in enumerate(wanted.parts):
         if progress is not None:
