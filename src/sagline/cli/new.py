@@ -76,7 +76,16 @@ def new(file: Path, answers: dict[str, str | None], *, force: bool) -> Robot:
     text = _header(said) + dump_robot(robot)
     made = parse_robot(text, file)
     write_text(file, text)
-    _explain(made, design, middle)
+    with working("looking at what came out"):
+        lines, share = _explained(made, design, middle)
+    for line in lines:
+        show(line)
+    if share < NEARLY_ALL:
+        note(
+            "Advice: ",
+            "for more of it, try a larger platform, the other layout, a thicker rope or a lighter load.",
+            style="bold",
+        )
     for what, command in (("Written", ""), ("Look at it", "sagline view "), ("Every value", "sagline show ")):
         show(f"{what}: {command}{quote(str(file)) if command else file}", whole=True)
     return made
@@ -171,7 +180,8 @@ def _header(said: dict[str, str]) -> str:
     return f"# made by sagline new: {made}\n# values in SI units; a quantity may also have its unit, 22 mm^2\n"
 
 
-def _explain(robot: Robot, design: Design, middle: Plan) -> None:
+def _explained(robot: Robot, design: Design, middle: Plan) -> tuple[list[str], float]:
+    """What there is to say of the robot, and the feasible share of the poses in its middle."""
     share = float(middle.feasible.mean())
     density, stiffness = float(robot.cables.linear_density[0]), float(robot.cables.axial_stiffness[0])
     lines = [
@@ -187,11 +197,4 @@ def _explain(robot: Robot, design: Design, middle: Plan) -> None:
         lines.append(
             f"There cables carry {tension.min():.3g} to {tension.max():.4g} N and sag by up to {1e3 * sag.max():.3g} mm"
         )
-    for line in lines:
-        show(line)
-    if share < NEARLY_ALL:
-        note(
-            "Advice: ",
-            "for more of it, try a larger platform, the other layout, a thicker rope or a lighter load.",
-            style="bold",
-        )
+    return lines, share

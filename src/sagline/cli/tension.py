@@ -62,21 +62,21 @@ def tension(
     if drawn:
         check_files(folder, figure_files([name_of_figure]))
     with working(f"{robot.name}: sharing the load", INVERSE, SHARING, MARGINS, *[POLYGON] * drawn):
+        least = inverse(robot, place, model.build(), MinimumNorm(variable.value), load)  # refuses what none can share
         plans = {title: _plan(robot, place, model, method(variable.value), load) for title, method in ALONE.items()}
-    least = plans[MinimumNorm.__name__]
-    assert least is not None
-    if least.status not in (PoseStatus.SOLVED, PoseStatus.NOT_COVERED, PoseStatus.UNBOUNDED):
-        note("Not feasible: ", _reason(robot, place, least), style="bold red")
+        reason = _reason(robot, place, least)
+        margin = float(capacity_margin(least.state))
+        shape = tension_polygon(robot, place, model.build(), load, variable.value) if drawn else None
+    if not any(plan is not None and plan.feasible for plan in plans.values()):
+        note("No tensions: ", reason, style="bold red")
         return OUTSIDE
     files: list[Path] = []
-    if drawn:
+    if shape is not None:
         made_folder(folder)
         from sagline import plot
 
-        shape = tension_polygon(robot, place, model.build(), variable=variable.value)
         points = {title: plan.chord_tension for title, plan in plans.items() if plan is not None}
         files = write_figures({name_of_figure: plot.polygon(shape, points)}, folder)
-    margin = float(capacity_margin(least.state))
     if as_json:
         show_json(
             {"capacity_margin": margin, "tensions": {k: _record(plan) for k, plan in plans.items()}, "files": files}

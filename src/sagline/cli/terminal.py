@@ -8,7 +8,7 @@ import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 from rich.console import Console, RenderableType
 from rich.padding import Padding
@@ -61,11 +61,18 @@ def notices() -> Iterator[None]:
     with warnings.catch_warnings():
         others = warnings.showwarning
 
-        def tell(message: Warning | str, category: type[Warning], *where: Any) -> None:
+        def tell(
+            message: Warning | str,
+            category: type[Warning],
+            filename: str,
+            lineno: int,
+            file: TextIO | None = None,
+            line: str | None = None,
+        ) -> None:
             if issubclass(category, SaglineWarning):
                 note("Note: ", str(message), style="bold")
             else:
-                others(message, category, *where)
+                others(message, category, filename, lineno, file, line)
 
         warnings.simplefilter("always", SaglineWarning)
         warnings.showwarning = tell
