@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import shutil
+import subprocess
+import sys
 import time
 from hashlib import sha256
 from pathlib import Path
@@ -21,6 +23,8 @@ from tests.abuse.command_lines import LINES, Case, cases, commands
 SHORT = "durations: 1\nrate: 4\nwaypoints: [{position: [0, 0, 1.5]}, {position: [1, 0, 1.5]}]\n"
 SHARE = 500  # of all, in make test
 SLOWEST = 2.0  # s, of the processor: other tests run beside
+START = 1.5  # s, that a process takes to load
+LARGEST = 500 * 1024  # kB
 
 
 @pytest.fixture(scope="module")
@@ -158,3 +162,32 @@ def test_every_command_and_option_is_tried(stocked: Path, tmp_path: Path) -> Non
             bench.renew()
     finally:
         os.chdir(here)
+
+
+def in_a_process(case: Case, place: Path) -> list[str]:
+    """What is wrong with how a real process ends, its time and its memory among it."""
+    words = [word.encode("utf-8", "surrogateescape") for word in case.words]
+    with open(place / "out", "wb") as out, open(place / "err", "wb") as err:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "sagline.cli", *words], cwd=place, stdout=out, stderr=err, stdin=subprocess.DEVNULL
+        )
+        _, status, used = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    errors = (place / "err").read_text()
+    found = complaints((place / "out").read_text(), errors) if process.returncode == 2 else []
+    if process.returncode not in (0, 1, 2) or "Traceback" in errors:
+        found.append(f"exit code {process.returncode}")
+    if used.ru_utime + used.ru_stime > SLOWEST + START:
+        found.append(f"{used.ru_utime + used.ru_stime:.1f} s")
+    if used.ru_maxrss > LARGEST:
+        found.append(f"{used.ru_maxrss // 1024} MB")
+    return [f"{case.name} {case.words[1:]!r}: {fault}; {errors[-200:]!r}" for fault in found]
+
+
+@pytest.mark.parametrize("count", [8, pytest.param(300, marks=pytest.mark.soak)])
+def test_real_processes_take_little_time_and_memory(count: int, stocked: Path, tmp_path: Path) -> None:
+    place = tmp_path / "place"
+    shutil.copytree(stocked, place, symlinks=True)
+    os.mkfifo(place / "pipe.yaml")
+    quick = (case for case in cases(11, None) if case.words[0] not in ("view", "article", "run"))
+    assert [fault for case, _ in zip(quick, range(count), strict=False) for fault in in_a_process(case, place)] == []
