@@ -65,7 +65,7 @@ def content(plan: sl.Plan, tmp_path_factory: pytest.TempPathFactory) -> bytes:
     return file.read_bytes()
 
 
-@pytest.mark.parametrize("count", [60, pytest.param(2000, marks=pytest.mark.soak)])
+@pytest.mark.parametrize("count", [30, pytest.param(2000, marks=pytest.mark.soak)])
 @pytest.mark.parametrize(
     "damage", [flip, overwrite, blank, cut, take_out, put_in, swap], ids=lambda damage: damage.__name__
 )

@@ -1,5 +1,6 @@
 import hashlib
 import io
+import os
 import resource
 import warnings
 from dataclasses import replace
@@ -147,17 +148,32 @@ def test_a_disk_that_fills_up_leaves_nothing(tmp_path: FilePath) -> None:
     assert [entry.name for entry in tmp_path.iterdir()] == ["other.nc"]
 
 
+def test_a_disk_that_fills_up_in_the_middle(tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise RuntimeError("Can't decrement id ref count (unable to close file, errno = 28)")
+
+    monkeypatch.setattr("xarray.Dataset.to_netcdf", fail)
+    with pytest.raises(FileError, match=r"run\.nc: cannot be written \(Can't decrement id ref count"):
+        a_plan().save(tmp_path / "run.nc")
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_files_that_are_no_plan(tmp_path: FilePath, saved: FilePath) -> None:
     half, text, other = tmp_path / "half.nc", tmp_path / "text.nc", tmp_path / "other.nc"
     half.write_bytes(saved.read_bytes()[:20_000])
     text.write_text("time,x,y,z\n")
     xr.Dataset({"a": ("b", [1.0, 2.0])}).to_netcdf(other, engine="h5netcdf")
+    os.mkfifo(tmp_path / "pipe.nc")
     reasons = {
         tmp_path / "missing.nc": "does not exist. Check its name",
         tmp_path: "cannot be read .Is a directory",
         half: "is no complete NetCDF file .*truncated.*it may have been cut off",
         text: "is no complete NetCDF file",
         other: "is no plan of sagline, it names no sagline_format",
+        tmp_path / "pipe.nc": "is no file. Check its name",  # opening it would wait for ever
+        FilePath("/dev/zero"): "is no file. Check its name",
+        tmp_path / "zero\0byte.nc": "cannot be read .embedded null byte",
+        tmp_path / ("x" * 300): "cannot be read .File name too long",
     }
     for file, reason in reasons.items():
         with pytest.raises(FileError, match=reason):
@@ -175,6 +191,8 @@ def test_files_that_are_no_plan(tmp_path: FilePath, saved: FilePath) -> None:
         ("tension", "Guess", "tension is 'Guess'; allowed: Closest, MinimumNorm"),
         ("model_k_p", -1.0, r"k_p is -1 m\^2/s\^4; allowed: >= 0"),
         ("robot", "name: x", "run.nc, robot: .* is missing"),
+        ("robot", 3.0, "run.nc, robot: has no keys"),
+        ("model_k_p", "four", "k_p is"),
     ],
 )
 def test_edited_attributes(old: FilePath, attribute: str, value: object, reason: str) -> None:

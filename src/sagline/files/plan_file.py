@@ -20,10 +20,11 @@ from sagline.cables.model import CableModel, CableState
 from sagline.cables.parabolic import Parabolic
 from sagline.cables.straight import Straight
 from sagline.errors import FileError, InvalidValueError, SaglineWarning
+from sagline.files.dataset import read_dataset
 from sagline.files.plan_checks import check_plan
 from sagline.files.plan_layout import JERK, MOTION, PARTS, PROOF, QUANTITIES, TIME, Quantity
 from sagline.files.robot_file import dump_robot, parse_robot
-from sagline.files.seal import Seal, seal, seal_of
+from sagline.files.seal import Seal, seal
 from sagline.files.whole import written_whole
 from sagline.kinematics.plan import Plan
 from sagline.motion.path import Path
@@ -39,7 +40,6 @@ if TYPE_CHECKING:
 FORMAT = 2  # raised whenever an older sagline could misread the file; 2: with a digest
 MODELS = {model.__name__: model for model in (Straight, Elastic, Empirical, Parabolic, Catenary)}
 HEADERS = 1 << 18  # bytes, more than all names and attributes take beside the robot
-INFLATION = 1000  # times the size of a file that its numbers may take in memory: nobody packs them so well
 STATE_ARRAYS = ("span", "rise", "unstrained_length", "horizontal_tension", "vertical_force", "chord_tension")
 
 Choice = TypeVar("Choice", CableModel, TensionMethod)
@@ -66,7 +66,10 @@ def save_plan(plan: Plan, file: os.PathLike[str] | str) -> None:
     with written_whole(file, size=data.nbytes + HEADERS + len(data.attrs["robot"].encode())) as partial:
         # _FillValue None: numbers are stored as they are, and NaN needs no second meaning
         encoding = {str(name): {"_FillValue": None} for name in data.variables}
-        data.to_netcdf(partial, engine="h5netcdf", encoding=encoding)
+        try:
+            data.to_netcdf(partial, engine="h5netcdf", encoding=encoding)
+        except RuntimeError as error:  # what h5py makes of a disk that fills up meanwhile
+            raise OSError(str(error)) from error
         seal(partial)
 
 
@@ -95,11 +98,10 @@ def load_plan(file: os.PathLike[str] | str) -> Plan:
         cogiro (283, 8)
     """
     path = FilePath(file)
-    found = _seal(path)
-    data = _opened(path)
+    data, found = read_dataset(path)
     _check_format(path, data.attrs, found)
     try:
-        return _plan(path, data, parse_robot(data.attrs["robot"], f"{path}, robot"))
+        return _plan(path, data, parse_robot(str(data.attrs["robot"]), f"{path}, robot"))
     except KeyError as error:
         raise FileError(path, f"has no {error.args[0]}", "Write it again; it is incomplete or was edited.") from None
     except InvalidValueError as error:
@@ -168,42 +170,6 @@ def _read(path: FilePath, data: Dataset, key: str, choices: Mapping[str, type[Ch
 
 def _plain(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else value
-
-
-def _opened(path: FilePath) -> Dataset:
-    """The whole file, in memory."""
-    from h5py import File
-    from xarray import open_dataset
-
-    size = path.stat().st_size
-    try:
-        with File(path) as file:  # h5netcdf writes to stderr about a file of which this cannot be read
-            dict(file.attrs)
-        with open_dataset(path, engine="h5netcdf", decode_times=False, mask_and_scale=False) as data:
-            if data.nbytes > INFLATION * size:
-                raise ValueError(f"{size} bytes that say to hold {data.nbytes:.2g}")
-            return data.load()
-    except Exception as error:  # h5py, h5netcdf and xarray have no error of their own for a damaged file: any will do
-        reason = next(iter(str(error).splitlines()), type(error).__name__)
-        raise FileError(
-            path, f"is no complete NetCDF file ({reason})", "Write it again; it may have been cut off."
-        ) from None
-
-
-def _seal(path: FilePath) -> Seal:
-    """What a file's end says, before anything else in it is believed."""
-    try:
-        if path.exists() and not path.is_file() and not path.is_dir():
-            raise FileError(path, "is no file", "Check its name.")  # opening a pipe would wait for its writer
-        found = seal_of(path)
-    except FileNotFoundError:
-        raise FileError(path, "does not exist", "Check its name.") from None
-    except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
-        reason = getattr(error, "strerror", None) or error
-        raise FileError(path, f"cannot be read ({reason})", "Check its name and its permissions.") from None
-    if found is Seal.BROKEN:
-        raise FileError(path, "is not as it was written: its digest differs", "Take it from its source again.")
-    return found
 
 
 def _check_format(path: FilePath, attributes: Mapping[str, Any], found_seal: Seal) -> None:

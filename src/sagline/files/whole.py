@@ -99,31 +99,14 @@ def write_text(file: os.PathLike[str] | str, text: str) -> None:
         FileError: If the file cannot be written, or the text holds half a character; what was there before is
             untouched.
     """
-    content = utf8(text, Path(file))
-    with written_whole(file) as partial:
-        partial.write_bytes(content)
-
-
-def utf8(text: str, file: Path) -> bytes:
-    """A text as a file holds it.
-
-    Args:
-        text: The text.
-        file: The file it is for, for the message.
-
-    Returns:
-        The text in UTF-8.
-
-    Raises:
-        FileError: If it holds half a character (a lone surrogate).
-    """
     try:
-        return text.encode()
+        content = text.encode()
     except UnicodeEncodeError as error:
         found = f"U+{ord(text[error.start]):04X} in {text[max(0, error.start - 20) : error.start]!r}…"
-        raise FileError(
-            file, f"cannot hold half a character ({found})", "Correct the name or note it comes from."
-        ) from None
+        step = "Correct the name or note it comes from."
+        raise FileError(Path(file), f"cannot hold half a character ({found})", step) from None
+    with written_whole(file) as partial:
+        partial.write_bytes(content)
 
 
 @contextmanager
