@@ -21,7 +21,7 @@ from sagline.report.blocks import Chapter
 from tests.abuse.command_lines import LINES, Case, cases, commands
 
 SHORT = "durations: 1\nrate: 4\nwaypoints: [{position: [0, 0, 1.5]}, {position: [1, 0, 1.5]}]\n"
-SHARE = 500  # of all, in make test
+SHARE = 250  # of all, in make test
 SLOWEST = 2.0  # s, of the processor: other tests run beside
 START = 1.5  # s, that a process takes to load
 LARGEST = 500 * 1024  # kB

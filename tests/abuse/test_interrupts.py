@@ -10,13 +10,16 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import pytest
 
 from sagline.cli.examples import write_examples
 
-SHARE, ALL = 6, 200  # moments, over all commands
+Whole = Callable[[tuple[str, ...]], tuple[float, set[str]]]
+SHARE, ALL = 4, 200  # moments, over all commands
 COMMANDS: tuple[tuple[str, ...], ...] = (
     ("track", "cogiro", "own_path.yaml", "--csv", "--out", "out"),
     ("forward", "cogiro", "lengths.csv", "--out", "out"),
@@ -58,18 +61,21 @@ def started(
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, ...], tuple[float, set[str]]]:
-    """How long each command takes where nobody disturbs it [s], and the files that it leaves."""
-    found = {}
-    for words in COMMANDS:
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Whole:
+    """How long a command takes where nobody disturbs it [s], and the files that it leaves."""
+
+    @cache
+    def found(words: tuple[str, ...]) -> tuple[float, set[str]]:
         place = tmp_path_factory.mktemp("whole")
         write_examples(place, force=False)
         before, start = files(place), time.monotonic()
         process = started(place, 600.0, signal.SIGINT, words)
         _, errors = process.communicate(timeout=300)
         assert process.returncode == 0, errors
-        found[words] = (time.monotonic() - start, files(place) - before)
-        assert found[words][1]
+        seconds, made = time.monotonic() - start, files(place) - before
+        assert made
+        return seconds, made
+
     return found
 
 
@@ -106,24 +112,22 @@ def check(
             assert any(name.endswith("article.html") for name in left), what
 
 
-def each(count: int, seed: int, number: int, whole: dict[tuple[str, ...], tuple[float, set[str]]], top: Path) -> None:
+def each(count: int, seed: int, number: int, whole: Whole, top: Path) -> None:
     draw = random.Random(seed)
     for k in range(count):
         words = COMMANDS[k % len(COMMANDS)]
         place = top / str(k)
         place.mkdir()
-        check(words, *whole[words], place, draw, number)
+        check(words, *whole(words), place, draw, number)
 
 
-def test_ctrl_c_at_any_moment(whole: dict[tuple[str, ...], tuple[float, set[str]]], tmp_path: Path) -> None:
+def test_ctrl_c_at_any_moment(whole: Whole, tmp_path: Path) -> None:
     each(SHARE, 12, signal.SIGINT, whole, tmp_path)
 
 
 @pytest.mark.soak
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
-def test_ctrl_c_and_kill_at_many_moments(
-    number: int, whole: dict[tuple[str, ...], tuple[float, set[str]]], tmp_path: Path
-) -> None:
+def test_ctrl_c_and_kill_at_many_moments(number: int, whole: Whole, tmp_path: Path) -> None:
     each(ALL, 13, number, whole, tmp_path)
 
 
