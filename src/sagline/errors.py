@@ -68,7 +68,15 @@ class FileError(SaglineError):
 
     @classmethod
     def of(cls, path: Path | str, error: InvalidValueError) -> FileError:
-        """What is wrong with a value, told with the file that says it."""
+        """What is wrong with a value, told with the file that says it.
+
+        Args:
+            path: The file.
+            error: What is wrong with a value in it.
+
+        Returns:
+            The error, to be raised.
+        """
         return cls(path, f"{error.item} is {error.value}; allowed: {error.allowed}", error.next_step)
 
     def __str__(self) -> str:

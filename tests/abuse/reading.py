@@ -180,8 +180,10 @@ def sound(found: Any, what: str) -> None:
     """What was read can be worked with: finite numbers, and the solver has an answer or an error."""
     robot = getattr(found, "robot", found)
     if isinstance(robot, sl.Robot):
-        for text in (robot.name, robot.source, robot.notes.replace("\n", ""), *robot.assumed.values()):
-            assert text == printable(text), what
+        lines = "\n".join((robot.name, robot.source, robot.notes, *robot.assumed.values())).split("\n")
+        assert robot.name in lines, what
+        for line in lines:
+            assert line.replace("\t", " ") == printable(line.replace("\t", " ")), what
         for array in (robot.frame_anchors, robot.platform_anchors, robot.inertia, robot.center_of_mass):
             assert np.isfinite(array).all(), what
         place = sl.Pose(robot.frame_anchors.mean(axis=0) - [0.0, 0.0, 0.5], np.eye(3))

@@ -21,6 +21,8 @@ from sagline.files.quantity import in_si, plain_number, within_reach
         ("22 mm²", "m^2", 22e-6),
         ("2 GPa", "Pa", 2e9),
         ("67 g/m", "kg/m", 0.067),
+        ("67\u00a0g/m", "kg/m", 0.067),
+        ("67\n g/m\n", "kg/m", 0.067),
         ("0.067 kg/m", "kg/m", 0.067),
         ("3 kg m^2", "kg*m^2", 3.0),
         ("-1.5e2 cm", "m", -1.5),

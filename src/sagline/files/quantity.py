@@ -22,10 +22,11 @@ _LONGEST: Final = 60  # letters of a number with its unit; a float64 takes 24
 
 _DECIMAL = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
 _WORD = r"[-+]?\.?(?:inf|Inf|INF)|\.?(?:nan|NaN|NAN)"  # as YAML and Python write what no digits can
-_FACTOR = r"[A-Za-zµμΩÅ°_]+(?:\s?(?:\^|\*\*)\s?[-+]?[0-9]|[²³])?"  # no parentheses, pint trips over some
-_UNIT = rf"{_FACTOR}(?:(?:\s?[*/·]\s?|\s){_FACTOR}){{0,5}}"
-_PLAIN = re.compile(rf"\s*(?:({_DECIMAL})|{_WORD})\s*")
-_WITH_UNIT = re.compile(rf"\s*({_DECIMAL})(\s+1\s?/\s?{_UNIT}|\s*{_UNIT})\s*")
+_FACTOR = r"[A-Za-zµμΩÅ°_]+(?:[ \t]?(?:\^|\*\*)[ \t]?[-+]?[0-9]|[²³])?"  # no parentheses, pint trips over some
+_UNIT = rf"{_FACTOR}(?:(?:[ \t]?[*/·][ \t]?|[ \t]){_FACTOR}){{0,5}}"
+_BLANKS = re.compile("[ \t\r\n\u00a0\u202f]+")  # the last two are what typographers put before a unit
+_PLAIN = re.compile(rf"[ \t]*(?:({_DECIMAL})|{_WORD})[ \t]*")
+_WITH_UNIT = re.compile(rf"[ \t]*({_DECIMAL})([ \t]+1[ \t]?/[ \t]?{_UNIT}|[ \t]*{_UNIT})[ \t]*")
 
 
 def plain_number(text: str) -> float | None:
@@ -92,6 +93,7 @@ def _from_number(value: object) -> float | None:
 
 
 def _from_text(text: str, unit: str) -> float | None:
+    text = _BLANKS.sub(" ", text).strip()
     number = plain_number(text)
     if number is not None or not unit or len(text) > _LONGEST:
         return number
