@@ -48,16 +48,28 @@ class Grid:
         Returns:
             Each table, and the columns that it needs for nothing in it to be cut.
         """
-        rest = range(self.keys, len(self.heads))
-        pieces: list[tuple[Table, int]] = []
-        for count in range(1, len(rest) + 1):
-            tables = [
-                self._table([*range(self.keys), *part], first=part[0] == self.keys) for part in _split(rest, count)
-            ]
+        full = self._filled(console, width)
+        even = list(_split(range(self.keys, len(self.heads)), len(full)))
+        for parts in (even, full):  # evenly, if that takes no more pieces
+            tables = [self._table([*range(self.keys), *part], first=part[0] == self.keys) for part in parts]
             pieces = [(table, _least(console, table)) for table in tables]
             if all(least <= width for _, least in pieces):
                 break
         return pieces
+
+    def _filled(self, console: Console, width: int) -> list[range]:
+        """Consecutive columns, as many in each piece as fit; one where not even one does."""
+        parts, first, count = [], self.keys, len(self.heads)
+        while first < count:
+            end = first + 1
+            while end < count:
+                wider = self._table([*range(self.keys), *range(first, end + 1)], first=False)
+                if _least(console, wider) > width:
+                    break
+                end += 1
+            parts.append(range(first, end))
+            first = end
+        return parts
 
     def _table(self, columns: Sequence[int], *, first: bool) -> Table:
         """A piece; only the first has the title."""
