@@ -335,3 +335,13 @@ def test_robots_of_any_name(tmp_path: FilePath, name: str) -> None:
     robot = SUSPENDED.replace(name=name)
     sl.inverse(robot, sl.Pose([0.0, 0.0, 1.5], np.eye(3))).save(tmp_path / "run.nc")
     assert sl.load_plan(tmp_path / "run.nc").state.one_robot.name == name
+
+
+def test_a_folder_of_the_name_of_a_tilde_is_a_folder(tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    (tmp_path / "~").mkdir()
+    plan = sl.inverse(sl.load_robot("cogiro"), sl.Pose([0.0, 0.0, 2.0], np.eye(3)))
+    plan.save("~/run.nc")
+    assert [str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*.nc")] == ["~/run.nc"]
+    np.testing.assert_array_equal(sl.load_plan("~/run.nc").unstrained_length, plan.unstrained_length)

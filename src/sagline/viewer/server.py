@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import logging
 import socket
 import warnings
@@ -76,10 +77,13 @@ def _check(host: str, port: int) -> None:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             probe.bind(address)
     except (OSError, UnicodeError) as error:
+        if getattr(error, "errno", None) == errno.EADDRINUSE:
+            step = "Choose another with --port; --port 0 takes any that is free."
+            raise InvalidValueError(f"port {port}", f"in use on {host}", "a free port", step) from None
         reason = getattr(error, "strerror", None) or error
         raise InvalidValueError(
             f"{host}:{port}",
-            f"not to be had ({reason})",
+            f"nothing to listen on ({reason})",
             "an address of this machine and a free port",
             "Choose others with --host and --port; --port 0 takes any that is free.",
         ) from None

@@ -118,7 +118,13 @@ class Snapshot:
 
 
 def taken_at(
-    robot: Robot, pose: Pose, settings: Settings, previous: Plan | None, *, confirmed: bool = True
+    robot: Robot,
+    pose: Pose,
+    settings: Settings,
+    previous: Plan | None,
+    *,
+    confirmed: bool = True,
+    wrench: Array | None = None,
 ) -> Snapshot:
     """A robot, already changed by the settings, held at rest at a pose.
 
@@ -128,10 +134,11 @@ def taken_at(
         settings: Model and method.
         previous: The plan before, for a method that remembers; others never see it.
         confirmed: Whether to find where the platform really rests, if the model is approximate.
+        wrench: External wrench, shape (6,), as `inverse` takes it; None for none.
     """
     reference = previous if remembers(settings.tension) else None
     try:
-        plan = inverse(robot, pose, settings.model, settings.tension, previous=reference)
+        plan = inverse(robot, pose, settings.model, settings.tension, wrench, reference)
     except CableGeometryError:
         return Snapshot(robot, pose, None, None)
     approximate = confirmed and not isinstance(settings.model, Catenary) and bool(plan.feasible)

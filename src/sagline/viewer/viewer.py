@@ -57,6 +57,7 @@ class Viewer:
         robot: Robot,
         run: Run | None = None,
         ready: Callable[[Reading], bool] = lambda _: True,
+        wrench: Array | None = None,
     ) -> None:
         """Build the page.
 
@@ -66,8 +67,10 @@ class Viewer:
             run: A plan along a path, to play.
             ready: Whether a reading can be had without waiting; until then the page says that it comes. `refresh`
                 when one has become ready.
+            wrench: External wrench on the platform that is dragged, shape (6,), as `inverse` takes it; None for none.
         """
         self._ready = ready
+        self._wrench = wrench
         self._server = server
         self._robot = robot
         self._run = run
@@ -194,6 +197,7 @@ class Viewer:
             settings,
             self._previous,
             confirmed=self._ready(Reading.REST),
+            wrench=self._wrench,
         )
         if not remembers(settings.tension):
             self._forget()  # what one comes from by another way of sharing is no way there
