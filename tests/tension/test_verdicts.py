@@ -107,10 +107,13 @@ def check_with_sag(robot: Robot, count: int, seed: int) -> None:
     assert plan.bracket is not None
     statuses = set(np.unique(plan.status))
     assert statuses <= {PoseStatus.SOLVED, PoseStatus.INFEASIBLE, PoseStatus.TOO_SLACK, PoseStatus.BORDERLINE}
-    # where one direction proves nothing the load is next to the border: a hundredth of the weight would do
-    for i in unproved(sample):
+    # where one direction proves nothing the load is next to the border: a hundredth of the weight would do, or a moment
+    lost = unproved(sample)
+    assert len(lost) <= 0.01 * count
+    for i in lost:
         assert plan.status[i] != PoseStatus.SOLVED
-        assert plan.status[i] == PoseStatus.TOO_SLACK or plan.shortfall[i] < 0.01 * robot.mass * robot.gravity
+        if plan.status[i] != PoseStatus.TOO_SLACK:
+            assert plan.shortfall[i] < 0.01 * robot.mass * robot.gravity or np.isinf(plan.shortfall[i])
 
 
 @pytest.mark.parametrize("robot", presets(), ids=lambda robot: robot.name)

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sagline.numbers import n
 from sagline.plot.courses import INFEASIBLE, clock_of, dress_over
-from sagline.plot.numbers import n
 from sagline.plot.sheet import (
     COLORS,
     ORANGE,

@@ -17,7 +17,7 @@ from scipy.spatial import ConvexHull
 from sagline.errors import InvalidValueError
 from sagline.kernels.cable import geometry
 from sagline.kinematics.inverse import inverse
-from sagline.plot.numbers import n
+from sagline.numbers import n
 from sagline.plot.sheet import LABEL, TICK, VERMILLION, sheet
 from sagline.robot.pose import Pose
 from sagline.statics.tables import body_table, cable_table, pose_rows

@@ -18,7 +18,7 @@ from sagline.article.constants import (
     published_sampling,
 )
 from sagline.article.intercept import InterceptStudy, intercept_studies
-from sagline.plot.numbers import n
+from sagline.numbers import n
 from sagline.plot.sheet import BLUE, PURPLE, VERMILLION
 from sagline.report.blocks import Chapter, Finding, Table, Verdict
 from sagline.report.drawing import Drawings, axes, legend, shades

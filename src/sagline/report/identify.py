@@ -10,7 +10,7 @@ from sagline.article.identify import EmpiricalFit, identify_empirical
 from sagline.article.identify_cable import CableFit, identify_cable
 from sagline.cables.cable import Cable
 from sagline.cables.catenary import Catenary
-from sagline.plot.numbers import n
+from sagline.numbers import n
 from sagline.report.blocks import Chapter, Finding, Table, Verdict
 from sagline.report.drawing import Drawings, axes, legend, shades
 from sagline.report.maps import draw_errors, map_axes

@@ -10,7 +10,7 @@ from matplotlib import patheffects
 from matplotlib.colors import BoundaryNorm, ListedColormap
 
 from sagline.arrays import Array
-from sagline.plot.numbers import n
+from sagline.numbers import n
 from sagline.plot.sheet import GAP_COLOR, LABEL, TICK, Sheet
 from sagline.report.drawing import axes
 

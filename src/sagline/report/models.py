@@ -13,7 +13,7 @@ from sagline.arrays import Array
 from sagline.article.errata_cables import simulated_cable
 from sagline.article.model_errors import MODELS, ModelErrors, model_errors
 from sagline.article.sampling import GRAVITY
-from sagline.plot.numbers import n
+from sagline.numbers import n
 from sagline.plot.sheet import COLORS, TICK
 from sagline.report.blocks import Chapter, Finding, Panel, Table, Verdict
 from sagline.report.drawing import Drawings, axes, floored, legend

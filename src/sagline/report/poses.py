@@ -8,7 +8,7 @@ from sagline.arrays import Array
 from sagline.article.fits import fit_line
 from sagline.article.machine import DENSITY, MODULUS, Parameter
 from sagline.article.ten_poses import Explanation, TenPoses, Tour, ten_poses, tour
-from sagline.plot.numbers import n
+from sagline.numbers import n
 from sagline.plot.sheet import BLUE, COLORS, TICK, VERMILLION
 from sagline.report.blocks import Chapter, Finding, Panel, Table, Verdict
 from sagline.report.drawing import Drawings, axes, legend, thinned

@@ -21,7 +21,7 @@ from sagline.article.sag_constant import (
     stretch_study,
 )
 from sagline.article.sampling import ANGLE
-from sagline.plot.numbers import n
+from sagline.numbers import n
 from sagline.plot.sheet import BLUE, GREEN, VERMILLION
 from sagline.report.blocks import Chapter, Finding, Verdict
 from sagline.report.drawing import Courses, Drawings, axes, legend, with_fit

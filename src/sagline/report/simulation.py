@@ -12,8 +12,8 @@ from sagline.cables.parabolic import Parabolic
 from sagline.kinematics.confirm import Confirmation
 from sagline.kinematics.plan import Plan
 from sagline.motion.path import Path
+from sagline.numbers import n
 from sagline.plot.motion import path as draw_path
-from sagline.plot.numbers import n
 from sagline.plot.robot import robot as draw_robot
 from sagline.plot.sheet import BLUE, COLORS, VERMILLION, Sheet
 from sagline.report.blocks import Chapter, Finding, Panel, Table, Verdict
