@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from sagline.arguments import file_path
 from sagline.arrays import Array, checked
 from sagline.errors import FileError, InvalidValueError
 from sagline.files.path_table import QUATERNION_TOLERANCE, path_from_table
@@ -59,7 +60,7 @@ def load_path(file: str | os.PathLike[str]) -> Path:
     Raises:
         FileError: If the file cannot be read, or what it says is no path; the message names the line or the key.
     """
-    path = FilePath(file)
+    path = file_path(file)
     readers = {".yaml": _path_from_yaml, ".yml": _path_from_yaml, ".csv": path_from_table}
     reader = readers.get(path.suffix.lower())
     if reader is None:

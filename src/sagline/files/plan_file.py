@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from sagline.arguments import file_path, instance
 from sagline.arrays import locked
 from sagline.cables.catenary import Catenary
 from sagline.cables.elastic import Elastic
@@ -55,8 +56,8 @@ def save_plan(plan: Plan, file: os.PathLike[str] | str) -> None:
         InvalidValueError: If the plan is of several robots, one a pose.
         FileError: If the file cannot be written; what was there before is untouched.
     """
-    data = _dataset(plan)
-    with written_whole(file, size=data.nbytes + HEADERS) as partial:
+    data = _dataset(instance(plan, Plan, "plan"))
+    with written_whole(file_path(file), size=data.nbytes + HEADERS) as partial:
         # _FillValue None: numbers are stored as they are, and NaN needs no second meaning
         encoding = {str(name): {"_FillValue": None} for name in data.variables}
         data.to_netcdf(partial, engine="h5netcdf", encoding=encoding)
@@ -82,7 +83,7 @@ def load_plan(file: os.PathLike[str] | str) -> Plan:
         >>> print(plan.state.robot.name, plan.unstrained_length.shape, plan.feasible.all())
         cogiro (283, 8) True
     """
-    path = FilePath(file)
+    path = file_path(file)
     data = _opened(path)
     _check_format(path, data.attrs)
     try:

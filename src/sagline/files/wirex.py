@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import Final, cast, get_args
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
+from sagline.arguments import file_path, optional
 from sagline.arrays import Array
 from sagline.cables.cable import Cable
 from sagline.errors import FileError, InvalidValueError
@@ -36,7 +36,8 @@ def load_wirex(source: str | os.PathLike[str], cables: Cable | None = None) -> I
     Raises:
         FileError: If the file cannot be read, or describes no robot with one platform.
     """
-    path = Path(source)
+    optional(cables, Cable, "cables")
+    path = file_path(source, "source")
     try:
         root = read_xml(path)
         _check_generation(root)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import struct
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array, Codes, checked, locked
+from sagline.arguments import brief, instance, optional
+from sagline.arrays import LARGEST, SMALLEST, Array, Codes, checked, exactly, locked
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
@@ -15,12 +18,15 @@ from sagline.kernels import codes, tables
 from sagline.kernels.forward.forward import forward_poses
 from sagline.kernels.forward.problem import FORCE_RESIDUAL, FORWARD_NUMBERS, MOMENT_RESIDUAL, STIFFNESS_MIN
 from sagline.kernels.memory import memory_for
+from sagline.kinematics.caller import give, plain
 from sagline.kinematics.forward_rows import new_chain
 from sagline.kinematics.forward_status import STABLE, ForwardStatus
 from sagline.kinematics.start import search
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.tables import body_table, cable_table, pose_rows
+
+_NO_WRENCH = (0.0,) * 6
 
 
 class ForwardStep(NamedTuple):
@@ -61,10 +67,11 @@ class ForwardSolver:
             start: Where the first step begins; None: it searches, which takes some hundred microseconds.
 
         Raises:
-            InvalidValueError: If the model is Straight, which has no forces, or start is a batch.
+            InvalidValueError: If the model is Straight, which has no forces, start is a batch, or an argument is of the
+                wrong kind.
         """
-        self._robot = robot
-        self._model = model or Catenary()
+        self._robot = instance(robot, Robot, "robot")
+        self._model = optional(model, CableModel, "model") or Catenary()
         if self._model.code == codes.STRAIGHT:
             raise InvalidValueError(
                 "model", "Straight()", "a model with forces", "Use forward() to fit straight cables."
@@ -90,6 +97,8 @@ class ForwardSolver:
             memory_for(m),
             (self._pose, self._results, np.empty((1, m), dtype=np.int8), self._numbers, self._status),
         )
+        self._pack_lengths = partial(struct.Struct(f"{m}d").pack_into, self._lengths[0].data.cast("B"))
+        self._pack_wrench = partial(struct.Struct("6d").pack_into, self._wrench[0].data.cast("B"))
         self._start[0, 6] = 1.0
         self._lengths[0] = np.nan  # compiles, solves nothing
         forward_poses(*self._arguments)
@@ -102,9 +111,9 @@ class ForwardSolver:
             start: Where the next step begins; None: it searches.
 
         Raises:
-            InvalidValueError: If start is a batch.
+            InvalidValueError: If start is a batch, or no pose.
         """
-        if start is not None and start.shape:
+        if start is not None and instance(start, Pose, "start").shape:
             raise InvalidValueError("start", f"a batch of {len(start)} poses", "one pose", "Give one of them.")
         self._lost = start is None
         if start is not None:
@@ -124,7 +133,7 @@ class ForwardSolver:
             InvalidValueError: If a length is not positive (the message names its index), or a shape is wrong.
         """
         lengths = self._checked(unstrained_length)
-        load = None if wrench is None else checked(wrench, "wrench", "N or N m", shape=(6,))
+        load = None if wrench is None else exactly(wrench, "wrench", "N or N m", (6,))
         position, quaternion = np.empty(3), np.empty(4)
         status = self.step_into(lengths, position, quaternion, load)
         numbers = self._numbers[0]
@@ -140,11 +149,10 @@ class ForwardSolver:
 
     def _checked(self, unstrained_length: ArrayLike) -> Array:
         """Lengths of shape (m,), positive and finite; looked at as a list, which for few numbers is the fastest."""
-        given = np.asarray(unstrained_length)
-        shape = self._lengths.shape[1:]
-        if given.dtype == np.float64 and given.shape == shape:
+        given, shape = unstrained_length, self._lengths.shape[1:]
+        if type(given) is np.ndarray and given.dtype == np.float64 and given.shape == shape:
             values = given.tolist()
-            if min(values) > 0.0 and sum(values) < np.inf:  # the sum is NaN if a length is
+            if min(values) >= SMALLEST and sum(values) < LARGEST:  # the sum is NaN if a length is
                 return given
         lengths = checked(unstrained_length, "unstrained_length", "m", shape=shape, above=0.0)
         if lengths.ndim != 1:
@@ -156,7 +164,9 @@ class ForwardSolver:
     def step_into(
         self, unstrained_length: Array, position: Array, quaternion: Array, wrench: Array | None = None
     ) -> ForwardStatus:
-        """Solve one sample into the caller's memory: no allocation once a pose is known, no check of the arguments.
+        """Solve one sample into the caller's memory: no allocation once a pose is known.
+
+        What is wrong with a length or a number of the wrench is told by the status, not by an error.
 
         Args:
             unstrained_length: L [m], shape (m,).
@@ -166,9 +176,15 @@ class ForwardSolver:
 
         Returns:
             The status of the sample.
+
+        Raises:
+            InvalidValueError: If an argument is no such array of numbers.
         """
-        self._lengths[0] = unstrained_length
-        self._wrench[0] = 0.0 if wrench is None else wrench
+        try:
+            self._pack_lengths(0, *plain(unstrained_length, "unstrained_length", "m", self._lengths.size))
+            self._pack_wrench(0, *(_NO_WRENCH if wrench is None else plain(wrench, "wrench", "N or N m", 6)))
+        except (struct.error, TypeError, OverflowError):
+            raise self._misfit(unstrained_length, wrench) from None
         if self._lost:
             found = search(self._robot, self._model, locked(self._lengths.copy()), locked(self._wrench.copy()))
             self._start[:] = found.poses
@@ -177,6 +193,13 @@ class ForwardSolver:
         if status in STABLE:
             self._start[0] = self._pose[0]
             self._lost = False
-        position[:] = self._pose[0, :3]
-        quaternion[:] = self._pose[0, 3:]
+        give(self._pose[0, :3], position, "position")
+        give(self._pose[0, 3:], quaternion, "quaternion")
         return status
+
+    def _misfit(self, unstrained_length: Any, wrench: Any) -> InvalidValueError:
+        """The error of what are no lengths, or no wrench."""
+        m = self._lengths.size
+        exactly(unstrained_length, "unstrained_length", "m", (m,))
+        value, allowed = brief(wrench), "six numbers"
+        return InvalidValueError("wrench", value, allowed, "Give force [N] and moment [N m] as plain numbers.")

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array, Codes, locked
+from sagline.arguments import brief, callback, instance, optional
+from sagline.arrays import Array, Codes, check_memory, locked
 from sagline.blocks import Progress
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel, CableState
@@ -18,6 +19,7 @@ from sagline.kinematics.plan import Plan
 from sagline.motion.path import Path
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
+from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot
 from sagline.robot.several import cables_of, first_of, one_a_pose
 from sagline.statics.tables import pose_rows
@@ -26,6 +28,7 @@ from sagline.tension.closest import Closest
 from sagline.tension.method import TensionMethod, Variable
 from sagline.tension.options import kernel_options
 
+POSE_BYTES, CABLE_BYTES = 700.0, 150.0  # what a pose takes while it is solved, and each of its cables
 _CATENARY = Catenary()
 _CLOSEST = Closest()
 
@@ -61,8 +64,9 @@ def inverse(
 
     Raises:
         InvalidValueError: If a robot has fewer cables than degrees of freedom, the method cannot share among
-            its cables, several robots do not fit together (the message names which), or an argument is of the
-            wrong shape.
+            its cables, several robots do not fit together (the message names which), an argument is of the
+            wrong kind or shape, a pose is outside the motions of the robot's pattern, or there are more poses than
+            memory for them.
         CableGeometryError: If a cable has no length at some pose.
 
     Source:
@@ -75,13 +79,17 @@ def inverse(
         >>> print(plan.feasible, plan.unstrained_length.round(3))
         True [11.049 10.542  9.674  9.829  8.49   7.85   9.453  9.402]
     """
+    _check_kinds(motion, model, tension, previous)
+    callback(progress, "progress")
     method = tension if isinstance(motion, Path) or previous is not None else tension.alone
     pose = motion.pose if isinstance(motion, Path) else motion
     robots = one_a_pose(robot, len(pose) if pose.shape else None)
     shared = first_of(robots)
+    check_reach(shared, pose, "pose")
     options = kernel_options(robots, model, method)
     rows = pose_rows(pose)
     count = len(rows)
+    check_memory("motion", count * (POSE_BYTES + CABLE_BYTES * shared.cable_count), "Give its poses in parts.")
     load = external_wrench(wrench, count if pose.shape else None)
     if isinstance(motion, Path):
         load = locked(inertial_wrench(robots, pose, motion.twist, motion.twist_rate) + load)
@@ -113,6 +121,15 @@ def inverse(
         farkas=locked(_in_world(farkas, shared).reshape(*pose.shape, 6)),
         needed=locked(_in_world(found.needed, shared).reshape(*pose.shape, 6)),
     )
+
+
+def _check_kinds(motion: object, model: object, tension: object, previous: object) -> None:
+    if not isinstance(motion, Path | Pose):
+        step = "Give Pose.from_euler(position, 0, 0, 0), or quintic_path(waypoints, speed=1.0)."
+        raise InvalidValueError("motion", brief(motion), "a Pose or a Path", step)
+    instance(model, CableModel, "model")
+    instance(tension, TensionMethod, "tension")
+    optional(previous, Plan, "previous")
 
 
 def _in_world(components: Array, robot: Robot) -> Array:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import struct
 from functools import partial
-from math import isfinite
+from math import hypot, isfinite, nan
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array, checked, locked
+from sagline.arguments import instance, optional
+from sagline.arrays import Array, exactly, locked
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
@@ -17,6 +19,7 @@ from sagline.kernels import codes, tables
 from sagline.kernels.inverse.poses import inverse_poses
 from sagline.kernels.jit import machine_code
 from sagline.kernels.memory import memory_for
+from sagline.kinematics.caller import give, plain
 from sagline.kinematics.inverse_rows import Found, explained
 from sagline.kinematics.status import PoseStatus
 from sagline.robot.robot import Robot
@@ -27,7 +30,10 @@ from sagline.tension.options import kernel_options, takes_default_kernel
 
 _STATUSES = tuple(PoseStatus)  # by code; a lookup costs a tenth of a conversion
 _INFEASIBLE = locked(np.array([codes.POSE_INFEASIBLE], dtype=np.int8))
-QUATERNION_TOLERANCE = 2e-6  # of the squared length: as `Pose.from_quaternion`
+# each takes exactly so many real numbers, quicker than an array takes a tuple
+_POSE, _WRENCH = struct.Struct(f"{tables.POSE_COLUMNS}d").pack_into, struct.Struct("6d").pack_into
+QUATERNION_TOLERANCE = 1e-6  # of the length: as `Pose.from_quaternion`
+ROUNDING = 1e-15  # of the length: what needs no normalizing
 
 
 class InverseStep(NamedTuple):
@@ -73,16 +79,17 @@ class InverseSolver:
             tension: How the load is shared; the default is `Closest`, to the step before.
 
         Raises:
-            InvalidValueError: If the robot has too few cables, or the method cannot share among them.
+            InvalidValueError: If the robot has too few cables, the method cannot share among them, or an argument is of
+                the wrong kind.
         """
-        m, n = robot.cable_count, robot.degrees_of_freedom
-        method = tension or Closest()
+        m, n = instance(robot, Robot, "robot").cable_count, robot.degrees_of_freedom
+        method = optional(tension, TensionMethod, "tension") or Closest()
         self._robot = robot
-        self._options = kernel_options(robot, model or Catenary(), method)
+        self._options = kernel_options(robot, optional(model, CableModel, "model") or Catenary(), method)
         self._pose = np.zeros((1, tables.POSE_COLUMNS))
         self._pose[0, 6] = 1.0
-        self._position, self._quaternion = self._pose[0, :3], self._pose[0, 3:]
         self._wrench = np.zeros((1, 6))
+        self._pose_bytes, self._wrench_bytes = (array[0].data.cast("B") for array in (self._pose, self._wrench))
         self._reference = np.full(m, np.nan)
         self._found = Found.empty(1, m, n)
         self._status = self._found.pose_status.data  # read five times faster than an array of one
@@ -122,12 +129,14 @@ class InverseSolver:
             A fresh result whose arrays belong to the caller.
 
         Raises:
-            InvalidValueError: If an argument is not finite or of the wrong shape.
+            InvalidValueError: If an argument is not finite or of the wrong shape, or the quaternion is not of length 1
+                to 1e-6.
         """
-        _check_pose(position, quaternion)
-        load = None if wrench is None else checked(wrench, "wrench", "N or N m", shape=(6,))
+        load = None if wrench is None else exactly(wrench, "wrench", "N or N m", (6,))
         lengths = np.empty(self._reference.size)
         status = self.step_into(position, quaternion, lengths, load)
+        if status is PoseStatus.NO_POSE:
+            raise _misfit(position, quaternion, wrench)
         return InverseStep(
             lengths,
             self._found.results[tables.TENSION, 0].copy(),
@@ -140,28 +149,52 @@ class InverseSolver:
     def step_into(
         self, position: ArrayLike, quaternion: ArrayLike, out: Array, wrench: ArrayLike | None = None
     ) -> PoseStatus:
-        """Solve one pose into the caller's memory: no allocation, no check of the arguments.
+        """Solve one pose into the caller's memory: no allocation, and no error where a number is wrong but a status.
 
         Args:
             position: Of the platform origin [m], shape (3,).
-            quaternion: Rotation platform -> world, unit, scalar last, shape (4,).
+            quaternion: Rotation platform -> world, scalar last, of length 1 to 1e-6 (what is left is normalized away),
+                shape (4,).
             out: Filled with the unstrained lengths [m], shape (m,); NaN where there is no answer.
             wrench: External plus inertial, about the center of mass, world axes [N, N m], shape (6,); None for none.
 
         Returns:
-            The status of the pose.
+            The status of the pose; NO_POSE where a number is not finite, or the quaternion is of another length.
+
+        Raises:
+            InvalidValueError: If an argument is no such array of numbers.
         """
-        self._position[:] = position
-        self._quaternion[:] = quaternion
-        if wrench is not None:
-            self._wrench[0] = wrench
-        elif self._loaded:
-            self._wrench.fill(0.0)
-        self._loaded = wrench is not None
+        try:
+            x, y, z = plain(position, "position", "m", 3)
+            i, j, k, w = plain(quaternion, "quaternion", "", 4)
+            _POSE(self._pose_bytes, 0, x, y, z, i, j, k, w)
+            if wrench is not None:
+                self._loaded = True
+                _WRENCH(self._wrench_bytes, 0, *plain(wrench, "wrench", "N or N m", 6))
+            elif self._loaded:
+                self._loaded = False
+                self._wrench.fill(0.0)
+        except InvalidValueError:
+            raise
+        except (struct.error, TypeError, ValueError, OverflowError):
+            raise _misfit(position, quaternion, wrench) from None
+        if not -ROUNDING < (length := hypot(i, j, k, w)) - 1.0 < ROUNDING and not self._normalized(length):
+            self._lengths.fill(nan)
+            give(self._lengths, out, "out")
+            return PoseStatus.NO_POSE
         self._solve()
-        out[:] = self._lengths
+        give(self._lengths, out, "out")
         status: PoseStatus = _STATUSES[self._status[0]]
+        if status is not PoseStatus.SOLVED and not isfinite(x + y + z):
+            return PoseStatus.NO_POSE
         return status
+
+    def _normalized(self, length: float) -> bool:
+        """Normalize the quaternion in place, where its length is near enough to 1 to be meant."""
+        if not abs(length - 1.0) <= QUATERNION_TOLERANCE:  # NaN is not near
+            return False
+        self._pose[0, 3:] /= length
+        return True
 
     def _shortfall(self, status: PoseStatus) -> float:
         if status is PoseStatus.SOLVED:
@@ -170,17 +203,11 @@ class InverseSolver:
         return float(shortfall[0])
 
 
-def _check_pose(position: Any, quaternion: Any) -> None:
-    """Refuse what is no pose; plain floats first, because a control loop has no time for arrays."""
-    try:
-        x, y, z = position
-        a, b, c, d = quaternion
-        if isfinite(x + y + z) and abs(a * a + b * b + c * c + d * d - 1.0) < QUATERNION_TOLERANCE:
-            return
-    except (TypeError, ValueError):
-        next_step = "Give the platform's position and a unit quaternion, scalar last."
-    else:
-        next_step = "Normalize it; scalar last: (x, y, z, w)."
-    checked(position, "position", "m", shape=(3,))
-    norm = float(np.linalg.norm(checked(quaternion, "quaternion", "", shape=(4,))))
-    raise InvalidValueError("quaternion", f"of length {norm:.12g}", "length 1 to 1e-6", next_step)
+def _misfit(position: Any, quaternion: Any, wrench: Any) -> InvalidValueError:
+    """The error of what is no pose, or no wrench."""
+    exactly(position, "position", "m", (3,))
+    norm = float(np.linalg.norm(exactly(quaternion, "quaternion", "", (4,))))
+    if wrench is not None:
+        exactly(wrench, "wrench", "N or N m", (6,))
+    step = "Normalize it; scalar last: (x, y, z, w)."
+    return InvalidValueError("quaternion", f"of length {norm:.12g}", "length 1 to 1e-6", step)

@@ -15,6 +15,8 @@ from sagline.kinematics.length_rate import length_rate
 from sagline.kinematics.status import PoseStatus
 from sagline.motion.path import Path
 from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.reach import LEVEL, ROUNDING, forbidden_turn, in_words, out_of_plane
+from sagline.robot.several import first_of
 from sagline.tension.method import TensionMethod
 
 
@@ -112,7 +114,29 @@ class Plan:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What stands, but is to be taken with care: cables whose tension leaves the empirical model's range."""
+        """What stands, but is to be taken with care: cables out of the robot's plane or the empirical model's range."""
+        return (*self._turned_away(), *self._out_of_plane(), *self._below_validity())
+
+    def _turned_away(self) -> tuple[str, ...]:
+        robot = first_of(self.state.robot)
+        turn = forbidden_turn(robot, self.state.pose, LEVEL)[:1]  # all poses have the same, or `inverse` refuses them
+        if not np.linalg.norm(turn) > ROUNDING:
+            return ()
+        return (
+            f"the platform is turned by {in_words(turn[0])}, which motion_pattern {robot.motion_pattern} does not do: "
+            "what holds it so is not in the balance; correct the pose, or give the robot another motion_pattern",
+        )
+
+    def _out_of_plane(self) -> tuple[str, ...]:
+        away = np.abs(out_of_plane(first_of(self.state.robot), self.state.pose))
+        if not (away > ROUNDING).any():
+            return ()
+        return (
+            f"the cables leave the plane of the robot by up to {np.nanmax(away):.6g} m, and only what guides the "
+            "platform can hold it against them there; correct the poses, or give the robot another motion_pattern",
+        )
+
+    def _below_validity(self) -> tuple[str, ...]:
         below = (
             np.atleast_2d(self.state.cables.status == CableStatus.BELOW_VALIDITY)
             & np.atleast_1d(self.feasible)[:, None]

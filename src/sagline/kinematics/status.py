@@ -34,3 +34,8 @@ class PoseStatus(Status):
         codes.POSE_UNBOUNDED,
         "the feasible tensions have no upper end, and so no middle; give tension_max, or choose MinimumNorm",
     )
+    NO_POSE = (
+        100,  # no kernel says it: what is no pose does not reach one
+        "what was given is no pose: a number is not finite, or the quaternion is not of length 1; give a position and "
+        "a unit quaternion, scalar last",
+    )

@@ -8,15 +8,16 @@ from typing import cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array, checked
+from sagline.arrays import Array, check_memory, checked, number
 from sagline.errors import InvalidValueError
 from sagline.motion.path import Path
 from sagline.motion.profile import QUINTIC, SEPTIC, Profile
-from sagline.motion.segments import Segments, positive
+from sagline.motion.segments import Segments
 from sagline.robot.pose import Pose
 
 LIMITS = ("speed", "acceleration", "angular_speed", "angular_acceleration")
 MOST_SAMPLES = 100_000_000  # 21 GB of path: beyond it a duration or the rate has the wrong unit
+SAMPLE_BYTES = 350  # what a sample takes while the path is made: 208 in the end
 
 
 def quintic_path(
@@ -168,7 +169,8 @@ def _checked_durations(durations: ArrayLike, segments: int) -> Array:
 
 def _time_grid(total: float, rate: float) -> Array:
     """Times k/rate from 0 to the total time, and the total itself as the last [s]."""
-    steps = total * positive(rate, "rate", "1/s")
+    rate = number(rate, "rate", "1/s", above=0.0)
+    steps = total * rate
     if steps > MOST_SAMPLES:
         raise InvalidValueError(
             "the number of samples",
@@ -176,6 +178,7 @@ def _time_grid(total: float, rate: float) -> Array:
             f"<= {MOST_SAMPLES:g}",
             "Check the units of durations, limits and rate.",
         )
+    check_memory(f"a path of {steps:.3g} samples", SAMPLE_BYTES * steps, "Give a lower rate, or shorter segments.")
     # A total within rounding of a multiple of 1/rate gets no extra sample.
     last = round(steps) if abs(steps - round(steps)) <= 1e-9 * steps else int(np.ceil(steps))
     time = np.arange(last + 1) / rate

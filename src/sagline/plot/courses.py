@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from sagline.errors import InvalidValueError
+from sagline.arguments import choice, instance
+from sagline.kinematics.plan import Plan
 from sagline.plot.sheet import COLORS, TICK, axes_or_new, dressed, legend_outside, shade, sheet
 
 if TYPE_CHECKING:
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from sagline.arrays import Array
-    from sagline.kinematics.plan import Plan
 
 TENSIONS = {
     "chord_tension": r"chord tension $\tau$ [N]",
@@ -110,18 +110,16 @@ def clock_of(plan: Plan) -> Array:
 
 def _lengths(ax: Axes, plan: Plan, quantity: str) -> None:
     label, scale = _known(quantity, LENGTHS)
-    _cables(ax, plan, scale * getattr(plan.state.cables, quantity), label)
+    _cables(ax, plan, scale * getattr(instance(plan, Plan, "plan").state.cables, quantity), label)
 
 
 def _tensions(ax: Axes, plan: Plan, quantity: str) -> None:
     label = _known(quantity, TENSIONS)
-    _cables(ax, plan, getattr(plan.state.cables, quantity), label)
+    _cables(ax, plan, getattr(instance(plan, Plan, "plan").state.cables, quantity), label)
 
 
 def _known(quantity: str, table: Mapping[str, Entry]) -> Entry:
-    if quantity not in table:
-        raise InvalidValueError("quantity", repr(quantity), ", ".join(table), "Name one of them.")
-    return table[quantity]
+    return table[choice(quantity, "quantity", table)]
 
 
 def _cables(ax: Axes, plan: Plan, values: Array, label: str) -> None:

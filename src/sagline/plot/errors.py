@@ -6,14 +6,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sagline.arguments import HOW_TO_GET, instance
+from sagline.errors import InvalidValueError
+from sagline.kinematics.confirm import Confirmation
 from sagline.plot.courses import INFEASIBLE, clock_of
 from sagline.plot.sheet import COLORS, TICK, axes_or_new, dressed, legend_outside, shade, sheet
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-    from sagline.kinematics.confirm import Confirmation
 
 LEAST = 1e-3  # mm: rounding errors are drawn as the flat line that they are
 STYLES = ("-", (0, (4.0, 1.6)), (0, (1.0, 1.2)))
@@ -43,7 +44,12 @@ def errors(*confirmations: Confirmation) -> Figure:
 
     Returns:
         A figure of one panel each, titled with the robot.
+
+    Raises:
+        InvalidValueError: If there is none, or one is no confirmation.
     """
+    if not confirmations:
+        raise InvalidValueError("confirmations", "none", "one at least", HOW_TO_GET["Confirmation"])
     figure = sheet(height=2.8)
     panels = figure.subplots(1, len(confirmations), sharey=True, squeeze=False)[0]
     for ax, confirmation in zip(panels, confirmations, strict=True):
@@ -56,7 +62,7 @@ def errors(*confirmations: Confirmation) -> Figure:
 
 
 def _draw(ax: Axes, confirmation: Confirmation) -> None:
-    plan = confirmation.plan
+    plan = instance(confirmation, Confirmation, "confirmation").plan
     clock = clock_of(plan)
     courses = 1e3 * np.atleast_2d(confirmation.position_error)
     for name, course, color, style in zip("xyz", courses.T, COLORS[:3], STYLES, strict=True):

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sagline.arguments import instance
+from sagline.motion.path import Path
 from sagline.plot.sheet import BLUE, COLORS, TICK, VERMILLION, axes_or_new, dressed, legend_outside
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-    from sagline.motion.path import Path
 
 LEVEL = 1e-9  # m: a path that rises less lies in a plane
 
@@ -27,7 +27,7 @@ def path(path: Path, ax: Axes | None = None) -> Axes:
         The axes.
     """
     ax = axes_or_new(ax, height=3.6, width=4.6)
-    x, y, z = path.pose.position.T
+    x, y, z = instance(path, Path, "path").pose.position.T
     ax.plot(x, y, color=BLUE, linewidth=1.3)
     ax.plot(x[0], y[0], "o", color=VERMILLION, markersize=5.0, zorder=3.0)
     ax.set_title("\N{BLACK CIRCLE} start", color=VERMILLION, fontsize=TICK, loc="left")
@@ -56,7 +56,9 @@ def velocity(path: Path, ax: Axes | None = None) -> Axes:
         The axes.
     """
     ax = axes_or_new(ax, height=2.6)
-    for name, course, color, style in zip("xyz", path.twist.T[:3], COLORS[:3], ("-", "--", ":"), strict=True):
+    for name, course, color, style in zip(
+        "xyz", instance(path, Path, "path").twist.T[:3], COLORS[:3], ("-", "--", ":"), strict=True
+    ):
         ax.plot(path.time, course, color=color, linestyle=style, linewidth=1.3, label=f"$v_{name}$")
     dressed(ax, "time [s]", "velocity [m/s]")
     ax.set_xlim(path.time[0], path.time[-1])

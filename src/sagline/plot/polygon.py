@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sagline.arguments import instance
 from sagline.errors import InvalidValueError
 from sagline.plot.sheet import COLORS, GAP_COLOR, TICK, axes_or_new, dressed, legend_outside
+from sagline.tension.polygon import TensionPolygon
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from matplotlib.axes import Axes
     from numpy.typing import ArrayLike
-
-    from sagline.tension.polygon import TensionPolygon
 
 MARKERS = "osD^v<>pPX*h"
 
@@ -32,14 +31,20 @@ def polygon(shape: TensionPolygon, points: Mapping[str, ArrayLike] | None = None
         The axes.
 
     Raises:
-        InvalidValueError: If there is no polygon to draw.
+        InvalidValueError: If there is no polygon to draw, or points are no tensions of its cables.
     """
-    if shape.vertices.shape[1] != 2 or len(shape.vertices) == 0:
+    if instance(shape, TensionPolygon, "shape").vertices.shape[1] != 2 or len(shape.vertices) == 0:
         raise InvalidValueError(
             "polygon",
             f"{len(shape.vertices)} points with {shape.vertices.shape[1]} coordinates",
             "a polygon of two redundant cables",
             "Choose a feasible pose of a robot with n + 2 cables.",
+        )
+    points = instance({} if points is None else points, Mapping, "points")  # type: ignore[type-abstract]
+    places = {str(name): shape.coordinates(tensions) for name, tensions in points.items()}
+    if wrong := [name for name, place in places.items() if place.ndim != 1]:
+        raise InvalidValueError(
+            f"points[{wrong[0]!r}]", "a batch of tensions", "those of one pose", "Give them one by one."
         )
     ax = axes_or_new(ax, height=4.5)
     corners = np.asarray(shape.vertices)
@@ -61,14 +66,13 @@ def polygon(shape: TensionPolygon, points: Mapping[str, ArrayLike] | None = None
                 fontsize=TICK,
                 color="0.3",
             )
-    for k, (name, tensions) in enumerate((points or {}).items()):
-        place = shape.coordinates(tensions)
+    for k, (name, place) in enumerate(places.items()):
         if np.isfinite(place).all():
             color, marker = COLORS[k % len(COLORS)], MARKERS[k % len(MARKERS)]
             ax.plot(*place, marker, color=color, markersize=6.0, markeredgecolor="white", label=name, linestyle="none")
     dressed(ax, r"$\lambda_1$ [N]", r"$\lambda_2$ [N]")
     ax.set_aspect("equal")
     ax.margins(0.12)
-    if points:
+    if any(np.isfinite(place).all() for place in places.values()):
         legend_outside(ax)
     return ax

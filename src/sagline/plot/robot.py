@@ -9,16 +9,17 @@ import numpy as np
 from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 
+from sagline.arguments import instance, optional
 from sagline.errors import InvalidValueError
 from sagline.kernels.cable import geometry
 from sagline.kinematics.inverse import inverse
 from sagline.plot.sheet import BLUE, LABEL, TICK, VERMILLION, sheet
 from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
 from sagline.statics.tables import body_table, cable_table, pose_rows
 
 if TYPE_CHECKING:
     from sagline.arrays import Array
-    from sagline.robot.robot import Robot
 
 POINTS = 50  # along each cable
 FRAME_COLOR = "0.6"
@@ -39,7 +40,8 @@ def robot(robot: Robot, pose: Pose | None = None, ax: Axes3D | None = None) -> A
     Raises:
         InvalidValueError: If no pose is given and the robot has no test box, or the pose is a batch.
     """
-    where = _pose_of(robot, pose)
+    where = _pose_of(instance(robot, Robot, "robot"), optional(pose, Pose, "pose"))
+    optional(ax, Axes3D, "ax")
     if ax is None:
         ax = sheet(height=4.0, width=5.6).add_subplot(projection="3d")
     lines, carried = _cable_lines(robot, where)

@@ -2,80 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array, checked, locked
+from sagline.arguments import instance
+from sagline.arrays import SMALLEST, Array, checked, locked
+from sagline.arrays import exactly as exactly  # what files check with, too
+from sagline.arrays import number as number
 from sagline.cables.cable import Cable
 from sagline.errors import InvalidValueError
 from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.unit import unit
 
 _SYMMETRY = 1e-9  # largest difference of mirrored elements, relative to the largest element
-
-
-def choice(value: Any, item: str, allowed: tuple[str, ...]) -> Any:
-    """One of a few words.
-
-    Args:
-        value: What was given.
-        item: The name a message uses.
-        allowed: The words.
-
-    Returns:
-        The value.
-
-    Raises:
-        InvalidValueError: If it is none of them.
-    """
-    if value not in allowed:
-        raise InvalidValueError(item, repr(value), ", ".join(allowed), f"Choose one of them as {item}.")
-    return value
-
-
-def number(value: Any, item: str, unit: str, *, low: float = -np.inf, above: float = -np.inf) -> float:
-    """A single finite number.
-
-    Args:
-        value: What was given.
-        item: The name a message uses.
-        unit: Its unit, for the message.
-        low: Smallest allowed value.
-        above: The value must be strictly larger than this.
-
-    Returns:
-        The number.
-
-    Raises:
-        InvalidValueError: If it is not; the message names the item.
-    """
-    return float(exactly(value, item, unit, (), low=low, above=above))
-
-
-def exactly(value: ArrayLike, item: str, unit: str, shape: tuple[int, ...], **limits: Any) -> Array:
-    """An array of exactly one shape: a robot's numbers have no batch axes.
-
-    Args:
-        value: What was given.
-        item: The name a message uses.
-        unit: Its unit, for the message.
-        shape: The whole shape.
-        **limits: As of `arrays.checked`.
-
-    Returns:
-        Array of that shape, write-locked.
-
-    Raises:
-        InvalidValueError: If the shape is another, or a value is out of range.
-    """
-    array = checked(value, item, unit, **limits)
-    if array.shape != shape:
-        raise InvalidValueError(
-            item, f"of shape {array.shape}", f"shape {shape}" if shape else "a single number", f"Reshape {item}."
-        )
-    return array
+_PRINTED = 1e-3  # by how much a flat body's largest moment may exceed the others' sum: three printed digits
 
 
 def anchors(frame: ArrayLike, platform: ArrayLike) -> tuple[Array, Array]:
@@ -135,8 +75,7 @@ def cables(given: Cable, count: int) -> Cable:
     Raises:
         InvalidValueError: If it is no Cable, has another count, or a cable weighs nothing.
     """
-    if not isinstance(given, Cable):
-        raise InvalidValueError("cables", repr(given), "a Cable", "Give Cable(linear_density, axial_stiffness).")
+    instance(given, Cable, "cables")
     density = per_cable(given.linear_density, "cables: linear_density", count)
     stiffness = per_cable(given.axial_stiffness, "cables: axial_stiffness", count)
     if not density.all():
@@ -160,7 +99,8 @@ def inertia(given: ArrayLike | None, pattern: str) -> Array:
         Matrix of shape (3, 3).
 
     Raises:
-        InvalidValueError: If it is missing for a platform that turns, not symmetric, or not positive definite.
+        InvalidValueError: If it is missing for a platform that turns, not symmetric, not positive definite, or that of
+            no body, of whose principal moments each two are together as large as the third.
     """
     if given is None and pattern in ROTATING:
         raise InvalidValueError(
@@ -189,7 +129,21 @@ def inertia(given: ArrayLike | None, pattern: str) -> Array:
             "principal moments > 0 kg m^2",
             "Give the inertia about the center of mass, in the platform frame.",
         )
+    if pattern not in PLANAR:
+        _refuse_impossible(matrix)
     return matrix
+
+
+def _refuse_impossible(matrix: Array) -> None:
+    """Of no body is a principal moment more than the sum of the other two: each is the sum of two mean squares."""
+    small, middle, large = (float(moment) for moment in np.linalg.eigvalsh(matrix))
+    if large > (1.0 + _PRINTED) * (small + middle):
+        raise InvalidValueError(
+            "inertia",
+            f"a matrix with the principal moments {small:g}, {middle:g} and {large:g} kg m^2",
+            f"none larger than the sum of the others, here {small + middle:g} kg m^2",
+            "No body has such moments; correct a moment, or its unit.",
+        )
 
 
 def plane_normal(given: ArrayLike | None, pattern: str) -> Array | None:
@@ -214,7 +168,7 @@ def plane_normal(given: ArrayLike | None, pattern: str) -> Array | None:
     if given is None:
         return None
     normal = exactly(given, "plane_normal", "", (3,))
-    if not normal.any():
+    if np.abs(normal).max() < SMALLEST:
         raise InvalidValueError("plane_normal", "the zero vector", "a direction", "Give the normal of the plane.")
     return locked(unit(normal))
 

@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, locked
+from sagline.arguments import instance
+from sagline.arrays import Array, locked, number
 from sagline.kernels.balance.wrench import structure_matrices
 from sagline.kernels.cable import geometry as rows
 from sagline.kernels.cable.geometry import cable_geometries
@@ -53,12 +54,13 @@ def structure_matrix(robot: Robot | Sequence[Robot], pose: Pose) -> Array:
     Source:
         docs/model.md, section 1.
     """
-    checked = one_a_pose(robot, len(pose) if pose.shape else None)
+    shape = instance(pose, Pose, "pose").shape
+    checked = one_a_pose(robot, shape[0] if shape else None)
     shared = first_of(checked)
     geometry = _geometry(checked, pose)
     out = np.empty((len(geometry), 6, shared.cable_count))
     structure_matrices(geometry, out)
-    return locked((shared.freedom @ out).reshape(*pose.shape, shared.degrees_of_freedom, shared.cable_count))
+    return locked((shared.freedom @ out).reshape(*shape, shared.degrees_of_freedom, shared.cable_count))
 
 
 def article_balance(robot: Robot, pose: Pose, k_h: float = 4.845) -> ArticleBalance:
@@ -75,10 +77,15 @@ def article_balance(robot: Robot, pose: Pose, k_h: float = 4.845) -> ArticleBala
     Returns:
         H of shape (6, m) or (N, 6, m), b of shape (6,) or (N, 6).
 
+    Raises:
+        InvalidValueError: If robot or pose are none, or k_h is no number.
+
     Source:
         Gia Luan & Truong Thinh 2020, equations (26), (27), (50), (51).
     """
-    geometry = np.moveaxis(_geometry(robot, pose), 1, 0)
+    instance(robot, Robot, "robot")
+    k_h = number(k_h, "k_h", "m/s^2")
+    geometry = np.moveaxis(_geometry(robot, instance(pose, Pose, "pose")), 1, 0)
     cosine, sine = geometry[rows.AZIMUTH_X], geometry[rows.AZIMUTH_Y]
     bx, by, bz = geometry[rows.LEVER_X], geometry[rows.LEVER_Y], geometry[rows.LEVER_Z]
     slope = geometry[rows.RISE] / geometry[rows.SPAN]

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sagline.arguments import instance
 from sagline.arrays import Array, locked
 from sagline.errors import InvalidValueError
 from sagline.robot.pose import Pose
@@ -42,7 +43,8 @@ def unresisted_motion(robot: Robot, pose: Pose) -> UnresistedMotion:
     Raises:
         InvalidValueError: If there is not one pose.
     """
-    if pose.shape:
+    instance(robot, Robot, "robot")
+    if instance(pose, Pose, "pose").shape:
         raise InvalidValueError("pose", f"a batch of shape {pose.shape}", "one pose", "Ask for one pose at a time.")
     lever = float(np.linalg.norm(robot.platform_anchors - robot.center_of_mass, axis=1).max()) or 1.0
     units = np.where(np.linalg.norm(robot.freedom[:, 3:], axis=1) > 0.5, 1.0 / lever, 1.0)
