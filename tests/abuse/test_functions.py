@@ -5,6 +5,7 @@ What comes of it is a `SaglineError` of one short line, or the right answer: no 
 
 from __future__ import annotations
 
+import resource
 import time
 import warnings
 from collections.abc import Iterator
@@ -20,6 +21,7 @@ from tests.abuse.calls import INTERNAL, Call, calls, public_names
 
 SLOWEST = 2.0  # s of processor time
 LONGEST = 300  # characters
+MOST_MEMORY = 500_000  # kB
 SHARE = 0.08  # of the cases that are tried each time; all of them in a long run
 SEED = 20260310
 
@@ -44,7 +46,7 @@ def test_there_are_a_thousand_cases_and_more(table: dict[str, Call]) -> None:
 
 @pytest.mark.parametrize("share", [SHARE, pytest.param(1.0, marks=pytest.mark.soak)])
 def test_what_nobody_should_give_is_refused_or_answered(table: dict[str, Call], share: float) -> None:
-    generator = np.random.default_rng(SEED)
+    generator, used = np.random.default_rng(SEED), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     found = []
     for name, call in table.items():
         chosen = [case for case in _cases(call) if generator.random() < share]
@@ -53,6 +55,7 @@ def test_what_nobody_should_give_is_refused_or_answered(table: dict[str, Call], 
             if what := _fault(call, argument, bad, right):
                 found.append(f"{name}({argument}={bad.label}): {what}")
     assert found == []
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - used < MOST_MEMORY
 
 
 def _cases(call: Call) -> Iterator[tuple[str, Bad]]:

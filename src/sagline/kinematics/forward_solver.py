@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import struct
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import brief, instance, optional
+from sagline.arguments import instance, optional
 from sagline.arrays import LARGEST, SMALLEST, Array, Codes, checked, exactly, locked
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
@@ -18,15 +16,13 @@ from sagline.kernels import codes, tables
 from sagline.kernels.forward.forward import forward_poses
 from sagline.kernels.forward.problem import FORCE_RESIDUAL, FORWARD_NUMBERS, MOMENT_RESIDUAL, STIFFNESS_MIN
 from sagline.kernels.memory import memory_for
-from sagline.kinematics.caller import give, plain
+from sagline.kinematics.caller import give, take
 from sagline.kinematics.forward_rows import new_chain
 from sagline.kinematics.forward_status import STABLE, ForwardStatus
 from sagline.kinematics.start import search
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.tables import body_table, cable_table, pose_rows
-
-_NO_WRENCH = (0.0,) * 6
 
 
 class ForwardStep(NamedTuple):
@@ -97,8 +93,9 @@ class ForwardSolver:
             memory_for(m),
             (self._pose, self._results, np.empty((1, m), dtype=np.int8), self._numbers, self._status),
         )
-        self._pack_lengths = partial(struct.Struct(f"{m}d").pack_into, self._lengths[0].data.cast("B"))
-        self._pack_wrench = partial(struct.Struct("6d").pack_into, self._wrench[0].data.cast("B"))
+        self._own_lengths, self._load = self._lengths[0].data, self._wrench[0].data
+        self._place, self._turn = self._pose[0, :3], self._pose[0, 3:]
+        self._loaded = False  # whether the wrench of the last sample was given
         self._start[0, 6] = 1.0
         self._lengths[0] = np.nan  # compiles, solves nothing
         forward_poses(*self._arguments)
@@ -180,11 +177,13 @@ class ForwardSolver:
         Raises:
             InvalidValueError: If an argument is no such array of numbers.
         """
-        try:
-            self._pack_lengths(0, *plain(unstrained_length, "unstrained_length", "m", self._lengths.size))
-            self._pack_wrench(0, *(_NO_WRENCH if wrench is None else plain(wrench, "wrench", "N or N m", 6)))
-        except (struct.error, TypeError, OverflowError):
-            raise self._misfit(unstrained_length, wrench) from None
+        take(self._own_lengths, unstrained_length, "unstrained_length", "m")
+        if wrench is not None:
+            self._loaded = True
+            take(self._load, wrench, "wrench", "N or N m")
+        elif self._loaded:
+            self._loaded = False
+            self._wrench.fill(0.0)
         if self._lost:
             found = search(self._robot, self._model, locked(self._lengths.copy()), locked(self._wrench.copy()))
             self._start[:] = found.poses
@@ -193,13 +192,6 @@ class ForwardSolver:
         if status in STABLE:
             self._start[0] = self._pose[0]
             self._lost = False
-        give(self._pose[0, :3], position, "position")
-        give(self._pose[0, 3:], quaternion, "quaternion")
+        give(self._place, position, "position")
+        give(self._turn, quaternion, "quaternion")
         return status
-
-    def _misfit(self, unstrained_length: Any, wrench: Any) -> InvalidValueError:
-        """The error of what are no lengths, or no wrench."""
-        m = self._lengths.size
-        exactly(unstrained_length, "unstrained_length", "m", (m,))
-        value, allowed = brief(wrench), "six numbers"
-        return InvalidValueError("wrench", value, allowed, "Give force [N] and moment [N m] as plain numbers.")

@@ -19,7 +19,7 @@ from sagline.kernels import codes, tables
 from sagline.kernels.inverse.poses import inverse_poses
 from sagline.kernels.jit import machine_code
 from sagline.kernels.memory import memory_for
-from sagline.kinematics.caller import give, plain
+from sagline.kinematics.caller import ARRAY, FLOAT, WHOLE, give, take
 from sagline.kinematics.inverse_rows import Found, explained
 from sagline.kinematics.status import PoseStatus
 from sagline.robot.robot import Robot
@@ -28,11 +28,12 @@ from sagline.tension.closest import Closest
 from sagline.tension.method import TensionMethod
 from sagline.tension.options import kernel_options, takes_default_kernel
 
-_STATUSES = tuple(PoseStatus)  # by code; a lookup costs a tenth of a conversion
+_STATUSES = tuple(sorted(PoseStatus))  # by code; a lookup costs a tenth of a conversion
 _INFEASIBLE = locked(np.array([codes.POSE_INFEASIBLE], dtype=np.int8))
-# each takes exactly so many real numbers, quicker than an array takes a tuple
-_POSE, _WRENCH = struct.Struct(f"{tables.POSE_COLUMNS}d").pack_into, struct.Struct("6d").pack_into
+# takes exactly so many real numbers, quicker than an array takes a tuple
+_POSE = struct.Struct(f"{tables.POSE_COLUMNS}d").pack_into
 QUATERNION_TOLERANCE = 1e-6  # of the length: as `Pose.from_quaternion`
+_PLAIN = (tuple, list)
 ROUNDING = 1e-15  # of the length: what needs no normalizing
 
 
@@ -89,7 +90,10 @@ class InverseSolver:
         self._pose = np.zeros((1, tables.POSE_COLUMNS))
         self._pose[0, 6] = 1.0
         self._wrench = np.zeros((1, 6))
-        self._pose_bytes, self._wrench_bytes = (array[0].data.cast("B") for array in (self._pose, self._wrench))
+        self._pose_bytes = self._pose[0].data.cast("B")
+        self._position: Any = self._pose[0, :3].data
+        self._quaternion: Any = self._pose[0, 3:].data
+        self._load = self._wrench[0].data
         self._reference = np.full(m, np.nan)
         self._found = Found.empty(1, m, n)
         self._status = self._found.pose_status.data  # read five times faster than an array of one
@@ -136,7 +140,7 @@ class InverseSolver:
         lengths = np.empty(self._reference.size)
         status = self.step_into(position, quaternion, lengths, load)
         if status is PoseStatus.NO_POSE:
-            raise _misfit(position, quaternion, wrench)
+            raise self._no_pose()
         return InverseStep(
             lengths,
             self._found.results[tables.TENSION, 0].copy(),
@@ -164,29 +168,41 @@ class InverseSolver:
         Raises:
             InvalidValueError: If an argument is no such array of numbers.
         """
+        place: Any = position
+        turn: Any = quaternion
         try:
-            x, y, z = plain(position, "position", "m", 3)
-            i, j, k, w = plain(quaternion, "quaternion", "", 4)
-            _POSE(self._pose_bytes, 0, x, y, z, i, j, k, w)
-            if wrench is not None:
-                self._loaded = True
-                _WRENCH(self._wrench_bytes, 0, *plain(wrench, "wrench", "N or N m", 6))
-            elif self._loaded:
-                self._loaded = False
-                self._wrench.fill(0.0)
-        except InvalidValueError:
-            raise
-        except (struct.error, TypeError, ValueError, OverflowError):
-            raise _misfit(position, quaternion, wrench) from None
-        if not -ROUNDING < (length := hypot(i, j, k, w)) - 1.0 < ROUNDING and not self._normalized(length):
+            if place.__class__ is ARRAY and turn.__class__ is ARRAY:
+                self._position[WHOLE] = place
+                self._quaternion[WHOLE] = turn
+            elif place.__class__ in _PLAIN and turn.__class__ in _PLAIN:
+                (x, y, z), (i, j, k, w) = place, turn
+                _POSE(self._pose_bytes, 0, x, y, z, i, j, k, w)
+            else:
+                raise TypeError
+        except (struct.error, TypeError, ValueError, NotImplementedError, OverflowError):
+            take(self._position, place, "position", "m")  # integers and the like, or it is told what is wrong
+            take(self._quaternion, turn, "quaternion", "")
+        if wrench is not None:
+            self._loaded = True
+            take(self._load, wrench, "wrench", "N or N m")
+        elif self._loaded:
+            self._loaded = False
+            self._wrench.fill(0.0)
+        if not -ROUNDING < (length := hypot(*self._quaternion)) - 1.0 < ROUNDING and not self._normalized(length):
             self._lengths.fill(nan)
             give(self._lengths, out, "out")
             return PoseStatus.NO_POSE
         self._solve()
-        give(self._lengths, out, "out")
-        status: PoseStatus = _STATUSES[self._status[0]]
-        if status is not PoseStatus.SOLVED and not isfinite(x + y + z):
+        try:
+            if out.dtype is not FLOAT:
+                raise TypeError
+            out[WHOLE] = self._lengths
+        except (AttributeError, IndexError, TypeError, ValueError):
+            give(self._lengths, out, "out")  # looks closer, or tells what is wrong
+        code = self._status[0]
+        if code and not isfinite(sum(self._position)):  # 0 is SOLVED
             return PoseStatus.NO_POSE
+        status: PoseStatus = _STATUSES[code]
         return status
 
     def _normalized(self, length: float) -> bool:
@@ -196,18 +212,15 @@ class InverseSolver:
         self._pose[0, 3:] /= length
         return True
 
+    def _no_pose(self) -> InvalidValueError:
+        """The error of what is no pose."""
+        exactly(self._pose[0, :3], "position", "m", (3,))
+        length = float(np.linalg.norm(exactly(self._pose[0, 3:], "quaternion", "", (4,))))
+        step = "Normalize it; scalar last: (x, y, z, w)."
+        return InvalidValueError("quaternion", f"of length {length:.12g}", "length 1 to 1e-6", step)
+
     def _shortfall(self, status: PoseStatus) -> float:
         if status is PoseStatus.SOLVED:
             return 0.0
         shortfall, _, _ = explained(self._robot, self._options, self._rows, self._found)
         return float(shortfall[0])
-
-
-def _misfit(position: Any, quaternion: Any, wrench: Any) -> InvalidValueError:
-    """The error of what is no pose, or no wrench."""
-    exactly(position, "position", "m", (3,))
-    norm = float(np.linalg.norm(exactly(quaternion, "quaternion", "", (4,))))
-    if wrench is not None:
-        exactly(wrench, "wrench", "N or N m", (6,))
-    step = "Normalize it; scalar last: (x, y, z, w)."
-    return InvalidValueError("quaternion", f"of length {norm:.12g}", "length 1 to 1e-6", step)
