@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.arguments import choice, file_path, instance, part_of, whole_number
+from sagline.arguments import choice, file_path, instance, whole_number
 from sagline.errors import FileError, InvalidValueError, NoBatchError, NoSuchEntryError
+from sagline.indices import part_of
 
 ROBOT = sl.load_robot("cogiro")
 POSE = sl.Pose.from_euler([1.0, 1.0, 2.0], 0.0, 0.0, 0.0)

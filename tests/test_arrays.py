@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sagline import arrays
-from sagline.arrays import check_memory, checked, free_memory, kernel_input, locked, number
+from sagline import machine
+from sagline.arrays import checked, kernel_input, locked, number
 from sagline.errors import InvalidValueError
+from sagline.machine import check_memory, free_memory
 
 
 def test_a_callers_array_is_copied_and_locked() -> None:
@@ -123,7 +124,7 @@ def test_missing_numbers_pass_where_they_may() -> None:
 
 def test_more_than_is_free_is_refused_with_both_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
     assert 1e6 < free_memory() < 1e15
-    monkeypatch.setattr(arrays, "free_memory", lambda: 1e8)
+    monkeypatch.setattr(machine, "free_memory", lambda: 1e8)
     check_memory("points", 9e7, "Ask for fewer.")
     with pytest.raises(
         InvalidValueError, match="points is a request for 110,000,000 bytes of memory; allowed: <= 100,000"

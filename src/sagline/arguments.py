@@ -16,9 +16,8 @@ from types import MappingProxyType
 from typing import Any, Final, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from sagline.errors import FileError, InvalidValueError, NoBatchError, NoSuchEntryError, printable
+from sagline.errors import FileError, InvalidValueError, printable
 
 T = TypeVar("T")
 
@@ -154,6 +153,23 @@ def text(value: Any, item: str) -> str:
     raise InvalidValueError(item, brief(value), "a text", f'Put {item} between quotes: "...".')
 
 
+def integer(value: Any) -> int | None:
+    """The integer that a value is; truth values are none, and arrays of one number are no number either.
+
+    Args:
+        value: Anything.
+
+    Returns:
+        The integer, or None.
+    """
+    if isinstance(value, bool | np.bool_) or (isinstance(value, np.ndarray) and value.ndim):
+        return None
+    try:
+        return operator.index(value)
+    except TypeError:
+        return None
+
+
 def whole_number(value: Any, item: str, low: int, high: int = sys.maxsize) -> int:
     """A whole number.
 
@@ -169,7 +185,7 @@ def whole_number(value: Any, item: str, low: int, high: int = sys.maxsize) -> in
     Raises:
         InvalidValueError: If it is none, or out of range.
     """
-    number = _whole(value)
+    number = integer(value)
     if number is not None and low <= number <= high:
         return number
     allowed = f"{low} to {high}"
@@ -194,54 +210,6 @@ def callback(value: Any, item: str) -> Any:
     if value is None or (callable(value) and not isinstance(value, type)):
         return value
     raise InvalidValueError(item, brief(value), "a function of two numbers: done, of how many", "Give one, or None.")
-
-
-def part_of(index: Any, shape: tuple[int, ...], single: str) -> Any:
-    """An index along the first axis of a batch, checked.
-
-    Args:
-        index: A number, which may count from the end; a slice; or numbers or booleans, in a list or an array.
-        shape: Of the batch; () for a single entry.
-        single: What a single entry is called, "single pose" for instance.
-
-    Returns:
-        An integer, a slice, or an array of integers or booleans.
-
-    Raises:
-        NoBatchError: If there is a single entry.
-        NoSuchEntryError: If it is no such index, or names no entry.
-    """
-    if not shape:
-        raise NoBatchError("index", brief(index), "none", f"A {single} cannot be indexed; take it as it is.")
-    if isinstance(index, slice):
-        return _sliced(index, shape[0])
-    number = _whole(index)
-    if number is not None:
-        if -shape[0] <= number < shape[0]:
-            return number
-        raise _no_entry(index, shape[0])
-    chosen = np.asarray(index) if isinstance(index, list | np.ndarray) else None
-    if chosen is None or chosen.ndim != 1 or not _names_entries(chosen, shape[0]):
-        raise _no_entry(index, shape[0])
-    return chosen if chosen.size else chosen.astype(np.int64)  # an empty list has no kind
-
-
-def length_of(shape: tuple[int, ...], single: str) -> int:
-    """Number of entries along the first axis of a batch.
-
-    Args:
-        shape: Of the batch; () for a single entry.
-        single: What a single entry is called, "single pose" for instance.
-
-    Returns:
-        The number.
-
-    Raises:
-        NoBatchError: If there is a single entry.
-    """
-    if not shape:
-        raise NoBatchError("this", f"a {single}", "a batch", f"A {single} has no length; take it as it is.")
-    return shape[0]
 
 
 def file_path(file: Any, item: str = "file", *, folder: bool = False) -> Path:
@@ -292,36 +260,3 @@ def _step_to(value: object, kind: type) -> str:
             if isinstance(getattr(value, part, None), kind):
                 return f"Give {name[0].lower()}.{part}."
     return HOW_TO_GET.get(kind.__name__, f"Give {_a(kind.__name__)}.")
-
-
-def _whole(value: Any) -> int | None:
-    """The integer that a value is, or None; truth values are none, and arrays of one are not numbers either."""
-    if isinstance(value, bool | np.bool_) or (isinstance(value, np.ndarray) and value.ndim):
-        return None
-    try:
-        return operator.index(value)
-    except TypeError:
-        return None
-
-
-def _sliced(index: slice, size: int) -> slice:
-    try:
-        index.indices(size)
-    except (TypeError, ValueError):
-        raise _no_entry(index, size) from None
-    return index
-
-
-def _names_entries(chosen: NDArray[Any], size: int) -> bool:
-    if chosen.dtype == np.bool_:
-        return len(chosen) == size
-    if chosen.size == 0:
-        return True
-    return bool(chosen.dtype.kind in "iu" and int(chosen.min()) >= -size and int(chosen.max()) < size)
-
-
-def _no_entry(index: object, size: int) -> NoSuchEntryError:
-    allowed = f"{-size} to {size - 1}, a slice, or an array of such numbers or of {size} booleans"
-    if size == 0:
-        allowed = "a slice, because there is none"
-    return NoSuchEntryError("index", brief(index), allowed, f"There are {size}; count from 0.")

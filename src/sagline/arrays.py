@@ -6,11 +6,8 @@ comes through here.
 
 from __future__ import annotations
 
-import math
-import os
 from decimal import Decimal
 from numbers import Real
-from pathlib import Path
 from typing import Any, Final, TypeGuard
 
 import numpy as np
@@ -18,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sagline.arguments import brief
 from sagline.errors import InvalidValueError
+from sagline.machine import check_memory
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int8]
@@ -26,7 +24,6 @@ Flags = NDArray[np.bool_]
 
 LARGEST: Final = 1e50  # in any unit: far beyond every machine, and its square and cube are still numbers
 SMALLEST: Final = 1e-50  # of what must be more than zero
-UNASKED: Final = 1 << 26  # bytes: a request below that is not worth asking the machine how much it has
 _KINDS = {"c": "complex", "M": "dates", "m": "durations of a calendar", "V": "records"}
 
 
@@ -177,44 +174,6 @@ def broadcast_shape(item: str, *shapes: tuple[int, ...]) -> tuple[int, ...]:
         listed = " and ".join(str(shape) for shape in dict.fromkeys(shapes))
         step = "Give one value for each, or one for all."
         raise InvalidValueError(item, f"not of one shape, but {listed}", "shapes that broadcast", step) from None
-
-
-def check_memory(item: str, size: float, next_step: str) -> None:
-    """Refuse what would not fit into memory, before it is begun.
-
-    Args:
-        item: What asks for it, for the message.
-        size: Bytes that it needs; less than 64 MB are not asked about.
-        next_step: How to need less.
-
-    Raises:
-        InvalidValueError: If the machine has not as much left; the message gives both numbers.
-    """
-    if size > UNASKED and size > (free := free_memory()):
-        wanted, left = f"a request for {size:,.0f} bytes of memory", f"<= {free:,.0f} bytes, which are free"
-        raise InvalidValueError(item, wanted, left, next_step)
-
-
-def free_memory() -> float:
-    """Bytes of memory that this process can still have; infinite where the system does not tell.
-
-    Returns:
-        The least of what the machine has free and what its container is allowed.
-    """
-    free = [math.inf]
-    try:
-        fields = dict(line.split(":") for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines())
-        free.append(1024.0 * int(fields["MemAvailable"].split()[0]))
-    except (OSError, KeyError, ValueError):  # no Linux: all the machine has
-        if hasattr(os, "sysconf") and "SC_PHYS_PAGES" in os.sysconf_names:
-            free.append(float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE"))
-    try:
-        group = Path("/sys/fs/cgroup")
-        used, most = (float((group / name).read_text()) for name in ("memory.current", "memory.max"))
-        free.append(most - used)
-    except (OSError, ValueError):  # no container, or one without a limit
-        pass
-    return min(free)
 
 
 def _is_immutable(value: ArrayLike) -> TypeGuard[Array]:

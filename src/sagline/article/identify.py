@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.arguments import instance
-from sagline.arrays import Array, Flags, check_memory, checked, kernel_input, number
+from sagline.arrays import Array, Flags, checked, kernel_input, number
 from sagline.article.fits import fit_factor
 from sagline.cables.cable import Cable
 from sagline.cables.catenary import Catenary
@@ -18,6 +18,7 @@ from sagline.cables.empirical import Empirical
 from sagline.cables.model import CableState
 from sagline.errors import InvalidValueError
 from sagline.kernels.cable.batch import batch_end
+from sagline.machine import check_memory
 
 CONFIDENCE = 0.95
 POINT_BYTES = 400.0  # what each combination of span, rise and tension takes while it is fitted

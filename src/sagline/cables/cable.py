@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sagline.arrays import Array, broadcast_shape, check_memory, checked, locked
+from sagline.arrays import Array, broadcast_shape, checked, locked
+from sagline.machine import check_memory
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,13 +9,15 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sagline.arguments import instance, length_of, part_of, whole_number
-from sagline.arrays import Array, Codes, check_memory, checked, kernel_input, locked, number
+from sagline.arguments import instance, whole_number
+from sagline.arrays import Array, Codes, checked, kernel_input, locked, number
 from sagline.cables.cable import Cable
 from sagline.cables.problem import Problem
 from sagline.errors import InvalidValueError
+from sagline.indices import length_of, part_of
 from sagline.kernels.cable import batch, shape
 from sagline.kernels.cable.terms import Terms
+from sagline.machine import check_memory
 
 _ARRAYS = (
     "span",

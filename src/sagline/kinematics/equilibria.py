@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.arguments import instance, whole_number
-from sagline.arrays import Array, Indices, check_memory, locked
+from sagline.arrays import Array, Indices, locked
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
@@ -18,6 +18,7 @@ from sagline.kinematics.forward_rows import Found
 from sagline.kinematics.forward_solution import ForwardSolution
 from sagline.kinematics.forward_status import STABLE, ForwardStatus
 from sagline.kinematics.start import from_orientations, start_quaternions
+from sagline.machine import check_memory
 from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.robot import Robot
 from sagline.statics.wrench import external_wrench

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.arguments import callback, instance, optional
-from sagline.arrays import LARGEST, SMALLEST, Array, check_memory, locked, numbers
+from sagline.arrays import LARGEST, SMALLEST, Array, locked, numbers
 from sagline.blocks import Progress
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
@@ -17,6 +17,7 @@ from sagline.kinematics.forward_rows import solve_rows
 from sagline.kinematics.forward_solution import ForwardSolution
 from sagline.kinematics.measured import MeasuredTension, corrected
 from sagline.kinematics.start import search
+from sagline.machine import check_memory
 from sagline.robot.pose import Pose
 from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.arguments import brief, callback, instance, optional
-from sagline.arrays import Array, Codes, check_memory, locked
+from sagline.arrays import Array, Codes, locked
 from sagline.blocks import Progress
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel, CableState
@@ -16,6 +16,7 @@ from sagline.errors import CableGeometryError, InvalidValueError
 from sagline.kernels import codes, tables
 from sagline.kinematics.inverse_rows import explained, solve_rows
 from sagline.kinematics.plan import Plan
+from sagline.machine import check_memory
 from sagline.motion.path import Path
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose

@@ -8,8 +8,9 @@ from typing import cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array, check_memory, checked, number
+from sagline.arrays import Array, checked, number
 from sagline.errors import InvalidValueError
+from sagline.machine import check_memory
 from sagline.motion.path import Path
 from sagline.motion.profile import QUINTIC, SEPTIC, Profile
 from sagline.motion.segments import Segments

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from sagline.arguments import length_of, part_of
 from sagline.arrays import Array, locked
 from sagline.cables.model import CableState
 from sagline.errors import InvalidValueError
+from sagline.indices import length_of, part_of
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.robot.several import Index, Robots, first_of, robots_at

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sagline.arguments import length_of, part_of
-from sagline.arrays import Array, check_memory, checked, locked
+from sagline.arrays import Array, checked, locked
 from sagline.errors import InvalidValueError
+from sagline.indices import length_of, part_of
+from sagline.machine import check_memory
 from sagline.robot.unit import unit
 
 if TYPE_CHECKING:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sagline.arguments import instance
-from sagline.arrays import Array, check_memory, locked
+from sagline.arrays import Array, locked
+from sagline.machine import check_memory
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.several import bodies_of, first_of
 from sagline.statics.slopes import CableSlopes, cable_slopes, on_platform
