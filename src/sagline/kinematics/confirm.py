@@ -78,7 +78,7 @@ def confirm(plan: Plan, *, progress: Progress | None = None) -> Confirmation:
     """
     callback(progress, "progress")
     state, lengths = instance(plan, Plan, "plan").state, plan.unstrained_length
-    if not state.pose.shape:
+    if not state.pose.shape or not len(lengths):  # all at once
         found = forward(state.robot, lengths, start=state.pose, wrench=state.wrench, progress=progress)
         return Confirmation(plan, found.pose, found.status, found.wrench_residual)
     parts = []

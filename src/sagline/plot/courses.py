@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from sagline.arguments import choice, instance
+from sagline.errors import InvalidValueError
 from sagline.kinematics.plan import Plan
 from sagline.plot.sheet import COLORS, TICK, axes_or_new, dressed, legend_outside, shade, sheet
 
@@ -104,7 +105,12 @@ def clock_of(plan: Plan) -> Array:
 
     Returns:
         Times of its path [s], or the numbers of its poses, shape (N,).
+
+    Raises:
+        InvalidValueError: If it has no pose.
     """
+    if not plan.status.size:
+        raise InvalidValueError("plan", "one of no pose", "one pose at least", "Plan some poses first.")
     return np.arange(plan.status.size, dtype=np.float64) if plan.path is None else plan.path.time
 
 

@@ -61,7 +61,8 @@ def velocity(path: Path, ax: Axes | None = None) -> Axes:
     ):
         ax.plot(path.time, course, color=color, linestyle=style, linewidth=1.3, label=f"$v_{name}$")
     dressed(ax, "time [s]", "velocity [m/s]")
-    ax.set_xlim(path.time[0], path.time[-1])
+    if len(path) > 1:
+        ax.set_xlim(path.time[0], path.time[-1])
     legend_outside(ax)
     return ax
 
