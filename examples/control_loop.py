@@ -1,4 +1,4 @@
-"""Set points for winches: one pose at a time, without allocation, as a control loop wants it."""
+"""Set points for winches: one pose at a time, without allocation."""
 
 from time import perf_counter
 
@@ -7,18 +7,27 @@ import numpy as np
 import sagline as sl
 
 robot = sl.load_robot("ipanema-1")
-path = sl.quintic_path([(0, 0, 1.2), (0.5, 0.4, 1.4), (-0.5, 0.2, 1.0), (0, 0, 1.2)], speed=0.8, rate=1000)
-load = sl.inertial_wrench(robot, path.pose, path.twist, path.twist_rate)  # so that the platform is pulled along
+path = sl.quintic_path(
+    [(0, 0, 1.2), (0.5, 0.4, 1.4), (-0.5, 0.2, 1.0), (0, 0, 1.2)],
+    speed=0.8,
+    rate=1000,
+)
+# so that the platform is pulled along
+load = sl.inertial_wrench(robot, path.pose, path.twist, path.twist_rate)
 solver = sl.InverseSolver(robot)
 lengths = np.empty(robot.cable_count)
 wound, times = [], []
-for position, quaternion, wrench in zip(path.pose.position, path.pose.quaternion, load, strict=True):
+for position, quaternion, wrench in zip(
+    path.pose.position, path.pose.quaternion, load, strict=True
+):
     start = perf_counter()
     status = solver.step_into(position, quaternion, lengths, wrench)
     times.append(perf_counter() - start)
     if status != sl.PoseStatus.SOLVED:
         raise SystemExit(status.text)  # stop the winches
     wound.append(lengths.copy())
-difference = np.abs(np.array(wound) - sl.inverse(robot, path).unstrained_length).max()
+plan = sl.inverse(robot, path)  # the same in one call
+difference = np.abs(np.array(wound) - plan.unstrained_length).max()
 print(f"{len(path)} set points; the planner's lengths to {difference:.0e} m")
 print(f"{1e6 * np.median(times):.1f} µs a pose, median")
+sl.plot.save(sl.plot.lengths(plan), "control_loop.png")

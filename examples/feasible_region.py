@@ -1,4 +1,4 @@
-"""Where a robot can hold its platform: 4,000 poses at once, and by how many newtons the others fail."""
+"""Where a robot can hold its platform: 4,000 poses, what others lack."""
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -12,11 +12,16 @@ plan = sl.inverse(robot, sl.Pose.from_euler(position, 0.0, 0.0, 0.0))
 share = plan.feasible.mean()
 print(f"{share:.1%} of the plane y = 0 is wrench-feasible")
 lost = sl.PoseStatus(plan.status[0])
-print(f"corner: {lost.text}; shortfall {plan.shortfall[0]:.0f} N, cables {np.flatnonzero(plan.blocking[0])}")
+print(
+    f"corner: {lost.name}, shortfall {plan.shortfall[0]:.0f} N,",
+    f"cables {np.flatnonzero(plan.blocking[0])}",
+)
 
 figure = Figure(figsize=(6.0, 3.0), layout="constrained")
 ax = figure.subplots()
-shown = np.where(np.isfinite(plan.shortfall), plan.shortfall, np.nan).reshape(x.shape)
+shown = np.where(np.isfinite(plan.shortfall), plan.shortfall, np.nan).reshape(
+    x.shape
+)
 image = ax.pcolormesh(x, z, shown, cmap="viridis_r")
 ax.contour(x, z, plan.feasible.reshape(x.shape), levels=[0.5], colors="black")
 ax.set(xlabel="x [m]", ylabel="z [m]", aspect="equal")

@@ -1,4 +1,4 @@
-"""How fast may it go: the same way in less and less time, inertia included, until the tensions run out."""
+"""How fast may it go: the same way in less and less time, inertia included."""
 
 import sagline as sl
 
@@ -11,7 +11,12 @@ for seconds in (6.0, 4.0, 3.0, 2.5, 2.0, 1.5, 1.0):
     if not plan.feasible.all():
         gap = plan.gaps[0]
         when = path.time[gap.first]
-        print(f"{seconds} s: fails after {when:.2f} s by {gap.shortfall:.0f} N, cables {gap.cables}")
+        print(
+            f"{seconds} s: fails after {when:.2f} s",
+            f"by {gap.shortfall:.0f} N, cables {gap.cables}",
+        )
         break
     fastest = seconds
-    print(f"{seconds} s: {plan.chord_tension.min():.0f} to {plan.chord_tension.max():.0f} N")
+    sl.plot.save(sl.plot.tensions(plan), "how_fast.png")
+    low, high = plan.chord_tension.min(), plan.chord_tension.max()
+    print(f"{seconds} s: {low:.0f} to {high:.0f} N")

@@ -1,4 +1,4 @@
-"""One cable between two points: how much it sags, and what the approximate models make of it."""
+"""One cable between two points: its sag, and what other models make of it."""
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -7,15 +7,22 @@ import sagline as sl
 
 cable = sl.Cable(linear_density=0.067, axial_stiffness=44e3)  # kg/m, N
 tension = np.array([20.0, 50.0, 100.0, 200.0])  # along the chord, N
-exact = sl.Catenary().from_tension(cable, span=12.0, rise=-4.0, chord_tension=tension)
+exact = sl.Catenary().from_tension(
+    cable, span=12.0, rise=-4.0, chord_tension=tension
+)
 for k, pull in enumerate(tension):
-    print(f"{pull:4.0f} N: {exact.unstrained_length[k]:.4f} m of cable, {1e3 * exact.sag[k]:5.0f} mm of sag")
+    print(
+        f"{pull:4.0f} N: {exact.unstrained_length[k]:.4f} m of cable,",
+        f"{1e3 * exact.sag[k]:5.0f} mm of sag",
+    )
 
 worst = {}  # of the length, at 20 N
 for model in (sl.Parabolic(), sl.Empirical(), sl.Elastic(), sl.Straight()):
     length = model.from_tension(cable, 12.0, -4.0, tension).unstrained_length
     worst[type(model).__name__] = 1e3 * abs(length - exact.unstrained_length)[0]
-print("error of the length at 20 N:", ", ".join(f"{name} {mm:.1f} mm" for name, mm in worst.items()))
+print("error of the length at 20 N:")
+for name, millimeters in worst.items():
+    print(f"  {name:9} {millimeters:.1f} mm")
 
 figure = Figure(figsize=(6.0, 3.0), layout="constrained")
 ax = figure.subplots()

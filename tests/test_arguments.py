@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.arguments import choice, file_path, instance, whole_number
+from sagline.arguments import choice, file_path, instance, label, whole_number
+from sagline.arguments import text as text_of
 from sagline.errors import FileError, InvalidValueError, NoBatchError, NoSuchEntryError
 from sagline.indices import part_of
 
@@ -88,3 +89,24 @@ def test_what_no_file_can_be_called_is_refused(file: str) -> None:
 def test_the_longest_names_are_names() -> None:
     assert file_path("ä" * 127 + "a") == Path("ä" * 127 + "a")  # 255 bytes
     assert file_path(".", folder=True) == Path(".")
+
+
+@pytest.mark.parametrize("text", ["", "cogiro", "größer 2", "名" * 100, "a-b_c.d/..", "👩\u200d🔬"])
+def test_what_a_name_may_be(text: str) -> None:
+    assert label(text, "name") == text
+
+
+@pytest.mark.parametrize("text", ["a" * 101, "a\nb", "a\tb", "\x1b[31m", "a\0", "\ud800", "\u202egnp", 5, None, b"a"])
+def test_what_is_no_name_of_anything(text: object) -> None:
+    with pytest.raises(
+        InvalidValueError, match=r"name is .*; allowed: one line of printable text, at most 100"
+    ) as caught:
+        label(text, "name")
+    assert len(str(caught.value)) < 300
+
+
+def test_texts_have_lines_but_no_control_characters() -> None:
+    assert text_of("two\n\tlines" * 1000, "notes") == "two\n\tlines" * 1000
+    for text in ("\x1b]0;x\x07", "a\rb", "\ud800", 5):
+        with pytest.raises(InvalidValueError, match="notes is"):
+            text_of(text, "notes")

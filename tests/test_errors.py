@@ -1,19 +1,37 @@
-"""Messages of errors: one line of less than 300 characters, whatever they are about."""
+"""Messages of errors: one line of less than 300 letters, whatever they are about."""
 
 from __future__ import annotations
+
+import pickle
 
 import numpy as np
 import pytest
 
-from sagline.errors import FileError, InvalidValueError, shortened
+from sagline.errors import FileError, InvalidValueError, nearest, printable, shortened
 
 SEED = 7
 
 
-def test_a_short_message_is_left_alone() -> None:
-    error = InvalidValueError("mass", "-1 kg", "> 0 kg", "Correct mass.")
-    assert str(error) == "mass is -1 kg; allowed: > 0 kg. Correct mass."
-    assert str(FileError("robot.yaml", "is empty", "Write it again.")) == "robot.yaml: is empty. Write it again."
+def test_an_error_is_one_short_line_whatever_is_in_it() -> None:
+    long = "x" * 5000
+    for error in (
+        InvalidValueError(long, long, long, long),
+        InvalidValueError("mass", "\x1b[2J\r\n\0", "a\u2028b", "c\ud800d\u202ee"),
+        FileError("folder/" + long, long, "Next."),
+        FileError("a\nb\x07.yaml", "first\nsecond", "\x9b31mNext."),
+    ):
+        text = str(error)
+        assert len(text) < 300
+        assert text == printable(text)
+        assert text.encode("utf-8").isascii() or "…" in text
+
+
+def test_what_is_short_stays_when_something_long_is_cut() -> None:
+    text = str(FileError("robot.yaml", "name is " + "y" * 1000 + "; allowed: a word", "Correct name."))
+    assert text.startswith("robot.yaml: name is yyy")
+    assert text.endswith("yyy; allowed: a word. Correct name.")
+    assert len(text) == 299
+    assert str(InvalidValueError("a", "b", "c", "D.")) == "a is b; allowed: c. D."
 
 
 @pytest.mark.parametrize("long", range(4))
@@ -21,16 +39,11 @@ def test_a_long_part_loses_its_middle_and_the_others_nothing(long: int) -> None:
     parts = ["the item", "the value", "what is allowed", "What to do."]
     parts[long] = f"begin{'x' * 5000}end"
     text = str(InvalidValueError(*parts))
-    assert len(text) < 300
+    assert len(text) == 299
     assert all(part in text for k, part in enumerate(parts) if k != long)
     assert "beginx" in text
     assert "…x" in text
     assert "xend" in text
-
-
-def test_what_does_not_print_is_written_out() -> None:
-    text = str(InvalidValueError("robot\n\x1b[31mred", "\ud800", "\x00", "a\tb\u202e."))
-    assert text == "robot \\x1b[31mred is \\ud800; allowed: \\x00. a b\\u202e."
 
 
 def test_texts_of_any_length_fit_together() -> None:
@@ -38,6 +51,43 @@ def test_texts_of_any_length_fit_together() -> None:
     for _ in range(2000):
         parts = ["x" * int(size) for size in generator.integers(0, 400, size=generator.integers(1, 5))]
         fitted = shortened(parts, room=280)
-        assert sum(map(len, fitted)) <= 280
+        assert sum(map(len, fitted)) == min(280, sum(map(len, parts)))
         if sum(map(len, parts)) <= 280:
             assert fitted == parts
+
+
+def test_errors_keep_their_data_whole() -> None:
+    error = InvalidValueError("mass", "z" * 1000, "> 0 kg", "Correct mass.")
+    assert error.value == "z" * 1000
+    again = pickle.loads(pickle.dumps(FileError.of("a.yaml", error)))
+    assert (again.path.name, again.next_step) == ("a.yaml", "Correct mass.")
+    assert again.reason.endswith("zz; allowed: > 0 kg")
+
+
+@pytest.mark.parametrize("text", ["", "plain", "Größe µ ² — …", "日本語", "a b\u00a0c", "👩\u200d🔬", "عربي"])
+def test_what_prints_stays(text: str) -> None:
+    assert printable(text) == text
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("\x1b]0;title\x07", r"\x1b]0;title\x07"),
+        ("a\tb\nc\rd", r"a\tb\nc\rd"),
+        ("\x9b31m\x7f", r"\x9b31m\x7f"),
+        ("\ud83d", r"\ud83d"),
+        ("\u202egnp.exe\u2066", r"\u202egnp.exe\u2066"),
+        ("\u2028\u2029\ufeff\ufffe", r"\u2028\u2029\ufeff\ufffe"),
+    ],
+)
+def test_what_does_not_print_is_written_out(text: str, shown: str) -> None:
+    assert printable(text) == shown
+
+
+def test_only_near_words_are_suggested() -> None:
+    robots = ["article-mixed", "cogiro", "fast", "ipanema-1"]
+    assert nearest("cogero", robots) == "cogiro"
+    assert nearest("IPANEMA1", robots) == "ipanema-1"
+    for word in ("nothere", "", "xyz", "robot", "c", "x" * 100_000):
+        assert nearest(word, robots) is None
+    assert nearest("cogiro", []) is None

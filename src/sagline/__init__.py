@@ -14,7 +14,7 @@ from sagline.cables.model import CableModel, CableState
 from sagline.cables.parabolic import Parabolic
 from sagline.cables.status import CableStatus
 from sagline.cables.straight import Straight
-from sagline.errors import CableGeometryError, FileError, InvalidValueError, SaglineError
+from sagline.errors import CableGeometryError, FileError, InvalidValueError, SaglineError, SaglineWarning
 from sagline.kinematics.confirm import Confirmation, confirm
 from sagline.kinematics.equilibria import Equilibria, equilibria
 from sagline.kinematics.forward import forward
@@ -119,6 +119,7 @@ __all__ = [
     "QuadraticProgram",
     "Robot",
     "SaglineError",
+    "SaglineWarning",
     "Side",
     "Stiffness",
     "Straight",

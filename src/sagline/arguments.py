@@ -41,6 +41,7 @@ HOW_TO_GET: Final = MappingProxyType(
         "TensionPolygon": "Make one: tension_polygon(robot, pose).",
     }
 )
+LONGEST_TITLE: Final = 100  # letters of a name; it becomes part of file names
 LONGEST_NAME = 255  # bytes of a file's name, on all the usual disks
 _PARTS = ("state", "pose", "robot", "plan", "path", "cables", "cable", "model", "tension")
 
@@ -136,7 +137,7 @@ def choice(value: Any, item: str, allowed: Iterable[str]) -> Any:
 
 
 def text(value: Any, item: str) -> str:
-    """A text.
+    """A text, of several lines perhaps, that a terminal can show.
 
     Args:
         value: What was given.
@@ -146,11 +147,32 @@ def text(value: Any, item: str) -> str:
         The text.
 
     Raises:
-        InvalidValueError: If it is none.
+        InvalidValueError: If it is none, or has control characters or what cannot be encoded.
     """
-    if isinstance(value, str):
-        return str(value)
-    raise InvalidValueError(item, brief(value), "a text", f'Put {item} between quotes: "...".')
+    if not isinstance(value, str):
+        raise InvalidValueError(item, brief(value), "a text", f'Put {item} between quotes: "...".')
+    if (flat := value.replace("\n", " ").replace("\t", " ")) != printable(flat):
+        raise InvalidValueError(item, brief(value), "printable text", f"Remove what does not print in {item}.")
+    return str(value)  # numpy has a kind of its own
+
+
+def label(value: Any, item: str) -> str:
+    """What something is called: one line of text that a terminal, a figure and a file name can show.
+
+    Args:
+        value: What was given.
+        item: The name a message uses.
+
+    Returns:
+        The name.
+
+    Raises:
+        InvalidValueError: If it is no such text, or longer than 100 letters.
+    """
+    if not isinstance(value, str) or len(value) > LONGEST_TITLE or value != printable(value):
+        allowed = f"one line of printable text, at most {LONGEST_TITLE} letters"
+        raise InvalidValueError(item, brief(value), allowed, f"Choose another {item}.")
+    return str(value)
 
 
 def integer(value: Any) -> int | None:

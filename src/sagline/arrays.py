@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sagline.arguments import brief
 from sagline.errors import InvalidValueError
-from sagline.machine import check_memory
+from sagline.memory import check_memory
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int8]

@@ -1,16 +1,27 @@
-"""What sagline raises: one family of exceptions that carry their data."""
+"""What sagline raises: one family of exceptions that carry their data, each told in one line."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
 from pathlib import Path
+from typing import Final
 
-MOST = 298  # characters of a message
-LEAST = 30  # of each of its parts that are kept, whatever the others take
+_UNPRINTABLE = re.compile(  # what moves a cursor, ends a line, turns the reading direction, or cannot be encoded
+    "[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ufeff\ud800-\udfff\ufffe\uffff]"
+)
+_WORD: Final = 60  # letters of what was given that are looked at for a word that was meant
+MOST: Final = 299  # characters of a message; more is not read, and floods a terminal
+LEAST: Final = 30  # of each of its parts that are kept, whatever the others take
 
 
 class SaglineError(Exception):
     """Base of everything sagline raises on purpose; its text says what to do next."""
+
+
+class SaglineWarning(UserWarning):
+    """Something that stands, but is to be taken with care; its text says why and what to do."""
 
 
 class InvalidValueError(SaglineError, ValueError):
@@ -32,7 +43,7 @@ class InvalidValueError(SaglineError, ValueError):
         self.next_step = next_step
 
     def __str__(self) -> str:
-        """One sentence: item, value, allowed range, next step; one line, however long its parts are."""
+        """One line: item, value, allowed range, next step."""
         parts = (str(self.item), str(self.value), str(self.allowed), str(self.next_step))
         item, value, allowed, next_step = shortened(parts, room=MOST - len(" is ; allowed: . "))
         return f"{item} is {value}; allowed: {allowed}. {next_step}"
@@ -66,43 +77,77 @@ class FileError(SaglineError):
         self.reason = reason
         self.next_step = next_step
 
+    @classmethod
+    def of(cls, path: Path | str, error: InvalidValueError) -> FileError:
+        """What is wrong with a value, told with the file that says it.
+
+        Args:
+            path: The file.
+            error: What is wrong with a value in it.
+
+        Returns:
+            The error, to be raised.
+        """
+        return cls(path, f"{error.item} is {error.value}; allowed: {error.allowed}", error.next_step)
+
     def __str__(self) -> str:
-        """One sentence: file, reason, next step; one line, however long its parts are."""
+        """One line: file, reason, next step."""
         path, reason, next_step = shortened((str(self.path), self.reason, self.next_step), room=MOST - len(": . "))
         return f"{path}: {reason}. {next_step}"
 
 
+def printable(text: str) -> str:
+    r"""A text as a terminal may be given it: nothing in it moves the cursor, hides a letter or cannot be written.
+
+    Args:
+        text: Any text, from a file for instance.
+
+    Returns:
+        The text, with control characters, line ends and lone surrogates written out as Python writes them.
+
+    Examples:
+        >>> from sagline.errors import printable
+        >>> print(printable("a\x1b[31m\nb"))
+        a\x1b[31m\nb
+    """
+    return _UNPRINTABLE.sub(lambda found: repr(found[0])[1:-1], text)
+
+
+def nearest(word: str, known: Iterable[str]) -> str | None:
+    """The known word that somebody may have meant, for "Did you mean".
+
+    Args:
+        word: What was given.
+        known: What would have done.
+
+    Returns:
+        The nearest known word; None where none is near.
+
+    Examples:
+        >>> from sagline.errors import nearest
+        >>> nearest("cogero", ["cogiro", "fast"]), nearest("nothere", ["cogiro", "fast"])
+        ('cogiro', None)
+    """
+    folded = {other.lower(): other for other in known}
+    near = get_close_matches(word[:_WORD].lower(), folded, n=1)
+    return folded[near[0]] if near else None
+
+
 def shortened(parts: Sequence[str], room: int) -> list[str]:
-    """Texts on one line that fit together: what does not print is written out, the middle of the longest left out.
+    """Texts that fit together on one line: what does not print is written out, the middle of the longest left out.
 
     Args:
         parts: The texts.
-        room: Characters they may have together.
+        room: Letters they may have together.
 
     Returns:
         As many texts.
     """
     texts = [printable(part) for part in parts]
     while (excess := sum(map(len, texts)) - room) > 0:
-        longest = max(range(len(texts)), key=lambda k: len(texts[k]))
-        others = sorted(map(len, texts))[-2] if len(texts) > 1 else 0
-        size = max(len(texts[longest]) - excess, min(others, len(texts[longest]) - 1), LEAST)
-        texts[longest] = (
-            f"{texts[longest][: size // 2 - 1]}…{texts[longest][len(texts[longest]) - (size - size // 2) :]}"
-        )
+        k = max(range(len(texts)), key=lambda k: len(texts[k]))
+        others = max((len(text) for other, text in enumerate(texts) if other != k), default=0)
+        size = max(len(texts[k]) - excess, min(others, len(texts[k]) - 1), LEAST)
+        end = size // 2
+        texts[k] = f"{texts[k][: size - end - 1]}…{texts[k][-end:]}"
     return texts
-
-
-def printable(text: str) -> str:
-    """A text on one line without control characters, lone surrogates and the like: those are written as escapes.
-
-    Args:
-        text: The text; line breaks become spaces.
-
-    Returns:
-        The text itself, where it is one.
-    """
-    if text.isprintable():
-        return text
-    flat = " ".join(text.split())
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in flat)

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
+from sagline.errors import printable
 from tests.abuse.bad_values import REFUSED, SAME, Bad, bad_values
 from tests.abuse.calls import INTERNAL, Call, calls, public_names
 
@@ -89,7 +90,7 @@ def _fault(call: Call, argument: str, bad: Bad, right: Any) -> str:
 
 
 def _fault_of_text(text: str) -> str:
-    if "\n" in text or len(text) >= LONGEST or not text.isprintable():
+    if len(text) >= LONGEST or text != printable(text):
         return f"{len(text)} characters: {text!r}"
     return ""
 

@@ -7,6 +7,8 @@ from typer.testing import CliRunner
 
 from sagline.cli.main import app
 from sagline.files.robot_file import load_robot
+from sagline.kinematics.forward import forward
+from sagline.robot.pose import Pose
 
 WIREX = """<models version="0.32"><robot name="swing" motionpattern="3T"><geometry>
 <chain><base x="-1" y="-1" z="2" radius="0.02"/><platform x="0" y="0" z="0"/></chain>
@@ -53,6 +55,25 @@ def test_a_preset_becomes_a_mujoco_model(tmp_path: Path) -> None:
     model = mujoco.MjModel.from_xml_path(str(out))
     assert (code, model.ntendon) == (0, 8)
     np.testing.assert_array_equal(model.body("platform").pos, [0.5, -0.25, 2.0])
+
+
+@pytest.mark.parametrize(
+    ("name", "said"), [("cogiro", "0.4 mm away"), ("article-mixed", "19 mm away"), ("fast", "0.4 m away")]
+)
+def test_what_straight_tendons_cost_is_told(name: str, said: str, tmp_path: Path) -> None:
+    robot = load_robot(name)
+    assert robot.test_box is not None
+    pose = Pose.from_euler(0.5 * (robot.test_box.low + robot.test_box.high), 0.0, 0.0, 0.0)
+    out = tmp_path / "model.xml"
+    _, _, stderr = run(name, "--format", "mjcf", "--out", str(out))
+    told = [line for line in stderr.splitlines() if line.startswith("Lost: Sag and weight of the cables")]
+    assert len(told) == 1
+    assert told[0].endswith(f"sagging cables of these lengths hold the platform {said}.")
+    model = mujoco.MjModel.from_xml_path(str(out))  # from the file itself
+    rests = forward(robot, model.tendon_lengthspring[:, 1], start=pose)
+    away = np.linalg.norm(rests.pose.position - pose.position)
+    number, unit = said.split()[:2]
+    assert away == pytest.approx(float(number) * {"mm": 1e-3, "m": 1.0}[unit], rel=0.05)
 
 
 def test_caspr_files_are_recognized(tmp_path: Path) -> None:

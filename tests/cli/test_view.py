@@ -10,12 +10,14 @@ from contextlib import contextmanager
 from pathlib import Path as FilePath
 from urllib.request import urlopen
 
+import h5py
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 import sagline as sl
 from sagline.cli.main import app
+from sagline.cli.view import _run
 from tests.cli import interrupts
 from tests.viewer.client import Client
 
@@ -71,6 +73,19 @@ def test_a_run_of_another_robot_is_refused(tmp_path: FilePath) -> None:
     result = CliRunner().invoke(app, ["view", "cogiro", str(tmp_path / "run.nc"), "--port", "0", "--no-browser"])
     assert result.exit_code == 2
     assert "sagline view article-mixed" in " ".join(result.stderr.split())
+
+
+def test_a_run_from_before_digests_is_played_with_a_note(
+    tmp_path: FilePath, capsys: pytest.CaptureFixture[str]
+) -> None:
+    robot, file = sl.load_robot("article-mixed"), tmp_path / "run.nc"
+    sl.inverse(robot, sl.Pose([[0.0, 0.0, 1.5]], np.eye(3))).save(file)
+    with h5py.File(file, "r+") as content:  # which cuts the digest off
+        content.attrs["sagline_format"] = 1
+    assert len(_run(robot, file).plan.state.pose) == 1
+    assert capsys.readouterr().err == (
+        f"Note: {file} is from before plans carried a digest: damage to it need not show. Save it again to have one.\n"
+    )
 
 
 @pytest.mark.parametrize("wrong", [["nothing-like-it"], ["cogiro", "missing.nc"], ["cogiro", "--port", "99999"]])

@@ -29,6 +29,7 @@ TOLD = (
     "status",
     "tension",
 )
+WIDTH = 80  # columns of code that a page shows without scrolling
 CHECKS = ("checked", "exactly", "choice")  # these raise InvalidValueError for their caller
 
 
@@ -154,6 +155,14 @@ def test_every_example_prints_what_it_says(name: str, tmp_path: Path, monkeypatc
     failed, tried = doctest.DocTestRunner().run(EXAMPLES[name], out=said.append)
     assert tried > 0
     assert failed == 0, "".join(said)
+
+
+@pytest.mark.parametrize("name", sorted(EXAMPLES))
+def test_no_line_of_an_example_is_wider_than_a_page(name: str) -> None:
+    lines = textwrap.dedent(EXAMPLES[name].docstring or "").splitlines()
+    code = [line.strip() for line in lines if line.strip().startswith((">>> ", "... "))]
+    assert code
+    assert [line for line in code if len(line) > WIDTH + len(">>> ")] == []
 
 
 def test_the_most_used_have_an_example() -> None:

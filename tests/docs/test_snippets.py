@@ -6,6 +6,8 @@ The blocks of a page run in order, in one namespace and one empty folder. A bloc
 - of any kind is written to a file first, if the line `<!-- file: name -->` stands before it;
 - of `text title="output"` must be what the blocks of Python before it printed since the last such block;
 - of `sh` is not run, but its lines that begin with `sagline` must be understood by the command.
+
+A line `<!-- drawn by: sagline ... -->` shows the figures that a command draws; it must be understood as well.
 """
 
 import contextlib
@@ -23,6 +25,7 @@ import typer.main
 from sagline.cli.main import app
 
 ROOT = Path(__file__).parents[2]
+WIDTH = 80  # columns that a page shows without scrolling
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 BLOCK = re.compile(
     r"(?:^ *<!-- (?P<mark>not run|file): (?P<what>[^\n]+?) -->\n+)?"
@@ -51,6 +54,7 @@ def blocks(page: Path) -> Iterator[Block]:
 
 
 def commands(page: Path) -> Iterator[str]:
+    yield from re.findall(r"^<!-- drawn by: (sagline .+) -->$", page.read_text(encoding="utf-8"), re.MULTILINE)
     for block in blocks(page):
         if block.kind == "sh":
             for line in block.text.replace("\\\n", " ").splitlines():
@@ -98,3 +102,23 @@ def test_the_commands_exist(line: str) -> None:
 def test_the_pages_are_found_and_their_blocks_too() -> None:
     assert ROOT / "docs" / "model.md" in PAGES
     assert [block.kind for block in blocks(ROOT / "README.md")].count("python") == 2
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_no_line_of_code_is_wider_than_a_page(page: Path) -> None:
+    lines = [(block.line + i, line) for block in blocks(page) for i, line in enumerate(block.text.splitlines(), 1)]
+    assert [(number, line) for number, line in lines if len(line) > WIDTH] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_a_list_begins_after_an_empty_line(page: Path) -> None:
+    prose = BLOCK.sub("", page.read_text(encoding="utf-8"))
+    item = re.compile(r"^ *(?:[-*]|\d+\.) ", re.MULTILINE)
+    paragraphs = [part.strip("\n") for part in re.split(r"\n\s*\n", prose)]
+    assert [part for part in paragraphs if item.search(part) and not item.match(part)] == []  # else it is no list
+
+
+@pytest.mark.parametrize("file", sorted((ROOT / "examples").iterdir()), ids=name_of)
+def test_no_line_of_an_example_is_wider_than_a_page(file: Path) -> None:
+    lines = file.read_text(encoding="utf-8").splitlines() if file.suffix in (".py", ".yaml") else []
+    assert [line for line in lines if len(line) > WIDTH] == []

@@ -183,3 +183,65 @@ def test_files_that_are_not_there(folder: Path) -> None:
     (folder / "gondola_bodies.xml").unlink()
     with pytest.raises(FileError, match=r"0 CASPR files of bodies \(none\)"):
         load_caspr(folder)
+
+
+# the four ways in which CASPR's own planar models give an inertia: zero about what they never turn about
+@pytest.mark.parametrize(
+    ("joint", "moments", "turns"),
+    [
+        ("PLANAR_XY", (0.0, 0.0, 0.1), True),
+        ("PLANAR_XZ", (0.0, 0.2, 0.0), True),
+        ("PLANAR_YZ", (0.0925, 0.0, 0.0), True),
+        ("PLANAR_XZ", (1.0, 1.0, 1.0), True),
+        ("P_XY", (0.0, 0.0, 0.0), False),
+        ("P_XZ", (0.0, 0.0, 0.3), False),
+        ("T_XYZ", (0.0, 0.0, 0.0), False),
+    ],
+)
+def test_only_the_moment_that_counts_must_be_positive(
+    folder: Path, joint: str, moments: tuple[float, float, float], turns: bool
+) -> None:
+    given = "".join(f"<I{a}{a}>{moment}</I{a}{a}>" for a, moment in zip("xyz", moments, strict=True))
+    start, end = BODIES.index("<inertia"), BODIES.index("</inertia>")
+    text = BODIES[:start] + f'<inertia ref="com">{given}<Ixy>0</Ixy><Ixz>0</Ixz><Iyz>0</Iyz>' + BODIES[end:]
+    (folder / "gondola_bodies.xml").write_text(text.replace("SPATIAL_EULER_XYZ", joint))
+    robot = load_caspr(folder).robot
+    assert np.diag(robot.inertia).tolist() == list(moments)
+    if turns:
+        assert robot.plane_normal is not None
+        about = float(robot.plane_normal @ robot.inertia @ robot.plane_normal)
+        nothing = text.replace("SPATIAL_EULER_XYZ", joint).replace(f">{about}<", ">0.0<")
+        (folder / "gondola_bodies.xml").write_text(nothing)
+        with pytest.raises(FileError, match=r"inertia is a matrix with 0 kg m\^2 about plane_normal; allowed: > 0"):
+            load_caspr(folder)
+
+
+def test_a_solid_turning_about_every_axis_has_all_moments(folder: Path) -> None:
+    for given, message in (("0.0", "principal moment 0 kg m"), ("9.9", "none larger than the other two together")):
+        text = BODIES.replace('ref="joint"', 'ref="com"').replace("<Ixz>0.16</Ixz>", "<Ixz>0</Ixz>")
+        (folder / "gondola_bodies.xml").write_text(text.replace("<Izz>0.48</Izz>", f"<Izz>{given}</Izz>"))
+        with pytest.raises(FileError, match=message):
+            load_caspr(folder)
+
+
+def test_other_heads_comments_and_laws(folder: Path) -> None:
+    body = BODIES[BODIES.index("<links") :]
+    for head, tail in (
+        ('<?xml version="1.0" encoding="utf-8"?>\n<!DOCTYPE bodies_system SYSTEM "../../t/bodies.dtd">\n<bodies_system>'
+         '<!-- <link_rigid num="1"><joint type="R_Z"/></link_rigid> -->', "</bodies_system>"),
+        ('<?xml version="1.0" encoding="ISO-8859-1"?><bodies_system>', "</bodies_system>"),
+        ("", ""),
+    ):  # fmt: skip
+        (folder / "gondola_bodies.xml").write_text(head + body + tail)
+        assert load_caspr(folder).robot.mass == 8.0
+    law = cable(
+        "cable_vsd_torsion_spring",
+        "torsion",
+        "com",
+        "<K_cable>13000</K_cable><num_torsion_springs>4</num_torsion_springs>" + LIMITS + "<diameter>0.4</diameter>",
+        point(0, "-3 0 4") + point(1, "-0.2 0 0.1"),
+    )
+    (folder / "cables" / "gondola_cables.xml").write_text(cables_file(law, SPRING))
+    imported = load_caspr(folder)
+    assert imported.robot.cables.axial_stiffness.tolist() == [700e3, 90e3]
+    assert "torsion: its law of stiffness" in " ".join(imported.lost)

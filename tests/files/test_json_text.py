@@ -4,8 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sagline.errors import FileError
-from sagline.files.json_text import json_text, save_json
+from sagline.files.json_text import json_text
 
 GIVEN = {
     "lengths": np.array([[1.0, np.nan], [-np.inf, 2.5e-300]]),
@@ -23,17 +22,21 @@ MEANT = {
 }
 
 
-def test_numbers_are_numbers_and_what_is_not_finite_is_null(tmp_path: Path) -> None:
+def test_numbers_are_numbers_and_what_is_not_finite_is_null() -> None:
     text = json_text(GIVEN)
     assert json.loads(text, parse_constant=lambda name: pytest.fail(name)) == MEANT
     assert "φ" in text
-    save_json(GIVEN, tmp_path / "run.json")
-    assert (tmp_path / "run.json").read_text(encoding="utf-8") == text + "\n"
 
 
-def test_what_json_cannot_hold_is_refused_before_anything_is_written(tmp_path: Path) -> None:
+def test_what_json_cannot_hold_is_refused() -> None:
     with pytest.raises(TypeError, match="not JSON serializable"):
-        save_json({"what": object()}, tmp_path / "run.json")
-    with pytest.raises(FileError, match="Create the folder"):
-        save_json({}, tmp_path / "missing" / "run.json")
-    assert list(tmp_path.iterdir()) == []
+        json_text({"what": object()})
+
+
+def test_texts_do_nothing_to_a_terminal_and_come_back() -> None:
+    texts = [
+        chr(code) for code in (*range(0xA1), *range(0x2000, 0x2100), *range(0xD7F0, 0xE000), 0xFEFF, 0x1F600, 0xE0001)
+    ]
+    text = json_text(dict(zip(texts, texts, strict=True)))
+    assert all(line.isprintable() for line in text.encode().decode().split("\n"))
+    assert json.loads(text) == dict(zip(texts, texts, strict=True))

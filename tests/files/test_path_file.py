@@ -269,3 +269,58 @@ def test_text_that_is_no_waypoint_file(tmp_path: FilePath, text: str, match: str
 def test_another_suffix_is_refused(tmp_path: FilePath) -> None:
     with pytest.raises(FileError, match=r"suffix is \.txt; allowed: \.yaml, \.yml, \.csv"):
         load_path(write(tmp_path, "run.txt", "time,x,y,z\n0,1,2,3\n1,1,2,3\n"))
+
+
+@pytest.mark.parametrize(
+    ("text", "fragment"),
+    [
+        ("time;x;y;z\n0;1;2;3\n", "line 1: the columns are parted by semicolons; allowed: commas, and points in"),
+        ("time\tx\ty\tz\n0\t1\t2\t3\n", "line 1: the columns are parted by tabs"),
+        (
+            "time,x,y,z\n0,0,1,5,2,5,3,5\n",
+            "line 2: 8 columns; allowed: 4, as in the header, and a point in the numbers",
+        ),
+        ('time,x,y,z\n0,"1,5",2,3\n', "line 2: x is 1,5; allowed: a number with a point, not a comma"),
+        ("time [],x,y,z\n", "line 1: the unit of time is []; allowed: a unit that converts to s"),
+        ("time [ ],x,y,z\n", "line 1: the unit of time is [ ]"),
+        ("time,x [5],y,z\n", "line 1: the unit of x is [5]"),
+        ("time,x,y,z\n0,1:30,2,3\n", "line 2: x is 1:30; allowed: a number"),
+        ("time,x,y,z\n0,1_0,2,3\n", "line 2: x is 1_0; allowed: a number"),
+        ("time,x,y,z\n0,٣,2,3\n", "line 2: x is ٣; allowed: a number"),
+        ("time,x,y,z\n0,0x10,2,3\n", "line 2: x is 0x10; allowed: a number"),
+        ("time,x,y,z\n0,1e308,2,3\n", "line 2: x is 1e+308 m; allowed: numbers up to 1e+50 m"),
+        ("time,x,y,z\n0,1e999,2,3\n", "line 2: x is inf m; allowed: a finite number"),
+        ("time,x,y,z\n0,1,2,3\n1e-15,1,2,3\n", "line 3: time is 1e-15 s; allowed: a time after"),
+        ("position,x,y,z\n", "line 1: unknown column 'position'; allowed: time, x"),  # and no "did you mean"
+    ],
+)
+def test_tables_of_other_habits(tmp_path: FilePath, text: str, fragment: str) -> None:
+    with pytest.raises(FileError) as caught:
+        load_path(write(tmp_path, "run.csv", text))
+    assert fragment in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "fragment"),
+    [
+        ("nothere: 1\nwaypoints: []\n", "nothere is an unknown key; allowed: "),
+        ("durations: 1:30\nwaypoints:\n" + TWO, "durations is '1:30'; allowed: a number in s"),
+        ("durations: 1_000\nwaypoints:\n" + TWO, "durations is '1_000'"),
+        ("durations: 1e308\nwaypoints:\n" + TWO, "durations is 1e+308; allowed: numbers up to 1e+50 s"),
+        ("durations: 1e-320\nwaypoints:\n" + TWO, "durations is 9.99989e-321 s; allowed: > 0 s, 1e-50 to 1e+50 s"),
+        ("rate: null\n" + HEAD + TWO, "rate is None; allowed: a number in 1/s"),
+        ("rate: 100 rad/s\n" + HEAD + TWO, "rate is '100 rad/s'; allowed: a number in 1/s"),
+        ("rate: 1e12\n" + HEAD + TWO, "the number of samples is 1e+12"),
+        (HEAD + TWO + "  - position: [0, yes, 1]\n", "waypoints[2].position[1] is 'yes'"),
+    ],
+)
+def test_waypoints_of_other_habits(tmp_path: FilePath, text: str, fragment: str) -> None:
+    with pytest.raises(FileError) as caught:
+        load_path(write(tmp_path, "tour.yaml", text))
+    assert fragment in str(caught.value)
+    assert "Did you mean" not in str(caught.value)
+
+
+def test_a_rate_too_small_for_a_second_sample_is_both_ends(tmp_path: FilePath) -> None:
+    path = load_path(write(tmp_path, "tour.yaml", "rate: 1e-40\n" + HEAD + TWO))
+    assert path.time.tolist() == [0.0, 1.0]

@@ -1,5 +1,9 @@
+import hashlib
+import io
+import os
 import resource
-from operator import attrgetter
+import warnings
+from dataclasses import replace
 from pathlib import Path as FilePath
 
 import h5py
@@ -8,15 +12,12 @@ import pytest
 import xarray as xr
 
 import sagline as sl
-from sagline.errors import FileError
+from sagline.errors import FileError, SaglineWarning
 from sagline.files.robot_file import dump_robot
+from tests.files.plans import OUTSIDE, SUSPENDED, a_plan, assert_same
 
-SUSPENDED = sl.load_robot("article-suspended")
-OUTSIDE = sl.quintic_path([(0.0, 0.0, 1.5), (7.2, 3.0, 1.5)], durations=5.0, rate=8.0)  # ends outside
-
-
-def a_plan() -> sl.Plan:
-    return sl.inverse(SUSPENDED, OUTSIDE, sl.Empirical(k_p=4.1), sl.Closest("horizontal", 0.1))
+SEAL = len("\nsagline sha256 \n") + 64  # bytes at the end
+NOTICE = "run.nc is from before plans carried a digest: damage to it need not show. Save it again to have one"
 
 
 @pytest.fixture(scope="module")
@@ -34,28 +35,13 @@ def saved(tmp_path: FilePath, content: bytes) -> FilePath:
     return file
 
 
-PLACES = (
-    *(
-        f"state.cables.{name}"
-        for name in ("unstrained_length", "chord_tension", "horizontal_tension", "vertical_force")
-    ),
-    *(f"state.cables.{name}" for name in ("span", "rise", "status")),
-    *("state.pose.position", "state.pose.quaternion", "state.wrench"),
-    *("status", "shortfall", "wrench_residual", "blocking", "farkas", "needed"),
-)
-PATH_PLACES = ("path.time", "path.twist", "path.twist_rate", "path.jerk", "path.pose.position", "path.pose.quaternion")
-
-
-def assert_same(plan: sl.Plan, other: sl.Plan) -> None:
-    for place in PLACES + (() if plan.path is None else PATH_PLACES):
-        mine, theirs = (np.asarray(attrgetter(place)(p)) for p in (plan, other))
-        assert (mine.dtype, mine.shape) == (theirs.dtype, theirs.shape), place
-        assert mine.tobytes() == theirs.tobytes(), place
-        assert not theirs.flags.writeable
-    assert plan.tension == other.tension
-    assert plan.state.cables.model == other.state.cables.model
-    assert dump_robot(plan.state.one_robot) == dump_robot(other.state.one_robot)
-    assert (plan.path is None) == (other.path is None)
+@pytest.fixture
+def old(saved: FilePath) -> FilePath:
+    """The same as it was written before files carried digests, to be edited."""
+    saved.write_bytes(saved.read_bytes()[:-SEAL])
+    with h5py.File(saved, "r+") as file:
+        file.attrs["sagline_format"] = 1
+    return saved
 
 
 @pytest.mark.parametrize("model", [sl.Catenary(), sl.Empirical(k_h=4.9, k_p=4.1), sl.Straight()])
@@ -135,10 +121,12 @@ def test_the_proofs_are_kept(saved: FilePath) -> None:
         assert [data[name].attrs["units"] for name in ("farkas", "needed")] == ["1, 1/m", "N, N m"]
 
 
-def test_a_file_from_before_proofs_were_kept(saved: FilePath) -> None:
+def test_a_file_from_before_proofs_were_kept(old: FilePath) -> None:
+    saved = old
     with h5py.File(saved, "r+") as file:
         del file["farkas"], file["needed"]
-    plan = sl.load_plan(saved)
+    with pytest.warns(SaglineWarning, match=NOTICE):
+        plan = sl.load_plan(saved)
     assert plan.farkas is None
     assert plan.needed is None
     plan.save(saved)
@@ -160,17 +148,32 @@ def test_a_disk_that_fills_up_leaves_nothing(tmp_path: FilePath) -> None:
     assert [entry.name for entry in tmp_path.iterdir()] == ["other.nc"]
 
 
+def test_a_disk_that_fills_up_in_the_middle(tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise RuntimeError("Can't decrement id ref count (unable to close file, errno = 28)")
+
+    monkeypatch.setattr("xarray.Dataset.to_netcdf", fail)
+    with pytest.raises(FileError, match=r"run\.nc: cannot be written \(Can't decrement id ref count"):
+        a_plan().save(tmp_path / "run.nc")
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_files_that_are_no_plan(tmp_path: FilePath, saved: FilePath) -> None:
     half, text, other = tmp_path / "half.nc", tmp_path / "text.nc", tmp_path / "other.nc"
     half.write_bytes(saved.read_bytes()[:20_000])
     text.write_text("time,x,y,z\n")
     xr.Dataset({"a": ("b", [1.0, 2.0])}).to_netcdf(other, engine="h5netcdf")
+    os.mkfifo(tmp_path / "pipe.nc")
     reasons = {
         tmp_path / "missing.nc": "does not exist. Check its name",
         tmp_path: "cannot be read .Is a directory",
         half: "is no complete NetCDF file .*truncated.*it may have been cut off",
         text: "is no complete NetCDF file",
         other: "is no plan of sagline, it names no sagline_format",
+        tmp_path / "pipe.nc": "is no file. Check its name",  # opening it would wait for ever
+        FilePath("/dev/zero"): "is no file. Check its name",
+        tmp_path / "zero\0byte.nc": "is no name that a file can have",
+        tmp_path / ("x" * 300): "is no name that a file can have",
     }
     for file, reason in reasons.items():
         with pytest.raises(FileError, match=reason):
@@ -180,30 +183,155 @@ def test_files_that_are_no_plan(tmp_path: FilePath, saved: FilePath) -> None:
 @pytest.mark.parametrize(
     ("attribute", "value", "reason"),
     [
-        ("sagline_format", 2, "is of format 2, written by sagline .* reads up to 1. Install a newer sagline"),
+        ("sagline_format", 3, "is of format 3, written by sagline .* reads up to 2. Install a newer sagline"),
+        ("sagline_format", 2, "is not as it was written: its digest is missing"),
+        ("sagline_format", 0, "is of format .*0.*, which never was"),
+        ("sagline_format", "two", "is of format 'two', which never was"),
         ("model", "Rope", "model is 'Rope'; allowed: Straight, Elastic, Empirical, Parabolic, Catenary"),
         ("tension", "Guess", "tension is 'Guess'; allowed: Closest, MinimumNorm"),
         ("model_k_p", -1.0, r"k_p is -1 m\^2/s\^4; allowed: >= 0"),
         ("robot", "name: x", "run.nc, robot: .* is missing"),
+        ("robot", 3.0, "run.nc, robot: has no keys"),
+        ("model_k_p", "four", "k_p is"),
     ],
 )
-def test_edited_attributes(saved: FilePath, attribute: str, value: object, reason: str) -> None:
-    with h5py.File(saved, "r+") as file:
+def test_edited_attributes(old: FilePath, attribute: str, value: object, reason: str) -> None:
+    with h5py.File(old, "r+") as file:
         file.attrs[attribute] = value
-    with pytest.raises(FileError, match=reason):
-        sl.load_plan(saved)
+    assert_refused(old, reason)
 
 
 @pytest.mark.parametrize("name", ["unstrained_length", "shortfall", "twist"])
-def test_a_missing_variable(saved: FilePath, name: str) -> None:
-    with h5py.File(saved, "r+") as file:
+def test_a_missing_variable(old: FilePath, name: str) -> None:
+    with h5py.File(old, "r+") as file:
         del file[name]
-    with pytest.raises(FileError, match=f"has no .*{name}.*Write it again"):
-        sl.load_plan(saved)
+    assert_refused(old, f"has no .*{name}.*Write it again")
 
 
-def test_another_robot_in_the_file(saved: FilePath) -> None:
-    with h5py.File(saved, "r+") as file:
+def test_another_robot_in_the_file(old: FilePath) -> None:
+    with h5py.File(old, "r+") as file:
         file.attrs["robot"] = dump_robot(sl.load_robot("falcon-7"))
-    with pytest.raises(FileError, match="has 8 cables, its robot 7"):
-        sl.load_plan(saved)
+    assert_refused(old, "has 8 cables, its robot 7")
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "reason"),
+    [
+        ("unstrained_length", -1.0, r"unstrained_length\[2, 0\] is -1; allowed: >= 0 m, finite, at the solved poses"),
+        ("unstrained_length", np.nan, r"unstrained_length\[2, 0\] is nan; allowed: >= 0 m, finite"),
+        ("chord_tension", np.inf, r"chord_tension\[2, 0\] is inf; allowed: >= 0 N, finite"),
+        ("span", -0.5, r"span\[2, 0\] is -0.5; allowed: >= 0 m"),
+        ("rise", np.nan, r"rise\[2, 0\] is nan; allowed: finite, at every pose"),
+        ("shortfall", -3.0, r"shortfall\[2\] is -3; allowed: >= 0 N, at any poses"),
+        ("farkas", np.inf, r"farkas\[2, 0\] is inf; allowed: finite, at any poses"),
+        ("pose_status", 99, r"pose_status is 99 \(without a meaning\); allowed: 0 \(solved\), .*Read it with a newer"),
+        ("cable_status", -1, r"cable_status is -1 \(without a meaning\); allowed: 0 \(solved\)"),
+        ("quaternion", 2.0, "quaternion"),
+        ("time", 1e9, r"time\[3\] is .*allowed: > 1000000000.0 s"),
+    ],
+)
+def test_values_that_no_plan_has(old: FilePath, name: str, value: float, reason: str) -> None:
+    with h5py.File(old, "r+") as file:
+        file[name][(2, *[0] * (file[name].ndim - 1))] = value
+    assert_refused(old, reason)
+
+
+def test_a_length_where_there_is_no_answer(old: FilePath) -> None:
+    with h5py.File(old, "r+") as file:
+        file["unstrained_length"][-1, 5] = 3.0
+    assert_refused(old, r"unstrained_length\[40, 5\] is 3; allowed: .*at the solved poses alone")
+
+
+def test_units_types_shapes_and_meanings_are_those_of_the_layout(old: FilePath) -> None:
+    content = old.read_bytes()
+
+    def unit(file: h5py.File) -> None:
+        file["unstrained_length"].attrs["units"] = "mm"
+
+    def meaning(file: h5py.File) -> None:
+        file["pose_status"].attrs["flag_meanings"] = "infeasible solved " + "other " * 20
+
+    def single(file: h5py.File) -> None:
+        replaced(file, "unstrained_length", file["unstrained_length"][:].astype(np.float32))
+
+    def turned(file: h5py.File) -> None:
+        replaced(file, "twist", file["unstrained_length"][:, :6], ("pose", "cable"))
+
+    def order(file: h5py.File) -> None:
+        file["axis"][:] = ["z", "y", "x"]
+
+    edits = {
+        unit: "unstrained_length: units is 'mm'; allowed: 'm'",
+        meaning: r"pose_status is 0 \(infeasible\); allowed: 0 \(solved\)",
+        single: "unstrained_length: type is float32; allowed: float64",
+        turned: "twist: shape is 41 pose × .* cable; allowed: 41 pose × 6 twist_part|no complete NetCDF",
+        order: "axis is .*z.*y.*x.*; allowed: x, y, z",
+    }
+    for edit, reason in edits.items():
+        old.write_bytes(content)
+        with h5py.File(old, "r+") as file:
+            edit(file)
+        assert_refused(old, reason)
+
+
+def replaced(file: h5py.File, name: str, values: np.ndarray, dimensions: tuple[str, ...] | None = None) -> None:
+    before = file[name]
+    scales = dimensions or [dimension[0].name for dimension in before.dims]
+    attributes = {key: before.attrs[key] for key in ("long_name", "units")}
+    del file[name]
+    file[name] = values
+    for key, value in attributes.items():
+        file[name].attrs[key] = value
+    for k, scale in enumerate(scales):
+        file[name].dims[k].attach_scale(file[scale])
+
+
+def assert_refused(file: FilePath, reason: str) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SaglineWarning)
+        with pytest.raises(FileError, match=reason) as caught:
+            sl.load_plan(file)
+    assert len(str(caught.value).replace(str(file), file.name)) < 300
+
+
+def test_what_another_program_has_changed_is_told(saved: FilePath) -> None:
+    with h5py.File(saved, "r+") as file:
+        file["unstrained_length"][0, 0] += 1e-12  # HDF5 cuts off what follows its part
+    assert_refused(saved, "run.nc: is not as it was written: its digest is missing. Take it from its source again")
+    with xr.open_dataset(saved, engine="h5netcdf") as data:
+        data.to_netcdf(saved.with_name("copy.nc"), engine="h5netcdf")
+    assert_refused(saved.with_name("copy.nc"), "is not as it was written: its digest is missing")
+
+
+def test_what_was_added_behind_is_told(saved: FilePath) -> None:
+    content = saved.read_bytes()
+    saved.write_bytes(content + b"\n")
+    assert_refused(saved, "is not as it was written: its digest is missing")
+    saved.write_bytes(content[:-SEAL] + b"\0" + content[-SEAL:])
+    assert_refused(saved, "is not as it was written: its digest differs")
+
+
+def test_the_digest_is_that_of_everything_before_it(saved: FilePath) -> None:
+    content = saved.read_bytes()
+    assert content[-SEAL:].decode() == f"\nsagline sha256 {hashlib.sha256(content[:-SEAL]).hexdigest()}\n"
+    assert h5py.File(io.BytesIO(content[:-SEAL])).attrs["sagline_format"] == 2
+
+
+def test_what_could_not_be_read_again_is_not_written(tmp_path: FilePath) -> None:
+    class Own(sl.Catenary):
+        pass
+
+    plan = sl.inverse(SUSPENDED, sl.Pose([0.0, 0.0, 1.5], np.eye(3)))
+    cables = replace(plan.state.cables, model=Own())
+    lengths = replace(plan.state.cables, unstrained_length=-plan.unstrained_length)
+    for state, reason in ((cables, "model is Own; allowed: Straight"), (lengths, r"unstrained_length\[0\] is -")):
+        with pytest.raises(sl.InvalidValueError, match=reason):
+            replace(plan, state=replace(plan.state, cables=state)).save(tmp_path / "run.nc")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["", "x" * 100, "../../evil", "机器人"])
+def test_robots_of_any_name(tmp_path: FilePath, name: str) -> None:
+    robot = SUSPENDED.replace(name=name)
+    sl.inverse(robot, sl.Pose([0.0, 0.0, 1.5], np.eye(3))).save(tmp_path / "run.nc")
+    assert sl.load_plan(tmp_path / "run.nc").state.one_robot.name == name

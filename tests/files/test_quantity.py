@@ -1,5 +1,7 @@
 import subprocess
 import sys
+import time
+from math import inf, isinf, isnan
 
 import pytest
 from hypothesis import given
@@ -7,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
 from sagline.errors import InvalidValueError
-from sagline.files.quantity import in_si
+from sagline.files.quantity import in_si, plain_number, within_reach
 
 
 @pytest.mark.parametrize(
@@ -19,6 +21,8 @@ from sagline.files.quantity import in_si
         ("22 mm²", "m^2", 22e-6),
         ("2 GPa", "Pa", 2e9),
         ("67 g/m", "kg/m", 0.067),
+        ("67\u00a0g/m", "kg/m", 0.067),
+        ("67\n g/m\n", "kg/m", 0.067),
         ("0.067 kg/m", "kg/m", 0.067),
         ("3 kg m^2", "kg*m^2", 3.0),
         ("-1.5e2 cm", "m", -1.5),
@@ -40,7 +44,7 @@ def test_lists_keep_their_nesting() -> None:
     assert in_si([[1, "1 mm"], ["2 km"]], "m", "x") == [[1.0, 0.001], [2000.0]]
 
 
-@given(st.floats(allow_nan=False))
+@given(st.floats(allow_nan=False).filter(lambda number: within_reach(number) or isinf(number)))
 def test_plain_numbers_pass_bit_for_bit(number: float) -> None:
     assert in_si(number, "kg", "x") == number
     assert in_si(repr(number), "kg", "x") == number
@@ -73,10 +77,87 @@ def test_what_is_no_quantity_is_named(value: object, unit: str, message: str) ->
         in_si(value, unit, "x")
 
 
+@pytest.mark.parametrize("value", [1e51, "1e51", "1e400", -1e60, "1e49 km", "-1e300 m"])
+def test_numbers_out_of_reach_are_refused(value: object) -> None:
+    with pytest.raises(InvalidValueError, match=r"x is .*; allowed: "):
+        in_si(value, "m", "x")
+    assert within_reach(1e50)
+    assert within_reach(-5e-324)
+    assert not within_reach(inf)
+    assert not within_reach(float("nan"))
+
+
+@pytest.mark.parametrize(
+    ("text", "number"),
+    [
+        (" 010 ", 10.0),
+        ("+1.5e-3", 1.5e-3),
+        ("5.", 5.0),
+        (".5", 0.5),
+        ("-0", 0.0),
+        ("inf", inf),
+        ("-.inf", -inf),
+        ("1e999", 1.7976931348623157e308),
+    ],
+)
+def test_plain_numbers(text: str, number: float) -> None:
+    assert plain_number(text) == number
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", " ", "1:30", "1_0", "0x10", "0b1", "1e", "e1", ".", "+", "1 0", "1,5", "٣", "１", "²", "1+1j", "infinity",
+     "INF.", "1e1e1", "--1", "1d3", "9" * 61],
+)  # fmt: skip
+def test_what_is_no_plain_number(text: str) -> None:
+    assert plain_number(text) is None
+    with pytest.raises(InvalidValueError):
+        in_si(text, "m", "x")
+
+
+def test_not_a_number_is_a_word_that_nobody_takes() -> None:
+    assert isnan(plain_number(".nan") or 0.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit"),
+    [
+        ("5 Hz", "rad/s"),  # to pint both are 1/s
+        ("5 rad/s", "1/s"),
+        ("5 rpm", "1/s"),
+        ("0.5 rad", ""),
+        ("5 N*m/rad", "N*m"),
+        ("12 kg/m*", "kg/m"),
+        ("5 m**9**9**9", "m"),
+        ("5 m^10", "m"),
+        ("5 m^-", "m"),
+        ("5 /s", "1/s"),
+        ("5 m*m*m*m*m*m*m*m/m*m*m*m*m*m*m", "m"),
+        ("5 " + "m*" * 3000 + "m/m" * 3000, "m"),
+        ("5 " + "a" * 50_000, "m"),
+        ("5 m\n", "kg"),
+        ("5 degC", "m"),
+        ("5 dB", "N"),
+    ],
+)
+def test_units_that_will_not_do_are_told_at_once(text: str, unit: str) -> None:
+    start = time.process_time()
+    with pytest.raises(InvalidValueError) as caught:
+        in_si(text, unit, "x")
+    assert time.process_time() - start < 1.0
+    assert len(str(caught.value)) < 300
+
+
+@pytest.mark.parametrize(("text", "value"), [("30 rpm", 3.141592653589793), ("0.5 turn/s", 3.141592653589793)])
+def test_angles_are_a_dimension(text: str, value: float) -> None:
+    assert in_si(text, "rad/s", "x") == pytest.approx(value, rel=1e-15)
+    assert in_si("20°", "rad", "x") == pytest.approx(0.3490658503988659, rel=1e-15)
+
+
 def test_plain_numbers_do_not_load_pint() -> None:
     code = """
 import sys
-from sagline.files.quantity import in_si
+from sagline.files.quantity import in_si, plain_number, within_reach
 
 in_si([1, "2e3"], "m", "x")
 print("pint" in sys.modules)

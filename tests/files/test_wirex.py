@@ -2,6 +2,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 from sagline.cables.cable import Cable
 from sagline.errors import FileError
@@ -116,6 +117,11 @@ def test_planar_robots_get_a_plane(tmp_path: Path) -> None:
         ('radius="0.001"', 'radius="thin"', "cable thin: radius is 'thin'"),
         ('radius="0.001"', 'radius="-0.001"', "cable thin: radius is -0.001 m"),
         ("<controller", '<platform name="second" /><controller', "number of <platform> is 2; allowed: 1"),
+        ('Ixx="0.5"', 'Ixx="5"', r"principal moments 0.*, 5\.\d+ kg m\^2; allowed: none larger"),
+        ('Ixx="0.5"', 'Ixx="1_0"', "inertiatensor: Ixx is '1_0'; allowed: a number in kg m"),
+        (' version="0.32"', "", "version of the format is missing; allowed: 0.31 or 0.32"),
+        ('version="0.32"', 'version="9.99"', "version of the format is '9.99'; allowed: 0.31 or 0.32"),
+        ('version="0.32"', 'version="0.3"', "version of the format is '0.3'"),
         ("models", "shelves", "root element is <shelves>; allowed: <models>"),
         ("robot", "wireRobot", "robot is in the old form <wireRobot>"),
         ("chain", "leg", "number of <chain> is 0"),
@@ -125,3 +131,105 @@ def test_planar_robots_get_a_plane(tmp_path: Path) -> None:
 def test_files_that_will_not_do(tmp_path: Path, old: str, new: str, message: str) -> None:
     with pytest.raises(FileError, match=message):
         load(tmp_path, (old, new))
+
+
+TENSOR = '<inertiatensor Ixx="0.5" Ixy="0.01" Ixz="0" Iyy="0.6" Iyz="-0.02" Izz="0.7" />'
+
+
+@pytest.mark.parametrize(
+    ("tensor", "inertia", "said"),
+    [
+        # as WireX 0.4 to 1.1 write it, whatever the platform
+        ('<inertiatensor Ixx="14" />', np.diag([14.0, 14.0, 14.0]), "Ixy, Ixz, Iyy, Iyz, Izz missing"),
+        # as WireX 2.0 writes it: all nine
+        (
+            '<inertiatensor Ixx="2.000000" Ixy="0.1" Ixz="0.2" Iyx="0.1" Iyy="3" Iyz="0.3" '
+            'Izx="0.2" Izy="0.3" Izz="4.000000" />',
+            [[2, 0.1, 0.2], [0.1, 3, 0.3], [0.2, 0.3, 4]],
+            "taken about the center of mass",
+        ),
+        # the other half, by hand
+        ('<inertiatensor Ixx="2" Iyy="3" Izz="4" Iyx="0.1" Izx="0.2" Izy="0.3" />', None, "taken about the center"),
+        ('<inertiatensor Ixx="2" Iyy="3" Izz="4" />', np.diag([2.0, 3.0, 4.0]), "Ixy, Ixz, Iyz missing"),
+        ('<inertiatensor Iyy="0.2" Ixx="0.5" />', np.diag([0.5, 0.2, 0.5]), "largest given, 0.5 kg m^2"),
+        # a box of 0.2 x 0.2 x 0.02 m and 12.5 kg: the anchors lie in a plane
+        ("", np.diag([0.0420833333333333, 0.0420833333333333, 0.0833333333333333]), "a solid box around"),
+        ("<inertiatensor />", np.diag([0.0420833333333333, 0.0420833333333333, 0.0833333333333333]), "a solid box"),
+        (
+            '<inertiatensor Ixx="0.000000" Iyy="0.000000" Izz="0.000000" />',
+            np.diag([0.0420833333333333, 0.0420833333333333, 0.0833333333333333]),
+            "a solid box",
+        ),
+    ],
+)
+def test_every_writer_s_inertia(tmp_path: Path, tensor: str, inertia: ArrayLike | None, said: str) -> None:
+    robot = load(tmp_path, (TENSOR, tensor)).robot
+    expected = [[2, 0.1, 0.2], [0.1, 3, 0.3], [0.2, 0.3, 4]] if inertia is None else inertia
+    np.testing.assert_allclose(robot.inertia, np.array(expected, dtype=float), rtol=1e-13)
+    assert said in robot.assumed["inertia"]
+
+
+def chain(k: int) -> str:
+    """One chain as WireLib prints it: six decimals, the pulley's axes, a type of winch."""
+    turn = " ".join(f'a{j}{i}="{float(i == j):.6f}"' for i in (1, 2, 3) for j in (1, 2, 3))
+    x, y, z = (-1) ** k * 2.0, (-1) ** (k // 2) * 1.5, 2.0 * (k < 4)
+    return (
+        f'<chain id="{k + 1}" winchtype="Old-Winde">'
+        f'<base x="{x:.6f}" y="{y:.6f}" z="{z:.6f}" {turn} radius="0.100000" />'
+        f'<platform x="{0.05 * x:.6f}" y="{0.1 * y:.6f}" z="{0.1 * z:.6f}" {turn} /></chain>'
+    )
+
+
+GEOMETRY = f"<geometry>{''.join(chain(k) for k in range(8))}</geometry>"
+PLATFORM = (
+    '<platform name="default_platform" description="default_desc" mass="25.000000" swing_angle="50.000000">'
+    '<inertiatensor Ixx="14" /><centerofgravity x="0.000000" y="1.000000" z="0.200000" /></platform>'
+)
+APPLICATION = '<application name="feeding" id="1" load_mass="25.0" min_cable_load="40.0" max_cable_load="1000.0" />'
+CABLE_1_1 = (
+    '<cable name="defaultCable" elasticity="110000000000.000000" radius="0.006000" breaking_load="40000.000000" '
+    'damping="1.000000" weight="0.023000" minimum_load="0.000000" max_length="0.000000" material="any" />'
+)
+CABLE_0_4 = '<cable name="c" radius="0.006000" breaking_load="40000.000000" damping="1.000000" weight="0.023000" />'
+WINCH_1_1 = '<winch name="Old-Winde"><cable nr_cables="1" f_max="720.000000" f_hold_max="0.000000" /></winch>'
+WINCH_0_4 = '<winch name="w"><cable f_max="0.000000" dl_max="0.000000" /><guiding aperture="3.141593" /></winch>'
+
+
+@pytest.mark.parametrize(
+    ("version", "attributes", "inside", "after", "limit", "assumed"),
+    [
+        # WireLib 0.4 of 2011: no cable, no winch, an application, an attribute that a search and replace broke
+        ("0.31", 'name="A" SEGESTA-Winde=""', APPLICATION, "", np.inf, {"cables", "tension_min", "tension_max"}),
+        # the same with a cable without its elasticity, and a winch without a force
+        ("0.31", 'name="" id=""', APPLICATION, CABLE_0_4 + WINCH_0_4, 40e3, {"cables", "tension_min", "tension_max"}),
+        # WireLib 1.0 and 1.1
+        ("0.31", 'name="A" id="1.0"', "", CABLE_1_1 + WINCH_1_1, 720.0, set()),
+        ("0.32", 'name="A" id="1.0"', '<controller ipo_clock="4" />', CABLE_1_1 + WINCH_1_1, 720.0, set()),
+        # a Windows build prints what it does not know as 1.#INF00
+        (
+            "0.32",
+            'name="A"',
+            "",
+            CABLE_1_1.replace("40000.000000", "1.#INF00") + WINCH_0_4,
+            np.inf,
+            {"tension_max"},
+        ),
+    ],
+)
+def test_every_version_s_dialect(
+    tmp_path: Path, version: str, attributes: str, inside: str, after: str, limit: float, assumed: set[str]
+) -> None:
+    file = tmp_path / "stall.wcrfx"
+    file.write_text(
+        f'<models version="{version}"><robot {attributes} generator="WireLib$Revision: 1024 $" motionpattern="3R3T">'
+        f"{GEOMETRY}{PLATFORM}{inside}</robot>{after}</models>"
+    )
+    imported = load_wirex(file)
+    robot = imported.robot
+    assert robot.name == ("A" if 'name="A"' in attributes else "stall")
+    assert robot.cable_count == 8
+    assert robot.tension_max.tolist() == [limit] * 8
+    assert set(robot.assumed) == assumed | {"inertia"}
+    assert robot.inertia.tolist() == (14.0 * np.eye(3)).tolist()
+    assert robot.center_of_mass.tolist() == [0.0, 1.0, 0.2]
+    assert ("The application" in " ".join(imported.lost)) == bool(APPLICATION in inside)

@@ -1,14 +1,20 @@
 """Figures hold the numbers they claim to show, in the units on their axes."""
 
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path as FilePath
+from typing import Literal
 
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
+from matplotlib.collections import QuadMesh
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
-from matplotlib.text import Annotation
+from matplotlib.path import Path as OutlinePath
+from matplotlib.text import Annotation, Text
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 import sagline as sl
 from sagline import plot
@@ -125,6 +131,41 @@ def test_errors_are_in_millimetres_on_one_scale() -> None:
     assert (low, high) == (-1e-3, 1e-3)  # rounding is not blown up to fill the figure
 
 
+def test_errors_too_small_to_see_are_told() -> None:
+    straight, exact = (sl.confirm(sl.inverse(SUSPENDED, PATH, model=m)) for m in (sl.Straight(), sl.Catenary()))
+    assert [text.get_text() for text in plot.error(exact).texts] == ["largest: 0 (rounding)"]
+    left, right = plot.errors(straight, exact).axes
+    assert ([t.get_text() for t in left.texts], [t.get_text() for t in right.texts]) == ([], ["largest: 0 (rounding)"])
+    shallow = sl.confirm(sl.inverse(SUSPENDED, PATH, model=sl.Parabolic()))
+    largest = 1e6 * np.abs(shallow.position_error).max()
+    told = [text.get_text() for text in plot.errors(straight, shallow).axes[1].texts]
+    assert told == [f"largest: {largest:.0f}\u00a0µm"]
+
+
+def test_poses_without_confirmed_equilibrium_are_shaded() -> None:
+    found = sl.confirm(sl.inverse(SUSPENDED, PATH))
+    status = found.status.copy()
+    status[20:30] = sl.ForwardStatus.SOLVED + 1  # any other than SOLVED
+    position = found.pose.position.copy()
+    position[20:30] = np.nan
+    lost = replace(found, status=status, pose=sl.Pose._adopt(position, found.pose.quaternion))
+    ax = plot.error(lost)
+    spans = [p.get_extents().transformed(ax.transData.inverted()) for p in ax.patches if isinstance(p, Rectangle)]
+    middles = 0.5 * (PATH.time[19:31:10] + PATH.time[20:32:10])
+    np.testing.assert_allclose([(s.x0, s.x1) for s in spans], [tuple(middles)], rtol=1e-12)
+    assert legend(ax)[-1] == "not confirmed"
+
+
+def test_a_sample_between_two_gaps_is_seen() -> None:
+    times = np.arange(5.0)
+    x = np.array([0.0, 7.3, 0.0, 7.3, 7.3])
+    places = sl.Pose.from_euler(np.stack((x, 0.0 * x, 0.0 * x + 1.5), axis=1), 0.0, 0.0, 0.0)
+    plan = sl.inverse(SUSPENDED, sl.Path(times, places, np.zeros((5, 6)), np.zeros((5, 6))))
+    assert list(plan.feasible) == [True, False, True, False, False]
+    for line in plot.tensions(plan).get_lines():
+        assert (line.get_marker(), line.get_markevery()) == ("o", [0, 2])
+
+
 def test_the_robot_hangs_between_its_anchors() -> None:
     pose = sl.Pose.from_euler((1.0, 2.0, 1.7), 0.3, 0.0, 0.0)
     ax = plot.robot(SUSPENDED, pose)
@@ -137,6 +178,87 @@ def test_the_robot_hangs_between_its_anchors() -> None:
         share = np.linalg.norm((cable - cable[0])[:, :2], axis=1) / np.linalg.norm((cable[-1] - cable[0])[:2])
         drop = cable[0, 2] + share * (cable[-1, 2] - cable[0, 2]) - cable[:, 2]
         assert drop.max() == pytest.approx(sag, rel=2e-3)  # of 50 points one is near the lowest
+
+
+def test_cables_have_the_color_of_their_tension_and_their_numbers() -> None:
+    pose = sl.Pose.from_euler((3.0, 2.0, 1.7), 0.0, 0.0, 0.0)
+    robot = sl.load_robot("article-mixed")
+    ax = plot.robot(robot, pose)
+    tension = sl.inverse(robot, pose).chord_tension
+    colors = np.array([to_rgb(line.get_color()) for line in ax.get_lines()[:8]])
+    (bar,) = [other for other in ax.figure.axes if other is not ax]
+    assert bar.get_ylabel() == r"chord tension $\tau$ [N]"
+    (mesh,) = [drawn for drawn in bar.collections if isinstance(drawn, QuadMesh)]
+    np.testing.assert_allclose(mesh.to_rgba(tension)[:, :3], colors, atol=0.02)  # the bar says what colors mean
+    assert [text.get_text() for text in ax.texts] == [str(k) for k in range(8)]
+    for text, anchor in zip(ax.texts, robot.frame_anchors, strict=True):
+        assert np.linalg.norm(np.array(text.get_position_3d()) - anchor) < 1.0
+
+
+@pytest.mark.parametrize("name", sl.robot_names())
+def test_numbers_on_the_axes_of_a_robot_do_not_meet(name: str) -> None:
+    ax = plot.robot(sl.load_robot(name))
+    figure = ax.figure
+    figure.draw_without_rendering()
+    texts = []
+    for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
+        assert len(axis.get_ticklocs()) >= 1
+        texts += [tick.label1 for tick in axis.get_major_ticks() if tick.label1.get_text()] + [axis.label]
+    boxes = [outline(text) for text in texts]
+    for k, box in enumerate(boxes):
+        assert figure.bbox.contains(*box.get_extents().min)
+        assert figure.bbox.contains(*box.get_extents().max)
+        assert not any(box.intersects_path(other, filled=True) for other in boxes[:k]), (name, texts[k])
+
+
+def outline(text: Text) -> OutlinePath:
+    """The box of a text, turned as it is."""
+    turned = text.get_rotation()
+    middle = text.get_window_extent()
+    text.set_rotation(0.0)
+    size = np.asarray(text.get_window_extent().size)
+    text.set_rotation(turned)
+    corners = 0.5 * size * np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0)])
+    c, s = np.cos(np.radians(turned)), np.sin(np.radians(turned))
+    center = 0.5 * (np.asarray(middle.min) + np.asarray(middle.max))
+    return OutlinePath(center + corners @ np.array([(c, s), (-s, c)]))
+
+
+@pytest.mark.parametrize(
+    ("pattern", "size"), [("3T", (0.0, 0.0, 0.0)), ("2T", (0.3, 1e-9, 0.2)), ("2T", (0.0, 0.0, 0.0))]
+)
+def test_robots_without_width_are_drawn(pattern: Literal["3T", "2T"], size: tuple[float, float, float]) -> None:
+    corners = [(-4.0, 0.0, 3.0), (4.0, 0.0, 3.0), (4.0, 0.0, 0.0), (-4.0, 0.0, 0.0)]
+    frame = np.array(corners if pattern == "2T" else [*corners[:2], (0.0, 4.0, 3.0), (0.0, -4.0, 3.0)])
+    robot = sl.Robot(
+        name="flat",
+        frame_anchors=frame,
+        platform_anchors=np.zeros((4, 3)),
+        cables=sl.Cable(0.01, 1e5),
+        mass=10.0,
+        motion_pattern=pattern,
+        plane_normal=(0.0, 1.0, 0.0) if pattern == "2T" else None,
+        tension_min=1.0,
+        tension_max=1000.0,
+        platform_size=size if any(size) else None,
+    )
+    ax = plot.robot(robot, sl.Pose([0.2, 0.0, 1.5], np.eye(3)))
+    ax.figure.draw_without_rendering()
+    low, high = ax.get_ylim3d()
+    assert high - low >= 0.79  # a tenth of its length, so that it can be seen
+
+
+def test_the_platform_stands_over_its_shadow() -> None:
+    ax = plot.robot(SUSPENDED, sl.Pose.from_euler((2.0, -1.0, 1.7), 0.3, 0.0, 0.0))
+    ground, shadow = (drawn for drawn in ax.collections if isinstance(drawn, Poly3DCollection))
+    corners, dark = (np.asarray(flat._faces)[0] for flat in (ground, shadow))
+    assert np.all(corners[:, 2] == 0.0)
+    assert np.all(dark[:, 2] == 0.0)
+    np.testing.assert_allclose(np.mean(dark[:4, :2], axis=0), (2.0, -1.0), atol=1e-9)
+    edges = np.sort(np.linalg.norm(np.diff(dark[[0, 1, 2, 3, 0], :2], axis=0), axis=1))
+    assert SUSPENDED.platform_size is not None
+    np.testing.assert_allclose(edges[::2], np.sort(SUSPENDED.platform_size[:2]), rtol=1e-9)
+    assert ground.get_zorder() <= shadow.get_zorder() < ax.get_lines()[0].get_zorder()
 
 
 def test_a_robot_that_nothing_holds_says_so() -> None:

@@ -1,6 +1,11 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
+from matplotlib.path import Path
 from matplotlib.text import Annotation
+from matplotlib.transforms import Bbox
 
 import sagline as sl
 from sagline import plot
@@ -25,6 +30,58 @@ def test_polygon_shows_corners_limits_and_methods() -> None:
     np.testing.assert_allclose(shape.origin + place @ shape.basis, plan.chord_tension, atol=1e-8)
 
 
+def test_sides_without_length_have_names_too() -> None:
+    """Where three limits meet in one corner two of them have a side of no length; names must still not meet."""
+    shape = sl.tension_polygon(MIXED, POSE)
+    corner = shape.vertices[0]
+    vertices = np.vstack((corner, corner + 1e-12, corner, shape.vertices[1:]))  # one points where it should not
+    touched = replace(shape, vertices=vertices, sides=(shape.sides[0], shape.sides[0], *shape.sides))
+    check_names(plot.polygon(touched), touched, "three in a corner")
+
+
 def test_nothing_to_draw() -> None:
     with pytest.raises(sl.InvalidValueError, match="0 points with 2 coordinates"):
         plot.polygon(sl.tension_polygon(MIXED, sl.Pose([9.0, 0, 1.5], np.eye(3))))
+
+
+def poses(count: int) -> list[tuple[str, sl.TensionPolygon]]:
+    """Polygons of many shapes: presets with two redundant cables, at random poses; small and long sides included."""
+    random = np.random.default_rng(5)
+    found = []
+    for name in ("article-mixed", "article-suspended", "ipanema-1", "ipanema-2", "copacabana", "cogiro", "caroca"):
+        robot = sl.load_robot(name)
+        assert robot.test_box is not None
+        low, high = robot.test_box.low, robot.test_box.high
+        for _ in range(count):
+            shape = sl.tension_polygon(robot, sl.Pose(random.uniform(low, high), np.eye(3)))
+            if len(shape.vertices) > 2:
+                found.append((name, shape))
+    return found
+
+
+def check_names(ax: Axes, shape: sl.TensionPolygon, where: str) -> None:
+    figure = ax.figure
+    figure.draw_without_rendering()  # type: ignore[union-attr]
+    names = [text for text in ax.texts if isinstance(text, Annotation)]
+    boxes = [super(Annotation, text).get_window_extent() for text in names]
+    corners = ax.transData.transform(shape.vertices)
+    outline = Path(np.vstack((corners, corners[:1])), closed=False)
+    for text, box in zip(names, boxes, strict=True):
+        assert not outline.intersects_bbox(box, filled=False), (where, text.get_text())
+        assert ax.bbox.x0 <= box.x0, (where, text.get_text())
+        assert box.x1 <= ax.bbox.x1, (where, text.get_text())
+    for k, box in enumerate(boxes):
+        assert not any(Bbox.intersection(box, other) for other in boxes[:k]), (where, names[k].get_text())
+
+
+def test_no_name_is_struck_through_or_over_another() -> None:
+    cases = poses(3)
+    assert len(cases) > 15
+    for where, shape in cases:
+        check_names(plot.polygon(shape, {"Centroid": shape.tensions.mean(axis=0)}), shape, where)
+
+
+@pytest.mark.soak
+def test_no_name_of_many_polygons_is_struck_through() -> None:
+    for where, shape in poses(100):
+        check_names(plot.polygon(shape), shape, where)

@@ -85,13 +85,13 @@ def test_the_sentences_say_the_numbers(findings: dict[str, Finding]) -> None:
     cubic, fourth = numbers["a-over-chord"]["cubic_away_share"], numbers["q-over-angle"]["cos4_away_share"]
     sentences = {
         "d-over-tension": [
-            f"{1e3 * stretch['least_unstretchable_m']:.2g}",
+            f"{1e6 * stretch['least_unstretchable_m']:.0f}",  # µm
             f"{1e3 * stretch['last_stretchable_m']:.0f}",
             f"{stretch['share_of_hooke']:.3f}",
         ],
         "stretch-removed": [
             f"{relieved['error_of_36_mm']:.2f}",
-            f"{relieved['error_with_mean_tension_mm']:.2f}",
+            f"{1e3 * relieved['error_with_mean_tension_mm']:.0f}",  # µm
         ],
         "d-model": [f"{ratio['exact_over_fit_min']:.3f}", f"{ratio['exact_over_fit_max']:.3f}"],
         "a-over-chord": [f"{100.0 * cubic:.1f}"],

@@ -20,7 +20,7 @@ def robot(pattern: Any) -> sl.Robot:
     frame, platform = generator.uniform(-5, 5, (8, 3)), generator.uniform(-0.3, 0.3, (8, 3))
     inertia = np.eye(3)
     return sl.Robot("any", frame, platform, sl.Cable(0.05, 5e4), 10.0, inertia, motion_pattern=pattern,
-                    plane_normal=normal)  # fmt: skip
+                    plane_normal=normal, tension_min=1.0)  # fmt: skip
 
 
 def poses(turn: Rotation, shift: np.ndarray) -> sl.Pose:
@@ -70,7 +70,7 @@ def test_a_pose_that_the_pattern_cannot_have_brought_about_is_told() -> None:
 
 def test_a_planar_robot_out_of_its_plane_is_told() -> None:
     flat = sl.Robot("flat", [[-3, 0.5, 3], [3, 0.5, 3], [0, 0.5, 0]], np.zeros((3, 3)), sl.Cable(0.05, 5e4), 10.0,
-                    motion_pattern="2T", plane_normal=[0, 1, 0])  # fmt: skip
+                    motion_pattern="2T", plane_normal=[0, 1, 0], tension_min=1.0)  # fmt: skip
     assert sl.inverse(flat, sl.Pose([0.0, 0.5, 1.5], np.eye(3))).warnings == ()
     (text,) = sl.inverse(flat, sl.Pose([0.0, 2.0, 1.5], np.eye(3))).warnings
     assert text.startswith("the cables leave the plane of the robot by up to 1.5 m")

@@ -59,7 +59,7 @@ def gravity_twice() -> Erratum:
         ("read literally, g pointing down", -weight),
         ("read literally, g pointing up", weight),
     ):
-        numbers.append(Quantity(f"cables lift, {label}", _lifted(force), "N"))
+        numbers.append(Quantity(f"cables lift, {label}", _lifted(force), "N", weight))
     return Erratum(
         2,
         "Gravity counted twice",
@@ -115,9 +115,14 @@ def rank_of_h() -> Erratum:
         (
             Quantity("rows of HᵀH", float(len(square)), ""),
             Quantity("rank of HᵀH", float(np.linalg.matrix_rank(square)), ""),
-            Quantity("its smallest singular value over its largest", float(singular[-1] / singular[0]), ""),
+            Quantity("its smallest singular value over its largest", float(singular[-1] / singular[0]), "", 1.0),
             Quantity("condition of HHᵀ", float(np.linalg.cond(h @ h.T)), ""),
-            Quantity("residual of Hᵀ(HHᵀ)⁻¹", float(np.abs(h @ tension + balance.b).max()), "N"),
+            Quantity(
+                "residual of Hᵀ(HHᵀ)⁻¹",
+                float(np.abs(h @ tension + balance.b).max()),
+                "N",
+                float(np.abs(balance.b).max()),
+            ),
         ),
     )
 

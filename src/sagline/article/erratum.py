@@ -13,11 +13,13 @@ class Quantity(NamedTuple):
         label: What it is.
         value: The number.
         unit: Its unit; "" for none.
+        size: Of what it is a difference, in the unit: tells rounding from a small number. 0 where it is none.
     """
 
     label: str
     value: float
     unit: str
+    size: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

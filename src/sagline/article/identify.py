@@ -18,7 +18,7 @@ from sagline.cables.empirical import Empirical
 from sagline.cables.model import CableState
 from sagline.errors import InvalidValueError
 from sagline.kernels.cable.batch import batch_end
-from sagline.machine import check_memory
+from sagline.memory import check_memory
 
 CONFIDENCE = 0.95
 POINT_BYTES = 400.0  # what each combination of span, rise and tension takes while it is fitted

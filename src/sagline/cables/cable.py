@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sagline.arrays import Array, broadcast_shape, checked, locked
-from sagline.machine import check_memory
+from sagline.memory import check_memory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,7 +26,7 @@ class Cable:
 
         >>> import sagline as sl
         >>> cable = sl.Cable(linear_density=0.067, axial_stiffness=44e3)
-        >>> state = sl.Catenary().from_tension(cable, span=12.0, rise=-4.0, chord_tension=100.0)
+        >>> state = sl.Catenary().from_tension(cable, 12.0, -4.0, chord_tension=100.0)
         >>> print(f"{state.unstrained_length:.4f} m, {1e3 * state.sag:.1f} mm")
         12.6237 m, 131.2 mm
         >>> sl.Cable([0.067, 0.1], 44e3).axial_stiffness
@@ -70,7 +70,9 @@ class Cable:
 
         Examples:
             >>> import sagline as sl
-            >>> cable = sl.Cable.from_material(linear_density=0.067, youngs_modulus=2e9, section_area=22e-6)
+            >>> cable = sl.Cable.from_material(
+            ...     linear_density=0.067, youngs_modulus=2e9, section_area=22e-6
+            ... )
             >>> print(f"{cable.axial_stiffness:.0f} N")
             44000 N
         """

@@ -17,7 +17,7 @@ from sagline.errors import InvalidValueError
 from sagline.indices import length_of, part_of
 from sagline.kernels.cable import batch, shape
 from sagline.kernels.cable.terms import Terms
-from sagline.machine import check_memory
+from sagline.memory import check_memory
 
 _ARRAYS = (
     "span",
@@ -96,10 +96,12 @@ class CableModel:
             One cable, and the same at three tensions:
 
             >>> import sagline as sl
-            >>> cable, model = sl.Cable(linear_density=0.067, axial_stiffness=44e3), sl.Catenary()
-            >>> print(f"{model.from_tension(cable, span=12.0, rise=-4.0, chord_tension=100.0).unstrained_length:.4f} m")
+            >>> model = sl.Catenary()
+            >>> cable = sl.Cable(linear_density=0.067, axial_stiffness=44e3)
+            >>> state = model.from_tension(cable, span=12.0, rise=-4.0, chord_tension=100.0)
+            >>> print(f"{state.unstrained_length:.4f} m")
             12.6237 m
-            >>> state = model.from_tension(cable, span=12.0, rise=-4.0, chord_tension=[50.0, 100.0, 200.0])
+            >>> state = model.from_tension(cable, 12.0, -4.0, [50.0, 100.0, 200.0])
             >>> print((1e3 * state.sag).round(1), "mm")
             [262.7 131.2  65.4] mm
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from sagline.arrays import Array, Codes, broadcast_shape, checked, kernel_input, locked, number
 from sagline.cables.cable import Cable
 from sagline.errors import CableGeometryError, InvalidValueError
-from sagline.machine import check_memory
+from sagline.memory import check_memory
 
 
 class Problem(NamedTuple):

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
 import typer
 
 from sagline.cables.cable import Cable
+from sagline.cables.elastic import Elastic
 from sagline.cli.choices import Format
-from sagline.cli.terminal import note
+from sagline.cli.entries import FORWARD, INVERSE
+from sagline.cli.terminal import note, working
 from sagline.errors import FileError, InvalidValueError
 from sagline.files.imported import Imported
 from sagline.files.quantity import in_si
 from sagline.files.robot_file import dump_robot, load_robot
 from sagline.files.whole import write_text
+from sagline.kinematics.confirm import confirm
+from sagline.kinematics.inverse import inverse
 from sagline.robot.pose import Pose
 
 if TYPE_CHECKING:
@@ -38,7 +44,11 @@ def convert(
     if out is not None and Path(source).exists() and out.resolve() == Path(source).resolve():
         raise FileError(out, "is the file to convert", "Name another file with --out.")
     imported = _read(source, _material(density, stiffness), cable_set)
-    text = dump_robot(imported.robot) if form is Format.ROBOT else _mjcf(imported.robot, at)
+    if form is Format.ROBOT:
+        text = dump_robot(imported.robot)
+    else:
+        text, straightness = _mjcf(imported.robot, at)
+        imported = replace(imported, lost=(*imported.lost, straightness))
     if out is None:
         typer.echo(text, nl=False)
     else:
@@ -73,13 +83,21 @@ def _material(density: str | None, stiffness: str | None) -> Cable | None:
     return Cable(*values)
 
 
-def _mjcf(robot: Robot, at: tuple[float, float, float] | None) -> str:
+def _mjcf(robot: Robot, at: tuple[float, float, float] | None) -> tuple[str, str]:
+    """The model, and what it costs this robot that its tendons neither sag nor weigh."""
     from sagline.files.mjcf import dump_mjcf
 
     if at is None and robot.test_box is None:
         raise InvalidValueError("--at", "missing", "X Y Z in m", "Say where the platform starts.")
     position = at if at is not None else 0.5 * (robot.test_box.low + robot.test_box.high)  # type: ignore[union-attr]
-    return dump_mjcf(robot, Pose.from_euler(position, 0.0, 0.0, 0.0))
+    pose = Pose.from_euler(position, 0.0, 0.0, 0.0)
+    with working(f"{robot.name}: planning and confirming one pose", INVERSE, FORWARD):
+        text = dump_mjcf(robot, pose)
+        proof = confirm(inverse(robot, pose, model=Elastic()))
+    away = float(np.linalg.norm(proof.position_error))
+    distance = f"{away:.2g} m" if away >= 0.1 else f"{max(1e3 * away, 0.001):.2g} mm"
+    held = f"hold the platform {distance} away" if proof.held else "do not hold the platform near it"
+    return text, f"Sag and weight of the cables: sagging cables of these lengths {held}."
 
 
 def _report(imported: Imported, out: Path | None) -> None:

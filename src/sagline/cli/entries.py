@@ -76,16 +76,15 @@ def _verdicts() -> None:
 
     import sagline as sl
     from sagline.kernels.codes import POSE_INFEASIBLE
-    from sagline.kinematics.inverse_rows import Found, explained
+    from sagline.kinematics.inverse_rows import Found, decide_rows
     from sagline.statics.tables import pose_rows
     from sagline.tension.options import kernel_options
 
     robot = sl.load_robot(ROBOT)
     found = Found.empty(1, robot.cable_count, robot.degrees_of_freedom)
-    found.needed[:] = 0.0
     found = found._replace(pose_status=np.full(1, POSE_INFEASIBLE, dtype=np.int8))
     options = kernel_options(robot, sl.Catenary(), sl.MinimumNorm())
-    explained(robot, options, pose_rows(sl.Pose(PLACE, LEVEL)), found)
+    decide_rows(robot, options, pose_rows(sl.Pose(PLACE, LEVEL)), np.zeros((1, 6)), found)
 
 
 def _forward(straight: bool = False) -> None:
@@ -149,7 +148,7 @@ ENTRIES = {
     for entry in (
         Entry(INVERSE, "inverse.poses.inverse_poses", 39, 14.0, _inverse),
         Entry(SHARING, "inverse.poses.inverse_poses", 39, 47.0, _other_sharing, version=2),
-        Entry(VERDICTS, "inverse.explain.explain_poses", 45, 16.0, _verdicts),
+        Entry(VERDICTS, "inverse.verdicts.decide_poses", 45, 16.0, _verdicts),
         Entry(FORWARD, "forward.forward.forward_poses", 71, 14.0, _forward),
         Entry(FIT, "forward.fit.fit_poses", 19, 5.0, lambda: _forward(straight=True)),
         Entry(MARGINS, "inverse.queries.margins_of_poses", 33, 5.0, _margins),

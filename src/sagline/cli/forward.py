@@ -13,8 +13,9 @@ from sagline.cli.entries import FIT, FORWARD
 from sagline.cli.tables import plain_table
 from sagline.cli.terminal import OUTSIDE, note, show, show_json, working
 from sagline.files.lengths_file import Lengths, load_lengths
+from sagline.files.names import file_stem
 from sagline.files.robot_file import load_robot
-from sagline.files.whole import check_folder, made_folder, written_whole
+from sagline.files.whole import check_files, made_folder, written_whole
 from sagline.kinematics.forward import forward as solve
 from sagline.kinematics.forward_solution import ForwardSolution
 from sagline.kinematics.forward_status import ForwardStatus
@@ -35,14 +36,16 @@ def forward(name: str, file: Path, model: Model, folder: Path, *, as_json: bool)
         SaglineError: If an input is wrong or the folder cannot be written.
     """
     robot = load_robot(name)
-    lengths = load_lengths(file, robot.cable_count)
-    check_folder(folder)
+    size = float(np.linalg.norm(np.ptp(robot.frame_anchors, axis=0)))
+    lengths = load_lengths(file, robot.cable_count, size)
+    target = folder / f"{file_stem(robot.name, 'poses')}.csv"
+    check_files(folder, [target.name])
     entry = FIT if model is Model.STRAIGHT else FORWARD
     with working(f"{robot.name}: finding {len(lengths.unstrained_length):,} poses", entry) as line:
         first = solve(robot, lengths.unstrained_length[0], model=model.build())
         start = first.pose if np.isfinite(first.pose.position).all() else None
         found = solve(robot, lengths.unstrained_length, start=start, model=model.build(), progress=line.progress)
-    target = made_folder(folder) / f"{robot.name}-poses.csv"
+    made_folder(folder)
     rows = _rows(lengths, found)
     with written_whole(target) as partial, partial.open("w", newline="", encoding="utf-8") as stream:
         csv.writer(stream).writerows(rows)

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from sagline.cli.entries import FORWARD, INVERSE
 from sagline.cli.terminal import counting, note, show_json
-from sagline.files.whole import check_folder
-from sagline.report.article import write_article
+from sagline.files.whole import check_files
+from sagline.report.article import NAMES, write_article
 
 
 def write_report(folder: Path, parts: Sequence[str], *, as_json: bool) -> None:
@@ -18,7 +18,7 @@ def write_report(folder: Path, parts: Sequence[str], *, as_json: bool) -> None:
     Raises:
         SaglineError: If a part is unknown or the folder cannot be written; then nothing has been.
     """
-    check_folder(folder)
+    check_files(folder, NAMES)
     needed = () if parts else (INVERSE, FORWARD)  # single parts need neither, or one
     with counting("redoing the article", *needed) as progress:
         report = write_article(folder, parts, progress)

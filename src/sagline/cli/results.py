@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+FORMS = ("png", "svg")  # of a figure
 MOST_GAPS = 5  # told in full
 
 
@@ -27,14 +28,19 @@ def write_plans(runs: Sequence[Run], folder: Path) -> list[Path]:
     return files
 
 
+def figure_files(names: Iterable[str]) -> list[str]:
+    """Names of the files of figures of these names."""
+    return [f"{name}.{suffix}" for name in names for suffix in FORMS]
+
+
 def write_figures(figures: Mapping[str, Figure | Axes], folder: Path) -> list[Path]:
     """Save each figure as PNG and SVG under its name; returns the files."""
     from sagline.plot import save
 
     files = []
     for name, figure in figures.items():
-        for suffix in ("png", "svg"):
-            files.append(folder / f"{name}.{suffix}")
+        for file in figure_files([name]):
+            files.append(folder / file)
             save(figure, files[-1])
     return files
 

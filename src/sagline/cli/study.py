@@ -11,6 +11,7 @@ from sagline.arrays import Array
 from sagline.blocks import Progress
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
+from sagline.files.names import file_stem
 from sagline.kinematics.confirm import Confirmation, confirm
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Gap, Plan
@@ -46,9 +47,8 @@ class Run(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Robot and model, as files are named: letters, digits, dots and hyphens."""
-        words = f"{self.plan.state.one_robot.name} {type(self.plan.state.cables.model).__name__.lower()}"
-        return "-".join("".join(c if c.isalnum() or c in "._-" else " " for c in words).split()).lstrip(".-")
+        """Robot and model, as files are named."""
+        return run_name(self.plan.state.one_robot, self.plan.state.cables.model)
 
     @property
     def lost(self) -> int:
@@ -72,6 +72,11 @@ class Summary(NamedTuple):
     adjusting_length_max_mm: float
     feasible_share_percent: float
     inverse_us_per_pose: float
+
+
+def run_name(robot: Robot, model: CableModel) -> str:
+    """How the files of a run are named, without a suffix."""
+    return file_stem(robot.name, type(model).__name__.lower())
 
 
 def run_along(robot: Robot, path: Path, model: CableModel, tension: TensionMethod, line: Stages) -> Run:

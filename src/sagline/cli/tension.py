@@ -10,12 +10,14 @@ from rich.table import Table
 
 from sagline.cli.choices import Model, Variable
 from sagline.cli.entries import INVERSE, MARGINS, POLYGON, SHARING
-from sagline.cli.results import write_figures
+from sagline.cli.results import figure_files, write_figures
 from sagline.cli.tables import plain_table
 from sagline.cli.terminal import OUTSIDE, note, show, show_json, working
 from sagline.errors import InvalidValueError
+from sagline.files.names import file_stem
+from sagline.files.pose_text import parse_pose
 from sagline.files.robot_file import load_robot
-from sagline.files.whole import check_folder, made_folder
+from sagline.files.whole import check_files, made_folder
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.polygon import tension_polygon
 from sagline.kinematics.status import PoseStatus
@@ -44,8 +46,9 @@ def tension(
     robot = load_robot(name)
     place = _pose(robot, pose)
     drawn = figures and robot.cable_count == robot.degrees_of_freedom + 2
+    name_of_figure = file_stem(robot.name, "tension")
     if drawn:
-        check_folder(folder)
+        check_files(folder, figure_files([name_of_figure]))
     with working(f"{robot.name}: sharing the load", INVERSE, SHARING, MARGINS, *[POLYGON] * drawn):
         plans = {title: _plan(robot, place, model, method(variable.value)) for title, method in ALONE.items()}
     least = plans[MinimumNorm.__name__]
@@ -60,7 +63,7 @@ def tension(
 
         shape = tension_polygon(robot, place, model.build(), variable=variable.value)
         points = {title: plan.chord_tension for title, plan in plans.items() if plan is not None}
-        files = write_figures({f"{robot.name}-tension": plot.polygon(shape, points)}, folder)
+        files = write_figures({name_of_figure: plot.polygon(shape, points)}, folder)
     margin = float(capacity_margin(least.state))
     if as_json:
         show_json(
@@ -87,14 +90,7 @@ def _pose(robot: Robot, text: str | None) -> Pose:
         if robot.test_box is None:
             raise InvalidValueError("--pose", "missing", "X,Y,Z or X,Y,Z,A,B,C", "This robot names no box of poses.")
         return Pose((robot.test_box.low + robot.test_box.high) / 2, np.eye(3))
-    try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
-        numbers = []
-    if len(numbers) not in (3, 6):
-        step = "Give meters, and degrees about z, y and x: --pose 1,0,1.5 or --pose 1,0,1.5,10,0,0."
-        raise InvalidValueError("--pose", repr(text), "three or six numbers", step)
-    return Pose.from_euler(numbers[:3], *np.radians(numbers[3:] or (0.0, 0.0, 0.0)))
+    return parse_pose(text)
 
 
 def _reason(robot: Robot, pose: Pose, plan: Plan) -> str:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
@@ -16,11 +17,13 @@ from rich.text import Text
 
 from sagline.errors import SaglineError
 from sagline.files.json_text import json_text
+from sagline.files.whole import finished_files
 
 if TYPE_CHECKING:
     from sagline.cli.line import Line
 
 OUTSIDE, BAD_INPUT, INTERRUPTED = 1, 2, 130
+MOST_NAMES = 6  # of files, told when something failed after them
 
 _out = Console(highlight=False, markup=False)
 _err = Console(stderr=True, highlight=False, markup=False)
@@ -33,15 +36,25 @@ def reported() -> Iterator[None]:
     Raises:
         typer.Exit: With BAD_INPUT for an error that sagline raised on purpose, INTERRUPTED for Ctrl-C.
     """
-    try:
-        with _interrupts_heard():
-            yield
-    except SaglineError as error:
-        note("Error: ", str(error), style="bold red")
-        raise typer.Exit(BAD_INPUT) from None
-    except KeyboardInterrupt:
-        note("", "Interrupted. What has been written is whole.")
-        raise typer.Exit(INTERRUPTED) from None
+    with finished_files() as finished:
+        try:
+            with _interrupts_heard():
+                yield
+        except SaglineError as error:
+            note("Error: ", str(error), style="bold red")
+            _tell_finished(finished)
+            raise typer.Exit(BAD_INPUT) from None
+        except KeyboardInterrupt:
+            note("", "Interrupted. What has been written is whole.")
+            raise typer.Exit(INTERRUPTED) from None
+
+
+def _tell_finished(files: Sequence[Path]) -> None:
+    """What was written before something failed, where anything was."""
+    if files:
+        names = ", ".join(file.name for file in files[:MOST_NAMES])
+        more = f" and {len(files) - MOST_NAMES} more" if len(files) > MOST_NAMES else ""
+        note("", f"Written before, and whole: {names}{more} in {files[0].parent}")
 
 
 @contextmanager

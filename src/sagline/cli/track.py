@@ -7,17 +7,19 @@ from typing import TYPE_CHECKING
 
 from sagline.cli.choices import Model, Tension, Variable
 from sagline.cli.entries import FORWARD, needed_for
-from sagline.cli.results import tell, write_figures, write_plans
-from sagline.cli.study import Run, run_along
+from sagline.cli.results import figure_files, tell, write_figures, write_plans
+from sagline.cli.study import Run, run_along, run_name
 from sagline.cli.terminal import working
 from sagline.files.path_file import load_path
 from sagline.files.robot_file import load_robot
-from sagline.files.whole import check_folder
+from sagline.files.whole import check_files
 from sagline.motion.planar import article_path
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+FIGURES = ("path", "velocity", "cables", "error")
 
 
 def track(
@@ -38,25 +40,24 @@ def track(
     """
     machine = load_robot(robot)
     way = article_path() if path is None else load_path(path)
-    check_folder(folder)
+    cable = model.build()
+    name = run_name(machine, cable)
+    drawn = [f"{name}-{figure}" for figure in FIGURES] if figures else []
+    check_files(folder, [f"{name}.nc", *figure_files(drawn)])
     shared = tension.build(variable)
     with working(f"{machine.name}: planning and confirming {len(way):,} poses", *needed_for(shared), FORWARD) as line:
-        run = run_along(machine, way, model.build(), shared, line)
+        run = run_along(machine, way, cable, shared, line)
     with working("writing"):
         files = write_plans([run], folder)
         if figures:
-            files += write_figures(_figures(run), folder)
+            files += write_figures(dict(zip(drawn, _figures(run), strict=True)), folder)
     return tell([run], files, folder, as_json=as_json)
 
 
-def _figures(run: Run) -> dict[str, Figure | Axes]:
+def _figures(run: Run) -> tuple[Figure | Axes, ...]:
+    """In the order of FIGURES."""
     from sagline import plot
 
     way = run.plan.path
     assert way is not None
-    return {
-        f"{run.name}-path": plot.path(way),
-        f"{run.name}-velocity": plot.velocity(way),
-        f"{run.name}-cables": plot.overview(run.plan),
-        f"{run.name}-error": plot.error(run.confirmation),
-    }
+    return plot.path(way), plot.velocity(way), plot.overview(run.plan), plot.error(run.confirmation)

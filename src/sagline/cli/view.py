@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import warnings
 import webbrowser
 from contextlib import nullcontext
 from pathlib import Path
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from sagline.cli.entries import FORWARD
 from sagline.cli.terminal import note, show, working
-from sagline.errors import FileError
+from sagline.errors import FileError, SaglineWarning
 from sagline.files.plan_file import load_plan
 from sagline.files.robot_file import load_robot
 from sagline.robot.robot import Robot
@@ -66,7 +67,11 @@ def serve(robot: Robot, run: Path | None, host: str, port: int, *, browser: bool
 def _run(robot: Robot, file: Path) -> Run:
     from sagline.viewer.run import Run
 
-    plan = load_plan(file)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always", SaglineWarning)
+        plan = load_plan(file)
+    for warning in told:
+        note("Note: ", str(warning.message), style="bold")
     made_for = plan.state.one_robot.name
     if made_for != robot.name:
         raise FileError(

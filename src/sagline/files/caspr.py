@@ -14,6 +14,7 @@ from sagline.arrays import Array
 from sagline.cables.cable import Cable
 from sagline.errors import FileError, InvalidValueError
 from sagline.files.imported import STEEL_ROPE_DENSITY, STEEL_ROPE_STIFFNESS, Imported, imported
+from sagline.files.text import exists
 from sagline.files.xml_text import number, numbers, only_child, read_xml
 from sagline.robot.pattern import MotionPattern
 from sagline.robot.robot import Robot
@@ -63,7 +64,7 @@ def load_caspr(source: str | os.PathLike[str], cables: Cable | None = None, cabl
         lost = (*platform.lost, *lost_sets, *lost_cables)
         robot = _robot(bodies.stem.removesuffix("_bodies"), platform, legs, cables)
     except InvalidValueError as error:
-        raise FileError(at, f"{error.item} is {error.value}; allowed: {error.allowed}", error.next_step) from None
+        raise FileError.of(at, error) from None
     return imported(robot, lost)
 
 
@@ -85,17 +86,17 @@ class _Leg(NamedTuple):
 
 def _files(source: Path) -> tuple[Path, Path]:
     """The files of bodies and of cables; a file that is named wins over others of its kind in the folder."""
-    if not source.exists():
+    if not exists(source):
         raise FileError(source, "does not exist", "Check its name.")
     folder = source if source.is_dir() else source.parent
     folder = folder.parent if folder.name == "cables" else folder
     beside = sorted((*folder.glob("*.xml"), *folder.glob("cables/*.xml")))
-    if source.is_file() and _kind(read_xml(source)) is None:
+    if not source.is_dir() and _kind(read_xml(source)) is None:
         raise FileError(
             source, "holds neither <link_rigid> nor <cables>", "Check that this is the CASPR file you mean."
         )
     found: dict[str, list[Path]] = {"bodies": [], "cables": []}
-    for file in [source, *beside] if source.is_file() else beside:
+    for file in beside if source.is_dir() else [source, *beside]:
         kind = _kind(read_xml(file))
         if kind is not None and not (found[kind] and source in found[kind]):
             found[kind].append(file)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import math
-import os
+import re
 from pathlib import PurePath
 from typing import Any
 
 import numpy as np
 
-from sagline.files.whole import write_text
+_OTHERS = re.compile(r"[^\n -~]+")  # beside ASCII that prints; json escapes what of it is below the space
 
 
 def plain(what: Any) -> Any:
@@ -38,7 +38,7 @@ def plain(what: Any) -> Any:
 
 
 def json_text(what: Any) -> str:
-    """One JSON document, for `plain` data and all that `plain` makes so.
+    """One JSON document, for `plain` data and all that `plain` makes so; safe for a terminal, whatever texts hold.
 
     Args:
         what: As for `plain`.
@@ -49,18 +49,10 @@ def json_text(what: Any) -> str:
     Raises:
         TypeError: If something in it has no form in JSON.
     """
-    return json.dumps(plain(what), indent=2, ensure_ascii=False, allow_nan=False)
+    text = json.dumps(plain(what), indent=2, ensure_ascii=False, allow_nan=False)
+    return _OTHERS.sub(lambda found: _seen(found[0]), text)
 
 
-def save_json(what: Any, file: os.PathLike[str] | str) -> None:
-    """Write one JSON document, whole or not at all.
-
-    Args:
-        what: As for `plain`.
-        file: The file; one that exists is replaced.
-
-    Raises:
-        FileError: If the file cannot be written.
-        TypeError: If something in it has no form in JSON.
-    """
-    write_text(file, json_text(what) + "\n")
+def _seen(text: str) -> str:
+    """A text in which what moves a cursor, turns the text around or is half a character is written as an escape."""
+    return "".join(c if c.isprintable() else json.dumps(c)[1:-1] for c in text)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import NamedTuple
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Comment, Element, SubElement
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.linalg import eigh
 
 from sagline.arguments import instance
 from sagline.arrays import Array, checked
@@ -20,52 +22,106 @@ from sagline.robot.robot import Robot
 
 _NOTE = (
     " Written by sagline. Every cable is a straight spring that pulls and never pushes, of the given unstrained length "
-    "and axial stiffness. Its sag, its weight and the tension limits are not in this model. "
+    "and axial stiffness. Its sag, its weight and the tension limits are not in this model. The damping is none of the "
+    "robot's: it lets the platform come to rest, and acts on slack cables too. "
 )
-_RADIUS = 0.01  # of what is only drawn [m]
+_RADIUS = 0.002  # of ends of cables, which are only drawn, to the size of the robot
+_THINNEST = 0.02  # of a box that is only drawn, to its longest edge
+_STEPS = 20.0  # in a period of the fastest motion
+_LONGEST_STEP = 0.002  # MuJoCo's own [s]
+_STRETCH_DAMPING = 4.0  # half the bound of the frequencies, about the fastest there is, is damped critically
+_SWING_DAMPING = 0.4  # a fifth of critical
+_ROUNDING = 1e-12
+_SHORTEST = 1e-6  # of a cable [m]
+
+
+class _Dynamics(NamedTuple):
+    """How the model is stepped and damped.
+
+    Attributes:
+        step: Time step [s].
+        stretch_time: Damping of a cable over its stiffness [s].
+        drag: Damping of each joint [N s/m, N m s/rad]; zero where the cables resist every motion.
+    """
+
+    step: float
+    stretch_time: float
+    drag: float
 
 
 def dump_mjcf(robot: Robot, pose: Pose, unstrained_length: ArrayLike | None = None) -> str:
     """The text of a MuJoCo model of the robot, with the platform at a pose.
 
     A cable of unstrained length L is a spatial tendon of stiffness EA/L that is slack below L: the model `Elastic`.
-    Nothing damps the platform; give its joints damping to let it settle.
+    The time step is short enough for the fastest motion that the platform can make on its cables, wherever it is.
+    Damping lets it come to rest: that of a cable is proportional to its stiffness; where motions are left that no cable
+    resists, the platform's joints are damped as well.
 
     Args:
         robot: The robot.
         pose: A single pose, where the platform starts.
-        unstrained_length: L [m], > 0, shape (m,). None takes the lengths with which straight elastic cables hold the
-            platform at rest at this pose.
+        unstrained_length: L [m], >= 1e-6, shape (m,). None takes the lengths with which straight elastic cables hold
+            the platform at rest at this pose.
 
     Returns:
         The XML text.
 
     Raises:
-        InvalidValueError: If the pose is a batch, a length is not positive, or no tensions within the robot's limits
+        InvalidValueError: If the pose is a batch, a length is below 1e-6 m, or no tensions within the robot's limits
             hold the platform there.
     """
     instance(robot, Robot, "robot")
     if instance(pose, Pose, "pose").shape:
         raise InvalidValueError("pose", f"a batch of {len(pose)}", "a single pose", "Write one model a pose.")
     lengths = _held(robot, pose) if unstrained_length is None else _checked(robot, unstrained_length)
+    stiffness = robot.cables.axial_stiffness / lengths
+    dynamics = _dynamics(robot, pose, stiffness)
     root = Element("mujoco", model=robot.name)
     root.append(Comment(_NOTE))
     SubElement(root, "compiler", angle="radian", inertiafromgeom="false")
-    SubElement(root, "option", gravity=_text((0.0, 0.0, -robot.gravity)))
+    option = SubElement(root, "option", gravity=_text((0.0, 0.0, -robot.gravity)))
+    option.set("timestep", f"{dynamics.step:.2g}")
+    option.set("integrator", "implicitfast")  # which takes damping implicitly: it never limits the step
+    radius = _RADIUS * _add_view(root, robot)
     world = SubElement(root, "worldbody")
     for i, point in enumerate(robot.frame_anchors):
-        SubElement(world, "site", name=f"frame_{i}", pos=_text(point), size=_text((_RADIUS,)))
-    _add_platform(world, robot, pose)
+        SubElement(world, "site", name=f"frame_{i}", pos=_text(point), size=_text((radius,)))
+    _add_platform(world, robot, pose, radius, dynamics.drag)
     tendons = SubElement(root, "tendon")
     for i, length in enumerate(lengths):
-        stiffness = robot.cables.axial_stiffness[i] / length
-        tendon = SubElement(tendons, "spatial", name=f"cable_{i}", stiffness=_text((stiffness,)))
+        tendon = SubElement(tendons, "spatial", name=f"cable_{i}", stiffness=_text((stiffness[i],)))
         tendon.set("springlength", _text((0.0, length)))
-        tendon.set("width", _text((0.3 * _RADIUS,)))
+        tendon.set("damping", _text((dynamics.stretch_time * stiffness[i],)))
+        tendon.set("width", _text((0.3 * radius,)))
         for end in ("frame", "platform"):
             SubElement(tendon, "site", site=f"{end}_{i}")
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def _dynamics(robot: Robot, pose: Pose, stiffness: Array) -> _Dynamics:
+    """Time step and damping from the robot's own frequencies.
+
+    The cables' springs are the same at every pose, so none of its motions is faster than if each cable pulled where the
+    platform gives way most easily: the square of its frequency is at most the sum over the cables of stiffness times
+    largest mobility of the end. The many steps in a period leave room for what forces that turn with the platform add.
+    """
+    levers = (robot.platform_anchors - robot.center_of_mass) @ pose.matrix.T
+    along, about = robot.freedom[:, :3], robot.freedom[:, 3:]
+    moved = along + np.cross(about, levers[:, None])  # of cable i's end by free motion j, (m, n, 3)
+    inertia = pose.matrix @ robot.inertia @ pose.matrix.T
+    masses = robot.mass * along @ along.T + about @ inertia @ about.T
+    mobility = np.swapaxes(moved, 1, 2) @ np.linalg.solve(masses, moved)
+    fastest = float(np.sqrt(stiffness @ np.linalg.eigvalsh(mobility)[:, -1]))
+    step = min(_LONGEST_STEP, 2.0 * np.pi / (_STEPS * fastest))
+    cables = pose.transform(robot.platform_anchors) - robot.frame_anchors
+    distance = np.linalg.norm(cables, axis=1)
+    directions = cables / np.where(distance > 0.0, distance, 1.0)[:, None]
+    stretch = np.einsum("ik,ijk->ij", directions, moved)
+    slowest = eigh((stretch.T * stiffness) @ stretch, masses, eigvals_only=True)[0]
+    swing = robot.gravity / max(distance.max(), _SHORTEST)  # of a pendulum as long as the longest cable, squared
+    drag = _SWING_DAMPING * robot.mass * np.sqrt(swing) if slowest < swing else 0.0
+    return _Dynamics(step, _STRETCH_DAMPING / fastest, float(drag))
 
 
 def _held(robot: Robot, pose: Pose) -> Array:
@@ -81,7 +137,7 @@ def _held(robot: Robot, pose: Pose) -> Array:
 
 
 def _checked(robot: Robot, lengths: ArrayLike) -> Array:
-    array = checked(lengths, "unstrained_length", "m", above=0.0)
+    array = checked(lengths, "unstrained_length", "m", low=_SHORTEST)
     if array.shape != (robot.cable_count,):
         raise InvalidValueError(
             "unstrained_length", f"of shape {array.shape}", f"shape ({robot.cable_count},)", "Give one length a cable."
@@ -89,30 +145,56 @@ def _checked(robot: Robot, lengths: ArrayLike) -> Array:
     return array
 
 
-def _add_platform(world: Element, robot: Robot, pose: Pose) -> None:
+def _add_view(root: Element, robot: Robot) -> float:
+    """What MuJoCo's camera shall see: the frame. Returns the size of the robot [m]."""
+    low, high = robot.frame_anchors.min(axis=0), robot.frame_anchors.max(axis=0)
+    size = float(np.linalg.norm(high - low)) + float(np.linalg.norm(np.ptp(robot.platform_anchors, axis=0)))
+    SubElement(root, "statistic", center=_text(0.5 * (low + high)), extent=_text((size,)))
+    return size
+
+
+def _add_platform(world: Element, robot: Robot, pose: Pose, radius: float, drag: float) -> None:
     x, y, z, w = pose.quaternion
     body = SubElement(world, "body", name="platform", pos=_text(pose.position), quat=_text((w, x, y, z)))
-    _add_joints(body, robot, pose)
-    # MuJoCo wants an inertia even of a platform that cannot turn, where it has no effect
-    inertia = robot.inertia if robot.inertia.any() else robot.mass * np.eye(3)
+    _add_joints(body, robot, pose, drag)
+    inertia = _inertia(robot, pose)
     moments = [inertia[i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
     inertial = SubElement(body, "inertial", pos=_text(robot.center_of_mass), mass=_text((robot.mass,)))
     inertial.set("fullinertia", _text(moments))
-    size = (_RADIUS,) * 3 if robot.platform_size is None else 0.5 * robot.platform_size
-    SubElement(body, "geom", type="box", size=_text(size), contype="0", conaffinity="0")
+    low, high = robot.platform_anchors.min(axis=0), robot.platform_anchors.max(axis=0)
+    edges = high - low if robot.platform_size is None else robot.platform_size
+    half = np.maximum(0.5 * edges, max(0.5 * _THINNEST * float(edges.max()), radius))
+    box = SubElement(body, "geom", type="box", pos=_text(0.5 * (low + high)), size=_text(half))
+    for key in ("contype", "conaffinity"):
+        box.set(key, "0")
     for i, point in enumerate(robot.platform_anchors):
-        SubElement(body, "site", name=f"platform_{i}", pos=_text(point), size=_text((_RADIUS,)))
+        SubElement(body, "site", name=f"platform_{i}", pos=_text(point), size=_text((radius,)))
 
 
-def _add_joints(body: Element, robot: Robot, pose: Pose) -> None:
+def _inertia(robot: Robot, pose: Pose) -> Array:
+    """The robot's inertia; where MuJoCo would not take it, one of the same effect on the free motions."""
+    least, middle, most = np.linalg.eigvalsh(robot.inertia)
+    missing = most - (least + middle) + _ROUNDING * most  # of two moments to reach the third, as those of a body do
+    if least > 0.0 and missing <= 0.0:
+        return robot.inertia
+    if robot.motion_pattern == "3R3T":  # a flat plate but for rounding; or what no body has, and MuJoCo says so
+        return robot.inertia + missing * np.eye(3) if missing < 2.0 * _ROUNDING * most else robot.inertia
+    axes = robot.freedom[:, 3:] @ pose.matrix  # the normal of a plane in the platform's axes, if it turns at all
+    moment = np.einsum("ij,jk,ik->", axes, robot.inertia, axes)
+    return np.asarray((moment or robot.mass) * np.eye(3))
+
+
+def _add_joints(body: Element, robot: Robot, pose: Pose, drag: float) -> None:
     """A free joint, or one slide or hinge for each free motion; their axes are in the body's own frame."""
     if robot.motion_pattern == "3R3T":
-        SubElement(body, "freejoint", name="pose")
-        return
-    to_world = pose.rotation.as_matrix()
-    for k, row in enumerate(robot.freedom):
-        kind, axis = ("slide", row[:3]) if row[:3].any() else ("hinge", row[3:])
-        SubElement(body, "joint", name=f"freedom_{k}", type=kind, axis=_text(axis @ to_world))
+        joints = [SubElement(body, "joint", name="pose", type="free")]
+    else:
+        joints = []
+        for k, row in enumerate(robot.freedom):
+            kind, axis = ("slide", row[:3]) if row[:3].any() else ("hinge", row[3:])
+            joints.append(SubElement(body, "joint", name=f"freedom_{k}", type=kind, axis=_text(axis @ pose.matrix)))
+    for joint in joints if drag > 0.0 else ():
+        joint.set("damping", _text((drag,)))
 
 
 def _text(values: Iterable[float]) -> str:

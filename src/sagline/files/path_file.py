@@ -14,7 +14,9 @@ from sagline.errors import FileError, InvalidValueError
 from sagline.files.path_table import QUATERNION_TOLERANCE, path_from_table
 from sagline.files.quantity import in_si
 from sagline.files.schema import Entry, validated
-from sagline.files.text import parse_mapping, read_text
+from sagline.files.table import TABLE_LIMIT
+from sagline.files.text import read_text
+from sagline.files.yaml_text import YAML_LIMIT, parse_mapping
 from sagline.motion.path import Path
 from sagline.motion.rest_to_rest import quintic_path, septic_path
 from sagline.robot.pose import Pose
@@ -61,19 +63,20 @@ def load_path(file: str | os.PathLike[str]) -> Path:
         FileError: If the file cannot be read, or what it says is no path; the message names the line or the key.
     """
     path = file_path(file)
-    readers = {".yaml": _path_from_yaml, ".yml": _path_from_yaml, ".csv": path_from_table}
-    reader = readers.get(path.suffix.lower())
-    if reader is None:
+    yaml, table = (_path_from_yaml, YAML_LIMIT), (path_from_table, TABLE_LIMIT)
+    readers = {".yaml": yaml, ".yml": yaml, ".csv": table}
+    if path.suffix.lower() not in readers:
         raise FileError(
             path,
             f"the suffix is {path.suffix or 'missing'}; allowed: {', '.join(readers)}",
             "Give waypoints as .yaml, or time and pose as .csv.",
         )
-    text = read_text(path)
+    reader, limit = readers[path.suffix.lower()]
+    text = read_text(path, limit)
     try:
         return reader(path, text)
     except InvalidValueError as error:
-        raise FileError(path, f"{error.item} is {error.value}; allowed: {error.allowed}", error.next_step) from None
+        raise FileError.of(path, error) from None
 
 
 class _Euler(Entry):
@@ -104,7 +107,7 @@ def _path_from_yaml(path: FilePath, text: str) -> Path:
     timing: dict[str, Any] = {
         name: in_si(getattr(entry, name), unit, name)
         for name, unit in TIMING_UNITS.items()
-        if getattr(entry, name) is not None
+        if name in entry.model_fields_set
     }
     return PROFILES[entry.profile]([_pose(w, f"waypoints[{k}]") for k, w in enumerate(entry.waypoints)], **timing)
 

@@ -16,6 +16,7 @@ PLACE = ("time", "x", "y", "z")
 EULER = ("alpha", "beta", "gamma")
 QUATERNION = ("qx", "qy", "qz", "qw")
 UNITS = dict(zip(PLACE + EULER + QUATERNION, ("s", "m", "m", "m", "rad", "rad", "rad", "", "", "", ""), strict=True))
+_LEAST_STEP = 1e-12  # s; over less, differences of positions tell no velocity
 QUATERNION_TOLERANCE = 1e-3  # of a length 1, printed with three decimals; more is a mistake
 
 
@@ -36,7 +37,7 @@ def path_from_table(path: FilePath, text: str) -> Path:
     table = Table.read(path, text, UNITS)
     _check_columns(table)
     time, *place = (table.columns[name] for name in PLACE)
-    late = np.diff(time, prepend=-np.inf) <= 0.0
+    late = np.diff(time, prepend=-np.inf) < _LEAST_STEP
     table.refuse(late, "time", time, "s", "a time after that of the row before")
     if time.size < 2:
         raise FileError(path, f"number of samples {time.size}; allowed: at least two", "Add the samples of the path.")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Mapping
 from dataclasses import fields
 from importlib.metadata import version
@@ -19,9 +20,12 @@ from sagline.cables.empirical import Empirical
 from sagline.cables.model import CableModel, CableState
 from sagline.cables.parabolic import Parabolic
 from sagline.cables.straight import Straight
-from sagline.errors import FileError, InvalidValueError
+from sagline.errors import FileError, InvalidValueError, SaglineWarning
+from sagline.files.dataset import read_dataset
+from sagline.files.plan_checks import check_plan
 from sagline.files.plan_layout import JERK, MOTION, PARTS, PROOF, QUANTITIES, TIME, Quantity
 from sagline.files.robot_file import dump_robot, parse_robot
+from sagline.files.seal import Seal, seal
 from sagline.files.whole import written_whole
 from sagline.kinematics.plan import Plan
 from sagline.motion.path import Path
@@ -34,9 +38,9 @@ from sagline.tension.methods import METHODS
 if TYPE_CHECKING:
     from xarray import Dataset
 
-FORMAT = 1  # raised whenever an older sagline could misread the file
+FORMAT = 2  # raised whenever an older sagline could misread the file; 2: with a digest
 MODELS = {model.__name__: model for model in (Straight, Elastic, Empirical, Parabolic, Catenary)}
-HEADERS = 1 << 18  # bytes, more than all names, attributes and the robot take
+HEADERS = 1 << 18  # bytes, more than all names and attributes take beside the robot
 STATE_ARRAYS = ("span", "rise", "unstrained_length", "horizontal_tension", "vertical_force", "chord_tension")
 
 Choice = TypeVar("Choice", CableModel, TensionMethod)
@@ -46,21 +50,28 @@ def save_plan(plan: Plan, file: os.PathLike[str] | str) -> None:
     """Write a plan to a NetCDF file, whole or not at all.
 
     Dimensions are pose (absent for a single pose) and cable; a path's times are a coordinate of pose. Poses without
-    an answer are kept, with their status, shortfall, blocking cables and proof, and NaN lengths and forces.
+    an answer are kept, with their status, shortfall, blocking cables and proof, and NaN lengths and forces. A digest
+    over all values and attributes stands at the end, behind what NetCDF reads, and shows when anything has changed.
 
     Args:
         plan: The plan, of one robot.
-        file: The file, "run.nc" for instance; one that exists is replaced.
+        file: The file, "run.nc" for instance; a regular file that exists is replaced, anything else is refused.
 
     Raises:
-        InvalidValueError: If the plan is of several robots, one a pose.
+        InvalidValueError: If the plan is of several robots, one a pose; of a cable model or a way of sharing that is
+            none of sagline's; or if its values are none that `inverse` gives.
         FileError: If the file cannot be written; what was there before is untouched.
     """
     data = _dataset(instance(plan, Plan, "plan"))
-    with written_whole(file_path(file), size=data.nbytes + HEADERS) as partial:
+    check_plan(data, plan.state.one_robot.cable_count)
+    with written_whole(file_path(file), size=data.nbytes + HEADERS + len(data.attrs["robot"].encode())) as partial:
         # _FillValue None: numbers are stored as they are, and NaN needs no second meaning
         encoding = {str(name): {"_FillValue": None} for name in data.variables}
-        data.to_netcdf(partial, engine="h5netcdf", encoding=encoding)
+        try:
+            data.to_netcdf(partial, engine="h5netcdf", encoding=encoding)
+        except RuntimeError as error:  # what h5py makes of a disk that fills up meanwhile
+            raise OSError(str(error)) from error
+        seal(partial)
 
 
 def load_plan(file: os.PathLike[str] | str) -> Plan:
@@ -73,21 +84,25 @@ def load_plan(file: os.PathLike[str] | str) -> Plan:
         The plan; its proofs, `farkas` and `needed`, are None in a file that was written before files kept them.
 
     Raises:
-        FileError: If the file is missing, cut off, no NetCDF file, no plan, or of a newer format.
+        FileError: If the file is missing, cut off, no NetCDF file, no plan, of a newer format, or not as it was
+            written: its digest, shapes, units, status codes and signs are checked.
+
+    Warns:
+        SaglineWarning: If the file is from before files carried a digest.
 
     Examples:
         >>> import sagline as sl
         >>> path = sl.quintic_path([(0, 0, 1.5), (1, 1, 2)], speed=1.0)
         >>> sl.inverse(sl.load_robot("cogiro"), path).save("run.nc")
         >>> plan = sl.load_plan("run.nc")
-        >>> print(plan.state.robot.name, plan.unstrained_length.shape, plan.feasible.all())
-        cogiro (283, 8) True
+        >>> print(plan.state.robot.name, plan.unstrained_length.shape)
+        cogiro (283, 8)
     """
     path = file_path(file)
-    data = _opened(path)
-    _check_format(path, data.attrs)
+    data, found = read_dataset(path)
+    _check_format(path, data.attrs, found)
     try:
-        return _plan(path, data, parse_robot(data.attrs["robot"], f"{path}, robot"))
+        return _plan(path, data, parse_robot(str(data.attrs["robot"]), f"{path}, robot"))
     except KeyError as error:
         raise FileError(path, f"has no {error.args[0]}", "Write it again; it is incomplete or was edited.") from None
     except InvalidValueError as error:
@@ -117,17 +132,26 @@ def _dataset(plan: Plan) -> Dataset:
 
 def _attributes(plan: Plan) -> dict[str, Any]:
     return {
-        "title": f"Cable lengths and tensions of {plan.state.one_robot.name}",
+        "title": f"Cable lengths and tensions of {_printable(plan.state.one_robot.name)}",
         "source": f"sagline {version('sagline')}",
         "sagline_format": FORMAT,
-        **_written("model", plan.state.cables.model),
-        **_written("tension", plan.tension),
+        **_written("model", plan.state.cables.model, MODELS),
+        **_written("tension", plan.tension, METHODS),
         "robot": dump_robot(plan.state.one_robot),
     }
 
 
-def _written(key: str, choice: CableModel | TensionMethod) -> dict[str, Any]:
+def _printable(text: str) -> str:
+    """A text for people, as attributes can hold it: no zero bytes, no half characters."""
+    return "".join(c if c.isprintable() else "�" for c in text)
+
+
+def _written(
+    key: str, choice: CableModel | TensionMethod, choices: Mapping[str, type[CableModel] | type[TensionMethod]]
+) -> dict[str, Any]:
     """A model or method as attributes: its name, and each of its options that is set."""
+    if choices.get(type(choice).__name__) is not type(choice):
+        raise InvalidValueError(key, type(choice).__name__, ", ".join(choices), "Only these can be read back.")
     options = {f"{key}_{field.name}": getattr(choice, field.name) for field in fields(choice)}
     return {key: type(choice).__name__, **{name: value for name, value in options.items() if value is not None}}
 
@@ -139,37 +163,24 @@ def _read(path: FilePath, data: Dataset, key: str, choices: Mapping[str, type[Ch
         raise FileError(path, f"{key} is {name!r}; allowed: {', '.join(choices)}", "Read it with a newer sagline.")
     choice = choices[name]
     given = {field.name: data.attrs.get(f"{key}_{field.name}") for field in fields(choice)}
-    return choice(**{option: _plain(value) for option, value in given.items() if value is not None})
+    try:
+        return choice(**{option: _plain(value) for option, value in given.items() if value is not None})
+    except TypeError as error:  # a text where a number belongs
+        raise FileError(path, f"{key}: {error}", "Write it again; it was edited.") from None
 
 
 def _plain(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else value
 
 
-def _opened(path: FilePath) -> Dataset:
-    """The whole file, in memory."""
-    from xarray import load_dataset
-
-    try:
-        path.open("rb").close()
-        return load_dataset(path, engine="h5netcdf", decode_times=False, mask_and_scale=False)
-    except FileNotFoundError:
-        raise FileError(path, "does not exist", "Check its name.") from None
-    except (IsADirectoryError, PermissionError) as error:
-        raise FileError(path, f"cannot be read ({error.strerror})", "Check its name and its permissions.") from None
-    except (OSError, RuntimeError, ValueError, KeyError) as error:  # h5py has no error of its own for a damaged file
-        reason = str(error).splitlines()[0]
-        raise FileError(
-            path, f"is no complete NetCDF file ({reason})", "Write it again; it may have been cut off."
-        ) from None
-
-
-def _check_format(path: FilePath, attributes: Mapping[str, Any]) -> None:
+def _check_format(path: FilePath, attributes: Mapping[str, Any], found_seal: Seal) -> None:
     found = attributes.get("sagline_format")
     if found is None:
         raise FileError(
             path, "is no plan of sagline, it names no sagline_format", "Check that this is the file you mean."
         )
+    if not isinstance(found, int | np.integer) or found < 1:
+        raise FileError(path, f"is of format {found!r}, which never was", "Write it again; it was edited, or damaged.")
     if found > FORMAT:
         raise FileError(
             path,
@@ -177,6 +188,11 @@ def _check_format(path: FilePath, attributes: Mapping[str, Any]) -> None:
             f"which reads up to {FORMAT}",
             "Install a newer sagline.",
         )
+    if found == 1:
+        text = f"{path} is from before plans carried a digest: damage to it need not show. Save it again to have one."
+        warnings.warn(text, SaglineWarning, stacklevel=3)
+    elif found_seal is Seal.MISSING:
+        raise FileError(path, "is not as it was written: its digest is missing", "Take it from its source again.")
 
 
 def _plan(path: FilePath, data: Dataset, robot: Robot) -> Plan:
@@ -185,6 +201,7 @@ def _plan(path: FilePath, data: Dataset, robot: Robot) -> Plan:
 
     if data.sizes["cable"] != robot.cable_count:
         raise FileError(path, f"has {data.sizes['cable']} cables, its robot {robot.cable_count}", "Write it again.")
+    check_plan(data, robot.cable_count)
     pose = Pose.from_quaternion(values("position"), values("quaternion"))
     cables = CableState(
         model=_read(path, data, "model", MODELS),
@@ -194,8 +211,8 @@ def _plan(path: FilePath, data: Dataset, robot: Robot) -> Plan:
         status=values("cable_status"),
     )
     motion = None
-    if "time" in data.coords:
-        jerk = values("jerk") if "jerk" in data else None
+    if TIME.name in data.variables:
+        jerk = values(JERK.name) if JERK.name in data.variables else None
         motion = Path(values("time"), pose, values("twist"), values("twist_rate"), jerk)
     return Plan(
         state=Equilibrium(robot, pose, values("wrench"), cables),
@@ -205,5 +222,5 @@ def _plan(path: FilePath, data: Dataset, robot: Robot) -> Plan:
         shortfall=values("shortfall"),
         wrench_residual=values("wrench_residual"),
         blocking=values("blocking"),
-        **{quantity.name: values(quantity.name) for quantity in PROOF if quantity.name in data},
+        **{quantity.name: values(quantity.name) for quantity in PROOF if quantity.name in data.variables},
     )

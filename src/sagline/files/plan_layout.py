@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from enum import IntEnum
+from enum import Enum, IntEnum
 from operator import attrgetter
 from typing import Any, NamedTuple
 
@@ -22,8 +22,16 @@ PARTS = {
 }
 
 
+class Known(Enum):
+    """Where a quantity has values; elsewhere it is NaN."""
+
+    EVERYWHERE = "at every pose"
+    SOLVED = "at the solved poses alone"
+    SOMEWHERE = "at any poses"
+
+
 class Quantity(NamedTuple):
-    """One variable of the file.
+    """One variable of the file, and what its values may be.
 
     Attributes:
         name: Its name in the file.
@@ -32,6 +40,10 @@ class Quantity(NamedTuple):
         unit: Unit as the file states it; "" for a plain number.
         long_name: What it is, in a reader's words.
         codes: The status it holds codes of, if any.
+        known: Where it has values.
+        low: Its lowest value.
+        infinite: Whether it may be infinite.
+        flag: Whether it says yes or no.
     """
 
     name: str
@@ -40,6 +52,15 @@ class Quantity(NamedTuple):
     unit: str
     long_name: str
     codes: type[IntEnum] | None = None
+    known: Known = Known.EVERYWHERE
+    low: float = -np.inf
+    infinite: bool = False
+    flag: bool = False
+
+    @property
+    def type(self) -> np.dtype[Any]:
+        """The type of its values."""
+        return np.dtype(np.bool_ if self.flag else np.float64 if self.codes is None else np.int8)
 
     def of(self, plan: Plan) -> Any:
         """The values of a plan.
@@ -65,29 +86,69 @@ class Quantity(NamedTuple):
 
 
 QUANTITIES = (
-    Quantity("unstrained_length", "state.cables.unstrained_length", ("cable",), "m", "unstrained length L to wind"),
-    Quantity("chord_tension", "state.cables.chord_tension", ("cable",), "N", "tension along the chord, T_x / cos phi"),
-    Quantity("horizontal_tension", "state.cables.horizontal_tension", ("cable",), "N", "horizontal tension T_x"),
+    Quantity(
+        "unstrained_length",
+        "state.cables.unstrained_length",
+        ("cable",),
+        "m",
+        "unstrained length L to wind",
+        known=Known.SOLVED,
+        low=0.0,
+    ),
+    Quantity(
+        "chord_tension",
+        "state.cables.chord_tension",
+        ("cable",),
+        "N",
+        "tension along the chord, T_x / cos phi",
+        known=Known.SOLVED,
+        low=0.0,
+    ),
+    Quantity(
+        "horizontal_tension",
+        "state.cables.horizontal_tension",
+        ("cable",),
+        "N",
+        "horizontal tension T_x",
+        known=Known.SOLVED,
+        low=0.0,
+    ),
     Quantity(
         "vertical_force",
         "state.cables.vertical_force",
         ("cable",),
         "N",
         "vertical force T_z on the cable at its platform end, up positive",
+        known=Known.SOLVED,
     ),
-    Quantity("span", "state.cables.span", ("cable",), "m", "horizontal distance from frame end to platform end"),
+    Quantity(
+        "span", "state.cables.span", ("cable",), "m", "horizontal distance from frame end to platform end", low=0.0
+    ),
     Quantity("rise", "state.cables.rise", ("cable",), "m", "height of the platform end above the frame end"),
     Quantity("cable_status", "state.cables.status", ("cable",), "", "how each cable's calculation ended", CableStatus),
     Quantity("pose_status", "status", (), "", "how each pose's calculation ended", PoseStatus),
-    Quantity("shortfall", "shortfall", (), "N", "smallest change of the force that would make the pose feasible"),
+    Quantity(
+        "shortfall",
+        "shortfall",
+        (),
+        "N",
+        "smallest change of the force that would make the pose feasible",
+        known=Known.SOMEWHERE,
+        low=0.0,
+        infinite=True,
+    ),
     Quantity(
         "wrench_residual",
         "wrench_residual",
         ("residual_part",),
         "N, N m",
         "norms of the unbalanced force and moment in the free motions",
+        known=Known.SOLVED,
+        low=0.0,
     ),
-    Quantity("blocking", "blocking", ("cable",), "", "whether the cable's limits stand against the needed wrench"),
+    Quantity(
+        "blocking", "blocking", ("cable",), "", "whether the cable's limits stand against the needed wrench", flag=True
+    ),
     Quantity(
         "wrench",
         "state.wrench",
@@ -105,7 +166,7 @@ QUANTITIES = (
     ),
 )
 
-# of a plan that has them: one of a file written before they were kept has none
+# of a plan that has them: one of a file written before they were kept has none. A proof more is a line here.
 PROOF = (
     Quantity(
         "farkas",
@@ -113,6 +174,7 @@ PROOF = (
         ("wrench_part",),
         "1, 1/m",
         "vector y that proves a pose infeasible: y . J tau < y . needed for all chord tensions within the limits",
+        known=Known.SOMEWHERE,
     ),
     Quantity(
         "needed",
@@ -120,6 +182,7 @@ PROOF = (
         ("wrench_part",),
         "N, N m",
         "wrench J tau that the chord tensions must supply, to which the proof refers",
+        known=Known.SOMEWHERE,
     ),
 )
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 import reprlib
-from functools import cache
-from math import isnan
-from typing import TYPE_CHECKING, Any
+from functools import cache, lru_cache
+from math import isinf, isnan
+from sys import float_info
+from typing import TYPE_CHECKING, Any, Final
 
 from sagline.errors import InvalidValueError
 
@@ -15,9 +16,46 @@ if TYPE_CHECKING:
 
 Nested = float | list["Nested"]
 
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-_UNIT = r"[^\W\d][\w\s*/^²³-]*"  # letters first; no parentheses, pint trips over some
-_NUMBER_AND_UNIT = re.compile(rf"\s*({_NUMBER})(\s+1\s*/\s*{_UNIT}|\s*{_UNIT})")
+LARGEST: Final = 1e50  # in SI: the products of a few such numbers are still numbers
+REACH: Final = f"numbers up to {LARGEST:g}"
+_LONGEST: Final = 60  # letters of a number with its unit; a float64 takes 24
+
+_DECIMAL = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
+_WORD = r"[-+]?\.?(?:inf|Inf|INF)|\.?(?:nan|NaN|NAN)"  # as YAML and Python write what no digits can
+_FACTOR = r"[A-Za-zµμΩÅ°_]+(?:[ \t]?(?:\^|\*\*)[ \t]?[-+]?[0-9]|[²³])?"  # no parentheses, pint trips over some
+_UNIT = rf"{_FACTOR}(?:(?:[ \t]?[*/·][ \t]?|[ \t]){_FACTOR}){{0,5}}"
+_BLANKS = re.compile("[ \t\r\n\u00a0\u202f]+")  # the last two are what typographers put before a unit
+_PLAIN = re.compile(rf"[ \t]*(?:({_DECIMAL})|{_WORD})[ \t]*")
+_WITH_UNIT = re.compile(rf"[ \t]*({_DECIMAL})([ \t]+1[ \t]?/[ \t]?{_UNIT}|[ \t]*{_UNIT})[ \t]*")
+
+
+def plain_number(text: str) -> float | None:
+    """A decimal number in the digits 0 to 9, with a point, a sign and an exponent if need be; or inf, or nan.
+
+    What else is a number to YAML, Python or C is none here: 1:30, 0x10, 1_000, digits of other alphabets.
+
+    Args:
+        text: The text; blanks around the number do not matter.
+
+    Returns:
+        The number, infinite only where the text says so (1e999 is the largest float64); None where it is none.
+
+    Examples:
+        >>> from sagline.files.quantity import plain_number
+        >>> plain_number(" 010.5e1 "), plain_number("1_000")
+        (105.0, None)
+    """
+    found = _PLAIN.fullmatch(text) if len(text) <= _LONGEST else None
+    if found is None:
+        return None
+    if found[1] is None:
+        return float(text.replace(".", ""))
+    return _capped(float(text))
+
+
+def within_reach(number: float) -> bool:
+    """Whether a number is finite, and of a size that products of a few do not take out of float64."""
+    return abs(number) <= LARGEST
 
 
 def in_si(value: object, unit: str, item: str) -> Nested:
@@ -32,46 +70,54 @@ def in_si(value: object, unit: str, item: str) -> Nested:
         A number, or lists of numbers nested like the value. Infinities pass, ranges are the caller's to check.
 
     Raises:
-        InvalidValueError: If something is no quantity, is not a number (NaN), or has another unit.
+        InvalidValueError: If something is no quantity, is not a number (NaN), is out of reach (see
+            `within_reach`), or has another unit.
     """
     if isinstance(value, list | tuple):
         return [in_si(element, unit, f"{item}[{i}]") for i, element in enumerate(value)]
-    number = _plain(value)
-    if number is None and isinstance(value, str):
-        number = _with_unit(value, unit, item)
+    number = _from_text(value, unit) if isinstance(value, str) else _from_number(value)
     if number is None or isnan(number):
         raise _no_quantity(value, unit, item)
+    if not (isinf(number) or within_reach(number)):
+        raise InvalidValueError(item, reprlib.repr(value), f"{REACH} {unit}".rstrip(), f"Correct {item}.")
     return number
 
 
-def _plain(value: object) -> float | None:
-    # YAML 1.1 reads 44e3 as text, so text is tried as a number first
-    if isinstance(value, bool) or not isinstance(value, int | float | str):
+def _from_number(value: object) -> float | None:
+    if isinstance(value, bool) or not isinstance(value, int | float):
         return None
     try:
         return float(value)
-    except (ValueError, OverflowError):
-        return None
+    except OverflowError:
+        return float_info.max
 
 
-def _with_unit(text: str, unit: str, item: str) -> float | None:
-    found = _NUMBER_AND_UNIT.fullmatch(text)
-    if found is None:
-        return None
-    factor = _factor(found[2].strip(), unit)
-    if factor is None:
-        raise _no_quantity(text, unit, item)
-    return float(found[1]) * factor
+def _from_text(text: str, unit: str) -> float | None:
+    text = _BLANKS.sub(" ", text).strip()
+    number = plain_number(text)
+    if number is not None or not unit or len(text) > _LONGEST:
+        return number
+    found = _WITH_UNIT.fullmatch(text)
+    factor = _factor(found[2].strip(), unit) if found else None
+    return None if found is None or factor is None else _capped(float(found[1]) * factor)
 
 
-@cache
+def _capped(number: float) -> float:
+    """Infinity is a word; a number with too many digits is none of it."""
+    return max(-float_info.max, min(number, float_info.max))
+
+
+@lru_cache(maxsize=1000)
 def _factor(given: str, wanted: str) -> float | None:
     """How many of the wanted unit one of the given is; None if it is no such unit."""
     from pint.errors import PintError
 
     units = _registry()
     try:
-        return float(units.Quantity(1.0, units.parse_units(given)).to(wanted or "dimensionless").magnitude)
+        one, wish = (units.Quantity(1.0, units.parse_units(text)) for text in (given, wanted))
+        # to pint an angle is no dimension, and 5 Hz would do for 5 rad/s; a root unit it is
+        same = one.to_root_units().units == wish.to_root_units().units
+        return float(one.to(wish.units).magnitude) if same else None
     except (PintError, ValueError, TypeError, AttributeError, SyntaxError, ArithmeticError):
         return None  # pint has no common ancestor for what it cannot parse
 

@@ -12,7 +12,8 @@ from sagline.arguments import file_path, instance
 from sagline.errors import FileError, InvalidValueError
 from sagline.files.robot_schema import RobotEntry
 from sagline.files.schema import validated
-from sagline.files.text import parse_mapping, read_text
+from sagline.files.text import exists, read_text
+from sagline.files.yaml_text import YAML_LIMIT, parse_mapping
 from sagline.robot.catalogue import preset_text, robot_names
 from sagline.robot.robot import Robot
 
@@ -53,7 +54,7 @@ def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
     path = file_path(name_or_path, "name_or_path")
     if isinstance(name_or_path, str) and _is_name(name_or_path, path):
         return parse_robot(preset_text(name_or_path), f"preset {name_or_path}")
-    return parse_robot(read_text(path), path)
+    return parse_robot(read_text(path, YAML_LIMIT), path)
 
 
 def parse_robot(text: str, origin: Path | str) -> Robot:
@@ -73,7 +74,7 @@ def parse_robot(text: str, origin: Path | str) -> Robot:
     try:
         return entry.robot()
     except InvalidValueError as error:
-        raise FileError(origin, f"{error.item} is {error.value}; allowed: {error.allowed}", error.next_step) from None
+        raise FileError.of(origin, error) from None
 
 
 def dump_robot(robot: Robot) -> str:
@@ -109,4 +110,4 @@ def dump_robot(robot: Robot) -> str:
 def _is_name(text: str, path: Path) -> bool:
     if text in robot_names():
         return True
-    return path.suffix not in {".yaml", ".yml"} and path.name == text and not path.exists()
+    return path.suffix not in {".yaml", ".yml"} and path.name == text and not exists(path)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import reprlib
 from collections.abc import Mapping
-from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from sagline.errors import FileError
+from sagline.errors import FileError, nearest
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
@@ -57,8 +56,9 @@ def _explained(mistake: ErrorDetails, schema: type[Entry]) -> tuple[str, str]:
             return f"{key} is missing", f"Add the key {key}."
         case "extra_forbidden":
             known = list(_at(schema, where[:-1]).model_fields)
-            near = get_close_matches(str(where[-1]), known, n=1, cutoff=0.0)[0]
-            return f"{key} is an unknown key; allowed: {', '.join(known)}", f"Did you mean {near}?"
+            near = nearest(str(where[-1]), known)
+            next_step = f"Did you mean {near}?" if near else "Remove it."
+            return f"{key} is an unknown key; allowed: {', '.join(known)}", next_step
         case "model_type":
             known = list(_at(schema, where).model_fields)
             return f"{key} is {reprlib.repr(mistake['input'])}; allowed: keys {', '.join(known)}", "Give it as keys."

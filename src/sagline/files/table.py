@@ -2,24 +2,28 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import io
 import re
 from array import array
 from collections.abc import Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 from pathlib import Path as FilePath
-from typing import cast
+from typing import Final, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sagline.arrays import Array
-from sagline.errors import FileError, InvalidValueError
-from sagline.files.quantity import in_si
+from sagline.errors import FileError, InvalidValueError, nearest
+from sagline.files.quantity import LARGEST, REACH, in_si, plain_number
 
+TABLE_LIMIT: Final = 64.0  # MB, about half a million rows
+_TOO_LONG: Final = 100.0  # times the size of what it belongs to: no length in m, but perhaps one in mm
 _COLUMN = re.compile(r"\s*(\w+)\s*(?:\[(.*)\])?\s*")  # name, or name [unit]
+_PLAIN_ROW = re.compile(r"[-+.0-9eE \t,]*")  # of these letters float reads plain numbers only, and much faster
+_DECIMAL_COMMA = re.compile(r"\s*[-+]?[0-9]+,[0-9]+\s*")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,12 +35,14 @@ class Table:
         columns: Name and numbers of each column, shape (rows,).
         lines: Line of each row in the file, from 1.
         header: Line of the columns' names.
+        plain: The columns whose unit is the SI unit because the header gives none.
     """
 
     path: FilePath
     columns: dict[str, Array]
     lines: array[int]
     header: int
+    plain: frozenset[str]
 
     @classmethod
     def read(cls, path: FilePath, text: str, units: Mapping[str, str]) -> Table:
@@ -54,27 +60,30 @@ class Table:
             FileError: If it is no such text; the message names the line.
         """
         reader = csv.reader(io.StringIO(text), strict=True)
-        factors: dict[str, float] = {}
+        found: dict[str, float | None] = {}
         numbers, lines, header = array("d"), array("q"), 0
         try:
             for row in reader:
                 if not "".join(row).strip():  # a blank line, or the bare commas of a spreadsheet
                     continue
-                if not factors:
-                    factors, header = _factors(path, reader.line_num, row, units), reader.line_num
+                if not found:
+                    found, header = _factors(path, reader.line_num, row, units), reader.line_num
                 else:
-                    numbers.extend(_numbers(path, reader.line_num, row, tuple(factors)))
+                    numbers.extend(_numbers(path, reader.line_num, row, tuple(found)))
                     lines.append(reader.line_num)
         except csv.Error as error:
             raise line_error(path, reader.line_num, f"it is no CSV ({error})") from None
-        if not factors:
+        if not found:
             raise FileError(path, f"no columns; allowed: {', '.join(units)}", "Give the names of the columns first.")
-        values = np.array(numbers).reshape(len(lines), len(factors))
-        table = cls(
-            path, {name: values[:, k] * factor for k, (name, factor) in enumerate(factors.items())}, lines, header
-        )
-        for name, column in table.columns.items():
+        values = np.array(numbers).reshape(len(lines), len(found))
+        factors = [1.0 if factor is None else factor for factor in found.values()]
+        with np.errstate(over="ignore"):  # what is too large is told below
+            columns = {name: values[:, k] * factor for k, (name, factor) in enumerate(zip(found, factors, strict=True))}
+        plain = frozenset(name for name, factor in found.items() if factor is None)
+        table = cls(path, columns, lines, header, plain)
+        for name, column in columns.items():
             table.refuse(~np.isfinite(column), name, column, units[name], "a finite number")
+            table.refuse(np.abs(column) > LARGEST, name, column, units[name], f"{REACH} {units[name]}".rstrip())
         return table
 
     def refuse(self, wrong: NDArray[np.bool_], item: str, values: Array, unit: str, allowed: str) -> None:
@@ -95,47 +104,65 @@ class Table:
             value = f"{values[k]:.12g} {unit}".rstrip()
             raise line_error(self.path, self.lines[k], f"{item} is {value}; allowed: {allowed}")
 
+    def refuse_millimeters(self, name: str, size: Array | float, whole: str) -> None:
+        """Refuse a column of lengths without a unit, if one is so long that it must have another unit.
 
-def _factors(path: FilePath, line: int, header: list[str], units: Mapping[str, str]) -> dict[str, float]:
-    """Column names, and what to multiply their numbers by to have them in SI."""
-    factors: dict[str, float] = {}
+        Args:
+            name: The column.
+            size: Size of what the lengths belong to [m], shape () or (rows,).
+            whole: What that is, for the message.
+
+        Raises:
+            FileError: If a length is more than a hundred times that size; it names the line.
+        """
+        if name in self.plain:
+            far = self.columns[name] > _TOO_LONG * size
+            allowed = f"lengths like {whole}; if these are millimeters, call the column {name} [mm]"
+            self.refuse(far, name, self.columns[name], "m", allowed)
+
+
+def _factors(path: FilePath, line: int, header: list[str], units: Mapping[str, str]) -> dict[str, float | None]:
+    """Column names, and what to multiply their numbers by to have them in SI; None where no unit is given."""
+    if len(header) == 1 and (other := next((mark for mark in ";\t" if mark in header[0]), None)):
+        shown = {";": "semicolons", "\t": "tabs"}[other]
+        raise line_error(path, line, f"the columns are parted by {shown}; allowed: commas, and points in the numbers")
+    factors: dict[str, float | None] = {}
     for cell in header:
         found = _COLUMN.fullmatch(cell)
         name, unit = (found[1], found[2]) if found else (cell, None)
         if name not in units:
-            nearest = get_close_matches(name, units, n=1)
-            hint = f" (did you mean {nearest[0]}?)" if nearest else ""
+            near = nearest(name, units)
+            hint = f" (did you mean {near}?)" if near else " (a number, no name)" if plain_number(cell) else ""
             raise line_error(path, line, f"unknown column {name!r}{hint}; allowed: {', '.join(units)}")
         if name in factors:
             raise line_error(path, line, f"column {name} is there twice; allowed: once")
-        factors[name] = 1.0 if unit is None else _factor(path, line, name, unit, units[name])
+        factors[name] = None if unit is None else _factor(path, line, name, unit, units[name])
     return factors
 
 
 def _factor(path: FilePath, line: int, name: str, unit: str, wanted: str) -> float:
     try:
-        return cast(float, in_si(f"1 {unit}", wanted, name))  # of one text, so no list
+        if unit.strip():
+            return cast(float, in_si(f"1 {unit.strip()}", wanted, name))  # of one text, so no list
     except InvalidValueError:
-        allowed = f"a unit that converts to {wanted}" if wanted else "none"
-        raise line_error(path, line, f"the unit of {name} is [{unit}]; allowed: {allowed}") from None
+        pass
+    allowed = f"a unit that converts to {wanted}" if wanted else "none"
+    raise line_error(path, line, f"the unit of {name} is [{unit}]; allowed: {allowed}")
 
 
 def _numbers(path: FilePath, line: int, row: list[str], names: tuple[str, ...]) -> list[float]:
     if len(row) != len(names):
-        raise line_error(path, line, f"{len(row)} columns; allowed: {len(names)}, as in the header")
-    try:
-        return [float(cell) for cell in row]
-    except ValueError:
-        name, cell = next((name, cell) for name, cell in zip(names, row, strict=True) if not _is_number(cell))
-        raise line_error(path, line, f"{name} is {cell.strip() or 'empty'}; allowed: a number") from None
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True
+        comma = ", and a point in the numbers, not a comma" if len(row) == 2 * len(names) else ""
+        raise line_error(path, line, f"{len(row)} columns; allowed: {len(names)}, as in the header{comma}")
+    if _PLAIN_ROW.fullmatch(",".join(row)):
+        with contextlib.suppress(ValueError):  # which cell it is, the slow way tells
+            return [float(cell) for cell in row]
+    numbers = [plain_number(cell) for cell in row]
+    if None in numbers:
+        k = numbers.index(None)
+        allowed = "a number with a point, not a comma" if _DECIMAL_COMMA.fullmatch(row[k]) else "a number"
+        raise line_error(path, line, f"{names[k]} is {row[k].strip() or 'empty'}; allowed: {allowed}")
+    return cast(list[float], numbers)
 
 
 def line_error(path: FilePath, line: int, reason: str) -> FileError:

@@ -1,77 +1,79 @@
-"""Text and YAML files in, with one clear message for whatever is wrong with them."""
+"""Files in: bytes of regular files of a size that fits, and text in UTF-8."""
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+import codecs
+import stat
 from pathlib import Path
-from typing import Any
-
-import yaml
+from typing import Final
 
 from sagline.errors import FileError
 
+MEGABYTE: Final = 1_000_000
+_OTHER_TEXT: Final = {codecs.BOM_UTF16_LE: "UTF-16", codecs.BOM_UTF16_BE: "UTF-16"}
 
-def read_text(path: Path) -> str:
+
+def exists(path: Path) -> bool:
+    """Whether there is something of that name; there is nothing of a name that no file can have."""
+    try:
+        path.stat()
+    except (OSError, ValueError):
+        return False
+    return True
+
+
+def read_bytes(path: Path, limit: float) -> bytes:
+    """A whole regular file; nothing else is opened, so that none waits for a writer or never ends.
+
+    Args:
+        path: The file.
+        limit: Largest size that is read [MB].
+
+    Returns:
+        What is in it.
+
+    Raises:
+        FileError: If it is missing, no regular file, unreadable, or larger than the limit.
+    """
+    most = int(limit * MEGABYTE)
+    try:
+        mode = path.stat().st_mode
+        if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+            raise FileError(path, "is no regular file but a pipe or a device", "Give a file on a disk.")
+        with path.open("rb") as file:
+            data = file.read(most + 1)
+    except (OSError, ValueError) as error:  # ValueError: a path with a zero byte or a lone surrogate
+        reason = getattr(error, "strerror", None) or error
+        raise FileError(path, f"cannot be read ({reason})", "Check its name and its permissions.") from None
+    if len(data) > most:
+        size = max(path.stat().st_size, len(data)) / MEGABYTE
+        raise FileError(path, f"has {size:.3g} MB; allowed: {limit:g} MB", "Check that this is the file you mean.")
+    return data
+
+
+def read_text(path: Path, limit: float) -> str:
     """A whole text file in UTF-8, with or without a byte order mark.
 
     Args:
         path: The file.
+        limit: Largest size that is read [MB].
 
     Returns:
         The text, without a byte order mark.
 
     Raises:
-        FileError: If it is missing, a folder, unreadable, or not text.
+        FileError: If it is missing, no regular file, unreadable, too large, or not text in UTF-8.
     """
+    data = read_bytes(path, limit)
+    if other := _OTHER_TEXT.get(data[:2]):
+        raise FileError(path, f"is {other} text, not UTF-8 text", "Save it again as UTF-8.")
     try:
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError:
-        raise FileError(path, "is not UTF-8 text", "Check that this is the file you mean.") from None
-    except (OSError, ValueError) as error:  # ValueError: a path with a zero byte
-        reason = getattr(error, "strerror", None) or error
-        raise FileError(path, f"cannot be read ({reason})", "Check its name and its permissions.") from None
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise FileError(
+            path, f"is not UTF-8 text (line {line})", "Check that this is the file you mean, or save it as UTF-8."
+        ) from None
     if "\0" in text:
         raise FileError(path, "is not text, it holds zero bytes", "Check that this is the file you mean.")
     return text
-
-
-def parse_mapping(text: str, origin: Path | str) -> dict[Any, Any]:
-    """A YAML text whose top level is a mapping, no key given twice.
-
-    Args:
-        text: The YAML text.
-        origin: The file or whatever else the text came from, for the message.
-
-    Returns:
-        The mapping.
-
-    Raises:
-        FileError: If it is empty, not YAML, cut off, or not a mapping.
-    """
-    try:
-        data = yaml.load(text, Loader=_UniqueKeyLoader)
-    except yaml.MarkedYAMLError as error:
-        line = "" if error.problem_mark is None else f"line {error.problem_mark.line + 1}: "
-        raise FileError(
-            origin, f"is not complete YAML ({line}{error.problem})", "Correct it; it may have been cut off."
-        ) from None
-    except (yaml.YAMLError, RecursionError, ValueError) as error:  # ValueError: a date such as 2020-99-99
-        reason = str(error).splitlines()[0]
-        raise FileError(origin, f"is not YAML ({reason})", "Check that this is the file you mean.") from None
-    if data is None:
-        raise FileError(origin, "is empty", "Write it again; it may have been cut off.")
-    if not isinstance(data, dict):
-        raise FileError(origin, "has no keys at its top level", "Check that this is the file you mean.")
-    return data
-
-
-class _UniqueKeyLoader(yaml.SafeLoader):
-    """PyYAML keeps the last of two equal keys and says nothing; this one refuses the second."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
-        seen = set()
-        for key in (key for key, _ in node.value if isinstance(key, yaml.ScalarNode)):
-            if key.value in seen:
-                raise yaml.MarkedYAMLError(problem=f"key {key.value} is given twice", problem_mark=key.start_mark)
-            seen.add(key.value)
-        return super().construct_mapping(node, deep)

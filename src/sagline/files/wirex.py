@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import re
+from itertools import combinations_with_replacement, product
 from typing import Final, cast, get_args
 from xml.etree.ElementTree import Element
 
@@ -14,17 +16,23 @@ from sagline.cables.cable import Cable
 from sagline.errors import FileError, InvalidValueError
 from sagline.files.imported import STEEL_ROPE_DENSITY, STEEL_ROPE_STIFFNESS, Imported, imported
 from sagline.files.xml_text import number, only_child, read_xml
+from sagline.robot.inertia import box_inertia
 from sagline.robot.pattern import MOTION_PATTERNS, PLANAR, ROTATING, MotionPattern
 from sagline.robot.robot import Robot
 
 _AXES: Final = ("x", "y", "z")
+_FLATTEST: Final = 0.1  # least edge of the assumed box over its largest: anchors may lie in a plane, a body does not
+_VERSIONS: Final = ("0.31", "0.32")
+_INFINITE: Final = re.compile(r"\+?(inf|infinity|1\.#inf0*)", re.IGNORECASE)  # the last as Windows prints it
 
 
 def load_wirex(source: str | os.PathLike[str], cables: Cable | None = None) -> Imported:
     """Read a robot file of WireX (version 0.31 or 0.32 of its format).
 
-    WireX asks for no material, no mass and no limits: what a file leaves out is assumed, and the robot says so in
-    `assumed`. Its winches are kept as the tension limit they give, its pulleys as the points they stand at.
+    WireX asks for no material, no inertia and no limits: what a file leaves out is assumed, and the robot says so in
+    `assumed`. Moments of inertia that are missing are taken as large as the largest that is given, the others as zero;
+    where none is given, the platform is a box around its anchors. Its winches are kept as the tension limit they give,
+    its pulleys as the points they stand at.
 
     Args:
         source: The `.wcrfx` file.
@@ -34,7 +42,7 @@ def load_wirex(source: str | os.PathLike[str], cables: Cable | None = None) -> I
         Imported: the robot, and what was lost.
 
     Raises:
-        FileError: If the file cannot be read, or describes no robot with one platform.
+        FileError: If the file cannot be read, has another version, or describes no robot with one platform.
     """
     optional(cables, Cable, "cables")
     path = file_path(source, "source")
@@ -43,7 +51,7 @@ def load_wirex(source: str | os.PathLike[str], cables: Cable | None = None) -> I
         _check_generation(root)
         return _robot(root, path.stem, cables)
     except InvalidValueError as error:
-        raise FileError(path, f"{error.item} is {error.value}; allowed: {error.allowed}", error.next_step) from None
+        raise FileError.of(path, error) from None
 
 
 def _check_generation(root: Element) -> None:
@@ -52,6 +60,12 @@ def _check_generation(root: Element) -> None:
     if root.find("robot") is None and root.find("wireRobot") is not None:
         raise InvalidValueError(
             "robot", "in the old form <wireRobot>", "<robot>", "Open it in WireCenter and save it again."
+        )
+    version = root.get("version")
+    if version not in _VERSIONS:
+        shown = "missing" if version is None else repr(version)
+        raise InvalidValueError(
+            "version of the format", shown, " or ".join(_VERSIONS), "Open it in WireCenter and save it again."
         )
 
 
@@ -68,13 +82,15 @@ def _robot(root: Element, name: str, cables: Cable | None) -> Imported:
     assumed: dict[str, str] = {}
     pattern = _pattern(robot, assumed)
     low, high = _limits(root, materials, assumed)
+    mass = _given(platform, "mass", "platform", "kg")
+    anchors = [_point(chain, "platform", k) for k, chain in enumerate(chains)]
     result = Robot(
         robot.get("name") or name,
         [_point(chain, "base", k) for k, chain in enumerate(chains)],
-        [_point(chain, "platform", k) for k, chain in enumerate(chains)],
+        anchors,
         _cables(materials, assumed) if cables is None else cables,
-        _given(platform, "mass", "platform", "kg"),
-        _inertia(platform, assumed) if pattern in ROTATING else None,
+        mass,
+        _inertia(platform, mass, np.ptp(anchors, axis=0), assumed) if pattern in ROTATING else None,
         center_of_mass=_center(platform, assumed),
         motion_pattern=pattern,
         plane_normal=(0.0, 0.0, 1.0) if pattern in PLANAR else None,
@@ -89,7 +105,7 @@ def _robot(root: Element, name: str, cables: Cable | None) -> Imported:
 def _value(element: Element | None, key: str, item: str, unit: str) -> float | None:
     """An attribute's number; None where it is missing, empty, or infinite, which some writers put for unknown."""
     text = "" if element is None else element.get(key, "").strip()
-    if not text or text.lstrip("+").lower() in ("inf", "infinity"):
+    if not text or _INFINITE.fullmatch(text):
         return None
     return number(text, f"{item}: {key}", unit)
 
@@ -174,15 +190,29 @@ def _center(platform: Element, assumed: dict[str, str]) -> list[float]:
     return [_given(center, axis, "centerofgravity", "m") for axis in _AXES]
 
 
-def _inertia(platform: Element, assumed: dict[str, str]) -> Array:
-    """Symmetric matrix; of two mirrored elements one may be left out."""
-    tensor = only_child(platform, "inertiatensor", "platform")
-    assumed["inertia"] = "taken about the center of mass; the WireX format does not say about which point"
-    matrix = np.zeros((3, 3))
-    for i, row in enumerate(_AXES):
-        for j, column in enumerate(_AXES):
-            key = f"I{row}{column}" if tensor.get(f"I{row}{column}") else f"I{column}{row}"
-            matrix[i, j] = _given(tensor, key, "inertiatensor", "kg m^2")
+def _inertia(platform: Element, mass: float, size: Array, assumed: dict[str, str]) -> Array:
+    """Symmetric matrix; of two mirrored elements one may be left out, what is missing altogether is assumed."""
+    matrix = np.full((3, 3), np.nan)
+    tensor = platform.find("inertiatensor")
+    for (i, row), (j, column) in product(enumerate(_AXES), repeat=2):
+        value = _value(tensor, f"I{row}{column}", "inertiatensor", "kg m^2")
+        matrix[i, j] = np.nan if value is None else value
+    matrix = np.where(np.isnan(matrix), matrix.T, matrix)
+    if not np.nan_to_num(matrix).any():
+        assumed["inertia"] = "that of a solid box around the platform's anchors; the WireX file gives none"
+        return box_inertia(mass, *np.maximum(size, _FLATTEST * size.max()))
+    why = ["taken about the center of mass; the WireX format does not say about which point"]
+    missing = [(i, j) for i, j in combinations_with_replacement(range(3), 2) if np.isnan(matrix[i, j])]
+    products = [pair for pair in missing if pair[0] != pair[1]]
+    if len(products) not in (0, 3):  # who gives two of them has lost the third
+        key = "I" + "".join(_AXES[k] for k in products[0])
+        raise InvalidValueError(f"inertiatensor: {key}", "missing", "a number in kg m^2", f"Add {key} to the file.")
+    if missing:
+        names = ", ".join(f"I{_AXES[i]}{_AXES[j]}" for i, j in missing)
+        largest = float(np.nanmax(np.diag(matrix)))
+        why.append(f"{names} missing: moments taken as the largest given, {largest:g} kg m^2, products as 0")
+        matrix = np.where(np.isnan(matrix), largest * np.eye(3), matrix)
+    assumed["inertia"] = "; ".join(why)
     return matrix
 
 
@@ -199,4 +229,6 @@ def _lost(root: Element, chains: list[Element]) -> tuple[str, ...]:
         lost.append("The cables' damping, cost and largest length.")
     if root.find("robot/controller") is not None:
         lost.append("The controller.")
+    if root.find("robot/application") is not None:
+        lost.append("The application: its load and its limits of the cables' forces.")
     return tuple(lost)

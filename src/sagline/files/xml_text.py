@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
-from typing import NoReturn
+from typing import Final, NoReturn
 from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
@@ -11,6 +12,11 @@ import numpy as np
 
 from sagline.arrays import Array, locked
 from sagline.errors import FileError, InvalidValueError
+from sagline.files.quantity import plain_number, within_reach
+from sagline.files.text import read_bytes
+
+_LIMIT: Final = 4.0  # MB; the largest of CASPR's files has 0.1
+_ENCODING = re.compile(r"utf-?8|utf-?16|us-ascii|ascii|latin-?1|iso-8859-1?[0-9]|(windows-|cp)125[0-8]", re.IGNORECASE)
 
 
 def read_xml(path: Path) -> Element:
@@ -26,31 +32,28 @@ def read_xml(path: Path) -> Element:
         The root element.
 
     Raises:
-        FileError: If the file is missing, unreadable, no complete XML, or declares entities.
+        FileError: If the file is missing, unreadable, too large, no complete XML, or declares entities.
     """
-    try:
-        data = path.read_bytes()
-    except (OSError, ValueError) as error:  # ValueError: a path with a zero byte
-        reason = getattr(error, "strerror", None) or error
-        raise FileError(path, f"cannot be read ({reason})", "Check its name and its permissions.") from None
+    data = read_bytes(path, _LIMIT)
     builder, parser = TreeBuilder(), expat.ParserCreate()
     parser.StartElementHandler = builder.start
     parser.EndElementHandler = builder.end
     parser.CharacterDataHandler = builder.data
     parser.EntityDeclHandler = _refuse_entity
+    parser.XmlDeclHandler = _check_encoding
     try:
         parser.Parse(data, True)
-    except (expat.ExpatError, LookupError) as error:  # LookupError: an encoding nobody knows
+    except (expat.ExpatError, LookupError, ValueError) as error:  # the last two: an encoding that is none of this file
         raise FileError(
             path, f"is no complete XML ({error})", "Check that this is the file you mean; it may have been cut off."
         ) from None
-    except _EntityDeclaredError as error:
-        raise FileError(path, f"declares the entity {error}", "Write its text out; entities are not read.") from None
+    except _RefusedError as error:
+        raise FileError(path, *error.args) from None
     return builder.close()
 
 
 def numbers(text: str | None, count: int, item: str, unit: str) -> Array:
-    """As many finite numbers as wanted, between blanks.
+    """As many numbers as wanted, between blanks.
 
     Args:
         text: The text; None where the file has none.
@@ -64,15 +67,13 @@ def numbers(text: str | None, count: int, item: str, unit: str) -> Array:
     Raises:
         InvalidValueError: If the text is missing or says anything else; the message names the item.
     """
-    try:
-        values = np.array((text or "").split(), dtype=np.float64)
-    except ValueError:
-        values = np.empty(0)
-    if len(values) != count or not np.isfinite(values).all():
+    found = [plain_number(word) for word in (text or "").split()[: count + 1]]
+    values = [number for number in found if number is not None and within_reach(number)]
+    if len(found) != count or len(values) != count:
         shown = "missing" if text is None or not text.strip() else repr(text.strip()[:60])
         wanted = "a number" if count == 1 else f"{count} numbers between blanks"
         raise InvalidValueError(item, shown, f"{wanted}{unit and f' in {unit}'}", f"Correct {item} in the file.")
-    return locked(values)
+    return locked(np.array(values))
 
 
 def number(text: str | None, item: str, unit: str) -> float:
@@ -114,9 +115,14 @@ def only_child(parent: Element, tag: str, item: str) -> Element:
     return found[0]
 
 
-class _EntityDeclaredError(Exception):
-    """Stops the parser at an entity's declaration."""
+class _RefusedError(Exception):
+    """Stops the parser: what is wrong, and the next step."""
 
 
 def _refuse_entity(name: str, *_: object) -> NoReturn:
-    raise _EntityDeclaredError(name)
+    raise _RefusedError(f"declares the entity {name}", "Write its text out; entities are not read.")
+
+
+def _check_encoding(version: str, encoding: str | None, standalone: int) -> None:
+    if encoding is not None and not _ENCODING.fullmatch(encoding):
+        raise _RefusedError(f"is no complete XML (unknown encoding {encoding})", "Save it as UTF-8.")

@@ -49,6 +49,7 @@ POSE_NOT_CONVERGED = 4
 POSE_NO_CHORD = 5  # both ends of a cable coincide
 POSE_NOT_COVERED = 6  # feasible, but not by the chosen way of sharing
 POSE_UNBOUNDED = 7  # the feasible set has no end, and the chosen way of sharing needs one
+POSE_BORDERLINE = 8  # so near the border that neither tensions nor a proof were found
 
 # How the forward calculation of one sample ended.
 FORWARD_SOLVED = 0

@@ -72,8 +72,9 @@ def confirm(plan: Plan, *, progress: Progress | None = None) -> Confirmation:
         >>> import numpy as np
         >>> import sagline as sl
         >>> path = sl.quintic_path([(0, 0, 2), (2, 1, 2.5)], durations=4.0)
-        >>> proof = sl.confirm(sl.inverse(sl.load_robot("cogiro"), path, model=sl.Elastic()))
-        >>> print(f"{1e3 * np.linalg.norm(proof.position_error, axis=1).max():.2f} mm off")
+        >>> plan = sl.inverse(sl.load_robot("cogiro"), path, model=sl.Elastic())
+        >>> error = np.linalg.norm(sl.confirm(plan).position_error, axis=1)
+        >>> print(f"{1e3 * error.max():.2f} mm off")
         0.23 mm off
     """
     callback(progress, "progress")

@@ -18,7 +18,7 @@ from sagline.kinematics.forward_rows import Found
 from sagline.kinematics.forward_solution import ForwardSolution
 from sagline.kinematics.forward_status import STABLE, ForwardStatus
 from sagline.kinematics.start import from_orientations, start_quaternions
-from sagline.machine import check_memory
+from sagline.memory import check_memory
 from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.robot import Robot
 from sagline.statics.wrench import external_wrench

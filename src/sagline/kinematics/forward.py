@@ -17,7 +17,7 @@ from sagline.kinematics.forward_rows import solve_rows
 from sagline.kinematics.forward_solution import ForwardSolution
 from sagline.kinematics.measured import MeasuredTension, corrected
 from sagline.kinematics.start import search
-from sagline.machine import check_memory
+from sagline.memory import check_poses
 from sagline.robot.pose import Pose
 from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot
@@ -25,7 +25,6 @@ from sagline.robot.several import check_count, first_of, together
 from sagline.statics.tables import pose_rows
 from sagline.statics.wrench import external_wrench
 
-SAMPLE_BYTES = 250.0  # what each cable of a sample takes while it is solved
 _CATENARY = Catenary()
 
 
@@ -63,7 +62,9 @@ def forward(
     Raises:
         InvalidValueError: If a length is not positive or single lengths of a sample are NaN (the message names the
             cable), several robots do not fit together (it names which), an argument is of the wrong kind or shape,
-            or the start is outside the motions of the robot's pattern.
+            the start is outside the motions of the robot's pattern, or so many samples need more memory than is free.
+            cable), several robots do not fit together (it names which), an argument is of the wrong shape, or so many
+            samples need more memory than is free.
 
     Source:
         docs/model.md, section 6.
@@ -85,8 +86,8 @@ def forward(
     shape = lengths.shape[:-1]
     count = shape[0] if shape else None
     check_count(robots, count)
+    check_poses(count or 1, lengths.shape[-1])
     load = external_wrench(wrench, count)
-    check_memory("unstrained_length", SAMPLE_BYTES * lengths.size, "Give the samples in parts.")
     samples, loads = np.atleast_2d(lengths), np.atleast_2d(load)
     if start is None:
         found = search(robots, model, samples, loads, progress)

@@ -14,9 +14,10 @@ from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel, CableState
 from sagline.errors import CableGeometryError, InvalidValueError
 from sagline.kernels import codes, tables
-from sagline.kinematics.inverse_rows import explained, solve_rows
+from sagline.kernels.inverse.verdicts import ENOUGH
+from sagline.kinematics.inverse_rows import decide_rows, solve_rows
 from sagline.kinematics.plan import Plan
-from sagline.machine import check_memory
+from sagline.memory import check_poses
 from sagline.motion.path import Path
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
@@ -29,7 +30,6 @@ from sagline.tension.closest import Closest
 from sagline.tension.method import TensionMethod, Variable
 from sagline.tension.options import kernel_options
 
-POSE_BYTES, CABLE_BYTES = 700.0, 150.0  # what a pose takes while it is solved, and each of its cables
 _CATENARY = Catenary()
 _CLOSEST = Closest()
 
@@ -66,8 +66,8 @@ def inverse(
     Raises:
         InvalidValueError: If a robot has fewer cables than degrees of freedom, the method cannot share among
             its cables, several robots do not fit together (the message names which), an argument is of the
-            wrong kind or shape, a pose is outside the motions of the robot's pattern, or there are more poses than
-            memory for them.
+            wrong kind or shape, a pose is outside the motions of the robot's pattern, or so many poses need more
+            memory than is free.
         CableGeometryError: If a cable has no length at some pose.
 
     Source:
@@ -90,14 +90,15 @@ def inverse(
     options = kernel_options(robots, model, method)
     rows = pose_rows(pose)
     count = len(rows)
-    check_memory("motion", count * (POSE_BYTES + CABLE_BYTES * shared.cable_count), "Give its poses in parts.")
+    check_poses(count, shared.cable_count)
     load = external_wrench(wrench, count if pose.shape else None)
     if isinstance(motion, Path):
         load = locked(inertial_wrench(robots, pose, motion.twist, motion.twist_rate) + load)
     reference = _reference(shared, previous, tension.variable)
-    found = solve_rows(robots, method, options, rows, np.atleast_2d(load), reference, progress)
+    loads = np.atleast_2d(load)
+    found = solve_rows(robots, method, options, rows, loads, reference, progress)
     _refuse_missing_chords(found.pose_status, found.results)
-    shortfall, farkas, blocking = explained(robots, options, rows, found, progress)
+    verdicts = decide_rows(robots, options, rows, loads, found, progress)
     cables = CableState(
         model=model,
         cable=cables_of(robots),
@@ -116,11 +117,13 @@ def inverse(
         path=motion if isinstance(motion, Path) else None,
         tension=tension,
         status=locked(found.pose_status.reshape(pose.shape)),
-        shortfall=locked(shortfall.reshape(pose.shape)),
+        shortfall=locked(verdicts.brackets[:, ENOUGH].reshape(pose.shape)),
         wrench_residual=locked(found.residuals.reshape(*pose.shape, 2)),
-        blocking=locked(blocking.reshape(*pose.shape, shared.cable_count)),
-        farkas=locked(_in_world(farkas, shared).reshape(*pose.shape, 6)),
+        blocking=locked(verdicts.blocking.reshape(*pose.shape, shared.cable_count)),
+        farkas=locked(_in_world(verdicts.farkas, shared).reshape(*pose.shape, 6)),
         needed=locked(_in_world(found.needed, shared).reshape(*pose.shape, 6)),
+        bracket=locked(verdicts.brackets.reshape(*pose.shape, 2)),
+        at_border=locked(verdicts.at_border.reshape(pose.shape)),
     )
 
 

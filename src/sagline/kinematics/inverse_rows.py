@@ -9,8 +9,8 @@ import numpy as np
 from sagline.arrays import Array, Codes, Flags, locked
 from sagline.blocks import Progress, blocks
 from sagline.kernels import codes, tables
-from sagline.kernels.inverse.explain import explain_poses
 from sagline.kernels.inverse.poses import Answers, inverse_poses
+from sagline.kernels.inverse.verdicts import decide_poses
 from sagline.kernels.memory import memory_for
 from sagline.robot.pose import Pose
 from sagline.robot.several import Robots, first_of
@@ -18,6 +18,7 @@ from sagline.statics.tables import robot_terms
 from sagline.tension.method import TensionMethod
 from sagline.tension.options import Options, takes_default_kernel
 
+UNDECIDED = (codes.POSE_INFEASIBLE, codes.POSE_NOT_CONVERGED)  # what the rounds of sharing leave open
 BLOCK = 1 << 12  # poses solved at once: less than 0.2 s, after which an interrupt is heard
 
 
@@ -86,7 +87,7 @@ def solve_rows(
         rows: Pose rows (N, POSE_COLUMNS).
         loads: External plus inertial wrenches (1 or N, 6).
         reference: Tensions that `Closest` starts from, in its variable (m,), or NaN; the last feasible ones on return.
-        progress: Told after each block how many poses are solved, without the infeasible ones, of how many.
+        progress: Told after each block how many poses are solved, without those left open, of how many.
 
     Returns:
         The answers.
@@ -100,45 +101,91 @@ def solve_rows(
     for part in blocks(len(rows), BLOCK):
         inverse_poses(*given, part.start, part.stop)
         if progress is not None:
-            done += int(np.count_nonzero(found.pose_status[part] != codes.POSE_INFEASIBLE))
+            done += int(np.count_nonzero(~np.isin(found.pose_status[part], UNDECIDED)))
             progress(done, len(rows))
     return found
 
 
-def explained(
-    robot: Robots, options: Options, rows: Array, found: Found, progress: Progress | None = None
-) -> tuple[Array, Array, Flags]:
-    """Why poses are infeasible.
+class Verdicts(NamedTuple):
+    """Why poses have no answer; arrays lead with the N poses.
+
+    Attributes:
+        brackets: What is proved, and what suffices, of the smallest change of the force [N], (N, 2): 0 where a pose is
+            solved, NaN where the load is not the reason that it is not.
+        farkas: Farkas vectors along the free motions, (N, n).
+        blocking: Cables whose limits stand against the needed wrench, (N, m).
+        at_border: Poses that were solved here, and not by the way of sharing, (N,).
+    """
+
+    brackets: Array
+    farkas: Array
+    blocking: Flags
+    at_border: Flags
+
+    @classmethod
+    def empty(cls, count: int, cables: int, freedoms: int) -> Verdicts:
+        """Room for a batch without verdicts.
+
+        Args:
+            count: Number of poses N.
+            cables: Number of cables m.
+            freedoms: Number of free motions n.
+
+        Returns:
+            Arrays to be filled: NaN, and no cables.
+        """
+        return cls(
+            np.full((count, 2), np.nan),
+            np.full((count, freedoms), np.nan),
+            np.zeros((count, cables), dtype=np.bool_),
+            np.zeros(count, dtype=np.bool_),
+        )
+
+    @property
+    def answers(self) -> tuple[Array, Array, Flags]:
+        """As the kernel takes them: a plain tuple."""
+        return self.brackets, self.farkas, self.blocking
+
+
+def covers_all(method: int, redundant: int) -> bool:
+    """Whether a way of sharing reaches all that is feasible.
+
+    Args:
+        method: Its code.
+        redundant: How many cables there are beyond the degrees of freedom.
+
+    Returns:
+        False for formulas that do not look at the limits, where there is something to choose.
+    """
+    return redundant == 0 or not codes.CLOSED_FORM <= method <= codes.PUNCTURE
+
+
+def decide_rows(
+    robot: Robots, options: Options, rows: Array, loads: Array, found: Found, progress: Progress | None = None
+) -> Verdicts:
+    """Decide the poses that the rounds of sharing called infeasible; fills the answers of those that are not.
 
     Args:
         robot: The robot, or one a pose.
         options: Of `kernel_options`.
         rows: Pose rows (N, POSE_COLUMNS).
+        loads: External plus inertial wrenches (1 or N, 6).
         found: The answers.
         progress: Told after each block how many poses are done, the feasible ones among them, of how many.
 
     Returns:
-        Shortfall [N] (N,), Farkas vectors along the free motions (N, n) and blocking cables (N, m).
+        The verdicts.
     """
     count, n = found.needed.shape
     m = found.cable_status.shape[1]
-    solved = found.pose_status == codes.POSE_SOLVED
-    shortfall = np.where(solved, 0.0, np.nan)
-    farkas = np.full((count, n), np.nan)
-    blocking = np.zeros((count, m), dtype=np.bool_)
-    which = np.flatnonzero(found.pose_status == codes.POSE_INFEASIBLE)
-    terms, memory = robot_terms(robot), memory_for(m)
+    verdicts = Verdicts.empty(count, m, n)
+    verdicts.brackets[found.pose_status == codes.POSE_SOLVED] = 0.0
+    which = np.flatnonzero(np.isin(found.pose_status, UNDECIDED))
+    given = (options.model, options.limits, robot_terms(robot), rows, loads)
+    how = (covers_all(options.sharing[0], m - n), memory_for(m), found.answers, verdicts.answers)
     for part in blocks(which.size, BLOCK):
-        explain_poses(
-            options.model,
-            options.limits,
-            terms,
-            rows,
-            found.needed,
-            which[part],
-            memory,
-            (shortfall, farkas, blocking),
-        )
+        decide_poses(*given, which[part], *how)
         if progress is not None:
             progress(count - which.size + part.stop, count)
-    return shortfall, farkas, blocking
+    verdicts.at_border[which] = found.pose_status[which] == codes.POSE_SOLVED
+    return verdicts

@@ -15,12 +15,13 @@ from sagline.arrays import Array, exactly, locked
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
-from sagline.kernels import codes, tables
+from sagline.kernels import tables
 from sagline.kernels.inverse.poses import inverse_poses
+from sagline.kernels.inverse.verdicts import ENOUGH, decide_poses
 from sagline.kernels.jit import machine_code
 from sagline.kernels.memory import memory_for
 from sagline.kinematics.caller import ARRAY, FLOAT, WHOLE, give, take
-from sagline.kinematics.inverse_rows import Found, explained
+from sagline.kinematics.inverse_rows import UNDECIDED, Found, Verdicts, covers_all
 from sagline.kinematics.status import PoseStatus
 from sagline.robot.robot import Robot
 from sagline.statics.tables import robot_terms
@@ -29,7 +30,6 @@ from sagline.tension.method import TensionMethod
 from sagline.tension.options import kernel_options, takes_default_kernel
 
 _STATUSES = tuple(sorted(PoseStatus))  # by code; a lookup costs a tenth of a conversion
-_INFEASIBLE = locked(np.array([codes.POSE_INFEASIBLE], dtype=np.int8))
 # takes exactly so many real numbers, quicker than an array takes a tuple
 _POSE = struct.Struct(f"{tables.POSE_COLUMNS}d").pack_into
 QUATERNION_TOLERANCE = 1e-6  # of the length: as `Pose.from_quaternion`
@@ -101,20 +101,17 @@ class InverseSolver:
         self._lengths = self._found.results[tables.LENGTH, 0]
         # the views are read-only: kernels are compiled for read-only inputs, and writing goes through the owner
         self._rows = locked(self._pose.view())
-        arguments = (
-            *self._options,
-            robot_terms(robot),
-            self._rows,
-            locked(self._wrench.view()),
-            self._reference,
-            memory_for(m),
-            None if takes_default_kernel(method) else True,
-            self._found.answers,
-            0,
-            1,
-        )
-        self._solve = partial(machine_code(inverse_poses, arguments), *arguments)
-        explained(robot, self._options, self._rows, self._found._replace(pose_status=_INFEASIBLE))
+        model_terms, sharing_terms, limit_terms = self._options
+        given = (robot_terms(robot), self._rows, locked(self._wrench.view()))
+        memory, answers = memory_for(m), self._found.answers
+        otherwise = None if takes_default_kernel(method) else True
+        share = (*self._options, *given, self._reference, memory, otherwise, answers, 0, 1)
+        self._solve = partial(machine_code(inverse_poses, share), *share)
+        self._verdicts = Verdicts.empty(1, m, n)
+        only = locked(np.zeros(1, dtype=np.int64))
+        how = (only, covers_all(sharing_terms[0], m - n), memory, answers, self._verdicts.answers)
+        decide = (model_terms, limit_terms, *given, *how)
+        self._decide = partial(machine_code(decide_poses, decide), *decide)
         self.reset()
 
     def reset(self) -> None:
@@ -193,15 +190,21 @@ class InverseSolver:
             give(self._lengths, out, "out")
             return PoseStatus.NO_POSE
         self._solve()
+        code = self._status[0]
+        if code:  # 0 is SOLVED
+            if not (isfinite(sum(self._position)) and isfinite(sum(self._load))):
+                self._lengths.fill(nan)
+                give(self._lengths, out, "out")
+                return PoseStatus.NO_POSE
+            if code in UNDECIDED:
+                self._decide()
+                code = self._status[0]
         try:
             if out.dtype is not FLOAT:
                 raise TypeError
             out[WHOLE] = self._lengths
         except (AttributeError, IndexError, TypeError, ValueError):
             give(self._lengths, out, "out")  # looks closer, or tells what is wrong
-        code = self._status[0]
-        if code and not isfinite(sum(self._position)):  # 0 is SOLVED
-            return PoseStatus.NO_POSE
         status: PoseStatus = _STATUSES[code]
         return status
 
@@ -222,5 +225,5 @@ class InverseSolver:
     def _shortfall(self, status: PoseStatus) -> float:
         if status is PoseStatus.SOLVED:
             return 0.0
-        shortfall, _, _ = explained(self._robot, self._options, self._rows, self._found)
-        return float(shortfall[0])
+        decided = status in (PoseStatus.INFEASIBLE, PoseStatus.BORDERLINE)
+        return float(self._verdicts.brackets[0, ENOUGH]) if decided else nan

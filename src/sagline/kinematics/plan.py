@@ -48,17 +48,25 @@ class Plan:
         tension: How the load was shared.
         status: Codes of `PoseStatus`, shape () or (N,).
         shortfall: Smallest change of the force on the platform that would make the pose feasible [N], shape () or
-            (N,): 0 where it is feasible, infinite where no force alone would do, NaN where that is not the reason.
+            (N,), reached by tensions within their limits: 0 where it is feasible, infinite where no force alone would
+            do, NaN where that is not the reason.
         wrench_residual: Norms of the unbalanced force [N] and moment [N m] in the platform's free motions,
             shape (2,) or (N, 2).
-        blocking: Cables whose limits stand against the needed wrench, at most one more than are redundant, shape (m,)
-            or (N, m).
-        farkas: Proof of each infeasible pose, shape (6,) or (N, 6), NaN elsewhere: with y = farkas and the structure
-            matrix J, y . J tau < y . needed for all chord tensions tau within their limits. Its force part has length
-            1, so that the gap is in newtons. NaN also where the limits contradict by no more than rounding. None for
-            a plan from a file that was written before files kept it.
+        blocking: Cables at a limit that stands against the needed wrench: a wider one lessens the shortfall, shape
+            (m,) or (N, m).
+        farkas: Proof of each infeasible pose, shape (6,) or (N, 6), NaN elsewhere: with y = farkas, what the cables
+            give along y, the sum of y . (J_i tau_i - G_i pull_i(tau_i)) with J the structure matrix and G_i what a
+            pull takes away, stays below y . (needed - the pulls in it) for all chord tensions within their limits, on
+            the cables' exact curves. Its force part has length 1, so that the gap is in newtons. NaN also where one
+            direction alone proves nothing and ranges of tensions were narrowed or split. None for a plan from a file
+            that was written before files kept it.
         needed: The wrench J tau that the chord tensions must supply, shape (6,) or (N, 6): weight, given wrench and
-            the cables' pulls T_z - tau sin phi of the last linearization; to that the proof refers. None as above.
+            the cables' pulls T_z - tau sin phi; where there is no answer, at the tensions that leave least of it.
+            None as above.
+        bracket: What is proved, and what suffices, of the shortfall [N], shape (2,) or (N, 2); the second is
+            `shortfall`. None as above.
+        at_border: Poses so near the border that the rounds of sharing found nothing: tensions were searched for on
+            the cables' exact curves, and the way of sharing had no say, shape () or (N,). None as above.
     """
 
     state: Equilibrium
@@ -70,6 +78,8 @@ class Plan:
     blocking: NDArray[np.bool_]
     farkas: Array | None = None
     needed: Array | None = None
+    bracket: Array | None = None
+    at_border: NDArray[np.bool_] | None = None
 
     @property
     def feasible(self) -> NDArray[np.bool_]:
@@ -114,8 +124,8 @@ class Plan:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What stands, but is to be taken with care: cables out of the robot's plane or the empirical model's range."""
-        return (*self._turned_away(), *self._out_of_plane(), *self._below_validity())
+        """What stands, but is to be taken with care: poses out of the robot's plane, at the border, out of validity."""
+        return (*self._turned_away(), *self._out_of_plane(), *self._at_the_border(), *self._below_validity())
 
     def _turned_away(self) -> tuple[str, ...]:
         robot = first_of(self.state.robot)
@@ -134,6 +144,15 @@ class Plan:
         return (
             f"the cables leave the plane of the robot by up to {np.nanmax(away):.6g} m, and only what guides the "
             "platform can hold it against them there; correct the poses, or give the robot another motion_pattern",
+        )
+
+    def _at_the_border(self) -> tuple[str, ...]:
+        count = 0 if self.at_border is None else int(np.count_nonzero(self.at_border))
+        if not count:
+            return ()
+        return (
+            f"{count} of {self.status.size} poses are at the border of what the limits allow: their tensions "
+            f"balance the platform, but {type(self.tension).__name__} had no say in them; widen the limits there",
         )
 
     def _below_validity(self) -> tuple[str, ...]:

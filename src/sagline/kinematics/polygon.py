@@ -59,9 +59,10 @@ def tension_polygon(
 
     Examples:
         >>> import sagline as sl
-        >>> polygon = sl.tension_polygon(sl.load_robot("cogiro"), sl.Pose.from_euler([1, 1, 2], 0, 0, 0))
-        >>> print(len(polygon.vertices), "corners, the first side:", polygon.sides[0])
-        4 corners, the first side: Side(cable=1, limit='min')
+        >>> pose = sl.Pose.from_euler([1, 1, 2], 0, 0, 0)
+        >>> polygon = sl.tension_polygon(sl.load_robot("cogiro"), pose)
+        >>> print(len(polygon.vertices), "corners, first side:", polygon.sides[0])
+        4 corners, first side: Side(cable=1, limit='min')
     """
     check_sharing(instance(robot, Robot, "robot"), Centroid())
     if instance(pose, Pose, "pose").shape:

@@ -39,3 +39,8 @@ class PoseStatus(Status):
         "what was given is no pose: a number is not finite, or the quaternion is not of length 1; give a position and "
         "a unit quaternion, scalar last",
     )
+    BORDERLINE = (
+        codes.POSE_BORDERLINE,
+        "so near the border that neither tensions nor a proof that there are none was found; move the platform, or "
+        "change the load by more than the shortfall's bracket",
+    )

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from sagline.arrays import Array, checked, number
 from sagline.errors import InvalidValueError
-from sagline.machine import check_memory
+from sagline.memory import check_memory
 from sagline.motion.path import Path
 from sagline.motion.profile import QUINTIC, SEPTIC, Profile
 from sagline.motion.segments import Segments
@@ -18,7 +18,7 @@ from sagline.robot.pose import Pose
 
 LIMITS = ("speed", "acceleration", "angular_speed", "angular_acceleration")
 MOST_SAMPLES = 100_000_000  # 21 GB of path: beyond it a duration or the rate has the wrong unit
-SAMPLE_BYTES = 350  # what a sample takes while the path is made: 208 in the end
+SAMPLE_BYTES = 300.0  # of memory a sample needs while the path is made
 
 
 def quintic_path(
@@ -65,8 +65,9 @@ def quintic_path(
 
     Examples:
         >>> import sagline as sl
-        >>> path = sl.quintic_path([(0, 0, 1.5), (4, 3, 1.5)], speed=1.5)  # 5 m: 15/8 5/1.5 s
-        >>> print(f"{path.duration} s, {len(path)} samples, peak {path.twist[:, :3].max():.1f} m/s along x")
+        >>> path = sl.quintic_path([(0, 0, 1.5), (4, 3, 1.5)], speed=1.5)  # 5 m
+        >>> peak = path.twist[:, :3].max()
+        >>> print(f"{path.duration} s, {len(path)} samples, peak {peak:.1f} m/s along x")
         6.25 s, 626 samples, peak 1.2 m/s along x
     """
     limits = (speed, acceleration, angular_speed, angular_acceleration)
@@ -111,7 +112,8 @@ def septic_path(
         >>> import numpy as np
         >>> import sagline as sl
         >>> path = sl.septic_path([(0, 0, 1.5), (4, 3, 1.5)], durations=6.25)
-        >>> print(path.jerk[[0, -1]].any(), f"{np.linalg.norm(path.twist[:, :3], axis=1).max():.2f} m/s")
+        >>> peak = np.linalg.norm(path.twist[:, :3], axis=1).max()
+        >>> print(path.jerk[[0, -1]].any(), f"{peak:.2f} m/s")
         False 1.75 m/s
     """
     limits = (speed, acceleration, angular_speed, angular_acceleration)
@@ -179,9 +181,9 @@ def _time_grid(total: float, rate: float) -> Array:
             f"<= {MOST_SAMPLES:g}",
             "Check the units of durations, limits and rate.",
         )
-    check_memory(f"a path of {steps:.3g} samples", SAMPLE_BYTES * steps, "Give a lower rate, or shorter segments.")
+    check_memory(
+        f"a path of {steps:.4g} samples", SAMPLE_BYTES * steps, "Check the units of durations, limits and rate."
+    )
     # A total within rounding of a multiple of 1/rate gets no extra sample.
     last = round(steps) if abs(steps - round(steps)) <= 1e-9 * steps else int(np.ceil(steps))
-    time = np.arange(last + 1) / rate
-    time[-1] = total
-    return time
+    return np.append(np.arange(last) / rate, total)

@@ -37,7 +37,8 @@ def path_from_samples(time: ArrayLike, pose: Pose) -> Path:
         >>> import numpy as np
         >>> import sagline as sl
         >>> time = np.linspace(0.0, 2.0, 21)
-        >>> path = sl.path_from_samples(time, sl.Pose.from_euler(np.outer(time**2, [1, 0, 2]), 0, 0, 0))
+        >>> pose = sl.Pose.from_euler(np.outer(time**2, [1, 0, 2]), 0, 0, 0)
+        >>> path = sl.path_from_samples(time, pose)
         >>> print(path.twist[-1, :3].round(6), path.twist_rate[0, :3].round(6))
         [4. 0. 8.] [2. 0. 4.]
     """

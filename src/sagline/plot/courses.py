@@ -5,11 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
+from matplotlib.ticker import MaxNLocator
 
 from sagline.arguments import choice, instance
 from sagline.errors import InvalidValueError
 from sagline.kinematics.plan import Plan
-from sagline.plot.sheet import COLORS, TICK, axes_or_new, dressed, legend_outside, shade, sheet
+from sagline.plot.sheet import COLORS, TICK, axes_or_new, draw_course, dressed, legend_outside, shade, sheet
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -114,6 +115,22 @@ def clock_of(plan: Plan) -> Array:
     return np.arange(plan.status.size, dtype=np.float64) if plan.path is None else plan.path.time
 
 
+def dress_over(ax: Axes, plan: Plan, label: str) -> None:
+    """Dress axes of what a plan does over time, or over the numbers of its poses.
+
+    Args:
+        ax: The axes.
+        plan: The plan.
+        label: Of the vertical axis, with its unit.
+    """
+    dressed(ax, "pose" if plan.path is None else "time [s]", label)
+    if plan.path is None:
+        ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+    clock = clock_of(plan)
+    if clock.size > 1:
+        ax.set_xlim(clock[0], clock[-1])
+
+
 def _lengths(ax: Axes, plan: Plan, quantity: str) -> None:
     label, scale = _known(quantity, LENGTHS)
     _cables(ax, plan, scale * getattr(instance(plan, Plan, "plan").state.cables, quantity), label)
@@ -132,12 +149,9 @@ def _cables(ax: Axes, plan: Plan, values: Array, label: str) -> None:
     """One line a cable; neighbors, which most robots pair at a winch post, share a color."""
     courses = np.atleast_2d(values)
     clock = clock_of(plan)
-    marker = "o" if len(courses) == 1 else None
     for i, course in enumerate(courses.T):
         color = COLORS[i // 2 % len(COLORS)]
         style = "-" if i % 2 == 0 else (0, (4.0, 1.6))
-        ax.plot(clock, course, color=color, linestyle=style, linewidth=1.1, marker=marker, label=f"cable {i}")
+        draw_course(ax, clock, course, color=color, linestyle=style, linewidth=1.1, label=f"cable {i}")
     shade(ax, clock, [(gap.first, gap.last) for gap in plan.gaps], INFEASIBLE)
-    dressed(ax, "pose" if plan.path is None else "time [s]", label)
-    if len(clock) > 1:
-        ax.set_xlim(clock[0], clock[-1])
+    dress_over(ax, plan, label)

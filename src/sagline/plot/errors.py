@@ -9,19 +9,35 @@ import numpy as np
 from sagline.arguments import HOW_TO_GET, instance
 from sagline.errors import InvalidValueError
 from sagline.kinematics.confirm import Confirmation
-from sagline.plot.courses import INFEASIBLE, clock_of
-from sagline.plot.sheet import COLORS, TICK, axes_or_new, dressed, legend_outside, shade, sheet
+from sagline.plot.courses import INFEASIBLE, clock_of, dress_over
+from sagline.plot.numbers import n
+from sagline.plot.sheet import (
+    COLORS,
+    ORANGE,
+    TICK,
+    axes_or_new,
+    draw_course,
+    legend_outside,
+    runs,
+    shade,
+    sheet,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-LEAST = 1e-3  # mm: rounding errors are drawn as the flat line that they are
+LEAST = 1e-3  # mm: rounding errors are drawn as the flat line that they are, and told
+FLAT = 0.01  # of the axis: below it a course is a flat line to the eye
+UNCONFIRMED = "not confirmed"  # planned, but the lengths lead to no stable equilibrium that is found
 STYLES = ("-", (0, (4.0, 1.6)), (0, (1.0, 1.2)))
 
 
 def error(confirmation: Confirmation, ax: Axes | None = None) -> Axes:
     """Position error along x, y and z over time: where the platform really is, less where it was planned.
+
+    Poses without a plan, and poses whose lengths lead to no stable equilibrium that was found, are shaded. Errors too
+    small for the axis are told in numbers.
 
     Args:
         confirmation: A plan and what its lengths lead to.
@@ -32,6 +48,7 @@ def error(confirmation: Confirmation, ax: Axes | None = None) -> Axes:
     """
     ax = axes_or_new(ax, height=2.6)
     _draw(ax, confirmation)
+    _tell_flat(ax, confirmation)
     legend_outside(ax)
     return ax
 
@@ -56,6 +73,8 @@ def errors(*confirmations: Confirmation) -> Figure:
         _draw(ax, confirmation)
         ax.set_title(confirmation.plan.state.one_robot.name, fontsize=TICK)
         ax.label_outer()
+    for ax, confirmation in zip(panels, confirmations, strict=True):
+        _tell_flat(ax, confirmation)  # on the scale that they have found together
     handles = {label: line for ax in panels for line, label in zip(*ax.get_legend_handles_labels(), strict=True)}
     figure.legend(handles.values(), handles.keys(), loc="outside right upper", fontsize=TICK, frameon=False)
     return figure
@@ -66,10 +85,20 @@ def _draw(ax: Axes, confirmation: Confirmation) -> None:
     clock = clock_of(plan)
     courses = 1e3 * np.atleast_2d(confirmation.position_error)
     for name, course, color, style in zip("xyz", courses.T, COLORS[:3], STYLES, strict=True):
-        ax.plot(clock, course, color=color, linestyle=style, linewidth=1.2, label=f"${name}$")
+        draw_course(ax, clock, course, color=color, linestyle=style, linewidth=1.2, label=f"${name}$")
     shade(ax, clock, [(gap.first, gap.last) for gap in plan.gaps], INFEASIBLE)
-    dressed(ax, "pose" if plan.path is None else "time [s]", "position error [mm]")
+    lost = np.atleast_1d(plan.feasible & ~confirmation.held)
+    shade(ax, clock, runs(lost), UNCONFIRMED, ORANGE, 0.25)
+    dress_over(ax, plan, "position error [mm]")
     low, high = ax.get_ylim()
     ax.set_ylim(min(low, -LEAST), max(high, LEAST))
-    if clock.size > 1:
-        ax.set_xlim(clock[0], clock[-1])
+
+
+def _tell_flat(ax: Axes, confirmation: Confirmation) -> None:
+    """Say how large errors are that the scale of the axis makes a flat line."""
+    errors = np.abs(1e3 * confirmation.position_error)
+    known = errors[np.isfinite(errors)]
+    if known.size and known.max() < FLAT * max(map(abs, ax.get_ylim())):
+        size = 1e3 * float(np.nanmax(confirmation.plan.unstrained_length))
+        text = f"largest: {n(known.max(), '.2g', 'mm', size=size)}"
+        ax.text(0.03, 0.95, text, transform=ax.transAxes, fontsize=TICK, va="top")

@@ -13,6 +13,7 @@ from sagline.plot.sheet import BLUE, COLORS, TICK, VERMILLION, axes_or_new, dres
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+START_COLOR = "#A84300"  # vermillion, dark enough for text
 LEVEL = 1e-9  # m: a path that rises less lies in a plane
 
 
@@ -30,7 +31,7 @@ def path(path: Path, ax: Axes | None = None) -> Axes:
     x, y, z = instance(path, Path, "path").pose.position.T
     ax.plot(x, y, color=BLUE, linewidth=1.3)
     ax.plot(x[0], y[0], "o", color=VERMILLION, markersize=5.0, zorder=3.0)
-    ax.set_title("\N{BLACK CIRCLE} start", color=VERMILLION, fontsize=TICK, loc="left")
+    ax.set_title("\N{BLACK CIRCLE} start", color=START_COLOR, fontsize=TICK, loc="left")
     for k in _marks(path):
         base = path.pose.position[k, :2]
         tip = base + 1e-3 * path.twist[k, :2]  # s: short enough to show the direction only

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.textpath import TextPath
 
 from sagline.arguments import instance
 from sagline.errors import InvalidValueError
@@ -16,7 +18,13 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import ArrayLike
 
+    from sagline.arrays import Array
+
 MARKERS = "osD^v<>pPX*h"
+POINT = 1.0 / 72.0  # in
+TRIES, SPARE = 5, 0.03  # at axes in which all names are; what they grow by in excess, of their size
+SHORT = 1e-9  # of the longest side: one shorter has no direction
+GAP = 4.0  # pt between a side and its name
 
 
 def polygon(shape: TensionPolygon, points: Mapping[str, ArrayLike] | None = None, ax: Axes | None = None) -> Axes:
@@ -46,33 +54,107 @@ def polygon(shape: TensionPolygon, points: Mapping[str, ArrayLike] | None = None
         raise InvalidValueError(
             f"points[{wrong[0]!r}]", "a batch of tensions", "those of one pose", "Give them one by one."
         )
+    fresh = ax is None
     ax = axes_or_new(ax, height=4.5)
+    if fresh:
+        cast(Figure, ax.get_figure(root=True)).set_layout_engine("compressed")  # it knows of axes of equal scales
     corners = np.asarray(shape.vertices)
     ax.fill(*corners.T, facecolor=GAP_COLOR, alpha=0.25, edgecolor="none")
-    middle = corners.mean(axis=0)
     for k, side in enumerate(shape.sides):
         ends = corners[[k, (k + 1) % len(corners)]]
         ax.plot(*ends.T, color="0.3", linewidth=1.0, linestyle="-" if side else ":")
-        if side is not None:
-            place = ends.mean(axis=0)
-            out = place - middle
-            ax.annotate(
-                f"cable {side.cable} {side.limit}",
-                place,
-                xytext=12.0 * out / (np.linalg.norm(out) or 1.0),
-                textcoords="offset points",
-                ha="center",
-                va="center",
-                fontsize=TICK,
-                color="0.3",
-            )
     for k, (name, place) in enumerate(places.items()):
         if np.isfinite(place).all():
             color, marker = COLORS[k % len(COLORS)], MARKERS[k % len(MARKERS)]
             ax.plot(*place, marker, color=color, markersize=6.0, markeredgecolor="white", label=name, linestyle="none")
     dressed(ax, r"$\lambda_1$ [N]", r"$\lambda_2$ [N]")
     ax.set_aspect("equal")
-    ax.margins(0.12)
+    ax.margins(x=0.33, y=0.16)  # room for names
     if any(np.isfinite(place).all() for place in places.values()):
         legend_outside(ax)
+    _name_sides(ax, shape, corners)
     return ax
+
+
+class _Name(NamedTuple):
+    """The name of a side and where it stands.
+
+    Attributes:
+        text: "cable 3 min".
+        middle: Of the side, in coordinates of the null space [N].
+        offset: From there to the middle of the name [pt].
+        half: Half the width and height of the name [pt].
+        moved: Whether it has made room for others.
+    """
+
+    text: str
+    middle: Array
+    offset: Array
+    half: Array
+    moved: bool
+
+
+def _name_sides(ax: Axes, shape: TensionPolygon, corners: Array) -> None:
+    """Write the names; the axes grow until all are in them."""
+    figure = cast(Figure, ax.get_figure(root=True))
+    for _ in range(TRIES):
+        figure.draw_without_rendering()  # now it is known how large the polygon is on the sheet
+        pixels = np.diff(ax.transData.transform([(0.0, 0.0), (1.0, 0.0)])[:, 0])
+        scale = float(pixels[0]) / (figure.dpi * POINT)  # points a newton
+        names = _names(shape, corners, scale)
+        reach = np.array([name.middle + (name.offset + sign * name.half) / scale for name in names for sign in (-1, 1)])
+        seen = np.array([ax.get_xlim(), ax.get_ylim()]).T
+        wanted = np.array([np.min([seen[0], *reach], axis=0), np.max([seen[1], *reach], axis=0)])
+        if np.array_equal(wanted, seen):
+            break
+        wanted += (wanted != seen) * np.array([[-SPARE], [SPARE]]) * np.ptp(wanted, axis=0)
+        ax.set(xlim=wanted[:, 0], ylim=wanted[:, 1])
+    line = {"arrowstyle": "-", "color": "0.75", "linewidth": 0.6, "shrinkA": 0.0, "shrinkB": 2.0}
+    for name in names:
+        ax.annotate(
+            name.text,
+            (name.middle[0], name.middle[1]),
+            xytext=(name.offset[0], name.offset[1]),
+            textcoords="offset points",
+            ha="center",
+            va="center",
+            fontsize=TICK,
+            color="0.3",
+            arrowprops=line if name.moved else None,
+        )
+
+
+def _names(shape: TensionPolygon, corners: Array, scale: float) -> list[_Name]:
+    """Each name beyond its side, where a convex polygon has no other line; names that would meet move outward."""
+    names: list[_Name] = []
+    normals = _normals(corners)
+    for k, side in enumerate(shape.sides):
+        if side is None:
+            continue
+        text, middle = f"cable {side.cable} {side.limit}", 0.5 * (corners[k] + corners[(k + 1) % len(corners)])
+        out = normals[k]
+        half = 0.5 * np.array([TextPath((0.0, 0.0), text, size=TICK).get_extents().width + 4.0, 1.3 * TICK])
+        away = least = GAP + half @ np.abs(out)  # then the whole box is beyond the line
+        while any(
+            np.all(np.abs(scale * (middle - name.middle) + away * out - name.offset) < half + name.half + 1.0)
+            for name in names
+        ):
+            away += 0.5 * TICK
+        names.append(_Name(text, middle, away * out, half, bool(away > least)))
+    return names
+
+
+def _normals(corners: Array) -> Array:
+    """Outward directions of the sides, shape (h, 2); a side without length has one between its neighbors'."""
+    along = np.roll(corners, -1, axis=0) - corners
+    lengths = np.linalg.norm(along, axis=1)
+    long = np.flatnonzero(lengths > SHORT * lengths.max())
+    if long.size == 0:
+        return np.tile((0.0, 1.0), (len(corners), 1))
+    normals = np.zeros_like(along)
+    normals[long] = np.column_stack((along[long, 1], -along[long, 0])) / lengths[long, None]  # counter-clockwise
+    for k in set(range(len(corners))) - set(long.tolist()):
+        place = int(np.searchsorted(long, k))
+        between = normals[long[place - 1]] + normals[long[place % long.size]]
+        normals[k] = between / (np.linalg.norm(between) or 1.0)
+    return normals

@@ -6,32 +6,47 @@ from itertools import combinations, product
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib import patheffects
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.ticker import MaxNLocator
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from mpl_toolkits.mplot3d.axes3d import Axes3D
+from scipy.spatial import ConvexHull
 
 from sagline.arguments import instance, optional
 from sagline.errors import InvalidValueError
 from sagline.kernels.cable import geometry
 from sagline.kinematics.inverse import inverse
-from sagline.plot.sheet import BLUE, LABEL, TICK, VERMILLION, sheet
+from sagline.plot.numbers import n
+from sagline.plot.sheet import LABEL, TICK, VERMILLION, sheet
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.tables import body_table, cable_table, pose_rows
+from sagline.viewer.tension_scale import TensionScale
 
 if TYPE_CHECKING:
     from sagline.arrays import Array
+    from sagline.kinematics.plan import Plan
 
 POINTS = 50  # along each cable
-FRAME_COLOR = "0.6"
+FRAME_COLOR, FLOOR_COLOR, SHADOW_COLOR = "0.6", "0.955", "0.82"
+FLAT = 1e-6  # of the robot's size: a platform that is thinner casts a line
+NEAR = 0.04  # of the robot's size: anchors that are closer share a label
+HALO = [patheffects.withStroke(linewidth=2.0, foreground="white")]
+AWAY = 0.045  # of the robot's size: how far outside its anchor a label stands
 
 
 def robot(robot: Robot, pose: Pose | None = None, ax: Axes3D | None = None) -> Axes3D:
     """The robot in space at rest: frame, platform, and its cables as exact catenaries that carry it.
 
+    Cables have the color of their chord tension, on the scale of the robot's limits as in `sagline view`, and their
+    numbers at the frame; the platform stands over its shadow on the ground, which is at z = 0 or lower.
+
     Args:
         robot: The robot.
         pose: Where the platform is; None for the middle of the robot's test box. Where no tensions carry the platform
-            the cables are straight and dashed.
+            the cables are straight, dashed and without color.
         ax: Axes to draw on, made with `projection="3d"`; None for a new figure.
 
     Returns:
@@ -44,19 +59,26 @@ def robot(robot: Robot, pose: Pose | None = None, ax: Axes3D | None = None) -> A
     optional(ax, Axes3D, "ax")
     if ax is None:
         ax = sheet(height=4.0, width=5.6).add_subplot(projection="3d")
-    lines, carried = _cable_lines(robot, where)
-    for line in lines:
-        ax.plot(*line.T, color=BLUE, linewidth=1.0, linestyle="-" if carried else (0, (3.0, 2.0)))
-    if robot.frame_size is not None:
-        top = robot.frame_anchors.max(axis=0)
-        middle = 0.5 * (top + robot.frame_anchors.min(axis=0))
-        middle[2] = top[2] - 0.5 * robot.frame_size[2]  # frames stand: their top is where the highest anchors are
-        _draw_box(ax, _corners(middle, robot.frame_size), FRAME_COLOR, 0.7)
-    ax.scatter(*robot.frame_anchors.T, color="black", s=8.0, depthshade=False)
+    ax.computed_zorder = False  # by the middles of things, which puts the ground over what stands on it
+    plan, lines = _cable_lines(robot, where)
+    scale = TensionScale.of(robot)
+    colors = scale.colors(plan.chord_tension) / 255.0  # gray where there is no tension
+    for line, color in zip(lines, colors, strict=True):
+        ax.plot(*line.T, color=color, linewidth=1.4, linestyle="-" if plan.feasible else (0, (3.0, 2.0)), zorder=2.0)
+    frame = _frame_box(robot)
+    if frame is not None:
+        _draw_box(ax, frame, FRAME_COLOR, 0.7)
+    ax.scatter(*robot.frame_anchors.T, color="black", s=8.0, depthshade=False, zorder=4.0)
     low, high = robot.platform_anchors.min(axis=0), robot.platform_anchors.max(axis=0)
     size = high - low if robot.platform_size is None else robot.platform_size
-    _draw_box(ax, where.position + _corners(0.5 * (low + high), size) @ where.matrix.T, VERMILLION, 1.3)
-    _dress(ax, robot.name if carried else f"{robot.name}: no tensions within the limits carry it here")
+    platform = where.position + _corners(0.5 * (low + high), size) @ where.matrix.T
+    _draw_box(ax, platform, VERMILLION, 1.3)
+    points = np.concatenate((lines.reshape(-1, 3), platform, *([] if frame is None else [frame])))
+    _draw_ground(ax, points, platform)
+    _number(ax, robot.frame_anchors, points)
+    _dress(ax, points, robot.name if plan.feasible else f"{robot.name}: no tensions within the limits carry it here")
+    if plan.feasible:
+        _tension_bar(ax, scale, plan.chord_tension)
     return ax
 
 
@@ -69,8 +91,8 @@ def _pose_of(robot: Robot, pose: Pose | None) -> Pose:
     return pose
 
 
-def _cable_lines(robot: Robot, pose: Pose) -> tuple[Array, bool]:
-    """Points of the cables in the world [m], shape (m, POINTS, 3), and whether tensions carry the platform."""
+def _cable_lines(robot: Robot, pose: Pose) -> tuple[Plan, Array]:
+    """What carries the platform, and points of the cables in the world [m], shape (m, POINTS, 3)."""
     plan = inverse(robot, pose)
     tables = np.empty((1, geometry.GEOMETRY_ROWS, robot.cable_count))
     geometry.cable_geometries(cable_table(robot), body_table(robot), pose_rows(pose), np.empty((3, 3)), tables)
@@ -82,7 +104,17 @@ def _cable_lines(robot: Robot, pose: Pose) -> tuple[Array, bool]:
         along, up = (np.outer(table[row], share) for row in (geometry.SPAN, geometry.RISE))
     azimuth = table[[geometry.AZIMUTH_X, geometry.AZIMUTH_Y]]
     offsets = np.stack((azimuth[0, :, None] * along, azimuth[1, :, None] * along, up), axis=-1)
-    return robot.frame_anchors[:, None] + offsets, bool(plan.feasible)
+    return plan, robot.frame_anchors[:, None] + offsets
+
+
+def _frame_box(robot: Robot) -> Array | None:
+    """Corners of the frame, shape (8, 3). Frames stand: their top is where the highest anchors are."""
+    if robot.frame_size is None:
+        return None
+    top = robot.frame_anchors.max(axis=0)
+    middle = 0.5 * (top + robot.frame_anchors.min(axis=0))
+    middle[2] = top[2] - 0.5 * robot.frame_size[2]
+    return _corners(middle, robot.frame_size)
 
 
 def _corners(middle: Array, size: Array) -> Array:
@@ -97,16 +129,64 @@ def _draw_box(ax: Axes3D, corners: Array, color: str, width: float) -> None:
     signs = list(product((0, 1), repeat=3))
     for a, b in combinations(range(8), 2):
         if sum(p != q for p, q in zip(signs[a], signs[b], strict=True)) == 1:
-            ax.plot(*corners[[a, b]].T, color=color, linewidth=width)
+            ax.plot(*corners[[a, b]].T, color=color, linewidth=width, zorder=1.0 + width)
 
 
-def _dress(ax: Axes3D, title: str) -> None:
-    ax.set_title(title, fontsize=LABEL, y=0.93)
-    for name, axis in zip("xyz", (ax.xaxis, ax.yaxis, ax.zaxis), strict=True):
+def _draw_ground(ax: Axes3D, points: Array, platform: Array) -> None:
+    """The ground under everything, and the platform's shadow on it."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    height = min(0.0, float(low[2]))
+    outline = _corners(0.5 * (low + high), high - low)[[0, 2, 6, 4], :2]
+    shadow = platform[:, :2]
+    if np.linalg.matrix_rank(shadow - shadow[0], tol=FLAT * float(np.ptp(points))) == 2:
+        shadow = shadow[ConvexHull(shadow).vertices]
+    for place, color in ((outline, FLOOR_COLOR), (shadow, SHADOW_COLOR)):
+        flat = np.column_stack((place, np.full(len(place), height)))
+        ax.add_collection3d(Poly3DCollection([flat], facecolor=color, edgecolor="none", zorder=0.5))
+
+
+def _number(ax: Axes3D, anchors: Array, points: Array) -> None:
+    """The number of each cable above and outside its anchor; anchors close to each other share a place."""
+    size = float(np.linalg.norm(np.ptp(points, axis=0)))
+    left = list(range(len(anchors)))
+    while left:
+        together = [k for k in left if np.linalg.norm(anchors[k] - anchors[left[0]]) <= NEAR * size]
+        left = [k for k in left if k not in together]
+        place = anchors[together].mean(axis=0)
+        out = (place - points.mean(axis=0)) * (1.0, 1.0, 0.0)
+        out = 0.5 * out / (np.linalg.norm(out) or 1.0) + (0.0, 0.0, 0.85)  # upward: the axes have their numbers below
+        place = place + AWAY * size * out
+        text = ", ".join(map(str, together))
+        ax.text(*place, text, fontsize=TICK, ha="center", va="center", path_effects=HALO, zorder=5.0)
+
+
+def _tension_bar(ax: Axes3D, scale: TensionScale, tension: Array) -> None:
+    steps = np.geomspace(scale.low, scale.high, 128)
+    shown = ScalarMappable(LogNorm(scale.low, scale.high), ListedColormap(scale.colors(steps) / 255.0))
+    below, above = tension.min() < scale.low * (1.0 - 1e-6), tension.max() > scale.high * (1.0 + 1e-6)
+    extend = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
+    bar = ax.figure.colorbar(
+        shown, ax=ax, location="left", shrink=0.6, pad=0.0, aspect=24, extend=extend[bool(below), bool(above)]
+    )
+    bar.set_label(r"chord tension $\tau$ [N]", fontsize=LABEL)
+    bar.set_ticks(list(scale.ticks()), labels=[n(tick, ",.4g") for tick in scale.ticks()])
+    bar.ax.minorticks_off()
+    bar.ax.tick_params(labelsize=TICK)
+
+
+def _dress(ax: Axes3D, points: Array, title: str) -> None:
+    """Labels, and ticks as far apart as their numbers are wide, none where two axes meet."""
+    ax.set_title(title, fontsize=LABEL, y=0.97)
+    low, high = points.min(axis=0), points.max(axis=0)
+    low[2] = min(0.0, low[2])
+    size = np.maximum(high - low, 0.1 * np.max(high - low))
+    middle = 0.5 * (low + high)
+    ax.set(**{f"{name}lim": (m - 0.5 * s, m + 0.5 * s) for name, m, s in zip("xyz", middle, size, strict=True)})
+    for name, axis, share in zip("xyz", (ax.xaxis, ax.yaxis, ax.zaxis), size / size.max(), strict=True):
         axis.set_label_text(f"${name}$ [m]", fontsize=LABEL)
-        axis.set_tick_params(labelsize=TICK)
-        axis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+        axis.labelpad = 7.0
+        axis.set_tick_params(labelsize=TICK, pad=0.0)
+        axis.set_major_locator(MaxNLocator(max(1, round(4.5 * share)), steps=[1, 2, 5, 10], prune="both"))
         axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
     ax.grid(visible=False)
-    limits = (ax.get_xlim3d(), ax.get_ylim3d(), ax.get_zlim3d())
-    ax.set_box_aspect([high - low for low, high in limits], zoom=0.95)
+    ax.set_box_aspect(size, zoom=0.84 - 0.1 * float(size[2] / size.max()))  # what is tall needs room for its labels

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from io import BytesIO
 from itertools import pairwise
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import matplotlib
 import numpy as np
@@ -19,7 +19,7 @@ from sagline.files.whole import written_whole
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from sagline.arrays import Array
+    from sagline.arrays import Array, Flags
 
 # Okabe and Ito 2008, "Color universal design", without the two that are too pale for a line on white
 BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"
@@ -110,7 +110,37 @@ def legend_outside(ax: Axes, title: str = "") -> None:
     )
 
 
-def shade(ax: Axes, clock: Array, spans: Iterable[tuple[int, int]], label: str) -> None:
+def draw_course(ax: Axes, clock: Array, course: Array, **look: Any) -> None:
+    """A line over time; a sample that has no neighbor to be joined to is a point, not nothing.
+
+    Args:
+        ax: The axes.
+        clock: Where the samples are on the horizontal axis, shape (N,).
+        course: The samples, NaN where there is none, shape (N,).
+        look: Of the line, as `Axes.plot` takes it.
+    """
+    known = np.concatenate(([False], np.isfinite(course), [False]))
+    alone = np.flatnonzero(known[1:-1] & ~known[:-2] & ~known[2:])
+    points: dict[str, Any] = {"marker": "o", "markersize": 3.5, "markevery": alone.tolist()} if alone.size else {}
+    ax.plot(clock, course, **look, **points)
+
+
+def runs(flags: Flags) -> list[tuple[int, int]]:
+    """First and last sample of each run of flags.
+
+    Args:
+        flags: Shape (N,).
+
+    Returns:
+        The runs, in order.
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(np.int8)))
+    return [(int(first), int(end) - 1) for first, end in edges.reshape(-1, 2)]
+
+
+def shade(
+    ax: Axes, clock: Array, spans: Iterable[tuple[int, int]], label: str, color: str = GAP_COLOR, alpha: float = 0.5
+) -> None:
     """Shade the spans of samples (first, last), each up to halfway to its neighbors.
 
     Args:
@@ -118,6 +148,8 @@ def shade(ax: Axes, clock: Array, spans: Iterable[tuple[int, int]], label: str) 
         clock: Where the samples are on the horizontal axis, shape (N,).
         spans: First and last sample of each span.
         label: Of all of them, in the legend.
+        color: Of the shade.
+        alpha: How dense it is, 0 to 1.
     """
     if clock.size > 1:
         middles = [0.5 * (before + after) for before, after in pairwise(clock)]
@@ -126,7 +158,7 @@ def shade(ax: Axes, clock: Array, spans: Iterable[tuple[int, int]], label: str) 
         edges = clock[0] + np.array([-0.5, 0.5])
     for k, (first, last) in enumerate(spans):
         name = label if k == 0 else "_"
-        ax.axvspan(edges[first], edges[last + 1], color=GAP_COLOR, alpha=0.5, linewidth=0.0, label=name, zorder=0.5)
+        ax.axvspan(edges[first], edges[last + 1], color=color, alpha=alpha, linewidth=0.0, label=name, zorder=0.5)
 
 
 def save(drawing: Figure | Axes, file: os.PathLike[str] | str) -> None:
@@ -145,10 +177,13 @@ def save(drawing: Figure | Axes, file: os.PathLike[str] | str) -> None:
     figure = drawing if isinstance(drawing, Figure) else cast(Figure, drawing.get_figure(root=True))
     path = file_path(file)
     kind = path.suffix.lstrip(".").lower()
-    known = figure.canvas.get_supported_filetypes()
+    known = sorted(figure.canvas.get_supported_filetypes().keys() - {"pgf"})  # text for LaTeX, which may be missing
     if kind not in known:
-        raise FileError(path, f"the suffix is {path.suffix or 'missing'}", f"Choose one of {', '.join(sorted(known))}.")
+        raise FileError(path, f"the suffix is {path.suffix or 'missing'}", f"Choose one of {', '.join(known)}.")
     # the same figure gives the same bytes: no date, no random names
     metadata = {"Date": None} if kind == "svg" else None
-    with written_whole(path) as partial, matplotlib.rc_context({"svg.hashsalt": "sagline"}):
-        figure.savefig(partial, format=kind, dpi=RESOLUTION, metadata=metadata)
+    drawn = BytesIO()  # matplotlib leaves a file open that it cannot write to
+    with matplotlib.rc_context({"svg.hashsalt": "sagline"}):
+        figure.savefig(drawn, format=kind, dpi=RESOLUTION, metadata=metadata)
+    with written_whole(path) as partial:
+        partial.write_bytes(drawn.getbuffer())

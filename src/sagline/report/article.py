@@ -8,19 +8,23 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from sagline.files.json_text import plain, save_json
-from sagline.files.whole import check_folder, made_folder, write_text
+from sagline.files.json_text import json_text, plain
+from sagline.files.whole import check_files, made_folder, written_together
 from sagline.report.blocks import Chapter
 from sagline.report.page import page
 from sagline.report.parts import selection
+from sagline.report.result import picture
 
+NAMES = ("article.html", "article.json")  # both or neither is written
 TITLE = "The article, redone"
 LEAD = (
     "Gia Luan & Truong Thinh, “Empirical Quasi-Static and Inverse Kinematics of Cable-Driven Parallel Manipulators "
-    "Including Presence of Sagging”, Appl. Sci. 2020, 10(15), 5318, doi:10.3390/app10155318. What it says stands "
-    "beside what sagline computes, with exact elastic catenaries as the reference. Notation: z up, T acts on the "
-    "cable at its platform end, φ is the article's β. Every number on the computed side was computed when this page "
-    "was made."
+    "Including Presence of Sagging”, Appl. Sci. 2020, 10(15), 5318, doi:10.3390/app10155318, beside what sagline "
+    "computes with exact elastic catenaries."
+)
+NOTATION = (
+    "Notation: z up, T acts on the cable at its platform end, φ is the article's β. Every number on the computed side "
+    "was computed when this page was made; one that is rounding of the arithmetic alone is told as such."
 )
 
 Progress = Callable[[int, int, str], None]
@@ -59,7 +63,7 @@ def write_article(folder: Path | str, parts: Sequence[str] = (), progress: Progr
         FileError: If the folder cannot be written; then nothing has been.
     """
     wanted = selection(parts)
-    check_folder(folder)
+    check_files(folder, NAMES)
     chapters = []
     for done, part in enumerate(wanted.parts):
         if progress is not None:
@@ -69,8 +73,9 @@ def write_article(folder: Path | str, parts: Sequence[str] = (), progress: Progr
         progress(len(chapters), len(chapters), "done")
     numbers = {c.key: {finding.key: plain(finding.numbers) for finding in c.findings} for c in chapters}
     made = f"Made by sagline {version('sagline')}: sagline article {' '.join(parts)}".rstrip() + "."
+    contents = page(TITLE, LEAD, NOTATION, chapters, picture(chapters), made), json_text(numbers) + "\n"
     place = made_folder(folder)
-    report = ArticleReport(place / "article.html", place / "article.json", tuple(chapters), numbers)
-    save_json(numbers, report.data)
-    write_text(report.page, page(TITLE, LEAD, chapters, made))
-    return report
+    with written_together(place, NAMES) as files:
+        for file, content in zip(files, contents, strict=True):
+            file.write_text(content, encoding="utf-8")
+    return ArticleReport(place / NAMES[0], place / NAMES[1], tuple(chapters), numbers)

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from math import isfinite
-from typing import Any, NamedTuple, SupportsFloat
+from typing import Any, NamedTuple
 
 
 class Verdict(StrEnum):
@@ -90,9 +89,3 @@ class Chapter:
     title: str
     lead: str
     findings: tuple[Finding, ...]
-
-
-def n(value: SupportsFloat, form: str = ".4g") -> str:
-    """A number for a reader: a true minus sign, a dash for what is none."""
-    number = float(value)
-    return format(number, form).replace("-", "−") if isfinite(number) else "–"

@@ -18,8 +18,9 @@ from sagline.article.constants import (
     published_sampling,
 )
 from sagline.article.intercept import InterceptStudy, intercept_studies
+from sagline.plot.numbers import n
 from sagline.plot.sheet import BLUE, PURPLE, VERMILLION
-from sagline.report.blocks import Chapter, Finding, Table, Verdict, n
+from sagline.report.blocks import Chapter, Finding, Table, Verdict
 from sagline.report.drawing import Drawings, axes, legend, shades
 
 if TYPE_CHECKING:
@@ -39,9 +40,10 @@ def intercept_chapter() -> Chapter:
     return Chapter(
         "intercept",
         "The intercept of π",
-        f"Lines T_z(T_x) fitted to exact cables: chords {n(sampling.chords[0])} to {n(sampling.chords[-1])} m, ρ up to "
-        f"{n(sampling.densities[-1])} kg/m, T_x from {n(sampling.tensions[0], '.3g')} N to "
-        f"{n(1e-3 * sampling.tensions[-1], '.3g')} kN, the range in which the article's constants come out "
+        f"Lines T_z(T_x) fitted to exact cables: chords {n(sampling.chords[0])} to "
+        f"{n(sampling.chords[-1], unit='m')}, ρ up to "
+        f"{n(sampling.densities[-1], unit='kg/m')}, T_x from {n(sampling.tensions[0], '.3g', 'N')} to "
+        f"{n(sampling.tensions[-1], '.3g', 'N')}, the range in which the article's constants come out "
         "(see below). Each at both ends of the cable.",
         (_over_chord(platform, frame, draw), _over_density(platform, frame, draw)),
     )
@@ -68,15 +70,16 @@ def _over_chord(platform: InterceptStudy, frame: InterceptStudy, draw: Drawings)
         ax.plot(sampling.chords, platform.intercept[MIDDLE, :, k], color=color, marker="o", markersize=3.0, label=label)
         ax.plot(sampling.chords, frame.intercept[MIDDLE, :, k], color=color, marker="s", markersize=3.0, linestyle="--")
     ax.axhline(0.0, color="0.6", linewidth=0.6)
-    legend(ax, r"$\rho$ [kg/m]", columns=2, loc="upper left")
+    legend(ax, r"$\rho$ [kg/m]")
     bent = [_bend(sampling.chords[:, None], study.intercept, study.h_b[:, None, :]) for study in (platform, frame)]
     return Finding(
         key="b-over-chord",
         figures=(6,),
         title="b_π is proportional to D",
         statement="(27): b_π = h_b(ρ) D.",
-        measured=f"So it is: away from the proportion by at most {n(100 * bent[0], '.2g')} % of the largest b_π at the "
-        f"platform end and {n(100 * bent[1], '.2g')} % at the frame end.",
+        measured=f"So it is: away from the proportion by at most {n(100 * bent[0], '.2g', '%')} of the largest b_π at "
+        "the "
+        f"platform end and {n(100 * bent[1], '.2g', '%')} at the frame end.",
         verdict=Verdict.HOLDS_WITHIN,
         numbers={"nonproportional_share_platform": bent[0], "nonproportional_share_frame": bent[1]},
         panels=(
@@ -97,7 +100,7 @@ def _over_density(platform: InterceptStudy, frame: InterceptStudy, draw: Drawing
             sampling.densities, frame.h_b[k], color=color, marker="s", markersize=2.6, linewidth=0.9, linestyle="--"
         )
     ax.axhline(0.0, color="0.6", linewidth=0.6)
-    legend(ax, r"$\varphi$ [rad]", columns=2, loc="upper left")
+    legend(ax, r"$\varphi$ [rad]")
     spread = np.ptp(frame.k_h_of_angle) / abs(frame.k_h)
     return Finding(
         key="h-over-density",
@@ -105,9 +108,10 @@ def _over_density(platform: InterceptStudy, frame: InterceptStudy, draw: Drawing
         title="h_b is proportional to ρ, and k_h",
         statement="h_b is linearly decreasing in ρ and does not depend on β; h_b = k_h ρ with |k_h| ≈ 4.845, "
         "approximately half of g; (28): h_b = −ρg/2.",
-        measured=f"k_h = {n(frame.k_h, '.4f')} m/s² at the frame end, {n(platform.k_h, '+.4f')} m/s² at the platform "
+        measured=f"k_h = {n(frame.k_h, '.4f', 'm/s²')} at the frame end, {n(platform.k_h, '+.4f', 'm/s²')} at the "
+        "platform "
         f"end; g/2 = {n(SHALLOW_K_H)}. The decreasing h_b of the article's figure is the frame end's; the force on the "
-        f"platform needs the other, rising one. Over the angles k_h varies by {n(100 * spread, '.2g')} %.",
+        f"platform needs the other, rising one. Over the angles k_h varies by {n(100 * spread, '.2g', '%')}.",
         verdict=Verdict.HOLDS_WITHIN,
         numbers={
             "k_h_frame": frame.k_h,
@@ -142,7 +146,7 @@ def _range(study: ConstantsStudy, draw: Drawings) -> Finding:
         title="the range of tensions that gives the published constants",
         statement="“Based on our taken data” k_h ≈ 4.845; “based on the non-linear regression method” k_p ≈ 4.385. "
         "The tensions are not given.",
-        measured=f"With T_x evenly spaced from {n(found.lowest, '.1f')} N to {n(1e-3 * found.highest, '.2f')} kN the "
+        measured=f"With T_x evenly spaced from {n(found.lowest, '.1f', 'N')} to {n(found.highest, '.2f', 'N')} the "
         f"article's regressions give both: |k_h| = {n(abs(found.k_h_frame), '.4f')} at the frame end and k_p = "
         f"{n(found.k_p, '.4f')}. With other lower ends k_p runs from {n(min(all_k_p), '.3g')} to "
         f"{n(max(all_k_p), '.3g')}: the least squares of d = a_d/T_x² hear the slackest cables alone. This is one "
@@ -154,8 +158,8 @@ def _range(study: ConstantsStudy, draw: Drawings) -> Finding:
             "over_highest": [c._asdict() for c in study.over_highest],
         },
         panels=(
-            draw.panel(figure, f"k_p over the lowest tension, up to {n(1e-3 * found.highest, '.3g')} kN."),
-            draw.panel(second, f"|k_h| over the highest tension, from {n(found.lowest, '.3g')} N."),
+            draw.panel(figure, f"k_p over the lowest tension, up to {n(found.highest, '.3g', 'N')}."),
+            draw.panel(second, f"|k_h| over the highest tension, from {n(found.lowest, '.3g', 'N')}."),
         ),
     )
 
@@ -167,7 +171,8 @@ def _limit(study: ConstantsStudy, draw: Drawings) -> Finding:
     labels = {"k_p": "$k_p$ from $g^2/24$", "k_h_frame": "$|k_h|$, frame end", "k_h_platform": "$|k_h|$, platform end"}
     for (name, limit), color in zip(limits.items(), (BLUE, VERMILLION, PURPLE), strict=True):
         away = [100.0 * abs(abs(getattr(c, name)) / limit - 1.0) for c in study.scaled]
-        ax.loglog(FACTORS, away, color=color, marker="o", markersize=3.0, linewidth=1.1, label=labels[name])
+        ax.semilogy(FACTORS, away, color=color, marker="o", markersize=3.0, linewidth=1.1, label=labels[name])
+    _logarithmic(ax, tuple(FACTORS.astype(int)))
     legend(ax)
     rows = [
         (

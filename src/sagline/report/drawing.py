@@ -5,19 +5,24 @@ from __future__ import annotations
 import re
 from io import StringIO
 from itertools import count
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from math import ceil
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import matplotlib
+import numpy as np
+from matplotlib.textpath import TextPath
 
 from sagline.arrays import Array
-from sagline.plot.sheet import BLUE, TICK, Sheet, dressed
+from sagline.plot.sheet import BLUE, GAP_COLOR, TICK, Sheet, dressed
 from sagline.report.blocks import Panel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Place = Literal["best", "upper left", "upper right", "lower left", "lower right"]
 WIDTH, HEIGHT = 4.6, 3.1  # in: drawn at its own size on a desk, at four fifths of it on a phone
+LEFT, RIGHT, BELOW, ABOVE = 0.16, 0.975, 0.5, 0.12  # margins around axes: shares of the width, then in
+POINT = 1.0 / 72.0  # in
+NAMES = TICK - 0.5  # pt, of legends
 SHADES = "viridis"
 MOST_POINTS = 400  # of a course over time: a page is not a data file
 
@@ -38,7 +43,7 @@ class Drawings:
         """The figure as a drawing inside the page; the caption is its text for those who do not see it."""
         buffer = StringIO()
         with matplotlib.rc_context({"svg.hashsalt": "sagline", "svg.fonttype": "path"}):
-            figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None}, transparent=True)
+            figure.savefig(buffer, format="svg", dpi=200, metadata={"Date": None, "Creator": None}, transparent=True)
         text = buffer.getvalue()
         svg = _remarks.sub("", text[text.index("<svg") :]).strip()
         svg = _size.sub("", svg, count=2).replace("<svg ", '<svg role="img" ', 1)  # as large as its place in the page
@@ -50,16 +55,80 @@ class Drawings:
 def axes(x: str, y: str, height: float = HEIGHT) -> tuple[Sheet, Axes]:
     """A small figure with one pair of axes."""
     figure = Sheet(figsize=(WIDTH, height))  # fixed margins: half the time of a layout that measures every label
-    figure.subplots_adjust(left=0.16, right=0.975, bottom=0.5 / height, top=1.0 - 0.12 / height)
+    figure.subplots_adjust(left=LEFT, right=RIGHT, bottom=BELOW / height, top=1.0 - ABOVE / height)
     ax = figure.add_subplot()
     dressed(ax, x, y)
     return figure, ax
 
 
-def legend(ax: Axes, title: str = "", columns: int = 1, loc: Place = "best") -> None:
-    """A legend inside the axes."""
-    size = TICK - 0.5
-    ax.legend(title=title or None, fontsize=size, title_fontsize=size, frameon=False, ncols=columns, loc=loc)
+def legend(ax: Axes, title: str = "") -> None:
+    """A legend above the axes, off the curves, in as many columns as fit; the figure grows by its height."""
+    figure = cast(Sheet, ax.get_figure(root=True))
+    handles, labels = ax.get_legend_handles_labels()
+    widest = max(TextPath((0.0, 0.0), label, size=NAMES).get_extents().width for label in labels)
+    room = ax.get_position().width * figure.get_figwidth() / POINT
+    columns = min(len(labels), max(1, int((room + 1.2 * NAMES) / (widest + 3.6 * NAMES))))
+    rows = ceil(len(labels) / columns) + bool(title)
+    grown = (1.45 * rows + 0.4) * NAMES * POINT
+    _grow(figure, grown)
+    ax.legend(
+        handles,
+        labels,
+        title=title or None,
+        alignment="left",
+        fontsize=NAMES,
+        title_fontsize=NAMES,
+        frameon=False,
+        ncols=columns,
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        borderaxespad=0.2,
+        borderpad=0.1,
+        labelspacing=0.25,
+        handlelength=1.8,
+        handletextpad=0.5,
+        columnspacing=1.2,
+    )
+
+
+def _grow(figure: Sheet, more: float) -> None:
+    """Make room above the axes [in]; they keep their size."""
+    before, place = figure.get_figheight(), figure.subplotpars
+    after = before + more
+    figure.set_figheight(after)
+    figure.subplots_adjust(bottom=place.bottom * before / after, top=1.0 - ((1.0 - place.top) * before + more) / after)
+
+
+def floored(ax: Axes, floor: float, told: str) -> None:
+    """A logarithmic vertical axis that ends at a floor.
+
+    Curves below it run under a shaded strip that says what is there; none is lifted onto the floor. Without any the
+    axis is an ordinary one.
+
+    Args:
+        ax: Axes on which all curves are drawn.
+        floor: In units of the axis, > 0.
+        told: What the strip holds, such as "below 1 nm".
+    """
+    ax.set_yscale("log")
+    values = np.concatenate([np.asarray(line.get_ydata(), dtype=np.float64) for line in ax.get_lines()])
+    seen = values[np.isfinite(values)]
+    if not np.any(seen < floor):
+        return
+    high = 3.0 * max(float(seen.max()), 10.0 * floor)
+    strip = floor * (floor / high) ** 0.09  # a share of the axis that holds a line of text
+    ax.set_ylim(strip, high)
+    ax.axhspan(strip, floor, facecolor=GAP_COLOR, linewidth=0.0, zorder=3.0)
+    ax.text(
+        0.5,
+        (floor * strip) ** 0.5,
+        told,
+        transform=ax.get_yaxis_transform(),
+        zorder=3.1,
+        fontsize=NAMES,
+        ha="center",
+        va="center",
+    )
 
 
 def shades(number: int) -> list[tuple[float, float, float, float]]:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from sagline.article.errata import errata
 from sagline.article.erratum import Erratum
-from sagline.report.blocks import Chapter, Finding, Table, Verdict, n
+from sagline.plot.numbers import n
+from sagline.report.blocks import Chapter, Finding, Table, Verdict
 
 
 def errata_chapter() -> Chapter:
@@ -19,7 +20,7 @@ def errata_chapter() -> Chapter:
 
 
 def _finding(erratum: Erratum) -> Finding:
-    rows = [(number.label, n(number.value, ".5g"), number.unit) for number in erratum.numbers]
+    rows = [(number.label, n(number.value, ".5g", number.unit, size=number.size)) for number in erratum.numbers]
     return Finding(
         key=f"erratum-{erratum.number}",
         title=f"erratum {erratum.number}: {erratum.title[0].lower() + erratum.title[1:]}",
@@ -27,5 +28,5 @@ def _finding(erratum: Erratum) -> Finding:
         measured=erratum.right,
         verdict=Verdict.ERRATUM,
         numbers={number.label: number.value for number in erratum.numbers},
-        data=(Table("Computed", ("quantity", "value", "unit"), rows),),
+        data=(Table("Computed", ("quantity", "value"), rows),),
     )

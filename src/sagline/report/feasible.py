@@ -8,8 +8,9 @@ from sagline.arrays import Array
 from sagline.article.errata_cables import simulated_cable
 from sagline.article.feasible_sets import End, FeasibleSets, feasible_sets
 from sagline.article.sampling import ANGLE
+from sagline.plot.numbers import n
 from sagline.plot.sheet import BLUE, VERMILLION
-from sagline.report.blocks import Chapter, Finding, Verdict, n
+from sagline.report.blocks import Chapter, Finding, Verdict
 from sagline.report.drawing import Drawings, axes, legend, shades
 
 CHORD = 10.0  # m
@@ -28,7 +29,8 @@ def feasible_chapter() -> Chapter:
     return Chapter(
         "feasible-sets",
         "Feasible tensions of one cable",
-        f"Simulation's cable (Table 1), its platform end {n(CHORD)} m away at φ = {n(ANGLE)} rad; our choice, the "
+        f"Simulation's cable (Table 1), its platform end {n(CHORD, unit='m')} away at φ = {n(ANGLE, unit='rad')}; our "
+        "choice, the "
         "article gives none. The map from (T, L) to B is one to one at a given L, so the sets are computed exactly, as "
         "images of the tolerance, without a search.",
         (_psi(studies, draw), _curve(studies[0], draw), _line(studies[0], draw)),
@@ -41,24 +43,24 @@ def _psi(studies: list[FeasibleSets], draw: Drawings) -> Finding:
     figure, ax = axes("$T_x$ [N]", "$T_z$ [N]")
     for study, color in zip(studies, shades(len(studies)), strict=True):
         outline = study.psi[SHOWN]
-        ax.plot(outline[:, 0], outline[:, 1], color=color, linewidth=1.3, label=f"{1e3 * study.tolerance:g} mm")
+        ax.plot(outline[:, 0], outline[:, 1], color=color, linewidth=1.3, label=n(1e3 * study.tolerance, unit="mm"))
     legend(ax, r"tolerance $\epsilon_{max}$")
     along = np.array(studies[0].end) / CHORD
     second, bx = axes("along the chord [N]", "across it [N]")
     middle = studies[-1].psi[SHOWN].mean(axis=0)
     for study, color in zip(studies[:2], shades(len(studies)), strict=False):
-        away, label = study.psi[SHOWN] - middle, f"{1e3 * study.tolerance:g} mm"
+        away, label = study.psi[SHOWN] - middle, n(1e3 * study.tolerance, unit="mm")
         bx.plot(away @ along, away @ (-along[1], along[0]), color=color, linewidth=1.3, label=label)
     bx.set_ylim(-0.2, 0.3)
-    legend(bx, r"tolerance $\epsilon_{max}$", columns=2, loc="upper left")
+    legend(bx, r"tolerance $\epsilon_{max}$")
     ratio = extents[:-1] / extents[1:]
     return Finding(
         key="psi",
         figures=(3,),
         title="the set ψ of tensions that reach B_d with one length",
         statement="Statement 1: for a given L, if ε_max → 0, then |ψ| → 1: the set has a unique tension.",
-        measured=f"With L = {n(length, '.5g')} m the set spans "
-        + ", ".join(f"{n(x, '.3g')} N at {1e3 * e:g} mm" for x, e in zip(extents, TOLERANCES, strict=True))
+        measured=f"With L = {n(length, '.5g', 'm')} the set spans "
+        + ", ".join(f"{n(x, '.3g', 'N')} at {n(1e3 * e, unit='mm')}" for x, e in zip(extents, TOLERANCES, strict=True))
         + f": it shrinks {n(ratio[0], '.3g')} and {n(ratio[1], '.3g')} times when the tolerance does 10 times, to a "
         "point. It is a sliver along the chord: 1 mm of position is many newtons of a taut cable.",
         verdict=Verdict.HOLDS,
@@ -69,7 +71,7 @@ def _psi(studies: list[FeasibleSets], draw: Drawings) -> Finding:
             "times_smaller": ratio,
         },
         panels=(
-            draw.panel(figure, f"ψ for L = {n(length, '.5g')} m and three tolerances."),
+            draw.panel(figure, f"ψ for L = {n(length, '.5g', 'm')} and three tolerances."),
             draw.panel(second, "The same sets from their middle, along and across the chord: mind the scales."),
         ),
     )
@@ -80,7 +82,7 @@ def _curve(study: FeasibleSets, draw: Drawings) -> Finding:
     ax.plot(study.tensions, 1e3 * (study.lengths - CHORD), color=BLUE, linewidth=1.3, label=r"$\Psi$, exact")
     for k, (length, outline) in enumerate(zip(study.psi_lengths, study.psi, strict=True)):
         height = np.full(2, 1e3 * (length - CHORD))
-        label = rf"$\psi$, $\epsilon_{{max}}$ = {1e3 * study.tolerance:g} mm" if k == 0 else "_"
+        label = rf"$\psi$, $\epsilon_{{max}}$ = {n(1e3 * study.tolerance, unit='mm')}" if k == 0 else "_"
         ax.plot([outline[:, 0].min(), outline[:, 0].max()], height, color=VERMILLION, linewidth=2.2, label=label)
     ax.set_xlim(0.0, TENSIONS[-1])
     legend(ax)
@@ -89,8 +91,9 @@ def _curve(study: FeasibleSets, draw: Drawings) -> Finding:
         figures=(4,),
         title="the set Ψ of all solutions, a curve over L",
         statement="Collecting all ψ over L gives Ψ; for ε_max → 0 it is a spatial curve.",
-        measured=f"L determines T: d falls from {n(1e3 * (study.lengths[0] - CHORD), '.3g')} mm at "
-        f"{n(TENSIONS[0], '.3g')} N to {n(1e3 * (study.lengths[-1] - CHORD), '.3g')} mm at {n(TENSIONS[-1], '.3g')} N, "
+        measured=f"L determines T: d falls from {n(1e3 * (study.lengths[0] - CHORD), '.3g', 'mm')} at "
+        f"{n(TENSIONS[0], '.3g', 'N')} to {n(1e3 * (study.lengths[-1] - CHORD), '.3g', 'mm')} at "
+        f"{n(TENSIONS[-1], '.3g', 'N')}, "
         "strictly.",
         verdict=Verdict.HOLDS,
         numbers={
@@ -127,10 +130,12 @@ def _line(study: FeasibleSets, draw: Drawings) -> Finding:
         statement="Statement 2, (21): T_z = a_π T_x + b_π, an affine line; (26): a_π = tan β; the nonlinear part is at "
         "low T_x.",
         measured=f"R² = {n(line.r_squared, '.8f')}; slope {n(line.slope, '.5f')} against tan φ = "
-        f"{n(study.tangent, '.5f')}; intercept {n(line.intercept, '.4f')} N against wD/2 = "
-        f"{n(study.half_weight, '.4f')} N. Largest distance from the fitted line {n(line.deviation, '.2g')} N. With "
-        f"tan φ and wD/2 it is {n(_largest(from_article), '.2g')} N in all and "
-        f"{n(_largest(from_article[taut]), '.2g')} N from {n(LOW_PART)} N on. Nearly a line, and never exactly one.",
+        f"{n(study.tangent, '.5f')}; intercept {n(line.intercept, '.4f', 'N')} against wD/2 = "
+        f"{n(study.half_weight, '.4f', 'N')}. Largest distance from the fitted line {n(line.deviation, '.2g', 'N')}. "
+        "With "
+        f"tan φ and wD/2 it is {n(_largest(from_article), '.2g', 'N')} in all and "
+        f"{n(_largest(from_article[taut]), '.2g', 'N')} from {n(LOW_PART, unit='N')} on. Nearly a line, and never "
+        "exactly one.",
         verdict=Verdict.HOLDS_WITHIN,
         numbers={
             "r_squared": line.r_squared,

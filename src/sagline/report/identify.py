@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from matplotlib.colors import LogNorm
 
 from sagline.arrays import Array
 from sagline.article.errata_cables import simulated_cable
@@ -11,16 +10,20 @@ from sagline.article.identify import EmpiricalFit, identify_empirical
 from sagline.article.identify_cable import CableFit, identify_cable
 from sagline.cables.cable import Cable
 from sagline.cables.catenary import Catenary
-from sagline.plot.sheet import LABEL, TICK
-from sagline.report.blocks import Chapter, Finding, Table, Verdict, n
+from sagline.plot.numbers import n
+from sagline.report.blocks import Chapter, Finding, Table, Verdict
 from sagline.report.drawing import Drawings, axes, legend, shades
+from sagline.report.maps import draw_errors, map_axes
 
 SPANS = np.linspace(1.0, 13.0, 13)  # m: the working range of the simulated robots
 RISES = np.linspace(-5.0, 4.0, 10)  # m
 TENSIONS = np.linspace(20.0, 400.0, 77)  # N
 TOLERANCES = (1e-3, 2e-3, 5e-3, 10e-3)  # m
+EDGES, TICKS = np.outer(10.0 ** np.arange(-4.0, -1.0), (1.0, 2.0, 5.0)).ravel(), (1e-4, 1e-3, 1e-2)  # of the map [m]
+LINES = (1e-3, 5e-3, 1e-2)  # m, drawn in it
 SAMPLES, LENGTH_ERROR, TENSION_ERROR, SEED = 60, 1e-3, 1.0, 2020  # of the made-up measurements: m, N
 BOTH = ("linear_density", "axial_stiffness")
+UNITS = {"linear_density": "kg/m", "axial_stiffness": "N", "length_offset": "m"}
 CASES = (  # lowest and highest chord tension [N], what is sought
     ("loose and taut", 30.0, 600.0, BOTH),
     ("taut only", 300.0, 600.0, BOTH),
@@ -44,18 +47,8 @@ def identify_chapter() -> Chapter:
 
 
 def _constants(fit: EmpiricalFit, draw: Drawings) -> Finding:
-    figure, ax = axes("$T_x$ [N]", "span [m]")
-    figure.subplots_adjust(left=0.13, right=0.9)
-    error = 1e3 * fit.position_error.max(axis=1)
-    mesh = ax.pcolormesh(
-        fit.tensions, fit.spans, error, norm=LogNorm(0.01, 100.0), cmap="magma_r", shading="nearest", rasterized=True
-    )
-    lines = ax.contour(fit.tensions, fit.spans, error, levels=[1.0, 2.0, 5.0, 10.0], colors="black", linewidths=0.7)
-    ax.clabel(lines, fmt=lambda level: f"{level:g} mm", fontsize=TICK - 1.0)
-    ax.grid(visible=False)
-    bar = figure.colorbar(mesh, ax=ax, pad=0.02)
-    bar.set_label("position error [mm]", fontsize=LABEL - 1.0)
-    bar.ax.tick_params(labelsize=TICK - 1.0)
+    figure, ax = map_axes("$T_x$ [N]", "span [m]")
+    draw_errors(ax, fit.tensions, fit.spans, fit.position_error.max(axis=1), EDGES, TICKS, LINES)
     rows = [
         (name, n(estimate.value, ".4f"), f"{n(estimate.low, '.4f')} to {n(estimate.high, '.4f')}", unit)
         for name, estimate, unit in (("k_h", fit.k_h, "m/s²"), ("k_p", fit.k_p, "m²/s⁴"))
@@ -64,8 +57,9 @@ def _constants(fit: EmpiricalFit, draw: Drawings) -> Finding:
         key="empirical-fit",
         title="constants for a working range",
         statement="",
-        measured=f"Spans {n(SPANS[0])} to {n(SPANS[-1])} m, rises {n(RISES[0])} to {n(RISES[-1])} m, T_x "
-        f"{n(TENSIONS[0])} to {n(TENSIONS[-1])} N: k_h = {n(fit.k_h.value, '.4f')}, k_p = {n(fit.k_p.value, '.4f')}. "
+        measured=f"Spans {n(SPANS[0])} to {n(SPANS[-1], unit='m')}, rises {n(RISES[0])} to "
+        f"{n(RISES[-1], unit='m')}, T_x {n(TENSIONS[0])} to {n(TENSIONS[-1], unit='N')}: k_h = "
+        f"{n(fit.k_h.value, '.4f')}, k_p = {n(fit.k_p.value, '.4f')}. "
         "k_h is below g/2 because a stretched cable is lighter. The interval says how far a constant moves within the "
         "range; it is no measuring error.",
         verdict=Verdict.OURS,
@@ -77,7 +71,13 @@ def _constants(fit: EmpiricalFit, draw: Drawings) -> Finding:
             "k_p": fit.k_p._asdict(),
             "largest_position_error_m": fit.position_error.max(),
         },
-        panels=(draw.panel(figure, "Position error of (20), largest over the rises."),),
+        panels=(
+            draw.panel(
+                figure,
+                f"Position error of (20), largest over the rises, between {len(fit.spans)} spans and "
+                f"{len(fit.tensions)} tensions.",
+            ),
+        ),
         data=(Table("The constants", ("constant", "value", "95 % interval", "unit"), rows),),
     )
 
@@ -87,14 +87,14 @@ def _limits(fit: EmpiricalFit, draw: Drawings) -> Finding:
     frontier = {}
     for tolerance, color in zip(TOLERANCES, shades(len(TOLERANCES)), strict=True):
         frontier[tolerance] = np.array([fit.weight_max(tolerance, tension) for tension in fit.tensions])
-        ax.plot(fit.tensions, frontier[tolerance], color=color, linewidth=1.3, label=f"{1e3 * tolerance:g} mm")
-    legend(ax, "position error", loc="lower right")
+        ax.plot(fit.tensions, frontier[tolerance], color=color, linewidth=1.3, label=n(1e3 * tolerance, unit="mm"))
+    legend(ax, "position error")
     rows, limits = [], []
     for tolerance in TOLERANCES:
         tension, weight = fit.tension_min(tolerance), fit.weight_max(tolerance)
         rows.append(
             (
-                f"{n(1e3 * tolerance)} mm",
+                n(1e3 * tolerance, unit="mm"),
                 n(tension, ".3g"),
                 n(weight, ".2f"),
                 n(fit.weight_max(tolerance, 100.0), ".2f"),
@@ -105,8 +105,9 @@ def _limits(fit: EmpiricalFit, draw: Drawings) -> Finding:
         key="validity-limits",
         title="the validity limits w_max and T_x,min",
         statement="Section 3: ρgL < w_max and T_x > T_x,min must be satisfied. Neither has a value in the article.",
-        measured=f"For 5 mm: T_x,min = {n(limits[2]['tension_min_N'], '.3g')} N with the heaviest cable of the range, "
-        f"or wL ≤ {n(limits[2]['weight_max_N'], '.2f')} N with every tension of it. A dash: not within this range.",
+        measured=f"For 5 mm: T_x,min = {n(limits[2]['tension_min_N'], '.3g', 'N')} with the heaviest cable of the "
+        "range, "
+        f"or wL ≤ {n(limits[2]['weight_max_N'], '.2f', 'N')} with every tension of it. A dash: not within this range.",
         verdict=Verdict.OPEN,
         numbers={"limits": limits},
         panels=(draw.panel(figure, "Heaviest cable over the lowest tension, for four tolerances."),),
@@ -126,10 +127,10 @@ def _measured() -> Finding:
         fit = made_up_fit(cable, lowest, highest, unknowns)
         rows.append(
             (
-                f"{name} ({n(lowest)} to {n(highest)} N)",
+                f"{name} ({n(lowest)} to {n(highest, unit='N')})",
                 *(
-                    f"{n(value, '.4g')} ± {n(error, '.2g')}"
-                    for value, error in zip(fit.values, fit.standard_error, strict=True)
+                    n(value, unit=UNITS[unknown], uncertainty=error)
+                    for unknown, value, error in zip(unknowns, fit.values, fit.standard_error, strict=True)
                 ),
                 *["–"] * (3 - len(unknowns)),
                 n(fit.chi_squared, ".2f"),
@@ -150,9 +151,11 @@ def _measured() -> Finding:
         key="cable-fit",
         title="density and stiffness from measurements",
         statement="",
-        measured=f"Four sets of {SAMPLES} made-up measurements of a cable of {n(cable.linear_density)} kg/m and EA = "
-        f"{n(1e-3 * cable.axial_stiffness)} kN, with scatter of {n(1e3 * LENGTH_ERROR)} mm and {n(TENSION_ERROR)} N "
-        "at the frame end. Loose cables tell the density, taut ones the stiffness; an unknown zero of the encoder "
+        measured=f"Four sets of {SAMPLES} made-up measurements of a cable of {n(cable.linear_density, unit='kg/m')} "
+        "and EA = "
+        f"{n(cable.axial_stiffness, unit='N')}, with scatter of {n(1e3 * LENGTH_ERROR, unit='mm')} and "
+        f"{n(TENSION_ERROR, unit='N')} at the frame end. Loose cables tell the density, taut ones the stiffness; an "
+        "unknown zero of the encoder "
         "makes the stiffness less certain.",
         verdict=Verdict.OURS,
         numbers={
@@ -165,8 +168,8 @@ def _measured() -> Finding:
         },
         data=(
             Table(
-                "What was found",
-                ("chord tensions", "ρ [kg/m]", "EA [N]", "offset [m]", "χ² per freedom", "warnings"),
+                "What was found; in parentheses the standard uncertainty of the last digits",
+                ("chord tensions", "ρ", "EA", "offset", "χ² per freedom", "warnings"),
                 rows,
             ),
         ),

@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from html import escape
 from importlib.resources import files
 
-from sagline.report.blocks import Chapter, Finding, Table, Verdict
+from sagline.report.blocks import Chapter, Finding, Panel, Table, Verdict
 
 SENTENCE = 40  # characters from which on a cell of a table is text
+NARROW = 3  # columns of a table that stands beside the text
+
+MANY = {  # verdicts as they are told of more than one finding
+    Verdict.HOLDS: "hold",
+    Verdict.HOLDS_WITHIN: "hold within limits",
+    Verdict.FAILS: "do not hold",
+    Verdict.ERRATUM: "errata",
+}
 
 _subscript = re.compile(r"(?<=[A-Za-zα-ωΑ-Ω])_([A-Za-zα-ω0-9]{1,3}(?:,min)?)(?![A-Za-zα-ω0-9_])")
 
@@ -23,13 +32,15 @@ CLASSES = {
 }
 
 
-def page(title: str, lead: str, chapters: Sequence[Chapter], footer: str) -> str:
-    """The whole page.
+def page(title: str, lead: str, notation: str, chapters: Sequence[Chapter], picture: Panel | None, footer: str) -> str:
+    """The whole page: the result on one screen, then every finding.
 
     Args:
         title: Of the page.
         lead: The first paragraph.
+        notation: How to read what follows, before the findings.
         chapters: What it consists of.
+        picture: The drawing beside the result; None for none.
         footer: How it was made.
 
     Returns:
@@ -40,48 +51,86 @@ def page(title: str, lead: str, chapters: Sequence[Chapter], footer: str) -> str
     return (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        '<meta name="color-scheme" content="light dark">\n'
         f"<title>{escape(title)}</title>\n<style>\n{style}</style>\n</head>\n<body>\n"
         f"<header>\n<h1>{escape(title)}</h1>\n<p>{escape(lead)}</p>\n</header>\n"
-        f"{_contents(chapters)}\n<main>\n{body}\n</main>\n<footer>{escape(footer)}</footer>\n</body>\n</html>\n"
+        f"{_result(chapters, picture)}\n{_contents(chapters)}\n<p>{_text(notation)}</p>\n"
+        f"<main>\n{body}\n</main>\n<footer>{escape(footer)}</footer>\n</body>\n</html>\n"
     )
 
 
-def _contents(chapters: Sequence[Chapter]) -> str:
-    """The overview: every finding with its verdict, one line each."""
-    lines = []
+def _result(chapters: Sequence[Chapter], picture: Panel | None) -> str:
+    """How many statements hold, which chapters they are in, and one drawing."""
+    counts = Counter(finding.verdict for chapter in chapters for finding in chapter.findings)
+    verdicts = [verdict for verdict in Verdict if counts[verdict]]
+    tiles = "".join(
+        f'<li class="{CLASSES[verdict]}"><strong>{counts[verdict]}</strong> {_counted(verdict, counts[verdict])}</li>'
+        for verdict in verdicts
+    )
+    head = '<th scope="col">chapter</th>' + "".join(
+        f'<th scope="col"><span>{verdict}</span></th>' for verdict in verdicts
+    )
+    rows = ""
     for number, chapter in enumerate(chapters, start=1):
-        lines.append(
-            f'<tr class="part"><th colspan="2" scope="rowgroup"><a href="#{chapter.key}">'
-            f"{number}. {_text(chapter.title)}</a></th></tr>"
-        )
-        lines += [
-            f'<tr><td><a href="#{finding.key}">{_text(_headline(finding))}</a></td><td>{_badge(finding)}</td></tr>'
+        found = Counter(finding.verdict for finding in chapter.findings)
+        cells = "".join(f'<td class="{CLASSES[verdict]}">{found[verdict] or ""}</td>' for verdict in verdicts)
+        name = f'<a href="#{chapter.key}">{number}. {_text(chapter.title)}</a>'
+        rows += f'<tr><th scope="row">{name}</th>{cells}</tr>'
+    return (
+        f'<section class="result" aria-label="Result">\n<ul class="tiles">{tiles}</ul>\n<div class="beside">\n'
+        f'<div class="scroll" tabindex="0"><table class="counts"><thead><tr>{head}</tr></thead>'
+        f"<tbody>{rows}</tbody></table></div>\n{_figure(picture) if picture else ''}</div>\n</section>"
+    )
+
+
+def _counted(verdict: Verdict, count: int) -> str:
+    return str(verdict) if count == 1 else MANY.get(verdict, str(verdict))
+
+
+def _contents(chapters: Sequence[Chapter]) -> str:
+    """Every finding with its verdict, one line each."""
+    parts = []
+    for number, chapter in enumerate(chapters, start=1):
+        lines = "".join(
+            f'<li><a href="#{finding.key}">{_text(_headline(finding))}</a> {_badge(finding)}</li>'
             for finding in chapter.findings
-        ]
-    return f'<nav aria-label="Overview">\n<h2>Overview</h2>\n<table>\n{"".join(lines)}\n</table>\n</nav>'
+        )
+        parts.append(
+            f'<section><h3><a href="#{chapter.key}">{number}. {_text(chapter.title)}</a></h3><ul>{lines}</ul></section>'
+        )
+    return f'<nav aria-label="All findings">\n<h2>All findings</h2>\n<div>{"".join(parts)}</div>\n</nav>'
 
 
 def _chapter(number: int, chapter: Chapter) -> str:
     findings = "\n".join(_finding(finding) for finding in chapter.findings)
     return (
         f'<section class="chapter" id="{chapter.key}">\n<h2>{number}. {_text(chapter.title)}</h2>\n'
-        f"<p>{_text(chapter.lead)}</p>\n{findings}\n</section>"
+        f'<p class="lead">{_text(chapter.lead)}</p>\n{findings}\n</section>'
     )
 
 
 def _finding(finding: Finding) -> str:
+    """Heading, what is said and found, drawings and tables; one drawing or a narrow table stands beside the text."""
     said = f'<div class="said"><h4>The article</h4><p>{_text(finding.statement)}</p></div>' if finding.statement else ""
     paragraphs = "".join(f"<p>{_text(part)}</p>" for part in finding.measured.split("\n\n"))
-    found = f'<div class="found"><h4>Computed</h4>{paragraphs}</div>'
-    panels = "".join(
-        f"<figure>{panel.svg}<figcaption>{_text(panel.caption)}</figcaption></figure>" for panel in finding.panels
-    )
-    drawn = f'<div class="panels">{panels}</div>\n' if panels else ""
-    tables = "\n".join(_table(table) for table in finding.data)
+    pair = f'<div class="pair">{said}<div class="found"><h4>Computed</h4>{paragraphs}</div></div>'
+    drawn = "".join(map(_figure, finding.panels))
+    tables = "\n".join(map(_table, finding.data))
+    if len(finding.panels) == 1:
+        content = f'<div class="beside">\n{pair}\n{drawn}</div>\n{tables}'
+    elif finding.panels:
+        content = f'{pair}\n<div class="panels{" three" * (len(finding.panels) % 3 == 0)}">{drawn}</div>\n{tables}'
+    elif all(len(table.head) <= NARROW for table in finding.data):
+        content = f'<div class="beside">\n{pair}\n<div>{tables}</div></div>'
+    else:
+        content = f"{pair}\n{tables}"
     return (
-        f'<article id="{finding.key}">\n<h3>{_text(_headline(finding))} {_badge(finding)}</h3>\n'
-        f'<div class="pair">{said}{found}</div>\n{drawn}{tables}\n</article>'
+        f'<article id="{finding.key}">\n<h3>{_text(_headline(finding))} {_badge(finding)}</h3>\n{content}\n</article>'
     )
+
+
+def _figure(panel: Panel) -> str:
+    return f"<figure>{panel.svg}<figcaption>{_text(panel.caption)}</figcaption></figure>"
 
 
 def _headline(finding: Finding) -> str:

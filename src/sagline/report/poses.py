@@ -8,8 +8,9 @@ from sagline.arrays import Array
 from sagline.article.fits import fit_line
 from sagline.article.machine import DENSITY, MODULUS, Parameter
 from sagline.article.ten_poses import Explanation, TenPoses, Tour, ten_poses, tour
+from sagline.plot.numbers import n
 from sagline.plot.sheet import BLUE, COLORS, TICK, VERMILLION
-from sagline.report.blocks import Chapter, Finding, Panel, Table, Verdict, n
+from sagline.report.blocks import Chapter, Finding, Panel, Table, Verdict
 from sagline.report.drawing import Drawings, axes, legend, thinned
 
 COUNTS = ("one parameter", "two parameters", "three parameters")
@@ -52,9 +53,10 @@ def _table(study: TenPoses) -> Finding:
         tables=(2,),
         title="errors recomputed, lengths and tensions planned",
         statement="Table 2: errors from 1.7 to 44.8 mm, “obtained by applying Equation (56)”.",
-        measured=f"The printed errors are the distances of the printed positions to {n(1e3 * difference, '.1g')} mm, "
+        measured="The printed errors are the distances of the printed positions to "
+        f"{n(1e3 * difference, '.2g', 'mm')}, "
         "not what (56) says (erratum 9). The empirical model itself puts the platform at most "
-        f"{n(1e3 * model, '.2g')} mm off at these poses: it is not the cause.",
+        f"{n(1e3 * model, '.2g', 'mm')} off at these poses: it is not the cause.",
         verdict=Verdict.HOLDS,
         numbers={
             "largest_difference_mm": 1e3 * difference,
@@ -109,7 +111,7 @@ def _tour(way: Tour, draw: Drawings) -> Finding:
         statement="Amplified load cell signals and differences of cable length while the platform visits the ten "
         "points from (0, 0, 1.5) and returns; no numbers in the text.",
         measured=f"Planned along straight lines: tensions at the winch from {n(tension.min(), '.3g')} to "
-        f"{n(tension.max(), '.3g')} N, all poses feasible: {'yes' if way.plan.feasible.all() else 'no'}.",
+        f"{n(tension.max(), '.3g', 'N')}, all poses feasible: {'yes' if way.plan.feasible.all() else 'no'}.",
         verdict=Verdict.OPEN,
         numbers={
             "frame_end_tension_min_N": tension.min(),
@@ -146,7 +148,7 @@ def _space(study: TenPoses, draw: Drawings) -> Finding:
         statement="Tensions are smaller at low altitude; “the larger the cable tensions, the smaller the positioning "
         "error”. P2, P8, P6 are low and worse; P7, P5, P4 are high and better.",
         measured="So it is measured: every platform sits too high, by a height that falls "
-        f"{n(-1e3 * line.slope, '.3g')} mm with every meter up (R² {n(line.r_squared, '.2f')}). Correlation of the "
+        f"{n(-1e3 * line.slope, '.3g', 'mm')} with every meter up (R² {n(line.r_squared, '.2f')}). Correlation of the "
         f"error with the mean planned T_x: {n(against, '.2f')}. That the tension is the cause does not follow: see "
         "what a wrong E would do.",
         verdict=Verdict.HOLDS_WITHIN,
@@ -170,14 +172,14 @@ def _trends(study: TenPoses, draw: Drawings) -> Finding:
     for k, trend in enumerate(study.trends):
         axis = ax if k < 5 else bx
         line = fit_line(height, 1e3 * trend.error[:, 2])
-        label = f"{trend.parameter.name} {n(trend.parameter.typical, '+g')} {trend.parameter.unit}"
+        label = f"{trend.parameter.name} {n(trend.parameter.typical, '+g', trend.parameter.unit)}"
         axis.plot(fine, line.slope * fine + line.intercept, color=COLORS[k % 5], linewidth=1.2, label=label)
     for axis in (ax, bx):
         axis.set_ylim(-25.0, 85.0)
         legend(axis)
     rows = [
         (
-            f"{trend.parameter.name} {n(trend.parameter.typical, '+g')} {trend.parameter.unit}",
+            f"{trend.parameter.name} {n(trend.parameter.typical, '+g', trend.parameter.unit)}",
             *(n(1e3 * z, ".1f") for z in trend.error[:, 2]),
             n(trend.height_slope, "+.1f"),
         )
@@ -194,7 +196,7 @@ def _trends(study: TenPoses, draw: Drawings) -> Finding:
         statement="“The larger the cable tensions, the smaller the positioning error”; the relation “can be "
         "interpreted easily”.",
         measured="A stiffer cable than planned (E too low in the plan) lifts the platform most where tensions are "
-        f"high: {n(slopes[study.trends[0].parameter.name], '+.3g')} mm per meter, the opposite of the measured "
+        f"high: {n(slopes[study.trends[0].parameter.name], '+.3g', 'mm')} per meter, the opposite of the measured "
         f"{n(1e3 * study.height_line.slope, '+.3g')}. With the signs shown, an error that falls with height comes "
         "from: " + ", ".join(falling) + ".",
         verdict=Verdict.FAILS,
@@ -231,15 +233,15 @@ def _explanations(study: TenPoses, draw: Drawings) -> Finding:
         title="what would explain the measured errors",
         statement="Sources named: the model, the measurement, the cable material, latency, transmission and cumulative "
         "error.",
-        measured=f"Of {n(1e3 * study.measured_rms, '.1f')} mm (root mean square of all coordinates) the best single "
-        f"parameter leaves {n(1e3 * best[0].rms, '.1f')} mm: {_values(best[0])}. Two leave "
-        f"{n(1e3 * best[1].rms, '.1f')}: {_values(best[1])}. Three leave {n(1e3 * best[2].rms, '.1f')}: "
-        f"{_values(best[2])}. Printing in whole millimeters allows {n(1e3 * PRINTING, '.1f')} mm, so none is the "
+        measured=f"Of {n(1e3 * study.measured_rms, '.1f', 'mm')} (root mean square of all coordinates) the best single "
+        f"parameter leaves {n(1e3 * best[0].rms, '.1f', 'mm')}: {_values(best[0])}. Two leave "
+        f"{n(1e3 * best[1].rms, '.1f', 'mm')}: {_values(best[1])}. Three leave {n(1e3 * best[2].rms, '.1f', 'mm')}: "
+        f"{_values(best[2])}. Printing in whole millimeters allows {n(1e3 * PRINTING, '.1f', 'mm')}, so none is the "
         "whole truth.\n\nIt says: the pattern is geometric, as unmodeled pulleys or a wrong height of the anchors "
-        f"make it, not that of a wrong cable: E alone leaves {n(1e3 * alone[MODULUS], '.1f')} mm, ρ alone "
-        f"{n(1e3 * alone[DENSITY], '.1f')} mm.\n\nIt does not say that these parts were wrong: anchors and "
+        f"make it, not that of a wrong cable: E alone leaves {n(1e3 * alone[MODULUS], '.1f', 'mm')}, ρ alone "
+        f"{n(1e3 * alone[DENSITY], '.1f', 'mm')}.\n\nIt does not say that these parts were wrong: anchors and "
         "wiring are ours, ten poses cannot separate parameters with like patterns, and values without limits fit still "
-        f"better ({n(1e3 * guess.rms, '.1f')} mm) with nonsense: " + _list(guess.parameters, guess.values) + ".",
+        f"better ({n(1e3 * guess.rms, '.1f', 'mm')}) with nonsense: " + _list(guess.parameters, guess.values) + ".",
         verdict=Verdict.OPEN,
         numbers={
             "measured_rms_mm": 1e3 * study.measured_rms,
@@ -292,4 +294,4 @@ def _values(found: Explanation) -> str:
 
 
 def _list(parameters: tuple[Parameter, ...], values: Array) -> str:
-    return ", ".join(f"{p.name} {n(value, '+.3g')} {p.unit}" for p, value in zip(parameters, values, strict=True))
+    return ", ".join(f"{p.name} {n(value, '+.3g', p.unit)}" for p, value in zip(parameters, values, strict=True))

@@ -21,8 +21,9 @@ from sagline.article.sag_constant import (
     stretch_study,
 )
 from sagline.article.sampling import ANGLE
+from sagline.plot.numbers import n
 from sagline.plot.sheet import BLUE, GREEN, VERMILLION
-from sagline.report.blocks import Chapter, Finding, Verdict, n
+from sagline.report.blocks import Chapter, Finding, Verdict
 from sagline.report.drawing import Courses, Drawings, axes, legend, with_fit
 
 CHORD = 10.0  # m
@@ -40,7 +41,8 @@ def sag_chapter() -> Chapter:
     return Chapter(
         "sag",
         "The adjusting length and k_p",
-        f"Figures 8 and 9 with the simulation's cable at D = {n(CHORD)} m; figures 10 to 15 with cables that do not "
+        f"Figures 8 and 9 with the simulation's cable at D = {n(CHORD, unit='m')}; figures 10 to 15 with cables that "
+        "do not "
         "stretch, sampled as above.",
         (
             _with_stretch(stretch, draw),
@@ -71,8 +73,8 @@ def _with_stretch(study: StretchStudy, draw: Drawings) -> Finding:
         title="d of stretchable and unstretchable cables",
         statement="Unstretchable: d ≥ 0 with d = 0 as asymptote. Stretchable: negative d, an inclined asymptote by "
         "Hooke's law.",
-        measured=f"The least d of the unstretchable cable is {n(1e3 * numbers['least_unstretchable_m'], '.2g')} mm; "
-        f"with stretch d reaches {n(1e3 * numbers['last_stretchable_m'], '.3g')} mm, "
+        measured=f"The least d of the unstretchable cable is {n(1e3 * numbers['least_unstretchable_m'], '.2g', 'mm')}; "
+        f"with stretch d reaches {n(1e3 * numbers['last_stretchable_m'], '.3g', 'mm')}, "
         f"{n(numbers['share_of_hooke'], '.3f')} of |T|D/EA.",
         verdict=Verdict.HOLDS,
         numbers=numbers,
@@ -98,9 +100,10 @@ def _relieved(study: StretchStudy, draw: Drawings) -> Finding:
         figures=(9,),
         title="d with the elongation taken out",
         statement="(38): d = d_e + Δl with Δl = |T|L/EA of (36); red and blue dots coincide.",
-        measured=f"They do to the eye at low tension, but (36) is {n(numbers['error_of_36_mm'], '.2g')} mm too long: "
+        measured=f"They do to the eye at low tension, but (36) is {n(numbers['error_of_36_mm'], '.2g', 'mm')} too "
+        "long: "
         "it stretches the cable with the tension at its upper end. With the mean tension "
-        f"{n(numbers['error_with_mean_tension_mm'], '.1g')} mm are left (erratum 5).",
+        f"{n(numbers['error_with_mean_tension_mm'], '.2g', 'mm')} are left (erratum 5).",
         verdict=Verdict.HOLDS_WITHIN,
         numbers=numbers,
         panels=(
@@ -149,7 +152,7 @@ def _chord(study: SagStudy, draw: Drawings) -> Finding:
         figures=(11, 12),
         title="a_d is cubic in D",
         statement="(43): a_d = q_a(β) D³, the fittest; at every β.",
-        measured=f"The cubic misses a_d by at most {n(100 * away, '.2g')} % of the largest a_d of its angle "
+        measured=f"The cubic misses a_d by at most {n(100 * away, '.2g', '%')} of the largest a_d of its angle "
         "and density.",
         verdict=Verdict.HOLDS_WITHIN,
         numbers={"cubic_away_share": away},
@@ -164,7 +167,7 @@ def _angle(study: SagStudy, draw: Drawings) -> Finding:
     labels = _named(sampling.densities[[*DRAWN]], ".1f")
     courses = Courses(sampling.angles, study.q_a[:, DRAWN].T, fine, fits, labels)
     captions = (
-        f"q_a at ρ = {n(sampling.densities[DENSE])} kg/m (figure 13).",
+        f"q_a at ρ = {n(sampling.densities[DENSE], unit='kg/m')} (figure 13).",
         "The same at five densities (figure 14).",
     )
     away = _away(study.fitted_q_a, study.q_a)
@@ -173,7 +176,7 @@ def _angle(study: SagStudy, draw: Drawings) -> Finding:
         figures=(13, 14),
         title="q_a goes with cos⁴ of the angle",
         statement="(44): q_a = p_q(ρ) cos⁴ β, chosen “experimentally”.",
-        measured=f"cos⁴ misses q_a by at most {n(100 * away, '.2g')} % of the largest q_a of its density. It is no "
+        measured=f"cos⁴ misses q_a by at most {n(100 * away, '.2g', '%')} of the largest q_a of its density. It is no "
         "guess: d = D (wD cos φ)²/(24 τ²) of a shallow cable, with τ = T_x/cos φ.",
         verdict=Verdict.HOLDS_WITHIN,
         numbers={"cos4_away_share": away},
@@ -220,7 +223,7 @@ def _named(values: Iterable[float], form: str) -> list[str]:
 
 def _middle_and_dense(study: SagStudy) -> str:
     """Which cables are drawn, for a caption."""
-    return f"at φ = {n(ANGLE)} rad, ρ = {n(study.sampling.densities[DENSE])} kg/m"
+    return f"at φ = {n(ANGLE, unit='rad')}, ρ = {n(study.sampling.densities[DENSE], unit='kg/m')}"
 
 
 def _away(fit: Array, values: Array) -> float:

@@ -13,10 +13,11 @@ from sagline.kinematics.confirm import Confirmation
 from sagline.kinematics.plan import Plan
 from sagline.motion.path import Path
 from sagline.plot.motion import path as draw_path
+from sagline.plot.numbers import n
 from sagline.plot.robot import robot as draw_robot
 from sagline.plot.sheet import BLUE, COLORS, VERMILLION, Sheet
-from sagline.report.blocks import Chapter, Finding, Panel, Table, Verdict, n
-from sagline.report.drawing import WIDTH, Drawings, axes, legend, thinned
+from sagline.report.blocks import Chapter, Finding, Panel, Table, Verdict
+from sagline.report.drawing import WIDTH, Drawings, axes, floored, legend, thinned
 from sagline.robot.pose import Pose
 
 LIMITS = np.array(
@@ -24,6 +25,7 @@ LIMITS = np.array(
 )  # N, lower limits of the chord tension
 CORNER = (5.0, 3.5, 1.5)  # m, of the path
 STYLES = ("-", (0, (4.0, 1.6)))
+FLOOR = 1e-9  # m: distances below a nanometer are not drawn
 NEAR = 1.05  # times the lower limit: what counts as near the minimum
 
 
@@ -54,7 +56,7 @@ def _robots(study: Simulation, draw: Drawings) -> Finding:
     panels = []
     for run, caption in zip(study.of(Catenary), ("First configuration: suspended.", "Second: mixed."), strict=True):
         figure = Sheet(figsize=(WIDTH, 3.4))
-        figure.subplots_adjust(left=0.0, right=1.0, bottom=0.0, top=1.0)
+        figure.subplots_adjust(left=0.13, right=1.0, bottom=0.0, top=1.0)
         ax = figure.add_subplot(projection="3d")
         draw_robot(run.plan.state.one_robot, Pose.from_euler(CORNER, 0.0, 0.0, 0.0), ax)
         ax.set_title("")
@@ -89,8 +91,8 @@ def _path(path: Path, draw: Drawings) -> Finding:
         figures=(18, 19),
         title="path and velocity",
         statement="z_P = 1.5 m, all angles 0; 5th order polynomials. No numbers are given.",
-        measured=f"Ours: {n(path.duration)} s, {len(path)} samples, up to {n(speed.max(), '.3g')} m/s and "
-        f"{n(acceleration.max(), '.2g')} m/s², at rest at the corners, the center and both ends.",
+        measured=f"Ours: {n(path.duration, unit='s')}, {len(path)} samples, up to {n(speed.max(), '.3g', 'm/s')} and "
+        f"{n(acceleration.max(), '.2g', 'm/s²')}, at rest at the corners, the center and both ends.",
         verdict=Verdict.OPEN,
         numbers={
             "duration_s": path.duration,
@@ -115,11 +117,12 @@ def _courses(study: Simulation, draw: Drawings) -> Finding:
             panels.append(_cables(run.plan, values, label, f"Figure {figure}, {robot}: {what}.", draw))
         found = figures(run)
         texts.append(
-            f"{robot.capitalize()}: L {n(found.length_min, '.2f')} to {n(found.length_max, '.2f')} m, d "
-            f"{n(1e3 * found.adjusting_min, '.3g')} to {n(1e3 * found.adjusting_max, '.3g')} mm, T_x "
-            f"{n(found.tension_min, '.3g')} to {n(found.tension_max, '.3g')} N, changing by at most "
-            f"{n(found.step_max, '.2g')} N from sample to sample, its slope of up to {n(found.slope_max, '.2g')} N/s "
-            f"by at most {n(found.slope_jump, '.2g')} N/s"
+            f"{robot.capitalize()}: L {n(found.length_min, '.2f')} to {n(found.length_max, '.2f', 'm')}, d "
+            f"{n(1e3 * found.adjusting_min, '.3g')} to {n(1e3 * found.adjusting_max, '.3g', 'mm')}, T_x "
+            f"{n(found.tension_min, '.3g')} to {n(found.tension_max, '.3g', 'N')}, changing by at most "
+            f"{n(found.step_max, '.2g', 'N')} from sample to sample, its slope of up to "
+            f"{n(found.slope_max, '.2g', 'N/s')} "
+            f"by at most {n(found.slope_jump, '.2g', 'N/s')}"
         )
     return Finding(
         key="courses",
@@ -142,19 +145,16 @@ def _cables(plan: Plan, values: Array, label: str, caption: str, draw: Drawings)
     figure, ax = axes("time [s]", label, height=2.7)
     for i, course in enumerate(values[part].T):
         color = COLORS[i // 2 % len(COLORS)]
-        ax.plot(path.time[part], course, color=color, linestyle=STYLES[i % 2], linewidth=1.0, label=f"{i}")
-    ax.set_xlim(path.time[0], path.time[-1])
-    if label.startswith("$L"):
-        ax.legend(
-            fontsize=6.5,
-            frameon=False,
-            ncols=8,
-            loc="upper center",
-            bbox_to_anchor=(0.5, 1.07),
-            handlelength=1.6,
-            columnspacing=0.7,
-            handletextpad=0.3,
+        ax.plot(
+            path.time[part],
+            course,
+            color=color,
+            linestyle=STYLES[i % 2],
+            linewidth=1.0,
+            label=f"{i}",
         )
+    ax.set_xlim(path.time[0], path.time[-1])
+    legend(ax, "cable")
     return draw.panel(figure, caption)
 
 
@@ -170,10 +170,10 @@ def _error(study: Simulation, draw: Drawings) -> Finding:
         title="position error of the empirical model",
         statement="The model keeps the positioning error around (−6, 6) mm.",
         measured="On our path the largest error along an axis is "
-        + ", ".join(f"{n(1e3 * f.axis_error_max, '.2f')} mm ({robot})" for robot, f in found.items())
+        + ", ".join(f"{n(1e3 * f.axis_error_max, '.2f', 'mm')} ({robot})" for robot, f in found.items())
         + "; distance "
         + ", ".join(
-            f"{n(1e3 * f.error_max, '.2f')} mm at most and {n(1e3 * f.error_mean, '.2f')} mm in the mean"
+            f"{n(1e3 * f.error_max, '.2f', 'mm')} at most and {n(1e3 * f.error_mean, '.2f', 'mm')} in the mean"
             for f in found.values()
         )
         + ". Better than the article says, with our path and limits; worse where cables are looser, see below.",
@@ -192,7 +192,7 @@ def _error_panel(run: Confirmation, path: Path, caption: str, draw: Drawings) ->
     for name, course, color in zip("xyz", 1e3 * run.position_error[part].T, COLORS, strict=False):
         ax.plot(path.time[part], course, color=color, linewidth=1.1, label=f"${name}$")
     ax.set_xlim(path.time[0], path.time[-1])
-    legend(ax, columns=3)
+    legend(ax)
     return draw.panel(figure, caption)
 
 
@@ -219,7 +219,7 @@ def _comparison(study: Simulation) -> Finding:
         statement="T_x of the lower cables is small, but valid; the highest load of the second configuration is "
         "approximately twice that of the first.",
         measured=f"The ratio of the highest T_x is {n(study.tension_ratio, '.2f')}. The lower cables are within "
-        f"{n(100 * (NEAR - 1))} % of their lower limit {n(100 * near, '.3g')} % of the time.",
+        f"{n(100 * (NEAR - 1), unit='%')} of their lower limit {n(100 * near, '.3g', '%')} of the time.",
         verdict=Verdict.HOLDS,
         numbers={
             "tension_ratio": study.tension_ratio,
@@ -237,7 +237,11 @@ def _models(study: Simulation, draw: Drawings) -> Finding:
         rows.append(
             (
                 name,
-                *(n(1e3 * value, ".3g") for f in pair for value in (f.error_max, f.error_mean)),
+                *(
+                    n(1e3 * value, ".3g", size=1e3 * f.length_max)
+                    for f in pair
+                    for value in (f.error_max, f.error_mean)
+                ),
                 *(n(f.tension_max, ".1f") for f in pair),
                 *(n(100 * f.held, ".4g") for f in pair),
             )
@@ -250,20 +254,24 @@ def _models(study: Simulation, draw: Drawings) -> Finding:
         for model, run, color in zip(study.models[:-1], runs, COLORS, strict=False):
             distance = 1e3 * np.linalg.norm(run.position_error[part], axis=1)
             ax.plot(study.path.time[part], distance, color=color, linewidth=1.1, label=type(model).__name__)
-        ax.set_yscale("log")
-        ax.set_ylim(1e-3, 2e3)
-        legend(ax, columns=4, loc="upper left")
+        floored(ax, 1e3 * FLOOR, f"below {n(FLOOR, '.3g', 'm')}")
+        legend(ax)
         panels.append(draw.panel(figure, f"Position error of four models, {robot}; the exact one is the zero."))
     shallow = [figures(run).error_max for run in study.of(Parabolic)]
     return Finding(
         key="five-models",
         title="all five cable models on the same path",
         statement="",
-        measured=f"The exact model comes back to within {n(1e12 * _worst(study.of(Catenary)), '.2g')} pm. The "
-        f"parabolic one, as cheap as the article's, is within {n(1e6 * max(shallow), '.2g')} µm: the published "
+        measured=f"The exact model comes back to within {n(_worst(study.of(Catenary)), '.2g', 'm')}, which is "
+        "rounding. The "
+        f"parabolic one, as cheap as the article's, is within {n(max(shallow), '.2g', 'm')}: the published "
         "constants and the stretch by one end's tension make up nearly all of the empirical model's error.",
         verdict=Verdict.OURS,
-        numbers={"largest_error": numbers, "exact_largest_error_pm": 1e12 * _worst(study.of(Catenary))},
+        numbers={
+            "largest_error": numbers,
+            "exact_largest_error_pm": 1e12 * _worst(study.of(Catenary)),
+            "longest_length_m": max(figures(run).length_max for run in study.of(Catenary)),
+        },
         panels=tuple(panels),
         data=(
             Table(
@@ -298,10 +306,12 @@ def _low_tension(low: LowTension, draw: Drawings) -> Finding:
         key="low-tension",
         title="position error where cables are loose",
         statement="(54) bounds T_x from below, and T_adj > 0 is added “to maintain the accuracy”.",
-        measured=f"The error stays within ±{n(1e3 * ERROR_BAND)} mm for lower limits from {n(good.min(), '.3g')} N on "
+        measured=f"The error stays within ±{n(1e3 * ERROR_BAND, unit='mm')} for lower limits from "
+        f"{n(good.min(), '.3g', 'N')} on "
         "and grows fast below, where the mixed robot's lower cables hang slack. With the bound (54) alone, T_adj = 0, "
-        f"it is {n(1e3 * bound[0].axis_error_max, '.2f')} and {n(1e3 * bound[1].axis_error_max, '.2f')} mm, the lowest "
-        f"T_x {n(bound[0].tension_min, '.3g')} and {n(bound[1].tension_min, '.3g')} N.",
+        f"it is {n(1e3 * bound[0].axis_error_max, '.2f')} and {n(1e3 * bound[1].axis_error_max, '.2f', 'mm')}, the "
+        "lowest "
+        f"T_x {n(bound[0].tension_min, '.3g')} and {n(bound[1].tension_min, '.3g', 'N')}.",
         verdict=Verdict.HOLDS_WITHIN,
         numbers={
             "band_mm": 1e3 * ERROR_BAND,

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from difflib import get_close_matches
 from importlib.resources import files
 
-from sagline.errors import InvalidValueError
+from sagline.errors import InvalidValueError, nearest
 
 _PRESETS = files("sagline.robot") / "presets"
 
@@ -36,15 +35,13 @@ def preset_text(name: str) -> str:
         YAML, as `load_robot` reads it.
 
     Raises:
-        InvalidValueError: If there is no such preset; the message suggests the nearest.
+        InvalidValueError: If there is no such preset; the message suggests one that is near.
     """
     names = robot_names()
     if name not in names:
-        near = get_close_matches(name, names, n=1, cutoff=0.0)[0]
+        near = nearest(name, names)
+        hint = f"Did you mean {near}? " if near else ""
         raise InvalidValueError(
-            "robot",
-            repr(name),
-            ", ".join(names),
-            f"Did you mean {near}? A robot file is given by its path, robot.yaml.",
+            "robot", repr(name), ", ".join(names), f"{hint}A robot file is given by its path, robot.yaml."
         )
     return (_PRESETS / f"{name}.yaml").read_text(encoding="utf-8")

@@ -15,7 +15,7 @@ from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.unit import unit
 
 _SYMMETRY = 1e-9  # largest difference of mirrored elements, relative to the largest element
-_PRINTED = 1e-3  # by how much a flat body's largest moment may exceed the others' sum: three printed digits
+_ROUNDED = 0.01  # what moments printed with three digits may lack: a thin plate's largest is the sum of the others
 
 
 def anchors(frame: ArrayLike, platform: ArrayLike) -> tuple[Array, Array]:
@@ -88,19 +88,23 @@ def cables(given: Cable, count: int) -> Cable:
     return Cable(density, stiffness)
 
 
-def inertia(given: ArrayLike | None, pattern: str) -> Array:
-    """Inertia about the center of mass, symmetric and positive definite; zero will do for a body that cannot turn.
+def inertia(given: ArrayLike | None, pattern: str, normal: Array | None) -> Array:
+    """Inertia about the center of mass: symmetric, no moment negative, positive about each axis that is turned about.
+
+    A body that turns about every axis obeys the triangle inequality too: none of its principal moments is larger than
+    the other two together. What a planar platform has about the axes in its plane may be zero, as other tools write it;
+    so may everything where nothing turns.
 
     Args:
         given: Inertia [kg m^2], or None.
         pattern: The motion pattern, which says whether the platform turns.
+        normal: Unit normal of the plane of a planar pattern, shape (3,); None for the others.
 
     Returns:
         Matrix of shape (3, 3).
 
     Raises:
-        InvalidValueError: If it is missing for a platform that turns, not symmetric, not positive definite, or that of
-            no body, of whose principal moments each two are together as large as the third.
+        InvalidValueError: If it is missing for a platform that turns, not symmetric, or no body's.
     """
     if given is None and pattern in ROTATING:
         raise InvalidValueError(
@@ -110,8 +114,6 @@ def inertia(given: ArrayLike | None, pattern: str) -> Array:
             f"Motion pattern {pattern} turns; give its inertia.",
         )
     matrix = exactly(np.zeros((3, 3)) if given is None else given, "inertia", "kg m^2", (3, 3))
-    if pattern not in ROTATING and not matrix.any():
-        return matrix
     skew = np.abs(matrix - matrix.T)
     if skew.max() > _SYMMETRY * np.abs(matrix).max():
         row, column = (int(i) for i in np.argwhere(skew == skew.max())[0])
@@ -121,28 +123,33 @@ def inertia(given: ArrayLike | None, pattern: str) -> Array:
             f"the same as inertia[{column}, {row}], {matrix[column, row]:g} kg m^2",
             "An inertia matrix is symmetric; correct one of the two.",
         )
-    lowest = float(np.linalg.eigvalsh(matrix)[0])
-    if lowest <= 0.0:
+    _check_moments(np.linalg.eigvalsh(matrix).astype(np.float64), everywhere=pattern in ROTATING and normal is None)
+    if pattern in ROTATING and normal is not None and not (about := float(normal @ matrix @ normal)) > 0.0:
         raise InvalidValueError(
             "inertia",
-            f"a matrix with the principal moment {lowest:g} kg m^2",
-            "principal moments > 0 kg m^2",
-            "Give the inertia about the center of mass, in the platform frame.",
+            f"a matrix with {about:g} kg m^2 about plane_normal",
+            "> 0 kg m^2",
+            "Give the moment about the axis the platform turns about.",
         )
-    if pattern not in PLANAR:
-        _refuse_impossible(matrix)
     return matrix
 
 
-def _refuse_impossible(matrix: Array) -> None:
-    """Of no body is a principal moment more than the sum of the other two: each is the sum of two mean squares."""
-    small, middle, large = (float(moment) for moment in np.linalg.eigvalsh(matrix))
-    if large > (1.0 + _PRINTED) * (small + middle):
+def _check_moments(moments: Array, *, everywhere: bool) -> None:
+    """Refuse principal moments, in rising order [kg m^2], that no body has; everywhere: it turns about every axis."""
+    least = 0.0 if everywhere else np.nextafter(-_SYMMETRY * abs(moments[2]), -1.0)
+    if moments[0] <= least:
         raise InvalidValueError(
             "inertia",
-            f"a matrix with the principal moments {small:g}, {middle:g} and {large:g} kg m^2",
-            f"none larger than the sum of the others, here {small + middle:g} kg m^2",
-            "No body has such moments; correct a moment, or its unit.",
+            f"a matrix with the principal moment {moments[0]:g} kg m^2",
+            f"principal moments {'>' if everywhere else '>='} 0 kg m^2",
+            "Give the inertia about the center of mass, in the platform frame.",
+        )
+    if everywhere and moments[2] > (1.0 + _ROUNDED) * (moments[0] + moments[1]):
+        raise InvalidValueError(
+            "inertia",
+            f"a matrix with the principal moments {', '.join(f'{moment:g}' for moment in moments)} kg m^2",
+            "none larger than the other two together",
+            "No body has these; give the inertia about the center of mass, in the platform frame.",
         )
 
 

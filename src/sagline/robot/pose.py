@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from sagline.arrays import Array, checked, locked
 from sagline.errors import InvalidValueError
 from sagline.indices import length_of, part_of
-from sagline.machine import check_memory
+from sagline.memory import check_memory
 from sagline.robot.unit import unit
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import brief, choice, optional, text
+from sagline.arguments import brief, choice, label, optional, text
 from sagline.arrays import Array
 from sagline.cables.cable import Cable
 from sagline.errors import InvalidValueError
@@ -31,8 +31,9 @@ class Robot:
         platform_anchors: Platform ends of the cables in the platform frame [m], shape (m, 3).
         cables: Material of the cables, fields of shape (m,).
         mass: Mass of the platform [kg], > 0.
-        inertia: Inertia about the center of mass in the platform frame [kg m^2], shape (3, 3), positive definite;
-            zero where the motion pattern has no rotation and none was given.
+        inertia: Inertia about the center of mass in the platform frame [kg m^2], shape (3, 3): positive
+            definite, no principal moment larger than the other two together. Only the moment about plane_normal need
+            be positive in a planar pattern, and none where the motion pattern has no rotation.
         center_of_mass: Center of mass in the platform frame [m], shape (3,).
         gravity: Gravitational acceleration along -z [m/s^2], >= 0.
         motion_pattern: "3R3T", "3T" (point mass), "1R2T" (planar) or "2T" (planar without rotation).
@@ -134,18 +135,19 @@ class Robot:
         """
         frame, platform = checks.anchors(frame_anchors, platform_anchors)
         pattern = choice(motion_pattern, "motion_pattern", MOTION_PATTERNS)
+        normal = checks.plane_normal(plane_normal, pattern)
         lower, upper = checks.tension_limits(tension_min, tension_max, len(frame))
         values = {
-            "name": text(name, "name"),
+            "name": label(name, "name"),
             "frame_anchors": frame,
             "platform_anchors": platform,
             "cables": checks.cables(cables, len(frame)),
             "mass": checks.number(mass, "mass", "kg", above=0.0),
-            "inertia": checks.inertia(inertia, pattern),
+            "inertia": checks.inertia(inertia, pattern, normal),
             "center_of_mass": checks.exactly(center_of_mass, "center_of_mass", "m", (3,)),
             "gravity": checks.number(gravity, "gravity", "m/s^2", low=0.0),
             "motion_pattern": pattern,
-            "plane_normal": checks.plane_normal(plane_normal, pattern),
+            "plane_normal": normal,
             "tension_min": lower,
             "tension_max": upper,
             "tension_limits_of": choice(tension_limits_of, "tension_limits_of", get_args(TensionLimitsOf)),

@@ -8,7 +8,7 @@ import numpy as np
 
 from sagline.arguments import instance
 from sagline.arrays import Array, locked
-from sagline.machine import check_memory
+from sagline.memory import check_memory
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.several import bodies_of, first_of
 from sagline.statics.slopes import CableSlopes, cable_slopes, on_platform
@@ -92,7 +92,8 @@ def stiffness(state: Equilibrium) -> Stiffness:
 
         >>> import numpy as np
         >>> import sagline as sl
-        >>> plan = sl.inverse(sl.load_robot("cogiro"), sl.Pose((1.0, 0.5, 1.5), np.eye(3)))
+        >>> pose = sl.Pose((1.0, 0.5, 1.5), np.eye(3))
+        >>> plan = sl.inverse(sl.load_robot("cogiro"), pose)
         >>> found = sl.stiffness(plan.state)
         >>> print(f"{1e3 * 100.0 * found.compliance[2, 2]:.3f} mm")
         1.438 mm
@@ -181,7 +182,8 @@ def modes(state: Equilibrium) -> Modes:
     Examples:
         >>> import numpy as np
         >>> import sagline as sl
-        >>> plan = sl.inverse(sl.load_robot("cogiro"), sl.Pose((1.0, 0.5, 1.5), np.eye(3)))
+        >>> pose = sl.Pose((1.0, 0.5, 1.5), np.eye(3))
+        >>> plan = sl.inverse(sl.load_robot("cogiro"), pose)
         >>> print(sl.modes(plan.state).frequency.round(2), "Hz")
         [ 4.38  5.31  6.93  8.05 10.88 13.17] Hz
     """

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import viser
 
+from sagline.files.names import file_stem
 from sagline.viewer.export import picture_as_png, pictures_as_gif, scene_as_glb
 from sagline.viewer.run import Run
 from sagline.viewer.view import View
@@ -76,7 +77,7 @@ class ExportPanel:
 
     def _name(self) -> str:
         view = self._view()
-        return "sagline" if view is None else "".join(c if c.isalnum() else "-" for c in view.snapshot.robot.name)
+        return "sagline" if view is None else file_stem(view.snapshot.robot.name)
 
 
 def _ordered(soon: Callable[[Callable[[], None]], None], send: Send, event: viser.GuiEvent[Any]) -> None:

@@ -26,9 +26,9 @@ from sagline.kernels.codes import (
     POSE_SINGULAR,
     POSE_SOLVED,
 )
-from sagline.kernels.inverse.explain import explain_poses
 from sagline.kernels.inverse.poses import inverse_poses
 from sagline.kernels.inverse.queries import margins_of_poses, polygon_of_pose
+from sagline.kernels.inverse.verdicts import decide_poses
 from sagline.kernels.memory import memory_for
 from sagline.kernels.sharing.polygon import SPARE_CORNERS
 from tests.kernels.balance.robots import A_POINT, EVERY_MOTION, GRAVITY, IN_A_PLANE, TO_AND_FRO, Case, random_case
@@ -53,6 +53,16 @@ class Answer(NamedTuple):
     poses: Codes
 
 
+def new_answers(count: int, m: int, n: int) -> Answer:
+    return Answer(
+        np.full((tables.RESULT_ROWS, count, m), -7.0),
+        np.full((count, m), -7, dtype=np.int8),
+        np.full((count, 2), -7.0),
+        np.full((count, n), -7.0),
+        np.full(count, -7, dtype=np.int8),
+    )
+
+
 def solve(
     case: Case,
     poses: Array | None = None,
@@ -67,13 +77,7 @@ def solve(
 ) -> Answer:
     poses = case.pose[None] if poses is None else poses
     count, m, n = len(poses), len(case.robot), len(case.freedom)
-    answer = Answer(
-        np.full((tables.RESULT_ROWS, count, m), -7.0),
-        np.full((count, m), -7, dtype=np.int8),
-        np.full((count, 2), -7.0),
-        np.full((count, n), -7.0),
-        np.full(count, -7, dtype=np.int8),
-    )
+    answer = new_answers(count, m, n)
     parameter = 4.0 if method == codes.P_NORM else 1.0
     inverse_poses(
         (model, 4.9, 4.0),
@@ -303,7 +307,7 @@ def test_memory_is_enough_for_every_robot_and_way_of_sharing() -> None:
                 solve(case, method=method, variable=variable, otherwise=True, goal=50.0, model=ELASTIC)
         for room in (memory_for(m), (np.empty(30), np.empty(2, dtype=np.int64))):
             enough = room[0].size > 30
-            for call in (explained, margined, polygoned):
+            for call in (decided, margined, polygoned):
                 if enough:
                     if call is not margined or m < 14:  # a margin looks at all choices of columns
                         call(case, room)
@@ -331,11 +335,15 @@ def robot_terms(case: Case) -> tuple[Array, Array, Array]:
     return fixed(case.freedom), fixed(case.body[None]), fixed(case.robot[None])
 
 
-def explained(case: Case, room: Room) -> Array:
+def decided(case: Case, room: Room) -> Array:
     m, n = len(case.robot), len(case.freedom)
-    found = (np.full(1, np.nan), np.full((1, n), np.nan), np.zeros((1, m), dtype=np.bool_))
+    found = (np.full((1, 2), np.nan), np.full((1, n), np.nan), np.zeros((1, m), dtype=np.bool_))
+    answers = new_answers(1, m, n)
+    heavy = fixed(np.array([[0.0, 0.0, -1e5, 0.0, 0.0, 0.0]]))
     which = np.zeros(1, dtype=np.int64)
-    explain_poses(TERMS, LIMITS, robot_terms(case), fixed(case.pose[None]), np.full((1, n), 1e5), which, room, found)
+    given = (TERMS, LIMITS, robot_terms(case), fixed(case.pose[None]), heavy)
+    results = (answers.results, answers.statuses, answers.residuals, answers.needed, answers.poses)
+    decide_poses(*given, which, True, room, results, found)
     return found[0]
 
 

@@ -1,0 +1,187 @@
+"""Hooks of MkDocs: the pages that are made rather than written, so that none of them can be out of date.
+
+The gallery runs the examples, the reference lists what `sagline.__all__` lists, the command's page is its own help.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import typer.main
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.exceptions import PluginError
+from mkdocs.structure.files import File, Files
+from running import EXAMPLES, WORK, fresh_folder, ran
+
+import sagline as sl
+from sagline.cli.main import app
+
+RINGS = {  # package -> title and opening line of its page of reference
+    "cables": ("Cables", "One cable: its material, its models, its state."),
+    "robot": ("Robots", "Where cables are fixed, what they carry, and where the platform is."),
+    "motion": ("Motion", "Paths of the platform."),
+    "kinematics": ("Kinematics", "From motion to lengths, from lengths to the pose, and the proof of a plan."),
+    "tension": ("Tension", "How redundant cables share the load."),
+    "statics": ("Statics", "Structure matrix, wrenches, stiffness."),
+    "article": ("Identification", "Constants of cables and of the empirical model, from measurements."),
+    "files": ("Files", "What is read and written."),
+    "plot": ("Figures", "`sl.plot`: figures for papers, on Matplotlib."),
+    "errors": ("Errors", "What sagline raises."),
+}
+DRAWN = {  # command -> what is shown of it
+    "track": "<!-- drawn by: sagline track own_robot.yaml own_path.yaml --model empirical -->",
+    "run": "<!-- drawn by: sagline run -->",
+    "article": "<!-- drawn by: sagline article figures 6-9 -->",
+    "tension": "<!-- drawn by: sagline tension article-mixed --pose 1,0.5,2.5 -->",
+    "view": "![A robot in the viewer](../images/viewer.png)\n\n![A run in the viewer](../images/viewer-run.png)",
+}
+SCENE = """\
+robot = sl.load_robot("cogiro")
+path = sl.quintic_path([(0, 0, 1.5), (2, 1, 2.5), (-2, 1, 2.5)], speed=1.0)
+proof = sl.confirm(sl.inverse(robot, path, model=sl.Elastic()))
+again = sl.confirm(sl.inverse(robot, path, model=sl.Empirical()))
+pose = sl.Pose.from_euler((1.0, 1.0, 2.0), 0.0, 0.0, 0.0)
+shape = sl.tension_polygon(robot, pose)
+chosen = {"Closest": sl.inverse(robot, pose).chord_tension}
+"""
+FIGURES = {  # function of `sl.plot` -> a call that draws
+    "error": "error(proof)",
+    "errors": "errors(proof, again)",
+    "lengths": "lengths(proof.plan)",
+    "overview": "overview(proof.plan)",
+    "path": "path(path)",
+    "polygon": "polygon(shape, chosen)",
+    "robot": "robot(robot, pose)",
+    "tensions": "tensions(proof.plan)",
+    "velocity": "velocity(path)",
+}
+LOADED = re.compile(
+    r"""<(?:script|img|iframe|source|video|audio)\b[^>]*\bsrc(?:set)?=["']?(?:https?:)?//|<link\b[^>]*\brel=["']?"""
+    r"""(?:stylesheet|preload|preconnect|icon)["']?[^>]*\bhref=["']?(?:https?:)?//|@import\s+["'(]*(?:url\()?https?:"""
+    r"""|url\(["']?https?:"""
+)
+
+
+def on_config(config: MkDocsConfig) -> MkDocsConfig:
+    """Complete the navigation: background pages as they stand in the folder, one page of reference for each ring."""
+    nav: list[dict[str, list[str]] | str] = config.nav or []
+    for section in nav:
+        if isinstance(section, dict) and "Background" in section:
+            written = {page for page in section["Background"] if (Path(config.docs_dir) / page).is_file()}
+            section["Background"] = [page for page in section["Background"] if page in written]
+    nav.append({"Reference": [f"api/{ring}.md" for ring in names_by_ring()] + ["api/command.md"]})
+    config.nav = nav
+    return config
+
+
+def on_files(files: Files, config: MkDocsConfig) -> Files:
+    """Add the pages and figures that are made here."""
+    fresh_folder()
+    files.append(File.generated(config, "gallery.md", content=gallery(files, config)))
+    files.append(File.generated(config, "api/command.md", content=command_reference()))
+    for ring, names in names_by_ring().items():
+        text = reference(ring, names)
+        files.append(File.generated(config, f"api/{ring}.md", content=with_figures(text) if ring == "plot" else text))
+    for name in FIGURES:
+        files.append(File.generated(config, f"api/plot-{name}.svg", abs_src_path=str(WORK / f"plot-{name}.svg")))
+    return files
+
+
+def names_by_ring() -> dict[str, list[str]]:
+    """Full names of everything public, by the package it lives in; functions of `sl.plot` among them."""
+    full = [f"{value.__module__}.{name}" for name in sl.__all__ if hasattr(value := getattr(sl, name), "__module__")]
+    full += [f"{getattr(sl.plot, name).__module__}.{name}" for name in sl.plot.__all__]
+    rings: dict[str, list[str]] = {ring: [] for ring in RINGS}
+    for name in full:
+        rings.setdefault(name.split(".")[1], []).append(name)
+    return {ring: sorted(names, key=sort_key) for ring, names in rings.items() if names}
+
+
+def sort_key(full_name: str) -> tuple[bool, str]:
+    """Functions first, then types, each in alphabetical order."""
+    name = full_name.rsplit(".", 1)[1]
+    return name[0].isupper(), name.lower()
+
+
+def reference(ring: str, names: list[str]) -> str:
+    """One page of reference, filled by mkdocstrings."""
+    title, opening = RINGS.get(ring, (ring.capitalize(), ""))
+    return f"# {title}\n\n{opening}\n\n" + "\n\n".join(f"::: {name}" for name in names) + "\n"
+
+
+def with_figures(text: str) -> str:
+    """The reference of `sl.plot`, each function with a figure that it draws."""
+    calls = "".join(f'sl.plot.save(sl.plot.{call}, "plot-{name}.svg")\n' for name, call in FIGURES.items())
+    ran("-c", f"import sagline as sl\n{SCENE}{calls}")
+    head, *functions = text.split("::: ")
+    shown = [f"{head}The figures below are drawn of these:\n{fenced(SCENE, 'python')}"]
+    for function in functions:
+        name = function.strip().rsplit(".", 1)[1]
+        if name not in (*FIGURES, "save"):
+            raise PluginError(f"sl.plot.{name} has no figure in its reference; give it a call that draws one")
+        figure = f"`sl.plot.{FIGURES[name]}`:\n\n![sl.plot.{name}](plot-{name}.svg)\n" if name in FIGURES else ""
+        shown.append(f"::: {function.strip()}\n\n{figure}")
+    return "\n".join(shown)
+
+
+def gallery(files: Files, config: MkDocsConfig) -> str:
+    """Source, output and figures of every example, quickstart first; above them all figures, small."""
+    scripts = sorted(EXAMPLES.glob("*.py"), key=lambda script: (script.stem != "quickstart", script.stem))
+    head = "# Gallery\n\nThe scripts are in the folder `examples`; output and figures were made with this page.\n\n"
+    examples = [example(script, files, config) for script in scripts]
+    cards = "\n".join(card for card, _ in examples)
+    return f'{head}<div class="cards" markdown>\n{cards}\n</div>\n' + "".join(text for _, text in examples)
+
+
+def example(script: Path, files: Files, config: MkDocsConfig) -> tuple[str, str]:
+    """A card for one example, and the example: title and opening line, its figures, its code, what it prints."""
+    before = set(WORK.iterdir())
+    output = ran(script.name)
+    source = script.read_text(encoding="utf-8")
+    opening, code = source.removeprefix('"""').split('"""', 1)
+    title, _, rest = re.sub(r"\s+", " ", opening).strip().removesuffix(".").partition(":")
+    what = f"`{script.name}`" + (f": {rest.strip()}." if rest else "")
+    figures = sorted(file for file in set(WORK.iterdir()) - before if file.suffix == ".png")
+    if not figures:
+        raise PluginError(f"{script.name} draws nothing that its card could show")
+    for figure in figures:
+        files.append(File.generated(config, f"gallery/{figure.name}", abs_src_path=str(figure)))
+    shown = "\n\n".join(f"![{title}](gallery/{figure.name})" for figure in figures)
+    card = f"[![](gallery/{figures[0].name}){{ loading=lazy }} {title}](#{script.stem})"
+    text = f"\n## {title} {{ #{script.stem} }}\n\n{what}\n\n{shown}\n"
+    return card, text + fenced(code.strip(), "python") + fenced(output, "text")
+
+
+def command_reference() -> str:
+    """The help of `sagline` and of each of its commands, with the figures that it draws."""
+    text = ran("-m", "typer", "sagline.cli.main", "utils", "docs", "--name", "sagline")
+    commands = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+    lines = [f"- [`sagline {name}`](#sagline-{name}): {first_line(command.help)}" for name, command in commands.items()]
+    text = text.replace("# `sagline`\n", "# The command\n", 1)
+    text = re.sub(r"\*\*Commands\*\*:\n\n(?:\* .*\n)+", "**Commands**:\n\n" + "\n".join(lines) + "\n", text)
+    text = re.sub(r"^```console\n\$ ", "```\n", text, flags=re.MULTILINE)
+    text = re.sub(r"^\* `--help`: .*\n", "", text, flags=re.MULTILINE)
+    for name, shown in DRAWN.items():
+        text = re.sub(
+            rf"(## `sagline {name}`\n.*?)(?=\n## |\Z)", lambda m, what=shown: f"{m[1]}\n{what}\n", text, flags=re.S
+        )
+    return text
+
+
+def first_line(text: str | None) -> str:
+    """The summary of a command."""
+    return (text or "").strip().split("\n\n")[0].replace("\n", " ")
+
+
+def fenced(text: str, language: str) -> str:
+    """A block of code."""
+    return f"\n```{language}\n{text.rstrip()}\n```\n"
+
+
+def on_post_page(output: str, page: Any, **_: Any) -> str:
+    """Make sure that a page loads nothing from elsewhere."""
+    if found := LOADED.search(output):
+        raise PluginError(f"{page.file.src_uri} loads something from elsewhere: {found[0]}")
+    return output

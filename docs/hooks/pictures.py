@@ -1,0 +1,69 @@
+"""Pictures that commands draw: made with the pages, so that they show what the command draws today.
+
+The line `<!-- drawn by: sagline track cogiro -->` of a page becomes the figures that this command writes, in a folder
+where the page's files (`<!-- file: name -->` before a block of code) and those of the examples are.
+"""
+
+from __future__ import annotations
+
+import re
+import shlex
+from hashlib import sha256
+from pathlib import Path
+from posixpath import dirname, relpath
+from typing import Any
+
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.exceptions import PluginError
+from mkdocs.structure.files import File, Files
+from mkdocs.structure.pages import Page
+from running import WORK, ran
+
+MARK = re.compile(r"^<!-- drawn by: sagline (.+?) -->$", re.MULTILINE)
+NAMED = re.compile(r"^<!-- file: (\S+) -->\n+```\w*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+NAMESPACE = 'xmlns="http://www.w3.org/2000/svg"'
+_drawn: dict[str, list[File]] = {}
+
+
+def on_pre_build(**_: Any) -> None:
+    """Forget the pictures of the last build."""
+    _drawn.clear()
+
+
+def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
+    """Put the pictures in the place of the lines that ask for them."""
+    for name, text in NAMED.findall(markdown):
+        (WORK / name).write_text(text, encoding="utf-8")
+    return MARK.sub(lambda found: _shown(found[1], page, config, files), markdown)
+
+
+def _shown(command: str, page: Page, config: MkDocsConfig, files: Files) -> str:
+    if command not in _drawn:
+        _drawn[command] = [
+            File.generated(config, f"pictures/{file.name}", content=text) for file, text in draw(command)
+        ]
+        for file in _drawn[command]:
+            files.append(file)
+    here = dirname(page.file.src_uri)
+    return "\n\n".join(f"![sagline {command}]({relpath(file.src_uri, here or '.')})" for file in _drawn[command])
+
+
+def draw(command: str) -> list[tuple[Path, str]]:
+    """The figures that a command writes, in the order in which it writes them, as SVG."""
+    folder = WORK / sha256(command.encode()).hexdigest()[:8]
+    ran("-m", "sagline.cli", *shlex.split(command), "--out", folder.name)
+    written = sorted(folder.glob("*.svg"), key=lambda file: file.stat().st_mtime_ns)
+    figures = [(file.with_stem(f"{folder.name}-{file.stem}"), file.read_text(encoding="utf-8")) for file in written]
+    for page in folder.glob("*.html"):
+        figures.append((page.with_name(f"{folder.name}.svg"), first_drawing(page.read_text(encoding="utf-8"))))
+    if not figures:
+        raise PluginError(f"sagline {command} drew nothing")
+    return figures
+
+
+def first_drawing(html: str) -> str:
+    """The first drawing of a report, as a file of its own."""
+    found = re.search(r"<svg\b.*?</svg>", html, re.DOTALL)
+    if not found:
+        raise PluginError("there is no drawing in the report")
+    return found[0] if NAMESPACE in found[0] else found[0].replace("<svg", f"<svg {NAMESPACE}", 1)

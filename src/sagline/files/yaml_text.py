@@ -1,0 +1,141 @@
+"""YAML without its surprises: a number is a decimal number, a word is a word, and nothing grows while it is read."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from itertools import chain
+from pathlib import Path
+from typing import Any, ClassVar, Final
+
+import yaml
+
+from sagline.errors import FileError
+from sagline.files.quantity import plain_number
+
+YAML_LIMIT: Final = 1.0  # MB; thousands of waypoints or cables
+_DEEPEST: Final = 20  # levels of nesting
+_MOST: Final = 25_000  # values; that many take a second
+_TAG: Final = "tag:yaml.org,2002:"
+_WORDS: Final = {
+    **dict.fromkeys(("", "~", "null", "Null", "NULL"), f"{_TAG}null"),
+    **dict.fromkeys(("true", "True", "TRUE", "false", "False", "FALSE"), f"{_TAG}bool"),
+    "<<": f"{_TAG}merge",
+}
+
+
+def parse_mapping(text: str, origin: Path | str) -> dict[Any, Any]:
+    """A YAML text whose top level is a mapping, no key given twice.
+
+    Text stays text but for plain decimal numbers, true, false and null: no yes that becomes true, no 1:30 that becomes
+    90, no dates, no tags. Aliases may be used as long as what they stand for is not too much.
+
+    Args:
+        text: The YAML text.
+        origin: The file or whatever else the text came from, for the message.
+
+    Returns:
+        The mapping.
+
+    Raises:
+        FileError: If it is empty, not YAML, cut off, not a mapping, or grows out of measure.
+    """
+    try:
+        data = yaml.load(text, Loader=_PlainLoader)
+    except yaml.MarkedYAMLError as error:
+        place = "" if error.problem_mark is None else f"line {error.problem_mark.line + 1}: "
+        reason = f"is not complete YAML ({place}{error.problem or error.context})"
+        raise FileError(origin, reason, "Correct it; it may have been cut off.") from None
+    except (yaml.YAMLError, RecursionError, ValueError, OverflowError) as error:  # the last two: \UFFFFFFFF
+        raise FileError(
+            origin, f"is not YAML as read here ({_reason(error, text)})", "Check that this is the file you mean."
+        ) from None
+    if data is None:
+        raise FileError(origin, "is empty", "Write it again; it may have been cut off.")
+    if not isinstance(data, dict):
+        raise FileError(origin, "has no keys at its top level", "Check that this is the file you mean.")
+    return data
+
+
+def _reason(error: Exception, text: str) -> str:
+    if isinstance(error, yaml.reader.ReaderError):
+        line = text.count("\n", 0, error.position) + 1
+        return f"line {line} holds the character {chr(int(error.character))!r}"
+    return str(error).splitlines()[0]
+
+
+class _PlainLoader(yaml.SafeLoader):
+    """Text, plain numbers, null, lists and mappings; unique keys; no more levels and values than a person writes."""
+
+    yaml_constructors: ClassVar[dict[Any, Any]] = {}
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self._level = self._composed = 0
+
+    def get_single_node(self) -> yaml.Node | None:
+        node: yaml.Node | None = super().get_single_node()
+        if node is not None:
+            _extent(node, {})
+        return node
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        self._composed += 1
+        if self._level == _DEEPEST or self._composed > _MOST:
+            raise _too_much(self.peek_event().start_mark)  # type: ignore[no-untyped-call]
+        self._level += 1
+        node: yaml.Node | None = super().compose_node(parent, index)
+        self._level -= 1
+        return node
+
+    def resolve(self, kind: type[yaml.Node], value: str | None, implicit: Any) -> str:
+        if kind is yaml.ScalarNode and value is not None and implicit[0]:  # neither quoted nor tagged
+            if value in _WORDS:
+                return _WORDS[value]
+            return f"{_TAG}{'str' if plain_number(value) is None else 'float'}"
+        return f"{_TAG}seq" if kind is yaml.SequenceNode else f"{_TAG}map" if kind is yaml.MappingNode else f"{_TAG}str"
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
+        # PyYAML keeps the last of two equal keys and says nothing; a !!map of something else it refuses itself
+        keys = [key for key, _ in node.value] if node.id == "mapping" else []
+        seen = set()
+        for key in (key for key in keys if isinstance(key, yaml.ScalarNode)):
+            if key.value in seen:
+                raise yaml.MarkedYAMLError(problem=f"key {key.value} is given twice", problem_mark=key.start_mark)
+            seen.add(key.value)
+        return super().construct_mapping(node, deep)
+
+    def construct_number(self, node: yaml.ScalarNode) -> object:
+        text = self.construct_scalar(node)
+        number = plain_number(text)
+        if number is None:  # for whom the text is meant says what is wrong with it
+            return text
+        return int(text) if text.lstrip("+-").isdecimal() else number
+
+
+def _extent(node: yaml.Node, known: dict[int, tuple[int, int] | None]) -> tuple[int, int]:
+    """How many values and levels a node has with all its aliases written out; what is known of it is kept."""
+    if id(node) in known:
+        found = known[id(node)]
+        if found is None:
+            raise yaml.YAMLError(f"line {node.start_mark.line + 1}: an alias that stands for itself")
+        return found
+    known[id(node)] = None
+    inside = node.value if isinstance(node, yaml.CollectionNode) else []
+    children = chain.from_iterable(inside) if isinstance(node, yaml.MappingNode) else inside
+    extents = [_extent(child, known) for child in children]
+    values, levels = 1 + sum(values for values, _ in extents), 1 + max((levels for _, levels in extents), default=0)
+    if values > _MOST or levels > _DEEPEST:
+        raise _too_much(node.start_mark)
+    known[id(node)] = values, levels
+    return values, levels
+
+
+def _too_much(mark: yaml.Mark) -> yaml.YAMLError:
+    return yaml.YAMLError(f"line {mark.line + 1}: more than {_DEEPEST} levels or {_MOST} values, aliases written out")
+
+
+for _kind in ("null", "bool", "str", "seq", "map"):
+    _PlainLoader.add_constructor(f"{_TAG}{_kind}", getattr(yaml.SafeLoader, f"construct_yaml_{_kind}"))
+for _kind in ("int", "float"):
+    _PlainLoader.add_constructor(f"{_TAG}{_kind}", _PlainLoader.construct_number)
+_PlainLoader.add_constructor(None, yaml.SafeLoader.construct_undefined)  # type: ignore[type-var]

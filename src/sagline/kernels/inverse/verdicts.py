@@ -1,0 +1,189 @@
+"""Whether poses that were left open have an answer on the cables' exact curves; the proof and the shortfall if not."""
+
+from __future__ import annotations
+
+import math
+
+from sagline.arrays import Array, Flags, Indices
+from sagline.kernels import tables
+from sagline.kernels.algebra.strips import START
+from sagline.kernels.balance.freedom import translations_of
+from sagline.kernels.balance.setting import (
+    Balance,
+    Limits,
+    Platform,
+    need,
+    new_balance,
+    set_pose,
+    start_from_minimum_norm,
+)
+from sagline.kernels.balance.wrench import along_freedom
+from sagline.kernels.cable import geometry as g
+from sagline.kernels.cable.cables import Cables, new_cables
+from sagline.kernels.cable.pulls import new_curves, pulls_at
+from sagline.kernels.cable.terms import Model
+from sagline.kernels.codes import (
+    CABLE_SOLVED,
+    CHORD_TENSION,
+    POSE_BORDERLINE,
+    POSE_INFEASIBLE,
+    POSE_NOT_COVERED,
+    POSE_SOLVED,
+)
+from sagline.kernels.inverse.poses import Answers, LimitTerms, ModelTerms, Robots, measure_balance, write
+from sagline.kernels.inverse.rounds import limits_leave_room
+from sagline.kernels.jit import entry, glue
+from sagline.kernels.memory import Memory, block
+from sagline.kernels.sharing.bracket import along, decide
+from sagline.kernels.sharing.least_change import Change, Demand, length_of
+
+SUPPORT = 1e-9  # of the largest component along the proof: cables that count less do not stand against the wrench
+AT_LIMIT = 1e-9  # of a limit: what is this near stands at it
+PROVED, ENOUGH = 0, 1  # columns of the brackets
+
+
+@entry
+def decide_poses(
+    model_terms: ModelTerms,
+    limit_terms: LimitTerms,
+    robot_terms: Robots,
+    poses: Array,
+    wrenches: Array,
+    which: Indices,
+    covers: bool,
+    memory: tuple[Array, Indices],
+    answers: Answers,
+    verdicts: tuple[Array, Array, Flags],
+) -> None:
+    """Decide those of N poses that the rounds of sharing called infeasible, in chord tensions.
+
+    Those that are feasible after all get the tensions that were found.
+
+    Args:
+        model_terms: As in `inverse_poses`.
+        limit_terms: As in `inverse_poses`.
+        robot_terms: As in `inverse_poses`.
+        poses: Rows (N, POSE_COLUMNS).
+        wrenches: External plus inertial, about the center of mass, (1 or N, 6).
+        which: Which poses, (K,).
+        covers: Whether the way of sharing covers all that is feasible; what it does not is POSE_NOT_COVERED.
+        memory: `memory_for` as many cables.
+        answers: As in `inverse_poses`; filled anew for these poses.
+        verdicts: Filled for these poses: what is proved and what suffices of the smallest change of the force [N],
+            (N, 2); Farkas vectors along the free motions, (N, n); whether a limit of a cable stands against the needed
+            wrench, (N, m).
+    """
+    limits = Limits(*limit_terms)
+    freedom, bodies, robots = robot_terms
+    results, statuses, residuals, needed, pose_statuses = answers
+    brackets, farkas, blocking = verdicts
+    n = freedom.shape[0]
+    m = statuses.shape[1]
+    cables, rest = new_cables(Memory(*memory), m)
+    balance, rest = new_balance(rest, m, n)
+    rows, at = block(rest.numbers, 0, 2 * n + 3, m)
+    vectors, at = block(rest.numbers, at, 3, n)
+    rest = Memory(rest.numbers[at:], rest.counters)
+    weight, change = rows[2 * n], Change(rows[2 * n + 1], rows[2 * n + 2], vectors[0], vectors[1])
+    for i in range(m):
+        weight[i] = 1.0
+    translations = translations_of(freedom)
+    for p in which:
+        body = bodies[min(p, bodies.shape[0] - 1)]
+        wrench = wrenches[min(p, wrenches.shape[0] - 1)]
+        platform = Platform(freedom, body, robots[min(p, robots.shape[0] - 1)], poses[p], wrench)
+        model = Model(model_terms[0], model_terms[1], model_terms[2], body[tables.GRAVITY])
+        set_pose(model, limits, CHORD_TENSION, weight, platform, cables, balance)
+        if not limits_leave_room(cables):
+            brackets[p, PROVED], brackets[p, ENOUGH] = math.inf, math.inf
+            for i in range(m):
+                blocking[p, i] = not cables.low[i] <= cables.high[i]
+            continue
+        need(platform, cables, balance)
+        start_from_minimum_norm(balance)
+        for i in range(m):
+            change.tau[i] = balance.strips[START, i]
+        demand, lever = demand_of(
+            platform, cables, balance, Demand(rows[:n], rows[n : 2 * n], vectors[2], translations, 0.0)
+        )
+        curves, left = new_curves(model, cables, statuses[p], rest)
+        status, brackets[p, PROVED], brackets[p, ENOUGH], proved = decide(curves, demand, change, left)
+        pulls_at(curves, change.tau, change.pull)
+        if status == POSE_SOLVED and not covers:
+            status = POSE_NOT_COVERED
+            brackets[p, PROVED] = brackets[p, ENOUGH] = math.nan
+        if status == POSE_SOLVED:
+            measure_balance(platform, cables, balance, residuals[p])
+            write(True, cables, balance, results, p)
+        else:
+            for i in range(m):
+                statuses[p, i] = CABLE_SOLVED
+        pose_statuses[p] = status
+        for k in range(n):
+            supplied = demand.right[k]
+            for i in range(m):
+                supplied += demand.hanging[k, i] * change.pull[i]
+            needed[p, k] = supplied if k < translations else supplied * lever
+            farkas[p, k] = math.nan
+        if status == POSE_INFEASIBLE and proved:
+            write_proof(demand, change, lever, farkas[p])
+        if status == POSE_INFEASIBLE or status == POSE_BORDERLINE:
+            block_cables(cables, demand, change, blocking[p])
+
+
+@glue
+def demand_of(platform: Platform, cables: Cables, balance: Balance, room: Demand) -> tuple[Demand, float]:
+    """Fill what is asked of the cables of a pose, and the lever arm [m] its moments are divided by."""
+    n, m = balance.matrix.shape
+    lever = 0.0
+    for i in range(m):
+        for k in range(room.soft, n):
+            lever = max(lever, abs(balance.matrix[k, i]))
+    column, hanging = balance.needed, room.right
+    for i in range(m):
+        for a in range(6):
+            column[a] = 0.0
+        column[2] = 1.0
+        column[3] = balance.geometry[g.LEVER_Y, i]
+        column[4] = -balance.geometry[g.LEVER_X, i]
+        along_freedom(platform.freedom, column, hanging)
+        for k in range(n):
+            unit = 1.0 if k < room.soft else 1.0 / lever
+            room.matrix[k, i] = balance.matrix[k, i] * unit
+            room.hanging[k, i] = hanging[k] * unit
+    size = 0.0
+    for i in range(m):
+        size = max(size, cables.half_weight[i])
+    for k in range(n):
+        room.right[k] = balance.right[k] if k < room.soft else balance.right[k] / lever
+        for i in range(m):
+            room.right[k] -= room.hanging[k, i] * cables.pull[i]
+        size = max(size, abs(room.right[k]))
+    if size == 0.0:
+        for i in range(m):
+            size = max(size, cables.low[i])
+    return Demand(room.matrix, room.hanging, room.right, room.soft, size), lever
+
+
+@glue
+def write_proof(demand: Demand, change: Change, lever: float, farkas: Array) -> None:
+    """Fill the direction of the proof, its force part of length 1, or its moment part where it has no force."""
+    n = farkas.size
+    for k in range(n):
+        farkas[k] = change.direction[k] if k < demand.soft else change.direction[k] / lever
+    if length_of(farkas, 0, demand.soft) == 0.0:
+        size = length_of(farkas, demand.soft, n)
+        for k in range(n):
+            farkas[k] /= size
+
+
+@glue
+def block_cables(cables: Cables, demand: Demand, change: Change, blocking: Flags) -> None:
+    """Fill which cables (m,) stand at a limit that keeps them from giving more along the least change."""
+    largest = 0.0
+    for i in range(blocking.size):
+        largest = max(largest, abs(along(demand.matrix, change.direction, i)))
+    for i in range(blocking.size):
+        a = along(demand.matrix, change.direction, i)
+        limit = cables.high[i] if a > 0.0 else cables.low[i]
+        blocking[i] = abs(a) > SUPPORT * largest and abs(cables.tau[i] - limit) <= AT_LIMIT * limit

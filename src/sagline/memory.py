@@ -1,0 +1,73 @@
+"""How much memory is free, asked before much of it is taken: a process that takes too much is killed without a word."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from pathlib import Path
+from typing import Final
+
+from sagline.errors import InvalidValueError
+
+UNASKED: Final = 1 << 26  # bytes: less is not worth asking how much is free
+_POSE_BYTES, _CABLE_BYTES = 400.0, 64.0  # what a pose takes while it is solved, and each of its cables: as measured
+_GROUPS: Final = (  # limit and use of a container
+    ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"),
+    ("/sys/fs/cgroup/memory/memory.limit_in_bytes", "/sys/fs/cgroup/memory/memory.usage_in_bytes"),
+)
+
+
+def check_memory(item: str, size: float, next_step: str) -> None:
+    """Refuse what would not fit into memory, before it is begun.
+
+    Args:
+        item: What asks for it, for the message: "a path of 2e+08 samples".
+        size: Bytes that it needs at the peak; less than 64 MB are not asked about.
+        next_step: How to need less.
+
+    Raises:
+        InvalidValueError: If less is free; the message gives both numbers.
+    """
+    if size > UNASKED and size > (free := free_memory()):
+        wanted, left = f"a request for {size / 1e9:.3g} GB of memory", f"<= {free / 1e9:.3g} GB, which are free"
+        raise InvalidValueError(item, wanted, left, next_step)
+
+
+def check_poses(count: int, cable_count: int) -> None:
+    """Refuse to solve, forward or inverse, for more poses than there is memory.
+
+    Args:
+        count: How many poses.
+        cable_count: Number of cables m of the robot.
+
+    Raises:
+        InvalidValueError: If all together need more than is free; the message says how much.
+    """
+    check_memory(
+        f"a batch of {count:,} poses", count * (_POSE_BYTES + _CABLE_BYTES * cable_count), "Take them in parts."
+    )
+
+
+def free_memory() -> float:
+    """Memory that this process can still take [bytes]; infinite where the system does not tell.
+
+    Returns:
+        The least of what the machine has free, what its container is allowed and what the process is.
+    """
+    free = [float("inf")]
+    with contextlib.suppress(OSError, ValueError, AttributeError):  # AttributeError: Windows has no sysconf
+        free.append(float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE"))
+    with contextlib.suppress(OSError, ValueError, StopIteration):
+        lines = Path("/proc/meminfo").read_text().splitlines()
+        free.append(1024.0 * float(next(line for line in lines if line.startswith("MemAvailable")).split()[1]))
+    for limit, used in _GROUPS:
+        with contextlib.suppress(OSError, ValueError):  # ValueError: "max", no limit
+            free.append(float(Path(limit).read_text()) - float(Path(used).read_text()))
+    with contextlib.suppress(ImportError, OSError, ValueError):
+        import resource
+
+        limit_of_process = resource.getrlimit(resource.RLIMIT_AS)[0]
+        if limit_of_process != resource.RLIM_INFINITY:
+            taken = float(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+            free.append(limit_of_process - taken)
+    return max(0.0, min(free))

@@ -1,0 +1,61 @@
+"""The commands that write files, with small inputs, and what a folder holds."""
+
+import hashlib
+import os
+import stat
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from typer.testing import CliRunner, Result
+
+import sagline as sl
+from sagline.cli.main import app
+
+PATH = """\
+waypoints:
+  - {position: [0.0, 0.0, 1.5]}
+  - {position: [0.4, 0.2, 1.6]}
+durations: 1.0
+rate: 8
+"""
+Written = Callable[[str], dict[str, str]]  # name of a command -> its files and what is in them
+ROBOT, MIXED = "article-suspended", "article-mixed"
+COMMANDS = {
+    "track": ("track", ROBOT, "path.yaml", "--out", "out"),
+    "forward": ("forward", ROBOT, "lengths.csv", "--out", "out"),
+    "tension": ("tension", MIXED, "--pose", "1,0.5,2.5", "--out", "out"),
+    "article": ("article", "errata", "--out", "out"),
+    "convert": ("convert", ROBOT, "--out", "out/robot.yaml"),
+    "mjcf": ("convert", ROBOT, "--format", "mjcf", "--out", "out/robot.xml"),
+    "new": ("new", "out/mine.yaml", "--force"),
+}
+
+
+def prepare(folder: Path) -> None:
+    """The inputs of the commands."""
+    (folder / "path.yaml").write_text(PATH)
+    plan = sl.inverse(sl.load_robot(ROBOT), sl.Pose([[0.0, 0.0, 1.5], [0.1, 0.0, 1.5]], np.stack([np.eye(3)] * 2)))
+    head = ",".join(f"L{i} [m]" for i in range(plan.unstrained_length.shape[1]))
+    np.savetxt(folder / "lengths.csv", plan.unstrained_length, delimiter=",", header=head, comments="")
+    (folder / "out").mkdir()
+
+
+def ended(*words: str) -> Result:
+    """A command, run here."""
+    return CliRunner().invoke(app, words)
+
+
+def tree(folder: Path) -> dict[str, str]:
+    """What is in a folder: each path with what it is, links not followed."""
+    return {str(place.relative_to(folder)): _what(place) for place in sorted(folder.rglob("*"))}
+
+
+def _what(place: Path) -> str:
+    mode = os.lstat(place).st_mode
+    if stat.S_ISLNK(mode):
+        return f"link to {os.readlink(place)}"
+    if not stat.S_ISREG(mode):
+        return f"kind {stat.S_IFMT(mode)}"
+    content = place.read_bytes()
+    return f"{len(content)} bytes {hashlib.sha256(content).hexdigest()}"

@@ -1,0 +1,203 @@
+"""What every reader must do with every file: read it right, or refuse it in one line, at once, in little memory."""
+
+from __future__ import annotations
+
+import resource
+import time
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+import sagline as sl
+from sagline.errors import SaglineError, printable
+from sagline.files.lengths_file import load_lengths
+from sagline.files.pose_text import parse_pose
+
+SECONDS: Final = 2.0  # of processor time; a wall clock would tell how busy the machine is
+MEGABYTES: Final = 500.0
+
+
+@dataclass(frozen=True)
+class Reader:
+    """A kind of input: a good sample of it, and who reads it."""
+
+    name: str
+    sample: str
+    read: Callable[[Path], Any]
+
+    def written(self, folder: Path, data: bytes) -> Path:
+        """A file of this kind."""
+        file = folder / self.name
+        file.write_bytes(data)
+        return file
+
+
+ROBOT = """\
+name: shelf
+frame_anchors: [[-2, -1, 3], [2, -1, 3 m], [2, 1, 3], [-2000 mm, 1, 3]]
+platform_anchors:
+  - [-0.1, -0.1, 0.2]
+  - [0.1, -0.1, 0.2]
+  - [0.1, 0.1, 0.2]
+  - [-0.1, 0.1, 0.2]
+cables: {linear_density: 67 g/m, youngs_modulus: 2 GPa, section_area: [22 mm^2, 22e-6, 22 mm², 22e-6 m^2]}
+mass: 12.5
+inertia: {Ixx: 0.5, Iyy: 0.6, Izz: 0.7, Ixy: 0.01}
+center_of_mass: [0, 0.01, -3 cm]
+gravity: 9.81
+motion_pattern: 1R2T
+plane_normal: [0, 1, 0]
+tension_min: 5
+tension_max: [300, 300 N, 0.3 kN, .inf]
+test_box: {low: [-1, 0, 1], high: [1, 0, 2], tilt: 5 deg}
+source: by hand
+notes: |
+  Two lines
+  of notes.
+assumed: {tension_min: nobody knows}
+"""
+WAYPOINTS = """\
+rate: 20
+profile: septic
+durations: [2 s, 500 ms]
+waypoints:
+  - position: [0, 0, 1.5]
+  - {position: [2 m, 1500 mm, 1.5], euler: {alpha: 20 deg, gamma: 0.1}}
+  - position: [2, 1, 1.5]
+    quaternion: [0, 0, 0.6, 0.8]
+"""
+PATH = "time [s],x [mm],y,z,alpha [deg],beta,gamma\n0,0,0.5,1,0,0,0\n0.5,10,0.5,1,1,0,0\n1,20,0.5,1.5,2,0.1,-0.25\n"
+LENGTHS = "time,L0,L1 [mm],L2,L3\n0,2.5,2500,2.75,3\n0.1,2.5,2510.5,2.75,3e0\n"
+MEASURED = "span [m],rise,length [m],tension [kN]\n10,-2.5,10.4,0.1\n12,3.25,12.6,0.2\n"
+WIREX = """<?xml version="1.0" ?>
+<models version="0.32">
+  <robot name="shelf" motionpattern="3R3T" generator="by hand">
+    <geometry>
+      <chain id="1"><base x="-2" y="-1" z="3" radius="0.05" /><platform x="-0.1" y="-0.1" z="0.2" /></chain>
+      <chain id="2" cable_id="2"><base x="2" y="-1" z="3" /><platform x="0.1" y="-0.1" z="0.2" /></chain>
+      <chain id="3"><base x="0" y="1.5" z="3" radius="0" /><platform x="0" y="0.1" z="0.2" /></chain>
+    </geometry>
+    <platform name="tray" mass="12.5">
+      <inertiatensor Ixx="0.5" Ixy="0.01" Ixz="0" Iyy="0.6" Iyz="-0.02" Izz="0.7" />
+      <centerofgravity x="0" y="0.01" z="-0.03" />
+    </platform>
+  </robot>
+  <cable name="thin" elasticity="2.5e10" radius="0.001" weight="0.01" minimum_load="4" breaking_load="900" />
+  <cable name="thick" elasticity="1e10" radius="0.002" weight="0.03" minimum_load="6" breaking_load="2500" />
+  <winch name="small"><cable f_max="800" /></winch>
+</models>
+"""
+
+
+def _caspr_cable(name: str, frame: str, platform: str) -> str:
+    ends = "".join(
+        f"<attachment><link>{k}</link><location>{place}</location></attachment>"
+        for k, place in enumerate((frame, platform))
+    )
+    limits = "<force_min>5</force_min><force_max>300</force_max><K>9e4</K>"
+    return (
+        f'<cable_linear_spring name="{name}" attachment_reference="com"><properties>{limits}</properties>'
+        f"<attachments>{ends}</attachments></cable_linear_spring>"
+    )
+
+
+CASPR_BODIES = """<?xml version="1.0" encoding="utf-8"?>
+<!DOCTYPE bodies_system SYSTEM "bodies.dtd">
+<bodies_system><links><link_rigid num="1" name="gondola">
+  <joint type="PLANAR_XZ" q_initial="0 0 1"/>
+  <physical><mass>8</mass><com_location>0.1 0.0 -0.2</com_location>
+    <inertia ref="com"><Ixx>0</Ixx><Iyy>0.5</Iyy><Izz>0</Izz><Ixy>0</Ixy><Ixz>0</Ixz><Iyz>0</Iyz></inertia></physical>
+  <parent><num>0</num><location>0 0 0.5</location></parent>
+</link_rigid></links></bodies_system>
+"""
+CASPR_CABLES = (
+    '<cables default_cable_set="all"><cable_set id="all">'
+    + _caspr_cable("a", "-3 0 4", "-0.2 0 0.1")
+    + _caspr_cable("b", "3 0 4", "0.2 0 0.1")
+    + _caspr_cable("c", "0 0 -4", "0 0 -0.1")
+    + "</cable_set></cables>"
+)
+
+
+def _caspr_beside(other: str, text: str) -> Callable[[Path], Any]:
+    def read(file: Path) -> Any:
+        (file.parent / other).write_text(text)
+        return sl.load_caspr(file)
+
+    return read
+
+
+READERS: Final = (
+    Reader("robot.yaml", ROBOT, sl.load_robot),
+    Reader("tour.yaml", WAYPOINTS, sl.load_path),
+    Reader("tour.csv", PATH, sl.load_path),
+    Reader("lengths.csv", LENGTHS, lambda file: load_lengths(file, 4, 5.0)),
+    Reader("cable.csv", MEASURED, sl.load_measurements),
+    Reader("shelf.wcrfx", WIREX, sl.load_wirex),
+    Reader("gondola_bodies.xml", CASPR_BODIES, _caspr_beside("gondola_cables.xml", CASPR_CABLES)),
+    Reader("gondola_cables.xml", CASPR_CABLES, _caspr_beside("gondola_bodies.xml", CASPR_BODIES)),
+    Reader(
+        "pose.txt",
+        "1.5,-0.25,2,10,20,30",
+        lambda file: parse_pose(file.read_bytes().decode("utf-8", "surrogateescape")),
+    ),
+)
+
+
+def judged(call: Callable[[], Any], what: str) -> Any:
+    """What a call returns, or its error; whatever it is, it has kept the limits.
+
+    Args:
+        call: The call.
+        what: Tells the case if it has not.
+
+    Returns:
+        What came out, or the SaglineError.
+    """
+    before, start = _peak(), time.process_time()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        try:
+            found = call()
+        except SaglineError as error:
+            found = error
+            text = str(error)
+            assert len(text) < 300, f"{what}: {len(text)} letters"
+            assert text == printable(text), f"{what}: {text!r}"
+            text.encode("utf-8")
+        except BaseException as error:
+            raise AssertionError(f"{what}: {type(error).__name__}: {error}"[:2000]) from error
+    assert time.process_time() - start < SECONDS, f"{what}: {time.process_time() - start:.1f} s"
+    assert _peak() - before < MEGABYTES, f"{what}: {_peak() - before:.0f} MB more than before"
+    return found
+
+
+def sound(found: Any, what: str) -> None:
+    """What was read can be worked with: finite numbers, and the solver has an answer or an error."""
+    robot = getattr(found, "robot", found)
+    if isinstance(robot, sl.Robot):
+        lines = "\n".join((robot.name, robot.source, robot.notes, *robot.assumed.values())).split("\n")
+        assert robot.name in lines, what
+        for line in lines:
+            assert line.replace("\t", " ") == printable(line.replace("\t", " ")), what
+        for array in (robot.frame_anchors, robot.platform_anchors, robot.inertia, robot.center_of_mass):
+            assert np.isfinite(array).all(), what
+        place = sl.Pose(robot.frame_anchors.mean(axis=0) - [0.0, 0.0, 0.5], np.eye(3))
+        plan = judged(lambda: sl.inverse(robot, place), what)
+        if isinstance(plan, sl.Plan) and plan.feasible:
+            assert np.isfinite(plan.unstrained_length).all(), what
+    elif isinstance(found, sl.Path):
+        for array in (found.time, found.pose.position, found.pose.quaternion, found.twist, found.twist_rate):
+            assert np.isfinite(array).all(), what
+    elif isinstance(found, tuple):
+        for array in found:
+            assert array is None or np.isfinite(array).all(), what
+
+
+def _peak() -> float:
+    """Most memory that this process has had so far [MB]."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0

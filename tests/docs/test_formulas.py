@@ -1,0 +1,45 @@
+"""The formulas of the pages stand between dollars, where they are typeset; `make docs` fails where one cannot be."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+DOCS = Path(__file__).parents[2] / "docs"
+PAGES = sorted(DOCS.rglob("*.md"))
+CODE = re.compile(r"^( *)```.*?^\1```$|`[^`\n]+`", re.DOTALL | re.MULTILINE)
+FORMULA = re.compile(r"^ *\$\$\n.*?\n *\$\$$|\$[^$\s](?:[^$\n]*[^$\s])?\$", re.DOTALL | re.MULTILINE)
+UNIT = r"(?<!\bm)(?<!mm)(?<!/s)"
+UNSET = re.compile(rf"[α-λν-ωΓΔΘΛΞΣΦΨΩ∂√∑∫]|\b[A-Za-z]_[A-Za-z0-9]|{UNIT}[²³⁴⁻¹ᵏᵀ₀₁ᵢ]|\w\^|\\[a-z]+")
+
+
+def unset(text: str) -> list[str]:
+    """What looks like a formula in prose, with what stands around it."""
+    prose = FORMULA.sub("", CODE.sub("", text))
+    found = [prose[max(0, match.start() - 20) : match.end() + 20] for match in UNSET.finditer(prose)]
+    return found + ["$"] * prose.count("$")
+
+
+def name_of(page: Path) -> str:
+    return str(page.relative_to(DOCS))
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_every_formula_is_typeset(page: Path) -> None:
+    assert unset(page.read_text(encoding="utf-8")) == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_no_formula_breaks_a_table(page: Path) -> None:
+    formulas = FORMULA.findall(CODE.sub("", page.read_text(encoding="utf-8")))
+    assert [formula for formula in formulas if "|" in formula] == []
+
+
+@pytest.mark.parametrize("text", ["τ = T/cos φ", "the T_x of", "g²/24", "10^6 poses", "a \\frac12", "$5 for", "HᵀH"])
+def test_what_is_not_typeset_would_be_found(text: str) -> None:
+    assert unset(f"Here is {text} in prose.")
+
+
+@pytest.mark.parametrize("text", ["5 kg m² or 3 m/s² or 4 mm²", "25 µs", "`T_x`", "$T_x$ and $\\tau$", "$$\nx^2\n$$"])
+def test_units_code_and_formulas_are_not_found(text: str) -> None:
+    assert unset(text) == []

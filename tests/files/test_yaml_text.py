@@ -1,0 +1,116 @@
+import math
+import time
+
+import pytest
+
+from sagline.errors import FileError
+from sagline.files.yaml_text import parse_mapping
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("10", 10),
+        ("+010", 10),  # YAML 1.1 reads 8
+        ("-2.50", -2.5),
+        ("1e3", 1000.0),  # YAML 1.1 reads a text
+        (".5E-1", 0.05),
+        ("2.", 2.0),
+        (".inf", math.inf),
+        ("-inf", -math.inf),
+        ("!!float 2", 2),
+        # YAML 1.1 reads 90, 1000, 16, 5, 3, 2020-01-01, True, False, True
+        ("1:30", "1:30"),
+        ("1_000", "1_000"),
+        ("0x10", "0x10"),
+        ("0b101", "0b101"),
+        ("0o3", "0o3"),
+        ("2020-01-01", "2020-01-01"),
+        ("yes", "yes"),
+        ("off", "off"),
+        ("On", "On"),
+        ("٣", "٣"),
+        ("1,5", "1,5"),
+        ("'5'", "5"),
+        ('"5"', "5"),
+        ("!!str 5", "5"),
+        ("!!int 0x10", "0x10"),
+        ("true", True),
+        ("null", None),
+        ("", None),
+        ("=", "="),
+        ("1e400", 1.7976931348623157e308),
+        ("9" * 70, "9" * 70),
+    ],
+)
+def test_a_number_is_a_plain_number_and_a_word_is_a_word(text: str, value: object) -> None:
+    found = parse_mapping(f"a: {text}", "x.yaml")["a"]
+    assert found == value
+    assert type(found) is type(value)
+
+
+def test_aliases_and_merges_in_measure() -> None:
+    text = "base: &b {x: 1, y: [1, 2]}\nsame: *b\nmore: {<<: *b, x: 3}\n"
+    assert parse_mapping(text, "x.yaml")["more"] == {"x": 3, "y": [1, 2]}
+    assert parse_mapping(text, "x.yaml")["same"] == {"x": 1, "y": [1, 2]}
+
+
+def _bomb(first: str, item: str, between: str) -> str:
+    lines = [f"a: &a {first}"]
+    lines += [f"{c}: &{c} {item.format(between.join(['*' + chr(ord(c) - 1)] * 9))}" for c in "bcdefghi"]
+    return "\n".join(lines)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        _bomb("[x, x, x, x, x, x, x, x, x]", "[{}]", ","),
+        _bomb("{k: x}", "{{<<: [{}]}}", ","),
+        _bomb("x", "{{p: [{0}], q: [{0}]}}", ","),
+        "a: &a [*a]",
+        "a: &a {b: *a}",
+        "a: &a {<<: *a}",
+        "a: &a\n  ? *a\n  : 1",
+        "a: &a0 [x]\n" + "".join(f"b{k}: &a{k} [*a{k - 1}]\n" for k in range(1, 3000)),
+        "a: " + "[" * 100_000,
+        "a: " + "{a: " * 30_000,
+        "- " * 50_000,
+        "? " * 50_000,
+        "a: " + "[" * 21 + "]" * 21,
+        "".join(" " * k + "a:\n" for k in range(700)),
+        "a: [" + "1," * 100_000 + "]",
+        "a: [" + "[]," * 100_000,
+    ],
+)
+def test_nothing_grows_while_it_is_read(text: str) -> None:
+    start = time.process_time()
+    with pytest.raises(FileError, match=r"an alias that stands for itself|more than 20 levels or 25000 values"):
+        parse_mapping(text, "x.yaml")
+    assert time.process_time() - start < 2.0
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("a: 1\nb: 2\na: 3", r"line 3: key a is given twice"),
+        ('a: 1\n"a": 3', r"line 2: key a is given twice"),
+        ("<<: {a: 1}\n<<: {a: 2}", "line 2: key << is given twice"),
+        ("a: !!python/object/apply:os.system [ls]", "could not determine a constructor"),
+        ("a: !!binary eA==", "could not determine a constructor"),
+        ("a: !!set {b, c}", "could not determine a constructor"),
+        ("a: !!map [b]", "expected a mapping node"),
+        ("{[a]: 1}", "unhashable"),
+        ('a: "\\UFFFFFFFF"', "is not YAML"),
+        ("a: b\x1b", r"line 1 holds the character '\\x1b'"),
+        ("a: b\n\n\x00", r"line 3 holds the character '\\x00'"),
+        ("--- {a: 1}\n--- {b: 1}", "another document"),
+        ("a: &b 1\nc: &b 2", "line 2"),
+        ("a: *b", "undefined alias"),
+        ("- a", "no keys at its top level"),
+        ("a", "no keys at its top level"),
+        ("# nothing", "is empty"),
+    ],
+)
+def test_what_is_no_such_yaml(text: str, message: str) -> None:
+    with pytest.raises(FileError, match=message):
+        parse_mapping(text, "x.yaml")

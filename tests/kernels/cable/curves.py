@@ -1,0 +1,50 @@
+"""Cables of one pose as kernels take them, and their pulls one by one: the reference of their curves."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sagline.arrays import Array
+from sagline.kernels.cable import models, pulls, turns
+from sagline.kernels.cable.cables import Cables
+from sagline.kernels.cable.pulls import TURN_ROWS, Curves
+from sagline.kernels.cable.terms import Chord, Material, Model
+from sagline.kernels.codes import CATENARY
+from tests.kernels.compiled import from_python, memory
+
+GRAVITY = 9.81
+
+find_turns = from_python(turns.find_turns)
+pull_range = from_python(pulls.pull_range)
+from_tension = from_python(models.from_tension)
+
+
+def random_curves(rng: np.random.Generator, m: int, model: int = CATENARY) -> Curves:
+    """Chords of 1 to 100 m at any slope, X = wD/(2 tau) up to 3 at the least tension, strains up to a hundredth."""
+    chord, slope = 10 ** rng.uniform(0, 2, m), rng.uniform(-np.pi / 2, np.pi / 2, m)
+    density = 10 ** rng.uniform(-2, 1, m)
+    half_weight = 0.5 * density * GRAVITY * chord
+    low = half_weight / 10 ** rng.uniform(-2.5, 0.5, m)
+    high = low * 10 ** rng.uniform(0.3, 3, m)
+    stiffness = high / 10 ** rng.uniform(-5, -2, m)
+    sine = np.where(rng.uniform(size=m) < 0.05, -1.0, np.sin(slope))
+    cables = Cables(*(np.full(m, np.nan) for _ in Cables._fields))._replace(
+        density=density, stiffness=stiffness, half_weight=half_weight, chord=chord, sine=sine,
+        cosine=np.sqrt(1 - sine * sine), low=low, high=high,
+    )  # fmt: skip
+    turned = np.full((TURN_ROWS, m), np.nan)
+    return Curves(Model(model, 4.9, 4.0, GRAVITY), cables, turned, np.zeros(m, dtype=np.int8))
+
+
+def with_turns(curves: Curves) -> Curves:
+    """The same, its turns found."""
+    find_turns(curves, memory())
+    return curves
+
+
+def pulls_of(curves: Curves, i: int, tensions: Array) -> Array:
+    """Pulls of cable i, one by one."""
+    cables = curves.cables
+    chord = Chord(float(cables.chord[i]), float(cables.sine[i]), float(cables.cosine[i]))
+    material = Material(float(cables.density[i]), float(cables.stiffness[i]))
+    return np.array([from_tension(curves.model, chord, material, float(tau))[1] for tau in tensions])

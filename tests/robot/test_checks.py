@@ -1,0 +1,36 @@
+import numpy as np
+import pytest
+
+from sagline.errors import InvalidValueError
+from sagline.robot import checks
+
+Z = np.array([0.0, 0.0, 1.0])
+
+
+@pytest.mark.parametrize(
+    ("moments", "pattern", "normal", "good"),
+    [
+        ((1.0, 1.0, 2.0), "3R3T", None, True),  # a thin plate
+        ((0.333, 0.333, 0.667), "3R3T", None, True),  # one printed with three digits
+        ((1.0, 1.0, 2.1), "3R3T", None, False),
+        ((1.0, -1e-6, 1.0), "3R3T", None, False),
+        ((1.0, -0.1, 1.0), "3R3T", None, False),
+        ((0.0, 0.0, 0.1), "1R2T", Z, True),
+        ((5.0, 5.0, 0.0), "1R2T", Z, False),
+        ((-1.0, 0.0, 0.1), "1R2T", Z, False),
+        ((0.0, 0.0, 0.0), "2T", Z, True),
+        ((0.0, 0.0, 0.3), "3T", None, True),
+        ((0.0, 0.0, -0.3), "3T", None, False),
+    ],
+)
+def test_which_inertia_a_platform_can_have(
+    moments: tuple[float, float, float], pattern: str, normal: np.ndarray | None, good: bool
+) -> None:
+    # turned about the normal, which a planar platform may be, and anyhow where it turns about every axis
+    turn = np.array([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
+    for matrix in (np.diag(moments), turn @ np.diag(moments) @ turn.T):
+        if good:
+            np.testing.assert_array_equal(checks.inertia(matrix, pattern, normal), matrix)
+        else:
+            with pytest.raises(InvalidValueError, match="inertia is a matrix with"):
+                checks.inertia(matrix, pattern, normal)

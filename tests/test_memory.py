@@ -1,0 +1,73 @@
+import resource
+import tracemalloc
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline import memory
+from sagline.memory import check_memory, free_memory
+
+
+def test_free_memory_is_that_of_the_machine() -> None:
+    total = next(
+        1024.0 * float(line.split()[1]) for line in Path("/proc/meminfo").read_text().splitlines() if "MemTotal" in line
+    )
+    assert 1e6 < free_memory() <= total
+
+
+def test_the_limit_of_the_process_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    taken = float(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    monkeypatch.setattr(resource, "getrlimit", lambda _: (int(taken + 5e6), resource.RLIM_INFINITY))
+    assert 0.0 <= free_memory() <= 6e6
+
+
+def test_what_does_not_fit_is_said_with_its_size(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(memory, "free_memory", lambda: 3e9)
+    check_memory("a path", 2.9e9, "Check the units.")
+    with pytest.raises(sl.InvalidValueError) as caught:
+        check_memory("a path", 6e9, "Check the units.")
+    assert str(caught.value) == (
+        "a path is a request for 6 GB of memory; allowed: <= 3 GB, which are free. Check the units."
+    )
+
+
+def test_paths_and_batches_ask_before_they_take(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = sl.load_robot("cogiro")
+    poses = sl.Pose.from_euler(np.tile([1.0, 1.0, 2.0], (200_000, 1)), 0.0, 0.0, 0.0)
+    lengths = np.full((200_000, 8), 10.0)
+    monkeypatch.setattr(memory, "free_memory", lambda: 110e6)
+    tracemalloc.start()
+    for call in (
+        lambda: sl.quintic_path([(0, 0, 0), (1, 0, 0)], durations=1e4),
+        lambda: sl.septic_path([(0, 0, 0), (1, 0, 0)], durations=9e5),
+        lambda: sl.quintic_path([(0, 0, 0), (1, 0, 0)], durations=1e12),
+        lambda: sl.inverse(robot, poses),
+        lambda: sl.forward(robot, lengths, start=poses[0]),
+    ):
+        with pytest.raises(sl.InvalidValueError, match=r"(samples|poses) is "):
+            call()
+    assert tracemalloc.get_traced_memory()[1] < 60e6
+    tracemalloc.stop()
+
+
+@pytest.mark.parametrize("cable_count", [7, 8])
+def test_a_pose_needs_no_more_than_is_reckoned(cable_count: int) -> None:
+    robot = sl.load_robot("falcon-7" if cable_count == 7 else "cogiro")
+    assert robot.test_box is not None
+    place = np.random.default_rng(5).uniform(robot.test_box.low, robot.test_box.high, (20_000, 3))
+    poses = sl.Pose.from_euler(place, 0.0, 0.0, 0.0)
+    plan = sl.inverse(robot, poses)
+    start = poses[plan.feasible]
+    sl.forward(robot, plan.unstrained_length[plan.feasible][:2], start=start[:2])  # loading it takes memory too
+    for call in (
+        lambda: sl.inverse(robot, poses),
+        lambda: sl.forward(robot, plan.unstrained_length[plan.feasible], start=start),
+    ):
+        tracemalloc.start()
+        found = call()
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        assert peak < 20_000 * (400 + 64 * cable_count)
+        del found
