@@ -163,6 +163,8 @@ def command_reference() -> str:
     text = re.sub(r"\*\*Commands\*\*:\n\n(?:\* .*\n)+", "**Commands**:\n\n" + "\n".join(lines) + "\n", text)
     text = re.sub(r"^```console\n\$ ", "```\n", text, flags=re.MULTILINE)
     text = re.sub(r"^\* `--help`: .*\n", "", text, flags=re.MULTILINE)
+    text = re.sub(r"\{([A-Z][\w.]*)\}", r"\1", text)  # arguments as the command's own help names them
+    text = re.sub(r"^(\* `[A-Z][\w.]*) <[^>]+>`", r"\1`", text, flags=re.MULTILINE)
     for name, shown in DRAWN.items():
         text = re.sub(
             rf"(## `sagline {name}`\n.*?)(?=\n## |\Z)", lambda m, what=shown: f"{m[1]}\n{what}\n", text, flags=re.S

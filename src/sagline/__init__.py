@@ -3,64 +3,21 @@
 from __future__ import annotations
 
 from importlib import import_module
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
-
-from sagline.cables.cable import Cable
-from sagline.cables.catenary import Catenary
-from sagline.cables.elastic import Elastic
-from sagline.cables.empirical import Empirical
-from sagline.cables.model import CableModel, CableState
-from sagline.cables.parabolic import Parabolic
-from sagline.cables.status import CableStatus
-from sagline.cables.straight import Straight
-from sagline.errors import CableGeometryError, FileError, InvalidValueError, SaglineError, SaglineWarning
-from sagline.kinematics.confirm import Confirmation, confirm
-from sagline.kinematics.equilibria import Equilibria, equilibria
-from sagline.kinematics.forward import forward
-from sagline.kinematics.forward_solution import ForwardSolution
-from sagline.kinematics.forward_solver import ForwardSolver, ForwardStep
-from sagline.kinematics.forward_status import ForwardStatus
-from sagline.kinematics.inverse import inverse
-from sagline.kinematics.inverse_solver import InverseSolver, InverseStep
-from sagline.kinematics.measured import MeasuredTension
-from sagline.kinematics.plan import Gap, Plan
-from sagline.kinematics.polygon import tension_polygon
-from sagline.kinematics.status import PoseStatus
-from sagline.motion.path import Path
-from sagline.motion.planar import article_path
-from sagline.motion.rest_to_rest import quintic_path, septic_path
-from sagline.motion.sampled import path_from_samples
-from sagline.robot.catalogue import robot_names
-from sagline.robot.equilibrium import Equilibrium
-from sagline.robot.pose import Pose
-from sagline.robot.pose_box import PoseBox
-from sagline.robot.robot import Robot
-from sagline.statics.balance import ArticleBalance, article_balance, structure_matrix
-from sagline.statics.stiffness import Modes, Stiffness, modes, stiffness
-from sagline.statics.wrench import inertial_wrench
-from sagline.tension.analytic_center import AnalyticCenter
-from sagline.tension.broken import without_cables
-from sagline.tension.centroid import Centroid
-from sagline.tension.closed_form import ClosedForm
-from sagline.tension.closest import Closest
-from sagline.tension.improved_closed_form import ImprovedClosedForm
-from sagline.tension.lowest_maximum import LowestMaximum
-from sagline.tension.lowest_sum import LowestSum
-from sagline.tension.margin import capacity_margin, limit_margin
-from sagline.tension.method import TensionMethod
-from sagline.tension.minimum_norm import MinimumNorm
-from sagline.tension.p_norm import PNorm
-from sagline.tension.polygon import Side, TensionPolygon
-from sagline.tension.polygon_walk import PolygonWalk
-from sagline.tension.puncture import Puncture
-from sagline.tension.quadratic_program import QuadraticProgram
-from sagline.tension.singular import unresisted_motion
 
 if TYPE_CHECKING:
     from sagline import plot
     from sagline.article.identify import EmpiricalFit, identify_empirical
     from sagline.article.identify_cable import CableFit, identify_cable
+    from sagline.cables.cable import Cable
+    from sagline.cables.catenary import Catenary
+    from sagline.cables.elastic import Elastic
+    from sagline.cables.empirical import Empirical
+    from sagline.cables.model import CableModel, CableState
+    from sagline.cables.parabolic import Parabolic
+    from sagline.cables.status import CableStatus
+    from sagline.cables.straight import Straight
+    from sagline.errors import CableGeometryError, FileError, InvalidValueError, SaglineError, SaglineWarning
     from sagline.files.caspr import load_caspr
     from sagline.files.imported import Imported
     from sagline.files.measurements import load_measurements
@@ -69,8 +26,49 @@ if TYPE_CHECKING:
     from sagline.files.plan_file import load_plan, save_plan
     from sagline.files.robot_file import dump_robot, load_robot
     from sagline.files.wirex import load_wirex
+    from sagline.kinematics.confirm import Confirmation, confirm
+    from sagline.kinematics.equilibria import Equilibria, equilibria
+    from sagline.kinematics.forward import forward
+    from sagline.kinematics.forward_solution import ForwardSolution
+    from sagline.kinematics.forward_solver import ForwardSolver, ForwardStep
+    from sagline.kinematics.forward_status import ForwardStatus
+    from sagline.kinematics.inverse import inverse
+    from sagline.kinematics.inverse_solver import InverseSolver, InverseStep
+    from sagline.kinematics.measured import MeasuredTension
+    from sagline.kinematics.plan import Gap, Plan
+    from sagline.kinematics.polygon import tension_polygon
+    from sagline.kinematics.status import PoseStatus
+    from sagline.motion.path import Path
+    from sagline.motion.planar import article_path
+    from sagline.motion.rest_to_rest import quintic_path, septic_path
+    from sagline.motion.sampled import path_from_samples
+    from sagline.robot.catalogue import robot_names
+    from sagline.robot.equilibrium import Equilibrium
+    from sagline.robot.pose import Pose
+    from sagline.robot.pose_box import PoseBox
+    from sagline.robot.robot import Robot
+    from sagline.statics.balance import ArticleBalance, article_balance, structure_matrix
+    from sagline.statics.stiffness import Modes, Stiffness, modes, stiffness
+    from sagline.statics.wrench import inertial_wrench
+    from sagline.tension.analytic_center import AnalyticCenter
+    from sagline.tension.broken import without_cables
+    from sagline.tension.centroid import Centroid
+    from sagline.tension.closed_form import ClosedForm
+    from sagline.tension.closest import Closest
+    from sagline.tension.improved_closed_form import ImprovedClosedForm
+    from sagline.tension.lowest_maximum import LowestMaximum
+    from sagline.tension.lowest_sum import LowestSum
+    from sagline.tension.margin import capacity_margin, limit_margin
+    from sagline.tension.method import TensionMethod
+    from sagline.tension.minimum_norm import MinimumNorm
+    from sagline.tension.p_norm import PNorm
+    from sagline.tension.polygon import Side, TensionPolygon
+    from sagline.tension.polygon_walk import PolygonWalk
+    from sagline.tension.puncture import Puncture
+    from sagline.tension.quadratic_program import QuadraticProgram
+    from sagline.tension.singular import unresisted_motion
 
-__version__ = version("sagline")
+__version__: str
 
 __all__ = [
     "AnalyticCenter",
@@ -159,31 +157,101 @@ __all__ = [
     "without_cables",
 ]
 
-# The outer ring loads on first use: it brings xarray, matplotlib, pint and pydantic with it.
-_LAZY = {
+# Everything loads on first use: the command hears Ctrl-C before it loads anything, and only what it needs.
+_HOMES = {
+    "AnalyticCenter": "sagline.tension.analytic_center",
+    "ArticleBalance": "sagline.statics.balance",
+    "Cable": "sagline.cables.cable",
     "CableFit": "sagline.article.identify_cable",
-    "dump_robot": "sagline.files.robot_file",
+    "CableGeometryError": "sagline.errors",
+    "CableModel": "sagline.cables.model",
+    "CableState": "sagline.cables.model",
+    "CableStatus": "sagline.cables.status",
+    "Catenary": "sagline.cables.catenary",
+    "Centroid": "sagline.tension.centroid",
+    "ClosedForm": "sagline.tension.closed_form",
+    "Closest": "sagline.tension.closest",
+    "Confirmation": "sagline.kinematics.confirm",
+    "Elastic": "sagline.cables.elastic",
+    "Empirical": "sagline.cables.empirical",
     "EmpiricalFit": "sagline.article.identify",
+    "Equilibria": "sagline.kinematics.equilibria",
+    "Equilibrium": "sagline.robot.equilibrium",
+    "FileError": "sagline.errors",
+    "ForwardSolution": "sagline.kinematics.forward_solution",
+    "ForwardSolver": "sagline.kinematics.forward_solver",
+    "ForwardStatus": "sagline.kinematics.forward_status",
+    "ForwardStep": "sagline.kinematics.forward_solver",
+    "Gap": "sagline.kinematics.plan",
+    "Imported": "sagline.files.imported",
+    "ImprovedClosedForm": "sagline.tension.improved_closed_form",
+    "InvalidValueError": "sagline.errors",
+    "InverseSolver": "sagline.kinematics.inverse_solver",
+    "InverseStep": "sagline.kinematics.inverse_solver",
+    "LowestMaximum": "sagline.tension.lowest_maximum",
+    "LowestSum": "sagline.tension.lowest_sum",
+    "MeasuredTension": "sagline.kinematics.measured",
+    "MinimumNorm": "sagline.tension.minimum_norm",
+    "Modes": "sagline.statics.stiffness",
+    "PNorm": "sagline.tension.p_norm",
+    "Parabolic": "sagline.cables.parabolic",
+    "Path": "sagline.motion.path",
+    "Plan": "sagline.kinematics.plan",
+    "PolygonWalk": "sagline.tension.polygon_walk",
+    "Pose": "sagline.robot.pose",
+    "PoseBox": "sagline.robot.pose_box",
+    "PoseStatus": "sagline.kinematics.status",
+    "Puncture": "sagline.tension.puncture",
+    "QuadraticProgram": "sagline.tension.quadratic_program",
+    "Robot": "sagline.robot.robot",
+    "SaglineError": "sagline.errors",
+    "SaglineWarning": "sagline.errors",
+    "Side": "sagline.tension.polygon",
+    "Stiffness": "sagline.statics.stiffness",
+    "Straight": "sagline.cables.straight",
+    "TensionMethod": "sagline.tension.method",
+    "TensionPolygon": "sagline.tension.polygon",
+    "article_balance": "sagline.statics.balance",
+    "article_path": "sagline.motion.planar",
+    "capacity_margin": "sagline.tension.margin",
+    "confirm": "sagline.kinematics.confirm",
+    "dump_mjcf": "sagline.files.mjcf",
+    "dump_robot": "sagline.files.robot_file",
+    "equilibria": "sagline.kinematics.equilibria",
+    "forward": "sagline.kinematics.forward",
     "identify_cable": "sagline.article.identify_cable",
     "identify_empirical": "sagline.article.identify",
-    "load_measurements": "sagline.files.measurements",
-    "Imported": "sagline.files.imported",
-    "dump_mjcf": "sagline.files.mjcf",
+    "inertial_wrench": "sagline.statics.wrench",
+    "inverse": "sagline.kinematics.inverse",
+    "limit_margin": "sagline.tension.margin",
     "load_caspr": "sagline.files.caspr",
+    "load_measurements": "sagline.files.measurements",
     "load_path": "sagline.files.path_file",
     "load_plan": "sagline.files.plan_file",
     "load_robot": "sagline.files.robot_file",
     "load_wirex": "sagline.files.wirex",
+    "modes": "sagline.statics.stiffness",
+    "path_from_samples": "sagline.motion.sampled",
     "plot": "sagline.plot",
+    "quintic_path": "sagline.motion.rest_to_rest",
+    "robot_names": "sagline.robot.catalogue",
     "save_plan": "sagline.files.plan_file",
+    "septic_path": "sagline.motion.rest_to_rest",
+    "stiffness": "sagline.statics.stiffness",
+    "structure_matrix": "sagline.statics.balance",
+    "tension_polygon": "sagline.kinematics.polygon",
+    "unresisted_motion": "sagline.tension.singular",
+    "without_cables": "sagline.tension.broken",
 }
 
 
 def __getattr__(name: str) -> Any:
-    """Load a part of the outer ring the first time it is asked for, and keep it."""
-    if name not in _LAZY:
+    """Load a name the first time it is asked for, and keep it."""
+    if name == "__version__":
+        return import_module("importlib.metadata").version("sagline")
+    if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    module = import_module(_LAZY[name])
+    module = import_module(_HOMES[name])
     value = module if name == "plot" else getattr(module, name)
     globals()[name] = value
     return value

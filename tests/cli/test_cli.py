@@ -13,13 +13,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-import typer
 from numba.core import event
 from typer.testing import CliRunner
 
 import sagline as sl
+from sagline.cli.ending import ended
 from sagline.cli.main import app
-from sagline.cli.terminal import reported
 from sagline.kernels.inverse.poses import inverse_poses
 from tests.cli import interrupts
 
@@ -166,12 +165,16 @@ def test_robots_lists_all_presets() -> None:
     result = sagline("robots")
     assert result.exit_code == 0
     assert [
-        name for name in sl.robot_names() if re.search(rf"^{name} +\d cables", result.stdout, re.MULTILINE)
+        name for name in sl.robot_names() if re.search(rf"^ {name} +\d +3R3T ", result.stdout, re.MULTILINE)
     ] == list(sl.robot_names())
-    assert "15 × 11 × 6 m" in result.stdout
+    assert re.search(r"^ cogiro +8 +3R3T +91.058 +15 × 11 × 5.42 +1.01 × 0.986 × 1 *$", result.stdout, re.MULTILINE)
+    assert re.search(
+        r"^ robot +cables +motion +mass \[kg\] +frame \[m\] +platform \[m\] *$", result.stdout, re.MULTILINE
+    )
     falcon = next(robot for robot in numbers("robots") if robot["name"] == "falcon-7")
     assert (falcon["cables"], falcon["mass_kg"], falcon["motion_pattern"]) == (7, 0.3, "3R3T")
-    np.testing.assert_allclose(falcon["size_m"], [1.45, 1.45, 0.0])
+    np.testing.assert_allclose(falcon["frame_size_m"], [1.45, 1.45, 1.25])  # its anchors hang 1.25 m over the floor
+    np.testing.assert_allclose(falcon["platform_size_m"], [0.0, 0.1, 1.0])
 
 
 @pytest.mark.parametrize("name", sl.robot_names())
@@ -224,8 +227,8 @@ def test_run_makes_the_articles_test(folder: FilePath) -> None:
 
 def test_version_and_help() -> None:
     assert sagline("--version").stdout == f"sagline {sl.__version__}\n"
-    assert "sagline track cogiro my_path.yaml" in sagline("--help").stdout
-    assert "my_robot.yaml my_path.yaml --model empirical" in sagline("track", "-h").stdout
+    assert "sagline track cogiro own_path.yaml" in sagline("--help").stdout
+    assert "own_robot.yaml own_path.yaml --model empirical" in sagline("track", "-h").stdout
     assert "130 Ctrl-C" in " ".join(sagline("--help").stdout.split())
 
 
@@ -254,12 +257,16 @@ def test_a_lost_interrupt_ends_the_command_all_the_same(capsys: pytest.CaptureFi
     """Python prints and forgets an interrupt that comes while it finalizes an object."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        with pytest.raises(typer.Exit) as ended, reported(), suppress(KeyboardInterrupt):
-            signal.raise_signal(signal.SIGINT)
+
+        def loses() -> None:
+            with suppress(KeyboardInterrupt):
+                signal.raise_signal(signal.SIGINT)
+
+        code = ended(loses)
         assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
     finally:
         signal.signal(signal.SIGINT, before)
-    assert ended.value.exit_code == 130
+    assert code == 130
     assert capsys.readouterr().err == "Interrupted. What has been written is whole.\n"
 
 

@@ -17,6 +17,7 @@ from rich.console import Console
 from sagline.cli import cold_start
 from sagline.cli.compiling import Stage, first_run_text, heard
 from sagline.cli.entries import ENTRIES, FORWARD, INVERSE, MARGINS, POLYGON, SHARING, VIBRATION
+from sagline.cli.examples import write_examples
 from sagline.cli.line import shown
 from sagline.kernels.forward.forward import forward_poses
 from sagline.kernels.inverse.poses import inverse_poses, measure_balance
@@ -211,3 +212,45 @@ def test_however_the_command_ends_the_other_process_ends_too(way: signal.Signals
     while FilePath(f"/proc/{child}").exists() or any(tmp_path.glob("compiling-*")):
         assert time.monotonic() < end, "the other process is still there"
         time.sleep(0.05)
+
+
+WATCHED = """
+import sys
+from numba.core import dispatcher, event
+from sagline.cli.main import app
+from typer.testing import CliRunner
+
+silent = []
+load = dispatcher.Dispatcher.compile
+
+def watched(self, signature):
+    heard = event._registered["numba:compile"]
+    if self.py_func.__module__.startswith("sagline.") and not heard:
+        silent.append(self.py_func.__module__ + "." + self.py_func.__name__)
+    return load(self, signature)
+
+dispatcher.Dispatcher.compile = watched
+result = CliRunner().invoke(app, sys.argv[1:])
+assert result.exit_code == 0, result.output
+print(*silent, sep="\\n", end="")
+"""
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("tension", "cogiro", "--out", "out"),
+        ("new", "my_robot.yaml"),
+        ("convert", "cogiro", "--format", "mjcf"),
+        pytest.param(("track", "cogiro", "own_path.yaml"), marks=pytest.mark.soak),
+        pytest.param(("forward", "cogiro", "lengths.csv"), marks=pytest.mark.soak),
+        pytest.param(("identify", "cable.csv"), marks=pytest.mark.soak),
+        pytest.param(("article", "figures", "3-7"), marks=pytest.mark.soak),
+    ],
+    ids=" ".join,
+)
+def test_whatever_a_command_compiles_is_told(words: tuple[str, ...], tmp_path: FilePath) -> None:
+    """Each kernel is loaded, or compiled where it is not there yet, while somebody listens who would say so."""
+    write_examples(tmp_path, force=False)
+    done = subprocess.run([sys.executable, "-c", WATCHED, *words], cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (0, ""), done.stderr

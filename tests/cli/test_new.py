@@ -1,6 +1,11 @@
 """`sagline new`: the robot file it writes, what it says of it, and what it refuses."""
 
+import os
+import pty
 import re
+import subprocess
+import sys
+from contextlib import suppress
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -115,3 +120,48 @@ def test_ropes_agree_with_a_makers_table() -> None:
     # a braid of polyethylene is lighter and, for its weight, stronger than steel
     braid = ROPES["dyneema-sk78"]
     assert braid.strength_factor / braid.density_factor > 5.0 * steel.strength_factor / steel.density_factor
+
+
+def on_terminal(folder: FilePath, *answers: str) -> tuple[int, str]:
+    """What `sagline new` says on a terminal where someone types."""
+    leader, follower = pty.openpty()
+    process = subprocess.Popen(
+        [sys.executable, "-m", "sagline.cli", "new", "mine.yaml"],
+        cwd=folder,
+        stdin=follower,
+        stdout=follower,
+        stderr=follower,
+    )
+    os.close(follower)
+    os.write(leader, "".join(f"{answer}\n" for answer in answers).encode())
+    text = b""
+    with suppress(OSError):  # the other end is closed
+        while part := os.read(leader, 65536):
+            text += part
+    os.close(leader)
+    return process.wait(), " ".join(re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", text.decode()).split())
+
+
+def test_a_wrong_answer_is_told_at_once_and_asked_again(folder: FilePath) -> None:
+    code, said = on_terminal(
+        folder,
+        *("3 x 2", "4 x 4 x 0 m", "4 x 4 x 3 m", "bottom", "top", "7", "6", "9 x 1 x 1 m", "0.4 x 0.4 x 0.3 m"),
+        *("heavy", "0 kg", "20 kg", "string", "steel-6x19", "3 kg", "0.1 mm", "3 mm"),
+    )
+    assert code == 0, said
+    robot = sl.load_robot(folder / "mine.yaml")
+    assert (robot.cable_count, robot.mass) == (6, 20.0)
+    assert robot.frame_size is not None
+    np.testing.assert_allclose(robot.frame_size, [4.0, 4.0, 3.0])
+    wrong = re.findall(r"No: (\S+)", said)
+    assert wrong == [
+        *("frame", "frame[2]", "layout", "cables", "platform[0]", "mass", "mass", "rope", "diameter", "diameter"),
+    ]
+
+
+def test_what_the_options_say_is_checked_before_anything_is_asked_of_the_rest(folder: FilePath) -> None:
+    for option, value in (("--frame", "3 x 2"), ("--mass", "nan"), ("--cables", "eight"), ("--mass", "")):
+        result = new("mine.yaml", option, value)
+        assert result.exit_code == 2
+        assert result.stderr.startswith("Error: ")
+        assert list(folder.iterdir()) == []

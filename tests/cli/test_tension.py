@@ -59,3 +59,24 @@ def test_bad_pose() -> None:
     result = sagline("cogiro", "--pose", "1,2")
     assert result.exit_code == 2
     assert "--pose is '1,2'; allowed: three or six numbers" in result.stderr
+
+
+def test_the_polygon_is_that_of_the_load(folder: FilePath, monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn: list[sl.TensionPolygon] = []
+    monkeypatch.setattr("sagline.plot.polygon", lambda shape, points: drawn.append(shape))
+    monkeypatch.setattr("sagline.cli.tension.write_figures", lambda figures, place: [])
+    assert sagline("article-mixed", "--wrench", "0,0,-100").exit_code == 0
+    robot = sl.load_robot("article-mixed")
+    assert robot.test_box is not None
+    middle = sl.Pose((robot.test_box.low + robot.test_box.high) / 2, np.eye(3))
+    expected = sl.tension_polygon(robot, middle, wrench=[0.0, 0.0, -100.0, 0.0, 0.0, 0.0])
+    np.testing.assert_allclose(drawn[0].vertices, expected.vertices, rtol=1e-9)
+    assert not np.allclose(expected.vertices, sl.tension_polygon(robot, middle).vertices)
+
+
+def test_a_robot_of_too_few_cables_is_refused(folder: FilePath) -> None:
+    robot = sl.without_cables(sl.load_robot("article-mixed"), 0, 1, 2)
+    (folder / "five.yaml").write_text(sl.dump_robot(robot))
+    result = sagline("five.yaml", "--no-figures")
+    assert result.exit_code == 2
+    assert result.stderr.startswith("Error: ")

@@ -17,6 +17,7 @@ from typer.testing import CliRunner
 
 import sagline as sl
 from sagline.cli.main import app
+from sagline.cli.terminal import notices
 from sagline.cli.view import _run
 from tests.cli import interrupts
 from tests.viewer.client import Client
@@ -45,8 +46,9 @@ def test_it_serves_a_page_and_stops_at_ctrl_c_mid_drag() -> None:
         client = Client(port)
         client.grab()
         client.drag([0.5, 0.0, 2.0])
-        client.send(b"\xff nonsense")
         assert any("Feasible" in str(message) for message in client.heard(20.0))
+        client.drag([0.6, 0.0, 2.0])
+        client.send(b"\xff nonsense")
         process.send_signal(signal.SIGINT)
         said, complained = process.communicate(timeout=20.0)
         assert process.returncode == 0
@@ -62,7 +64,7 @@ def test_a_taken_port_is_told() -> None:
         port = str(taken.getsockname()[1])
         result = CliRunner().invoke(app, ["view", "article-suspended", "--port", port, "--no-browser"])
     assert result.exit_code == 2
-    assert f"127.0.0.1:{port}" in result.stderr
+    assert f"port {port} is in use" in result.stderr
     assert "--port 0" in result.stderr
 
 
@@ -82,10 +84,13 @@ def test_a_run_from_before_digests_is_played_with_a_note(
     sl.inverse(robot, sl.Pose([[0.0, 0.0, 1.5]], np.eye(3))).save(file)
     with h5py.File(file, "r+") as content:  # which cuts the digest off
         content.attrs["sagline_format"] = 1
-    assert len(_run(robot, file).plan.state.pose) == 1
-    assert capsys.readouterr().err == (
+    with notices():  # as around every command
+        assert len(_run(robot, file).plan.state.pose) == 1
+    told = (
         f"Note: {file} is from before plans carried a digest: damage to it need not show. Save it again to have one.\n"
     )
+    assert capsys.readouterr().err == told
+    assert CliRunner().invoke(app, ["lengths", str(file)]).stderr == told
 
 
 @pytest.mark.parametrize("wrong", [["nothing-like-it"], ["cogiro", "missing.nc"], ["cogiro", "--port", "99999"]])

@@ -111,20 +111,20 @@ def test_the_proofs_are_kept(saved: FilePath) -> None:
     plan = sl.load_plan(saved)
     assert plan.farkas is not None
     assert plan.needed is not None
-    matrices = sl.structure_matrix(SUSPENDED, plan.state.pose[37:])
-    y, needed = plan.farkas[37:], plan.needed[37:]
-    along = np.einsum("nk,nki->ni", y, matrices)
-    most = np.maximum(along * SUSPENDED.tension_min, along * SUSPENDED.tension_max).sum(axis=1)
-    assert (np.einsum("nk,nk->n", y, needed) > most).all()  # no tensions within the limits supply it
+    whole = a_plan()
+    assert whole.bracket is not None
+    for name in ("farkas", "needed", "bracket", "at_border"):
+        np.testing.assert_array_equal(getattr(plan, name), getattr(whole, name))
+    assert (whole.bracket[37:, 0] > 0).all()  # there is something to keep
     assert np.isnan(plan.farkas[:37]).all()
     with xr.open_dataset(saved, engine="h5netcdf") as data:
-        assert [data[name].attrs["units"] for name in ("farkas", "needed")] == ["1, 1/m", "N, N m"]
+        assert [data[name].attrs["units"] for name in ("farkas", "needed", "bracket")] == ["1, 1/m", "N, N m", "N"]
 
 
 def test_a_file_from_before_proofs_were_kept(old: FilePath) -> None:
     saved = old
     with h5py.File(saved, "r+") as file:
-        del file["farkas"], file["needed"]
+        del file["farkas"], file["needed"], file["bracket"], file["at_border"]
     with pytest.warns(SaglineWarning, match=NOTICE):
         plan = sl.load_plan(saved)
     assert plan.farkas is None
@@ -335,3 +335,13 @@ def test_robots_of_any_name(tmp_path: FilePath, name: str) -> None:
     robot = SUSPENDED.replace(name=name)
     sl.inverse(robot, sl.Pose([0.0, 0.0, 1.5], np.eye(3))).save(tmp_path / "run.nc")
     assert sl.load_plan(tmp_path / "run.nc").state.one_robot.name == name
+
+
+def test_a_folder_of_the_name_of_a_tilde_is_a_folder(tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    (tmp_path / "~").mkdir()
+    plan = sl.inverse(sl.load_robot("cogiro"), sl.Pose([0.0, 0.0, 2.0], np.eye(3)))
+    plan.save("~/run.nc")
+    assert [str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*.nc")] == ["~/run.nc"]
+    np.testing.assert_array_equal(sl.load_plan("~/run.nc").unstrained_length, plan.unstrained_length)

@@ -20,9 +20,7 @@ class Client:
     def __init__(self, port: int) -> None:
         protocol = Subprotocol(f"viser-v{viser.__version__}")
         self._socket = connect(f"ws://127.0.0.1:{port}", subprotocols=[protocol], compression=None, max_size=None)
-        eye = {"wxyz": [1, 0, 0, 0], "position": [0, -10, 3], "look_at": [0, 0, 0], "up_direction": [0, 0, 1]}
-        lens = {"fov": 1.0, "near": 0.1, "far": 100.0, "image_height": 600, "image_width": 800}
-        self.say(type="ViewerCameraMessage", **eye, **lens)
+        self.look([0, -10, 3], [0, 0, 0])
 
     def __enter__(self) -> Client:
         return self
@@ -37,6 +35,13 @@ class Client:
 
     def send(self, raw: bytes | str) -> None:
         self._socket.send(raw)
+
+    def look(self, position: Any, look_at: Any, width: int = 800) -> None:
+        """Tell where the camera is, in a picture 600 px high."""
+        eye: dict[str, Any] = {"wxyz": [1, 0, 0, 0], "up_direction": [0, 0, 1]}
+        eye |= {"position": [float(x) for x in position], "look_at": [float(x) for x in look_at]}
+        lens = {"fov": 1.0, "near": 0.1, "far": 100.0, "image_height": 600, "image_width": width}
+        self.say(type="ViewerCameraMessage", **eye, **lens)
 
     def grab(self) -> None:
         self.say(type="TransformControlsDragStartMessage", name="/platform", owner="")

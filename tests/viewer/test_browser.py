@@ -7,14 +7,16 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path as FilePath
+from typing import Literal
 
 import numpy as np
 import pytest
 import trimesh
-from PIL import Image
+from PIL import Image, ImageSequence
 from playwright.sync_api import Browser, ConsoleMessage, Error, Page, sync_playwright
 
 import sagline as sl
+from sagline.viewer import film
 from sagline.viewer.run import Run
 from sagline.viewer.server import started, stop
 from sagline.viewer.viewer import Viewer
@@ -24,6 +26,10 @@ FLAGS = (
     "--headless --no-sandbox --disable-quic --no-first-run --disable-background-networking --disable-component-update "
     "--disable-sync --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader"
 )
+CONTRAST = FilePath(__file__).with_name("contrast.js").read_text()
+BACKGROUND = "getComputedStyle(document.querySelector('div:has(> div > [data-dock-root])')).backgroundColor"
+OVERFLOWING = """() => [...document.querySelectorAll(".sagline, .sagline td, .mantine-NumberInput-input")]
+    .filter((each) => each.scrollWidth > each.clientWidth + 1).map((each) => each.outerHTML.slice(0, 200))"""
 PATIENCE = 60.0  # s: the picture is computed without a graphics card
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None and not os.environ.get("CI"), reason="Chromium is not installed")
@@ -39,9 +45,17 @@ def browser() -> Iterator[Browser]:
 
 
 @contextmanager
-def opened(browser: Browser, robot: sl.Robot, run: Run | None = None) -> Iterator[tuple[Page, Viewer]]:
-    """A page on a viewer; whatever the console complains of fails the test."""
-    server = started(port=0)
+def opened(
+    browser: Browser,
+    robot: sl.Robot,
+    run: Run | None = None,
+    *,
+    width: int = 1000,
+    theme: Literal["light", "dark"] = "light",
+    complains: bool = False,
+) -> Iterator[tuple[Page, Viewer]]:
+    """A page on a viewer; whatever the console complains of fails the test, unless it has reason to."""
+    server = started(port=0, title=robot.name)
     viewer = Viewer(server, robot, run)
     thread = threading.Thread(target=viewer.serve)
     thread.start()
@@ -54,7 +68,7 @@ def opened(browser: Browser, robot: sl.Robot, run: Run | None = None) -> Iterato
     def fail(error: Error) -> None:
         complaints.append(str(error))
 
-    page = browser.new_page(viewport={"width": 1000, "height": 640})
+    page = browser.new_page(viewport={"width": width, "height": 640}, color_scheme=theme)
     page.set_default_timeout(1e3 * PATIENCE)
     page.on("console", hear)
     page.on("pageerror", fail)
@@ -67,7 +81,7 @@ def opened(browser: Browser, robot: sl.Robot, run: Run | None = None) -> Iterato
         viewer.stop()
         thread.join(timeout=30.0)
         stop(server)
-    assert complaints == []
+    assert complains or complaints == []
 
 
 def await_that(page: Page, done: Callable[[], bool]) -> None:
@@ -117,3 +131,106 @@ def test_scene_and_picture_can_be_taken_away(browser: Browser, tmp_path: FilePat
         download.value.save_as(tmp_path / "picture.png")
         with Image.open(tmp_path / "picture.png") as picture:
             assert np.asarray(picture.convert("L")).std() > 2.0  # not blank
+
+
+def test_a_film_shows_the_run_and_leaves_the_scene_as_it_was(
+    browser: Browser, tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(film, "FRAMES", 3)
+    robot = sl.load_robot("article-suspended")
+    ends = sl.Pose(np.array([[-4.0, 0.0, 1.5], [4.0, 0.0, 1.5]]), np.stack([np.eye(3)] * 2))
+    run = Run.of(sl.inverse(robot, sl.quintic_path(ends, durations=[2.0], rate=20)))
+    with opened(browser, robot, run) as (page, viewer):
+        page.get_by_text("Take away").click()
+        with page.expect_download() as download:
+            page.get_by_role("button", name="Film of the run (GIF)").click()
+            page.get_by_text("Picture 1 of 3").wait_for()
+            assert page.get_by_label("Follow the run").is_checked()
+        download.value.save_as(tmp_path / "film.gif")
+        page.get_by_text("Picture 3 of 3").wait_for(state="detached")
+        with Image.open(tmp_path / "film.gif") as gif:
+            pictures = [np.asarray(frame.convert("RGB"), dtype=float) for frame in ImageSequence.Iterator(gif)]
+        assert len(pictures) == 3
+        cables = [np.argwhere((p[..., 0] > 150.0) & (p[..., 1] < 120.0) & (p[..., 2] > 120.0)) for p in pictures]
+        across = np.array([where[:, 1].mean() for where in cables]) / pictures[0].shape[1]
+        assert np.all(np.diff(across) > 0.015)  # they lead to the platform, which goes to the right
+        assert not next(iter(viewer._server.get_clients().values())).scene._handle_from_node_name
+
+
+def least_contrast(page: Page) -> float:
+    """The least contrast of a text on the page with what is behind it; fails with the texts below 4.5 : 1."""
+    page.wait_for_timeout(400)  # what fades in and out has done so
+    texts = page.evaluate(CONTRAST)
+    assert len(texts) > 40
+    pale = {(text["words"], round(text["ratio"], 2)) for text in texts if not text["ratio"] >= 4.5}
+    assert pale == set()
+    return float(min(text["ratio"] for text in texts))
+
+
+@pytest.mark.parametrize("width", [390, 1000])
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_every_text_can_be_read(browser: Browser, theme: Literal["light", "dark"], width: int) -> None:
+    robot = sl.load_robot("article-mixed")
+    ends = sl.Pose(np.array([[0.0, 0.0, 1.5], [2.0, 1.0, 1.5]]), np.stack([np.eye(3)] * 2))
+    run = Run.of(sl.inverse(robot, sl.quintic_path(ends, durations=[2.0], rate=50), model=sl.Empirical()))
+    with opened(browser, robot, run, width=width, theme=theme, complains=True) as (page, viewer):
+        assert page.evaluate("document.documentElement.dataset.mantineColorScheme") == theme
+        least_contrast(page)
+        page.get_by_label("Follow the run").uncheck()
+        page.get_by_text("Take away").click()
+        page.get_by_label("Cable model").first.click()
+        page.get_by_text("parabolic").wait_for()
+        least_contrast(page)
+        page.keyboard.press("Escape")
+        viewer._stage.gizmo.position = np.array([7.4, 5.4, 1.5])
+        viewer.refresh()
+        page.get_by_text("Not feasible", exact=True).wait_for()
+        least_contrast(page)
+        viewer._stage.gizmo.position = np.array([np.nan, 0.0, 0.0])
+        viewer.refresh()
+        page.get_by_text("Not possible", exact=True).wait_for()
+        least_contrast(page)
+        page.locator(".tabler-icon-adjustments").first.click()
+        page.get_by_text("Reset View").wait_for()
+        least_contrast(page)
+        page.locator(".tabler-icon-arrow-back").first.click()
+        stop(viewer._server)
+        page.get_by_text("Disconnected: is sagline view still running?").wait_for()
+        least_contrast(page)
+
+
+def test_the_theme_follows_the_system_while_the_page_is_open(browser: Browser) -> None:
+    with opened(browser, sl.load_robot("cogiro")) as (page, _):
+        assert page.title() == "cogiro – sagline"
+        light = page.evaluate(BACKGROUND)
+        page.emulate_media(color_scheme="dark")
+        await_that(page, lambda: page.evaluate(BACKGROUND) != light)
+        least_contrast(page)
+        page.emulate_media(color_scheme="light")
+        await_that(page, lambda: page.evaluate(BACKGROUND) == light)
+
+
+@pytest.mark.parametrize("width", [390, pytest.param(699, marks=pytest.mark.soak), 768])
+def test_on_small_screens_the_panels_are_a_sheet_below_the_robot(browser: Browser, width: int) -> None:
+    with opened(browser, sl.load_robot("falcon-7"), width=width) as (page, _):
+        sheet = page.locator('[style*="position: fixed"][style*="width: 20em"]').bounding_box()
+        scene = page.locator("canvas[data-engine]").bounding_box()
+        assert sheet is not None
+        assert scene is not None
+        assert sheet["x"] == 0.0
+        assert sheet["width"] == width == scene["width"]
+        assert sheet["y"] + sheet["height"] == pytest.approx(640.0, abs=1.0)
+        assert scene["height"] == pytest.approx(sheet["y"], abs=1.0)
+        assert scene["height"] > 250.0
+        verdict = page.get_by_text("Feasible", exact=True).bounding_box()
+        assert verdict is not None
+        assert verdict["y"] < 640.0
+
+
+@pytest.mark.parametrize(
+    "name", [each if each == "fast" else pytest.param(each, marks=pytest.mark.soak) for each in sl.robot_names()]
+)
+def test_nothing_overflows_its_panel(browser: Browser, name: str) -> None:
+    with opened(browser, sl.load_robot(name)) as (page, _):
+        page.get_by_text("Natural frequencies").wait_for()
+        assert page.evaluate(OVERFLOWING) == []

@@ -7,10 +7,23 @@ import pytest
 
 import sagline as sl
 from sagline.viewer import readout
-from sagline.viewer.course_figure import BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH, CourseFigure
+from sagline.viewer.course_figure import (
+    BOTTOM,
+    COLORS,
+    HEIGHT,
+    LEFT,
+    RIGHT,
+    TOP,
+    WIDTH,
+    CourseFigure,
+    Limit,
+    round_ticks,
+)
 from sagline.viewer.settings import Settings
 from sagline.viewer.snapshot import taken_at
+from sagline.viewer.stage import ACTUAL, INFEASIBLE, PLATFORM, REST, WANTED
 from sagline.viewer.tension_scale import TensionScale
+from sagline.viewer.viewer import home_pose
 
 ROBOT = sl.load_robot("article-suspended")
 SCALE = TensionScale.of(ROBOT)
@@ -42,9 +55,40 @@ def test_the_verdict_names_the_cable_that_is_nearest_to_its_limit() -> None:
     tension = sl.inverse(ROBOT, pose).chord_tension
     margins = np.minimum(tension - 25.0, 2000.0 - tension)
     text = readout.verdict(taken_at(ROBOT, pose, Settings(mass=50.0), None))
-    assert f"tensions {tension.min():.4g} to {tension.max():.4g} N" in text
-    assert f"margin {margins.min():.1f} N (cable {int(np.argmin(margins))})" in text
-    assert f"takes {float(sl.capacity_margin(sl.inverse(ROBOT, pose).state)):.1f} N more" in text
+    assert f"{tension.min():.1f} to {tension.max():.1f} N" in text
+    nearest = int(np.argmin(margins))
+    assert f"Nearest limit</dt><dd>{margins.min():.1f} N away (cable {nearest}, lower limit)" in text
+    extra = float(sl.capacity_margin(sl.inverse(ROBOT, pose).state))
+    assert f"Spare force</dt><dd>{extra:.1f} N, in any direction" in text
+
+
+def test_limits_that_are_reached_are_no_margin_of_nothing() -> None:
+    robot = sl.load_robot("article-mixed")
+    pose = sl.Pose([0.0, 0.0, 3.0], np.eye(3))
+    tension = sl.inverse(robot, pose).chord_tension
+    at = ", ".join(str(i) for i in np.flatnonzero(np.abs(tension - 25.0) < 1e-6))
+    assert at == "1, 3, 5, 7"
+    assert f"reached by cables {at}</dd>" in readout.verdict(taken_at(robot, pose, Settings(mass=50.0), None))
+
+
+def test_other_answers_than_a_proof_are_not_called_infeasible() -> None:
+    on_anchor = taken_at(
+        ROBOT, sl.Pose(ROBOT.frame_anchors[0] - ROBOT.platform_anchors[0], np.eye(3)), Settings(mass=50.0), None
+    )
+    assert readout.headline(on_anchor) == "No chord"
+    assert "coincide" in readout.verdict(on_anchor)
+
+
+def test_no_number_has_a_false_sign_or_runs_out_of_its_column() -> None:
+    turned = sl.Pose.from_euler([-1e-5, 0.0, 1.0], -1e-5, -1e-7, 0.0)
+    text = readout.numbers(taken_at(ROBOT, turned, Settings(mass=50.0), None), SCALE, None)
+    assert "-0.0" not in text
+    assert "0.000, 0.000, 1.000 m" in text
+    for name in sl.robot_names():
+        robot = sl.load_robot(name)
+        shown = readout.numbers(taken_at(robot, home_pose(robot), Settings(mass=robot.mass), None), SCALE, None)
+        assert max(len(cell) for row in cells(shown) for cell in row) <= 8
+        assert "e+" not in shown
 
 
 def test_infeasible_pose_shows_dashes_and_the_reason() -> None:
@@ -59,9 +103,9 @@ def test_messages_are_no_markup() -> None:
 
 
 def test_legend_names_its_ticks_in_their_places() -> None:
-    found = re.findall(r"left:([\d.]+)%[^>]*>([\d.k]+)<", readout.legend(SCALE))
-    assert [text for _, text in found] == ["50", "100", "200", "500", "1k", "2k"]
-    values = [float(text.replace("k", "e3")) for _, text in found]
+    found = re.findall(r"left:([\d.]+)%[^>]*>([\d.]+)<", readout.legend(SCALE, ROBOT))
+    assert [text for _, text in found] == ["50", "100", "200", "500", "1000", "2000"]
+    values = [float(text) for _, text in found]
     places = 100.0 * np.log(np.array(values) / 25.0) / np.log(2000.0 / 25.0)
     assert [float(place) for place, _ in found] == pytest.approx(places, abs=0.06)
 
@@ -78,9 +122,51 @@ def test_course_draws_gaps_as_gaps_and_its_cursor_in_place() -> None:
     assert first[:, 1] == pytest.approx(
         HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * (time - low) / (high - low), abs=0.06
     )
-    cursor = re.search(r'<line x1="([\d.]+)" x2="\1" y1="18"', figure.at(2.5))
+    cursor = re.search(r'<line class="cursor" x1="([\d.]+)" x2="\1"', figure.at(2.5))
     assert cursor is not None
     assert float(cursor[1]) == pytest.approx(LEFT + 0.25 * (WIDTH - LEFT - RIGHT))
+
+
+def ticks(html: str) -> list[float]:
+    return [float(text) for text in re.findall(r'<text class="quiet" [^>]*text-anchor="end">([\d.-]+)</text>', html)]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_ticks_of_a_course_are_round_and_in_their_places(seed: int) -> None:
+    generator = np.random.default_rng(seed)
+    low = generator.uniform(-1.0, 1.0) * 10.0 ** generator.integers(-2, 6)
+    values = low + np.linspace(0.0, 10.0 ** generator.uniform(-2.0, 5.0), 50)[:, None]
+    html = CourseFigure.of("x", np.linspace(0.0, 10.0, 50), values).at(0.0)
+    found = np.array(round_ticks(float(values.min()), float(values.max())))
+    assert 3 <= len(found) <= 7
+    step = float(f"{np.diff(found).mean():.0e}")
+    assert np.diff(found) == pytest.approx(step, rel=1e-6)
+    assert f"{step:.0e}"[0] in "125"
+    assert np.abs(found / step - np.rint(found / step)).max() < 1e-6
+    told = ticks(html)
+    assert len(told) >= 2
+    assert np.abs(np.array(told) / step - np.rint(np.array(told) / step)).max() < 1e-3
+
+
+def test_limits_are_drawn_where_they_are_near_and_told_where_not() -> None:
+    time = np.linspace(0.0, 1.0, 11)
+    limits = (Limit(25.0, "lowest allowed"), Limit(2000.0, "highest allowed"))
+    html = CourseFigure.of("Chord tension [N]", time, 30.0 + 20.0 * time[:, None], limits).at(0.0)
+    found = re.search(r'<line class="limit" [^>]*y1="([\d.]+)"', html)
+    assert found is not None
+    low, high = 25.0 - 0.8, 50.0 + 0.8
+    assert float(found[1]) == pytest.approx(HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * 0.8 / (high - low), abs=0.06)
+    assert html.count('<line class="limit"') == 1
+    assert "highest allowed 2000</text>" in html
+
+
+def test_colors_of_cables_are_those_of_nothing_else() -> None:
+    other = np.array([WANTED, ACTUAL, INFEASIBLE, PLATFORM, REST])
+    lines = np.array([[int(color[i : i + 2], 16) for i in (1, 3, 5)] for color in COLORS])
+    scale = SCALE.colors(np.geomspace(25.0, 2000.0, 60))
+    assert np.linalg.norm(lines[:, None] - other, axis=2).min() > 40.0
+    assert np.linalg.norm(lines[:, None].astype(float) - scale, axis=2).min() > 40.0
+    assert np.linalg.norm(lines[:, None] - lines, axis=2)[~np.eye(len(lines), dtype=bool)].min() > 40.0
 
 
 def test_until_the_first_numbers_the_page_says_what_it_waits_for() -> None:

@@ -84,3 +84,19 @@ def test_platform_on_an_anchor_is_no_accident() -> None:
     assert not snapshot.feasible
     assert "coincide" in snapshot.reason
     assert np.isfinite(snapshot.cable_segments(1.0)).all()
+
+
+def test_ghosts_are_drawn_only_where_they_are_apart_from_their_cables() -> None:
+    snapshot = taken_at(ROBOT, HERE, Settings(mass=50.0), None)
+    assert snapshot.plan is not None
+    sag = snapshot.plan.state.cables.sag
+    apart = 0.042  # m: two cables hang less below their chords, the others visibly more
+    assert np.abs(sag - apart).min() > 0.1 * apart
+    for sag_scale in (0.0, 1.0, 3.0):
+        ghosts = snapshot.ghost_segments(sag_scale, apart).reshape(ROBOT.cable_count, -1, 2, 3)
+        drawn = np.linalg.norm(ghosts[:, :, 1] - ghosts[:, :, 0], axis=2) > 0.0
+        assert np.array_equal(drawn.any(axis=1), sag_scale * sag > apart)  # taut cables have none
+        cables = snapshot.cable_segments(sag_scale).reshape(ghosts.shape)
+        away = np.linalg.norm(ghosts - cables, axis=3)
+        assert away[drawn].size == 0 or away[drawn].min() > apart
+        assert not drawn[:, [0, -1]].any()  # where both end at the same anchor

@@ -40,3 +40,19 @@ def test_suspended_robot_without_a_frame_stands_on_the_floor() -> None:
     robot = sl.load_robot("cogiro")
     assert robot.frame_size is None
     assert solids.bounds(robot)[0][2] == 0.0
+
+
+@pytest.mark.parametrize("name", sl.robot_names())
+def test_frames_that_nobody_gave_are_dashed(name: str) -> None:
+    robot = sl.load_robot(name)
+    pieces = mesh(solids.frame(robot)).body_count
+    assert pieces == 1 if not solids.is_frame_assumed(robot) else pieces > 60
+    given = robot.replace(frame_size=solids.bounds(robot)[1] - solids.bounds(robot)[0], assumed={})
+    assert mesh(solids.frame(given)).body_count == 1
+
+
+@pytest.mark.parametrize(
+    ("length", "rounded"), [(0.099, 0.05), (0.1, 0.1), (1.99, 1.0), (2.0, 2.0), (4.9, 2.0), (7.0, 5.0), (640.0, 500.0)]
+)
+def test_lengths_to_measure_by_are_round(length: float, rounded: float) -> None:
+    assert solids.round_below(length) == pytest.approx(rounded, rel=1e-12)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 import sagline as sl
 from sagline.viewer.tension_scale import GRAY, TensionScale
@@ -14,12 +15,47 @@ def test_places_are_logarithmic_and_stay_at_the_ends() -> None:
     assert shares == pytest.approx([0.0, 0.0, 0.5, 1.0, 1.0])
 
 
-def test_colors_get_brighter_with_tension_and_unknown_is_gray() -> None:
-    colors = SCALE.colors(np.geomspace(10.0, 1000.0, 50)).astype(float)
-    luminance = colors @ [0.2126, 0.7152, 0.0722]
-    assert np.all(np.diff(luminance) > -1.0)
-    assert luminance[-1] - luminance[0] > 120.0
+WHITE, DARK = (255, 255, 255), (27, 30, 35)  # backgrounds of the scene in page.css
+# Machado, Oliveira & Fernandes 2009: how red-blind and green-blind eyes see linear sRGB
+SIGHTS: dict[str, list[list[float]]] = {
+    "all colors": [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+    "red-blind": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
+    "green-blind": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.01182, 0.04294, 0.968881]],
+}
+
+
+def linear(colors: ArrayLike) -> np.ndarray:
+    share = np.asarray(colors, dtype=float) / 255.0
+    return np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+
+
+def luminance(colors: ArrayLike) -> np.ndarray:
+    return linear(colors) @ [0.2126, 0.7152, 0.0722]
+
+
+def lab(light: np.ndarray) -> np.ndarray:
+    """CIELAB of linear sRGB, D65."""
+    matrix = [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]]
+    x, y, z = np.cbrt(np.clip(light, 0.01, 1.0) @ np.transpose(matrix) / [0.95047, 1.0, 1.08883]).T
+    return np.stack((116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)), axis=-1)
+
+
+@pytest.mark.parametrize("background", [WHITE, DARK])
+def test_no_tension_is_lost_on_either_background(background: tuple[int, int, int]) -> None:
+    colors = np.concatenate((SCALE.colors(np.geomspace(10.0, 1000.0, 200)), GRAY[None]))
+    bright, other = luminance(colors), luminance(background)
+    contrast = (np.maximum(bright, other) + 0.05) / (np.minimum(bright, other) + 0.05)
+    assert contrast.min() >= 3.0
     assert np.array_equal(SCALE.colors(np.array([np.nan]))[0], GRAY)
+
+
+@pytest.mark.parametrize("sight", SIGHTS)
+def test_tensions_are_told_apart_whatever_colors_one_sees(sight: str) -> None:
+    colors = SCALE.colors(np.geomspace(10.0, 1000.0, 9))
+    seen = lab(linear(colors) @ np.transpose(SIGHTS[sight]))
+    apart = np.linalg.norm(seen[:, None] - seen, axis=2)[~np.eye(9, dtype=bool)]
+    assert apart.min() > 8.0
+    assert np.all(np.diff(seen[:, 2]) > 0.0)  # ever less blue, more yellow
 
 
 def test_linear_colors_come_back_through_the_srgb_curve() -> None:

@@ -4,6 +4,7 @@ import re
 import threading
 import time
 from collections.abc import Callable, Iterator
+from html import unescape
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -92,7 +93,7 @@ def test_the_gizmo_goes_where_it_is_put() -> None:
     server = started(port=0)
     try:
         pose = sl.Pose.from_euler([1.0, 0.5, 2.0], 0.3, -0.2, 0.1)
-        stage = Stage(server, ROBOT, pose)
+        stage = Stage(server.scene, ROBOT, pose)
         x, y, z, w = pose.quaternion
         assert stage.gizmo.wxyz == pytest.approx([w, x, y, z], abs=1e-15)
         np.testing.assert_allclose(stage.dragged_pose().matrix, pose.matrix, atol=1e-14)
@@ -111,9 +112,7 @@ def test_everything_follows_a_drag(page: Shown) -> None:
         view = page.viewer.view
         assert view is not None
         assert view.snapshot.plan is not None
-        # Closest keeps near to the tensions before, which differ; but the balance is the same
-        matrix = sl.structure_matrix(ROBOT, plan.state.pose)
-        assert matrix @ view.snapshot.tension == pytest.approx(matrix @ plan.chord_tension, abs=1.0)
+        assert view.snapshot.tension == pytest.approx(plan.chord_tension, rel=1e-12)
         texts = [m["updates"]["content"] for m in client.heard(0.5) if "content" in m.get("updates", {})]
         assert any("1.000, 0.500, 2.000 m" in text for text in texts)
 
@@ -152,6 +151,36 @@ def test_a_slider_changes_the_robot(page: Shown) -> None:
         client.set(model._impl.uuid, "catenary (exact)")
         client.set(mass._impl.uuid, 50.0)
         await_that(lambda: page.viewer.view is not None and page.viewer.view.snapshot.robot.mass == 50.0)
+
+
+def test_the_same_pose_shows_the_same_tensions_whatever_the_way_there(page: Shown) -> None:
+    generator = np.random.default_rng(20)
+    method = handle(page, "Tensions")
+    forget = handle(page, "Forget the way here")
+
+    def tensions_at(client: Client, position: Any) -> np.ndarray:
+        client.drag(position)
+        await_that(lambda: np.array_equal(page.position, position))
+        assert page.viewer.view is not None
+        return page.viewer.view.snapshot.tension
+
+    with Client(page.port) as client:
+        places = generator.uniform([-4.0, -3.0, 1.0], [4.0, 3.0, 3.5], (8, 3))
+        there = [tensions_at(client, place) for place in places]
+        back = [tensions_at(client, place) for place in places[::-1]][::-1]
+        assert np.array_equal(there, back)
+        assert not forget.visible
+        client.set(method._impl.uuid, "Closest (remembers the way)")
+        await_that(lambda: bool(forget.visible))
+        tensions_at(client, places[1])
+        near = tensions_at(client, places[0])
+        assert np.abs(near - there[0]).max() > 1.0  # N: the way there is seen
+        texts = page.viewer._panel._numbers.content
+        assert "Closest (remembers the way)" in texts
+        client.set(forget._impl.uuid, True)
+        await_that(lambda: page.viewer.view is not None and np.allclose(page.viewer.view.snapshot.tension, there[0]))
+        client.set(method._impl.uuid, "MinimumNorm")
+        await_that(lambda: not forget.visible)
 
 
 def test_a_client_that_vanishes_mid_drag_is_not_missed(page: Shown) -> None:
@@ -227,6 +256,37 @@ def test_a_run_plays_pauses_and_is_left_by_a_drag(film: Shown) -> None:
         await_that(lambda: follow.value and film.position[2] == 1.5)
 
 
+def test_a_run_is_named_once_and_cannot_be_changed(film: Shown) -> None:
+    model, mass = handle(film, "Cable model"), handle(film, "Platform + load [kg]")
+    with Client(film.port) as client:
+        client.set(handle(film, "Follow the run")._impl.uuid, True)
+        await_that(lambda: "empirical (the article's)" in unescape(film.viewer._panel._numbers.content))
+        await_that(lambda: not model.visible)
+        assert not mass.visible
+        client.grab()
+        client.drag([0.1, 0.8, 2.0])
+        await_that(lambda: film.position[1] == 0.8 and bool(model.visible) and bool(mass.visible))
+        await_that(lambda: f"</b> {model.value}" in unescape(film.viewer._panel._numbers.content))
+
+
+def test_a_film_is_a_matter_of_its_client(film: Shown) -> None:
+    """One client films, gives its pictures slowly, and leaves in the middle; another drags meanwhile."""
+    button = handle(film, "Film of the run (GIF)")
+    with Client(film.port) as filming, Client(film.port) as other:
+        list(other.heard(0.5))
+        filming.set(button._impl.uuid, True)
+        asked = next(m for m in filming.heard(5.0) if m["type"] == "GetRenderRequestMessage")
+        assert asked["width"] <= 720
+        assert film.viewer._export._filming
+        other.grab()
+        other.drag([0.3, 0.7, 2.0])
+        await_that(lambda: film.position[1] == 0.7, seconds=2.0)
+        heard = list(other.heard(0.5))
+        assert any(m.get("name") == "/cables" and "points" in m.get("updates", {}) for m in heard)
+        assert not any(m["type"] == "NotificationShowMessage" for m in heard)
+    await_that(lambda: not film.viewer._export._filming)
+
+
 def test_cables_verdict_and_table_come_before_what_is_not_ready(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*arguments: object) -> None:
         raise AssertionError("asked before it is ready")
@@ -263,10 +323,10 @@ def test_cables_verdict_and_table_come_before_what_is_not_ready(monkeypatch: pyt
             assert viewer.view is not None
             assert viewer.view.snapshot.rest is None
         for reading, text in (
-            (Reading.MARGIN, "more in any direction"),
+            (Reading.MARGIN, "in any direction"),
             (Reading.FREQUENCIES, " Hz</div>"),
             (Reading.POLYGON, "<polygon"),
-            (Reading.REST, "really rests"),
+            (Reading.REST, "Really rests"),
         ):
             assert text not in texts()
             ready.add(reading)

@@ -1,5 +1,38 @@
-"""`python -m sagline.cli` is the command `sagline`."""
+"""What the shell starts, and `python -m sagline.cli` too: it hears Ctrl-C before it loads anything."""
 
-from sagline.cli.main import app_entry
+from __future__ import annotations
 
-app_entry()
+import os
+import sys
+
+from sagline.cli.ending import ended
+
+
+def app_entry() -> None:
+    """Run the command and end the process."""
+    for descriptor in range(3):  # one that the caller closed would be taken by the first file that is opened
+        try:
+            os.fstat(descriptor)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)
+    debug = "--debug" in sys.argv
+    sys.exit(ended(lambda: _command(debug), debug=debug, last=True))
+
+
+def _command(debug: bool) -> object:
+    import logging
+    import threading
+    import warnings
+
+    from sagline.cli.ending import tell_thread
+    from sagline.cli.main import app
+
+    if not debug:  # what libraries have to say is for developers
+        warnings.simplefilter("ignore")
+        logging.getLogger().addHandler(logging.NullHandler())
+        threading.excepthook = tell_thread
+    return app(prog_name="sagline", standalone_mode=False)
+
+
+if __name__ == "__main__":
+    app_entry()

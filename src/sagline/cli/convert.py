@@ -7,16 +7,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import typer
 
 from sagline.cables.cable import Cable
 from sagline.cables.elastic import Elastic
 from sagline.cli.choices import Format
 from sagline.cli.entries import FORWARD, INVERSE
-from sagline.cli.terminal import note, working
+from sagline.cli.terminal import note, show_data, working
+from sagline.cli.values import FARTHEST, numbers, quantity
 from sagline.errors import FileError, InvalidValueError
 from sagline.files.imported import Imported
-from sagline.files.quantity import in_si
 from sagline.files.robot_file import dump_robot, load_robot
 from sagline.files.whole import write_text
 from sagline.kinematics.confirm import confirm
@@ -34,7 +33,7 @@ def convert(
     density: str | None,
     stiffness: str | None,
     cable_set: str | None,
-    at: tuple[float, float, float] | None,
+    at: tuple[str, str, str] | None,
 ) -> None:
     """Read, convert, write to a file or to stdout, and report on stderr.
 
@@ -43,14 +42,19 @@ def convert(
     """
     if out is not None and Path(source).exists() and out.resolve() == Path(source).resolve():
         raise FileError(out, "is the file to convert", "Name another file with --out.")
+    if at is not None and form is Format.ROBOT:
+        raise InvalidValueError(
+            "--at", "given for a robot file", "--format mjcf", "A robot file holds no pose: leave it out."
+        )
+    place = None if at is None else numbers(at, "--at", "m", FARTHEST)
     imported = _read(source, _material(density, stiffness), cable_set)
     if form is Format.ROBOT:
         text = dump_robot(imported.robot)
     else:
-        text, straightness = _mjcf(imported.robot, at)
+        text, straightness = _mjcf(imported.robot, place)
         imported = replace(imported, lost=(*imported.lost, straightness))
     if out is None:
-        typer.echo(text, nl=False)
+        show_data(text)
     else:
         write_text(out, text)
     _report(imported, out)
@@ -58,11 +62,14 @@ def convert(
 
 def _read(source: str, cables: Cable | None, cable_set: str | None) -> Imported:
     path = Path(source)
+    is_caspr = path.suffix.lower() == ".xml" or path.is_dir()
+    if cable_set is not None and not is_caspr:
+        raise InvalidValueError("--cable-set", repr(cable_set), "none but for CASPR", "Leave it out.")
     if path.suffix.lower() == ".wcrfx":
         from sagline.files.wirex import load_wirex
 
         return load_wirex(path, cables)
-    if path.suffix.lower() == ".xml" or path.is_dir():
+    if is_caspr:
         from sagline.files.caspr import load_caspr
 
         return load_caspr(path, cables, cable_set)
@@ -76,14 +83,10 @@ def _material(density: str | None, stiffness: str | None) -> Cable | None:
     if density is None or stiffness is None:
         missing = "--linear-density" if density is None else "--axial-stiffness"
         raise InvalidValueError(missing, "missing", "both or none of the two", f"Add {missing}.")
-    values = [
-        in_si(text, unit, item)
-        for text, unit, item in ((density, "kg/m", "--linear-density"), (stiffness, "N", "--axial-stiffness"))
-    ]
-    return Cable(*values)
+    return Cable(quantity(density, "--linear-density", "kg/m"), quantity(stiffness, "--axial-stiffness", "N"))
 
 
-def _mjcf(robot: Robot, at: tuple[float, float, float] | None) -> tuple[str, str]:
+def _mjcf(robot: Robot, at: list[float] | None) -> tuple[str, str]:
     """The model, and what it costs this robot that its tendons neither sag nor weigh."""
     from sagline.files.mjcf import dump_mjcf
 

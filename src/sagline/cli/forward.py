@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 
 import numpy as np
-from rich.table import Table
 
 from sagline.cli.choices import Model
+from sagline.cli.csv_text import csv_text
+from sagline.cli.ending import OUTSIDE
 from sagline.cli.entries import FIT, FORWARD
-from sagline.cli.tables import plain_table
-from sagline.cli.terminal import OUTSIDE, note, show, show_json, working
+from sagline.cli.tables import Grid, show_table, written
+from sagline.cli.terminal import note, show, show_json, working
+from sagline.cli.values import loaded, wrench_of
 from sagline.files.lengths_file import Lengths, load_lengths
 from sagline.files.names import file_stem
 from sagline.files.robot_file import load_robot
-from sagline.files.whole import check_files, made_folder, written_whole
+from sagline.files.whole import check_files, made_folder, write_text
 from sagline.kinematics.forward import forward as solve
 from sagline.kinematics.forward_solution import ForwardSolution
 from sagline.kinematics.forward_status import ForwardStatus
@@ -27,7 +28,9 @@ COLUMNS = ("x", "y", "z", "qx", "qy", "qz", "qw", "force_residual", "moment_resi
 Cell = float | str
 
 
-def forward(name: str, file: Path, model: Model, folder: Path, *, as_json: bool) -> int:
+def forward(
+    name: str, file: Path, model: Model, wrench: str | None, payload: str | None, folder: Path, *, as_json: bool
+) -> int:
     """Find the poses, tell, and write them; returns the exit code.
 
     The first sample is searched for without a start; each other begins where the last one ended.
@@ -35,27 +38,29 @@ def forward(name: str, file: Path, model: Model, folder: Path, *, as_json: bool)
     Raises:
         SaglineError: If an input is wrong or the folder cannot be written.
     """
-    robot = load_robot(name)
+    load = wrench_of(wrench)
+    robot = loaded(load_robot(name), payload)
     size = float(np.linalg.norm(np.ptp(robot.frame_anchors, axis=0)))
     lengths = load_lengths(file, robot.cable_count, size)
     target = folder / f"{file_stem(robot.name, 'poses')}.csv"
     check_files(folder, [target.name])
     entry = FIT if model is Model.STRAIGHT else FORWARD
     with working(f"{robot.name}: finding {len(lengths.unstrained_length):,} poses", entry) as line:
-        first = solve(robot, lengths.unstrained_length[0], model=model.build())
+        first = solve(robot, lengths.unstrained_length[0], model=model.build(), wrench=load)
         start = first.pose if np.isfinite(first.pose.position).all() else None
-        found = solve(robot, lengths.unstrained_length, start=start, model=model.build(), progress=line.progress)
+        found = solve(robot, lengths.unstrained_length, start, model.build(), load, progress=line.progress)
     made_folder(folder)
     rows = _rows(lengths, found)
-    with written_whole(target) as partial, partial.open("w", newline="", encoding="utf-8") as stream:
-        csv.writer(stream).writerows(rows)
+    write_text(target, csv_text(rows))
     lost = [k for k, status in enumerate(found.status) if status not in FINE]
     if as_json:
         header = [str(cell).split(" ")[0] for cell in rows[0]]
         show_json({"poses": [dict(zip(header, row, strict=True)) for row in rows[1:]], "file": target})
     else:
-        show(_table(rows))
-        show(f"In {folder.resolve()}: {target.name}")
+        show_table(_grid(rows))
+        if len(rows) - 1 > SHOWN:
+            show(f"The first {SHOWN} of {len(rows) - 1:,} samples; the file has them all")
+        show(f"In {folder.resolve()}: {target.name}", whole=True)
     if not lost:
         return 0
     status = ForwardStatus(int(found.status[lost[0]]))
@@ -75,13 +80,10 @@ def _rows(lengths: Lengths, found: ForwardSolution) -> list[list[Cell]]:
     return [["time [s]", *header], *([time, *row] for time, row in zip(lengths.time.tolist(), body, strict=True))]
 
 
-def _table(rows: list[list[Cell]]) -> Table:
-    header, *body = rows
-    table = plain_table()
-    for name in header:
-        table.add_column(str(name), justify="right")
-    for row in body[:SHOWN]:
-        table.add_row(*(cell if isinstance(cell, str) else f"{cell:.6g}" for cell in row))
-    if len(body) > SHOWN:
-        table.add_row("...", *[""] * (len(header) - 1))
-    return table
+def _grid(rows: list[list[Cell]]) -> Grid:
+    """The first samples; each is named by its time, or by its number."""
+    header, body = [str(name) for name in rows[0]], rows[1 : SHOWN + 1]
+    texts = [[cell if isinstance(cell, str) else written(cell, ".6g") for cell in row] for row in body]
+    if not header[0].startswith("time"):
+        header, texts = ["sample", *header], [[str(k), *row] for k, row in enumerate(texts)]
+    return Grid(header, texts, left=frozenset({len(header) - 1}))

@@ -10,8 +10,9 @@ import numpy as np
 
 from sagline.article.identify import EmpiricalFit, identify_empirical
 from sagline.article.identify_cable import UNITS, CableFit, TensionAt, identify_cable
-from sagline.cli.tables import plain_table, written
+from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
+from sagline.cli.values import quantity
 from sagline.files.measurements import Measurements, load_measurements
 
 STEPS = 25  # along each axis of the working range
@@ -20,8 +21,8 @@ TOLERANCE = 5e-3  # m, of the position: the article's own is 6 mm
 
 def identify(
     file: Path,
-    length_error: float,
-    tension_error: float,
+    length_error: str,
+    tension_error: str,
     tension_at: TensionAt,
     unknowns: Sequence[str],
     *,
@@ -32,23 +33,29 @@ def identify(
     Raises:
         SaglineError: If the file or a value is wrong.
     """
+    length_deviation = quantity(length_error, "--length-error", "m", above=0.0)
+    tension_deviation = quantity(tension_error, "--tension-error", "N", above=0.0)
     data = load_measurements(file)
     with working(f"{file.name}: identifying"):
         cable = identify_cable(
-            *data, length_error=length_error, tension_error=tension_error, tension_at=tension_at, unknowns=unknowns
+            *data,
+            length_error=length_deviation,
+            tension_error=tension_deviation,
+            tension_at=tension_at,
+            unknowns=unknowns,
         )
         model = _model(cable, data)
     if as_json:
         show_json(_record(cable, model))
         return
-    table = plain_table(f"{len(data.span)} measurements")
-    for head in ("", "value", "standard error", "unit"):
-        table.add_column(head, justify="left" if head in ("", "unit") else "right", no_wrap=True)
-    for name, value, error in zip(cable.names, cable.values, cable.standard_error, strict=True):
-        table.add_row(name, written(value, ".5g"), written(error, ".2g"), UNITS[name])
+    rows = [
+        [name, written(value, ".5g"), written(error, ".2g"), UNITS[name]]
+        for name, value, error in zip(cable.names, cable.values, cable.standard_error, strict=True)
+    ]
     for name, estimate, unit in (("k_h", model.k_h, "m/s²"), ("k_p", model.k_p, "m²/s⁴")):
-        table.add_row(name, written(estimate.value, ".5g"), written(estimate.high - estimate.value, ".2g"), unit)
-    show(table)
+        rows.append([name, written(estimate.value, ".5g"), written(estimate.high - estimate.value, ".2g"), unit])
+    heads = ["", "value", "standard error", "unit"]
+    show_table(Grid(heads, rows, f"{len(data.span)} measurements", left=frozenset({0, 3})))
     show(f"chi-squared per degree of freedom: {written(cable.chi_squared, '.3g')} (about 1 if the errors are as given)")
     show(
         f"The empirical model with k_h, k_p keeps a position error of {1e3 * TOLERANCE:g} mm in the measured range "

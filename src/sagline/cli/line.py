@@ -12,6 +12,7 @@ from rich.text import Text
 from sagline.blocks import Progress as Told
 from sagline.cli.cold_start import compile_all
 from sagline.cli.compiling import Stage, first_run_text, heard
+from sagline.cli.printable import printable
 
 PATIENCE = 2.0  # s: work that takes longer shows a bar and the time left
 
@@ -29,14 +30,14 @@ class Line:
         """
         self._console = console
         self._bar = bar
-        self._what = what
+        self._what = what = printable(what)
         self._task = bar.add_task(what, total=None, visible=bool(what))
         self._compiling: dict[str, Stage] = {}
         self._told: set[str] = set()
 
     def stage(self, what: str) -> Told:
         """A new part of the work, whose count begins at zero; returns what to call with the count and its end."""
-        self._what = what
+        self._what = what = printable(what)
         self._bar.reset(self._task, total=None, description=what)
         return self.progress
 
@@ -46,7 +47,7 @@ class Line:
 
     def name(self, what: str) -> None:
         """The same work, called by another name."""
-        self._what = what
+        self._what = what = printable(what)
         self._bar.update(self._task, description=what)
 
     def compile(self, entries: Sequence[str]) -> None:
@@ -71,7 +72,12 @@ class Line:
 @contextmanager
 def shown(console: Console, what: str) -> Iterator[Line]:
     """A line while inside."""
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), _Late(BarColumn()), _Late(TimeRemainingColumn()))
+    columns = (
+        SpinnerColumn(),
+        TextColumn("{task.description}", markup=False),
+        _Late(BarColumn()),
+        _Late(TimeRemainingColumn()),
+    )
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         line = Line(console, bar, what)
         with heard(line.hear):

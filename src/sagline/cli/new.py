@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from shlex import quote
+from typing import NamedTuple
 
 import numpy as np
 import typer
 
-from sagline.arrays import Array
+from sagline.arrays import Array, checked
 from sagline.cables.rope import ROPES
+from sagline.cli.entries import INVERSE
 from sagline.cli.terminal import note, show, working
+from sagline.cli.values import quantity
 from sagline.errors import FileError, InvalidValueError
 from sagline.files.quantity import in_si
 from sagline.files.robot_file import dump_robot, parse_robot
 from sagline.files.whole import write_text
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan
-from sagline.robot.design import COUNTS, Design
+from sagline.robot.design import COUNTS, LAYOUTS, Design
 from sagline.robot.pose import Pose
 from sagline.robot.pose_box import PoseBox
 from sagline.robot.robot import Robot
@@ -66,17 +70,25 @@ def new(file: Path, answers: dict[str, str | None], *, force: bool) -> Robot:
         SaglineError: If an answer is wrong, or the file exists or cannot be written; nothing has been written then.
     """
     _refuse_existing(file, force=force)
-    asks = sys.stdin.isatty() and sys.stderr.isatty()
-    said = {question.key: answers.get(question.key) or _asked(question, asks=asks) for question in QUESTIONS}
-    design = _design(file.stem, said)
-    with working("checking 343 poses of each of a few boxes"):
+    design, said = _answered(file.stem, answers)
+    with working("checking 343 poses of each of a few boxes", INVERSE):
         robot, middle = _boxed(design)
     text = _header(said) + dump_robot(robot)
-    checked = parse_robot(text, file)
+    made = parse_robot(text, file)
     write_text(file, text)
-    _explain(checked, design, middle)
-    show(f"Written: {file}\nLook at it: sagline view {file}\nEvery value: sagline show {file}")
-    return checked
+    with working("looking at what came out"):
+        lines, share = _explained(made, design, middle)
+    for line in lines:
+        show(line)
+    if share < NEARLY_ALL:
+        note(
+            "Advice: ",
+            "for more of it, try a larger platform, the other layout, a thicker rope or a lighter load.",
+            style="bold",
+        )
+    for what, command in (("Written", ""), ("Look at it", "sagline view "), ("Every value", "sagline show ")):
+        show(f"{what}: {command}{quote(str(file)) if command else file}", whole=True)
+    return made
 
 
 def _refuse_existing(file: Path, *, force: bool) -> None:
@@ -86,44 +98,63 @@ def _refuse_existing(file: Path, *, force: bool) -> None:
         raise FileError(file, "exists", "Choose another name, or replace it with --force.")
 
 
-def _asked(question: Question, *, asks: bool) -> str:
-    if not asks:
-        return question.default
+def _answered(name: str, answers: dict[str, str | None]) -> tuple[Design, dict[str, str]]:
+    """The design and what it was made from; a wrong answer to a question is told, and the question asked again."""
+    asks = sys.stdin.isatty() and sys.stderr.isatty()
+    said: dict[str, str] = {}
+    for question in QUESTIONS:
+        given = answers.get(question.key)
+        while question.key not in said:
+            text = given if given is not None else _asked(question) if asks else question.default
+            try:
+                design = _design(name, {**said, question.key: text})
+            except InvalidValueError as error:
+                if given is not None or not asks:
+                    raise
+                note("No: ", str(error), style="bold red")
+            else:
+                said[question.key] = text
+    return design, said
+
+
+def _asked(question: Question) -> str:
     return str(typer.prompt(question.text, default=question.default, err=True))
 
 
 def _design(name: str, said: dict[str, str]) -> Design:
-    return Design(
+    """The design as far as it has been answered; the rest stands in for what is not known yet, and cannot be wrong."""
+    frame = _edges(said["frame"], "frame")
+    layout = said.get("layout", LAYOUTS[0])
+    design = Design(
         name=name,
-        frame=_edges(said["frame"], "frame"),
-        platform=_edges(said["platform"], "platform"),
-        mass=_quantity(said["mass"], "kg", "mass"),
-        rope=said["rope"],
-        diameter=_quantity(said["diameter"], "m", "diameter"),
-        cables=_count(said["cables"], said["layout"]),
-        layout=said["layout"],
+        frame=frame,
+        platform=_edges(said["platform"], "platform") if "platform" in said else 0.5 * frame,
+        mass=quantity(said.get("mass", "1"), "mass", "kg", above=0.0),
+        rope=said.get("rope", next(iter(ROPES))),
+        diameter=quantity(said.get("diameter", "0.004"), "diameter", "m"),
+        cables=_count(said["cables"], layout) if "cables" in said else COUNTS.get(layout, (8,))[0],
+        layout=layout,
     )
-
-
-def _quantity(text: str, unit: str, item: str) -> float:
-    return float(cast(float, in_si(text, unit, item)))
+    if len(said) == len(QUESTIONS):
+        design.robot()  # now that all is known: whether the rope carries the platform
+    return design
 
 
 def _count(text: str, layout: str) -> int:
-    try:
-        return int(text)
-    except ValueError:
+    if not re.fullmatch(r"[0-9]{1,3}", text.strip()):
         allowed = " or ".join(map(str, COUNTS.get(layout, (6, 7, 8))))
-        raise InvalidValueError("cables", repr(text), allowed, "Give a whole number.") from None
+        raise InvalidValueError("cables", repr(text), allowed, "Give a whole number.")
+    return int(text)
 
 
-def _edges(text: str, item: str) -> Any:
+def _edges(text: str, item: str) -> Array:
     """Three edges in m from "6 x 4 x 3 m", "6x4x3", or "600 cm x 4 m x 3 m"."""
     parts = [part.strip() for part in text.replace("×", "x").split("x")]
     if len(parts) != 3:
         raise InvalidValueError(item, repr(text), 'three edges, such as "6 x 4 x 3 m"', f"Correct {item}.")
     unit = parts[2].lstrip("0123456789.+-eE ")
-    return in_si([part if part[-1:].isalpha() or not unit else f"{part} {unit}" for part in parts], "m", item)
+    edges = in_si([part if part[-1:].isalpha() or not unit else f"{part} {unit}" for part in parts], "m", item)
+    return checked(edges, item, "m", shape=(3,), above=0.0)
 
 
 def _boxed(design: Design) -> tuple[Robot, Plan]:
@@ -149,7 +180,8 @@ def _header(said: dict[str, str]) -> str:
     return f"# made by sagline new: {made}\n# values in SI units; a quantity may also have its unit, 22 mm^2\n"
 
 
-def _explain(robot: Robot, design: Design, middle: Plan) -> None:
+def _explained(robot: Robot, design: Design, middle: Plan) -> tuple[list[str], float]:
+    """What there is to say of the robot, and the feasible share of the poses in its middle."""
     share = float(middle.feasible.mean())
     density, stiffness = float(robot.cables.linear_density[0]), float(robot.cables.axial_stiffness[0])
     lines = [
@@ -165,10 +197,4 @@ def _explain(robot: Robot, design: Design, middle: Plan) -> None:
         lines.append(
             f"There cables carry {tension.min():.3g} to {tension.max():.4g} N and sag by up to {1e3 * sag.max():.3g} mm"
         )
-    show("\n".join(lines))
-    if share < NEARLY_ALL:
-        note(
-            "Advice: ",
-            "for more of it, try a larger platform, the other layout, a thicker rope or a lighter load.",
-            style="bold",
-        )
+    return lines, share

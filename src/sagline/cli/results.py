@@ -6,9 +6,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from sagline.cli.ending import OUTSIDE
 from sagline.cli.study import Run, gap_text, summary
-from sagline.cli.tables import summary_table
-from sagline.cli.terminal import OUTSIDE, note, show, show_json
+from sagline.cli.summary import summary_grid
+from sagline.cli.tables import show_table
+from sagline.cli.terminal import note, show, show_json
 from sagline.files.whole import made_folder
 
 if TYPE_CHECKING:
@@ -50,8 +52,8 @@ def tell(runs: Sequence[Run], files: Sequence[Path], folder: Path, *, as_json: b
     if as_json:
         show_json({"runs": [_record(run) for run in runs], "files": list(files)})
     else:
-        show(summary_table(runs))
-        show(f"In {folder.resolve()}: {_listed(files)}")
+        show_table(summary_grid(runs))
+        show(f"In {folder.resolve()}: {_listed(files)}", whole=True)
     return max((_complaints(run) for run in runs), default=0)
 
 

@@ -5,12 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from rich.padding import Padding
-from rich.table import Table
-from rich.text import Text
 
 from sagline.arrays import Array
-from sagline.cli.tables import plain_table
+from sagline.cli.tables import Grid, show_table
 from sagline.cli.terminal import show, show_json
 from sagline.files.robot_file import load_robot
 from sagline.robot.catalogue import robot_names
@@ -43,11 +40,18 @@ def list_robots(*, as_json: bool) -> None:
     if as_json:
         show_json([_short(robot) for robot in robots])
         return
+    heads = ["robot", "cables", "motion", "mass [kg]", "frame [m]", "platform [m]"]
+    rows = [
+        [robot.name, str(robot.cable_count), robot.motion_pattern, f"{robot.mass:g}", _edges(frame), _edges(platform)]
+        for robot in robots
+        for frame, platform in [(_frame(robot), _platform(robot))]
+    ]
+    show_table(Grid(heads, rows, left=frozenset({0, 2, 4, 5})))
+    show("Frame: length × width × height over the floor. Where a source gives no size, what the anchors span.")
+    show("")
     for robot in robots:
-        size = " × ".join(f"{edge:.3g}" for edge in _size(robot))
-        line = f"{robot.name:18} {robot.cable_count:2} cables, {robot.motion_pattern} {robot.mass:10g} kg   {size} m"
-        show(Text(line, style="bold"))
-        show(Padding(Text(robot.source), (0, 0, 0, 4), expand=False))
+        show(robot.name, style="bold")
+        show(robot.source, indent=4)
 
 
 def show_robot(name: str, *, as_json: bool) -> None:
@@ -60,15 +64,16 @@ def show_robot(name: str, *, as_json: bool) -> None:
     if as_json:
         show_json(_record(robot))
         return
-    show(_whole_table(robot))
-    show(_anchor_table(robot))
+    show_table(_values(robot))
+    show_table(_anchors(robot))
     for label, text in (("Source", robot.source), ("Notes", robot.notes)):
         if text:
-            show(Text(f"{label}: {text}"))
+            show(f"{label}:")
+            show(text, indent=2)
     if robot.assumed:
-        show("\n* assumed, not in the source:")
+        show("* assumed, not in the source:")
         for field, why in robot.assumed.items():
-            show(Padding(Text(f"{field}: {why}"), (0, 0, 0, 2), expand=False))
+            show(f"{field}: {why}", indent=2)
 
 
 def _short(robot: Robot) -> dict[str, Any]:
@@ -77,15 +82,29 @@ def _short(robot: Robot) -> dict[str, Any]:
         "cables": robot.cable_count,
         "motion_pattern": robot.motion_pattern,
         "mass_kg": robot.mass,
-        "size_m": _size(robot),
+        "frame_size_m": _frame(robot),
+        "platform_size_m": _platform(robot),
         "source": robot.source,
     }
 
 
-def _size(robot: Robot) -> Array:
-    """Edges of the frame, or of the box around its anchors."""
-    extent: Array = np.ptp(robot.frame_anchors, axis=0)
-    return extent if robot.frame_size is None else robot.frame_size
+def _frame(robot: Robot) -> Array:
+    """Edges of the frame; if it has none, of the box that holds its anchors and reaches down to the floor."""
+    if robot.frame_size is not None:
+        return robot.frame_size
+    low, high = robot.frame_anchors.min(axis=0), robot.frame_anchors.max(axis=0)
+    floor = min(0.0, low[2]) if robot.test_box is None else min(0.0, low[2], robot.test_box.low[2])
+    return np.array([*(high - low)[:2], high[2] - floor])
+
+
+def _platform(robot: Robot) -> Array:
+    """Edges of the platform; if it has none, of the box that holds its anchors."""
+    extent: Array = np.ptp(robot.platform_anchors, axis=0)
+    return extent if robot.platform_size is None else robot.platform_size
+
+
+def _edges(size: Array) -> str:
+    return " × ".join(f"{edge:.3g}" for edge in size)
 
 
 def _value(robot: Robot, field: str) -> Any:
@@ -113,15 +132,13 @@ def _marked(robot: Robot, field: str) -> str:
     return field.replace("_", " ") + mark
 
 
-def _whole_table(robot: Robot) -> Table:
-    table = plain_table(robot.name)
-    table.add_column("")
-    table.add_column("value")
-    table.add_column("unit")
-    for field, unit in WHOLE.items():
-        if (value := _value(robot, field)) is not None:
-            table.add_row(_marked(robot, field), _text(field, value), unit)
-    return table
+def _values(robot: Robot) -> Grid:
+    rows = [
+        [_marked(robot, field), _text(field, value), unit]
+        for field, unit in WHOLE.items()
+        if (value := _value(robot, field)) is not None
+    ]
+    return Grid(["", "value", "unit"], rows, robot.name, left=frozenset(range(3)), prose=frozenset({1}))
 
 
 def _text(field: str, value: Any) -> str:
@@ -142,11 +159,7 @@ def _numbers(row: Any) -> str:
     return "(" + ", ".join(f"{number:.5g}" for number in row) + ")"
 
 
-def _anchor_table(robot: Robot) -> Table:
-    table = plain_table()
-    table.add_column("cable", justify="right")
-    for field, unit in ANCHORS.items():
-        table.add_column(Text(f"{_marked(robot, field)} [{unit}]"), no_wrap=True)
-    for i in range(robot.cable_count):
-        table.add_row(str(i), *(_numbers(_value(robot, field)[i]) for field in ANCHORS))
-    return table
+def _anchors(robot: Robot) -> Grid:
+    heads = ["cable", *(f"{_marked(robot, field)} [{unit}]" for field, unit in ANCHORS.items())]
+    rows = [[str(k), *(_numbers(_value(robot, field)[k]) for field in ANCHORS)] for k in range(robot.cable_count)]
+    return Grid(heads, rows, left=frozenset({1, 2}))

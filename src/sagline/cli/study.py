@@ -79,7 +79,9 @@ def run_name(robot: Robot, model: CableModel) -> str:
     return file_stem(robot.name, type(model).__name__.lower())
 
 
-def run_along(robot: Robot, path: Path, model: CableModel, tension: TensionMethod, line: Stages) -> Run:
+def run_along(
+    robot: Robot, path: Path, model: CableModel, tension: TensionMethod, line: Stages, wrench: Array | None = None
+) -> Run:
     """Plan a path, and confirm the plan with exact cables.
 
     Args:
@@ -88,14 +90,16 @@ def run_along(robot: Robot, path: Path, model: CableModel, tension: TensionMetho
         model: Cable model the lengths are planned with.
         tension: How the load is shared.
         line: Told of planning and confirming.
+        wrench: External wrench, shape (6,), as `inverse` takes it; None for none.
 
     Raises:
         InvalidValueError: If the robot's tensions cannot be determined.
         CableGeometryError: If a cable has no length at some pose.
     """
-    inverse(robot, path.pose[:1], model, tension)  # loads the compiled kernels, so that the work alone is timed
+    inverse(robot, path.pose[:1], model, tension, wrench)  # loads the compiled kernels, so that the work alone is timed
     start = perf_counter()
-    plan = inverse(robot, path, model, tension, progress=line.stage(f"{robot.name}: planning {len(path):,} poses"))
+    told = line.stage(f"{robot.name}: planning {len(path):,} poses")
+    plan = inverse(robot, path, model, tension, wrench, progress=told)
     seconds = perf_counter() - start
     return Run(confirm(plan, progress=line.stage(f"{robot.name}: confirming {len(path):,} poses")), seconds)
 

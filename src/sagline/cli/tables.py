@@ -1,48 +1,108 @@
-"""The tables that the commands print."""
+"""The tables that the commands print; no cell of one is ever cut."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
 from math import isnan
-from textwrap import fill
 
 from rich.box import SIMPLE_HEAD
+from rich.cells import cell_len
+from rich.console import Console
+from rich.measure import Measurement
 from rich.table import Table
 from rich.text import Text
 
-from sagline.cli.study import Run, Summary, summary
-
-ROWS = {  # of a summary: what a person reads, and how its number is written
-    "position_error_max_mm": ("position error, largest [mm]", ".3g"),
-    "position_error_mean_mm": ("position error, mean [mm]", ".3g"),
-    "chord_tension_min_n": ("chord tension, smallest [N]", ".1f"),
-    "chord_tension_max_n": ("chord tension, largest [N]", ".1f"),
-    "unstrained_length_min_m": ("unstrained length, smallest [m]", ".3f"),
-    "unstrained_length_max_m": ("unstrained length, largest [m]", ".3f"),
-    "adjusting_length_min_mm": ("adjusting length, smallest [mm]", ".1f"),
-    "adjusting_length_max_mm": ("adjusting length, largest [mm]", ".1f"),
-    "feasible_share_percent": ("feasible poses [%]", ".4g"),
-    "inverse_us_per_pose": ("inverse kinematics [µs a pose]", ".2f"),
-}
-NARROW, WIDE = 10, 30  # characters of a column's head: four narrow ones fit a line of 80
+from sagline.cli.printable import printable
+from sagline.cli.terminal import FREE, show_pieces
 
 
-def plain_table(title: str = "") -> Table:
-    """An empty table with one line under its head."""
-    return Table(title=title or None, title_justify="left", title_style="bold", box=SIMPLE_HEAD, pad_edge=False)
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """A table of texts that is split between columns where it would not fit.
+
+    Attributes:
+        heads: What stands over each column; in lines, if need be.
+        rows: A text for each column.
+        title: Over the whole; "" for none.
+        keys: How many of the first columns say what a row is: they are repeated in each piece.
+        left: Numbers of the columns that are set flush left; the others flush right.
+        prose: Numbers of the columns that may be broken into lines, between words.
+    """
+
+    heads: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    title: str = ""
+    keys: int = 1
+    left: frozenset[int] = field(default=frozenset({0}))
+    prose: frozenset[int] = field(default=frozenset())
+
+    def pieces(self, console: Console, width: int) -> list[tuple[Table, int]]:
+        """In as few pieces as fit, all of about the same number of columns.
+
+        Args:
+            console: Where they go.
+            width: Columns of it.
+
+        Returns:
+            Each table, and the columns that it needs for nothing in it to be cut.
+        """
+        full = self._filled(console, width)
+        even = list(_split(range(self.keys, len(self.heads)), len(full)))
+        for parts in (even, full):  # evenly, if that takes no more pieces
+            tables = [self._table([*range(self.keys), *part], first=part[0] == self.keys) for part in parts]
+            pieces = [(table, _least(console, table)) for table in tables]
+            if all(least <= width for _, least in pieces):
+                break
+        return pieces
+
+    def _filled(self, console: Console, width: int) -> list[range]:
+        """Consecutive columns, as many in each piece as fit; one where not even one does."""
+        parts, first, count = [], self.keys, len(self.heads)
+        while first < count:
+            end = first + 1
+            while end < count:
+                wider = self._table([*range(self.keys), *range(first, end + 1)], first=False)
+                if _least(console, wider) > width:
+                    break
+                end += 1
+            parts.append(range(first, end))
+            first = end
+        return parts
+
+    def _table(self, columns: Sequence[int], *, first: bool) -> Table:
+        """A piece; only the first has the title."""
+        title = Text(printable(self.title)) if first and self.title else None
+        table = Table(title=title, title_justify="left", title_style="bold", box=SIMPLE_HEAD, pad_edge=False)
+        for k in columns:
+            texts = [printable(row[k], "\n") for row in (self.heads, *self.rows)]
+            parts = [part for text in texts for part in (text.split() if k in self.prose else text.split("\n"))]
+            table.add_column(
+                Text(texts[0]),
+                justify="left" if k in self.left else "right",
+                no_wrap=k not in self.prose,
+                overflow="fold",
+                min_width=max(map(cell_len, parts), default=0),
+            )
+        for row in self.rows:
+            table.add_row(*(Text(printable(row[k], "\n")) for k in columns))
+        return table
 
 
-def summary_table(runs: Sequence[Run]) -> Table:
-    """One column a run, so that it fits any terminal; one row a number."""
-    table = plain_table()
-    table.add_column("", no_wrap=True)
-    for run in runs:
-        name = fill(run.plan.state.one_robot.name, NARROW if len(runs) > 2 else WIDE)
-        table.add_column(Text(f"{name}\n{type(run.plan.state.cables.model).__name__}"), justify="right", no_wrap=True)
-    numbers: list[Summary] = [summary(run) for run in runs]
-    for field, (label, form) in ROWS.items():
-        table.add_row(Text(label), *(written(getattr(column, field), form) for column in numbers))
-    return table
+def show_table(grid: Grid) -> None:
+    """Print a table as part of the result."""
+    show_pieces(grid.pieces)
+
+
+def _least(console: Console, table: Table) -> int:
+    return Measurement.get(console, console.options.update_width(FREE), table).minimum
+
+
+def _split(columns: range, count: int) -> Iterable[range]:
+    """Consecutive parts that differ in size by one at most."""
+    edges = [len(columns) * k // count for k in range(count + 1)]
+    return [columns[first:end] for first, end in pairwise(edges)]
 
 
 def written(number: float, form: str) -> str:

@@ -6,13 +6,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from rich.table import Table
 
+from sagline.arrays import Array
 from sagline.cli.choices import Model, Variable
+from sagline.cli.ending import OUTSIDE
 from sagline.cli.entries import INVERSE, MARGINS, POLYGON, SHARING
 from sagline.cli.results import figure_files, write_figures
-from sagline.cli.tables import plain_table
-from sagline.cli.terminal import OUTSIDE, note, show, show_json, working
+from sagline.cli.tables import Grid, show_table
+from sagline.cli.terminal import note, show, show_json, working
+from sagline.cli.values import loaded, middle_of, wrench_of
 from sagline.errors import InvalidValueError
 from sagline.files.names import file_stem
 from sagline.files.pose_text import parse_pose
@@ -36,61 +38,63 @@ ALONE = {name: method for name, method in METHODS.items() if name not in ("Close
 
 
 def tension(
-    name: str, pose: str | None, model: Model, variable: Variable, folder: Path, *, figures: bool, as_json: bool
+    name: str,
+    pose: str | None,
+    model: Model,
+    variable: Variable,
+    wrench: str | None,
+    payload: str | None,
+    folder: Path,
+    *,
+    figures: bool,
+    as_json: bool,
 ) -> int:
     """Share the load of one pose in every way, tell, and draw; returns the exit code.
 
     Raises:
         SaglineError: If an input is wrong or the folder cannot be written.
     """
-    robot = load_robot(name)
-    place = _pose(robot, pose)
+    load, place = wrench_of(wrench), None if pose is None else parse_pose(pose)
+    robot = loaded(load_robot(name), payload)
+    place = middle_of(robot) if place is None else place
     drawn = figures and robot.cable_count == robot.degrees_of_freedom + 2
     name_of_figure = file_stem(robot.name, "tension")
     if drawn:
         check_files(folder, figure_files([name_of_figure]))
     with working(f"{robot.name}: sharing the load", INVERSE, SHARING, MARGINS, *[POLYGON] * drawn):
-        plans = {title: _plan(robot, place, model, method(variable.value)) for title, method in ALONE.items()}
-    least = plans[MinimumNorm.__name__]
-    assert least is not None
-    if least.status not in (PoseStatus.SOLVED, PoseStatus.NOT_COVERED, PoseStatus.UNBOUNDED):
-        note("Not feasible: ", _reason(robot, place, least), style="bold red")
+        least = inverse(robot, place, model.build(), MinimumNorm(variable.value), load)  # refuses what none can share
+        plans = {title: _plan(robot, place, model, method(variable.value), load) for title, method in ALONE.items()}
+        reason = _reason(robot, place, least)
+        margin = float(capacity_margin(least.state))
+        shape = tension_polygon(robot, place, model.build(), load, variable.value) if drawn else None
+    if not any(plan is not None and plan.feasible for plan in plans.values()):
+        note("No tensions: ", reason, style="bold red")
         return OUTSIDE
     files: list[Path] = []
-    if drawn:
+    if shape is not None:
         made_folder(folder)
         from sagline import plot
 
-        shape = tension_polygon(robot, place, model.build(), variable=variable.value)
         points = {title: plan.chord_tension for title, plan in plans.items() if plan is not None}
         files = write_figures({name_of_figure: plot.polygon(shape, points)}, folder)
-    margin = float(capacity_margin(least.state))
     if as_json:
         show_json(
             {"capacity_margin": margin, "tensions": {k: _record(plan) for k, plan in plans.items()}, "files": files}
         )
         return 0
-    show(_table(robot, plans))
+    show_table(_grid(robot, plans))
     show(f"Extra force in the worst direction before no tensions balance it: {margin:.4g} N")
     if files:
-        show(f"In {folder.resolve()}: {', '.join(file.name for file in files)}")
+        show(f"In {folder.resolve()}: {', '.join(file.name for file in files)}", whole=True)
     return 0
 
 
-def _plan(robot: Robot, pose: Pose, model: Model, method: TensionMethod) -> Plan | None:
+def _plan(robot: Robot, pose: Pose, model: Model, method: TensionMethod, wrench: Array | None) -> Plan | None:
     """None where the method cannot share among the robot's cables."""
     try:
-        return inverse(robot, pose, model.build(), method)
+        return inverse(robot, pose, model.build(), method, wrench)
     except InvalidValueError:
         return None
-
-
-def _pose(robot: Robot, text: str | None) -> Pose:
-    if text is None:
-        if robot.test_box is None:
-            raise InvalidValueError("--pose", "missing", "X,Y,Z or X,Y,Z,A,B,C", "This robot names no box of poses.")
-        return Pose((robot.test_box.low + robot.test_box.high) / 2, np.eye(3))
-    return parse_pose(text)
 
 
 def _reason(robot: Robot, pose: Pose, plan: Plan) -> str:
@@ -109,16 +113,15 @@ def _record(plan: Plan | None) -> Any:
     return {"status": PoseStatus(int(plan.status)).name, "chord_tension": list(map(float, plan.chord_tension))}
 
 
-def _table(robot: Robot, plans: dict[str, Plan | None]) -> Table:
-    table = plain_table("Chord tensions [N]")
-    table.add_column("", no_wrap=True)
-    for i in range(robot.cable_count):
-        table.add_column(f"{i}", justify="right", no_wrap=True)
-    table.add_column("")
+def _grid(robot: Robot, plans: dict[str, Plan | None]) -> Grid:
+    rows = []
     for title, plan in plans.items():
         if plan is not None and plan.feasible:
-            table.add_row(title, *(f"{value:.1f}" for value in plan.chord_tension), "")
+            rows.append([title, *(f"{value:.1f}" for value in plan.chord_tension), ""])
         else:
             why = "cannot share here" if plan is None else PoseStatus(int(plan.status)).name.lower().replace("_", " ")
-            table.add_row(title, *([""] * robot.cable_count), why)
-    return table
+            rows.append([title, *[""] * robot.cable_count, why])
+    heads = ["", *map(str, range(robot.cable_count)), ""]
+    if not any(row[-1] for row in rows):
+        heads, rows = heads[:-1], [row[:-1] for row in rows]
+    return Grid(heads, rows, "Chord tensions [N]", left=frozenset({0, robot.cable_count + 1}))

@@ -1,88 +1,31 @@
-"""What the commands say and how they end: results on stdout, everything else on stderr, an exit code that tells."""
+"""What the commands say: results on stdout, everything else on stderr, nothing that a terminal would obey."""
 
 from __future__ import annotations
 
-import signal
+import errno
+import json
 import sys
-import threading
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from pathlib import Path
-from types import FrameType
-from typing import TYPE_CHECKING, Any
+import warnings
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from typing import TYPE_CHECKING, Any, TextIO
 
-import typer
 from rich.console import Console, RenderableType
+from rich.padding import Padding
 from rich.text import Text
 
-from sagline.errors import SaglineError
+from sagline.cli.printable import is_seen, printable
+from sagline.errors import FileError, SaglineWarning
 from sagline.files.json_text import json_text
-from sagline.files.whole import finished_files
 
 if TYPE_CHECKING:
     from sagline.cli.line import Line
 
-OUTSIDE, BAD_INPUT, INTERRUPTED = 1, 2, 130
-MOST_NAMES = 6  # of files, told when something failed after them
+FREE = 1 << 16  # columns of a file or a pipe
 
-_out = Console(highlight=False, markup=False)
-_err = Console(stderr=True, highlight=False, markup=False)
-
-
-@contextmanager
-def reported() -> Iterator[None]:
-    """Turn what goes wrong inside into one message and an exit code.
-
-    Raises:
-        typer.Exit: With BAD_INPUT for an error that sagline raised on purpose, INTERRUPTED for Ctrl-C.
-    """
-    with finished_files() as finished:
-        try:
-            with _interrupts_heard():
-                yield
-        except SaglineError as error:
-            note("Error: ", str(error), style="bold red")
-            _tell_finished(finished)
-            raise typer.Exit(BAD_INPUT) from None
-        except KeyboardInterrupt:
-            note("", "Interrupted. What has been written is whole.")
-            raise typer.Exit(INTERRUPTED) from None
-
-
-def _tell_finished(files: Sequence[Path]) -> None:
-    """What was written before something failed, where anything was."""
-    if files:
-        names = ", ".join(file.name for file in files[:MOST_NAMES])
-        more = f" and {len(files) - MOST_NAMES} more" if len(files) > MOST_NAMES else ""
-        note("", f"Written before, and whole: {names}{more} in {files[0].parent}")
-
-
-@contextmanager
-def _interrupts_heard() -> Iterator[None]:
-    """Ctrl-C ends what is inside even where Python loses it, as it does in a finalizer.
-
-    Raises:
-        KeyboardInterrupt: At the moment of Ctrl-C, or, if that one was lost, at the end.
-    """
-    heard = False
-
-    def hear(number: int, frame: FrameType | None) -> None:
-        nonlocal heard
-        heard = True
-        sys.unraisablehook = lambda _: None  # what half-made objects say when they are thrown away helps nobody
-        signal.default_int_handler(number, frame)
-
-    ours = threading.current_thread() is threading.main_thread()
-    if not ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
-        yield
-        return
-    signal.signal(signal.SIGINT, hear)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-    if heard:
-        raise KeyboardInterrupt
+_out = Console(highlight=False, markup=False, emoji=False)
+_wide = Console(highlight=False, markup=False, emoji=False, width=FREE)  # where nobody looks through a window
+_err = Console(stderr=True, highlight=False, markup=False, emoji=False)
 
 
 @contextmanager
@@ -112,16 +55,122 @@ def counting(what: str, *needed: str) -> Iterator[Callable[[int, int, str], None
         yield tell
 
 
+@contextmanager
+def notices() -> Iterator[None]:
+    """While inside, what sagline warns of is a note on stderr."""
+    with warnings.catch_warnings():
+        others = warnings.showwarning
+
+        def tell(
+            message: Warning | str,
+            category: type[Warning],
+            filename: str,
+            lineno: int,
+            file: TextIO | None = None,
+            line: str | None = None,
+        ) -> None:
+            if issubclass(category, SaglineWarning):
+                note("Note: ", str(message), style="bold")
+            else:
+                others(message, category, filename, lineno, file, line)
+
+        warnings.simplefilter("always", SaglineWarning)
+        warnings.showwarning = tell
+        yield
+
+
 def note(head: str, text: str, style: str = "") -> None:
-    """A message beside the result, on stderr; paths in it are not broken into lines."""
-    _err.print(Text.assemble((head, style), text), soft_wrap=True)
+    """One line beside the result, on stderr; paths in it are not broken into lines."""
+    with suppress(OSError):  # where nobody can be told, nothing is said
+        _err.print(Text.assemble((printable(head), style), printable(text)), soft_wrap=True)
 
 
-def show(what: RenderableType) -> None:
-    """Part of the result, for a person; plain text keeps its lines, so that paths in it can be copied."""
-    _out.print(what, soft_wrap=isinstance(what, str))
+def show(what: str, indent: int = 0, style: str = "", *, whole: bool = False) -> None:
+    """Part of the result, for a person; its lines are broken between words where the terminal ends.
+
+    Args:
+        what: The text.
+        indent: Columns before each line.
+        style: Of rich.
+        whole: Whether its line stays one, so that paths and commands in it can be copied.
+    """
+    if whole:
+        _emit(Text(printable(what), style))
+    else:
+        text = Text(printable(what, "\n" if indent else ""), style)
+        show_pieces(lambda console, width: [(Padding(text, (0, 0, 0, indent), expand=False) if indent else text, 0)])
+
+
+def show_pieces(pieces: Callable[[Console, int], Iterable[tuple[RenderableType, int]]]) -> None:
+    """Parts of the result that fit the terminal; outside a terminal the width is free.
+
+    Args:
+        pieces: Gives, for a console and its width, what to print and how many columns that needs at the least.
+    """
+    console = _out if _out.is_terminal else _wide
+    for piece, least in pieces(console, console.width):
+        _emit(piece, max(console.width, least))
 
 
 def show_json(what: Any) -> None:
     """The result, for a program: one JSON document; null stands for what is not finite."""
-    typer.echo(json_text(what))
+    _write("".join(c if _fits(c) else json.dumps(c)[1:-1] for c in json_text(what)) + "\n")
+
+
+def show_data(text: str) -> None:
+    """A file on stdout: in UTF-8 to the letter, but for a terminal, which gets nothing that it would obey."""
+    if sys.stdout is None or sys.stdout.isatty():
+        _write(printable(text, "\n\t"))
+        return
+    _write("")
+    with _refused():
+        sys.stdout.buffer.write(text.encode("utf-8"))
+        sys.stdout.buffer.flush()
+
+
+def _fits(character: str) -> bool:
+    """Whether a character of a JSON text may go out as it is."""
+    if character.isascii():
+        return character == "\n" or character.isprintable()
+    try:
+        character.encode(_encoding())
+    except UnicodeEncodeError:
+        return False
+    return is_seen(character)
+
+
+def _emit(what: RenderableType, width: int | None = None) -> None:
+    """Print in a width; None leaves lines whole."""
+    console = _out if _out.is_terminal else _wide
+    with _refused(), console.capture() as captured:
+        console.print(what, width=width, soft_wrap=width is None, crop=False)
+    _write(captured.get())
+
+
+def _write(text: str) -> None:
+    """The one way to stdout."""
+    with _refused():
+        sys.stdout.write(text.encode(_encoding(), "backslashreplace").decode(_encoding()))
+        sys.stdout.flush()
+
+
+@contextmanager
+def _refused() -> Iterator[None]:
+    """Turn what the system says of stdout into an error.
+
+    Raises:
+        FileError: If it is closed or full; not if nobody reads it any more, which is no error.
+    """
+    try:
+        if sys.stdout is None:
+            raise OSError(errno.EBADF, "it is closed")
+        yield
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        step = "Give it a file with space, a pipe or a terminal."
+        raise FileError("standard output", f"cannot be written ({error.strerror or error})", step) from None
+
+
+def _encoding() -> str:
+    return getattr(sys.stdout, "encoding", None) or "utf-8"

@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING
 
 from sagline.cli.choices import Model, Tension, Variable
 from sagline.cli.entries import FORWARD, needed_for
+from sagline.cli.lengths import plan_text
 from sagline.cli.results import figure_files, tell, write_figures, write_plans
 from sagline.cli.study import Run, run_along, run_name
 from sagline.cli.terminal import working
+from sagline.cli.values import loaded, wrench_of
 from sagline.files.path_file import load_path
 from sagline.files.robot_file import load_robot
-from sagline.files.whole import check_files
+from sagline.files.whole import check_files, write_text
 from sagline.motion.planar import article_path
 
 if TYPE_CHECKING:
@@ -28,9 +30,12 @@ def track(
     model: Model,
     tension: Tension,
     variable: Variable,
+    wrench: str | None,
+    payload: str | None,
     folder: Path,
     *,
     figures: bool,
+    table: bool,
     as_json: bool,
 ) -> int:
     """Plan, confirm, write and tell; returns the exit code.
@@ -38,17 +43,21 @@ def track(
     Raises:
         SaglineError: If an input is wrong or the folder cannot be written; then nothing has been.
     """
-    machine = load_robot(robot)
+    load = wrench_of(wrench)
+    machine = loaded(load_robot(robot), payload)
     way = article_path() if path is None else load_path(path)
     cable = model.build()
     name = run_name(machine, cable)
     drawn = [f"{name}-{figure}" for figure in FIGURES] if figures else []
-    check_files(folder, [f"{name}.nc", *figure_files(drawn)])
+    check_files(folder, [f"{name}.nc", *[f"{name}.csv"] * table, *figure_files(drawn)])
     shared = tension.build(variable)
     with working(f"{machine.name}: planning and confirming {len(way):,} poses", *needed_for(shared), FORWARD) as line:
-        run = run_along(machine, way, cable, shared, line)
+        run = run_along(machine, way, cable, shared, line, load)
     with working("writing"):
         files = write_plans([run], folder)
+        if table:
+            files.append(folder / f"{name}.csv")
+            write_text(files[-1], plan_text(run.plan))
         if figures:
             files += write_figures(dict(zip(drawn, _figures(run), strict=True)), folder)
     return tell([run], files, folder, as_json=as_json)

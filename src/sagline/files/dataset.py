@@ -54,7 +54,7 @@ def _opened(path: Path) -> Dataset:
     try:
         with File(path) as file:  # h5netcdf writes to stderr about a file of which this cannot be read
             dict(file.attrs)
-        with open_dataset(path, engine="h5netcdf", decode_times=False, mask_and_scale=False) as data:
+        with open_dataset(path.absolute(), engine="h5netcdf", decode_times=False, mask_and_scale=False) as data:
             if data.nbytes > INFLATION * size:
                 raise ValueError(f"{size} bytes that say to hold {data.nbytes:.2g}")
             return data.load()

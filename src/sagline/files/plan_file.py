@@ -68,7 +68,7 @@ def save_plan(plan: Plan, file: os.PathLike[str] | str) -> None:
         # _FillValue None: numbers are stored as they are, and NaN needs no second meaning
         encoding = {str(name): {"_FillValue": None} for name in data.variables}
         try:
-            data.to_netcdf(partial, engine="h5netcdf", encoding=encoding)
+            data.to_netcdf(partial.absolute(), engine="h5netcdf", encoding=encoding)  # xarray takes ~ for the home
         except RuntimeError as error:  # what h5py makes of a disk that fills up meanwhile
             raise OSError(str(error)) from error
         seal(partial)

@@ -19,6 +19,7 @@ PARTS = {
     "wrench_part": ("force x", "force y", "force z", "moment x", "moment y", "moment z"),
     "twist_part": ("linear x", "linear y", "linear z", "angular x", "angular y", "angular z"),
     "residual_part": ("force", "moment"),
+    "bracket_part": ("proved", "sufficient"),
 }
 
 
@@ -173,7 +174,7 @@ PROOF = (
         "farkas",
         ("wrench_part",),
         "1, 1/m",
-        "vector y that proves a pose infeasible: y . J tau < y . needed for all chord tensions within the limits",
+        "vector y that proves a pose infeasible: along it the cables give less than is needed, at any tensions",
         known=Known.SOMEWHERE,
     ),
     Quantity(
@@ -181,8 +182,26 @@ PROOF = (
         "needed",
         ("wrench_part",),
         "N, N m",
-        "wrench J tau that the chord tensions must supply, to which the proof refers",
+        "wrench J tau that the chord tensions must supply",
         known=Known.SOMEWHERE,
+    ),
+    Quantity(
+        "bracket",
+        "bracket",
+        ("bracket_part",),
+        "N",
+        "what is proved and what suffices of the smallest change of the force that would make the pose feasible",
+        known=Known.SOMEWHERE,
+        low=0.0,
+        infinite=True,
+    ),
+    Quantity(
+        "at_border",
+        "at_border",
+        (),
+        "",
+        "whether the tensions were searched for at the border of feasibility, where the way of sharing had no say",
+        flag=True,
     ),
 )
 

@@ -3,17 +3,36 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import ceil, floor, log10
 
 import numpy as np
 
 from sagline.arrays import Array
-from sagline.viewer.readout import FONT
+from sagline.viewer.readout import block
+from sagline.viewer.wording import number
 
-WIDTH, HEIGHT = 340, 150  # px
-LEFT, RIGHT, TOP, BOTTOM = 44, 8, 18, 24  # px around the axes
+WIDTH, HEIGHT = 340, 160  # px
+LEFT, RIGHT, TOP, BOTTOM = 44, 10, 20, 24  # px around the axes
 SAMPLES = 240  # of each line: more would not show
-COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#666666", "#8B5A2B")
+MOST_TICKS = 6
+# Cables by number, here and nowhere else: no color of the platform, of its path, of a tension or of a verdict.
+# Each holds 3 : 1 on the panels of both themes.
+COLORS = ("#0e9384", "#8a8a12", "#9a6f52", "#1897b8", "#5e9a3c", "#7d8794")
 _DASHES = ("", "4 2")  # lines beyond the colors are dashed
+_NEAR = 0.6  # of the values' spread: a limit within this of them is drawn, one farther away is told
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """A limit to draw beside the values.
+
+    Attributes:
+        value: Where it is.
+        name: What it is.
+    """
+
+    value: float
+    name: str
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,47 +48,63 @@ class CourseFigure:
     duration: float
 
     @classmethod
-    def of(cls, title: str, time: Array, values: Array) -> CourseFigure:
+    def of(cls, title: str, time: Array, values: Array, limits: tuple[Limit, ...] = ()) -> CourseFigure:
         """Draw the lines of values (N, m) over time (N,) [s]; gaps where they are NaN."""
         rows = np.unique(np.linspace(0, len(time) - 1, SAMPLES).astype(np.intp))
         time, values = time[rows], values[rows]
-        low, high = _range(values)
-        x = LEFT + (WIDTH - LEFT - RIGHT) * time / max(float(time[-1]), 1e-12)
-        y = HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * (values - low) / (high - low)
+        low, high, drawn = _range(values, limits)
+        x = _across(time, float(time[-1]))
+        y = _up(values, low, high)
         lines = "".join(_line(x, y[:, i], i) for i in range(values.shape[1]))
-        axes = _axes(title, low, high, float(time[-1]))
-        return cls(axes + lines, float(time[-1]))
+        told = _told([limit for limit in limits if limit not in drawn])
+        marks = "".join(_limit(limit, float(_up(np.array(limit.value), low, high))) for limit in drawn)
+        return cls(_axes(title, low, high, float(time[-1])) + told + lines + marks, float(time[-1]))
 
     @staticmethod
     def key(count: int) -> str:
         """HTML that says which line is which cable."""
-        marks = " ".join(
-            f'<span style="color:{COLORS[i % len(COLORS)]}">{"━" if i < len(COLORS) else "┅"}</span>{i}'
+        marks = "".join(
+            f'<span class="key"><span class="stroke" style="border-color:{COLORS[i % len(COLORS)]};'
+            f'border-top-style:{"solid" if i < len(COLORS) else "dashed"}"></span> {i}</span>'
             for i in range(count)
         )
-        return f'<div style="{FONT};padding:0 8px">cable &nbsp;{marks}</div>'
+        return block(f"cable &nbsp;{marks}")
 
     def at(self, time: float) -> str:
         """HTML with the cursor at a time [s]."""
-        x = LEFT + (WIDTH - LEFT - RIGHT) * time / max(self.duration, 1e-12)
-        cursor = f'<line x1="{x:.1f}" x2="{x:.1f}" y1="{TOP}" y2="{HEIGHT - BOTTOM}" stroke="#111" stroke-width="1.2"/>'
-        return (
-            f'<svg width="100%" viewBox="0 0 {WIDTH} {HEIGHT}" style="{FONT};font-size:10px">'
-            f"{self.background}{cursor}</svg>"
-        )
+        x = float(_across(np.array(time), self.duration))
+        cursor = f'<line class="cursor" x1="{x:.1f}" x2="{x:.1f}" y1="{TOP}" y2="{HEIGHT - BOTTOM}"/>'
+        return block(f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img">{self.background}{cursor}</svg>')
 
 
-def _range(values: Array) -> tuple[float, float]:
+def round_ticks(low: float, high: float, most: int = MOST_TICKS) -> list[float]:
+    """One, two or five times a power of ten apart, at most so many, all that there are from low to high."""
+    coarse = (high - low) / most
+    power = 10.0 ** floor(log10(coarse))
+    step = next(times * power for times in (1.0, 2.0, 5.0, 10.0) if times * power >= coarse * (1.0 - 1e-9))
+    return [step * k for k in range(ceil(low / step - 1e-9), floor(high / step + 1e-9) + 1)]
+
+
+def _across(time: Array, duration: float) -> Array:
+    return np.asarray(LEFT + (WIDTH - LEFT - RIGHT) * time / max(duration, 1e-12))
+
+
+def _up(values: Array, low: float, high: float) -> Array:
+    return np.asarray(HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * (values - low) / (high - low))
+
+
+def _range(values: Array, limits: tuple[Limit, ...]) -> tuple[float, float, list[Limit]]:
+    """Lowest and highest value of the axis, and the limits that lie on it."""
     known = values[np.isfinite(values)]
-    if not known.size:
-        return 0.0, 1.0
-    low, high = float(known.min()), float(known.max())
+    low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
     spread = max(high - low, 1e-6 * max(abs(high), 1.0))
-    return low - 0.04 * spread, high + 0.04 * spread
+    near = [limit for limit in limits if low - _NEAR * spread <= limit.value <= high + _NEAR * spread]
+    low, high = min([low, *(limit.value for limit in near)]), max([high, *(limit.value for limit in near)])
+    return low - 0.04 * spread, high + 0.04 * spread, near
 
 
 def _line(x: Array, y: Array, which: int) -> str:
-    style = f'fill="none" stroke="{COLORS[which % len(COLORS)]}" stroke-width="1.3"'
+    style = f'fill="none" stroke="{COLORS[which % len(COLORS)]}" stroke-width="1.5"'
     style += f' stroke-dasharray="{_DASHES[which // len(COLORS) % 2]}"'
     known = np.isfinite(y)
     pieces = np.split(np.arange(len(x)), np.flatnonzero(np.diff(known)) + 1)
@@ -80,16 +115,32 @@ def _line(x: Array, y: Array, which: int) -> str:
     )
 
 
+def _limit(limit: Limit, y: float) -> str:
+    return (
+        f'<line class="limit" x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{y:.1f}" y2="{y:.1f}"/>'
+        f'<text class="limit" x="{WIDTH - RIGHT}" y="{y - 3.0:.1f}" text-anchor="end">{limit.name}</text>'
+    )
+
+
+def _told(limits: list[Limit]) -> str:
+    """The limits that lie beyond the axis, in words."""
+    text = ", ".join(f"{limit.name} {limit.value:g}" for limit in limits)
+    return f'<text class="quiet" x="{WIDTH - RIGHT}" y="12" text-anchor="end">{text}</text>' if text else ""
+
+
 def _axes(title: str, low: float, high: float, duration: float) -> str:
-    marks = [f'<text x="4" y="12" font-weight="600" fill="#333">{title}</text>']
-    for share in (0.0, 0.5, 1.0):
-        y = HEIGHT - BOTTOM - share * (HEIGHT - TOP - BOTTOM)
-        x = LEFT + share * (WIDTH - LEFT - RIGHT)
-        marks.append(f'<line x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{y}" y2="{y}" stroke="#ddd"/>')
-        label = f"{low + share * (high - low):.4g}"
-        marks.append(f'<text x="{LEFT - 4}" y="{y + 3.5}" text-anchor="end" fill="#555">{label}</text>')
-        anchor = ("start", "middle", "end")[round(2 * share)]
+    marks = [f'<text x="4" y="12" font-weight="600">{title}</text>']
+    ticks = round_ticks(low, high)
+    form = f".{max(0, -floor(log10(ticks[1] - ticks[0]) + 1e-9))}f"
+    for value in ticks:
+        y = float(_up(np.array(value), low, high))
+        marks.append(f'<line class="grid" x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{y:.1f}" y2="{y:.1f}"/>')
         marks.append(
-            f'<text x="{x}" y="{HEIGHT - 8}" text-anchor="{anchor}" fill="#555">{share * duration:.3g} s</text>'
+            f'<text class="quiet" x="{LEFT - 4}" y="{y + 3.5:.1f}" text-anchor="end">{number(value, form)}</text>'
         )
+    seconds = round_ticks(0.0, max(duration, 1e-12))
+    for moment in seconds:
+        x = float(_across(np.array(moment), duration))
+        unit = " s" if moment == seconds[-1] else ""
+        marks.append(f'<text class="quiet" x="{x:.1f}" y="{HEIGHT - 8}" text-anchor="middle">{moment:.6g}{unit}</text>')
     return "".join(marks)

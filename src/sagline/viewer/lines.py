@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sagline.arrays import Array, locked
 from sagline.cables.model import CableState
@@ -36,9 +37,18 @@ def hanging(ends: Array, cables: CableState, sag_scale: float) -> Array:
     return np.asarray(ends[:, :1] + np.concatenate((level[:, None] * along[..., None], height[..., None]), axis=-1))
 
 
-def segments(points: Array, *, dashed: bool) -> Array:
-    """Consecutive points (m, P, 3) as segments (m (P - 1), 2, 3), every other one of no length where dashed."""
+def segments(points: Array, *, dashed: bool, shown: NDArray[np.bool_] | None = None) -> Array:
+    """Consecutive points (m, P, 3) as segments (m (P - 1), 2, 3).
+
+    Args:
+        points: Points along lines.
+        dashed: Whether every other segment has no length.
+        shown: Which points are shown, shape (m, P); a segment without both ends has no length.
+    """
     pairs = np.stack((points[:, :-1], points[:, 1:]), axis=2)
     if dashed:
         pairs[:, 1::2, 1] = pairs[:, 1::2, 0]
+    if shown is not None:
+        hidden = ~(shown[:, :-1] & shown[:, 1:])
+        pairs[hidden, 1] = pairs[hidden, 0]
     return np.asarray(pairs.reshape(-1, 2, 3))

@@ -3,28 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import ceil, floor, log10
 from typing import Any
 
 import viser
 
+from sagline.errors import InvalidValueError
 from sagline.robot.robot import Robot
 from sagline.viewer import readout
 from sagline.viewer.settings import METHODS, MODELS, Settings
 from sagline.viewer.tension_scale import TensionScale
+from sagline.viewer.wording import remembers
 
-LEFT_WIDTH, RIGHT_WIDTH = 290, 370  # px
+LEFT_WIDTH, RIGHT_WIDTH = 310, 380  # px
 _LIGHTEST, _HEAVIEST = 0.1, 4.0  # of the robot's own mass
+_OF_RUN = "A run is what it was planned as; drag the platform to ask what if."
 
 
 class Panel:
     """Sliders, choices and readings. Reading a value twice is free; nothing here calls back but `changed`."""
 
     def __init__(
-        self, server: viser.ViserServer, robot: Robot, scale: TensionScale, changed: Callable[[], None]
+        self,
+        server: viser.ViserServer,
+        robot: Robot,
+        scale: TensionScale,
+        changed: Callable[[], None],
+        forget: Callable[[], None],
     ) -> None:
-        """Build the panels; `changed` is called, from any thread, when a value changes."""
+        """Build the panels; `changed` is called, from any thread, when a value changes, `forget` to forget the way."""
         self._gui = server.gui
         self._changed = changed
+        self._forget = forget
         self._gui.main_panel.dock_left()
         self._gui.main_panel.set_width(LEFT_WIDTH)
         self._build_what_if(robot)
@@ -32,12 +42,13 @@ class Panel:
         readings = self._gui.add_panel()
         with readings.add_tab("Readings"):
             self._verdict = self._gui.add_html(readout.waiting())
-            self._gui.add_html(readout.legend(scale))
+            self._gui.add_html(readout.legend(scale, robot))
             self._numbers = self._gui.add_html("")
             with self._gui.add_folder("Feasible tensions"):
                 self._polygon = self._gui.add_html("")
         readings.dock_right()
         readings.set_width(RIGHT_WIDTH)
+        readings.expand()  # in the bottom sheet of a small screen it would start closed
 
     @property
     def ghost(self) -> bool:
@@ -51,19 +62,21 @@ class Panel:
             InvalidValueError: If a client sent what no slider gives.
         """
         return Settings(
-            mass=float(self._mass.value),
-            density=float(self._density.value),
-            stiffness=float(self._stiffness.value),
-            model=MODELS.get(self._model.value, MODELS["catenary (exact)"]),
-            tension=METHODS.get(self._method.value, METHODS["Closest"]),
-            sag_scale=float(self._sag_scale.value),
-            error_scale=float(self._error_scale.value),
+            mass=_slid(self._mass),
+            density=_slid(self._density),
+            stiffness=_slid(self._stiffness),
+            model=MODELS.get(self._model.value, next(iter(MODELS.values()))),
+            tension=METHODS.get(self._method.value, next(iter(METHODS.values()))),
+            sag_scale=_slid(self._sag_scale),
+            error_scale=_slid(self._error_scale),
         )
 
-    def lock_what_if(self, locked: bool) -> None:
-        """Disable what would change the robot: a run is what it is."""
+    def show_what_if(self, shown: bool) -> None:
+        """Show what would change the robot, or in its place that a run is what it is."""
         for handle in (self._mass, self._density, self._stiffness, self._model, self._method):
-            handle.disabled = locked
+            handle.visible = shown
+        self._of_run.visible = not shown
+        self._forgetting.visible = shown and remembers(self.settings().tension)
 
     def read_out(self, verdict: str, numbers: str, polygon: str) -> None:
         """Show the readings."""
@@ -87,10 +100,11 @@ class Panel:
     def _build_what_if(self, robot: Robot) -> None:
         gui = self._gui
         with gui.add_folder("What if"):
+            self._of_run = gui.add_html(readout.block(f'<div class="quiet">{_OF_RUN}</div>'), visible=False)
+            lightest, heaviest, step = mass_range(robot.mass)
             self._mass = self.watched(
                 gui.add_slider(
-                    "Platform + load [kg]",
-                    _LIGHTEST * robot.mass, _HEAVIEST * robot.mass, 0.01 * robot.mass, robot.mass,
+                    "Platform + load [kg]", lightest, heaviest, step, robot.mass,
                     hint="Mass of the platform with its load; the inertia grows with it.",
                 )
             )  # fmt: skip
@@ -110,6 +124,13 @@ class Panel:
             self._method = self.watched(
                 gui.add_dropdown("Tensions", tuple(METHODS), hint="How redundant cables share the load.")
             )
+            self._forgetting = gui.add_button(
+                "Forget the way here",
+                icon=viser.Icon.ERASER,
+                visible=False,
+                hint="The tensions depend on the poses before this one; begin again from this pose alone.",
+            )
+            self._forgetting.on_click(lambda _: self._forget())
 
     def _build_drawing(self) -> None:
         gui = self._gui
@@ -118,4 +139,27 @@ class Panel:
             self._error_scale = self.watched(
                 gui.add_slider("Error drawn ×", 1.0, 200.0, 1.0, 1.0, hint="Position error of the orange platform.")
             )
-            self._ghost = self.watched(gui.add_checkbox("Straight cables beside", False))
+            self._ghost = self.watched(
+                gui.add_checkbox(
+                    "Straight cables beside", False, hint="Drawn where a cable hangs visibly apart from it."
+                )
+            )
+
+
+def _slid(slider: Any) -> float:
+    """The value of a slider.
+
+    Raises:
+        InvalidValueError: If a client sent one that the slider does not reach.
+    """
+    value, low, high = float(slider.value), float(slider.min), float(slider.max)
+    if not low <= value <= high:
+        raise InvalidValueError(slider.label, value, f"{low:g} to {high:g}", "Move the slider.")
+    return value
+
+
+def mass_range(mass: float) -> tuple[float, float, float]:
+    """Lowest and highest mass of the slider and its step [kg], all round numbers."""
+    step = 10.0 ** (floor(log10(mass)) - 2)
+    rounding = 10.0 * step
+    return max(round(_LIGHTEST * mass / step) * step, step), ceil(_HEAVIEST * mass / rounding) * rounding, step

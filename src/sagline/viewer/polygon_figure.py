@@ -8,12 +8,12 @@ from sagline.arrays import Array
 from sagline.errors import InvalidValueError
 from sagline.kinematics.polygon import tension_polygon
 from sagline.tension.polygon import TensionPolygon
-from sagline.viewer.readout import FONT
+from sagline.viewer.readout import LATER, block, force_unit
 from sagline.viewer.snapshot import Snapshot
+from sagline.viewer.wording import ForceUnit, number
 
 MOST_REDUNDANT = 2  # dimensions of a drawing
 WIDTH, HEIGHT, BORDER = 340, 190, 26  # px
-_BLUE, _VERMILLION = "#0072B2", "#D55E00"
 
 
 def polygon_figure(snapshot: Snapshot) -> str:
@@ -27,12 +27,15 @@ def polygon_figure(snapshot: Snapshot) -> str:
     if polygon is None or not len(polygon.vertices):
         return _sentence("No tensions within the limits balance the platform: there is nothing to choose from.")
     point = polygon.coordinates(snapshot.tension)
-    return _interval(polygon.vertices[:, 0], float(point[0])) if redundant == 1 else _drawing(polygon, point)
+    unit = force_unit(snapshot.robot)
+    if redundant == 1:
+        return _interval(polygon.vertices[:, 0], float(point[0]))
+    return _drawing(polygon, point, unit)
 
 
 def polygon_later() -> str:
     """HTML: that the polygon is not there yet."""
-    return _sentence("Compiling …")
+    return _sentence(LATER.capitalize())
 
 
 def _polygon(snapshot: Snapshot) -> TensionPolygon | None:
@@ -45,7 +48,7 @@ def _polygon(snapshot: Snapshot) -> TensionPolygon | None:
         return None
 
 
-def _drawing(polygon: TensionPolygon, point: Array) -> str:
+def _drawing(polygon: TensionPolygon, point: Array, unit: ForceUnit) -> str:
     corners = polygon.vertices
     low, high = corners.min(axis=0), corners.max(axis=0)
     scale = float(np.min((np.array([WIDTH, HEIGHT]) - 2 * BORDER) / np.maximum(high - low, 1e-9)))
@@ -59,14 +62,16 @@ def _drawing(polygon: TensionPolygon, point: Array) -> str:
     sides = "".join(
         _side(polygon, k, place(corners[k]), place(corners[(k + 1) % len(corners)])) for k in range(len(corners))
     )
-    x, y = place(point)
-    return (
-        f'<svg width="100%" viewBox="0 0 {WIDTH} {HEIGHT}" style="{FONT};font-size:10px" role="img" '
-        f'aria-label="polygon of feasible tensions">'
-        f'<polygon points="{outline}" fill="{_BLUE}" fill-opacity="0.15" stroke="{_BLUE}" stroke-width="1.5"/>{sides}'
-        f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4.5" fill="{_VERMILLION}" stroke="white"/></svg>'
-        f"{_sentence(f'Dot: the chosen tensions. Sides: the limit that each is. {_extent(high - low)}')}"
+    dot = ""
+    if np.isfinite(point).all():  # no tensions were chosen where the way of sharing found none
+        x, y = place(point)
+        dot = f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4.5" class="dot"/>'
+    drawing = (
+        f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="polygon of feasible tensions">'
+        f'<polygon points="{outline}" class="polygon"/>{sides}{dot}</svg>'
     )
+    extent = f"Width {unit.written(high[0] - low[0])}, height {unit.written(high[1] - low[1])}."
+    return block(drawing) + _sentence(f"Dot: the chosen tensions. Sides: the limit that each is. {extent}")
 
 
 def _side(polygon: TensionPolygon, k: int, start: tuple[float, float], end: tuple[float, float]) -> str:
@@ -76,19 +81,16 @@ def _side(polygon: TensionPolygon, k: int, start: tuple[float, float], end: tupl
         return ""
     x, y = 0.5 * (start[0] + end[0]), 0.5 * (start[1] + end[1])
     nx, ny = start[1] - end[1], end[0] - start[0]  # outward: corners go around counter-clockwise, and y points down
-    length = np.hypot(nx, ny)
-    x, y = x + 15.0 * nx / length, y + 9.0 * ny / length + 3.0
-    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="middle" fill="#444">{side.cable} {side.limit}</text>'
+    nx, ny = nx / np.hypot(nx, ny), ny / np.hypot(nx, ny)
+    anchor = "start" if nx > 0.35 else "end" if nx < -0.35 else "middle"  # the text leaves its side, not along it
+    x, y = x + 7.0 * nx, y + 9.0 * ny + 3.0
+    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{side.cable} {side.limit}</text>'
 
 
 def _interval(ends: Array, point: float) -> str:
     low, high = float(ends.min()), float(ends.max())
-    return _sentence(f"One redundant cable: λ may be {low:.4g} to {high:.4g} N; chosen: {point:.4g} N.")
-
-
-def _extent(size: Array) -> str:
-    return f"Width {size[0]:,.0f} N, height {size[1]:,.0f} N."
+    return _sentence(f"One redundant cable: λ may be {low:.4g} to {high:.4g} N; chosen: {number(point, '.4g')} N.")
 
 
 def _sentence(text: str) -> str:
-    return f'<div style="{FONT};color:#555;padding:0 4px">{text}</div>'
+    return f'<div class="sagline quiet">{text}</div>'

@@ -1,4 +1,4 @@
-"""What the panel says, as HTML: verdict, numbers, legend. Pure text, tested as such."""
+"""What the panel says, as HTML: verdict, numbers, legend. Pure text, tested as such; its colors are in page.css."""
 
 from __future__ import annotations
 
@@ -7,14 +7,20 @@ from html import escape
 import numpy as np
 
 from sagline.arrays import Array
+from sagline.kinematics.status import PoseStatus
+from sagline.robot.robot import Robot
 from sagline.tension.margin import capacity_margin
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.tension_scale import TensionScale
+from sagline.viewer.wording import ForceUnit, number, quantity
 
-GOOD, BAD = "#0b7a4b", "#c92a2a"  # green and red that hold their contrast on white
-QUIET = "#555555"  # of what is neither good nor bad
-FONT = "font-family:system-ui,sans-serif;font-size:12px;line-height:1.45;color:#222"
-_CELL = "padding:1px 0 1px 10px;text-align:right;font-variant-numeric:tabular-nums"
+LATER = "compiling …"
+_ALONE = 1e-9  # of a robot's highest tension: a tension this near to its limit is at it
+
+
+def block(content: str) -> str:
+    """HTML of ours: what gives it its font and colors."""
+    return f'<div class="sagline">{content}</div>'
 
 
 def verdict(snapshot: Snapshot, *, capacity: bool = True) -> str:
@@ -22,32 +28,30 @@ def verdict(snapshot: Snapshot, *, capacity: bool = True) -> str:
 
     Args:
         snapshot: What is shown.
-        capacity: Whether the margin to any load can be computed already.
+        capacity: Whether the spare force can be computed already.
     """
-    color = GOOD if snapshot.feasible else BAD
-    head = "Feasible" if snapshot.feasible else "Not feasible"
-    text = _summary(snapshot, capacity=capacity) if snapshot.feasible else escape(snapshot.reason)
-    return (
-        f'<div style="{FONT};border-left:5px solid {color};background:{color}14;padding:6px 10px;margin:2px 8px">'
-        f'<b style="color:{color};font-size:14px">{head}</b><br>{text}</div>'
-    )
+    if snapshot.feasible:
+        return _box("good", "Feasible", _summary(snapshot, capacity=capacity))
+    return _box("bad", headline(snapshot), escape(snapshot.reason))
+
+
+def headline(snapshot: Snapshot) -> str:
+    """The verdict in a word or two; what is neither feasible nor proved infeasible is named by its status."""
+    if snapshot.feasible:
+        return "Feasible"
+    if snapshot.status is PoseStatus.INFEASIBLE:
+        return "Not feasible"
+    return snapshot.status.name.replace("_", " ").capitalize()
 
 
 def refused(message: str) -> str:
     """What a setting asked for and cannot have."""
-    return (
-        f'<div style="{FONT};border-left:5px solid {BAD};background:{BAD}14;padding:6px 10px;margin:2px 8px">'
-        f'<b style="color:{BAD};font-size:14px">Not possible</b><br>{escape(message)}</div>'
-    )
+    return _box("bad", "Not possible", escape(message))
 
 
 def waiting(what: str = "The first run on a machine compiles the numerical core; later ones start at once.") -> str:
     """What stands there until the numbers do: at the first run the numerical core is compiled before them."""
-    return (
-        f'<div style="{FONT};border-left:5px solid {QUIET};background:{QUIET}14;padding:6px 10px;margin:2px 8px">'
-        f'<b style="color:{QUIET};font-size:14px">Getting ready</b><br>'
-        f"{escape(what)}</div>"
-    )
+    return _box("quiet", "Getting ready", escape(what))
 
 
 def numbers(
@@ -57,28 +61,42 @@ def numbers(
     parts = (
         _pose_line(snapshot),
         _cable_table(snapshot, scale),
-        _frequencies_later() if frequencies_later else _frequency_line(frequencies),
+        _frequency_line(LATER) if frequencies_later else _listed(frequencies),
         _material_line(snapshot),
     )
-    return f'<div style="{FONT};padding:2px 14px">{"".join(parts)}</div>'
+    return block("".join(parts))
 
 
-def legend(scale: TensionScale) -> str:
+def legend(scale: TensionScale, robot: Robot) -> str:
     """The colors of the tensions, as a bar with round numbers below."""
     stops = np.linspace(0.0, 1.0, 12)
     values = scale.low * (scale.high / scale.low) ** stops
     colors = ",".join(
         f"{_hex(color)} {100 * stop:.0f}%" for stop, color in zip(stops, scale.colors(values), strict=True)
     )
+    unit = force_unit(robot)
     marks = "".join(
-        f'<span style="position:absolute;left:{100 * place:.1f}%;transform:translateX(-50%)">{_short(tick)}</span>'
+        f'<span style="position:absolute;left:{100 * place:.1f}%;transform:translateX(-{100 * place:.0f}%)">'
+        f"{tick / unit.newtons:g}</span>"
         for tick, place in _spaced(scale)
     )
-    return (
-        f'<div style="{FONT};padding:2px 14px 4px 14px"><b>Chord tension [N]</b>'
+    return block(
+        f"<b>Chord tension [{unit.name}]</b>"
         f'<div style="height:12px;background:linear-gradient(to right,{colors});margin-top:3px"></div>'
         f'<div style="position:relative;height:17px">{marks}</div>'
-        f'<div style="color:#666">ends: the lowest and highest allowed</div></div>'
+        f'<div class="quiet">{_ends(robot)}</div>'
+    )
+
+
+def force_unit(robot: Robot) -> ForceUnit:
+    """How the forces of a robot are written: by its highest tension, so that nothing changes its unit in a drag."""
+    return ForceUnit.up_to(TensionScale.of(robot).high)
+
+
+def _box(kind: str, head: str, text: str) -> str:
+    return (
+        f'<div class="sagline sagline-verdict {kind}"><h2>{head}</h2>'
+        f'<div style="color:var(--sagline-text)">{text}</div></div>'
     )
 
 
@@ -93,85 +111,93 @@ def _spaced(scale: TensionScale) -> list[tuple[float, float]]:
 
 
 def _summary(snapshot: Snapshot, *, capacity: bool) -> str:
-    tension, margin = snapshot.tension, snapshot.margin
-    nearest = int(np.argmin(margin))
-    parts = [
-        f"tensions {tension.min():.4g} to {tension.max():.4g} N",
-        f"margin {_number(margin[nearest], '.1f')} N (cable {nearest})",
+    """The quantities of a feasible pose, each by its name."""
+    unit = force_unit(snapshot.robot)
+    tension = snapshot.tension
+    rows = [
+        ("Tensions", f"{unit.bare(tension.min())} to {unit.written(tension.max())}"),
+        ("Nearest limit", _nearest_limit(snapshot, unit)),
     ]
-    if snapshot.plan is not None and not capacity:
-        parts.append("margin in any direction: compiling …")
-    elif snapshot.plan is not None:
-        extra = float(capacity_margin(snapshot.plan.state))
-        parts.append(f"takes {_number(extra, '.1f')} N more in any direction")
+    if snapshot.plan is not None:
+        extra = unit.written(float(capacity_margin(snapshot.plan.state))) if capacity else LATER
+        rows.append(("Spare force", f"{extra}, in any direction, the load shared anew" if capacity else extra))
     if (error := snapshot.error) is not None:
-        parts.append(f"really rests {1e3 * float(np.linalg.norm(error)):.3g} mm off")
-    return " · ".join(parts)
+        rows.append(("Really rests", f"{quantity(float(np.linalg.norm(error)), 'm')} off"))
+    return "<dl>" + "".join(f"<dt>{name}</dt><dd>{text}</dd>" for name, text in rows) + "</dl>"
+
+
+def _ends(robot: Robot) -> str:
+    """What the ends of the scale are: limits, where the robot has them."""
+    low = "lowest allowed" if robot.tension_min.min() > 0.0 else "no lower limit"
+    high = "highest allowed" if np.isfinite(robot.tension_max).all() else "no upper limit"
+    return f"ends: {low}, {high}"
+
+
+def _nearest_limit(snapshot: Snapshot, unit: ForceUnit) -> str:
+    """Which tension is nearest to its limit, to which, and how near; several at their limits are told as such."""
+    margin, robot = snapshot.margin, snapshot.robot
+    reach = _ALONE * float(np.nanmax(np.where(np.isfinite(robot.tension_max), robot.tension_max, margin.max())))
+    at = np.flatnonzero(margin <= reach)
+    if len(at) > 1:
+        return f"reached by cables {', '.join(map(str, at))}"
+    nearest = int(np.argmin(margin))
+    which = snapshot.nearer_limit(nearest)
+    if len(at):
+        return f"reached by cable {nearest} ({which})"
+    return f"{unit.written(margin[nearest])} away (cable {nearest}, {which})"
 
 
 def _pose_line(snapshot: Snapshot) -> str:
-    position = ", ".join(f"{value:.3f}" for value in snapshot.pose.position)
-    turned = ", ".join(f"{value:.1f}°" for value in snapshot.pose.rotation.as_euler("ZYX", degrees=True))
+    position = ", ".join(number(value, ".3f") for value in snapshot.pose.position)
+    turned = ", ".join(f"{number(value, '.1f')}°" for value in snapshot.pose.rotation.as_euler("ZYX", degrees=True))
     return f"<b>Position</b> {position} m<br><b>α, β, γ</b> {turned}"
 
 
 def _cable_table(snapshot: Snapshot, scale: TensionScale) -> str:
-    heads = ("cable", "tension<br>[N]", "winch<br>[N]", "length<br>[m]", "sag<br>[mm]", "margin<br>[N]")
-    head = "".join(f'<th style="{_CELL};font-weight:600;color:#555">{text}</th>' for text in heads)
+    unit = force_unit(snapshot.robot)
+    heads = ("cable", f"tension<br>[{unit.name}]", f"winch<br>[{unit.name}]", "length<br>[m]", "sag<br>[mm]",
+             f"to limit<br>[{unit.name}]")  # fmt: skip
+    head = "".join(f"<th>{text}</th>" for text in heads)
     cables = None if snapshot.plan is None else snapshot.plan.state.cables
     count = snapshot.robot.cable_count
     unknown = np.full(count, np.nan)
     columns = (
-        (snapshot.tension, ".1f"),
-        (unknown if cables is None else cables.frame_end_tension, ".1f"),
+        (snapshot.tension / unit.newtons, unit.form),
+        (unknown if cables is None else cables.frame_end_tension / unit.newtons, unit.form),
         (unknown if cables is None else cables.unstrained_length, ".4f"),
         (unknown if cables is None else 1e3 * cables.sag, ".1f"),
-        (snapshot.margin, ".1f"),
+        (snapshot.margin / unit.newtons, unit.form),
     )
     colors = scale.colors(snapshot.tension)
     rows = "".join(
-        f'<tr><td style="{_CELL}"><span style="color:{_hex(colors[i])}">■</span> {i}</td>'
-        + "".join(f'<td style="{_CELL}">{_number(values[i], form)}</td>' for values, form in columns)
+        f'<tr><td><span class="swatch" style="background:{_hex(colors[i])}"></span> {i}</td>'
+        + "".join(f"<td>{number(values[i], form)}</td>" for values, form in columns)
         + "</tr>"
         for i in range(count)
     )
-    return f'<table style="border-collapse:collapse;width:100%;margin-top:4px"><tr>{head}</tr>{rows}</table>'
+    return f"<table><tr>{head}</tr>{rows}</table>"
 
 
-def _frequency_line(frequencies: Array | None) -> str:
+def _listed(frequencies: Array | None) -> str:
     if frequencies is None or not np.isfinite(frequencies).any():
         return ""
-    listed = ", ".join(_number(value, ".2f") for value in frequencies)
-    return f'<div style="margin-top:4px"><b>Natural frequencies</b> {listed} Hz</div>'
+    return _frequency_line(", ".join(number(value, ".2f") for value in frequencies) + " Hz")
 
 
-def _frequencies_later() -> str:
-    return '<div style="margin-top:4px"><b>Natural frequencies</b> compiling …</div>'
+def _frequency_line(text: str) -> str:
+    return f'<div style="margin-top:4px"><b>Natural frequencies</b> {text}</div>'
 
 
 def _material_line(snapshot: Snapshot) -> str:
     cables = snapshot.robot.cables
     density = _span(1e3 * cables.linear_density, "g/m")
-    stiffness = _span(1e-3 * cables.axial_stiffness, "kN")
-    solved = f"<br><b>Solved with</b> {snapshot.origin}" if snapshot.origin else ""
-    return f'<div style="margin-top:2px"><b>Cables</b> {density}, EA {stiffness}{solved}</div>'
+    solved = f"<br><b>Solved with</b> {escape(snapshot.origin)}" if snapshot.origin else ""
+    return f'<div style="margin-top:2px"><b>Cables</b> {density}, EA {_span(cables.axial_stiffness, "N")}{solved}</div>'
 
 
 def _span(values: Array, unit: str) -> str:
     low, high = float(values.min()), float(values.max())
-    return f"{low:.4g} {unit}" if low == high else f"{low:.4g} to {high:.4g} {unit}"
-
-
-def _number(value: float, form: str) -> str:
-    """A number, or a dash for none; what rounds to zero has no sign."""
-    if not np.isfinite(value):
-        return "–"
-    text = f"{value:{form}}"
-    return text if float(text) != 0.0 else text.removeprefix("-")
-
-
-def _short(value: float) -> str:
-    return f"{value / 1000:g}k" if value >= 1000.0 else f"{value:g}"
+    return quantity(low, unit) if low == high else f"{quantity(low, unit)} to {quantity(high, unit)}"
 
 
 def _hex(color: Array) -> str:

@@ -3,26 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import isfinite
 from typing import Any
 
 import viser
 
-from sagline.viewer.course_figure import CourseFigure
-from sagline.viewer.readout import FONT
+from sagline.robot.robot import Robot
+from sagline.viewer.course_figure import CourseFigure, Limit
+from sagline.viewer.readout import block, force_unit
 from sagline.viewer.run import Run
 from sagline.viewer.stage import ACTUAL, WANTED
 from sagline.viewer.timeline import Timeline
 
-
-def _css(color: tuple[int, int, int]) -> str:
-    return f"rgb{color}"
-
-
 _SPEEDS = {"¼ ×": 0.25, "1 ×": 1.0, "4 ×": 4.0, "16 ×": 16.0}
-_TRACES = (
-    f'<div style="{FONT};padding:0 8px">path &nbsp;<span style="color:{_css(WANTED)}">━</span> desired '
-    f'<span style="color:{_css(ACTUAL)}">━</span> actual</div>'
-)
 _STEPS = 2000  # of the time slider
 
 
@@ -33,10 +26,12 @@ class RunPanel:
         self, server: viser.ViserServer, run: Run, changed: Callable[[], None], toggled: Callable[[], None]
     ) -> None:
         """Build the panel; `changed` is called when a value changes, `toggled` when play or pause is pressed."""
-        cables = run.plan.state.cables
-        self._tensions = CourseFigure.of("Chord tension [N]", run.time, cables.chord_tension)
-        self._lengths = CourseFigure.of("Unstrained length [m]", run.time, cables.unstrained_length)
-        self._key = CourseFigure.key(cables.chord_tension.shape[-1]) + _TRACES
+        lengths = run.plan.state.cables.unstrained_length
+        self._tensions = _tensions(run)
+        self._lengths = CourseFigure.of("Unstrained length [m]", run.time, lengths)
+        self._key = CourseFigure.key(lengths.shape[-1]) + block(
+            f"path &nbsp;{_stroke(WANTED)} desired {_stroke(ACTUAL)} actual"
+        )
         gui = server.gui
         with gui.add_folder("Run", order=-1.0):
             # Any: mypy takes the values that viser lets one set for read-only
@@ -81,3 +76,25 @@ class RunPanel:
 
     def _drawn(self, time: float) -> str:
         return self._tensions.at(time) + self._lengths.at(time) + self._key
+
+
+def _tensions(run: Run) -> CourseFigure:
+    """The tensions that are limited, with their limits."""
+    state = run.plan.state
+    robot, unit = state.one_robot, force_unit(state.one_robot)
+    name = "Chord tension" if robot.tension_limits_of == "chord" else "Tension at the winch"
+    return CourseFigure.of(
+        f"{name} [{unit.name}]", run.time, state.limited_tension / unit.newtons, _limits(robot, unit.newtons)
+    )
+
+
+def _limits(robot: Robot, newtons: float) -> tuple[Limit, ...]:
+    """The limits that all cables keep, in a unit [N]; where they differ, the first that one may reach."""
+    low, high = float(robot.tension_min.max()), float(robot.tension_max.min())
+    lower = (Limit(low / newtons, "lowest allowed"),) if low > 0.0 else ()
+    upper = (Limit(high / newtons, "highest allowed"),) if isfinite(high) else ()
+    return lower + upper
+
+
+def _stroke(color: tuple[int, int, int]) -> str:
+    return f'<span class="stroke" style="border-color:rgb{color}"></span>'

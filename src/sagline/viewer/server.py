@@ -2,28 +2,37 @@
 
 from __future__ import annotations
 
+import errno
 import logging
 import socket
+import warnings
 from contextlib import redirect_stdout
 from io import StringIO
 
 import viser
 
 from sagline.errors import InvalidValueError
+from sagline.viewer import page
 
 LOOPBACK = "127.0.0.1"
 PORT = 8080
+NAME = "sagline"
 
 
 class Server(viser.ViserServer):
-    """A viser server that no page can ask to open a tunnel to the internet."""
+    """A viser server with our page, that no page can ask to open a tunnel to the internet."""
+
+    def __init__(self, host: str, port: int, title: str) -> None:
+        """Start serving; `title` stands at the top of the panel and in the browser's tab."""
+        with page.served(title if title == NAME else f"{title} – {NAME}"):
+            super().__init__(host=host, port=port, label=title, verbose=False)
 
     def request_share_url(self, verbose: bool = True) -> str | None:
         """Refuse: viser would publish this machine's page under a public address."""
         return None
 
 
-def started(host: str = LOOPBACK, port: int = PORT, title: str = "sagline") -> Server:
+def started(host: str = LOOPBACK, port: int = PORT, title: str = NAME) -> Server:
     """A running server.
 
     Args:
@@ -35,10 +44,12 @@ def started(host: str = LOOPBACK, port: int = PORT, title: str = "sagline") -> S
         InvalidValueError: If nothing can listen there; viser itself would take the next port, or wait for ever.
     """
     _check(host, port)
-    # a client that says nonsense is cut off; that is no error of ours, and needs no traceback
-    logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
+    # a client that says nonsense is cut off or not heard, one that leaves gets no more; neither is news on the terminal
+    for name in ("websockets.server", "asyncio"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+    warnings.filterwarnings("ignore", message="Queued a .* on a closed connection")
     with redirect_stdout(StringIO()):
-        server = Server(host=host, port=port, label=title, verbose=False)
+        server = Server(host, port, title)
     server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
     return server
 
@@ -66,10 +77,13 @@ def _check(host: str, port: int) -> None:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             probe.bind(address)
     except (OSError, UnicodeError) as error:
+        if getattr(error, "errno", None) == errno.EADDRINUSE:
+            step = "Choose another with --port; --port 0 takes any that is free."
+            raise InvalidValueError(f"port {port}", f"in use on {host}", "a free port", step) from None
         reason = getattr(error, "strerror", None) or error
         raise InvalidValueError(
             f"{host}:{port}",
-            f"not to be had ({reason})",
+            f"nothing to listen on ({reason})",
             "an address of this machine and a free port",
             "Choose others with --host and --port; --port 0 takes any that is free.",
         ) from None

@@ -9,26 +9,18 @@ from typing import Final
 from sagline.arrays import checked
 from sagline.cables.cable import Cable
 from sagline.cables.catenary import Catenary
-from sagline.cables.elastic import Elastic
-from sagline.cables.empirical import Empirical
 from sagline.cables.model import CableModel
-from sagline.cables.parabolic import Parabolic
-from sagline.cables.straight import Straight
 from sagline.robot.robot import Robot
-from sagline.tension.closest import Closest
 from sagline.tension.method import TensionMethod
 from sagline.tension.methods import METHODS as ALL_METHODS
+from sagline.tension.minimum_norm import MinimumNorm
+from sagline.viewer.wording import MODEL_NAMES, method_name, remembers
 
-MODELS: Final = MappingProxyType(
-    {
-        "catenary (exact)": Catenary(),
-        "parabolic": Parabolic(),
-        "empirical (the article's)": Empirical(),
-        "elastic, weightless": Elastic(),
-        "straight": Straight(),
-    }
+MODELS: Final = MappingProxyType({name: model() for model, name in MODEL_NAMES.items()})
+# those that remember come last: by default what is shown depends on the pose alone
+METHODS: Final = MappingProxyType(
+    {method_name(method): method for method in sorted((make() for make in ALL_METHODS.values()), key=remembers)}
 )
-METHODS: Final = MappingProxyType({name: method() for name, method in ALL_METHODS.items()})
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +41,7 @@ class Settings:
     density: float = 1.0
     stiffness: float = 1.0
     model: CableModel = field(default_factory=Catenary)
-    tension: TensionMethod = field(default_factory=Closest)
+    tension: TensionMethod = field(default_factory=MinimumNorm)
     sag_scale: float = 1.0
     error_scale: float = 1.0
 

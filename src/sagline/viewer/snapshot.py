@@ -15,11 +15,11 @@ from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.tension.closest import Closest
 from sagline.tension.margin import cable_margins
 from sagline.viewer import lines
 from sagline.viewer.settings import Settings
 from sagline.viewer.tension_scale import Colors, TensionScale
+from sagline.viewer.wording import method_name, model_name, remembers
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,15 +45,17 @@ class Snapshot:
         return self.plan is not None and bool(self.plan.feasible)
 
     @property
+    def status(self) -> PoseStatus:
+        """How the calculation ended."""
+        return PoseStatus.NO_CHORD if self.plan is None else PoseStatus(int(self.plan.status))
+
+    @property
     def reason(self) -> str:
         """Why it is not feasible, with the shortfall and the blocking cables; "" where it is."""
-        if self.plan is None:
-            return PoseStatus.NO_CHORD.text
-        if self.plan.feasible:
+        if self.feasible:
             return ""
-        status = PoseStatus(int(self.plan.status))
-        if status is not PoseStatus.INFEASIBLE:
-            return status.text
+        if self.plan is None or self.status is not PoseStatus.INFEASIBLE:
+            return self.status.text
         shortfall = float(self.plan.shortfall)
         short = f"short of {shortfall:,.1f} N" if np.isfinite(shortfall) else "no force alone would do"
         blocking = ", ".join(str(i) for i in np.flatnonzero(self.plan.blocking))
@@ -69,14 +71,20 @@ class Snapshot:
         """How far each limited tension is within its limits [N], shape (m,); NaN where there is no answer."""
         return self.tension if self.plan is None else cable_margins(self.plan.state)
 
+    def nearer_limit(self, cable: int) -> str:
+        """The limit that a cable's tension is nearer to, by name."""
+        if self.plan is None:
+            return ""
+        tension, robot = self.plan.state.limited_tension[cable], self.robot
+        lower = tension - robot.tension_min[cable] <= robot.tension_max[cable] - tension
+        return "lower limit" if lower else "upper limit"
+
     @property
     def origin(self) -> str:
         """Model and way of sharing that the tensions come from; "" where there are none."""
-        return (
-            ""
-            if self.plan is None
-            else f"{type(self.plan.state.cables.model).__name__}, {type(self.plan.tension).__name__}"
-        )
+        if self.plan is None:
+            return ""
+        return f"{model_name(self.plan.state.cables.model)}, {method_name(self.plan.tension)}"
 
     @property
     def error(self) -> Array | None:
@@ -90,6 +98,15 @@ class Snapshot:
             return lines.segments(lines.straight(ends), dashed=True)
         return lines.segments(lines.hanging(ends, self.plan.state.cables, sag_scale), dashed=False)
 
+    def ghost_segments(self, sag_scale: float, apart: float) -> Array:
+        """Segments of the chords where a cable as drawn hangs farther from its own than that [m]; else of no length."""
+        ends = lines.chords(self.robot, self.pose)
+        points = lines.straight(ends)
+        drawn = points
+        if self.plan is not None and self.feasible:
+            drawn = lines.hanging(ends, self.plan.state.cables, sag_scale)
+        return lines.segments(points, dashed=False, shown=np.linalg.norm(drawn - points, axis=2) > apart)
+
     def cable_colors(self, scale: TensionScale) -> Colors:
         """Colors of both ends of every segment as viser takes them, shape (m (POINTS - 1), 2, 3)."""
         return np.repeat(scale.linear_colors(self.tension), 2 * (lines.POINTS - 1), axis=0).reshape(-1, 2, 3)
@@ -101,7 +118,13 @@ class Snapshot:
 
 
 def taken_at(
-    robot: Robot, pose: Pose, settings: Settings, previous: Plan | None, *, confirmed: bool = True
+    robot: Robot,
+    pose: Pose,
+    settings: Settings,
+    previous: Plan | None,
+    *,
+    confirmed: bool = True,
+    wrench: Array | None = None,
 ) -> Snapshot:
     """A robot, already changed by the settings, held at rest at a pose.
 
@@ -109,12 +132,13 @@ def taken_at(
         robot: The robot.
         pose: One pose.
         settings: Model and method.
-        previous: The plan before, whose tensions `Closest` stays near to.
+        previous: The plan before, for a method that remembers; others never see it.
         confirmed: Whether to find where the platform really rests, if the model is approximate.
+        wrench: External wrench, shape (6,), as `inverse` takes it; None for none.
     """
-    reference = previous if isinstance(settings.tension, Closest) else None
+    reference = previous if remembers(settings.tension) else None
     try:
-        plan = inverse(robot, pose, settings.model, settings.tension, previous=reference)
+        plan = inverse(robot, pose, settings.model, settings.tension, wrench, reference)
     except CableGeometryError:
         return Snapshot(robot, pose, None, None)
     approximate = confirmed and not isinstance(settings.model, Catenary) and bool(plan.feasible)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import combinations, product
+from math import floor, log10
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ from sagline.robot.robot import Robot
 Faces = NDArray[np.int64]
 
 _BEAM = 0.0045  # thickness of the frame's beams, of the robot's size
+_DASH = 0.02  # length of a dash of an assumed frame, of the robot's size
 _WINCH = 0.009  # radius of a winch, of the robot's size
 _THINNEST = 0.08  # thinnest platform, of its largest edge
 _SIDES = 20  # of a winch's drum
@@ -58,12 +60,31 @@ def size_of(robot: Robot) -> float:
 
 
 def frame(robot: Robot) -> Solid:
-    """The twelve beams of the robot's box."""
+    """The twelve beams of the robot's box, dashed where the box is assumed."""
     low, high = bounds(robot)
     corners = low + (_SIGNS + 0.5) * (high - low)
     edges = [(a, b) for a, b in combinations(range(8), 2) if np.count_nonzero(_SIGNS[a] != _SIGNS[b]) == 1]
     thick = _BEAM * size_of(robot)
-    return merged([box(0.5 * (corners[a] + corners[b]), np.abs(corners[b] - corners[a]) + thick) for a, b in edges])
+    dash = _DASH * size_of(robot) if is_frame_assumed(robot) else np.inf
+    return merged([beam for a, b in edges for beam in _beams(corners[a], corners[b], thick, dash)])
+
+
+def is_frame_assumed(robot: Robot) -> bool:
+    """Whether nobody has said what the frame is like."""
+    return robot.frame_size is None or "frame_size" in robot.assumed
+
+
+def round_below(length: float) -> float:
+    """The largest of one, two and five times a power of ten that is not above a length, > 0."""
+    power = 10.0 ** floor(log10(length))
+    return max(step * power for step in (1.0, 2.0, 5.0) if step * power <= length * (1.0 + 1e-12))
+
+
+def _beams(start: Array, end: Array, thick: float, dash: float) -> list[Solid]:
+    """A beam along an axis; or dashes about so long, with gaps as long, that begin and end with one."""
+    pieces = 2 * round(0.5 * float(np.linalg.norm(end - start)) / dash) + 1
+    cuts = start + np.linspace(0.0, 1.0, pieces + 1)[:, None] * (end - start)
+    return [box(0.5 * (a + b), np.abs(b - a) + thick) for a, b in zip(cuts[:-1:2], cuts[1::2], strict=True)]
 
 
 def winches(robot: Robot) -> Solid:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import viser
@@ -13,32 +13,40 @@ from sagline.robot.pattern import ROTATING
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.viewer import lines, solids
+from sagline.viewer.readout import headline
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.tension_scale import TensionScale
 
-STEEL, DRUM, FLOOR = (120, 128, 138), (60, 66, 74), (225, 228, 232)
-PLATFORM, INFEASIBLE, REST = (95, 165, 225), (230, 50, 45), (240, 165, 20)
-WANTED, ACTUAL = (0, 114, 178), (213, 94, 0)
-GHOST = (150, 150, 150)
-CABLE_WIDTH, GHOST_WIDTH, TRACE_WIDTH = 3.5, 1.5, 2.5  # px
+# All stand out from the white and from the dark background, 3 : 1 or more but for the floor.
+STEEL, DRUM, FLOOR, SECTION = (120, 128, 138), (104, 112, 122), (172, 178, 186), (132, 138, 146)
+PLATFORM, INFEASIBLE, REST = (58, 134, 201), (220, 56, 48), (200, 118, 16)
+WANTED, ACTUAL = PLATFORM, REST  # the paths of these two platforms
+GHOST = (128, 134, 142)
+CABLE_WIDTH, GHOST_WIDTH, TRACE_WIDTH, ARM_WIDTH = 3.5, 1.5, 2.5, 3.0  # px
+TRACE_POINTS = 600
 NEAR = 0.03  # of the robot's size: anchors this close share a label
 FAR = 5.0  # sizes of the robot from its middle: no gizmo is dragged there, only nonsense comes from there
-_HOME_VIEW: Final = np.array([0.42, -0.86, 0.30])  # from the middle of the robot to the camera, of its size
+APART = 0.0035  # of the robot's size: a straight cable nearer to the hanging one would be drawn on it
+_ARM = 0.12  # longest arm of the axes, of the robot's size
+_BELOW: Final = np.array([0.02, 0.07, 0.03])  # room for the axes and their names around the robot, of its size
+_ABOVE: Final = np.array([0.02, 0.0, 0.08])  # room for the cables' names
+_GIZMO: Final = (0.09, 0.16)  # smallest and largest reach of the gizmo, of the robot's size
 
 
 class Stage:
-    """The robot's parts on a viser server. Every client sees, and may drag, the same."""
+    """The robot's parts in a scene. Every client of a server's scene sees, and may drag, the same."""
 
-    def __init__(self, server: viser.ViserServer, robot: Robot, home: Pose) -> None:
-        """Build the scene with the platform at home."""
-        self._scene = server.scene
+    def __init__(self, scene: viser.SceneApi, robot: Robot, home: Pose, *, draggable: bool = True) -> None:
+        """Build the scene with the platform at home, to be dragged or only to be looked at."""
+        self._scene = scene
         self._scene.configure_default_lights(cast_shadow=False)  # a small screen has better things to compute
         self._low, self._high = solids.bounds(robot)
         self._size = solids.size_of(robot)
-        self._aim(server)
         self._build_surroundings(robot)
-        body = solids.platform(robot)
-        self._gizmo = self._build_gizmo(robot, body)
+        body = self._body = solids.platform(robot)
+        self._gizmo: Any = (
+            self._build_gizmo(robot, body) if draggable else scene.add_frame("/platform", show_axes=False)
+        )
         self._platform = self._scene.add_mesh_simple("/platform/body", body.vertices, body.faces, color=PLATFORM)
         self._rest_frame = self._scene.add_frame("/rest", show_axes=False, visible=False)
         self._scene.add_mesh_simple("/rest/body", body.vertices, body.faces, color=REST, opacity=0.55)
@@ -48,17 +56,23 @@ class Stage:
         )
         self._cables.colors = np.zeros(blank.shape, dtype=np.uint8)
         self._ghost = self._scene.add_line_segments(
-            "/chords", blank[: robot.cable_count], GHOST, thickness=GHOST_WIDTH, thickness_units="screen", visible=False
+            "/chords", blank, GHOST, thickness=GHOST_WIDTH, thickness_units="screen", visible=False
         )
         self._notice = self._scene.add_label(
             "/platform/notice", "", position=(0.0, 0.0, 0.13 * self._size), visible=False, anchor="bottom-center"
         )
-        self.move_gizmo(home)
+        self.place(home)
 
     @property
     def gizmo(self) -> viser.TransformControlsHandle:
-        """What is dragged."""
-        return self._gizmo
+        """What is dragged, where something is."""
+        gizmo: viser.TransformControlsHandle = self._gizmo
+        return gizmo
+
+    def extent(self, pose: Pose) -> tuple[Array, Array]:
+        """Lowest and highest corner of what there is to see with the platform at a pose, names and axes too [m]."""
+        corners = np.vstack((self._low, self._high, pose.transform(self._body.vertices)))
+        return corners.min(axis=0) - _BELOW * self._size, corners.max(axis=0) + _ABOVE * self._size
 
     def dragged_pose(self) -> Pose:
         """Where the gizmo is.
@@ -77,8 +91,8 @@ class Stage:
             )
         return Pose.from_quaternion(position, np.roll(wxyz, -1) / length)
 
-    def move_gizmo(self, pose: Pose) -> None:
-        """Put the gizmo, and with it the platform, at a pose."""
+    def place(self, pose: Pose) -> None:
+        """Put the platform, and with it its gizmo, at a pose."""
         self._gizmo.position = pose.position
         self._gizmo.wxyz = np.roll(pose.quaternion, 1)
 
@@ -91,10 +105,10 @@ class Stage:
         self._platform.color = PLATFORM if snapshot.feasible else INFEASIBLE
         self._notice.visible = not snapshot.feasible
         if not snapshot.feasible:
-            self._notice.text = f"not feasible: {snapshot.reason}"
+            self._notice.text = headline(snapshot)
         self._ghost.visible = ghost
         if ghost:
-            self._ghost.points = lines.chords(snapshot.robot, snapshot.pose).astype(np.float32)
+            self._ghost.points = snapshot.ghost_segments(sag_scale, APART * self._size).astype(np.float32)
         rest = snapshot.drawn_rest(error_scale)
         shown = rest is not None and bool(np.isfinite(rest).all())
         self._rest_frame.visible = shown
@@ -110,25 +124,19 @@ class Stage:
             if len(known):
                 self._scene.add_line_segments(name, known, color, thickness=TRACE_WIDTH, thickness_units="screen")
 
-    def _aim(self, server: viser.ViserServer) -> None:
-        middle = 0.5 * (self._low + self._high)
-        server.initial_camera.look_at = middle
-        server.initial_camera.position = middle + self._size * _HOME_VIEW
-        server.initial_camera.up = np.array([0.0, 0.0, 1.0])
-        server.initial_camera.far = 20.0 * self._size
-        server.initial_camera.near = 0.002 * self._size
-
     def _build_surroundings(self, robot: Robot) -> None:
         frame, drums = solids.frame(robot), solids.winches(robot)
         self._scene.add_mesh_simple("/frame", frame.vertices, frame.faces, color=STEEL)
         self._scene.add_mesh_simple("/winches", drums.vertices, drums.faces, color=DRUM)
         width, depth = 1.5 * (self._high - self._low)[:2]
-        cell = 10.0 ** np.floor(np.log10(self._size / 5.0))
+        cell = solids.round_below(self._size / 10.0)
         middle = 0.5 * (self._low + self._high)
         self._scene.add_grid(
             "/floor", width, depth, position=(middle[0], middle[1], self._low[2] - 0.005 * self._size),
-            cell_size=cell, section_size=5.0 * cell, cell_color=FLOOR, section_color=(200, 204, 210),
+            cell_size=cell, section_size=5.0 * cell, cell_color=FLOOR, section_color=SECTION,
+            cell_thickness=0.6, section_thickness=1.0, fade_distance=12.0 * self._size,
         )  # fmt: skip
+        self._build_axes()
         for place, names in _neighbors(robot.frame_anchors, NEAR * self._size):
             self._scene.add_label(
                 f"/names/{names[0]}",
@@ -137,11 +145,25 @@ class Stage:
                 anchor="bottom-center",
             )
 
+    def _build_axes(self) -> None:
+        """The directions of the world at a corner of the floor; their arms of a round length are the scale."""
+        arm = solids.round_below(_ARM * self._size)
+        corner = self._low - np.array([0.0, 0.06 * self._size, 0.0])
+        arms = np.stack((np.zeros((3, 3)), arm * np.eye(3)), axis=1) + corner
+        self._scene.add_line_segments("/axes", arms, STEEL, thickness=ARM_WIDTH, thickness_units="screen")
+        for name, place in zip("xyz", arms[:, 1], strict=True):
+            self._scene.add_label(f"/axes/{name}", name, position=place, anchor="bottom-center", font_screen_scale=0.8)
+        self._scene.add_label(
+            "/axes/length", f"{arm:g} m", position=arms[0].mean(axis=0), anchor="top-center", font_screen_scale=0.8
+        )
+
     def _build_gizmo(self, robot: Robot, body: solids.Solid) -> viser.TransformControlsHandle:
         free = np.abs(robot.freedom[:, :3]).max(axis=0) > 0.5  # world axes along which the platform may move
-        reach = max(2.0 * float(np.abs(body.vertices).max()), 0.11 * self._size)
+        least, most = (share * self._size for share in _GIZMO)
         return self._scene.add_transform_controls(
-            "/platform", scale=reach, line_width=3.0, depth_test=False, opacity=0.7,
+            "/platform", scale=float(np.clip(1.6 * np.abs(body.vertices).max(), least, most)), line_width=2.0,
+            depth_test=True,  # what lies behind the platform does not hide it
+            opacity=0.8,
             active_axes=(bool(free[0]), bool(free[1]), bool(free[2])),
             disable_rotations=robot.motion_pattern not in ROTATING,
         )  # fmt: skip

@@ -13,23 +13,12 @@ from sagline.robot.robot import Robot
 
 Colors = NDArray[np.uint8]
 
-# matplotlib's plasma at ten equal steps up to 0.85: told apart by color-blind eyes, and none too pale on white
+# From blue over red to ochre. Each step holds 3 : 1 on the white and on the dark background alike, which leaves little
+# lightness to tell tensions by: blue to yellow does it, which color-blind eyes keep too.
 _STEPS = np.array(
-    [
-        [13, 8, 135],
-        [63, 4, 156],
-        [102, 0, 167],
-        [138, 9, 165],
-        [170, 35, 149],
-        [196, 62, 127],
-        [218, 91, 105],
-        [236, 119, 84],
-        [249, 151, 63],
-        [254, 186, 44],
-    ],
-    dtype=np.float64,
+    [[62, 96, 232], [170, 74, 194], [200, 74, 166], [214, 80, 126], [216, 98, 78], [206, 128, 20]], dtype=np.float64
 )
-GRAY = np.array([140, 140, 140], dtype=np.uint8)  # of a cable without a tension
+GRAY = np.array([130, 136, 144], dtype=np.uint8)  # of a cable without a tension
 _SPREAD = 100.0  # highest over lowest tension where the robot has no lower limit
 _PER_WEIGHT = 4.0  # highest tension over the platform's weight where the robot has no upper limit
 
@@ -39,8 +28,8 @@ class TensionScale:
     """Tensions on a logarithmic scale: a robot's limits are often two decades apart.
 
     Attributes:
-        low: Tension at the dark end [N], > 0.
-        high: Tension at the bright end [N], > low.
+        low: Tension at the blue end [N], > 0.
+        high: Tension at the yellow end [N], > low.
     """
 
     low: float

@@ -16,3 +16,4 @@ class View:
     snapshot: Snapshot
     settings: Settings
     scale: TensionScale
+    ghost: bool

@@ -12,26 +12,27 @@ import numpy as np
 import viser
 
 from sagline.arrays import Array
-from sagline.errors import InvalidValueError
+from sagline.errors import SaglineError
 from sagline.kinematics.plan import Plan
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.stiffness import modes
 from sagline.viewer import readout, solids
 from sagline.viewer.export_panel import ExportPanel
+from sagline.viewer.framing import Framing
 from sagline.viewer.panel import Panel
 from sagline.viewer.polygon_figure import polygon_figure, polygon_later
 from sagline.viewer.run import Run
 from sagline.viewer.run_panel import RunPanel
 from sagline.viewer.settings import Settings
 from sagline.viewer.snapshot import Snapshot, taken_at
-from sagline.viewer.stage import Stage
+from sagline.viewer.stage import TRACE_POINTS, Stage
 from sagline.viewer.tension_scale import TensionScale
 from sagline.viewer.timeline import Timeline
 from sagline.viewer.view import View
+from sagline.viewer.wording import remembers
 
 FRAME_TIME = 1.0 / 60.0  # s: no update comes sooner after the one before
-TRACE_POINTS = 600
 IDLE = 0.5  # s: how long Ctrl-C may go unheard where waiting cannot be interrupted
 
 
@@ -56,6 +57,7 @@ class Viewer:
         robot: Robot,
         run: Run | None = None,
         ready: Callable[[Reading], bool] = lambda _: True,
+        wrench: Array | None = None,
     ) -> None:
         """Build the page.
 
@@ -65,8 +67,10 @@ class Viewer:
             run: A plan along a path, to play.
             ready: Whether a reading can be had without waiting; until then the page says that it comes. `refresh`
                 when one has become ready.
+            wrench: External wrench on the platform that is dragged, shape (6,), as `inverse` takes it; None for none.
         """
         self._ready = ready
+        self._wrench = wrench
         self._server = server
         self._robot = robot
         self._run = run
@@ -75,13 +79,14 @@ class Viewer:
         self._tasks: deque[Callable[[], None]] = deque()  # appended to by any thread
         self._scale = TensionScale.of(robot)
         self._home = home_pose(robot) if run is None else run.plan.state.pose[0]
-        self._panel = Panel(server, robot, self._scale, self._wake.set)
-        self._stage = Stage(server, robot, self._home)
+        self._panel = Panel(server, robot, self._scale, self._wake.set, lambda: self._soon(self._forget))
+        self._stage = Stage(server.scene, robot, self._home)
+        self._framing = Framing(server, *self._stage.extent(self._home))
         self._clock = Timeline(0.0 if run is None else run.duration)
         self._run_panel: RunPanel | None = None
         if run is not None:
             self._run_panel = RunPanel(server, run, self._scrub_soon, lambda: self._soon(self._toggle))
-        self._export = ExportPanel(server, self._soon, lambda: self.view, self._show_at, run)
+        self._export = ExportPanel(server, lambda: self.view, run)
         self._build_gizmo()
         self._changed: tuple[Settings, Robot] | None = None
         self._previous: Plan | None = None
@@ -143,7 +148,10 @@ class Viewer:
 
     def _go_home(self) -> None:
         self._leave_run()
-        self._stage.move_gizmo(self._home)
+        self._stage.place(self._home)
+
+    def _forget(self) -> None:
+        self._previous = None
 
     def _leave_run(self) -> None:
         self._clock = self._clock.scrubbed(self._clock.time)
@@ -168,20 +176,13 @@ class Viewer:
             settings = self._panel.settings()
             following = self._run_panel is not None and self._run_panel.following
             snapshot = self._from_run() if following else self._from_gizmo(settings)
-        except InvalidValueError as error:
+        except SaglineError as error:
             self._panel.refuse(str(error))
             return
         if self._run_panel is not None:
-            self._panel.lock_what_if(following)
             self._run_panel.show(self._clock)
-        self._show(View(snapshot, settings, self._scale), follow=following)
-
-    def _show_at(self, moment: float) -> None:
-        """Show the run at a time [s], for a film of it."""
-        if self._run_panel is not None:
-            self._clock = self._clock.scrubbed(moment)
-            self._run_panel.join()
-            self._update()
+        self._panel.show_what_if(not following)
+        self._show(View(snapshot, settings, self._scale, self._panel.ghost), follow=following)
 
     def _from_run(self) -> Snapshot:
         assert self._run is not None
@@ -196,8 +197,11 @@ class Viewer:
             settings,
             self._previous,
             confirmed=self._ready(Reading.REST),
+            wrench=self._wrench,
         )
-        if snapshot.feasible:
+        if not remembers(settings.tension):
+            self._forget()  # what one comes from by another way of sharing is no way there
+        elif snapshot.feasible:
             self._previous = snapshot.plan
         return snapshot
 
@@ -205,8 +209,8 @@ class Viewer:
         snapshot, settings = view.snapshot, view.settings
         with self._server.atomic():
             if follow:
-                self._stage.move_gizmo(snapshot.pose)
-            self._stage.show(snapshot, self._scale, settings.sag_scale, settings.error_scale, ghost=self._panel.ghost)
+                self._stage.place(snapshot.pose)
+            self._stage.show(snapshot, self._scale, settings.sag_scale, settings.error_scale, ghost=view.ghost)
             if self._run is not None and settings.error_scale != self._traced:
                 self._traced = settings.error_scale
                 self._stage.show_traces(*self._run.traces(TRACE_POINTS, settings.error_scale))

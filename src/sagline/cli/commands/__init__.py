@@ -1,0 +1,1 @@
+"""The subcommands: their options, and help that teaches by example. What they do loads when they are called."""

@@ -1,0 +1,39 @@
+"""`sagline view`: a robot in the browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from sagline.cli.options import PayloadOption, RobotArgument, WrenchOption
+
+
+def view(
+    robot: RobotArgument,
+    run: Annotated[
+        Path | None, typer.Argument(metavar="RUN.nc", help="A run of this robot, written by sagline track, to play.")
+    ] = None,
+    wrench: WrenchOption = None,
+    payload: PayloadOption = None,
+    host: Annotated[
+        str, typer.Option(metavar="ADDRESS", help="Address to listen on; 0.0.0.0 is every one, for others to look.")
+    ] = "127.0.0.1",
+    port: Annotated[str, typer.Option(metavar="NUMBER", help="Port to listen on; 0 takes any that is free.")] = "8080",
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open it in a browser here.")] = True,
+) -> int:
+    """Look at a robot in the browser: drag its platform, and the cables follow.
+
+    Over SSH, forward the port (`ssh -L 8080:localhost:8080 ...`) and open http://localhost:8080 at home.
+
+    For example:
+
+        sagline view cogiro
+        sagline view own_robot.yaml --payload "5 kg" --port 9000
+        sagline track article-mixed --model empirical
+        sagline view article-mixed output/article-mixed-empirical.nc
+    """
+    from sagline.cli.view import view as serve
+
+    return serve(robot, run, wrench, payload, host, port, browser=browser)

@@ -1,0 +1,146 @@
+"""How a command ends: with an exit code and, if something went wrong, with one line on stderr that says what."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+from sagline.cli.interrupts import Interrupts
+
+if TYPE_CHECKING:
+    from threading import ExceptHookArgs
+
+OUTSIDE, BAD_INPUT, UNEXPECTED, INTERRUPTED, CUT_OFF = 1, 2, 70, 130, 141  # the last as of SIGPIPE
+LONGEST = 299  # characters of a message
+REPORT = "the authors of sagline"
+
+
+def ended(command: Callable[[], object], *, debug: bool = False, last: bool = False) -> int:
+    """Run a command and turn whatever goes wrong into one message and an exit code.
+
+    Args:
+        command: Does the work; what it returns is the exit code, None for 0.
+        debug: Whether an error shows its traceback before its message.
+        last: Whether the process ends then: Ctrl-C does nothing any more.
+
+    Returns:
+        The exit code: BAD_INPUT for what sagline or the system refuses, UNEXPECTED for what nobody thought of,
+        INTERRUPTED for Ctrl-C, even where Python lost it, CUT_OFF if nobody reads the output any more.
+    """
+    interrupts = Interrupts()
+    code = UNEXPECTED
+    try:
+        try:
+            code = _finished(command)
+        finally:
+            interrupts.deafen()
+    except BaseException as error:  # an interrupt may come in the line above
+        interrupts.deafen()
+        if not interrupts.heard:
+            code = _told(error, debug)
+    if interrupts.heard or code == INTERRUPTED:
+        code = _interrupted()
+    if not last:
+        interrupts.restore()
+    return code
+
+
+def tell_thread(failed: ExceptHookArgs) -> None:
+    """Say in one line what ended a thread other than the first."""
+    if failed.exc_value is not None:
+        _told(failed.exc_value, debug=False)
+
+
+def _finished(command: Callable[[], object]) -> int:
+    code = command()
+    if sys.stdout is not None:
+        sys.stdout.flush()  # what cannot be written is an error of this command, not of Python's last moments
+    return code if isinstance(code, int) else 0
+
+
+def _told(error: BaseException, debug: bool) -> int:
+    """Say what went wrong; the exit code."""
+    _give_up_unwritable()
+    if isinstance(error, BrokenPipeError) or isinstance(error.__context__, BrokenPipeError):  # the latter by typer
+        return CUT_OFF
+    if isinstance(error, SystemExit):
+        return error.code if isinstance(error.code, int) else 0 if error.code is None else UNEXPECTED
+    if isinstance(error, KeyboardInterrupt):
+        return INTERRUPTED
+    if debug:
+        import traceback
+
+        traceback.print_exception(error)
+    from sagline.cli.terminal import note
+
+    head, text, code = _message(error)
+    note(head, shortened(text, LONGEST - len(head)), style="bold red")
+    for line in getattr(error, "__notes__", ()):
+        note("", line)
+    return code
+
+
+def _message(error: BaseException) -> tuple[str, str, int]:
+    """Head, text and exit code."""
+    from typer import Abort
+
+    from sagline.errors import SaglineError
+
+    if isinstance(error, SaglineError):
+        return "Error: ", str(error), BAD_INPUT
+    if isinstance(error, Abort):
+        return "Error: ", "the input ended before all was answered. Answer, or give the options.", BAD_INPUT
+    if hasattr(error, "format_message"):  # of the command line itself
+        return "Error: ", _usage(error), BAD_INPUT
+    if isinstance(error, MemoryError):
+        reason = f" ({error})" if str(error) else ""
+        return "Error: ", f"there is not enough memory{reason}. Take fewer poses or samples at a time.", BAD_INPUT
+    if isinstance(error, OSError):
+        what = error.filename if error.filename is not None else "standard output"
+        step = "Check its name, its permissions and the space on the disk."
+        return "Error: ", f"{what}: {error.strerror or error}. {step}", BAD_INPUT
+    what = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    told = f"{shortened(what, 120)}. This is a mistake in sagline: please report it to {REPORT}, with the command"
+    return "Unexpected error: ", f"{told} and its files; the option --debug shows where it happened.", UNEXPECTED
+
+
+def _usage(error: BaseException) -> str:
+    text = str(error.format_message()).strip()  # type: ignore[attr-defined]
+    text = text if text.endswith((".", "?")) else f"{text}."
+    context = getattr(error, "ctx", None)
+    command = "sagline" if context is None else context.command_path
+    return f"{text} See: {command} --help"
+
+
+def _interrupted() -> int:
+    _give_up_unwritable()
+    exec(
+        ""
+    )  # forgets an interrupt inside another exec, for which Python would end itself by the signal, whatever we say
+    with suppress(OSError, ValueError, AttributeError):  # plain: the library that writes may be half loaded
+        sys.stderr.write("Interrupted. What has been written is whole.\n")
+        sys.stderr.flush()
+    return INTERRUPTED
+
+
+def _give_up_unwritable() -> None:
+    """Where stdout takes no more, throw away what it still holds: Python would try again at its end, and complain."""
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except (OSError, ValueError):
+        with suppress(OSError, ValueError):
+            null = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(null, sys.stdout.fileno())
+            os.close(null)
+
+
+def shortened(text: str, longest: int) -> str:
+    """A text without its middle, if it is too long: where it begins says what it is about, where it ends what to do."""
+    if len(text) <= longest:
+        return text
+    end = longest // 2
+    return f"{text[: longest - end - 5]} ... {text[-end:]}"

@@ -1,0 +1,44 @@
+"""`sagline examples`: the files that the documentation's commands and the README's work with."""
+
+from __future__ import annotations
+
+import shutil
+from importlib.resources import files
+from pathlib import Path
+from shlex import quote
+
+from sagline.cli.terminal import show
+from sagline.errors import FileError
+from sagline.files.whole import check_folder, made_folder, written_whole
+
+KINDS = (".py", ".yaml", ".csv", ".wcrfx")
+
+
+def write_examples(folder: Path, *, force: bool) -> None:
+    """Copy the example files to a folder.
+
+    Args:
+        folder: Where to; created if missing.
+        force: Whether files that exist are replaced.
+
+    Raises:
+        FileError: If one of them exists, or the folder cannot be written; then nothing has been.
+    """
+    sources = example_files()
+    check_folder(folder)
+    taken = [file.name for file in sources if (folder / file.name).exists()]
+    if taken and not force:
+        raise FileError(folder / taken[0], "exists", "Choose another folder with --out, or replace it with --force.")
+    made_folder(folder)
+    for file in sources:
+        with written_whole(folder / file.name) as partial:
+            shutil.copyfile(file, partial)
+    show(f"In {folder.resolve()}: {', '.join(file.name for file in sources)}", whole=True)
+    show(f"Try: cd {quote(str(folder))}; sagline track own_robot.yaml own_path.yaml", whole=True)
+
+
+def example_files() -> list[Path]:
+    """The example files: in an installed package beside its modules, in the source tree beside its docs."""
+    inside = Path(str(files("sagline"))) / "examples"
+    folder = inside if inside.is_dir() else Path(__file__).parents[3] / "examples"
+    return sorted(file for file in folder.glob("*") if file.suffix in KINDS)

@@ -1,0 +1,101 @@
+"""Numbers as the command line gives them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+
+from sagline.arrays import Array, checked
+from sagline.errors import InvalidValueError
+from sagline.files.quantity import in_si, plain_number
+from sagline.robot.pose import Pose
+
+if TYPE_CHECKING:
+    from sagline.robot.robot import Robot
+
+FARTHEST, STRONGEST, HEAVIEST = 1e6, 1e12, 1e12  # m; N and N m; kg: beyond all machines, far below what overflows
+
+
+def numbers(parts: Sequence[str], item: str, unit: str, largest: float) -> list[float]:
+    """Plain decimal numbers.
+
+    Args:
+        parts: Their texts.
+        item: What they are, for the message.
+        unit: Their unit, for the message.
+        largest: Largest absolute value.
+
+    Raises:
+        InvalidValueError: If one is no such number, or too large.
+    """
+    found = []
+    for part in parts:
+        number = plain_number(part)
+        if number is None or not abs(number) <= largest:  # NaN neither
+            raise InvalidValueError(item, repr(part), f"decimal numbers up to {largest:g} {unit}", f"Correct {item}.")
+        found.append(number)
+    return found
+
+
+def quantity(text: str, item: str, unit: str, *, low: float = -np.inf, above: float = -np.inf) -> float:
+    """A number in SI, or a text with its unit.
+
+    Args:
+        text: Such as "20" or "20 kg".
+        item: What it is, for the message.
+        unit: The SI unit.
+        low: Smallest value.
+        above: Only larger values will do.
+
+    Raises:
+        InvalidValueError: If it is no such quantity, or out of range.
+    """
+    number = cast(float, in_si(text, unit, item))
+    if abs(number) > HEAVIEST:
+        raise InvalidValueError(item, repr(text), f"up to {HEAVIEST:g} {unit}", f"Correct {item}.")
+    return float(checked(number, item, unit, shape=(), low=low, above=above))
+
+
+def middle_of(robot: Robot) -> Pose:
+    """The middle of the poses that a robot is meant for, level.
+
+    Raises:
+        InvalidValueError: If it does not say which these are.
+    """
+    if robot.test_box is None:
+        raise InvalidValueError("--pose", "missing", "X,Y,Z or X,Y,Z,A,B,C", "This robot names no box of poses.")
+    return Pose((robot.test_box.low + robot.test_box.high) / 2, np.eye(3))
+
+
+def wrench_of(text: str | None) -> Array | None:
+    """A wrench from "fx,fy,fz" in N, or "fx,fy,fz,mx,my,mz" with moments in N m; None for none.
+
+    Raises:
+        InvalidValueError: If it is none.
+    """
+    if text is None:
+        return None
+    parts = text.split(",")
+    if len(parts) not in (3, 6):
+        step = "Give newtons, and newton meters about the center of mass: --wrench 0,0,-50 or --wrench 0,0,-50,0,5,0."
+        raise InvalidValueError("--wrench", repr(text), "three or six numbers", step)
+    whole = numbers(parts, "--wrench", "N or N m", STRONGEST)
+    return np.array(whole + [0.0] * (6 - len(whole)))
+
+
+def loaded(robot: Robot, payload: str | None) -> Robot:
+    """A robot whose platform carries a mass besides its own; the inertia grows in proportion.
+
+    Args:
+        robot: The robot.
+        payload: Such as "20" or "20 kg"; None for nothing.
+
+    Raises:
+        InvalidValueError: If it is no mass.
+    """
+    if payload is None:
+        return robot
+    mass = robot.mass + quantity(payload, "--payload", "kg", low=0.0)
+    return robot.replace(mass=mass, inertia=robot.inertia * (mass / robot.mass))

@@ -1,0 +1,84 @@
+"""How numbers and names are written: once for every panel, so that a thing has one name and a number no false sign."""
+
+from __future__ import annotations
+
+from math import floor, isfinite, log10
+from typing import NamedTuple
+
+from sagline.cables.catenary import Catenary
+from sagline.cables.elastic import Elastic
+from sagline.cables.empirical import Empirical
+from sagline.cables.model import CableModel
+from sagline.cables.parabolic import Parabolic
+from sagline.cables.straight import Straight
+from sagline.tension.method import TensionMethod
+
+MODEL_NAMES: dict[type[CableModel], str] = {
+    Catenary: "catenary (exact)",
+    Parabolic: "parabolic",
+    Empirical: "empirical (the article's)",
+    Elastic: "elastic, weightless",
+    Straight: "straight",
+}
+_PREFIXES = {-1: "m", 0: "", 1: "k", 2: "M", 3: "G"}
+_NONE = "–"
+KILO_FROM = 1e5  # N: forces from here on are written in kilonewtons
+
+
+class ForceUnit(NamedTuple):
+    """How the forces of one robot are written.
+
+    Attributes:
+        name: "N" or "kN".
+        newtons: One of it [N].
+        form: How many decimals.
+    """
+
+    name: str
+    newtons: float
+    form: str
+
+    @classmethod
+    def up_to(cls, highest: float) -> ForceUnit:
+        """The unit for forces up to a highest one [N], the same for small ones beside it."""
+        return cls("N", 1.0, ".1f") if highest < KILO_FROM else cls("kN", 1e3, ".2f")
+
+    def bare(self, force: float) -> str:
+        """A force [N] without the unit."""
+        return number(force / self.newtons, self.form)
+
+    def written(self, force: float) -> str:
+        """A force [N] with the unit."""
+        return f"{self.bare(force)} {self.name}"
+
+
+def number(value: float, form: str) -> str:
+    """A number, or a dash for none; what rounds to zero has no sign."""
+    if not isfinite(value):
+        return _NONE
+    text = f"{value:{form}}"
+    return text if float(text.replace(",", "")) != 0.0 else text.removeprefix("-")
+
+
+def quantity(value: float, unit: str) -> str:
+    """A number to four digits with its unit, and the prefix that keeps it below a thousand."""
+    if not isfinite(value):
+        return _NONE
+    power = 0 if value == 0.0 else min(max(floor(log10(float(f"{abs(value):.3e}")) / 3.0), -1), 3)
+    return f"{number(value / 1000.0**power, '.4g')} {_PREFIXES[power]}{unit}"
+
+
+def model_name(model: CableModel) -> str:
+    """What a cable model is called."""
+    return MODEL_NAMES.get(type(model), type(model).__name__)
+
+
+def method_name(method: TensionMethod) -> str:
+    """What a way of sharing the load is called, and that it remembers if it does."""
+    name = type(method).__name__
+    return f"{name} (remembers the way)" if remembers(method) else name
+
+
+def remembers(method: TensionMethod) -> bool:
+    """Whether the tensions of a pose depend on those before."""
+    return method.alone is not method

@@ -1,0 +1,106 @@
+"""Bad command lines: every argument and option of every command, with every kind of bad value, from a seed."""
+
+from __future__ import annotations
+
+import random
+from typing import Any, NamedTuple
+
+import typer.main
+
+from sagline.cli.main import app
+
+# a line of each command that works, as cheap as it can be; the files come from `sagline examples`
+LINES = {
+    "track": ["track", "cogiro", "short.yaml", "--no-figures"],
+    "lengths": ["lengths", "run.nc"],
+    "run": ["run"],
+    "article": ["article", "figure", "3"],
+    "identify": ["identify", "cable.csv"],
+    "forward": ["forward", "cogiro", "lengths.csv"],
+    "tension": ["tension", "cogiro", "--no-figures"],
+    "robots": ["robots"],
+    "show": ["show", "cogiro"],
+    "examples": ["examples"],
+    "new": ["new", "my_robot.yaml"],
+    "convert": ["convert", "robot.wcrfx"],
+    "view": ["view", "cogiro", "--no-browser"],
+}
+
+VALUES = (
+    # no text, or more than anybody reads
+    "", " ", "\t", "\n", "x" * 300, "x" * 5000, "1" * 400, "é" * 200,
+    # numbers that are none, or too large, or of the wrong kind
+    "nan", "-nan", "inf", "-inf", "1e308", "-1e308", "1e999", "1e-400", "0x10", "010", "1_000", "1:30", "1,5", "1.5.2",
+    "٣", "１", "½", "-1", "0", "-0", "1", "7", "True", "None", "+", "-", ".", "..", "e", "--",
+    # lists
+    "1,2", "1,2,3,4", "1,2,3,4,5,6,7", "1;2;3", "1 2 3", "nan,nan,nan", "1e308,0,0", "0,0,1e308", "1,2,", ",,",
+    "[1,2,3]", "0,0,2,1e308,0,0", "0,0,2,400,0,0", "1_0,0,0",
+    # units
+    "1 kg", "1 m", "12 kg/m*", "5 parsec", "1 kg kg kg", "-3 mm", "1e400 kg", "m", "3 m/", "1 " + "m*" * 500 + "m",
+    "6 x 4 x 3 m", "6 x 4", "0 x 0 x 0", "nan x nan x nan", "1e308 x 1e308 x 1e308 m", "axbxc", "×××",
+    # paths
+    "missing.yaml", "missing.csv", "missing.nc", "own_robot.yaml", "cable.csv", "lengths.csv", "run.nc", "folder",
+    "folder/", "folder.yaml", "own_robot.yaml/x", "../../evil", "/proc/nothere/x", "/", "~", "x/" * 200, "broken.nc",
+    "pipe.yaml", "/dev/null", "/dev/zero", "/dev/full", "broken.yaml", "empty.csv", "link.yaml", "*", "con", "-x",
+    # what a terminal, a shell, a format or an encoding would take for something
+    "\x1b[31mred", "a\x1b]0;title\x07", "\x9b2J", "\u202eevil", "\udcff", "a\rb", "%s%n", "{}", "$(x)",
+    "`x`", "[red]", ":smile:",
+    # words
+    "catenery", "Catenary", "closest ", "nothere", "cogiro", "COGIRO", "mixed", "steel", "robot", "3-1", "0-99",
+    "errata",
+)  # fmt: skip
+
+
+class Case(NamedTuple):
+    """One bad command line."""
+
+    name: str
+    words: list[str]
+
+
+def cases(seed: int, count: int | None) -> list[Case]:
+    """So many of all, shuffled from a seed; None for all of them."""
+    every = [*_options(), *_arguments(), *_others()]
+    random.Random(seed).shuffle(every)
+    return every[:count]
+
+
+def commands() -> dict[str, Any]:
+    """The commands by their names."""
+    whole: Any = typer.main.get_command(app)
+    return dict(whole.commands)
+
+
+def _options() -> list[Case]:
+    found = []
+    for name, command in commands().items():
+        for parameter in command.params:
+            option = parameter.opts[0]
+            if not option.startswith("--") or option == "--help":
+                continue
+            for value in VALUES:
+                if parameter.is_flag:
+                    words = [*LINES[name], f"{option}={value}"]
+                else:
+                    words = [*LINES[name], option, *[value] * parameter.nargs]
+                found.append(Case(f"{name} {option}", words))
+            if not parameter.is_flag:
+                found.append(Case(f"{name} {option}", [*LINES[name], option]))
+    return found
+
+
+def _arguments() -> list[Case]:
+    found = []
+    for name, line in LINES.items():
+        for k in range(1, len(line)):
+            if not line[k].startswith("-"):
+                found += [Case(f"{name} [{k}]", [*line[:k], value, *line[k + 1 :]]) for value in VALUES]
+        found += [
+            Case(f"{name} extra", [*line[:1], *line[1:], "a", "b", "c"]),
+            Case(f"{name} alone", [name, "--nothing"]),
+        ]
+    return found
+
+
+def _others() -> list[Case]:
+    return [Case("command", [value]) for value in VALUES]

@@ -1,0 +1,193 @@
+"""Bad command lines end in one line and exit code 2, and write nothing; good ones among them answer."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+import sagline as sl
+from sagline.cli.examples import example_files
+from sagline.cli.main import app
+from sagline.report.blocks import Chapter
+from tests.abuse.command_lines import LINES, Case, cases, commands
+
+SHORT = "durations: 1\nrate: 4\nwaypoints: [{position: [0, 0, 1.5]}, {position: [1, 0, 1.5]}]\n"
+SHARE = 250  # of all, in make test
+SLOWEST = 2.0  # s, of the processor: other tests run beside
+START = 1.5  # s, that a process takes to load
+LARGEST = 500 * 1024  # kB
+
+
+@pytest.fixture(scope="module")
+def stocked(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the example files, a run, and files that are none."""
+    folder = tmp_path_factory.mktemp("stocked")
+    for file in example_files():
+        if file.suffix != ".py":
+            shutil.copy(file, folder)
+    (folder / "short.yaml").write_text(SHORT)
+    sl.inverse(sl.load_robot("cogiro"), sl.load_path(folder / "short.yaml")).save(folder / "run.nc")
+    (folder / "broken.nc").write_bytes((folder / "run.nc").read_bytes()[:700])
+    (folder / "broken.yaml").write_text("name: [\n")
+    (folder / "empty.csv").write_text("")
+    (folder / "folder").mkdir()
+    (folder / "folder.yaml").mkdir()
+    (folder / "link.yaml").symlink_to("nowhere.yaml")
+    return folder
+
+
+@pytest.fixture(autouse=True)
+def short_of_work(stocked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Long commands stop once their arguments are accepted, or do a little of what they do."""
+    short = sl.load_path(stocked / "short.yaml")
+    for module in ("article", "track"):
+        monkeypatch.setattr(f"sagline.cli.{module}.article_path", lambda: short)
+    monkeypatch.setattr("sagline.cli.article.FIGURES", ())
+    monkeypatch.setattr("sagline.cli.article._figures", lambda *_: ())
+    monkeypatch.setattr("sagline.report.parts.Part.build", lambda part: Chapter(part.key, part.key, "", ()))
+    monkeypatch.setattr("sagline.cli.tension.write_figures", lambda figures, folder: [])
+    monkeypatch.setattr("sagline.cli.track.write_figures", lambda figures, folder: [])
+
+    def started(host: str, port: int, title: str) -> Any:
+        server._check(host, port)
+        raise SystemExit(0)
+
+    from sagline.viewer import server
+
+    monkeypatch.setattr(server, "started", started)
+
+
+def snapshot(folder: Path) -> dict[str, str]:
+    """Everything in a folder, and what is in it."""
+    found = {}
+    for path in folder.rglob("*"):
+        kind = "file" if path.is_file() and not path.is_symlink() else str(os.lstat(path).st_mode)
+        kind = sha256(path.read_bytes()).hexdigest() if kind == "file" else kind
+        found[str(path.relative_to(folder))] = kind
+    return found
+
+
+class Bench:
+    """A folder to run commands in, some levels down, watched from above."""
+
+    def __init__(self, stock: Path, top: Path) -> None:
+        self.stock, self.top, self.place = stock, top, top / "one" / "two" / "three"
+        self.renew()
+
+    def renew(self) -> None:
+        shutil.rmtree(self.top / "one", ignore_errors=True)
+        for extra in self.top.iterdir():
+            extra.unlink()
+        shutil.copytree(self.stock, self.place, symlinks=True)
+        os.mkfifo(self.place / "pipe.yaml")
+        os.chdir(self.place)
+        self.before = snapshot(self.top)
+
+    def faults(self, case: Case) -> list[str]:
+        """What is wrong with how a command line ends."""
+        start = time.process_time()
+        result = CliRunner().invoke(app, case.words)
+        seconds = time.process_time() - start
+        written = snapshot(self.top) != self.before
+        found = [f"{seconds:.1f} s"] if seconds > SLOWEST else []
+        if result.exception is not None and not isinstance(result.exception, SystemExit):
+            found.append(f"raises {result.exception!r}")
+        if result.exit_code == 2:
+            found += complaints(result.stdout, result.stderr)
+            found += ["writes"] if written else []
+        elif result.exit_code not in (0, 1):
+            found.append(f"exit code {result.exit_code}")
+        if "Traceback" in result.output:
+            found.append("a traceback")
+        if controls(result.output):
+            found.append(f"control characters {controls(result.output)!r}")
+        if written:
+            self.renew()
+        return [f"{case.name} {case.words[1:]!r}"[:300] + f": {fault}; {result.output[-200:]!r}" for fault in found]
+
+
+def complaints(stdout: str, stderr: str) -> list[str]:
+    """What is wrong with a refusal."""
+    found = [f"stdout {stdout[:80]!r}"] if stdout else []
+    lines = stderr.rstrip("\n").split("\n")
+    if len(lines) != 1 or not lines[0].startswith("Error: "):
+        found.append(f"{len(lines)} lines")
+    if max(map(len, lines)) >= 300:
+        found.append(f"{max(map(len, lines))} characters")
+    return found
+
+
+def controls(text: str) -> str:
+    return "".join(c for c in text if not c.isprintable() and c != "\n")
+
+
+def tried(stock: Path, top: Path, some: list[Case]) -> list[str]:
+    bench, here = Bench(stock, top), Path.cwd()
+    try:
+        return [fault for case in some for fault in bench.faults(case)]
+    finally:
+        os.chdir(here)
+
+
+def test_bad_command_lines_end_in_one_line_and_write_nothing(stocked: Path, tmp_path: Path) -> None:
+    assert tried(stocked, tmp_path, cases(10, SHARE)) == []
+
+
+@pytest.mark.soak
+def test_all_bad_command_lines(stocked: Path, tmp_path: Path) -> None:
+    every = cases(10, None)
+    assert len(every) > 5000
+    assert tried(stocked, tmp_path, every) == []
+
+
+def test_every_command_and_option_is_tried(stocked: Path, tmp_path: Path) -> None:
+    names = {case.name for case in cases(10, None)}
+    for name, command in commands().items():
+        assert {f"{name} {parameter.opts[0]}" for parameter in command.params if parameter.opts[0][:2] == "--"} <= names
+    lines = [Case(name, words) for name, words in LINES.items()]
+    bench, here = Bench(stocked, tmp_path), Path.cwd()
+    try:
+        for case in lines:  # as they stand they work: what is refused above is refused for what was put in
+            assert bench.faults(case) == []
+            assert CliRunner().invoke(app, case.words).exit_code == 0, case.name
+            bench.renew()
+    finally:
+        os.chdir(here)
+
+
+def in_a_process(case: Case, place: Path) -> list[str]:
+    """What is wrong with how a real process ends, its time and its memory among it."""
+    words = [word.encode("utf-8", "surrogateescape") for word in case.words]
+    with open(place / "out", "wb") as out, open(place / "err", "wb") as err:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "sagline.cli", *words], cwd=place, stdout=out, stderr=err, stdin=subprocess.DEVNULL
+        )
+        _, status, used = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    errors = (place / "err").read_text()
+    found = complaints((place / "out").read_text(), errors) if process.returncode == 2 else []
+    if process.returncode not in (0, 1, 2) or "Traceback" in errors:
+        found.append(f"exit code {process.returncode}")
+    if used.ru_utime + used.ru_stime > SLOWEST + START:
+        found.append(f"{used.ru_utime + used.ru_stime:.1f} s")
+    if used.ru_maxrss > LARGEST:
+        found.append(f"{used.ru_maxrss // 1024} MB")
+    return [f"{case.name} {case.words[1:]!r}: {fault}; {errors[-200:]!r}" for fault in found]
+
+
+@pytest.mark.parametrize("count", [8, pytest.param(300, marks=pytest.mark.soak)])
+def test_real_processes_take_little_time_and_memory(count: int, stocked: Path, tmp_path: Path) -> None:
+    place = tmp_path / "place"
+    shutil.copytree(stocked, place, symlinks=True)
+    os.mkfifo(place / "pipe.yaml")
+    quick = (case for case in cases(11, None) if case.words[0] not in ("view", "article", "run"))
+    assert [fault for case, _ in zip(quick, range(count), strict=False) for fault in in_a_process(case, place)] == []

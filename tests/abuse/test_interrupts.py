@@ -1,0 +1,147 @@
+"""Ctrl-C and kill at any moment: exit code 130 after Ctrl-C, one line, and nothing half written.
+
+The moments are random, from a seed, over all that a command does: loading, solving, drawing, writing, ending.
+"""
+
+from __future__ import annotations
+
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from sagline.cli.examples import write_examples
+
+Whole = Callable[[tuple[str, ...]], tuple[float, set[str]]]
+SHARE, ALL = 4, 200  # moments, over all commands
+COMMANDS: tuple[tuple[str, ...], ...] = (
+    ("track", "cogiro", "own_path.yaml", "--csv", "--out", "out"),
+    ("forward", "cogiro", "lengths.csv", "--out", "out"),
+    ("article", "figures", "6-7", "--out", "out"),
+    ("convert", "cogiro", "--format", "mjcf", "--out", "out.xml"),
+    ("tension", "cogiro", "--out", "out"),
+    ("new", "my_robot.yaml"),
+)
+INTERRUPTED = "Interrupted. What has been written is whole.\n"
+
+# Ctrl-C comes from a thread of the process itself, so that the moment is counted from where the command begins
+TIMED = """
+import os, signal, sys, threading, time
+from sagline.cli.__main__ import app_entry
+
+def strike(seconds=float(sys.argv.pop(1)), number=int(sys.argv.pop(1))):
+    time.sleep(seconds)
+    os.kill(os.getpid(), number)
+
+threading.Thread(target=strike, daemon=True).start()
+app_entry()
+"""
+
+
+HELD = TIMED.replace("    os.kill", "    while True:\n        time.sleep(0.005)\n        os.kill")
+
+
+def started(
+    place: Path, moment: float, number: int, words: tuple[str, ...], code: str = TIMED
+) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-c", code, f"{moment:.4f}", str(number), *words],
+        cwd=place,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Whole:
+    """How long a command takes where nobody disturbs it [s], and the files that it leaves."""
+
+    @cache
+    def found(words: tuple[str, ...]) -> tuple[float, set[str]]:
+        place = tmp_path_factory.mktemp("whole")
+        write_examples(place, force=False)
+        before, start = files(place), time.monotonic()
+        process = started(place, 600.0, signal.SIGINT, words)
+        _, errors = process.communicate(timeout=300)
+        assert process.returncode == 0, errors
+        seconds, made = time.monotonic() - start, files(place) - before
+        assert made
+        return seconds, made
+
+    return found
+
+
+def files(place: Path) -> set[str]:
+    return {str(path.relative_to(place)) for path in place.rglob("*") if path.is_file()}
+
+
+def check(
+    words: tuple[str, ...], seconds: float, made: set[str], place: Path, draw: random.Random, number: int
+) -> None:
+    write_examples(place, force=False)
+    before = files(place)
+    moment = seconds * draw.random()
+    process = started(place, moment, number, words)
+    printed, errors = process.communicate(timeout=300)
+    what = f"{' '.join(words)} after {moment:.3f} s: {process.returncode}, {errors!r}"
+    left = files(place) - before
+    if process.returncode == 0:  # it was over: all of it is there, and all of it was told
+        assert left == made, what
+        assert printed or "new" not in words, what
+        return
+    if number == signal.SIGKILL:
+        assert process.returncode == -signal.SIGKILL, what
+        rest = subprocess.run([sys.executable, "-m", "sagline.cli", *words], cwd=place, capture_output=True, text=True)
+        assert rest.returncode == 0 or "exists" in rest.stderr, rest.stderr  # what was killed is in nobody's way
+        left = files(place) - before
+        assert left == made, f"{what}: {left ^ made}"
+    else:
+        assert process.returncode == 130, what
+        assert errors.endswith(INTERRUPTED), what
+        assert [line for line in errors.splitlines() if "First run" not in line] == [INTERRUPTED.strip()], what
+        assert left <= made, f"{what}: {left - made}"
+        if any(name.endswith("article.json") for name in left):
+            assert any(name.endswith("article.html") for name in left), what
+
+
+def each(count: int, seed: int, number: int, whole: Whole, top: Path) -> None:
+    draw = random.Random(seed)
+    for k in range(count):
+        words = COMMANDS[k % len(COMMANDS)]
+        place = top / str(k)
+        place.mkdir()
+        check(words, *whole(words), place, draw, number)
+
+
+def test_ctrl_c_at_any_moment(whole: Whole, tmp_path: Path) -> None:
+    each(SHARE, 12, signal.SIGINT, whole, tmp_path)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_ctrl_c_and_kill_at_many_moments(number: int, whole: Whole, tmp_path: Path) -> None:
+    each(ALL, 13, number, whole, tmp_path)
+
+
+def test_ctrl_c_that_the_shell_told_to_ignore_is_ignored(tmp_path: Path) -> None:
+    """As of a command in the background, or behind nohup."""
+    code = TIMED.replace("threading.Thread", "signal.signal(signal.SIGINT, signal.SIG_IGN); threading.Thread", 1)
+    done = subprocess.run([sys.executable, "-c", code, "0.3", "2", "robots"], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_all_at_once_ends_at_once(tmp_path: Path) -> None:
+    """Ctrl-C held down: many signals, one line."""
+    write_examples(tmp_path, force=False)
+    process = started(tmp_path, 0.3, signal.SIGINT, COMMANDS[0], HELD)
+    _, errors = process.communicate(timeout=120)
+    assert process.returncode == 130, errors
+    assert errors == INTERRUPTED

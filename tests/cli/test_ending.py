@@ -1,0 +1,240 @@
+"""How the command ends when something goes wrong: one line, an exit code, and nothing that it did not mean to say."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from io import BytesIO, StringIO, TextIOWrapper
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+import sagline as sl
+from sagline.cli.ending import ended, shortened
+from sagline.cli.main import app
+from sagline.cli.printable import printable
+from sagline.cli.terminal import show_data
+
+COMMAND = [sys.executable, "-m", "sagline.cli"]
+needs_full = pytest.mark.skipif(not Path("/dev/full").exists(), reason="no disk that is always full")
+
+
+def broken(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise error
+
+    monkeypatch.setattr("sagline.cli.robots.list_robots", fail)
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "told"),
+    [
+        (
+            RuntimeError("boom\nbang"),
+            70,
+            "Unexpected error: RuntimeError: boom\\nbang. This is a mistake in sagline: please",
+        ),
+        (KeyError(), 70, "Unexpected error: KeyError. This is a mistake in sagline: please report it to the authors"),
+        (AssertionError("x" * 5000), 70, "with the command and its files; the option --debug shows where it happened."),
+        (RecursionError("deep"), 70, "Unexpected error: RecursionError: deep"),
+        (MemoryError("Unable to allocate 15 TiB"), 2, "Error: there is not enough memory (Unable to allocate 15 TiB)."),
+        (OSError(36, "File name too long", "x" * 400), 2, "File name too long. Check its name, its permissions and"),
+        (PermissionError(13, "Permission denied", "a.nc"), 2, "Error: a.nc: Permission denied. Check its name"),
+        (sl.InvalidValueError("pose", "x" * 9000, "numbers", "Correct it."), 2, "; allowed: numbers. Correct it."),
+        (sl.FileError("\x1b[2J.yaml", "is\nodd", "Rename it."), 2, "Error: \\x1b[2J.yaml: is\\nodd. Rename it."),
+        (KeyboardInterrupt(), 130, "Interrupted. What has been written is whole."),
+    ],
+)
+def test_whatever_goes_wrong_is_told_in_one_line(
+    error: BaseException, code: int, told: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    broken(monkeypatch, error)
+    result = CliRunner().invoke(app, ["robots"])
+    assert (result.exit_code, result.stdout) == (code, "")
+    assert told in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert len(result.stderr) <= 300
+
+
+@pytest.mark.parametrize("words", [["--debug", "robots"], ["robots", "--debug"]])
+def test_the_traceback_comes_only_if_asked_for(words: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    broken(monkeypatch, RuntimeError("boom"))
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == 70
+    assert result.stderr.startswith("Traceback (most recent call last):")
+    assert "in fail" in result.stderr
+    assert "Unexpected error: RuntimeError: boom." in result.stderr
+
+
+def test_what_was_written_before_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("short.yaml").write_text(
+        "durations: 1\nrate: 4\nwaypoints: [{position: [0, 0, 1.5]}, {position: [1, 0, 1.5]}]\n"
+    )
+
+    def fail(*_: object) -> None:
+        raise sl.FileError("figure.png", "cannot be written (No space left on device)", "Make room.")
+
+    monkeypatch.setattr("sagline.cli.track.write_figures", fail)
+    result = CliRunner().invoke(app, ["track", "cogiro", "short.yaml"])
+    assert result.exit_code == 2
+    assert "Error: figure.png: cannot be written (No space left on device). Make room." in result.stderr
+    assert "Written before, and whole: cogiro-catenary.nc in output" in result.stderr
+    assert os.listdir("output") == ["cogiro-catenary.nc"]
+
+
+def test_the_middle_of_what_is_too_long_is_left_out() -> None:
+    assert shortened("a" * 10, 10) == "a" * 10
+    assert shortened("begin" + "x" * 500 + "end", 40).startswith("begin")
+    assert shortened("begin" + "x" * 500 + "end", 40).endswith("end")
+    assert len(shortened("x" * 500, 40)) == 40
+
+
+def test_what_a_terminal_would_obey_is_written_out() -> None:
+    for code in [*range(0x20), *range(0x7F, 0xA0), 0x200E, 0x202E, 0x2028, 0x2066, 0xFEFF, 0xDCFF, 0xE000]:
+        shown = printable(f"a{chr(code)}b")
+        assert shown.isprintable(), hex(code)
+        assert shown.startswith("a\\"), hex(code)
+    for kept in ("Größe 5 m²", "a\u00a0b\u202fc", "名前", "−7.1 µm · 3 × 4"):
+        assert printable(kept) == kept
+    assert printable("a\nb\x1b", "\n") == "a\nb\\x1b"
+
+
+@pytest.mark.parametrize("command", ["show", "tension", "track", "forward"])
+def test_no_name_from_a_file_gives_orders_to_the_terminal(
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Names that readers would refuse, so that what prints is asked on its own."""
+    monkeypatch.chdir(tmp_path)
+    evil = "\x1b[31mred\x9b2J\x07[bold]x[/bold] :smile: \u202eevil"
+    robot = sl.load_robot("cogiro")
+    object.__setattr__(robot, "name", evil)
+    object.__setattr__(robot, "source", f"source {evil}")
+    object.__setattr__(robot, "notes", f"notes {evil}\nmore")
+    Path("short.yaml").write_text(
+        "durations: 1\nrate: 4\nwaypoints: [{position: [0, 0, 1.5]}, {position: [1, 0, 1.5]}]\n"
+    )
+    plan = sl.inverse(robot, sl.load_path("short.yaml"))
+    for module in ("robots", "tension", "track", "forward"):
+        monkeypatch.setattr(f"sagline.cli.{module}.load_robot", lambda _: robot)
+    header = ",".join(f"L{k}" for k in range(8))
+    row = ",".join(f"{length:.6f}" for length in plan.unstrained_length[0])
+    Path("lengths.csv").write_text(f"{header}\n{row}\n")
+    words = {
+        "show": ["cogiro"],
+        "tension": ["cogiro", "--no-figures"],
+        "track": ["cogiro", "short.yaml", "--no-figures"],
+        "forward": ["cogiro", "lengths.csv"],
+    }[command]
+    for more in ([], ["--json"]):
+        result = CliRunner().invoke(app, [command, *words, *more])
+        assert result.exit_code in (0, 2), result.output
+        assert [c for c in result.output if not c.isprintable() and c != "\n"] == []
+        assert "\U0001f604" not in result.output
+        if command == "show":
+            assert "[bold]x[/bold] :smile:" in result.output
+
+
+def test_a_file_on_stdout_is_to_the_letter_but_for_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Terminal(StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    text, seen = "a: \u202e\x9b\n\tb: é\n", Terminal()
+    monkeypatch.setattr(sys, "stdout", seen)
+    show_data(text)
+    assert seen.getvalue() == "a: \\u202e\\x9b\n\tb: é\n"
+    raw = BytesIO()
+    monkeypatch.setattr(sys, "stdout", TextIOWrapper(raw, encoding="ascii"))
+    show_data(text)
+    assert raw.getvalue() == text.encode()
+
+
+@needs_full
+@pytest.mark.parametrize("words", [["robots"], ["robots", "--json"], ["--help"], ["convert", "cogiro"]])
+def test_a_full_disk_behind_stdout(words: list[str]) -> None:
+    with open("/dev/full", "w") as full:
+        done = subprocess.run([*COMMAND, *words], stdout=full, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 2
+    assert done.stderr.startswith("Error: standard output")
+    assert "No space left on device" in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("words", [["robots", "--json"], ["--help"], ["convert", "cogiro"]])
+def test_nobody_reads_any_more(words: list[str]) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    done = subprocess.run([*COMMAND, *words], stdout=writer, stderr=subprocess.PIPE, text=True)
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (141, "")  # as of a command that SIGPIPE ends
+
+
+def test_stdout_and_stderr_may_be_closed() -> None:
+    line = f'"{sys.executable}" -m sagline.cli'
+    done = subprocess.run(["sh", "-c", f"{line} robots >&-"], stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 2
+    assert done.stderr.startswith("Error: standard output: cannot be written (it is closed).")
+    done = subprocess.run(["sh", "-c", f"{line} show nothing 2>&-"], stdout=subprocess.PIPE, text=True)
+    assert (done.returncode, done.stdout) == (2, "")
+
+
+def test_any_encoding_of_the_output_will_do() -> None:
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"}
+    done = subprocess.run([*COMMAND, "robots"], capture_output=True, env=environment)
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert rb"15 \xd7 11 \xd7 6" in done.stdout
+    done = subprocess.run([*COMMAND, "show", "article-mixed", "--json"], capture_output=True, env=environment)
+    assert json.loads(done.stdout.decode("ascii"))["inertia"]["unit"] == "kg m²"
+
+
+def test_what_libraries_warn_of_is_not_told() -> None:
+    code = (
+        "import logging, sys, warnings\n"
+        "from sagline.cli import __main__ as start, robots\n"
+        "def noisy(*, as_json):\n"
+        "    warnings.warn('of a library', RuntimeWarning)\n"
+        "    logging.getLogger('matplotlib').warning('of another')\n"
+        "    print('answer')\n"
+        "robots.list_robots = noisy\n"
+        "start.app_entry()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code, "robots"], capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "answer\n", "")
+    done = subprocess.run([sys.executable, "-c", code, "robots", "--debug"], capture_output=True, text=True)
+    assert "of a library" in done.stderr
+
+
+def test_a_thread_that_fails_says_so_in_one_line() -> None:
+    code = (
+        "import threading\n"
+        "from sagline.cli import __main__ as start, robots\n"
+        "def fails(*, as_json):\n"
+        "    thread = threading.Thread(target=lambda: 1 / 0)\n"
+        "    thread.start()\n"
+        "    thread.join()\n"
+        "robots.list_robots = fails\n"
+        "start.app_entry()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code, "robots"], capture_output=True, text=True)
+    assert done.stderr.startswith("Unexpected error: ZeroDivisionError: division by zero.")
+    assert done.stderr.count("\n") == 1
+
+
+def test_the_end_of_the_input_is_no_answer() -> None:
+    def asks() -> None:
+        import typer
+
+        raise typer.Abort
+
+    assert ended(asks) == 2
+
+
+def test_loading_takes_no_time_that_is_not_needed() -> None:
+    """Before the first line of the command's own nothing of weight is loaded: until then nobody hears Ctrl-C."""
+    heavy = ("numpy", "numba", "typer", "rich", "yaml", "matplotlib")
+    code = f"import sys, sagline.cli.__main__; print([name for name in {heavy} if name in sys.modules])"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout == "[]\n"

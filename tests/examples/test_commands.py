@@ -1,0 +1,107 @@
+"""The commands of README and help run as printed, in a folder with the files of `sagline examples`."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+import sagline as sl
+from sagline.cli.examples import KINDS, example_files
+from sagline.cli.main import app
+from sagline.report.blocks import Chapter
+from tests.abuse.command_lines import commands
+
+ROOT = Path(__file__).parents[2]
+
+
+def lines_of(text: str) -> list[list[str]]:
+    """The lines that begin with `sagline`, as words."""
+    whole = text.replace("\\\n", " ")
+    return [shlex.split(found, comments=True)[1:] for found in re.findall(r"^ *(sagline \S.*)$", whole, re.MULTILINE)]
+
+
+def printed() -> list[list[str]]:
+    """The commands of README's section on the command line, and the examples in the help of every command."""
+    readme = (ROOT / "README.md").read_text()
+    section = readme.partition("## On the command line")[2].partition("\n## ")[0]
+    found = lines_of(section.partition("```sh\n")[2].partition("```")[0])
+    assert len(found) >= 9
+    for command in commands().values():
+        found += lines_of(command.help)
+    return found
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("examples")
+    result = CliRunner().invoke(app, ["examples", "--out", str(place)])
+    assert result.exit_code == 0, result.output
+    return place
+
+
+@pytest.mark.parametrize("words", printed(), ids=" ".join)
+def test_a_printed_command_runs(words: list[str], folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(folder)
+    served: list[Any] = []
+
+    def serve(robot: sl.Robot, run: Path | None, *more: Any, **others: Any) -> int:
+        served.append((robot, None if run is None else sl.load_plan(run)))
+        return 0
+
+    monkeypatch.setattr("sagline.cli.view.serve", serve)
+    monkeypatch.setattr("sagline.report.parts.Part.build", lambda part: Chapter(part.key, part.key, "", ()))
+    monkeypatch.setattr("sagline.cli.article.FIGURES", ())
+    monkeypatch.setattr("sagline.cli.article._figures", lambda *_: ())
+    if words[0] == "new":
+        (folder / words[1]).unlink(missing_ok=True)
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == 0, result.output
+    assert len(served) == (words[0] == "view")
+
+
+@pytest.mark.soak
+def test_the_whole_article_too(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(folder)
+    assert CliRunner().invoke(app, ["article"]).exit_code == 0
+
+
+def test_examples_are_those_of_the_source_and_replace_nothing_unasked(tmp_path: Path) -> None:
+    words = ["examples", "--out", str(tmp_path / "new")]
+    assert CliRunner().invoke(app, words).exit_code == 0
+    source = {file.name: file.read_bytes() for file in (ROOT / "examples").iterdir() if file.suffix in KINDS}
+    assert {file.name: file.read_bytes() for file in (tmp_path / "new").iterdir()} == source
+    assert {"own_robot.yaml", "own_path.yaml", "lengths.csv", "cable.csv", "robot.wcrfx"} < set(source)
+    (tmp_path / "new" / "lengths.csv").write_text("mine")
+    (tmp_path / "new" / "cable.csv").unlink()
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == 2
+    assert "exists. Choose another folder with --out, or replace it with --force." in result.stderr
+    assert not (tmp_path / "new" / "cable.csv").exists()
+    assert CliRunner().invoke(app, [*words, "--force"]).exit_code == 0
+    assert (tmp_path / "new" / "lengths.csv").read_bytes() == source["lengths.csv"]
+
+
+def test_an_installed_package_has_them_inside(tmp_path: Path) -> None:
+    """As hatch puts them there: `examples` of the source becomes `sagline/examples` of the wheel."""
+    import tomllib
+
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    included = settings["tool"]["hatch"]["build"]["targets"]["wheel"]["force-include"]
+    assert included == {"examples": "sagline/examples"}
+    package = Path(sl.__file__).parent
+    shutil.copytree(package, tmp_path / "sagline", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(ROOT / "examples", tmp_path / "sagline" / "examples")
+    code = "import sys; sys.path.insert(0, sys.argv.pop(1)); from sagline.cli.examples import example_files; "
+    code += "print(*example_files(), sep='\\n')"
+    done = subprocess.run([sys.executable, "-I", "-c", code, str(tmp_path)], capture_output=True, text=True, check=True)
+    found = [Path(line) for line in done.stdout.splitlines()]
+    assert {file.parent for file in found} == {tmp_path / "sagline" / "examples"}
+    assert [file.name for file in found] == [file.name for file in example_files()]

@@ -1,0 +1,77 @@
+"""Where the camera stands."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.viewer import solids
+from sagline.viewer.framing import BORDER, FIELD, Framing, fitted
+from sagline.viewer.server import started, stop
+from tests.viewer.client import Client
+
+
+def seen(points: np.ndarray, camera: np.ndarray, target: np.ndarray, aspect: float, field: float) -> np.ndarray:
+    """Where points are in the picture, -1 to 1 within it: OpenGL's perspective, column by column."""
+    ahead = (target - camera) / np.linalg.norm(target - camera)
+    right = np.cross(ahead, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    view = (points - camera) @ np.stack((right, np.cross(right, ahead), ahead), axis=1)
+    return np.asarray(view[:, :2] / view[:, 2:] / np.tan(0.5 * field) / [aspect, 1.0])
+
+
+@pytest.mark.parametrize("aspect", [0.4, 0.7, 1.0, 1.6, 3.0])
+@pytest.mark.parametrize("name", sl.robot_names())
+def test_every_robot_fills_the_picture_and_no_more(name: str, aspect: float) -> None:
+    low, high = solids.bounds(sl.load_robot(name))
+    camera, target = fitted(low, high, aspect)
+    middle = 0.5 * (low + high)
+    corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+    places = seen(middle + BORDER * (corners - middle), camera, target, aspect, FIELD)
+    assert np.abs(places).max() <= 1.0 + 1e-6
+    assert np.abs(places).max() > 0.9
+    assert places.max(axis=0) == pytest.approx(-places.min(axis=0), abs=1e-6)  # in the middle
+
+
+def at(camera: Any, position: Any) -> bool:
+    return bool(np.allclose(camera.position, position, rtol=1e-6))
+
+
+def await_that(done: Callable[[], bool]) -> None:
+    end = time.monotonic() + 10.0
+    while not done():
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.01)
+
+
+def test_the_box_stays_in_the_picture_until_someone_looks_from_elsewhere() -> None:
+    low, high = np.array([-5.0, -4.0, 0.0]), np.array([5.0, 4.0, 6.0])
+    server = started(port=0)
+    try:
+        Framing(server, low, high)
+        with Client(server.get_port()) as client:
+            await_that(lambda: len(server.get_clients()) == 1)
+            camera = next(iter(server.get_clients().values())).camera
+            wide = fitted(low, high, 800 / 600, 1.0)
+            await_that(lambda: at(camera, wide[0]))
+
+            def look(position: Any, width: int) -> None:
+                client.look(position=position, look_at=wide[1], width=width)
+                await_that(lambda: camera.image_width == width)
+
+            narrow = fitted(low, high, 300 / 600, 1.0)[0]
+            look(wide[0], 300)
+            await_that(lambda: at(camera, narrow))
+            own = narrow + np.array([0.0, 3.0, 1.0])
+            look(own, 300)
+            look(own, 800)
+            time.sleep(0.2)
+            assert at(camera, own)
+            look([np.nan] * 3, 400)  # nonsense harms nobody
+            look(narrow, 401)
+            await_that(lambda: at(camera, fitted(low, high, 401 / 600, 1.0)[0]))
+    finally:
+        stop(server)

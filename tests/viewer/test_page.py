@@ -1,0 +1,41 @@
+"""The page around viser's client."""
+
+from pathlib import Path
+from urllib.request import urlopen
+
+import viser
+from viser import infra
+
+from sagline.viewer.page import Page, dressed
+from sagline.viewer.server import started, stop
+
+BUILD = Path(viser.__file__).parent / "client" / "build"
+
+
+def test_the_head_is_ours_and_the_client_what_it_is() -> None:
+    stock = (BUILD / "index.html").read_text()
+    ours = dressed(stock, "<b>robot</b> & co")
+    assert "<title>&lt;b&gt;robot&lt;/b&gt; &amp; co</title>" in ours
+    assert ours.count('rel="icon"') == 1
+    assert "Disconnected: is sagline view still running?" in ours
+    head, body = stock.split("</head>", 1)
+    assert ours.endswith(body)
+    assert head.partition("<script")[2] in ours
+
+
+def test_only_the_first_page_is_dressed(tmp_path: Path) -> None:
+    (tmp_path / "other.html").write_bytes(b"<title>Viser</title></head>")
+    folder = Page(tmp_path, "robot")
+    assert (folder / "other.html").read_bytes() == b"<title>Viser</title></head>"
+    assert not (folder / "index.html").is_file()
+
+
+def test_the_server_serves_it_and_viser_stays_what_it_was() -> None:
+    stock = infra.WebsockServer
+    server = started(port=0, title="cogiro <1>")
+    try:
+        assert infra.WebsockServer is stock
+        with urlopen(f"http://127.0.0.1:{server.get_port()}/") as answer:
+            assert "<title>cogiro &lt;1&gt; – sagline</title>" in answer.read().decode()
+    finally:
+        stop(server)

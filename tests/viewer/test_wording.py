@@ -1,0 +1,50 @@
+"""How numbers and names are written."""
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.viewer.settings import METHODS, MODELS, Settings
+from sagline.viewer.snapshot import taken_at
+from sagline.viewer.wording import ForceUnit, method_name, model_name, number, quantity, remembers
+
+FACTORS = {"m": 1e-3, "": 1.0, "k": 1e3, "M": 1e6, "G": 1e9}
+
+
+@pytest.mark.parametrize("value", [-0.04, -1e-300, -0.0, 0.0, 0.049])
+def test_what_rounds_to_zero_has_no_sign(value: float) -> None:
+    assert number(value, ".1f") == "0.0"
+
+
+def test_no_number_is_a_dash() -> None:
+    assert number(np.nan, ".1f") == number(np.inf, ".3f") == quantity(np.nan, "N") == "–"
+
+
+def test_quantities_are_below_a_thousand_and_right_to_four_digits() -> None:
+    generator = np.random.default_rng(3)
+    for value in np.concatenate((10.0 ** generator.uniform(-3.0, 11.9, 500), [999.95, 999.94, 1e3, 1e6, 0.9999999])):
+        digits, unit = quantity(float(value), "N").split()
+        assert "e" not in digits
+        assert 0.0 < float(digits) < 1000.0
+        assert float(digits) * FACTORS[unit.removesuffix("N")] == pytest.approx(value, rel=5.1e-4)
+
+
+def test_forces_of_a_robot_keep_one_unit() -> None:
+    assert ForceUnit.up_to(2000.0).written(31.27) == "31.3 N"
+    assert ForceUnit.up_to(1.2e6).written(363541.3) == "363.54 kN"
+    assert ForceUnit.up_to(1.2e6).written(-1e-9) == "0.00 kN"
+
+
+def test_the_choices_are_named_as_the_readings_name_them() -> None:
+    robot = sl.load_robot("article-suspended")
+    pose = sl.Pose([0.5, 0.2, 2.0], np.eye(3))
+    assert all(model_name(model) == name for name, model in MODELS.items())
+    for name, method in METHODS.items():
+        snapshot = taken_at(robot, pose, Settings(mass=50.0, tension=method), None)
+        assert snapshot.origin == f"catenary (exact), {name}"
+
+
+def test_by_default_nothing_is_remembered() -> None:
+    assert not remembers(Settings(mass=1.0).tension)
+    assert not remembers(next(iter(METHODS.values())))
+    assert [method_name(method) for method in METHODS.values() if remembers(method)] == ["Closest (remembers the way)"]
