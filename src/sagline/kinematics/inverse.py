@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.arguments import brief, callback, instance, optional
-from sagline.arrays import Array, Codes, locked
+from sagline.arrays import Array, locked
 from sagline.blocks import Progress
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel, CableState
-from sagline.errors import CableGeometryError, InvalidValueError
+from sagline.errors import InvalidValueError
 from sagline.kernels import codes, tables
 from sagline.kernels.inverse.verdicts import ENOUGH
 from sagline.kinematics.inverse_rows import decide_rows, solve_rows
@@ -24,6 +24,7 @@ from sagline.robot.pose import Pose
 from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot
 from sagline.robot.several import cables_of, first_of, one_a_pose
+from sagline.statics.balance import refuse_missing_chords
 from sagline.statics.tables import pose_rows
 from sagline.statics.wrench import external_wrench, inertial_wrench
 from sagline.tension.closest import Closest
@@ -97,7 +98,8 @@ def inverse(
     reference = _reference(shared, previous, tension.variable)
     loads = np.atleast_2d(load)
     found = solve_rows(robots, method, options, rows, loads, reference, progress)
-    _refuse_missing_chords(found.pose_status, found.results)
+    if (found.pose_status == codes.POSE_NO_CHORD).any():
+        refuse_missing_chords(np.hypot(found.results[tables.SPAN], found.results[tables.RISE]), pose)
     verdicts = decide_rows(robots, options, rows, loads, found, progress)
     cables = CableState(
         model=model,
@@ -164,17 +166,3 @@ def _reference(robot: Robot, previous: Plan | None, variable: Variable) -> Array
         return np.full(robot.cable_count, np.nan)
     last: Array = np.atleast_2d(tensions)[feasible[-1]].copy()
     return last
-
-
-def _refuse_missing_chords(status: Codes, results: Array) -> None:
-    lost = np.flatnonzero(status == codes.POSE_NO_CHORD)
-    if not lost.size:
-        return
-    pose = int(lost[0])
-    cable = int(np.argmin(np.hypot(results[tables.SPAN, pose], results[tables.RISE, pose])))
-    raise CableGeometryError(
-        f"pose {pose}, cable {cable}: distance between its ends",
-        "0 m",
-        "> 1e-9 m",
-        "Move the platform away from the anchor, or the anchor away from the path.",
-    )

@@ -99,8 +99,7 @@ def _name_sides(ax: Axes, shape: TensionPolygon, corners: Array) -> None:
     figure = cast(Figure, ax.get_figure(root=True))
     for _ in range(TRIES):
         figure.draw_without_rendering()  # now it is known how large the polygon is on the sheet
-        pixels = np.diff(ax.transData.transform([(0.0, 0.0), (1.0, 0.0)])[:, 0])
-        scale = float(pixels[0]) / (figure.dpi * POINT)  # points a newton
+        scale = ax.bbox.width / (figure.dpi * POINT) / float(np.ptp(ax.get_xlim()))  # points a newton
         names = _names(shape, corners, scale)
         reach = np.array([name.middle + (name.offset + sign * name.half) / scale for name in names for sign in (-1, 1)])
         seen = np.array([ax.get_xlim(), ax.get_ylim()]).T
@@ -145,7 +144,10 @@ def _names(shape: TensionPolygon, corners: Array, scale: float) -> list[_Name]:
 
 
 def _normals(corners: Array) -> Array:
-    """Outward directions of the sides, shape (h, 2); a side without length has one between its neighbors'."""
+    """Outward directions of the sides, shape (h, 2); a side without length has one between its neighbors'.
+
+    Where those are opposite, at the tip of a flat polygon, it points away from the tip: every name has a way out.
+    """
     along = np.roll(corners, -1, axis=0) - corners
     lengths = np.linalg.norm(along, axis=1)
     long = np.flatnonzero(lengths > SHORT * lengths.max())
@@ -156,5 +158,6 @@ def _normals(corners: Array) -> Array:
     for k in set(range(len(corners))) - set(long.tolist()):
         place = int(np.searchsorted(long, k))
         between = normals[long[place - 1]] + normals[long[place % long.size]]
-        normals[k] = between / (np.linalg.norm(between) or 1.0)
+        tip = along[long[place - 1]] / lengths[long[place - 1]]
+        normals[k] = between / size if (size := np.linalg.norm(between)) > SHORT else tip
     return normals
