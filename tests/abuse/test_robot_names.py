@@ -1,5 +1,6 @@
 """Robots with names of all kinds: their files are where they were asked for, or there is one line and nothing else."""
 
+import json
 import re
 from pathlib import Path
 
@@ -33,11 +34,13 @@ def test_files_stay_where_they_were_asked_for(
     monkeypatch.chdir(place)
     prepare(place)
     kind = MIXED if command == "tension" else ROBOT
-    robot = sl.load_robot(kind)
+    robot = sl.dump_robot(sl.load_robot(kind))
+    assert robot.startswith(f"name: {kind}\n")
     words = [word.replace(kind, "odd.yaml") for word in COMMANDS[command]]
     chosen = names(count) if count or command == "forward" else COMMON[:2]
     for name in chosen:
-        Path("odd.yaml").write_text(sl.dump_robot(robot.replace(name=name)), encoding="utf-8")
+        # as JSON writes it, which is YAML too: a robot with some of these names cannot be made in Python
+        Path("odd.yaml").write_text(robot.replace(kind, json.dumps(name), 1), encoding="utf-8")
         before = tree(tmp_path)
         result = ended(*words, *["--no-figures"] * (command == "track"))
         new = tree(tmp_path).keys() - before.keys()

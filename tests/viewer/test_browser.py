@@ -159,7 +159,12 @@ def test_a_film_shows_the_run_and_leaves_the_scene_as_it_was(
 
 def least_contrast(page: Page) -> float:
     """The least contrast of a text on the page with what is behind it; fails with the texts below 4.5 : 1."""
-    page.wait_for_timeout(400)  # what fades in and out has done so
+    page.wait_for_timeout(200)
+    # what fades in and out has done so, however busy the machine; what turns for ever does not fade
+    page.wait_for_function(
+        "document.getAnimations().every("
+        "(each) => each.playState !== 'running' || each.effect.getTiming().iterations === Infinity)"
+    )
     texts = page.evaluate(CONTRAST)
     assert len(texts) > 40
     pale = {(text["words"], round(text["ratio"], 2)) for text in texts if not text["ratio"] >= 4.5}

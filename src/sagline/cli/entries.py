@@ -148,7 +148,7 @@ ENTRIES = {
     for entry in (
         Entry(INVERSE, "inverse.poses.inverse_poses", 39, 14.0, _inverse),
         Entry(SHARING, "inverse.poses.inverse_poses", 39, 47.0, _other_sharing, version=2),
-        Entry(VERDICTS, "inverse.verdicts.decide_poses", 45, 16.0, _verdicts),
+        Entry(VERDICTS, "inverse.verdicts.decide_poses", 56, 24.0, _verdicts),
         Entry(FORWARD, "forward.forward.forward_poses", 71, 14.0, _forward),
         Entry(FIT, "forward.fit.fit_poses", 19, 5.0, lambda: _forward(straight=True)),
         Entry(MARGINS, "inverse.queries.margins_of_poses", 33, 5.0, _margins),

@@ -244,6 +244,45 @@ def point_along(soft: int, change: Change, step: Tangents) -> float:
     return rest
 
 
+@glue
+def take_step(curves: Curves, demand: Demand, rest: float, change: Change, step: Tangents) -> bool:
+    """Go as far along a step as keeps its promise, halving it; False where there is nothing to gain.
+
+    What hard rows leave counts by more than their multipliers, so that a step that pays for it elsewhere is none.
+    """
+    n, m = demand.matrix.shape
+    soft = demand.soft
+    trial, trial_pull, left = step.trial
+    known = STANDS * demand.size
+    price = 1.0
+    for k in range(soft, n):
+        price = max(price, 2.0 * abs(change.direction[k]))
+    before = length_of(change.residual, 0, soft) + price * length_of(change.residual, soft, n)
+    moved = 0.0
+    for i in range(m):
+        moved = max(moved, abs(trial[i] - change.tau[i]))
+    if before - rest <= known and (moved <= STEADY * rest or rest <= known):
+        return False
+    share = 1.0
+    after = math.inf
+    for _ in range(HALVINGS):
+        leave(curves, demand, trial, trial_pull, left)
+        after = length_of(left, 0, soft) + price * length_of(left, soft, n)
+        if after <= before - DECREASE * share * (before - rest) + known:
+            break
+        share *= 0.5
+        for i in range(m):
+            trial[i] = 0.5 * (trial[i] + change.tau[i])
+    if not after <= before + known:
+        return False
+    for i in range(m):
+        change.tau[i] = trial[i]
+        change.pull[i] = trial_pull[i]
+    for k in range(n):
+        change.residual[k] = left[k]
+    return True
+
+
 @kernel
 def least_change(curves: Curves, demand: Demand, ranges: Array, change: Change, memory: Memory) -> float:
     """Change tensions within their ranges until what they leave of the demand is least; returns its length [N].
@@ -261,7 +300,6 @@ def least_change(curves: Curves, demand: Demand, ranges: Array, change: Change, 
     n, m = demand.matrix.shape
     soft = demand.soft
     step, _ = new_tangents(memory, n, m, n - soft)
-    trial, trial_pull, left = step.trial
     leave(curves, demand, change.tau, change.pull, change.residual)
     for _ in range(NEWTON_STEPS):
         if not set_tangents(curves, demand, change.tau, step):
@@ -269,31 +307,6 @@ def least_change(curves: Curves, demand: Demand, ranges: Array, change: Change, 
         if not find_step(demand, ranges, change, step):
             return math.inf
         rest = point_along(soft, change, step)
-        price = 1.0
-        for k in range(soft, n):
-            price = max(price, 2.0 * abs(change.direction[k]))
-        before = length_of(change.residual, 0, soft) + price * length_of(change.residual, soft, n)
-        known = STANDS * demand.size
-        moved = 0.0
-        for i in range(m):
-            moved = max(moved, abs(trial[i] - change.tau[i]))
-        if before - rest <= known and (moved <= STEADY * rest or rest <= known):
+        if not take_step(curves, demand, rest, change, step):
             break
-        share = 1.0
-        after = before
-        for _halving in range(HALVINGS):
-            leave(curves, demand, trial, trial_pull, left)
-            after = length_of(left, 0, soft) + price * length_of(left, soft, n)
-            if after <= before - DECREASE * share * (before - rest) + known:
-                break
-            share *= 0.5
-            for i in range(m):
-                trial[i] = 0.5 * (trial[i] + change.tau[i])
-        if not after <= before + known:
-            break
-        for i in range(m):
-            change.tau[i] = trial[i]
-            change.pull[i] = trial_pull[i]
-        for k in range(n):
-            change.residual[k] = left[k]
     return length_of(change.residual, 0, soft)
