@@ -26,6 +26,15 @@ def test_what_is_no_rotation_has_a_status_and_no_lengths(quaternion: tuple[float
         solver.step(POSITION, kind(quaternion))
 
 
+@pytest.mark.parametrize("wrench", [(NAN,) * 6, (np.inf, 0, 0, 0, 0, 0), (0, 0, 0, 0, 0, -np.inf)])
+def test_a_load_that_is_not_finite_has_a_status_and_no_lengths(wrench: tuple[float, ...]) -> None:
+    solver, lengths = sl.InverseSolver(ROBOT), np.ones(8)
+    assert solver.step_into(POSITION, (0, 0, 0, 1), lengths, wrench) is sl.PoseStatus.NO_POSE
+    assert np.isnan(lengths).all()
+    assert solver.step_into(POSITION, (0, 0, 0, 1), lengths) is sl.PoseStatus.SOLVED
+    np.testing.assert_array_equal(lengths, sl.InverseSolver(ROBOT).step(POSITION, (0, 0, 0, 1)).unstrained_length)
+
+
 @pytest.mark.parametrize("position", [(NAN, 0, 0), (0, np.inf, 0), (0, 0, -np.inf)])
 def test_a_position_that_is_not_finite_has_a_status_and_no_lengths(position: tuple[float, ...]) -> None:
     lengths = np.ones(8)
