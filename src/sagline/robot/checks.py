@@ -6,9 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.arguments import instance
-from sagline.arrays import SMALLEST, Array, checked, locked
-from sagline.arrays import exactly as exactly  # what files check with, too
-from sagline.arrays import number as number
+from sagline.arrays import SMALLEST, Array, checked, exactly, locked
 from sagline.cables.cable import Cable
 from sagline.errors import InvalidValueError
 from sagline.robot.pattern import PLANAR, ROTATING

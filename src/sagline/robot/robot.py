@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.arguments import brief, choice, label, optional, text
-from sagline.arrays import Array
+from sagline.arrays import Array, exactly, number
 from sagline.cables.cable import Cable
 from sagline.errors import InvalidValueError
 from sagline.robot import checks
@@ -142,10 +142,10 @@ class Robot:
             "frame_anchors": frame,
             "platform_anchors": platform,
             "cables": checks.cables(cables, len(frame)),
-            "mass": checks.number(mass, "mass", "kg", above=0.0),
+            "mass": number(mass, "mass", "kg", above=0.0),
             "inertia": checks.inertia(inertia, pattern, normal),
-            "center_of_mass": checks.exactly(center_of_mass, "center_of_mass", "m", (3,)),
-            "gravity": checks.number(gravity, "gravity", "m/s^2", low=0.0),
+            "center_of_mass": exactly(center_of_mass, "center_of_mass", "m", (3,)),
+            "gravity": number(gravity, "gravity", "m/s^2", low=0.0),
             "motion_pattern": pattern,
             "plane_normal": normal,
             "tension_min": lower,
