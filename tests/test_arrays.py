@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sagline.arrays import checked, kernel_input, locked
+from sagline.arrays import checked, kernel_input, locked, number
 from sagline.errors import InvalidValueError
 
 
@@ -73,3 +73,48 @@ def test_what_is_wrong_is_named(value: object, limits: dict[str, object], words:
 
 def test_infinity_may_pass_where_it_means_no_limit() -> None:
     assert checked(np.inf, "x", "m", infinite=True) == np.inf
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        ([1.0 + 2.0j], "complex"),
+        (np.array([1.0 + 0.0j]), "complex"),
+        (["1.5"], "allowed: numbers"),
+        ([None, 1.0], "None"),
+        ([[1.0], [1.0, 2.0]], "inhomogeneous"),
+        (np.array(["2020-01-01"], dtype="datetime64[D]"), "dates"),
+        (np.ma.MaskedArray([1.0, 2.0], mask=[False, True]), r"x\[1\] is masked"),
+        (10**400, "too large"),
+        (1e60, "up to 1e\\+50 m"),
+        (np.broadcast_to(1.0, 10**13), "a request for 8e\\+04 GB of memory"),
+    ],
+)
+def test_what_is_no_plain_number_is_refused(value: object, words: str) -> None:
+    with pytest.raises(InvalidValueError, match=words):
+        checked(value, "x", "m")  # type: ignore[arg-type]
+
+
+class InMillimeters:
+    units = "mm"
+
+    def __array__(self, dtype: object = None, copy: object = None) -> np.ndarray:
+        return np.array([1.0])
+
+
+def test_a_unit_of_its_own_is_taken_only_where_it_is_ours() -> None:
+    with pytest.raises(InvalidValueError, match="x is in mm, a unit of its own; allowed: numbers in m"):
+        checked(InMillimeters(), "x", "m")
+    np.testing.assert_array_equal(checked(InMillimeters(), "x", "mm"), [1.0])
+
+
+def test_what_one_divides_by_is_not_next_to_nothing() -> None:
+    with pytest.raises(InvalidValueError, match="mass is 1e-60 kg; allowed: > 0 kg, 1e-50 to"):
+        number(1e-60, "mass", "kg", above=0.0)
+    assert number(1e-60, "force", "N", low=0.0) == 1e-60
+
+
+def test_missing_numbers_pass_where_they_may() -> None:
+    np.testing.assert_array_equal(checked([1.0, np.nan], "x", "m", missing=True), [1.0, np.nan])
+    with pytest.raises(InvalidValueError, match=r"x\[1\] is inf m"):
+        checked([np.nan, np.inf], "x", "m", missing=True)

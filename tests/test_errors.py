@@ -1,8 +1,15 @@
+"""Messages of errors: one line of less than 300 letters, whatever they are about."""
+
+from __future__ import annotations
+
 import pickle
 
+import numpy as np
 import pytest
 
-from sagline.errors import FileError, InvalidValueError, nearest, printable
+from sagline.errors import FileError, InvalidValueError, nearest, printable, shortened
+
+SEED = 7
 
 
 def test_an_error_is_one_short_line_whatever_is_in_it() -> None:
@@ -25,6 +32,28 @@ def test_what_is_short_stays_when_something_long_is_cut() -> None:
     assert text.endswith("yyy; allowed: a word. Correct name.")
     assert len(text) == 299
     assert str(InvalidValueError("a", "b", "c", "D.")) == "a is b; allowed: c. D."
+
+
+@pytest.mark.parametrize("long", range(4))
+def test_a_long_part_loses_its_middle_and_the_others_nothing(long: int) -> None:
+    parts = ["the item", "the value", "what is allowed", "What to do."]
+    parts[long] = f"begin{'x' * 5000}end"
+    text = str(InvalidValueError(*parts))
+    assert len(text) == 299
+    assert all(part in text for k, part in enumerate(parts) if k != long)
+    assert "beginx" in text
+    assert "…x" in text
+    assert "xend" in text
+
+
+def test_texts_of_any_length_fit_together() -> None:
+    generator = np.random.default_rng(SEED)
+    for _ in range(2000):
+        parts = ["x" * int(size) for size in generator.integers(0, 400, size=generator.integers(1, 5))]
+        fitted = shortened(parts, room=280)
+        assert sum(map(len, fitted)) == min(280, sum(map(len, parts)))
+        if sum(map(len, parts)) <= 280:
+            assert fitted == parts
 
 
 def test_errors_keep_their_data_whole() -> None:

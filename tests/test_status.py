@@ -8,6 +8,7 @@ import sagline as sl
 from sagline.kernels import codes
 from sagline.status import Status
 
+# no kernel answers NO_POSE: what is no pose does not reach one
 PREFIX = {sl.CableStatus: "CABLE_", sl.PoseStatus: "POSE_", sl.ForwardStatus: "FORWARD_"}
 
 
@@ -16,7 +17,7 @@ def test_a_status_for_every_code_and_a_sentence_for_every_status(kind: type[Stat
     known = {
         name.removeprefix(PREFIX[kind]): code for name, code in vars(codes).items() if name.startswith(PREFIX[kind])
     }
-    assert {status.name: int(status) for status in kind} == known
+    assert {status.name: int(status) for status in kind if status is not sl.PoseStatus.NO_POSE} == known
     assert [kind(int(status)) for status in kind] == list(kind)
     assert len({status.text for status in kind}) == len(kind)
     for status in kind:

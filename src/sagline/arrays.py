@@ -6,17 +6,25 @@ comes through here.
 
 from __future__ import annotations
 
-from typing import Any, TypeGuard
+from decimal import Decimal
+from numbers import Real
+from typing import Any, Final, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sagline.arguments import brief
 from sagline.errors import InvalidValueError
+from sagline.memory import check_memory
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int8]
 Indices = NDArray[np.int64]
 Flags = NDArray[np.bool_]
+
+LARGEST: Final = 1e50  # in any unit: far beyond every machine, and its square and cube are still numbers
+SMALLEST: Final = 1e-50  # of what must be more than zero
+_KINDS = {"c": "complex", "M": "dates", "m": "durations of a calendar", "V": "records"}
 
 
 def locked(array: NDArray[Any]) -> NDArray[Any]:
@@ -34,6 +42,7 @@ def checked(
     low: float = -np.inf,
     above: float = -np.inf,
     infinite: bool = False,
+    missing: bool = False,
 ) -> Array:
     """A locked float64 copy of a caller's value, or an error that names what is wrong.
 
@@ -45,7 +54,8 @@ def checked(
             None (the default) accepts every shape.
         low: Smallest allowed value.
         above: Every value must be strictly larger than this.
-        infinite: Whether infinities may pass (NaN never does).
+        infinite: Whether infinities may pass.
+        missing: Whether NaN may pass.
 
     Returns:
         Array of float64, C-contiguous, write-locked, with memory of its own; an array that already is
@@ -54,13 +64,89 @@ def checked(
     Raises:
         InvalidValueError: If the value is no number, has the wrong shape, or is out of range.
     """
-    array = value if _is_immutable(value) else _copied(value, item)
+    array = value if _is_immutable(value) else numbers(value, item, unit)
     if shape is not None:
         _check_shape(array, item, shape)
-    if _is_within(array, low=low, above=above):
-        return locked(array)
-    _check_range(array, item, unit, low=low, above=above, infinite=infinite)
+    if not _is_within(array, low=low, above=above):
+        _check_range(array, item, unit, low=low, above=above, infinite=infinite, missing=missing)
     return locked(array)
+
+
+def numbers(value: ArrayLike, item: str, unit: str) -> Array:
+    """A float64 copy of a caller's numbers in C order, of any shape and range; NaN may be among them.
+
+    Args:
+        value: Number or array of numbers: real ones, without a unit of their own, none masked.
+        item: The name a message uses.
+        unit: Unit of the value, for the message.
+
+    Returns:
+        Array with memory of its own.
+
+    Raises:
+        InvalidValueError: If the value is something else, or too large for the memory of this machine.
+    """
+    if type(value) in (float, np.float64):
+        return np.array(value)
+    _refuse_masked_or_with_unit(value, item, unit)
+    try:
+        size = value.size if isinstance(value, np.ndarray) else len(value)  # type: ignore[arg-type]
+    except Exception:  # a number has no length, and a caller's object may do anything
+        size = 1
+    check_memory(item, 8.0 * size, "Give fewer numbers.")
+    try:
+        given = np.asarray(value)
+        if given.dtype.kind in "fiub" and given.dtype.itemsize <= 8:
+            return np.array(given, dtype=np.float64, order="C")
+        return _from_other_kind(given, item)
+    except InvalidValueError:
+        raise
+    except Exception as error:  # whatever the caller's object does when it is asked for its numbers
+        reason = brief(error.args[0] if error.args else error).strip("'\"")
+        raise InvalidValueError(item, brief(value), "numbers", f"Give {item} as plain numbers ({reason}).") from None
+
+
+def number(value: Any, item: str, unit: str, *, low: float = -np.inf, above: float = -np.inf) -> float:
+    """A single finite number.
+
+    Args:
+        value: What was given.
+        item: The name a message uses.
+        unit: Its unit, for the message.
+        low: Smallest allowed value.
+        above: The value must be strictly larger than this.
+
+    Returns:
+        The number.
+
+    Raises:
+        InvalidValueError: If it is not; the message names the item.
+    """
+    return float(exactly(value, item, unit, (), low=low, above=above))
+
+
+def exactly(value: ArrayLike, item: str, unit: str, shape: tuple[int, ...], **limits: Any) -> Array:
+    """An array of exactly one shape, without batch axes.
+
+    Args:
+        value: What was given.
+        item: The name a message uses.
+        unit: Its unit, for the message.
+        shape: The whole shape.
+        **limits: As of `checked`.
+
+    Returns:
+        Array of that shape, write-locked.
+
+    Raises:
+        InvalidValueError: If the shape is another, or a value is out of range.
+    """
+    array = checked(value, item, unit, **limits)
+    if array.shape != shape:
+        raise InvalidValueError(
+            item, f"of shape {array.shape}", f"shape {shape}" if shape else "a single number", f"Reshape {item}."
+        )
+    return array
 
 
 def kernel_input(value: ArrayLike, shape: tuple[int, ...]) -> Array:
@@ -69,9 +155,30 @@ def kernel_input(value: ArrayLike, shape: tuple[int, ...]) -> Array:
     return array if not array.flags.writeable else locked(array.view())
 
 
+def broadcast_shape(item: str, *shapes: tuple[int, ...]) -> tuple[int, ...]:
+    """The shape to which several arrays broadcast.
+
+    Args:
+        item: What the arrays are, for the message.
+        *shapes: Theirs.
+
+    Returns:
+        The shape.
+
+    Raises:
+        InvalidValueError: If they do not broadcast.
+    """
+    try:
+        return np.broadcast_shapes(*shapes)
+    except ValueError:
+        listed = " and ".join(str(shape) for shape in dict.fromkeys(shapes))
+        step = "Give one value for each, or one for all."
+        raise InvalidValueError(item, f"not of one shape, but {listed}", "shapes that broadcast", step) from None
+
+
 def _is_immutable(value: ArrayLike) -> TypeGuard[Array]:
     """Whether a value is an array as ours, and so is whatever holds its memory."""
-    if not (isinstance(value, np.ndarray) and value.dtype == np.float64 and value.flags.c_contiguous):
+    if not (type(value) is np.ndarray and value.dtype == np.float64 and value.flags.c_contiguous):
         return False
     holder: object = value
     while isinstance(holder, np.ndarray):
@@ -81,11 +188,39 @@ def _is_immutable(value: ArrayLike) -> TypeGuard[Array]:
     return holder is None
 
 
-def _copied(value: ArrayLike, item: str) -> Array:
-    try:
-        return np.array(value, dtype=np.float64, order="C")
-    except (TypeError, ValueError) as error:
-        raise InvalidValueError(item, repr(value), "numbers", f"Give {item} as plain numbers ({error}).") from None
+def _refuse_masked_or_with_unit(value: Any, item: str, unit: str) -> None:
+    """What numpy would strip without a word: masks, and units that need not be ours."""
+    if type(value) in (np.ndarray, int, list, tuple):
+        return
+    if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+        where = ", ".join(str(int(i)) for i in np.argwhere(np.ma.getmaskarray(value))[0])
+        step = "Fill or leave out what is masked."
+        raise InvalidValueError(f"{item}[{where}]" if where else item, "masked", "a number", step)
+    for name in ("units", "unit"):
+        own = getattr(value, name, None)
+        if own is not None and not callable(own) and str(own) != unit:
+            step = f"Convert it, and give the bare number{' in ' + unit if unit else ''}."
+            raise InvalidValueError(item, f"in {own}, a unit of its own", f"numbers in {unit or '1'}", step)
+
+
+def _from_other_kind(given: NDArray[Any], item: str) -> Array:
+    """From long doubles and Python's own numbers; what is no real number is refused."""
+    if given.dtype.kind in "fO" and (given.dtype.kind == "f" or all(_is_real(entry) for entry in given.flat)):
+        with np.errstate(over="ignore"):  # beyond the range is infinite, which is refused like any infinity
+            return np.array(given, dtype=np.float64, order="C")
+    shown = next((entry for entry in given.flat if not _is_real(entry)), given) if given.dtype.kind == "O" else given
+    kind = _KINDS.get(given.dtype.kind, "")
+    value = f"{kind}: {_listed(shown)}" if kind else _listed(shown)
+    raise InvalidValueError(item, value, "numbers, real ones" if kind else "numbers", f"Give {item} as plain numbers.")
+
+
+def _listed(value: object) -> str:
+    """What a message shows of what is no number."""
+    return brief(value.item() if isinstance(value, np.ndarray) and value.size == 1 else value)
+
+
+def _is_real(entry: object) -> bool:
+    return isinstance(entry, Real | Decimal) and not isinstance(entry, np.timedelta64)
 
 
 def _is_within(array: Array, *, low: float, above: float) -> bool:
@@ -93,7 +228,12 @@ def _is_within(array: Array, *, low: float, above: float) -> bool:
     if array.size == 0:
         return True
     smallest, largest = float(array.min()), float(array.max())
-    return smallest >= low and smallest > above and smallest > -np.inf and largest < np.inf
+    return smallest >= max(low, -LARGEST) and smallest > above and largest <= LARGEST and not _too_near(smallest, above)
+
+
+def _too_near(value: float, above: float) -> bool:
+    """Whether a value that must be more than zero is too small to divide by."""
+    return above == 0.0 and 0.0 < value < SMALLEST
 
 
 def _check_shape(array: Array, item: str, shape: tuple[int | None, ...]) -> None:
@@ -105,16 +245,25 @@ def _check_shape(array: Array, item: str, shape: tuple[int | None, ...]) -> None
         )
 
 
-def _check_range(array: Array, item: str, unit: str, *, low: float, above: float, infinite: bool) -> None:
-    wrong = np.isnan(array) if infinite else ~np.isfinite(array)
+def _check_range(
+    array: Array, item: str, unit: str, *, low: float, above: float, infinite: bool, missing: bool
+) -> None:
+    wrong = np.zeros(array.shape, dtype=np.bool_) if infinite else np.isinf(array)
+    if not missing:
+        wrong |= np.isnan(array)
     wrong |= (array < low) | (array <= above)
-    if not wrong.any():
+    beyond = ~wrong & np.isfinite(array) & (np.abs(array) > LARGEST)
+    if above == 0.0:
+        beyond |= ~wrong & (array < SMALLEST)
+    if not (wrong | beyond).any():
         return
-    index = tuple(int(i) for i in np.argwhere(wrong)[0])
+    index = tuple(int(i) for i in np.argwhere(wrong | beyond)[0])
     where = item if not index else f"{item}[{', '.join(map(str, index))}]"
+    size = f"{SMALLEST:g} to {LARGEST:g} {unit}" if above == 0.0 else f"up to {LARGEST:g} {unit} either way"
     bounds = [
         f">= {low:g} {unit}".rstrip() if low > -np.inf else "",
         f"> {above:g} {unit}".rstrip() if above > -np.inf else "",
+        size.replace("  ", " ").rstrip() if beyond[index] else "",
         "" if infinite else "finite",
     ]
     raise InvalidValueError(

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Final
 
-_LONGEST: Final = 299  # letters of a message; more is not read, and floods a terminal
-_KEPT: Final = 60  # letters that stay of each part of a message that is too long
 _UNPRINTABLE = re.compile(  # what moves a cursor, ends a line, turns the reading direction, or cannot be encoded
     "[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ufeff\ud800-\udfff\ufffe\uffff]"
 )
+_WORD: Final = 60  # letters of what was given that are looked at for a word that was meant
+MOST: Final = 299  # characters of a message; more is not read, and floods a terminal
+LEAST: Final = 30  # of each of its parts that are kept, whatever the others take
 
 
 class SaglineError(Exception):
@@ -43,11 +44,21 @@ class InvalidValueError(SaglineError, ValueError):
 
     def __str__(self) -> str:
         """One line: item, value, allowed range, next step."""
-        return _line(self.item, " is ", str(self.value), "; allowed: ", self.allowed, ". ", self.next_step)
+        parts = (str(self.item), str(self.value), str(self.allowed), str(self.next_step))
+        item, value, allowed, next_step = shortened(parts, room=MOST - len(" is ; allowed: . "))
+        return f"{item} is {value}; allowed: {allowed}. {next_step}"
 
 
 class CableGeometryError(InvalidValueError):
     """The two ends of a cable are placed where no cable can be."""
+
+
+class NoSuchEntryError(InvalidValueError, IndexError):
+    """An index that names no entry of a batch."""
+
+
+class NoBatchError(InvalidValueError, TypeError):
+    """A single pose, cable or equilibrium that was taken for a batch of them."""
 
 
 class FileError(SaglineError):
@@ -81,7 +92,8 @@ class FileError(SaglineError):
 
     def __str__(self) -> str:
         """One line: file, reason, next step."""
-        return _line(str(self.path), ": ", self.reason, ". ", self.next_step)
+        path, reason, next_step = shortened((str(self.path), self.reason, self.next_step), room=MOST - len(": . "))
+        return f"{path}: {reason}. {next_step}"
 
 
 def printable(text: str) -> str:
@@ -117,19 +129,25 @@ def nearest(word: str, known: Iterable[str]) -> str | None:
         ('cogiro', None)
     """
     folded = {other.lower(): other for other in known}
-    near = get_close_matches(word[:_KEPT].lower(), folded, n=1)
+    near = get_close_matches(word[:_WORD].lower(), folded, n=1)
     return folded[near[0]] if near else None
 
 
-def _line(*parts: str) -> str:
-    """The parts as one line; where it is too long, the longest of them lose their middle."""
-    shown = [printable(part) for part in parts]
-    while (excess := sum(map(len, shown)) - _LONGEST) > 0:
-        k = max(range(len(shown)), key=lambda k: len(shown[k]))
-        shown[k] = _shortened(shown[k], max(_KEPT, len(shown[k]) - excess))
-    return "".join(shown)
+def shortened(parts: Sequence[str], room: int) -> list[str]:
+    """Texts that fit together on one line: what does not print is written out, the middle of the longest left out.
 
+    Args:
+        parts: The texts.
+        room: Letters they may have together.
 
-def _shortened(text: str, length: int) -> str:
-    end = length // 3
-    return f"{text[: length - end - 1]}…{text[-end:]}"
+    Returns:
+        As many texts.
+    """
+    texts = [printable(part) for part in parts]
+    while (excess := sum(map(len, texts)) - room) > 0:
+        k = max(range(len(texts)), key=lambda k: len(texts[k]))
+        others = max((len(text) for other, text in enumerate(texts) if other != k), default=0)
+        size = max(len(texts[k]) - excess, min(others, len(texts[k]) - 1), LEAST)
+        end = size // 2
+        texts[k] = f"{texts[k][: size - end - 1]}…{texts[k][-end:]}"
+    return texts

@@ -9,38 +9,32 @@ from typing import Final
 
 from sagline.errors import InvalidValueError
 
-_ALWAYS: Final = 100e6  # bytes that need no question
+UNASKED: Final = 1 << 26  # bytes: less is not worth asking how much is free
+_POSE_BYTES, _CABLE_BYTES = 400.0, 64.0  # what a pose takes while it is solved, and each of its cables: as measured
 _GROUPS: Final = (  # limit and use of a container
     ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"),
     ("/sys/fs/cgroup/memory/memory.limit_in_bytes", "/sys/fs/cgroup/memory/memory.usage_in_bytes"),
 )
 
 
-def check_memory(count: float, bytes_each: float, item: str, next_step: str) -> None:
-    """Refuse work that would need more memory than there is.
+def check_memory(item: str, size: float, next_step: str) -> None:
+    """Refuse what would not fit into memory, before it is begun.
 
     Args:
-        count: How many.
-        bytes_each: What each needs at the peak [bytes].
-        item: What they are, for the message: "poses".
-        next_step: What to do about it.
+        item: What asks for it, for the message: "a path of 2e+08 samples".
+        size: Bytes that it needs at the peak; less than 64 MB are not asked about.
+        next_step: How to need less.
 
     Raises:
-        InvalidValueError: If all together need more than is free; the message says how much.
+        InvalidValueError: If less is free; the message gives both numbers.
     """
-    needed = count * bytes_each
-    if needed <= _ALWAYS or needed <= (free := free_memory()):
-        return
-    raise InvalidValueError(
-        f"the number of {item}",
-        f"{count:.6g}, which need {needed / 1e9:.3g} GB",
-        f"what fits the {free / 1e9:.3g} GB of memory that are free",
-        next_step,
-    )
+    if size > UNASKED and size > (free := free_memory()):
+        wanted, left = f"a request for {size / 1e9:.3g} GB of memory", f"<= {free / 1e9:.3g} GB, which are free"
+        raise InvalidValueError(item, wanted, left, next_step)
 
 
 def check_poses(count: int, cable_count: int) -> None:
-    """Refuse to solve for more poses than there is memory.
+    """Refuse to solve, forward or inverse, for more poses than there is memory.
 
     Args:
         count: How many poses.
@@ -49,11 +43,17 @@ def check_poses(count: int, cable_count: int) -> None:
     Raises:
         InvalidValueError: If all together need more than is free; the message says how much.
     """
-    check_memory(count, 400.0 + 64.0 * cable_count, "poses", "Take them in parts.")  # as measured, forward and inverse
+    check_memory(
+        f"a batch of {count:,} poses", count * (_POSE_BYTES + _CABLE_BYTES * cable_count), "Take them in parts."
+    )
 
 
 def free_memory() -> float:
-    """Memory that this process can still take [bytes]; infinite where the system does not tell."""
+    """Memory that this process can still take [bytes]; infinite where the system does not tell.
+
+    Returns:
+        The least of what the machine has free, what its container is allowed and what the process is.
+    """
     free = [float("inf")]
     with contextlib.suppress(OSError, ValueError, AttributeError):  # AttributeError: Windows has no sysconf
         free.append(float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE"))

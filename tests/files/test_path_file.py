@@ -307,7 +307,7 @@ def test_tables_of_other_habits(tmp_path: FilePath, text: str, fragment: str) ->
         ("durations: 1:30\nwaypoints:\n" + TWO, "durations is '1:30'; allowed: a number in s"),
         ("durations: 1_000\nwaypoints:\n" + TWO, "durations is '1_000'"),
         ("durations: 1e308\nwaypoints:\n" + TWO, "durations is 1e+308; allowed: numbers up to 1e+50 s"),
-        ("durations: 1e-320\nwaypoints:\n" + TWO, "durations is 9.99989e-321 s; allowed: >= 1e-50 s"),
+        ("durations: 1e-320\nwaypoints:\n" + TWO, "durations is 9.99989e-321 s; allowed: > 0 s, 1e-50 to 1e+50 s"),
         ("rate: null\n" + HEAD + TWO, "rate is None; allowed: a number in 1/s"),
         ("rate: 100 rad/s\n" + HEAD + TWO, "rate is '100 rad/s'; allowed: a number in 1/s"),
         ("rate: 1e12\n" + HEAD + TWO, "the number of samples is 1e+12"),
@@ -322,5 +322,5 @@ def test_waypoints_of_other_habits(tmp_path: FilePath, text: str, fragment: str)
 
 
 def test_a_rate_too_small_for_a_second_sample_is_both_ends(tmp_path: FilePath) -> None:
-    path = load_path(write(tmp_path, "tour.yaml", "rate: 1e-300\n" + HEAD + TWO))
+    path = load_path(write(tmp_path, "tour.yaml", "rate: 1e-40\n" + HEAD + TWO))
     assert path.time.tolist() == [0.0, 1.0]

@@ -306,3 +306,14 @@ def test_a_notebook_shows_the_figure() -> None:
     figure = plot.overview(PLAN)
     image = Image.open(BytesIO(figure._repr_png_()))  # type: ignore[attr-defined]
     assert image.size == (700, 500)
+
+
+def test_a_path_of_a_hundred_thousand_stops_has_as_many_arrows_as_can_be_told_apart() -> None:
+    count = 200_000
+    moving = (np.arange(count) % 2)[:, None] * np.ones((count, 6))
+    angle = np.linspace(0.0, 6.0, count)
+    place = np.stack((np.cos(angle), np.sin(angle), 0.0 * angle), axis=1)
+    ax = plot.path(sl.Path(np.arange(count) / 1e3, sl.Pose(place, np.eye(3)), moving, 0.0 * moving))
+    begins = np.array([child.xy for child in ax.get_children() if isinstance(child, Annotation)])
+    assert len(begins) == 100
+    assert np.ptp(np.diff(np.unwrap(np.arctan2(begins[:, 1], begins[:, 0])))) < 1e-3  # evenly

@@ -85,3 +85,13 @@ def test_no_name_is_struck_through_or_over_another() -> None:
 def test_no_name_of_many_polygons_is_struck_through() -> None:
     for where, shape in poses(100):
         check_names(plot.polygon(shape), shape, where)
+
+
+@pytest.mark.parametrize("size", [1e-6, 100.0, 1e9])
+def test_names_at_the_tip_of_a_flat_polygon_find_their_ways(size: float) -> None:
+    shape = sl.tension_polygon(MIXED, POSE)
+    corners = size * np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 0.0], [1.0, 0.0], [0.0, 0.0]])
+    flat = replace(shape, vertices=corners, tensions=np.zeros((5, 8)), sides=(shape.sides[0],) * 5)
+    ax = plot.polygon(flat)
+    assert len([text for text in ax.texts if isinstance(text, Annotation)]) == 5
+    check_names(ax, flat, f"flat, {size:g} N")

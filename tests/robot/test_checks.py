@@ -7,27 +7,6 @@ from sagline.robot import checks
 Z = np.array([0.0, 0.0, 1.0])
 
 
-@pytest.mark.parametrize("text", ["", "cogiro", "größer 2", "名" * 100, "a-b_c.d/..", "👩\u200d🔬"])
-def test_names(text: str) -> None:
-    assert checks.name(text) == text
-
-
-@pytest.mark.parametrize("text", ["a" * 101, "a\nb", "a\tb", "\x1b[31m", "a\0", "\ud800", "\u202egnp", 5, None, b"a"])
-def test_what_is_no_name(text: object) -> None:
-    with pytest.raises(
-        InvalidValueError, match=r"name is .*; allowed: one line of printable text, at most 100"
-    ) as caught:
-        checks.name(text)
-    assert len(str(caught.value)) < 300
-
-
-def test_texts_have_lines_but_no_control_characters() -> None:
-    assert checks.text("two\n\tlines" * 1000, "notes") == "two\n\tlines" * 1000
-    for text in ("\x1b]0;x\x07", "a\rb", "\ud800", 5):
-        with pytest.raises(InvalidValueError, match="notes is"):
-            checks.text(text, "notes")
-
-
 @pytest.mark.parametrize(
     ("moments", "pattern", "normal", "good"),
     [

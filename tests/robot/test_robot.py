@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from sagline.cables.cable import Cable
 from sagline.errors import InvalidValueError
@@ -155,3 +156,27 @@ def test_a_flat_box_is_a_box() -> None:
 def test_a_crossed_box_is_refused() -> None:
     with pytest.raises(InvalidValueError, match="test_box: high\\[2\\] is 0 m; allowed: >= low, 1 m"):
         PoseBox([0, 0, 1], [1, 1, 0])
+
+
+def test_the_inertia_of_any_body_is_taken() -> None:
+    generator = np.random.default_rng(5)
+    for flat in (False, True) * 100:  # a few masses, turned anyhow
+        masses, places = generator.uniform(0.1, 2.0, 6), generator.normal(size=(6, 3)) * (1.0, 1.0, float(not flat))
+        places = (places - masses @ places / masses.sum()) @ Rotation.random(rng=generator).as_matrix().T
+        square = np.einsum("k,ki,kj->ij", masses, places, places)
+        tripod(inertia=np.trace(square) * np.eye(3) - square)
+
+
+@pytest.mark.parametrize("moments", [(1.0, 1.0, 2.03), (0.1, 1.0, 1.2), (5.0, 1.0, 1.0)])
+def test_moments_that_no_body_has_are_refused_whatever_the_axes(moments: tuple[float, float, float]) -> None:
+    turn = Rotation.from_rotvec([0.3, -1.0, 0.4]).as_matrix()
+    small, middle, large = sorted(moments)
+    words = f"principal moments {small:g}, {middle:g}, {large:g} kg m.2; allowed: none larger than the other two"
+    with pytest.raises(InvalidValueError, match=words):
+        tripod(inertia=turn @ np.diag(moments) @ turn.T)
+
+
+def test_the_angle_of_a_box_of_poses_is_at_most_half_a_turn() -> None:
+    assert PoseBox([0, 0, 0], [1, 1, 1], np.pi).tilt == np.pi
+    with pytest.raises(InvalidValueError, match=r"test_box: tilt is 6\.98132 rad; allowed: 0 to pi rad"):
+        PoseBox([0, 0, 0], [1, 1, 1], np.radians(400.0))

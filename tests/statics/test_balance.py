@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from sagline.arrays import Array
 from sagline.cables.cable import Cable
+from sagline.errors import CableGeometryError
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.balance import article_balance, structure_matrix
@@ -132,3 +133,23 @@ def test_a_wrench_of_the_wrong_shape_is_named() -> None:
         external_wrench(np.zeros((3, 6)), 4)
     with pytest.raises(ValueError, match=r"wrench\[2\] is nan"):
         external_wrench([0.0, 0.0, np.nan, 0.0, 0.0, 0.0], None)
+
+
+@pytest.mark.parametrize("batch", [False, True])
+def test_where_a_cable_has_no_direction_pose_and_cable_are_told(robot: Robot, batch: bool) -> None:
+    turn = Rotation.from_rotvec([0.1, -0.3, 0.2])
+    at_anchor = robot.frame_anchors[5] - turn.as_matrix() @ robot.platform_anchors[5]
+    pose = Pose(np.stack((np.zeros(3), at_anchor)), turn) if batch else Pose(at_anchor, turn)
+    words = f"pose{' 1' if batch else ''}, cable 5: distance between its ends is 0 m; allowed: >= 1e-09 m"
+    for matrix in (structure_matrix, article_balance):
+        with pytest.raises(CableGeometryError, match=words):
+            matrix(robot, pose)
+
+
+def test_under_an_anchor_the_article_has_no_numbers_and_we_have(robot: Robot) -> None:
+    """Erratum 8, without a warning."""
+    above = np.array([0.0, 0.0, 2.0])
+    straight = robot.replace(platform_anchors=robot.frame_anchors - above - np.eye(8, 3))
+    pose = Pose(np.eye(8, 3)[3], np.eye(3))
+    assert not np.isfinite(article_balance(straight, pose).h[2, 3])
+    np.testing.assert_allclose(structure_matrix(straight, pose)[:3, 3], [0.0, 0.0, 1.0], atol=1e-15)

@@ -1,3 +1,5 @@
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -70,3 +72,20 @@ def test_the_resistance_is_a_number_without_unit() -> None:
 def test_one_pose_at_a_time() -> None:
     with pytest.raises(InvalidValueError, match="one pose"):
         unresisted_motion(planar(), Pose(np.zeros((2, 3)), np.broadcast_to(np.eye(3), (2, 3, 3))))
+
+
+def test_many_cables_are_no_matrix_of_cables_squared() -> None:
+    generator = np.random.default_rng(4)
+    ends = generator.uniform(-1.0, 1.0, (20_000, 3))
+    robot = Robot("many", 5.0 * generator.uniform(-1.0, 1.0, ends.shape), ends, Cable(0.1, 1e5), 10.0, np.eye(3))
+    pose = Pose(np.zeros(3), np.eye(3))
+    tracemalloc.start()
+    motion = unresisted_motion(robot, pose)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 100e6  # the square takes 3 GB
+    structure = structure_matrix(robot, pose)
+    lever = np.linalg.norm(ends, axis=1).max()
+    scaled = structure / np.repeat([1.0, lever], 3)[:, None]
+    squares = np.linalg.eigvalsh(scaled @ scaled.T)
+    assert motion.resistance == pytest.approx(np.sqrt(squares[0] / squares[-1]), rel=1e-9)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array, Flags, checked, kernel_input
+from sagline.arguments import instance
+from sagline.arrays import Array, Flags, checked, kernel_input, number
 from sagline.article.fits import fit_factor
 from sagline.cables.cable import Cable
 from sagline.cables.catenary import Catenary
@@ -16,8 +18,10 @@ from sagline.cables.empirical import Empirical
 from sagline.cables.model import CableState
 from sagline.errors import InvalidValueError
 from sagline.kernels.cable.batch import batch_end
+from sagline.memory import check_memory
 
 CONFIDENCE = 0.95
+POINT_BYTES = 400.0  # what each combination of span, rise and tension takes while it is fitted
 
 
 class Estimate(NamedTuple):
@@ -94,7 +98,7 @@ class EmpiricalFit:
         Returns:
             The largest such sampled weight; NaN if even the lightest cable is too heavy.
         """
-        counted = self.tensions >= (0.0 if tension is None else tension)
+        counted = self.tensions >= (0.0 if tension is None else number(tension, "tension", "N"))
         weight = self.cable_weight[..., counted].ravel()
         error = self.position_error[..., counted].ravel()
         order = np.argsort(-weight)
@@ -126,7 +130,7 @@ def identify_empirical(
     Source:
         Gia Luan & Truong Thinh 2020, sections 3 to 5, in one step each; docs/article.md.
     """
-    if cable.linear_density.ndim or not cable.linear_density > 0.0:
+    if instance(cable, Cable, "cable").linear_density.ndim or not cable.linear_density > 0.0:
         raise InvalidValueError(
             "cable", f"of linear density {cable.linear_density} kg/m", "one cable, > 0 kg/m", "Give a single cable."
         )
@@ -135,7 +139,13 @@ def identify_empirical(
         np.unique(checked(rises, "rises", "m", shape=(None,))),
         np.unique(checked(tensions, "tensions", "N", shape=(None,), above=0.0)),
     )
-    gravity = float(checked(gravity, "gravity", "m/s^2", shape=(), above=0.0))
+    for name, axis in zip(("spans", "rises", "tensions"), axes, strict=True):
+        if not axis.size:
+            raise InvalidValueError(
+                name, "empty", "one number at least", "Give the range in which the cable will work."
+            )
+    gravity = number(gravity, "gravity", "m/s^2", above=0.0)
+    check_memory("spans, rises and tensions", POINT_BYTES * math.prod(map(len, axes)), "Give fewer of them.")
     span, rise, tension = np.meshgrid(*axes, indexing="ij")
     chord_tension = tension * np.hypot(span, rise) / span
     exact = Catenary().from_tension(cable, span, rise, chord_tension, gravity)
@@ -201,7 +211,7 @@ def _estimate(shape: Array, value: Array) -> Estimate:
 
 
 def _tolerance(tolerance: float) -> float:
-    return float(checked(tolerance, "tolerance", "m", shape=(), above=0.0))
+    return number(tolerance, "tolerance", "m", above=0.0)
 
 
 def _first_of_good_tail(values: Array, good: Flags) -> float:

@@ -9,7 +9,8 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array, checked, locked
+from sagline.arguments import brief, choice, optional
+from sagline.arrays import Array, checked, locked, number
 from sagline.cables.cable import Cable
 from sagline.cables.catenary import Catenary
 from sagline.errors import InvalidValueError
@@ -117,22 +118,21 @@ def identify_cable(
         InvalidValueError: If there are fewer measurements than unknowns, or a value is out of range.
     """
     names = _checked_unknowns(unknowns)
-    if tension_at not in get_args(TensionAt):
-        raise InvalidValueError("tension_at", repr(tension_at), ", ".join(get_args(TensionAt)), "Name one of them.")
+    choice(tension_at, "tension_at", get_args(TensionAt))
     data = _Measured(
         checked(span, "span", "m", shape=(None,), above=0.0),
         checked(rise, "rise", "m", shape=(None,)),
         checked(unstrained_length, "unstrained_length", "m", shape=(None,), above=0.0),
         checked(tension, "tension", "N", shape=(None,), above=0.0),
         tension_at,
-        float(checked(gravity, "gravity", "m/s^2", shape=(), above=0.0)),
+        number(gravity, "gravity", "m/s^2", above=0.0),
     )
     data.check(len(names))
     errors = (
-        float(checked(length_error, "length_error", "m", shape=(), above=0.0)),
-        float(checked(tension_error, "tension_error", "N", shape=(), above=0.0)),
+        number(length_error, "length_error", "m", above=0.0),
+        number(tension_error, "tension_error", "N", above=0.0),
     )
-    return _fit(data, names, start or Cable(0.1, 1e5), *errors)
+    return _fit(data, names, _checked_start(start), *errors)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -224,8 +224,19 @@ def _bounds(names: tuple[str, ...]) -> tuple[list[float], list[float]]:
     return [low[name] for name in names], [high[name] for name in names]
 
 
+def _checked_start(start: Cable | None) -> Cable:
+    known = optional(start, Cable, "start") or Cable(0.1, 1e5)
+    if known.linear_density.ndim or not known.linear_density > 0.0:
+        value = f"of linear density {brief(known.linear_density)} kg/m"
+        raise InvalidValueError("start", value, "one cable, > 0 kg/m", "Give a single cable.")
+    return known
+
+
 def _checked_unknowns(unknowns: Sequence[str]) -> tuple[str, ...]:
-    names = tuple(unknowns)
-    if not names or len(set(names)) != len(names) or not set(names) <= set(UNITS):
-        raise InvalidValueError("unknowns", repr(names), f"one to three of {', '.join(UNITS)}", "Name what to find.")
+    if not isinstance(unknowns, list | tuple) or not unknowns:
+        allowed = f"one to three of {', '.join(UNITS)}"
+        raise InvalidValueError("unknowns", brief(unknowns), allowed, "Name what to find, in a list.")
+    names = tuple(choice(name, "unknowns", UNITS) for name in unknowns)
+    if len(set(names)) != len(names):
+        raise InvalidValueError("unknowns", brief(names), "each of them once", "Leave out what is named twice.")
     return names

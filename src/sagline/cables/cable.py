@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sagline.arrays import Array, checked, locked
-from sagline.errors import InvalidValueError
+from sagline.arrays import Array, broadcast_shape, checked, locked
+from sagline.memory import check_memory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,17 +48,10 @@ class Cable:
         """
         density = checked(linear_density, "linear_density", "kg/m", low=0.0)
         stiffness = checked(axial_stiffness, "axial_stiffness", "N", above=0.0)
-        try:
-            density, stiffness = np.broadcast_arrays(density, stiffness)
-        except ValueError:
-            raise InvalidValueError(
-                "axial_stiffness",
-                f"of shape {stiffness.shape}",
-                f"a shape that broadcasts with linear_density's {density.shape}",
-                "Give both for the same cables.",
-            ) from None
-        object.__setattr__(self, "linear_density", locked(np.array(density, order="C")))
-        object.__setattr__(self, "axial_stiffness", locked(np.array(stiffness, order="C")))
+        shape = broadcast_shape("linear_density and axial_stiffness", density.shape, stiffness.shape)
+        check_memory("linear_density and axial_stiffness", 16.0 * math.prod(shape), "Give fewer cables.")
+        for name, field in (("linear_density", density), ("axial_stiffness", stiffness)):
+            object.__setattr__(self, name, locked(np.array(np.broadcast_to(field, shape), order="C")))
 
     @classmethod
     def from_material(cls, linear_density: ArrayLike, youngs_modulus: ArrayLike, section_area: ArrayLike) -> Cable:
@@ -84,6 +78,7 @@ class Cable:
         """
         modulus = checked(youngs_modulus, "youngs_modulus", "Pa", above=0.0)
         area = checked(section_area, "section_area", "m^2", above=0.0)
+        broadcast_shape("youngs_modulus and section_area", modulus.shape, area.shape)
         return cls(linear_density, modulus * area)
 
     def _part(self, index: int | slice | NDArray[Any], shape: tuple[int, ...]) -> Cable:

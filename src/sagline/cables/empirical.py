@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from sagline.arrays import checked
+from sagline.arrays import number
 from sagline.cables.model import CableModel
 from sagline.kernels import codes
 
@@ -31,8 +31,8 @@ class Empirical(CableModel):
 
     def __post_init__(self) -> None:
         """Check the constants."""
-        checked(self.k_h, "k_h", "m/s^2")
-        checked(self.k_p, "k_p", "m^2/s^4", low=0.0)
+        object.__setattr__(self, "k_h", number(self.k_h, "k_h", "m/s^2"))
+        object.__setattr__(self, "k_p", number(self.k_p, "k_p", "m^2/s^4", low=0.0))
 
     @property
     def parameters(self) -> tuple[float, float]:

@@ -9,12 +9,15 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sagline.arrays import Array, Codes, checked, kernel_input, locked
+from sagline.arguments import instance, whole_number
+from sagline.arrays import Array, Codes, checked, kernel_input, locked, number
 from sagline.cables.cable import Cable
 from sagline.cables.problem import Problem
 from sagline.errors import InvalidValueError
+from sagline.indices import length_of, part_of
 from sagline.kernels.cable import batch, shape
 from sagline.kernels.cable.terms import Terms
+from sagline.memory import check_memory
 
 _ARRAYS = (
     "span",
@@ -39,6 +42,16 @@ class CableModel:
     code: ClassVar[int]
     weightless: ClassVar[bool] = False
 
+    def __post_init__(self) -> None:
+        """Refuse the model that is none: the interface by itself.
+
+        Raises:
+            InvalidValueError: If there are no equations.
+        """
+        if type(self) is CableModel:
+            models = "Straight, Elastic, Empirical, Parabolic, Catenary"
+            raise InvalidValueError("CableModel()", "the interface alone", models, "Choose one of them.")
+
     @property
     def parameters(self) -> tuple[float, float]:
         """The article's k_h and k_p; zero where the model has none."""
@@ -52,8 +65,11 @@ class CableModel:
 
         Returns:
             Code, k_h, k_p and gravity.
+
+        Raises:
+            InvalidValueError: If gravity is negative, or no number.
         """
-        return self.code, *self.parameters, gravity
+        return self.code, *self.parameters, number(gravity, "gravity", "m/s^2", low=0.0)
 
     def from_tension(
         self, cable: Cable, span: ArrayLike, rise: ArrayLike, chord_tension: ArrayLike, gravity: float = 9.81
@@ -92,6 +108,7 @@ class CableModel:
         Source:
             Irvine 1981, ch. 2; docs/model.md, sections 2 (P3) and 3.
         """
+        instance(cable, Cable, "cable")
         tension = checked(chord_tension, "chord_tension", "N", low=0.0)
         problem = Problem.of(cable, span, rise, tension, gravity)
         length, horizontal, vertical, status = problem.outputs()
@@ -125,6 +142,7 @@ class CableModel:
         Source:
             Irvine 1981, ch. 2; docs/model.md, sections 2 (P2) and 3.
         """
+        instance(cable, Cable, "cable")
         length = checked(unstrained_length, "unstrained_length", "m", above=0.0)
         problem = Problem.of(cable, span, rise, length, gravity)
         tension, horizontal, vertical, status = problem.outputs()
@@ -167,11 +185,10 @@ class CableModel:
             Horizontal and vertical coordinates from the frame end on [m], shape (..., points, 2).
 
         Raises:
-            InvalidValueError: If fewer than two points are asked for.
+            InvalidValueError: If fewer than two points are asked for, or cable or state are none.
         """
-        if points < 2:
-            raise InvalidValueError("points", points, ">= 2", "Ask for the two ends at least.")
-        return replace(state, model=self, cable=cable).points(points)
+        hung = replace(instance(state, CableState, "state"), model=self, cable=instance(cable, Cable, "cable"))
+        return hung.points(whole_number(points, "points", 2))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -212,9 +229,7 @@ class CableState:
 
     def __len__(self) -> int:
         """Length of the first axis."""
-        if not self.shape:
-            raise TypeError("the state of a single cable has no length")
-        return self.shape[0]
+        return length_of(self.shape, "state of a single cable")
 
     def __getitem__(self, index: int | slice | NDArray[Any]) -> CableState:
         """The state of a part of the cables, along the first axis.
@@ -223,13 +238,12 @@ class CableState:
             index: A number, which may count from the end; a slice; or an array of numbers or booleans.
 
         Raises:
-            TypeError: If the state is that of a single cable.
-            IndexError: If there is no such entry.
+            NoBatchError: If the state is that of a single cable; it is a TypeError too.
+            NoSuchEntryError: If there is no such entry; it is an IndexError too.
         """
-        if not self.shape:
-            raise TypeError("the state of a single cable cannot be indexed")
-        arrays: dict[str, Any] = {name: locked(getattr(self, name)[index, ...]) for name in _ARRAYS}
-        return replace(self, cable=self.cable._part(index, self.shape), **arrays)
+        part = part_of(index, self.shape, "state of a single cable")
+        arrays: dict[str, Any] = {name: locked(getattr(self, name)[part, ...]) for name in _ARRAYS}
+        return replace(self, cable=self.cable._part(part, self.shape), **arrays)
 
     def __iter__(self) -> Iterator[CableState]:
         """The entries along the first axis, one by one."""
@@ -284,7 +298,12 @@ class CableState:
 
         Returns:
             Horizontal and vertical coordinates [m], frame end first, shape (..., count, 2).
+
+        Raises:
+            InvalidValueError: If fewer than two are asked for, or more than the memory of this machine holds.
         """
+        whole_number(count, "points", 2)
+        check_memory("points", 16.0 * self.unstrained_length.size * count, "Ask for fewer points.")
         out = np.empty((self.unstrained_length.size, count, 2))
         shape.shape_points(self.model.terms(self.gravity), *self._columns(), out)
         return locked(out.reshape(*self.shape, count, 2))

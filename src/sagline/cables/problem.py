@@ -8,9 +8,10 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array, Codes, checked, kernel_input, locked
+from sagline.arrays import Array, Codes, broadcast_shape, checked, kernel_input, locked, number
 from sagline.cables.cable import Cable
 from sagline.errors import CableGeometryError, InvalidValueError
+from sagline.memory import check_memory
 
 
 class Problem(NamedTuple):
@@ -51,16 +52,10 @@ class Problem(NamedTuple):
         """
         span = _checked_span(span)
         rise = checked(rise, "rise", "m")
-        gravity = float(checked(gravity, "gravity", "m/s^2", low=0.0, shape=()))
-        try:
-            shape = np.broadcast_shapes(span.shape, rise.shape, given.shape, cable.linear_density.shape)
-        except ValueError as error:
-            raise InvalidValueError(
-                "cable, span, rise and tension or length",
-                f"not of one shape ({error})",
-                "shapes that broadcast",
-                "Give one value for each cable, or one for all.",
-            ) from None
+        gravity = number(gravity, "gravity", "m/s^2", low=0.0)
+        item = "span, rise, tension or length, and cable"
+        shape = broadcast_shape(item, span.shape, rise.shape, given.shape, cable.linear_density.shape)
+        check_memory(item, 80.0 * math.prod(shape), "Give fewer cables at once.")
         if (span.size == 0 or span.min() == 0.0) and not np.all((span != 0.0) | (rise != 0.0)):
             raise CableGeometryError(
                 "span and rise",

@@ -9,6 +9,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
+from sagline.arguments import file_path, optional, text
 from sagline.arrays import Array
 from sagline.cables.cable import Cable
 from sagline.errors import FileError, InvalidValueError
@@ -50,7 +51,10 @@ def load_caspr(source: str | os.PathLike[str], cables: Cable | None = None, cabl
         FileError: If a file cannot be read, the two are not to be found, or they describe no robot with one platform
             and straight, unrouted cables.
     """
-    bodies, cables_file = _files(Path(source))
+    optional(cables, Cable, "cables")
+    if cable_set is not None:
+        text(cable_set, "cable_set")
+    bodies, cables_file = _files(file_path(source, "source", folder=True))
     at = bodies
     try:
         platform = _platform(read_xml(bodies))

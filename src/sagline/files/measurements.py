@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
+from sagline.arguments import file_path
 from sagline.arrays import Array, locked
 from sagline.files.table import TABLE_LIMIT, Table, line_error
 from sagline.files.text import read_text
@@ -45,7 +45,7 @@ def load_measurements(file: os.PathLike[str] | str) -> Measurements:
     Raises:
         FileError: If it cannot be read, or a column or number is wrong; the message names the line.
     """
-    path = Path(file)
+    path = file_path(file)
     table = Table.read(path, read_text(path, TABLE_LIMIT), UNITS)
     if missing := [name for name in UNITS if name not in table.columns]:
         raise line_error(path, table.header, f"missing column {', '.join(missing)}; found: {', '.join(table.columns)}")

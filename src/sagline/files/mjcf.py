@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import eigh
 
+from sagline.arguments import instance
 from sagline.arrays import Array, checked
 from sagline.cables.elastic import Elastic
 from sagline.errors import InvalidValueError
@@ -69,7 +70,8 @@ def dump_mjcf(robot: Robot, pose: Pose, unstrained_length: ArrayLike | None = No
         InvalidValueError: If the pose is a batch, a length is below 1e-6 m, or no tensions within the robot's limits
             hold the platform there.
     """
-    if pose.shape:
+    instance(robot, Robot, "robot")
+    if instance(pose, Pose, "pose").shape:
         raise InvalidValueError("pose", f"a batch of {len(pose)}", "a single pose", "Write one model a pose.")
     lengths = _held(robot, pose) if unstrained_length is None else _checked(robot, unstrained_length)
     stiffness = robot.cables.axial_stiffness / lengths

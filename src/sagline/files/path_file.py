@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from sagline.arguments import file_path
 from sagline.arrays import Array, checked
 from sagline.errors import FileError, InvalidValueError
 from sagline.files.path_table import QUATERNION_TOLERANCE, path_from_table
@@ -61,7 +62,7 @@ def load_path(file: str | os.PathLike[str]) -> Path:
     Raises:
         FileError: If the file cannot be read, or what it says is no path; the message names the line or the key.
     """
-    path = FilePath(file)
+    path = file_path(file)
     yaml, table = (_path_from_yaml, YAML_LIMIT), (path_from_table, TABLE_LIMIT)
     readers = {".yaml": yaml, ".yml": yaml, ".csv": table}
     if path.suffix.lower() not in readers:

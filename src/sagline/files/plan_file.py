@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from sagline.arguments import file_path, instance
 from sagline.arrays import locked
 from sagline.cables.catenary import Catenary
 from sagline.cables.elastic import Elastic
@@ -61,9 +62,9 @@ def save_plan(plan: Plan, file: os.PathLike[str] | str) -> None:
             none of sagline's; or if its values are none that `inverse` gives.
         FileError: If the file cannot be written; what was there before is untouched.
     """
-    data = _dataset(plan)
+    data = _dataset(instance(plan, Plan, "plan"))
     check_plan(data, plan.state.one_robot.cable_count)
-    with written_whole(file, size=data.nbytes + HEADERS + len(data.attrs["robot"].encode())) as partial:
+    with written_whole(file_path(file), size=data.nbytes + HEADERS + len(data.attrs["robot"].encode())) as partial:
         # _FillValue None: numbers are stored as they are, and NaN needs no second meaning
         encoding = {str(name): {"_FillValue": None} for name in data.variables}
         try:
@@ -97,7 +98,7 @@ def load_plan(file: os.PathLike[str] | str) -> Plan:
         >>> print(plan.state.robot.name, plan.unstrained_length.shape)
         cogiro (283, 8)
     """
-    path = FilePath(file)
+    path = file_path(file)
     data, found = read_dataset(path)
     _check_format(path, data.attrs, found)
     try:

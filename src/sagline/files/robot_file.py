@@ -8,6 +8,7 @@ from typing import Any
 
 import yaml
 
+from sagline.arguments import file_path, instance
 from sagline.errors import FileError, InvalidValueError
 from sagline.files.robot_schema import RobotEntry
 from sagline.files.schema import validated
@@ -50,7 +51,7 @@ def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
         >>> robot.cable_count, robot.mass, robot.motion_pattern
         (8, 91.058, '3R3T')
     """
-    path = Path(name_or_path)
+    path = file_path(name_or_path, "name_or_path")
     if isinstance(name_or_path, str) and _is_name(name_or_path, path):
         return parse_robot(preset_text(name_or_path), f"preset {name_or_path}")
     return parse_robot(read_text(path, YAML_LIMIT), path)
@@ -90,6 +91,7 @@ def dump_robot(robot: Robot) -> str:
         >>> print(sl.dump_robot(sl.load_robot("cogiro")).splitlines()[0])
         name: cogiro
     """
+    instance(robot, Robot, "robot")
     data: dict[str, Any] = {"name": robot.name, "source": robot.source, "notes": robot.notes}
     data["assumed"] = dict(robot.assumed)
     data["cables"] = {key: getattr(robot.cables, key).tolist() for key in ("linear_density", "axial_stiffness")}

@@ -7,12 +7,11 @@ from typing import Any, Final
 import numpy as np
 from pydantic import Field, model_validator
 
-from sagline.arrays import Array, checked
+from sagline.arrays import Array, checked, exactly, number
 from sagline.cables.cable import Cable
 from sagline.errors import InvalidValueError
 from sagline.files.quantity import in_si
 from sagline.files.schema import Entry
-from sagline.robot import checks
 from sagline.robot.inertia import box_inertia, cylinder_inertia
 from sagline.robot.pose_box import PoseBox
 from sagline.robot.robot import Robot
@@ -120,17 +119,17 @@ class _Inertia(_RobotPart):
         values = [self.given(key, "inertia.") for key in way]
         match way[0]:
             case "matrix":
-                return checks.exactly(values[0], "inertia", "kg m^2", (3, 3))
+                return exactly(values[0], "inertia", "kg m^2", (3, 3))
             case "diagonal":
-                return np.diag(checks.exactly(values[0], "inertia", "kg m^2", (3,)))
+                return np.diag(exactly(values[0], "inertia", "kg m^2", (3,)))
             case "box":
-                return box_inertia(mass, *checks.exactly(values[0], "inertia.box", "m", (3,), above=0.0))
+                return box_inertia(mass, *exactly(values[0], "inertia.box", "m", (3,), above=0.0))
             case "cylinder_radius":
                 sizes = zip(values, way, strict=True)
-                return cylinder_inertia(mass, *(checks.number(v, f"inertia.{key}", "m", above=0.0) for v, key in sizes))
+                return cylinder_inertia(mass, *(number(v, f"inertia.{key}", "m", above=0.0) for v, key in sizes))
         xx, yy, zz = values
         xy, xz, yz = (self.given(key, "inertia.") for key in ("Ixy", "Ixz", "Iyz"))
-        return checks.exactly([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], "inertia", "kg m^2", (3, 3))
+        return exactly([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], "inertia", "kg m^2", (3, 3))
 
 
 class _TestBox(_RobotPart):
@@ -176,7 +175,7 @@ class RobotEntry(_RobotPart):
         fields = {key: self.given(key) if key in _UNITS else getattr(self, key) for key in self.model_fields_set}
         fields["cables"] = self.cables.cable()
         if self.inertia is not None:
-            mass = checks.number(fields["mass"], "mass", "kg", above=0.0)
+            mass = number(fields["mass"], "mass", "kg", above=0.0)
             fields["inertia"] = self.inertia.about_center(mass)
         if self.test_box is not None:
             fields["test_box"] = PoseBox(*(self.test_box.given(key, "test_box.") for key in ("low", "high", "tilt")))

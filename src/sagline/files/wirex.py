@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 import re
 from itertools import combinations_with_replacement, product
-from pathlib import Path
 from typing import Final, cast, get_args
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
+from sagline.arguments import file_path, optional
 from sagline.arrays import Array
 from sagline.cables.cable import Cable
 from sagline.errors import FileError, InvalidValueError
@@ -44,7 +44,8 @@ def load_wirex(source: str | os.PathLike[str], cables: Cable | None = None) -> I
     Raises:
         FileError: If the file cannot be read, has another version, or describes no robot with one platform.
     """
-    path = Path(source)
+    optional(cables, Cable, "cables")
+    path = file_path(source, "source")
     try:
         root = read_xml(path)
         _check_generation(root)

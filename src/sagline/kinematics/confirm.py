@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sagline.arguments import callback, instance
 from sagline.arrays import Array, Codes, Flags, locked
 from sagline.blocks import Progress, blocks
 from sagline.kinematics.forward import forward
@@ -64,6 +65,9 @@ def confirm(plan: Plan, *, progress: Progress | None = None) -> Confirmation:
     Returns:
         The plan with the poses found.
 
+    Raises:
+        InvalidValueError: If the plan is none.
+
     Examples:
         >>> import numpy as np
         >>> import sagline as sl
@@ -73,8 +77,9 @@ def confirm(plan: Plan, *, progress: Progress | None = None) -> Confirmation:
         >>> print(f"{1e3 * error.max():.2f} mm off")
         0.23 mm off
     """
-    state, lengths = plan.state, plan.unstrained_length
-    if not state.pose.shape:
+    callback(progress, "progress")
+    state, lengths = instance(plan, Plan, "plan").state, plan.unstrained_length
+    if not state.pose.shape or not len(lengths):  # all at once
         found = forward(state.robot, lengths, start=state.pose, wrench=state.wrench, progress=progress)
         return Confirmation(plan, found.pose, found.status, found.wrench_residual)
     parts = []

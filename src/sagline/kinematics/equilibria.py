@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from sagline.arguments import instance, whole_number
 from sagline.arrays import Array, Indices, locked
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
@@ -17,10 +18,12 @@ from sagline.kinematics.forward_rows import Found
 from sagline.kinematics.forward_solution import ForwardSolution
 from sagline.kinematics.forward_status import STABLE, ForwardStatus
 from sagline.kinematics.start import from_orientations, start_quaternions
+from sagline.memory import check_memory
 from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.robot import Robot
 from sagline.statics.wrench import external_wrench
 
+START_BYTES = 250.0  # what each cable of a start takes while it is solved
 _SAME = 1e-6  # relative to the mean length, and in radians: closer poses are one
 _KEPT = (*STABLE, ForwardStatus.FITTED)
 _CATENARY = Catenary()
@@ -72,18 +75,20 @@ def equilibria(
         Equilibria.
 
     Raises:
-        InvalidValueError: If a length is wrong (the message names the cable), or starts is below 1.
+        InvalidValueError: If a length is wrong (the message names the cable), starts is below 1 or more than
+            memory holds, or an argument is of the wrong kind.
 
     Source:
         docs/model.md, section 6.
     """
-    lengths = checked_lengths(robot, unstrained_length)
+    instance(model, CableModel, "model")
+    lengths = checked_lengths(instance(robot, Robot, "robot"), unstrained_length)
     if lengths.ndim != 1 or np.isnan(lengths).any():
         raise InvalidValueError(
             "unstrained_length", f"of shape {lengths.shape}", f"({robot.cable_count},), no NaN", "Give one sample."
         )
-    if starts < 1:
-        raise InvalidValueError("starts", starts, ">= 1", "Ask for one start at least.")
+    starts, seed = whole_number(starts, "starts", 1), whole_number(seed, "seed", 0)
+    check_memory("starts", START_BYTES * starts * robot.cable_count, "Ask for fewer starts.")
     load = external_wrench(wrench, None)
     quaternions = _quaternions(robot, starts, seed)
     samples = locked(np.repeat(lengths[None], len(quaternions), axis=0))

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array, locked
+from sagline.arguments import callback, instance, optional
+from sagline.arrays import LARGEST, SMALLEST, Array, locked, numbers
 from sagline.blocks import Progress
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
@@ -18,6 +19,7 @@ from sagline.kinematics.measured import MeasuredTension, corrected
 from sagline.kinematics.start import search
 from sagline.memory import check_poses
 from sagline.robot.pose import Pose
+from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot
 from sagline.robot.several import check_count, first_of, together
 from sagline.statics.tables import pose_rows
@@ -59,6 +61,8 @@ def forward(
 
     Raises:
         InvalidValueError: If a length is not positive or single lengths of a sample are NaN (the message names the
+            cable), several robots do not fit together (it names which), an argument is of the wrong kind or shape,
+            the start is outside the motions of the robot's pattern, or so many samples need more memory than is free.
             cable), several robots do not fit together (it names which), an argument is of the wrong shape, or so many
             samples need more memory than is free.
 
@@ -74,6 +78,10 @@ def forward(
         True [1. 1. 2.]
     """
     robots = together(robot)
+    for value, kind, item in ((start, Pose, "start"), (tension_measured, MeasuredTension, "tension_measured")):
+        optional(value, kind, item)
+    instance(model, CableModel, "model")
+    callback(progress, "progress")
     lengths = checked_lengths(first_of(robots), unstrained_length)
     shape = lengths.shape[:-1]
     count = shape[0] if shape else None
@@ -84,6 +92,7 @@ def forward(
     if start is None:
         found = search(robots, model, samples, loads, progress)
     else:
+        check_reach(first_of(robots), start, "start")
         chained = bool(shape) and not start.shape
         starts = start_rows(start, lengths)
         found = solve_rows(robots, model, samples, starts, loads, chained=chained, progress=progress)
@@ -106,12 +115,7 @@ def checked_lengths(robot: Robot, lengths: ArrayLike) -> Array:
     Raises:
         InvalidValueError: If they are not; the message names the cable and, of many, the sample.
     """
-    try:
-        array = np.array(lengths, dtype=np.float64, order="C")
-    except (TypeError, ValueError) as error:
-        raise InvalidValueError(
-            "unstrained_length", repr(lengths), "numbers", f"Give lengths as plain numbers ({error})."
-        ) from None
+    array = numbers(lengths, "unstrained_length", "m")
     m = robot.cable_count
     if array.ndim not in (1, 2) or array.shape[-1] != m:
         raise InvalidValueError(
@@ -121,7 +125,7 @@ def checked_lengths(robot: Robot, lengths: ArrayLike) -> Array:
             f"Give one length for each of the {m} cables of {robot.name}.",
         )
     absent = np.isnan(array).all(axis=-1, keepdims=True)
-    wrong = ~(np.isfinite(array) & (array > 0.0)) & ~absent
+    wrong = ~((array >= SMALLEST) & (array < LARGEST)) & ~absent
     if wrong.any():
         index = tuple(int(i) for i in np.argwhere(wrong)[0])
         sample = f"sample {index[0]}, " if array.ndim == 2 else ""

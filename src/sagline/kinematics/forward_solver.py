@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array, Codes, checked, locked
+from sagline.arguments import instance, optional
+from sagline.arrays import LARGEST, SMALLEST, Array, Codes, checked, exactly, locked
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
@@ -15,6 +16,7 @@ from sagline.kernels import codes, tables
 from sagline.kernels.forward.forward import forward_poses
 from sagline.kernels.forward.problem import FORCE_RESIDUAL, FORWARD_NUMBERS, MOMENT_RESIDUAL, STIFFNESS_MIN
 from sagline.kernels.memory import memory_for
+from sagline.kinematics.caller import give, take
 from sagline.kinematics.forward_rows import new_chain
 from sagline.kinematics.forward_status import STABLE, ForwardStatus
 from sagline.kinematics.start import search
@@ -61,10 +63,11 @@ class ForwardSolver:
             start: Where the first step begins; None: it searches, which takes some hundred microseconds.
 
         Raises:
-            InvalidValueError: If the model is Straight, which has no forces, or start is a batch.
+            InvalidValueError: If the model is Straight, which has no forces, start is a batch, or an argument is of the
+                wrong kind.
         """
-        self._robot = robot
-        self._model = model or Catenary()
+        self._robot = instance(robot, Robot, "robot")
+        self._model = optional(model, CableModel, "model") or Catenary()
         if self._model.code == codes.STRAIGHT:
             raise InvalidValueError(
                 "model", "Straight()", "a model with forces", "Use forward() to fit straight cables."
@@ -90,6 +93,9 @@ class ForwardSolver:
             memory_for(m),
             (self._pose, self._results, np.empty((1, m), dtype=np.int8), self._numbers, self._status),
         )
+        self._own_lengths, self._load = self._lengths[0].data, self._wrench[0].data
+        self._place, self._turn = self._pose[0, :3], self._pose[0, 3:]
+        self._loaded = False  # whether the wrench of the last sample was given
         self._start[0, 6] = 1.0
         self._lengths[0] = np.nan  # compiles, solves nothing
         forward_poses(*self._arguments)
@@ -102,9 +108,9 @@ class ForwardSolver:
             start: Where the next step begins; None: it searches.
 
         Raises:
-            InvalidValueError: If start is a batch.
+            InvalidValueError: If start is a batch, or no pose.
         """
-        if start is not None and start.shape:
+        if start is not None and instance(start, Pose, "start").shape:
             raise InvalidValueError("start", f"a batch of {len(start)} poses", "one pose", "Give one of them.")
         self._lost = start is None
         if start is not None:
@@ -124,7 +130,7 @@ class ForwardSolver:
             InvalidValueError: If a length is not positive (the message names its index), or a shape is wrong.
         """
         lengths = self._checked(unstrained_length)
-        load = None if wrench is None else checked(wrench, "wrench", "N or N m", shape=(6,))
+        load = None if wrench is None else exactly(wrench, "wrench", "N or N m", (6,))
         position, quaternion = np.empty(3), np.empty(4)
         status = self.step_into(lengths, position, quaternion, load)
         numbers = self._numbers[0]
@@ -140,11 +146,10 @@ class ForwardSolver:
 
     def _checked(self, unstrained_length: ArrayLike) -> Array:
         """Lengths of shape (m,), positive and finite; looked at as a list, which for few numbers is the fastest."""
-        given = np.asarray(unstrained_length)
-        shape = self._lengths.shape[1:]
-        if given.dtype == np.float64 and given.shape == shape:
+        given, shape = unstrained_length, self._lengths.shape[1:]
+        if type(given) is np.ndarray and given.dtype == np.float64 and given.shape == shape:
             values = given.tolist()
-            if min(values) > 0.0 and sum(values) < np.inf:  # the sum is NaN if a length is
+            if min(values) >= SMALLEST and sum(values) < LARGEST:  # the sum is NaN if a length is
                 return given
         lengths = checked(unstrained_length, "unstrained_length", "m", shape=shape, above=0.0)
         if lengths.ndim != 1:
@@ -156,7 +161,9 @@ class ForwardSolver:
     def step_into(
         self, unstrained_length: Array, position: Array, quaternion: Array, wrench: Array | None = None
     ) -> ForwardStatus:
-        """Solve one sample into the caller's memory: no allocation once a pose is known, no check of the arguments.
+        """Solve one sample into the caller's memory: no allocation once a pose is known.
+
+        What is wrong with a length or a number of the wrench is told by the status, not by an error.
 
         Args:
             unstrained_length: L [m], shape (m,).
@@ -166,9 +173,17 @@ class ForwardSolver:
 
         Returns:
             The status of the sample.
+
+        Raises:
+            InvalidValueError: If an argument is no such array of numbers.
         """
-        self._lengths[0] = unstrained_length
-        self._wrench[0] = 0.0 if wrench is None else wrench
+        take(self._own_lengths, unstrained_length, "unstrained_length", "m")
+        if wrench is not None:
+            self._loaded = True
+            take(self._load, wrench, "wrench", "N or N m")
+        elif self._loaded:
+            self._loaded = False
+            self._wrench.fill(0.0)
         if self._lost:
             found = search(self._robot, self._model, locked(self._lengths.copy()), locked(self._wrench.copy()))
             self._start[:] = found.poses
@@ -177,6 +192,6 @@ class ForwardSolver:
         if status in STABLE:
             self._start[0] = self._pose[0]
             self._lost = False
-        position[:] = self._pose[0, :3]
-        quaternion[:] = self._pose[0, 3:]
+        give(self._place, position, "position")
+        give(self._turn, quaternion, "quaternion")
         return status

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array, Codes, locked
+from sagline.arguments import brief, callback, instance, optional
+from sagline.arrays import Array, locked
 from sagline.blocks import Progress
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel, CableState
-from sagline.errors import CableGeometryError, InvalidValueError
+from sagline.errors import InvalidValueError
 from sagline.kernels import codes, tables
 from sagline.kernels.inverse.verdicts import ENOUGH
 from sagline.kinematics.inverse_rows import decide_rows, solve_rows
@@ -20,8 +21,10 @@ from sagline.memory import check_poses
 from sagline.motion.path import Path
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
+from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot
 from sagline.robot.several import cables_of, first_of, one_a_pose
+from sagline.statics.balance import refuse_missing_chords
 from sagline.statics.tables import pose_rows
 from sagline.statics.wrench import external_wrench, inertial_wrench
 from sagline.tension.closest import Closest
@@ -63,8 +66,9 @@ def inverse(
 
     Raises:
         InvalidValueError: If a robot has fewer cables than degrees of freedom, the method cannot share among
-            its cables, several robots do not fit together (the message names which), an argument is of the wrong
-            shape, or so many poses need more memory than is free.
+            its cables, several robots do not fit together (the message names which), an argument is of the
+            wrong kind or shape, a pose is outside the motions of the robot's pattern, or so many poses need more
+            memory than is free.
         CableGeometryError: If a cable has no length at some pose.
 
     Source:
@@ -77,10 +81,13 @@ def inverse(
         >>> print(plan.feasible, plan.unstrained_length.round(3))
         True [11.049 10.542  9.674  9.829  8.49   7.85   9.453  9.402]
     """
+    _check_kinds(motion, model, tension, previous)
+    callback(progress, "progress")
     method = tension if isinstance(motion, Path) or previous is not None else tension.alone
     pose = motion.pose if isinstance(motion, Path) else motion
     robots = one_a_pose(robot, len(pose) if pose.shape else None)
     shared = first_of(robots)
+    check_reach(shared, pose, "pose")
     options = kernel_options(robots, model, method)
     rows = pose_rows(pose)
     count = len(rows)
@@ -91,7 +98,8 @@ def inverse(
     reference = _reference(shared, previous, tension.variable)
     loads = np.atleast_2d(load)
     found = solve_rows(robots, method, options, rows, loads, reference, progress)
-    _refuse_missing_chords(found.pose_status, found.results)
+    if (found.pose_status == codes.POSE_NO_CHORD).any():
+        refuse_missing_chords(np.hypot(found.results[tables.SPAN], found.results[tables.RISE]), pose)
     verdicts = decide_rows(robots, options, rows, loads, found, progress)
     cables = CableState(
         model=model,
@@ -119,6 +127,15 @@ def inverse(
         bracket=locked(verdicts.brackets.reshape(*pose.shape, 2)),
         at_border=locked(verdicts.at_border.reshape(pose.shape)),
     )
+
+
+def _check_kinds(motion: object, model: object, tension: object, previous: object) -> None:
+    if not isinstance(motion, Path | Pose):
+        step = "Give Pose.from_euler(position, 0, 0, 0), or quintic_path(waypoints, speed=1.0)."
+        raise InvalidValueError("motion", brief(motion), "a Pose or a Path", step)
+    instance(model, CableModel, "model")
+    instance(tension, TensionMethod, "tension")
+    optional(previous, Plan, "previous")
 
 
 def _in_world(components: Array, robot: Robot) -> Array:
@@ -149,17 +166,3 @@ def _reference(robot: Robot, previous: Plan | None, variable: Variable) -> Array
         return np.full(robot.cable_count, np.nan)
     last: Array = np.atleast_2d(tensions)[feasible[-1]].copy()
     return last
-
-
-def _refuse_missing_chords(status: Codes, results: Array) -> None:
-    lost = np.flatnonzero(status == codes.POSE_NO_CHORD)
-    if not lost.size:
-        return
-    pose = int(lost[0])
-    cable = int(np.argmin(np.hypot(results[tables.SPAN, pose], results[tables.RISE, pose])))
-    raise CableGeometryError(
-        f"pose {pose}, cable {cable}: distance between its ends",
-        "0 m",
-        "> 1e-9 m",
-        "Move the platform away from the anchor, or the anchor away from the path.",
-    )

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import struct
 from functools import partial
-from math import isfinite, nan
+from math import hypot, isfinite, nan
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array, checked, locked
+from sagline.arguments import instance, optional
+from sagline.arrays import Array, exactly, locked
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
@@ -18,6 +20,7 @@ from sagline.kernels.inverse.poses import inverse_poses
 from sagline.kernels.inverse.verdicts import ENOUGH, decide_poses
 from sagline.kernels.jit import machine_code
 from sagline.kernels.memory import memory_for
+from sagline.kinematics.caller import ARRAY, FLOAT, WHOLE, give, take
 from sagline.kinematics.inverse_rows import UNDECIDED, Found, Verdicts, covers_all
 from sagline.kinematics.status import PoseStatus
 from sagline.robot.robot import Robot
@@ -26,8 +29,12 @@ from sagline.tension.closest import Closest
 from sagline.tension.method import TensionMethod
 from sagline.tension.options import kernel_options, takes_default_kernel
 
-_STATUSES = tuple(PoseStatus)  # by code; a lookup costs a tenth of a conversion
-QUATERNION_TOLERANCE = 2e-6  # of the squared length: as `Pose.from_quaternion`
+_STATUSES = tuple(sorted(PoseStatus))  # by code; a lookup costs a tenth of a conversion
+# takes exactly so many real numbers, quicker than an array takes a tuple
+_POSE = struct.Struct(f"{tables.POSE_COLUMNS}d").pack_into
+QUATERNION_TOLERANCE = 1e-6  # of the length: as `Pose.from_quaternion`
+_PLAIN = (tuple, list)
+ROUNDING = 1e-15  # of the length: what needs no normalizing
 
 
 class InverseStep(NamedTuple):
@@ -73,16 +80,20 @@ class InverseSolver:
             tension: How the load is shared; the default is `Closest`, to the step before.
 
         Raises:
-            InvalidValueError: If the robot has too few cables, or the method cannot share among them.
+            InvalidValueError: If the robot has too few cables, the method cannot share among them, or an argument is of
+                the wrong kind.
         """
-        m, n = robot.cable_count, robot.degrees_of_freedom
-        method = tension or Closest()
+        m, n = instance(robot, Robot, "robot").cable_count, robot.degrees_of_freedom
+        method = optional(tension, TensionMethod, "tension") or Closest()
         self._robot = robot
-        self._options = kernel_options(robot, model or Catenary(), method)
+        self._options = kernel_options(robot, optional(model, CableModel, "model") or Catenary(), method)
         self._pose = np.zeros((1, tables.POSE_COLUMNS))
         self._pose[0, 6] = 1.0
-        self._position, self._quaternion = self._pose[0, :3], self._pose[0, 3:]
         self._wrench = np.zeros((1, 6))
+        self._pose_bytes = self._pose[0].data.cast("B")
+        self._position: Any = self._pose[0, :3].data
+        self._quaternion: Any = self._pose[0, 3:].data
+        self._load = self._wrench[0].data
         self._reference = np.full(m, np.nan)
         self._found = Found.empty(1, m, n)
         self._status = self._found.pose_status.data  # read five times faster than an array of one
@@ -119,12 +130,14 @@ class InverseSolver:
             A fresh result whose arrays belong to the caller.
 
         Raises:
-            InvalidValueError: If an argument is not finite or of the wrong shape.
+            InvalidValueError: If an argument is not finite or of the wrong shape, or the quaternion is not of length 1
+                to 1e-6.
         """
-        _check_pose(position, quaternion)
-        load = None if wrench is None else checked(wrench, "wrench", "N or N m", shape=(6,))
+        load = None if wrench is None else exactly(wrench, "wrench", "N or N m", (6,))
         lengths = np.empty(self._reference.size)
         status = self.step_into(position, quaternion, lengths, load)
+        if status is PoseStatus.NO_POSE:
+            raise self._no_pose()
         return InverseStep(
             lengths,
             self._found.results[tables.TENSION, 0].copy(),
@@ -137,49 +150,80 @@ class InverseSolver:
     def step_into(
         self, position: ArrayLike, quaternion: ArrayLike, out: Array, wrench: ArrayLike | None = None
     ) -> PoseStatus:
-        """Solve one pose into the caller's memory: no allocation, no check of the arguments.
+        """Solve one pose into the caller's memory: no allocation, and no error where a number is wrong but a status.
 
         Args:
             position: Of the platform origin [m], shape (3,).
-            quaternion: Rotation platform -> world, unit, scalar last, shape (4,).
+            quaternion: Rotation platform -> world, scalar last, of length 1 to 1e-6 (what is left is normalized away),
+                shape (4,).
             out: Filled with the unstrained lengths [m], shape (m,); NaN where there is no answer.
             wrench: External plus inertial, about the center of mass, world axes [N, N m], shape (6,); None for none.
 
         Returns:
-            The status of the pose.
+            The status of the pose; NO_POSE where a number is not finite, or the quaternion is of another length.
+
+        Raises:
+            InvalidValueError: If an argument is no such array of numbers.
         """
-        self._position[:] = position
-        self._quaternion[:] = quaternion
+        place: Any = position
+        turn: Any = quaternion
+        try:
+            if place.__class__ is ARRAY and turn.__class__ is ARRAY:
+                self._position[WHOLE] = place
+                self._quaternion[WHOLE] = turn
+            elif place.__class__ in _PLAIN and turn.__class__ in _PLAIN:
+                (x, y, z), (i, j, k, w) = place, turn
+                _POSE(self._pose_bytes, 0, x, y, z, i, j, k, w)
+            else:
+                raise TypeError
+        except (struct.error, TypeError, ValueError, NotImplementedError, OverflowError):
+            take(self._position, place, "position", "m")  # integers and the like, or it is told what is wrong
+            take(self._quaternion, turn, "quaternion", "")
         if wrench is not None:
-            self._wrench[0] = wrench
+            self._loaded = True
+            take(self._load, wrench, "wrench", "N or N m")
         elif self._loaded:
+            self._loaded = False
             self._wrench.fill(0.0)
-        self._loaded = wrench is not None
+        if not -ROUNDING < (length := hypot(*self._quaternion)) - 1.0 < ROUNDING and not self._normalized(length):
+            self._lengths.fill(nan)
+            give(self._lengths, out, "out")
+            return PoseStatus.NO_POSE
         self._solve()
-        if self._status[0] in UNDECIDED:
-            self._decide()
-        out[:] = self._lengths
-        status: PoseStatus = _STATUSES[self._status[0]]
+        code = self._status[0]
+        if code:  # 0 is SOLVED
+            if not (isfinite(sum(self._position)) and isfinite(sum(self._load))):
+                self._lengths.fill(nan)
+                give(self._lengths, out, "out")
+                return PoseStatus.NO_POSE
+            if code in UNDECIDED:
+                self._decide()
+                code = self._status[0]
+        try:
+            if out.dtype is not FLOAT:
+                raise TypeError
+            out[WHOLE] = self._lengths
+        except (AttributeError, IndexError, TypeError, ValueError):
+            give(self._lengths, out, "out")  # looks closer, or tells what is wrong
+        status: PoseStatus = _STATUSES[code]
         return status
+
+    def _normalized(self, length: float) -> bool:
+        """Normalize the quaternion in place, where its length is near enough to 1 to be meant."""
+        if not abs(length - 1.0) <= QUATERNION_TOLERANCE:  # NaN is not near
+            return False
+        self._pose[0, 3:] /= length
+        return True
+
+    def _no_pose(self) -> InvalidValueError:
+        """The error of what is no pose."""
+        exactly(self._pose[0, :3], "position", "m", (3,))
+        length = float(np.linalg.norm(exactly(self._pose[0, 3:], "quaternion", "", (4,))))
+        step = "Normalize it; scalar last: (x, y, z, w)."
+        return InvalidValueError("quaternion", f"of length {length:.12g}", "length 1 to 1e-6", step)
 
     def _shortfall(self, status: PoseStatus) -> float:
         if status is PoseStatus.SOLVED:
             return 0.0
         decided = status in (PoseStatus.INFEASIBLE, PoseStatus.BORDERLINE)
         return float(self._verdicts.brackets[0, ENOUGH]) if decided else nan
-
-
-def _check_pose(position: Any, quaternion: Any) -> None:
-    """Refuse what is no pose; plain floats first, because a control loop has no time for arrays."""
-    try:
-        x, y, z = position
-        a, b, c, d = quaternion
-        if isfinite(x + y + z) and abs(a * a + b * b + c * c + d * d - 1.0) < QUATERNION_TOLERANCE:
-            return
-    except (TypeError, ValueError):
-        next_step = "Give the platform's position and a unit quaternion, scalar last."
-    else:
-        next_step = "Normalize it; scalar last: (x, y, z, w)."
-    checked(position, "position", "m", shape=(3,))
-    norm = float(np.linalg.norm(checked(quaternion, "quaternion", "", shape=(4,))))
-    raise InvalidValueError("quaternion", f"of length {norm:.12g}", "length 1 to 1e-6", next_step)

@@ -47,9 +47,8 @@ class MeasuredTension:
         Raises:
             InvalidValueError: If a reading is negative or infinite, or a deviation is not positive.
         """
-        readings = np.array(frame_end_tension, dtype=np.float64)
-        checked(np.where(np.isnan(readings), 0.0, readings), "frame_end_tension", "N", low=0.0)
-        object.__setattr__(self, "frame_end_tension", locked(readings))
+        readings = checked(frame_end_tension, "frame_end_tension", "N", low=0.0, missing=True)
+        object.__setattr__(self, "frame_end_tension", readings)
         for name, value, unit in (
             ("tension_deviation", tension_deviation, "N"),
             ("length_deviation", length_deviation, "m"),

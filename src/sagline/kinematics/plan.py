@@ -15,6 +15,8 @@ from sagline.kinematics.length_rate import length_rate
 from sagline.kinematics.status import PoseStatus
 from sagline.motion.path import Path
 from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.reach import LEVEL, ROUNDING, forbidden_turn, in_words, out_of_plane
+from sagline.robot.several import first_of
 from sagline.tension.method import TensionMethod
 
 
@@ -122,17 +124,43 @@ class Plan:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What stands, but is to be taken with care: tensions out of the empirical model's range, or at the border."""
-        at_border = 0 if self.at_border is None else int(np.count_nonzero(self.at_border))
-        border = (
-            f"{at_border} of {self.status.size} poses are at the border of what the limits allow: their tensions "
+        """What stands, but is to be taken with care: poses out of the robot's plane, at the border, out of validity."""
+        return (*self._turned_away(), *self._out_of_plane(), *self._at_the_border(), *self._below_validity())
+
+    def _turned_away(self) -> tuple[str, ...]:
+        robot = first_of(self.state.robot)
+        turn = forbidden_turn(robot, self.state.pose, LEVEL)[:1]  # all poses have the same, or `inverse` refuses them
+        if not np.linalg.norm(turn) > ROUNDING:
+            return ()
+        return (
+            f"the platform is turned by {in_words(turn[0])}, which motion_pattern {robot.motion_pattern} does not do: "
+            "what holds it so is not in the balance; correct the pose, or give the robot another motion_pattern",
+        )
+
+    def _out_of_plane(self) -> tuple[str, ...]:
+        away = np.abs(out_of_plane(first_of(self.state.robot), self.state.pose))
+        if not (away > ROUNDING).any():
+            return ()
+        return (
+            f"the cables leave the plane of the robot by up to {np.nanmax(away):.6g} m, and only what guides the "
+            "platform can hold it against them there; correct the poses, or give the robot another motion_pattern",
+        )
+
+    def _at_the_border(self) -> tuple[str, ...]:
+        count = 0 if self.at_border is None else int(np.count_nonzero(self.at_border))
+        if not count:
+            return ()
+        return (
+            f"{count} of {self.status.size} poses are at the border of what the limits allow: their tensions "
             f"balance the platform, but {type(self.tension).__name__} had no say in them; widen the limits there",
         )
+
+    def _below_validity(self) -> tuple[str, ...]:
         below = (
             np.atleast_2d(self.state.cables.status == CableStatus.BELOW_VALIDITY)
             & np.atleast_1d(self.feasible)[:, None]
         )
-        return border[: at_border > 0] + tuple(
+        return tuple(
             f"cable {cable}: at {count} of {len(below)} poses its tension is below w D/(2 |sin phi|), where the "
             "empirical model's lowest point enters the span; raise tension_min, set lowest_point_margin, or use "
             "Catenary()"

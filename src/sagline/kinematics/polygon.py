@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from sagline.arguments import instance
 from sagline.arrays import Array, Indices, locked
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
@@ -63,8 +64,8 @@ def tension_polygon(
         >>> print(len(polygon.vertices), "corners, first side:", polygon.sides[0])
         4 corners, first side: Side(cable=1, limit='min')
     """
-    check_sharing(robot, Centroid())
-    if pose.shape:
+    check_sharing(instance(robot, Robot, "robot"), Centroid())
+    if instance(pose, Pose, "pose").shape:
         raise InvalidValueError("pose", f"a batch of shape {pose.shape}", "one pose", "Draw one pose at a time.")
     plan = inverse(robot, pose, model, MinimumNorm(variable), wrench)
     if plan.status not in (PoseStatus.SOLVED, PoseStatus.INFEASIBLE):

@@ -34,6 +34,11 @@ class PoseStatus(Status):
         codes.POSE_UNBOUNDED,
         "the feasible tensions have no upper end, and so no middle; give tension_max, or choose MinimumNorm",
     )
+    NO_POSE = (
+        100,  # no kernel says it: what is no pose does not reach one
+        "what was given is no pose: a number is not finite, or the quaternion is not of length 1; give a position and "
+        "a unit quaternion, scalar last",
+    )
     BORDERLINE = (
         codes.POSE_BORDERLINE,
         "so near the border that neither tensions nor a proof that there are none was found; move the platform, or "

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from sagline.arguments import instance
 from sagline.arrays import Array, checked
 from sagline.errors import InvalidValueError
 from sagline.robot.pose import Pose
@@ -48,7 +49,7 @@ class Path:
         """
         clock = checked_time(time)
         samples = clock.size
-        if pose.shape != (samples,):
+        if instance(pose, Pose, "pose").shape != (samples,):
             raise _length_error("pose", f"of shape {pose.shape}", samples)
         object.__setattr__(self, "time", clock)
         object.__setattr__(self, "pose", pose)

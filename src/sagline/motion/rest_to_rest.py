@@ -8,18 +8,17 @@ from typing import cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array, checked
+from sagline.arrays import Array, checked, number
 from sagline.errors import InvalidValueError
 from sagline.memory import check_memory
 from sagline.motion.path import Path
 from sagline.motion.profile import QUINTIC, SEPTIC, Profile
-from sagline.motion.segments import Segments, positive
+from sagline.motion.segments import Segments
 from sagline.robot.pose import Pose
 
 LIMITS = ("speed", "acceleration", "angular_speed", "angular_acceleration")
 MOST_SAMPLES = 100_000_000  # 21 GB of path: beyond it a duration or the rate has the wrong unit
-_SHORTEST = 1e-50  # s; its cube, which the jerk is divided by, is still a number
-_BYTES = 300.0  # of memory a sample needs while the path is made
+SAMPLE_BYTES = 300.0  # of memory a sample needs while the path is made
 
 
 def quintic_path(
@@ -168,16 +167,13 @@ def _checked_durations(durations: ArrayLike, segments: int) -> Array:
             f"one number, or one for each of the {segments} segments",
             "Give one duration from each waypoint to the next.",
         )
-    if given.min(initial=_SHORTEST) < _SHORTEST:
-        raise InvalidValueError(
-            "durations", f"{given.min():g} s", f">= {_SHORTEST:g} s", "Check the unit of durations."
-        )
     return np.broadcast_to(given, (segments,))
 
 
 def _time_grid(total: float, rate: float) -> Array:
     """Times k/rate from 0 to the total time, and the total itself as the last [s]."""
-    steps = total * positive(rate, "rate", "1/s")
+    rate = number(rate, "rate", "1/s", above=0.0)
+    steps = total * rate
     if steps > MOST_SAMPLES:
         raise InvalidValueError(
             "the number of samples",
@@ -185,7 +181,9 @@ def _time_grid(total: float, rate: float) -> Array:
             f"<= {MOST_SAMPLES:g}",
             "Check the units of durations, limits and rate.",
         )
-    check_memory(steps, _BYTES, "samples", "Check the units of durations, limits and rate.")
+    check_memory(
+        f"a path of {steps:.4g} samples", SAMPLE_BYTES * steps, "Check the units of durations, limits and rate."
+    )
     # A total within rounding of a multiple of 1/rate gets no extra sample.
     last = round(steps) if abs(steps - round(steps)) <= 1e-9 * steps else int(np.ceil(steps))
     return np.append(np.arange(last) / rate, total)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from sagline.arguments import instance
 from sagline.arrays import Array
 from sagline.errors import InvalidValueError
 from sagline.motion.path import Path, checked_time
@@ -42,7 +43,7 @@ def path_from_samples(time: ArrayLike, pose: Pose) -> Path:
         [4. 0. 8.] [2. 0. 4.]
     """
     clock = checked_time(time)
-    if clock.size < 2 or pose.shape != (clock.size,):
+    if clock.size < 2 or instance(pose, Pose, "pose").shape != (clock.size,):
         raise InvalidValueError(
             "pose",
             f"of shape {pose.shape} with {clock.size} time{'s' * (clock.size != 1)}",

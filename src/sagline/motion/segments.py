@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sagline.arrays import Array, checked, locked
+from sagline.arrays import Array, locked, number
 from sagline.errors import InvalidValueError
 from sagline.motion.path import Path
 from sagline.motion.profile import Profile
@@ -153,24 +153,4 @@ class Segments:
 
 
 def _limit(value: float | None, item: str, unit: str) -> float:
-    return np.inf if value is None else positive(value, item, unit)
-
-
-def positive(value: float, item: str, unit: str) -> float:
-    """One positive number, whatever the shape of the path.
-
-    Args:
-        value: What a caller gave.
-        item: The name a message uses.
-        unit: Unit of the value, for the message.
-
-    Returns:
-        The number.
-
-    Raises:
-        InvalidValueError: If it is not; the message names the item.
-    """
-    number = checked(value, item, unit, above=0.0)
-    if number.ndim:
-        raise InvalidValueError(item, f"of shape {number.shape}", "one number", f"Give one {item} for the whole path.")
-    return float(number)
+    return np.inf if value is None else number(value, item, unit, above=0.0)

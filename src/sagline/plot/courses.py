@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
+from sagline.arguments import choice, instance
 from sagline.errors import InvalidValueError
+from sagline.kinematics.plan import Plan
 from sagline.plot.sheet import COLORS, TICK, axes_or_new, draw_course, dressed, legend_outside, shade, sheet
 
 if TYPE_CHECKING:
@@ -17,7 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from sagline.arrays import Array
-    from sagline.kinematics.plan import Plan
 
 TENSIONS = {
     "chord_tension": r"chord tension $\tau$ [N]",
@@ -105,7 +106,12 @@ def clock_of(plan: Plan) -> Array:
 
     Returns:
         Times of its path [s], or the numbers of its poses, shape (N,).
+
+    Raises:
+        InvalidValueError: If it has no pose.
     """
+    if not plan.status.size:
+        raise InvalidValueError("plan", "one of no pose", "one pose at least", "Plan some poses first.")
     return np.arange(plan.status.size, dtype=np.float64) if plan.path is None else plan.path.time
 
 
@@ -127,18 +133,16 @@ def dress_over(ax: Axes, plan: Plan, label: str) -> None:
 
 def _lengths(ax: Axes, plan: Plan, quantity: str) -> None:
     label, scale = _known(quantity, LENGTHS)
-    _cables(ax, plan, scale * getattr(plan.state.cables, quantity), label)
+    _cables(ax, plan, scale * getattr(instance(plan, Plan, "plan").state.cables, quantity), label)
 
 
 def _tensions(ax: Axes, plan: Plan, quantity: str) -> None:
     label = _known(quantity, TENSIONS)
-    _cables(ax, plan, getattr(plan.state.cables, quantity), label)
+    _cables(ax, plan, getattr(instance(plan, Plan, "plan").state.cables, quantity), label)
 
 
 def _known(quantity: str, table: Mapping[str, Entry]) -> Entry:
-    if quantity not in table:
-        raise InvalidValueError("quantity", repr(quantity), ", ".join(table), "Name one of them.")
-    return table[quantity]
+    return table[choice(quantity, "quantity", table)]
 
 
 def _cables(ax: Axes, plan: Plan, values: Array, label: str) -> None:

@@ -6,6 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sagline.arguments import HOW_TO_GET, instance
+from sagline.errors import InvalidValueError
+from sagline.kinematics.confirm import Confirmation
 from sagline.numbers import n
 from sagline.plot.courses import INFEASIBLE, clock_of, dress_over
 from sagline.plot.sheet import (
@@ -23,8 +26,6 @@ from sagline.plot.sheet import (
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-    from sagline.kinematics.confirm import Confirmation
 
 LEAST = 1e-3  # mm: rounding errors are drawn as the flat line that they are, and told
 FLAT = 0.01  # of the axis: below it a course is a flat line to the eye
@@ -60,7 +61,12 @@ def errors(*confirmations: Confirmation) -> Figure:
 
     Returns:
         A figure of one panel each, titled with the robot.
+
+    Raises:
+        InvalidValueError: If there is none, or one is no confirmation.
     """
+    if not confirmations:
+        raise InvalidValueError("confirmations", "none", "one at least", HOW_TO_GET["Confirmation"])
     figure = sheet(height=2.8)
     panels = figure.subplots(1, len(confirmations), sharey=True, squeeze=False)[0]
     for ax, confirmation in zip(panels, confirmations, strict=True):
@@ -75,7 +81,7 @@ def errors(*confirmations: Confirmation) -> Figure:
 
 
 def _draw(ax: Axes, confirmation: Confirmation) -> None:
-    plan = confirmation.plan
+    plan = instance(confirmation, Confirmation, "confirmation").plan
     clock = clock_of(plan)
     courses = 1e3 * np.atleast_2d(confirmation.position_error)
     for name, course, color, style in zip("xyz", courses.T, COLORS[:3], STYLES, strict=True):

@@ -6,14 +6,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sagline.arguments import instance
+from sagline.motion.path import Path
 from sagline.plot.sheet import BLUE, COLORS, TICK, VERMILLION, axes_or_new, dressed, legend_outside
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from sagline.motion.path import Path
-
 START_COLOR = "#A84300"  # vermillion, dark enough for text
+MARKS = 100  # arrows along a path: more are a blur, and each takes its time
 LEVEL = 1e-9  # m: a path that rises less lies in a plane
 
 
@@ -28,7 +29,7 @@ def path(path: Path, ax: Axes | None = None) -> Axes:
         The axes.
     """
     ax = axes_or_new(ax, height=3.6, width=4.6)
-    x, y, z = path.pose.position.T
+    x, y, z = instance(path, Path, "path").pose.position.T
     ax.plot(x, y, color=BLUE, linewidth=1.3)
     ax.plot(x[0], y[0], "o", color=VERMILLION, markersize=5.0, zorder=3.0)
     ax.set_title("\N{BLACK CIRCLE} start", color=START_COLOR, fontsize=TICK, loc="left")
@@ -57,17 +58,24 @@ def velocity(path: Path, ax: Axes | None = None) -> Axes:
         The axes.
     """
     ax = axes_or_new(ax, height=2.6)
-    for name, course, color, style in zip("xyz", path.twist.T[:3], COLORS[:3], ("-", "--", ":"), strict=True):
+    for name, course, color, style in zip(
+        "xyz", instance(path, Path, "path").twist.T[:3], COLORS[:3], ("-", "--", ":"), strict=True
+    ):
         ax.plot(path.time, course, color=color, linestyle=style, linewidth=1.3, label=f"$v_{name}$")
     dressed(ax, "time [s]", "velocity [m/s]")
-    ax.set_xlim(path.time[0], path.time[-1])
+    if len(path) > 1:
+        ax.set_xlim(path.time[0], path.time[-1])
     legend_outside(ax)
     return ax
 
 
 def _marks(path: Path) -> list[int]:
-    """Samples before the middle of each stretch between two rests, so that arrows there and back do not meet."""
+    """Samples before the middle of each stretch between two rests, so that arrows there and back do not meet.
+
+    Of more stretches than anybody can tell apart, evenly chosen ones.
+    """
     speed = np.linalg.norm(path.twist[:, :2], axis=1)
     moving = np.concatenate(([False], speed > 1e-3 * speed.max(initial=0.0), [False]))
     edges = np.flatnonzero(np.diff(moving.astype(np.int8))).reshape(-1, 2)
-    return [int(first + 0.42 * (end - first)) for first, end in edges]
+    chosen = edges[np.unique(np.linspace(0, len(edges) - 1, min(len(edges), MARKS)).astype(np.intp))]
+    return [int(first + 0.42 * (end - first)) for first, end in chosen]

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.textpath import TextPath
 
+from sagline.arguments import instance
 from sagline.errors import InvalidValueError
 from sagline.plot.sheet import COLORS, GAP_COLOR, TICK, axes_or_new, dressed, legend_outside
+from sagline.tension.polygon import TensionPolygon
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from matplotlib.axes import Axes
     from numpy.typing import ArrayLike
 
     from sagline.arrays import Array
-    from sagline.tension.polygon import TensionPolygon
 
 MARKERS = "osD^v<>pPX*h"
 POINT = 1.0 / 72.0  # in
@@ -39,32 +39,38 @@ def polygon(shape: TensionPolygon, points: Mapping[str, ArrayLike] | None = None
         The axes.
 
     Raises:
-        InvalidValueError: If there is no polygon to draw.
+        InvalidValueError: If there is no polygon to draw, or points are no tensions of its cables.
     """
-    if shape.vertices.shape[1] != 2 or len(shape.vertices) == 0:
+    if instance(shape, TensionPolygon, "shape").vertices.shape[1] != 2 or len(shape.vertices) == 0:
         raise InvalidValueError(
             "polygon",
             f"{len(shape.vertices)} points with {shape.vertices.shape[1]} coordinates",
             "a polygon of two redundant cables",
             "Choose a feasible pose of a robot with n + 2 cables.",
         )
-    if ax is None:
-        ax = axes_or_new(None, height=4.5)
+    points = instance({} if points is None else points, Mapping, "points")  # type: ignore[type-abstract]
+    places = {str(name): shape.coordinates(tensions) for name, tensions in points.items()}
+    if wrong := [name for name, place in places.items() if place.ndim != 1]:
+        raise InvalidValueError(
+            f"points[{wrong[0]!r}]", "a batch of tensions", "those of one pose", "Give them one by one."
+        )
+    fresh = ax is None
+    ax = axes_or_new(ax, height=4.5)
+    if fresh:
         cast(Figure, ax.get_figure(root=True)).set_layout_engine("compressed")  # it knows of axes of equal scales
     corners = np.asarray(shape.vertices)
     ax.fill(*corners.T, facecolor=GAP_COLOR, alpha=0.25, edgecolor="none")
     for k, side in enumerate(shape.sides):
         ends = corners[[k, (k + 1) % len(corners)]]
         ax.plot(*ends.T, color="0.3", linewidth=1.0, linestyle="-" if side else ":")
-    for k, (name, tensions) in enumerate((points or {}).items()):
-        place = shape.coordinates(tensions)
+    for k, (name, place) in enumerate(places.items()):
         if np.isfinite(place).all():
             color, marker = COLORS[k % len(COLORS)], MARKERS[k % len(MARKERS)]
             ax.plot(*place, marker, color=color, markersize=6.0, markeredgecolor="white", label=name, linestyle="none")
     dressed(ax, r"$\lambda_1$ [N]", r"$\lambda_2$ [N]")
     ax.set_aspect("equal")
     ax.margins(x=0.33, y=0.16)  # room for names
-    if points:
+    if any(np.isfinite(place).all() for place in places.values()):
         legend_outside(ax)
     _name_sides(ax, shape, corners)
     return ax
@@ -93,8 +99,7 @@ def _name_sides(ax: Axes, shape: TensionPolygon, corners: Array) -> None:
     figure = cast(Figure, ax.get_figure(root=True))
     for _ in range(TRIES):
         figure.draw_without_rendering()  # now it is known how large the polygon is on the sheet
-        pixels = np.diff(ax.transData.transform([(0.0, 0.0), (1.0, 0.0)])[:, 0])
-        scale = float(pixels[0]) / (figure.dpi * POINT)  # points a newton
+        scale = ax.bbox.width / (figure.dpi * POINT) / float(np.ptp(ax.get_xlim()))  # points a newton
         names = _names(shape, corners, scale)
         reach = np.array([name.middle + (name.offset + sign * name.half) / scale for name in names for sign in (-1, 1)])
         seen = np.array([ax.get_xlim(), ax.get_ylim()]).T
@@ -139,7 +144,10 @@ def _names(shape: TensionPolygon, corners: Array, scale: float) -> list[_Name]:
 
 
 def _normals(corners: Array) -> Array:
-    """Outward directions of the sides, shape (h, 2); a side without length has one between its neighbors'."""
+    """Outward directions of the sides, shape (h, 2); a side without length has one between its neighbors'.
+
+    Where those are opposite, at the tip of a flat polygon, it points away from the tip: every name has a way out.
+    """
     along = np.roll(corners, -1, axis=0) - corners
     lengths = np.linalg.norm(along, axis=1)
     long = np.flatnonzero(lengths > SHORT * lengths.max())
@@ -150,5 +158,6 @@ def _normals(corners: Array) -> Array:
     for k in set(range(len(corners))) - set(long.tolist()):
         place = int(np.searchsorted(long, k))
         between = normals[long[place - 1]] + normals[long[place % long.size]]
-        normals[k] = between / (np.linalg.norm(between) or 1.0)
+        tip = along[long[place - 1]] / lengths[long[place - 1]]
+        normals[k] = between / size if (size := np.linalg.norm(between)) > SHORT else tip
     return normals

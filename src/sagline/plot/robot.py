@@ -14,19 +14,20 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 from scipy.spatial import ConvexHull
 
+from sagline.arguments import instance, optional
 from sagline.errors import InvalidValueError
 from sagline.kernels.cable import geometry
 from sagline.kinematics.inverse import inverse
 from sagline.numbers import n
 from sagline.plot.sheet import LABEL, TICK, VERMILLION, sheet
 from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
 from sagline.statics.tables import body_table, cable_table, pose_rows
 from sagline.viewer.tension_scale import TensionScale
 
 if TYPE_CHECKING:
     from sagline.arrays import Array
     from sagline.kinematics.plan import Plan
-    from sagline.robot.robot import Robot
 
 POINTS = 50  # along each cable
 FRAME_COLOR, FLOOR_COLOR, SHADOW_COLOR = "0.6", "0.955", "0.82"
@@ -54,7 +55,8 @@ def robot(robot: Robot, pose: Pose | None = None, ax: Axes3D | None = None) -> A
     Raises:
         InvalidValueError: If no pose is given and the robot has no test box, or the pose is a batch.
     """
-    where = _pose_of(robot, pose)
+    where = _pose_of(instance(robot, Robot, "robot"), optional(pose, Pose, "pose"))
+    optional(ax, Axes3D, "ax")
     if ax is None:
         ax = sheet(height=4.0, width=5.6).add_subplot(projection="3d")
     ax.computed_zorder = False  # by the middles of things, which puts the ground over what stands on it

@@ -5,20 +5,19 @@ from __future__ import annotations
 import os
 from io import BytesIO
 from itertools import pairwise
-from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, cast
 
 import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sagline.errors import FileError
+from sagline.arguments import brief, file_path, optional
+from sagline.errors import FileError, InvalidValueError
 from sagline.files.whole import written_whole
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
-
-    from matplotlib.axes import Axes
 
     from sagline.arrays import Array, Flags
 
@@ -63,8 +62,16 @@ def axes_or_new(ax: Axes | None, height: float = 3.0, width: float = WIDTH) -> A
 
     Returns:
         The axes.
+
+    Raises:
+        InvalidValueError: If the caller's are none, or not flat.
     """
-    return sheet(height, width).add_subplot() if ax is None else ax
+    optional(ax, Axes, "ax")
+    if ax is None:
+        return sheet(height, width).add_subplot()
+    if ax.name != "rectilinear":
+        raise InvalidValueError("ax", f"Axes of the projection {ax.name}", "flat ones", "Make them with add_subplot().")
+    return ax
 
 
 def dressed(ax: Axes, x: str, y: str) -> None:
@@ -162,10 +169,13 @@ def save(drawing: Figure | Axes, file: os.PathLike[str] | str) -> None:
         file: The file; one that exists is replaced.
 
     Raises:
+        InvalidValueError: If the drawing is none.
         FileError: If the file cannot be written, or its suffix is none that matplotlib knows.
     """
+    if not isinstance(drawing, Figure | Axes):
+        raise InvalidValueError("drawing", brief(drawing), "a figure of matplotlib, or its Axes", "Draw one first.")
     figure = drawing if isinstance(drawing, Figure) else cast(Figure, drawing.get_figure(root=True))
-    path = FilePath(file)
+    path = file_path(file)
     kind = path.suffix.lstrip(".").lower()
     known = sorted(figure.canvas.get_supported_filetypes().keys() - {"pgf"})  # text for LaTeX, which may be missing
     if kind not in known:

@@ -2,123 +2,18 @@
 
 from __future__ import annotations
 
-import reprlib
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array, checked, locked
+from sagline.arguments import instance
+from sagline.arrays import SMALLEST, Array, checked, exactly, locked
 from sagline.cables.cable import Cable
-from sagline.errors import InvalidValueError, printable
+from sagline.errors import InvalidValueError
 from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.unit import unit
 
 _SYMMETRY = 1e-9  # largest difference of mirrored elements, relative to the largest element
 _ROUNDED = 0.01  # what moments printed with three digits may lack: a thin plate's largest is the sum of the others
-_NAME_LENGTH = 100  # of a robot; it becomes part of file names
-
-
-def choice(value: Any, item: str, allowed: tuple[str, ...]) -> Any:
-    """One of a few words.
-
-    Args:
-        value: What was given.
-        item: The name a message uses.
-        allowed: The words.
-
-    Returns:
-        The value.
-
-    Raises:
-        InvalidValueError: If it is none of them.
-    """
-    if value not in allowed:
-        raise InvalidValueError(item, repr(value), ", ".join(allowed), f"Choose one of them as {item}.")
-    return value
-
-
-def name(value: Any) -> str:
-    """What a robot is called: one line of text that a terminal, a figure and a file name can show.
-
-    Args:
-        value: What was given.
-
-    Returns:
-        The name.
-
-    Raises:
-        InvalidValueError: If it is no such text, or longer than 100 letters.
-    """
-    if not isinstance(value, str) or len(value) > _NAME_LENGTH or value != printable(value):
-        raise InvalidValueError(
-            "name",
-            reprlib.repr(value),
-            f"one line of printable text, at most {_NAME_LENGTH} letters",
-            "Choose another name.",
-        )
-    return value
-
-
-def text(value: Any, item: str) -> str:
-    """Text of several lines that a terminal can show.
-
-    Args:
-        value: What was given.
-        item: The name a message uses.
-
-    Returns:
-        The text.
-
-    Raises:
-        InvalidValueError: If it is no text, or has control characters or what cannot be encoded.
-    """
-    if not isinstance(value, str) or (flat := value.replace("\n", " ").replace("\t", " ")) != printable(flat):
-        raise InvalidValueError(item, reprlib.repr(value), "printable text", f"Remove what does not print in {item}.")
-    return value
-
-
-def number(value: Any, item: str, unit: str, *, low: float = -np.inf, above: float = -np.inf) -> float:
-    """A single finite number.
-
-    Args:
-        value: What was given.
-        item: The name a message uses.
-        unit: Its unit, for the message.
-        low: Smallest allowed value.
-        above: The value must be strictly larger than this.
-
-    Returns:
-        The number.
-
-    Raises:
-        InvalidValueError: If it is not; the message names the item.
-    """
-    return float(exactly(value, item, unit, (), low=low, above=above))
-
-
-def exactly(value: ArrayLike, item: str, unit: str, shape: tuple[int, ...], **limits: Any) -> Array:
-    """An array of exactly one shape: a robot's numbers have no batch axes.
-
-    Args:
-        value: What was given.
-        item: The name a message uses.
-        unit: Its unit, for the message.
-        shape: The whole shape.
-        **limits: As of `arrays.checked`.
-
-    Returns:
-        Array of that shape, write-locked.
-
-    Raises:
-        InvalidValueError: If the shape is another, or a value is out of range.
-    """
-    array = checked(value, item, unit, **limits)
-    if array.shape != shape:
-        raise InvalidValueError(
-            item, f"of shape {array.shape}", f"shape {shape}" if shape else "a single number", f"Reshape {item}."
-        )
-    return array
 
 
 def anchors(frame: ArrayLike, platform: ArrayLike) -> tuple[Array, Array]:
@@ -178,8 +73,7 @@ def cables(given: Cable, count: int) -> Cable:
     Raises:
         InvalidValueError: If it is no Cable, has another count, or a cable weighs nothing.
     """
-    if not isinstance(given, Cable):
-        raise InvalidValueError("cables", repr(given), "a Cable", "Give Cable(linear_density, axial_stiffness).")
+    instance(given, Cable, "cables")
     density = per_cable(given.linear_density, "cables: linear_density", count)
     stiffness = per_cable(given.axial_stiffness, "cables: axial_stiffness", count)
     if not density.all():
@@ -279,7 +173,7 @@ def plane_normal(given: ArrayLike | None, pattern: str) -> Array | None:
     if given is None:
         return None
     normal = exactly(given, "plane_normal", "", (3,))
-    if not normal.any():
+    if np.abs(normal).max() < SMALLEST:
         raise InvalidValueError("plane_normal", "the zero vector", "a direction", "Give the normal of the plane.")
     return locked(unit(normal))
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from sagline.arrays import Array, locked
 from sagline.cables.model import CableState
 from sagline.errors import InvalidValueError
+from sagline.indices import length_of, part_of
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.robot.several import Index, Robots, first_of, robots_at
@@ -51,9 +52,7 @@ class Equilibrium:
 
     def __len__(self) -> int:
         """Number of poses in a batch."""
-        if not self.pose.shape:
-            raise TypeError("a single equilibrium has no length")
-        return len(self.pose)
+        return length_of(self.pose.shape, "single equilibrium")
 
     def __getitem__(self, index: Index) -> Equilibrium:
         """One pose of a batch, or a part of the batch.
@@ -62,14 +61,11 @@ class Equilibrium:
             index: A number, which may count from the end; a slice; or an array of numbers or of N booleans.
 
         Raises:
-            TypeError: If the equilibrium is a single one.
-            IndexError: If there is no such pose.
+            NoBatchError: If the equilibrium is a single one; it is a TypeError too.
+            NoSuchEntryError: If there is no such pose; it is an IndexError too.
         """
-        if not self.pose.shape:
-            raise TypeError("a single equilibrium cannot be indexed")
-        return Equilibrium(
-            robots_at(self.robot, index), self.pose[index], locked(self.wrench[index]), self.cables[index]
-        )
+        part = part_of(index, self.pose.shape, "single equilibrium")
+        return Equilibrium(robots_at(self.robot, part), self.pose[part], locked(self.wrench[part]), self.cables[part])
 
     def __iter__(self) -> Iterator[Equilibrium]:
         """The poses of a batch, one by one."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -11,6 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from sagline.arrays import Array, checked, locked
 from sagline.errors import InvalidValueError
+from sagline.indices import length_of, part_of
+from sagline.memory import check_memory
 from sagline.robot.unit import unit
 
 if TYPE_CHECKING:
@@ -42,7 +45,7 @@ class Pose:
         Raises:
             InvalidValueError: If a number is not finite, a matrix is no rotation, or the counts differ.
         """
-        quaternion = rotation.as_quat() if hasattr(rotation, "as_quat") else _quaternion_of(rotation)
+        quaternion = _quaternion_of(rotation)
         self._fill(checked(position, "position", "m", shape=(3,)), quaternion)
 
     @classmethod
@@ -111,6 +114,7 @@ class Pose:
             shape = np.broadcast_shapes(*shapes)
         except ValueError:
             raise _counts_differ("position and rotation", shapes) from None
+        check_memory("pose", 56.0 * math.prod(shape), "Give fewer poses.")
         if len(shape) > 1:
             raise InvalidValueError(
                 "pose", f"a batch of shape {shape}", "one pose, or a batch of shape (N,)", "Flatten the leading axes."
@@ -162,6 +166,7 @@ class Pose:
                    [0., 2., 3.]])
         """
         given = checked(points, "points", "m", shape=(3,))
+        check_memory("points", 16.0 * given.size * math.prod(self.shape), "Transform fewer points or poses at once.")
         turned = given.reshape(-1, 3) @ np.swapaxes(self.matrix, -1, -2)
         return locked((turned + self.position[..., None, :]).reshape(*self.shape, *given.shape))
 
@@ -172,15 +177,20 @@ class Pose:
 
     def __len__(self) -> int:
         """Number of poses in a batch."""
-        if not self.shape:
-            raise TypeError("a single pose has no length")
-        return len(self.position)
+        return length_of(self.shape, "single pose")
 
     def __getitem__(self, index: int | slice | NDArray[Any]) -> Pose:
-        """One pose of a batch, or a part of the batch; slices share the batch's memory where they can."""
-        if not self.shape:
-            raise TypeError("a single pose cannot be indexed")
-        return Pose._adopt(self.position[index], self.quaternion[index])
+        """One pose of a batch, or a part of the batch; slices share the batch's memory where they can.
+
+        Args:
+            index: A number, which may count from the end; a slice; or an array of numbers or of N booleans.
+
+        Raises:
+            NoBatchError: If the pose is a single one; it is a TypeError too.
+            NoSuchEntryError: If there is no such pose; it is an IndexError too.
+        """
+        part = part_of(index, self.shape, "single pose")
+        return Pose._adopt(self.position[part], self.quaternion[part])
 
     def __iter__(self) -> Iterator[Pose]:
         """The poses of a batch, one by one."""
@@ -191,7 +201,9 @@ class Pose:
         return Pose.from_quaternion, (self.position, self.quaternion)
 
 
-def _quaternion_of(rotation: ArrayLike) -> Array:
+def _quaternion_of(rotation: Any) -> Array:
+    if hasattr(rotation, "as_quat") and not isinstance(rotation, type):
+        return checked(rotation.as_quat(), "rotation", "", shape=(4,))
     matrix = checked(rotation, "rotation", "", shape=(3, 3))
     excess = np.abs(matrix @ np.swapaxes(matrix, -1, -2) - np.eye(3)).max(axis=(-1, -2))
     _refuse(excess > _MATRIX_TOLERANCE, "rotation", "largest element of Q Q^T - 1", excess, "an orthonormal matrix")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array, checked
+from sagline.arrays import Array, checked, number
 from sagline.errors import InvalidValueError
 
 
@@ -18,7 +18,7 @@ class PoseBox:
     Attributes:
         low: Lowest position of the platform origin [m], shape (3,).
         high: Highest position of the platform origin [m], shape (3,), not below low.
-        tilt: Largest angle of rotation [rad], >= 0.
+        tilt: Largest angle of rotation [rad], 0 to pi.
     """
 
     low: Array
@@ -31,10 +31,11 @@ class PoseBox:
         Args:
             low: Lowest position [m], shape (3,).
             high: Highest position [m], shape (3,).
-            tilt: Largest angle of rotation [rad], >= 0.
+            tilt: Largest angle of rotation [rad], 0 to pi.
 
         Raises:
-            InvalidValueError: If a number is not finite, a corner has not three numbers, or high is below low.
+            InvalidValueError: If a number is not finite, a corner has not three numbers, high is below low, or the tilt
+                is more than half a turn.
         """
         low = checked(low, "test_box: low", "m", shape=(3,))
         high = checked(high, "test_box: high", "m", shape=(3,))
@@ -48,7 +49,11 @@ class PoseBox:
             )
         object.__setattr__(self, "low", low)
         object.__setattr__(self, "high", high)
-        object.__setattr__(self, "tilt", float(checked(tilt, "test_box: tilt", "rad", shape=(), low=0.0)))
+        angle = number(tilt, "test_box: tilt", "rad", low=0.0)
+        if angle > np.pi:
+            value, step = f"{angle:.6g} rad", "Give it in radians: no rotation turns by more than half a turn."
+            raise InvalidValueError("test_box: tilt", value, "0 to pi rad", step)
+        object.__setattr__(self, "tilt", angle)
 
     def __reduce__(self) -> tuple[type[PoseBox], tuple[Array, Array, float]]:
         """Pickle through the constructor."""

@@ -10,8 +10,10 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array
+from sagline.arguments import brief, choice, label, optional, text
+from sagline.arrays import Array, exactly, number
 from sagline.cables.cable import Cable
+from sagline.errors import InvalidValueError
 from sagline.robot import checks
 from sagline.robot.pattern import MOTION_PATTERNS, MotionPattern, freedom_matrix
 from sagline.robot.pose_box import PoseBox
@@ -132,29 +134,29 @@ class Robot:
             array([72.6, 52.3, 52.3])
         """
         frame, platform = checks.anchors(frame_anchors, platform_anchors)
-        checks.choice(motion_pattern, "motion_pattern", MOTION_PATTERNS)
-        normal = checks.plane_normal(plane_normal, motion_pattern)
+        pattern = choice(motion_pattern, "motion_pattern", MOTION_PATTERNS)
+        normal = checks.plane_normal(plane_normal, pattern)
         lower, upper = checks.tension_limits(tension_min, tension_max, len(frame))
         values = {
-            "name": checks.name(name),
+            "name": label(name, "name"),
             "frame_anchors": frame,
             "platform_anchors": platform,
             "cables": checks.cables(cables, len(frame)),
-            "mass": checks.number(mass, "mass", "kg", above=0.0),
-            "inertia": checks.inertia(inertia, motion_pattern, normal),
-            "center_of_mass": checks.exactly(center_of_mass, "center_of_mass", "m", (3,)),
-            "gravity": checks.number(gravity, "gravity", "m/s^2", low=0.0),
-            "motion_pattern": motion_pattern,
+            "mass": number(mass, "mass", "kg", above=0.0),
+            "inertia": checks.inertia(inertia, pattern, normal),
+            "center_of_mass": exactly(center_of_mass, "center_of_mass", "m", (3,)),
+            "gravity": number(gravity, "gravity", "m/s^2", low=0.0),
+            "motion_pattern": pattern,
             "plane_normal": normal,
             "tension_min": lower,
             "tension_max": upper,
-            "tension_limits_of": checks.choice(tension_limits_of, "tension_limits_of", get_args(TensionLimitsOf)),
+            "tension_limits_of": choice(tension_limits_of, "tension_limits_of", get_args(TensionLimitsOf)),
             "platform_size": checks.size(platform_size, "platform_size"),
             "frame_size": checks.size(frame_size, "frame_size"),
-            "test_box": test_box,
-            "source": checks.text(source, "source"),
+            "test_box": optional(test_box, PoseBox, "test_box"),
+            "source": text(source, "source"),
             "assumed": _known_fields(assumed),
-            "notes": checks.text(notes, "notes"),
+            "notes": text(notes, "notes"),
         }
         for field, value in values.items():
             object.__setattr__(self, field, value)
@@ -193,7 +195,7 @@ class Robot:
             300.0 50.0
         """
         for field in changes:
-            checks.choice(field, "field", Robot.__slots__)
+            choice(field, "field", Robot.__slots__)
         return replace(self, **changes)
 
     def __reduce__(self) -> tuple[Any, tuple[dict[str, Any]]]:
@@ -208,6 +210,8 @@ def _from_fields(values: dict[str, Any]) -> Robot:
 
 def _known_fields(assumed: Mapping[str, str]) -> Mapping[str, str]:
     names = Robot.__slots__
+    if not isinstance(assumed, Mapping):
+        raise InvalidValueError("assumed", brief(assumed), "field names and reasons", 'Give {"mass": "why"}.')
     for field in assumed:
-        checks.choice(field, "assumed: field", names)
-    return MappingProxyType({field: checks.text(why, f"assumed: {field}") for field, why in assumed.items()})
+        choice(field, "assumed: field", names)
+    return MappingProxyType({field: text(why, f"assumed: {field}") for field, why in assumed.items()})

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from sagline.arguments import brief
 from sagline.arrays import Array
 from sagline.cables.cable import Cable
 from sagline.errors import InvalidValueError
@@ -45,7 +46,7 @@ def together(robot: Robot | Sequence[Robot]) -> Robots:
     if wrong or not robots:
         item, value = (f"robot[{wrong[0]}]", robots[wrong[0]]) if wrong else ("robot", given)
         step = 'Load one by its name or file: load_robot("cogiro").'
-        raise InvalidValueError(item, f"{value!r:.60}", "a Robot, or a sequence of them", step)
+        raise InvalidValueError(item, brief(value), "a Robot, or a sequence of them", step)
     first = first_of(robots)
     for index, other in enumerate(robots):
         _check_alike(first, other, index)
@@ -236,7 +237,7 @@ def limits_of(robot: Robots) -> Limits:
 
 def _check_alike(first: Robot, other: Robot, index: int) -> None:
     if not isinstance(other, Robot):
-        raise InvalidValueError(f"robot[{index}]", repr(other), "a Robot", "Give robots only.")
+        raise InvalidValueError(f"robot[{index}]", brief(other), "a Robot", "Give robots only.")
     if other is first:
         return
     step = "Robots of one batch share it; solve those that differ in a batch of their own."

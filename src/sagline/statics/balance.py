@@ -7,7 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, locked
+from sagline.arguments import instance
+from sagline.arrays import Array, locked, number
+from sagline.errors import CableGeometryError
+from sagline.kernels.balance.setting import SHORTEST_CHORD
 from sagline.kernels.balance.wrench import structure_matrices
 from sagline.kernels.cable import geometry as rows
 from sagline.kernels.cable.geometry import cable_geometries
@@ -34,7 +37,30 @@ def _geometry(robot: Robots, pose: Pose) -> Array:
     cables, poses = cable_table(robot), pose_rows(pose)
     out = np.empty((len(poses), rows.GEOMETRY_ROWS, cables.shape[1]))
     cable_geometries(cables, body_table(robot), poses, np.empty((3, 3)), out)
+    refuse_missing_chords(out[:, rows.CHORD], pose)
     return out
+
+
+def refuse_missing_chords(chord: Array, pose: Pose) -> None:
+    """Refuse poses at which both ends of a cable coincide: it has no direction there.
+
+    Args:
+        chord: Distances between the ends [m], shape (N, m).
+        pose: One pose or a batch of N, for the message.
+
+    Raises:
+        CableGeometryError: If one is no more than 1e-9 m; the message names pose and cable.
+    """
+    missing = np.argwhere(chord < SHORTEST_CHORD)
+    if not len(missing):
+        return
+    row, cable = (int(k) for k in missing[0])
+    raise CableGeometryError(
+        f"pose{f' {row}' if pose.shape else ''}, cable {cable}: distance between its ends",
+        f"{round(float(chord[row, cable]), 12):g} m",
+        f">= {SHORTEST_CHORD:g} m",
+        "Move the platform away from the anchor, or the anchor away from the path.",
+    )
 
 
 def structure_matrix(robot: Robot | Sequence[Robot], pose: Pose) -> Array:
@@ -49,16 +75,18 @@ def structure_matrix(robot: Robot | Sequence[Robot], pose: Pose) -> Array:
 
     Raises:
         InvalidValueError: If several robots are not one a pose, or do not fit together.
+        CableGeometryError: If both ends of a cable coincide; the message names pose and cable.
 
     Source:
         docs/model.md, section 1.
     """
-    checked = one_a_pose(robot, len(pose) if pose.shape else None)
+    shape = instance(pose, Pose, "pose").shape
+    checked = one_a_pose(robot, shape[0] if shape else None)
     shared = first_of(checked)
     geometry = _geometry(checked, pose)
     out = np.empty((len(geometry), 6, shared.cable_count))
     structure_matrices(geometry, out)
-    return locked((shared.freedom @ out).reshape(*pose.shape, shared.degrees_of_freedom, shared.cable_count))
+    return locked((shared.freedom @ out).reshape(*shape, shared.degrees_of_freedom, shared.cable_count))
 
 
 def article_balance(robot: Robot, pose: Pose, k_h: float = 4.845) -> ArticleBalance:
@@ -75,17 +103,24 @@ def article_balance(robot: Robot, pose: Pose, k_h: float = 4.845) -> ArticleBala
     Returns:
         H of shape (6, m) or (N, 6, m), b of shape (6,) or (N, 6).
 
+    Raises:
+        InvalidValueError: If robot or pose are none, or k_h is no number.
+        CableGeometryError: If both ends of a cable coincide; the message names pose and cable.
+
     Source:
         Gia Luan & Truong Thinh 2020, equations (26), (27), (50), (51).
     """
-    geometry = np.moveaxis(_geometry(robot, pose), 1, 0)
+    instance(robot, Robot, "robot")
+    k_h = number(k_h, "k_h", "m/s^2")
+    geometry = np.moveaxis(_geometry(robot, instance(pose, Pose, "pose")), 1, 0)
     cosine, sine = geometry[rows.AZIMUTH_X], geometry[rows.AZIMUTH_Y]
     bx, by, bz = geometry[rows.LEVER_X], geometry[rows.LEVER_Y], geometry[rows.LEVER_Z]
-    slope = geometry[rows.RISE] / geometry[rows.SPAN]
     pull = k_h * robot.cables.linear_density * geometry[rows.CHORD]
-    h = -np.stack(
-        (cosine, sine, slope, by * slope - bz * sine, bz * cosine - bx * slope, bx * sine - by * cosine), axis=-2
-    )
+    with np.errstate(divide="ignore", invalid="ignore"):  # infinite, times a lever of zero
+        slope = geometry[rows.RISE] / geometry[rows.SPAN]
+        h = -np.stack(
+            (cosine, sine, slope, by * slope - bz * sine, bz * cosine - bx * slope, bx * sine - by * cosine), axis=-2
+        )
     zero = np.zeros(len(pull))
     weight = robot.mass * robot.gravity
     b = -np.stack((zero, zero, pull.sum(-1) + weight, (by * pull).sum(-1), -(bx * pull).sum(-1), zero), axis=-1)

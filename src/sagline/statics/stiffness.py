@@ -6,13 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sagline.arguments import instance
 from sagline.arrays import Array, locked
+from sagline.memory import check_memory
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.several import bodies_of, first_of
 from sagline.statics.slopes import CableSlopes, cable_slopes, on_platform
 
 _SINGULAR = 1e-14  # determinant, at diagonal elements of 1
 _TINY = 1e-300
+_STIFFNESS_BYTES, _MODES_BYTES = 2500.0, 800.0  # a cable of a state, while it is worked out
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,6 +84,9 @@ def stiffness(state: Equilibrium) -> Stiffness:
     Returns:
         Stiffness; NaN where the state has no lengths, and for straight cables, which have none.
 
+    Raises:
+        InvalidValueError: If the state is no Equilibrium (of a plan: plan.state).
+
     Examples:
         How far 100 N upwards lift the platform, and how far 1 mm more of cable 0 does:
 
@@ -97,6 +103,7 @@ def stiffness(state: Equilibrium) -> Stiffness:
     Source:
         docs/model.md, section 6.
     """
+    _check_state(state, _STIFFNESS_BYTES)
     slopes = cable_slopes(state)
     freedom = first_of(state.robot).freedom
     compliance = _compliance(freedom, slopes.matrix)
@@ -169,6 +176,9 @@ def modes(state: Equilibrium) -> Modes:
     Returns:
         Modes; NaN where the state has no lengths.
 
+    Raises:
+        InvalidValueError: If the state is no Equilibrium (of a plan: plan.state).
+
     Examples:
         >>> import numpy as np
         >>> import sagline as sl
@@ -177,6 +187,7 @@ def modes(state: Equilibrium) -> Modes:
         >>> print(sl.modes(plan.state).frequency.round(2), "Hz")
         [ 4.38  5.31  6.93  8.05 10.88 13.17] Hz
     """
+    _check_state(state, _MODES_BYTES)
     freedom = first_of(state.robot).freedom
     matrix = freedom @ cable_slopes(state).matrix @ freedom.T
     lower = np.linalg.cholesky(freedom @ _mass_matrix(state) @ freedom.T)
@@ -188,6 +199,11 @@ def modes(state: Equilibrium) -> Modes:
     held = np.asarray((squares > 0.0) & ~absent[..., 0])
     frequency = np.where(held, np.sqrt(np.where(held, squares, 0.0)) / (2.0 * np.pi), np.nan)
     return Modes(state, locked(frequency), locked(np.where(absent, np.nan, shape)))
+
+
+def _check_state(state: Equilibrium, cable_bytes: float) -> None:
+    size = instance(state, Equilibrium, "state").cables.unstrained_length.size
+    check_memory("state", cable_bytes * size, "Take the poses in parts: state[:1000].")
 
 
 def _compliance(freedom: Array, matrix: Array) -> Array:

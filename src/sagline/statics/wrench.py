@@ -7,14 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array, checked, locked
+from sagline.arguments import instance
+from sagline.arrays import Array, checked, exactly, locked
 from sagline.errors import InvalidValueError
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.robot.several import bodies_of, one_a_pose
 
 
-def inertial_wrench(robot: Robot | Sequence[Robot], pose: Pose, twist: Array, twist_rate: Array) -> Array:
+def inertial_wrench(robot: Robot | Sequence[Robot], pose: Pose, twist: ArrayLike, twist_rate: ArrayLike) -> Array:
     """The d'Alembert wrench of a motion: what the platform's inertia does to it.
 
     Args:
@@ -27,12 +28,17 @@ def inertial_wrench(robot: Robot | Sequence[Robot], pose: Pose, twist: Array, tw
         Force -M p_c'' [N] and moment -(Gamma w' + w x Gamma w) [N m] about the center of mass, shape (N, 6).
 
     Raises:
-        InvalidValueError: If several robots are not one a pose, or do not fit together.
+        InvalidValueError: If several robots are not one a pose or do not fit together, or the poses, the twists and
+            their rates are not N of each.
 
     Source:
         Newton and Euler; docs/model.md, section 4. With the angular velocity itself, not Euler-angle rates.
     """
+    if not instance(pose, Pose, "pose").shape:
+        raise InvalidValueError("pose", "a single one", "a batch of N poses", "Take Pose(position[None], rotation).")
     body = bodies_of(one_a_pose(robot, len(pose)))
+    twist = exactly(twist, "twist", "m/s or rad/s", (len(pose), 6))
+    twist_rate = exactly(twist_rate, "twist_rate", "m/s^2 or rad/s^2", (len(pose), 6))
     spin, spin_rate = twist[:, 3:], twist_rate[:, 3:]
     wrench = np.empty((len(twist), 6))
     wrench[:, :3] = twist_rate[:, :3]
@@ -49,14 +55,7 @@ def inertial_wrench(robot: Robot | Sequence[Robot], pose: Pose, twist: Array, tw
 
 
 def external_wrench(wrench: ArrayLike | None, count: int | None) -> Array:
-    """The caller's wrench, checked.
-
-    Args:
-        wrench: Force [N] and moment [N m], shape (6,) or (N, 6); None for none.
-        count: N of the poses; None for a single pose.
-
-    Returns:
-        Zeros for None, shape (6,) for all poses or (N, 6).
+    """The caller's wrench, checked; zeros for None.
 
     Args:
         wrench: What the caller gave: force [N], then moment [N m], or None.

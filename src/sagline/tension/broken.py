@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sagline.arguments import instance, whole_number
 from sagline.cables.cable import Cable
 from sagline.errors import InvalidValueError
 from sagline.robot.robot import Robot
@@ -20,13 +21,13 @@ def without_cables(robot: Robot, *cables: int) -> Robot:
         A robot with the other cables, in their order; everything else unchanged.
 
     Raises:
-        InvalidValueError: If an index names no cable.
+        InvalidValueError: If an index names no cable, or no cable is left.
     """
-    kept = np.ones(robot.cable_count, dtype=bool)
+    kept = np.ones(instance(robot, Robot, "robot").cable_count, dtype=bool)
     for cable in cables:
-        if not 0 <= cable < robot.cable_count:
-            raise InvalidValueError("cable", cable, f"0 to {robot.cable_count - 1}", "Number cables from 0.")
-        kept[cable] = False
+        kept[whole_number(cable, "cable", 0, robot.cable_count - 1)] = False
+    if not kept.any():
+        raise InvalidValueError("cables", "all that the robot has", "fewer", "Leave one cable at least.")
     return robot.replace(
         frame_anchors=robot.frame_anchors[kept],
         platform_anchors=robot.platform_anchors[kept],

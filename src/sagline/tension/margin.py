@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sagline.arguments import instance
 from sagline.arrays import Array, locked
 from sagline.blocks import blocks, rows_of
 from sagline.kernels.inverse.queries import margins_of_poses
@@ -25,6 +26,9 @@ def limit_margin(state: Equilibrium) -> Array:
     Returns:
         Smallest distance [N] of the quantity that the robot's limits name, shape () or (N,): 0 where a cable is at its
         limit, NaN where there are no tensions. It depends on how the load is shared.
+
+    Raises:
+        InvalidValueError: If the state is no Equilibrium (of a plan: plan.state).
     """
     margin: Array = cable_margins(state).min(axis=-1)
     return margin
@@ -40,7 +44,7 @@ def cable_margins(state: Equilibrium) -> Array:
         Distance [N] of the quantity that the robot's limits name, shape (m,) or (N, m); NaN where there are no
         tensions.
     """
-    tension, limits = state.limited_tension, limits_of(state.robot)
+    tension, limits = instance(state, Equilibrium, "state").limited_tension, limits_of(state.robot)
     margins: Array = np.minimum(tension - limits.low, limits.high - tension)
     return margins
 
@@ -58,10 +62,14 @@ def capacity_margin(state: Equilibrium) -> Array:
         Force [N], shape () or (N,), whatever the way of sharing; infinite where no force alone can make the pose fail,
         NaN where there are no tensions.
 
+    Raises:
+        InvalidValueError: If the state is no Equilibrium (of a plan: plan.state).
+
     Source:
         Bouchard, Gosselin & Moore 2010; Guay, Cardou, Cruz-Ruiz & Caro 2014.
     """
-    shared, cables, rows = first_of(state.robot), state.cables, pose_rows(state.pose)
+    shared, cables = first_of(instance(state, Equilibrium, "state").robot), state.cables
+    rows = pose_rows(state.pose)
     pulls = np.atleast_2d(cables.vertical_force - cables.chord_tension * cables.rise / cables.chord)
     margins = np.empty(len(rows))
     wrenches, memory = np.atleast_2d(state.wrench), memory_for(shared.cable_count)

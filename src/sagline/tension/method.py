@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal, get_args
+from typing import ClassVar, Literal
 
 import numpy as np
 
-from sagline.arrays import Array, checked, locked
+from sagline.arguments import choice
+from sagline.arrays import Array, locked, number
 from sagline.errors import InvalidValueError
 from sagline.kernels import codes
 
@@ -46,11 +47,13 @@ class TensionMethod:
 
     def __post_init__(self) -> None:
         """Check the options."""
-        if self.variable not in VARIABLES:
-            allowed = ", ".join(get_args(Variable))
-            raise InvalidValueError("variable", repr(self.variable), allowed, "Name the tension to share the load in.")
+        if type(self) is TensionMethod:
+            step = "Choose one of the methods, MinimumNorm() for instance."
+            raise InvalidValueError("TensionMethod()", "the interface alone", "a way of sharing the load", step)
+        object.__setattr__(self, "variable", choice(self.variable, "variable", VARIABLES))
         if self.lowest_point_margin is not None:
-            checked(self.lowest_point_margin, "lowest_point_margin", "N", low=0.0)
+            margin = number(self.lowest_point_margin, "lowest_point_margin", "N", low=0.0)
+            object.__setattr__(self, "lowest_point_margin", margin)
 
     @property
     def alone(self) -> TensionMethod:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from sagline.arrays import checked
+from sagline.arrays import number
 from sagline.errors import InvalidValueError
 from sagline.kernels import codes
 from sagline.tension.method import TensionMethod
@@ -33,10 +33,12 @@ class PNorm(TensionMethod):
     def __post_init__(self) -> None:
         """Check the options."""
         TensionMethod.__post_init__(self)
-        if not float(checked(self.p, "p", "", shape=(), low=2.0)) <= LARGEST:
-            raise InvalidValueError("p", self.p, f"2 to {LARGEST:g}", "For larger p take LowestMaximum.")
+        p = number(self.p, "p", "", low=2.0)
+        if p > LARGEST:
+            raise InvalidValueError("p", f"{p:g}", f"2 to {LARGEST:g}", "For larger p take LowestMaximum.")
+        object.__setattr__(self, "p", p)
 
     @property
     def parameter(self) -> float:
         """The exponent."""
-        return float(self.p)
+        return self.p

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array
+from sagline.arrays import Array, checked
+from sagline.errors import InvalidValueError
 
 
 class Side(NamedTuple):
@@ -61,8 +61,15 @@ class TensionPolygon:
             chord_tension: Chord tensions that balance the pose [N], shape (..., m), as `Plan.chord_tension` has them.
 
         Returns:
-            Coordinates in the null space [N], shape (..., r).
+            Coordinates in the null space [N], shape (..., r); NaN for tensions that are NaN.
+
+        Raises:
+            InvalidValueError: If they are no numbers, or not one a cable.
         """
-        shared = self.scale * np.asarray(chord_tension, dtype=np.float64) + self.offset
+        given = checked(chord_tension, "chord_tension", "N", missing=True)
+        if given.ndim == 0 or given.shape[-1] != self.scale.size:
+            allowed = f"shape (..., {self.scale.size})"
+            raise InvalidValueError("chord_tension", f"of shape {given.shape}", allowed, "Give one tension a cable.")
+        shared = self.scale * given + self.offset
         found: Array = (shared - self.origin) @ self.basis.T
         return found

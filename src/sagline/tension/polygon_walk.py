@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal, get_args
+from typing import ClassVar, Literal
 
-from sagline.errors import InvalidValueError
+from sagline.arguments import choice
 from sagline.kernels import codes
 from sagline.kernels.sharing.on_polygon import WALK_CENTROID, WALK_NORM, WALK_SUM
 from sagline.tension.method import TensionMethod
@@ -37,9 +37,7 @@ class PolygonWalk(TensionMethod):
     def __post_init__(self) -> None:
         """Check the options."""
         TensionMethod.__post_init__(self)
-        if self.optimum not in _OPTIMA:
-            allowed = ", ".join(get_args(Optimum))
-            raise InvalidValueError("optimum", repr(self.optimum), allowed, "Name one of them.")
+        object.__setattr__(self, "optimum", choice(self.optimum, "optimum", _OPTIMA))
 
     @property
     def parameter(self) -> float:

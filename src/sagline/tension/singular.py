@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sagline.arguments import instance
 from sagline.arrays import Array, locked
 from sagline.errors import InvalidValueError
 from sagline.robot.pose import Pose
@@ -41,12 +42,16 @@ def unresisted_motion(robot: Robot, pose: Pose) -> UnresistedMotion:
 
     Raises:
         InvalidValueError: If there is not one pose.
+        CableGeometryError: If both ends of a cable coincide.
     """
-    if pose.shape:
+    instance(robot, Robot, "robot")
+    if instance(pose, Pose, "pose").shape:
         raise InvalidValueError("pose", f"a batch of shape {pose.shape}", "one pose", "Ask for one pose at a time.")
     lever = float(np.linalg.norm(robot.platform_anchors - robot.center_of_mass, axis=1).max()) or 1.0
     units = np.where(np.linalg.norm(robot.freedom[:, 3:], axis=1) > 0.5, 1.0 / lever, 1.0)
-    left, values, _right = np.linalg.svd(units[:, None] * structure_matrix(robot, pose))
+    structure = units[:, None] * structure_matrix(robot, pose)
+    # the right vectors, as many as cables squared, are not asked for where the left ones are whole without
+    left, values, _right = np.linalg.svd(structure, full_matrices=structure.shape[1] < structure.shape[0])
     twist = robot.freedom.T @ (units * left[:, -1])
     linear, angular = np.linalg.norm(twist[:3]), np.linalg.norm(twist[3:])
     turns = angular * lever > 1e-6 * linear

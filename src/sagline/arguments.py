@@ -1,0 +1,284 @@
+"""The border between a caller's objects and ours: what is no number is checked here by its kind.
+
+Numbers and arrays of them come through `sagline.arrays`.
+"""
+
+from __future__ import annotations
+
+import operator
+import os
+import re
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from reprlib import Repr
+from types import MappingProxyType
+from typing import Any, Final, TypeVar
+
+import numpy as np
+
+from sagline.errors import FileError, InvalidValueError, printable
+
+T = TypeVar("T")
+
+# How a caller comes by an object of a kind; every message that misses one ends with it.
+HOW_TO_GET: Final = MappingProxyType(
+    {
+        "Axes": "Make them with matplotlib, or leave ax out.",
+        "Axes3D": 'Make them with add_subplot(projection="3d"), or leave ax out.',
+        "Cable": "Give Cable(linear_density, axial_stiffness).",
+        "CableModel": "Give one of the models, Catenary() for instance.",
+        "CableState": "Take that of a model: Catenary().from_tension(...).",
+        "Confirmation": "Make one of a plan: confirm(plan).",
+        "Equilibrium": "Take that of a plan or a solution: plan.state.",
+        "MeasuredTension": "Give MeasuredTension(frame_end_tension, tension_deviation, length_deviation).",
+        "Path": "Make one, with quintic_path(waypoints, speed=1.0) for instance.",
+        "Plan": "Make one: inverse(robot, motion).",
+        "Pose": "Make one: Pose.from_euler(position, 0, 0, 0).",
+        "PoseBox": "Give PoseBox(low, high, tilt).",
+        "Robot": 'Load one by its name or file: load_robot("cogiro").',
+        "TensionMethod": "Give one of the methods, MinimumNorm() for instance.",
+        "TensionPolygon": "Make one: tension_polygon(robot, pose).",
+    }
+)
+LONGEST_TITLE: Final = 100  # letters of a name; it becomes part of file names
+LONGEST_NAME = 255  # bytes of a file's name, on all the usual disks
+_PARTS = ("state", "pose", "robot", "plan", "path", "cables", "cable", "model", "tension")
+
+
+class _Brief(Repr):
+    """What a person is shown of a value: its kind, where its text would not fit into a message."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.maxstring = self.maxother = 60
+        self.maxlist = self.maxtuple = self.maxdict = self.maxset = self.maxfrozenset = self.maxdeque = 3
+        self.maxlevel = 3
+
+    def repr_instance(self, x: Any, level: int) -> str:
+        if isinstance(x, np.ndarray) and x.size > 3:
+            return f"an array of {x.dtype} of shape {x.shape}"
+        if type(x).__module__.startswith("sagline") and len(repr(x)) > self.maxother:
+            return f"a {type(x).__name__}"
+        return super().repr_instance(x, level)
+
+
+def brief(value: object) -> str:
+    """A value as a message shows it: one short line, whatever it is.
+
+    Args:
+        value: Anything.
+
+    Returns:
+        Its text, or its kind where the text is long or not to be had.
+    """
+    if isinstance(value, type):
+        return f"the class {value.__name__}"
+    try:
+        return printable(_Brief().repr(value))
+    except Exception:  # the text of a caller's object is the caller's code
+        return f"one of type {type(value).__name__}"
+
+
+def instance(value: object, kind: type[T], item: str) -> T:
+    """An argument of one of our kinds, as it is.
+
+    Args:
+        value: What was given.
+        kind: What it must be.
+        item: The name a message uses.
+
+    Returns:
+        The value.
+
+    Raises:
+        InvalidValueError: If it is of another kind; the message says how to come by one.
+    """
+    if isinstance(value, kind):
+        return value
+    raise InvalidValueError(item, brief(value), _a(kind.__name__), _step_to(value, kind))
+
+
+def optional(value: object, kind: type[T], item: str) -> T | None:
+    """An argument of one of our kinds, or None, which leaves it out.
+
+    Args:
+        value: What was given.
+        kind: What it must be.
+        item: The name a message uses.
+
+    Returns:
+        The value.
+
+    Raises:
+        InvalidValueError: If it is neither.
+    """
+    return None if value is None else instance(value, kind, item)
+
+
+def choice(value: Any, item: str, allowed: Iterable[str]) -> Any:
+    """One of a few words.
+
+    Args:
+        value: What was given.
+        item: The name a message uses.
+        allowed: The words.
+
+    Returns:
+        The value.
+
+    Raises:
+        InvalidValueError: If it is none of them.
+    """
+    words = tuple(allowed)
+    if isinstance(value, str) and value in words:
+        return str(value)  # numpy has a kind of its own
+    raise InvalidValueError(item, brief(value), ", ".join(words), f"Choose one of them as {item}.")
+
+
+def text(value: Any, item: str) -> str:
+    """A text, of several lines perhaps, that a terminal can show.
+
+    Args:
+        value: What was given.
+        item: The name a message uses.
+
+    Returns:
+        The text.
+
+    Raises:
+        InvalidValueError: If it is none, or has control characters or what cannot be encoded.
+    """
+    if not isinstance(value, str):
+        raise InvalidValueError(item, brief(value), "a text", f'Put {item} between quotes: "...".')
+    if (flat := value.replace("\n", " ").replace("\t", " ")) != printable(flat):
+        raise InvalidValueError(item, brief(value), "printable text", f"Remove what does not print in {item}.")
+    return str(value)  # numpy has a kind of its own
+
+
+def label(value: Any, item: str) -> str:
+    """What something is called: one line of text that a terminal, a figure and a file name can show.
+
+    Args:
+        value: What was given.
+        item: The name a message uses.
+
+    Returns:
+        The name.
+
+    Raises:
+        InvalidValueError: If it is no such text, or longer than 100 letters.
+    """
+    if not isinstance(value, str) or len(value) > LONGEST_TITLE or value != printable(value):
+        allowed = f"one line of printable text, at most {LONGEST_TITLE} letters"
+        raise InvalidValueError(item, brief(value), allowed, f"Choose another {item}.")
+    return str(value)
+
+
+def integer(value: Any) -> int | None:
+    """The integer that a value is; truth values are none, and arrays of one number are no number either.
+
+    Args:
+        value: Anything.
+
+    Returns:
+        The integer, or None.
+    """
+    if isinstance(value, bool | np.bool_) or (isinstance(value, np.ndarray) and value.ndim):
+        return None
+    try:
+        return operator.index(value)
+    except TypeError:
+        return None
+
+
+def whole_number(value: Any, item: str, low: int, high: int = sys.maxsize) -> int:
+    """A whole number.
+
+    Args:
+        value: What was given: an integer of Python or numpy; a truth value is none.
+        item: The name a message uses.
+        low: The smallest allowed.
+        high: The largest allowed; by default the largest that counts anything.
+
+    Returns:
+        The number.
+
+    Raises:
+        InvalidValueError: If it is none, or out of range.
+    """
+    number = integer(value)
+    if number is not None and low <= number <= high:
+        return number
+    allowed = f"{low} to {high}"
+    if number is None:
+        allowed = f"a whole number, {allowed}"
+    raise InvalidValueError(item, brief(value), allowed, f"Correct {item}.")
+
+
+def callback(value: Any, item: str) -> Any:
+    """A function to call, or None.
+
+    Args:
+        value: What was given.
+        item: The name a message uses.
+
+    Returns:
+        The value.
+
+    Raises:
+        InvalidValueError: If it cannot be called.
+    """
+    if value is None or (callable(value) and not isinstance(value, type)):
+        return value
+    raise InvalidValueError(item, brief(value), "a function of two numbers: done, of how many", "Give one, or None.")
+
+
+def file_path(file: Any, item: str = "file", *, folder: bool = False) -> Path:
+    """The path of a file or folder.
+
+    Args:
+        file: What was given: a text or a path object.
+        item: The name a message uses.
+        folder: Whether it may be a folder.
+
+    Returns:
+        The path.
+
+    Raises:
+        InvalidValueError: If it is neither.
+        FileError: If it is empty, or no name that a file can have.
+    """
+    given = os.fspath(file) if isinstance(file, os.PathLike) and not isinstance(file, type) else file
+    if not isinstance(given, str):
+        raise InvalidValueError(item, brief(file), "the path of a file, a text or a Path", f"Give {item} as a text.")
+    if not given.strip():
+        raise FileError(".", f"is what an empty {item} stands for", "Give the name of a file.")
+    path = Path(given)
+    if not path.name and not folder:
+        raise FileError(path, "is a folder", "Give the name of a file in it.")
+    try:
+        longest = max(len(os.fsencode(part)) for part in (path.name, *path.parts))
+    except UnicodeEncodeError:
+        longest = -1
+    if "\0" in given or not 0 <= longest <= LONGEST_NAME:
+        raise FileError(path, f"is no name that a file can have, of up to {LONGEST_NAME} bytes", "Correct it.")
+    return path
+
+
+def _a(name: str) -> str:
+    if name.startswith("Axes"):
+        return f"matplotlib's {name}"
+    return f"{'an' if name[0] in 'AEIOU' else 'a'} {name}"
+
+
+def _step_to(value: object, kind: type) -> str:
+    """How to come from what was given to what is wanted."""
+    if isinstance(value, type) and issubclass(value, kind):
+        return f"Write {value.__name__}(), with parentheses: that makes one."
+    if type(value).__module__.startswith("sagline"):
+        name = re.findall("[A-Z][a-z]*", type(value).__name__)[-1:] or [type(value).__name__]
+        for part in _PARTS:
+            if isinstance(getattr(value, part, None), kind):
+                return f"Give {name[0].lower()}.{part}."
+    return HOW_TO_GET.get(kind.__name__, f"Give {_a(kind.__name__)}.")

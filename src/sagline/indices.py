@@ -1,0 +1,82 @@
+"""Indices along the first axis of a batch: of poses, of cables, of equilibria."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sagline.arguments import brief, integer
+from sagline.errors import NoBatchError, NoSuchEntryError
+
+
+def part_of(index: Any, shape: tuple[int, ...], single: str) -> Any:
+    """An index along the first axis of a batch, checked.
+
+    Args:
+        index: A number, which may count from the end; a slice; or numbers or booleans, in a list or an array.
+        shape: Of the batch; () for a single entry.
+        single: What a single entry is called, "single pose" for instance.
+
+    Returns:
+        An integer, a slice, or an array of integers or booleans.
+
+    Raises:
+        NoBatchError: If there is a single entry.
+        NoSuchEntryError: If it is no such index, or names no entry.
+    """
+    if not shape:
+        raise NoBatchError("index", brief(index), "none", f"A {single} cannot be indexed; take it as it is.")
+    if isinstance(index, slice):
+        return _sliced(index, shape[0])
+    number = integer(index)
+    if number is not None:
+        if -shape[0] <= number < shape[0]:
+            return number
+        raise _no_entry(index, shape[0])
+    chosen = np.asarray(index) if isinstance(index, list | np.ndarray) else None
+    if chosen is None or chosen.ndim != 1 or not _names_entries(chosen, shape[0]):
+        raise _no_entry(index, shape[0])
+    return chosen if chosen.size else chosen.astype(np.int64)  # an empty list has no kind
+
+
+def length_of(shape: tuple[int, ...], single: str) -> int:
+    """Number of entries along the first axis of a batch.
+
+    Args:
+        shape: Of the batch; () for a single entry.
+        single: What a single entry is called, "single pose" for instance.
+
+    Returns:
+        The number.
+
+    Raises:
+        NoBatchError: If there is a single entry.
+    """
+    if not shape:
+        raise NoBatchError("this", f"a {single}", "a batch", f"A {single} has no length; take it as it is.")
+    return shape[0]
+
+
+def _sliced(index: slice, size: int) -> slice:
+    try:
+        index.indices(size)
+    except (TypeError, ValueError):
+        raise _no_entry(index, size) from None
+    return index
+
+
+def _names_entries(chosen: NDArray[Any], size: int) -> bool:
+    if chosen.dtype == np.bool_:
+        return len(chosen) == size
+    if chosen.size == 0:
+        return True
+    return bool(chosen.dtype.kind in "iu" and int(chosen.min()) >= -size and int(chosen.max()) < size)
+
+
+def _no_entry(index: object, size: int) -> NoSuchEntryError:
+    allowed = f"{-size} to {size - 1}, a slice, or an array of such numbers or of {size} booleans"
+    if size == 0:
+        allowed = "a slice, because there is none"
+    return NoSuchEntryError("index", brief(index), allowed, f"There are {size}; count from 0.")

@@ -1,0 +1,64 @@
+"""What a control loop gives and gets: numbers into memory of ours and out of it, checked within some ten nanoseconds.
+
+A view of memory takes an array of its own kind and size and no other, which costs less than numpy takes to copy one.
+"""
+
+from __future__ import annotations
+
+from array import array
+from typing import Any, Final
+
+import numpy as np
+
+from sagline.arguments import brief
+from sagline.arrays import Array, exactly
+from sagline.errors import InvalidValueError
+
+ARRAY: Final = np.ndarray  # a name of a module's own is found quicker than that of another
+FLOAT: Final = np.dtype(np.float64)
+WHOLE: Final = slice(None)
+
+
+def take(memory: Any, given: Any, item: str, unit: str) -> None:
+    """Write a caller's numbers into memory of ours; that they are finite is for the solver to tell.
+
+    Args:
+        memory: A `memoryview` of float64 numbers, shape (k,).
+        given: What the caller gave: k numbers.
+        item: The name a message uses.
+        unit: Its unit, for the message.
+
+    Raises:
+        InvalidValueError: If they are no such numbers.
+    """
+    try:
+        if given.__class__ is ARRAY:
+            memory[WHOLE] = given
+            return
+        if isinstance(given, list | tuple):
+            memory[WHOLE] = array("d", given)
+            return
+    except (TypeError, ValueError, NotImplementedError, OverflowError):
+        pass  # of another kind or shape: integers and the like are taken, or it is told what is wrong
+    memory[WHOLE] = exactly(given, item, unit, (len(memory),))
+
+
+def give(values: Array, out: Any, item: str) -> None:
+    """Write an answer to a caller's memory.
+
+    Args:
+        values: The answer, shape (k,).
+        out: The caller's array.
+        item: The name a message uses.
+
+    Raises:
+        InvalidValueError: If it is no writable array of float64 of that shape.
+    """
+    try:
+        if out.dtype is FLOAT or out.dtype == FLOAT:
+            out[WHOLE] = values
+            return
+    except (AttributeError, IndexError, TypeError, ValueError):  # no array, of another shape, or write-locked
+        pass
+    allowed = f"a writable array of float64 of shape ({values.size},)"
+    raise InvalidValueError(item, brief(out), allowed, f"Give np.empty({values.size}).")

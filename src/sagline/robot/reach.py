@@ -1,0 +1,104 @@
+"""Poses that a robot's motion pattern has: a platform that does not turn is asked for no turn."""
+
+from __future__ import annotations
+
+from math import asin, degrees
+
+import numpy as np
+
+from sagline.arrays import Array
+from sagline.errors import InvalidValueError
+from sagline.robot.pattern import ROTATING
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+
+LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
+ROUNDING = 1e-6  # rad and m: what is printed with seven digits still counts as none
+
+
+def check_reach(robot: Robot, pose: Pose, item: str) -> None:
+    """Refuse poses between which the robot's motion pattern does not lead.
+
+    A platform that does not turn keeps its orientation, whichever that is; a planar one turns about the normal of its
+    plane alone, and stays in one plane, whichever of the parallel ones.
+
+    Args:
+        robot: The robot, or the first of several that share their pattern.
+        pose: One pose, which is always in reach, or a batch; NaN passes.
+        item: The name a message uses.
+
+    Raises:
+        InvalidValueError: If one cannot be reached from the first; the message names it and says by how much.
+    """
+    pattern, normal = robot.motion_pattern, robot.plane_normal
+    if pattern == "3R3T" or len(pose.shape) == 0 or len(pose) == 0:
+        return
+    turn = forbidden_turn(robot, pose, pose.quaternion[0])
+    size = np.linalg.norm(turn, axis=1)
+    if (outside := np.flatnonzero(size > ROUNDING)).size:
+        k = int(outside[0])
+        value = f"turned by {in_words(turn[k])} from {item}[0]"
+        allowed = "a turn about plane_normal" if pattern in ROTATING else "no turn"
+        step = "Give the robot another motion_pattern, or correct the poses."
+        raise InvalidValueError(f"{item}[{k}]", value, f"{allowed}, by motion_pattern {pattern}", step)
+    height = np.zeros(1) if normal is None else (pose.position - pose.position[0]) @ normal
+    if (outside := np.flatnonzero(np.abs(height) > ROUNDING)).size:
+        k = int(outside[0])
+        value = f"{height[k]:.6g} m along plane_normal from {item}[0]"
+        step = "Project the poses onto one plane, or give the robot another motion_pattern."
+        raise InvalidValueError(f"{item}[{k}]", value, f"0 m, by motion_pattern {pattern}", step)
+
+
+def forbidden_turn(robot: Robot, pose: Pose, other: Array) -> Array:
+    """The part of the rotation from an orientation to that of each pose that the robot's motion pattern does not have.
+
+    Args:
+        robot: The robot.
+        pose: One pose or a batch of N.
+        other: The orientation, a unit quaternion, shape (4,).
+
+    Returns:
+        Sine of half the angle times the axis, shape (N, 3); zeros where all motions are free.
+    """
+    own = np.atleast_2d(pose.quaternion)
+    if robot.motion_pattern == "3R3T":
+        return np.zeros((len(own), 3))
+    turn: Array = other[3] * own[:, :3] - own[:, 3:] * other[:3] - np.cross(own[:, :3], other[:3])
+    if robot.motion_pattern in ROTATING and robot.plane_normal is not None:
+        turn -= np.outer(turn @ robot.plane_normal, robot.plane_normal)
+    return turn
+
+
+def in_words(turn: Array) -> str:
+    """A turn as a person reads it.
+
+    Args:
+        turn: Sine of half the angle times the axis, shape (3,), more than zero.
+
+    Returns:
+        Angle and axis.
+    """
+    sine = float(np.linalg.norm(turn))
+    axis = ", ".join(f"{x:.3g}" for x in np.round(turn / sine, 9) + 0.0)
+    return f"{degrees(2.0 * asin(min(sine, 1.0))):.3g} deg about ({axis})"
+
+
+def out_of_plane(robot: Robot, pose: Pose) -> Array:
+    """How far the cables of a planar robot, if they lie in one plane, are out of it.
+
+    Args:
+        robot: The robot.
+        pose: One pose or a batch of N.
+
+    Returns:
+        Distance of the platform ends from the plane of the frame ends [m], shape (N,); zeros where the robot is not
+        planar, or its ends are not in one plane each.
+    """
+    away = np.zeros(len(np.atleast_2d(pose.position)))
+    if robot.plane_normal is None:
+        return away
+    frame, platform = robot.frame_anchors @ robot.plane_normal, robot.platform_anchors @ robot.plane_normal
+    if np.ptp(frame) > ROUNDING or np.ptp(platform) > ROUNDING:
+        return away
+    distance: Array = np.atleast_2d(pose.position) @ robot.plane_normal + platform[0] - frame[0]
+    return distance

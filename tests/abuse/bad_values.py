@@ -1,0 +1,346 @@
+"""What somebody may give in place of a valid argument, by what the argument is, and what must come of it."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Iterator
+from decimal import Decimal
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pint
+from matplotlib.figure import Figure
+
+import sagline as sl
+
+REFUSED, SAME, EITHER = "refused", "the same answer", "refused or answered"
+UNITS: pint.UnitRegistry[Any] = pint.UnitRegistry()
+
+
+class Bad(NamedTuple):
+    """A value and what must come of it."""
+
+    label: str
+    value: Any
+    verdict: str
+
+
+class Foreign:
+    """An array of another library, as numpy asks for it."""
+
+    def __init__(self, values: Any) -> None:
+        self.values = np.asarray(values)
+
+    def __array__(self, dtype: Any = None, copy: Any = None) -> Any:
+        return np.array(self.values, dtype=dtype)
+
+
+class Stubborn:
+    """An object that answers no question."""
+
+    def __array__(self, dtype: Any = None, copy: Any = None) -> Any:
+        raise RuntimeError("these numbers are on another machine\nand stay there")
+
+    def __repr__(self) -> str:
+        raise RuntimeError("no text either")
+
+
+def bad_values(kind: str, valid: Any, optional: bool) -> Iterator[Bad]:
+    """All of them for one argument.
+
+    Args:
+        kind: What the argument is: one of the functions below.
+        valid: A value that is taken.
+        optional: Whether None leaves the argument out.
+
+    Yields:
+        Values, each with its verdict.
+    """
+    yield Bad("None", None, EITHER if optional else REFUSED)
+    for label, value in (
+        ("an object", object()),
+        ("a stubborn object", Stubborn()),
+        ("bytes", b"1.0"),
+        ("a number with an imaginary part", 1.0 + 2.0j),
+        ("a class", sl.Straight),
+        ("an ellipsis", ...),
+        ("a set", {"a", "b"}),
+        ("nested lists", [[[["a"]]]]),
+        ("a long text", "nothing" * 100),
+        ("a text that does not print", "\x1b[31m\n\ud800"),
+    ):
+        if not (kind in ("text",) and isinstance(value, str)) and not (kind == "file" and isinstance(value, str)):
+            yield Bad(label, value, EITHER if kind == "index" and value is ... else REFUSED)
+    yield from KINDS[kind](valid)
+
+
+def _array(valid: Any) -> Iterator[Bad]:
+    """Numbers of any shape."""
+    v = np.asarray(valid, dtype=np.float64)
+    first = v.reshape(-1)[:1]
+    spoiled = {name: v.copy() for name in ("nan", "inf", "minus inf", "1e308", "minus 1e308", "1e200")}
+    for (name, array), number in zip(spoiled.items(), (np.nan, np.inf, -np.inf, 1e308, -1e308, 1e200), strict=True):
+        array.reshape(-1)[:1] = number
+        yield Bad(name, array, EITHER if name in ("nan", "inf") else REFUSED)
+    masked = np.ma.MaskedArray(v, mask=np.zeros(v.shape, dtype=bool))
+    yield Bad("nothing masked", masked.copy(), SAME)
+    masked.mask.reshape(-1)[:1] = True
+    yield Bad("something masked", np.ma.MaskedArray(v, mask=masked.mask), REFUSED if v.size else EITHER)
+    listed = v.tolist()
+    yield from (
+        Bad("complex", v + 1j, REFUSED),
+        Bad("complex, real", v.astype(complex), REFUSED),
+        Bad("text of numbers", v.astype(str), REFUSED),
+        Bad("objects of text", v.astype(str).astype(object), REFUSED),
+        Bad("all None", np.full(v.shape, None), REFUSED),
+        Bad("ragged", [[1.0], [1.0, 2.0]], REFUSED),
+        Bad("a list in itself", _endless(), REFUSED),
+        Bad("dates", v.astype("int64").astype("datetime64[s]"), REFUSED),
+        Bad("durations", v.astype("int64").astype("timedelta64[s]"), REFUSED),
+        Bad("records", np.zeros(v.shape, dtype=[("a", float)]), REFUSED),
+        Bad("a generator", (x for x in v.reshape(-1)), REFUSED),
+        Bad("a dictionary", OrderedDict(a=1.0), REFUSED),
+        Bad("too large an integer", 10**400, REFUSED),
+        Bad("beyond the range of doubles", np.full(v.shape, np.longdouble("1e4000")), EITHER),
+        Bad("millimeters", UNITS.Quantity(v, "mm"), REFUSED),
+        Bad("more than memory", np.broadcast_to(v, (10**13, *v.shape)), REFUSED),
+        Bad("a range more than memory", range(10**15), REFUSED),
+        Bad("a list", listed, SAME),
+        Bad("in Fortran's order", np.array(v, order="F"), SAME),
+        Bad("big-endian", v.astype(">f8"), SAME),
+        Bad("long doubles", v.astype(np.longdouble), SAME),
+        Bad("objects", v.astype(object), SAME),
+        Bad("another library's", Foreign(v), SAME),
+        Bad("every second", np.repeat(v, 2, axis=-1)[..., ::2] if v.ndim else v, SAME),
+        Bad("decimals", np.array([Decimal(repr(x)) for x in v.reshape(-1).tolist()]).reshape(v.shape), SAME),
+        Bad("booleans", v.astype(bool), EITHER),
+        Bad("a truth value", True, EITHER),
+        Bad("nothing", [], EITHER),
+        Bad("nothing in many axes", np.empty((0, 3, 0)), EITHER),
+        Bad("negative", -v, EITHER),
+        Bad("zero", 0.0 * v, EITHER),
+        Bad("tiny", 1e-320 * np.ones(v.shape), EITHER),
+        Bad("huge", 1e40 * v, EITHER),
+        Bad("one axis more", v[None], EITHER),
+        Bad("five axes more", v[None, None, None, None, None], EITHER),
+        Bad("one entry more", np.concatenate((v.reshape(-1), first)), EITHER),
+        Bad("turned", v.T[::-1] if v.ndim else v, EITHER),
+        Bad("twice", np.stack((v, v)), EITHER),
+    )
+
+
+def _sample(valid: Any) -> Iterator[Bad]:
+    """Numbers of a control loop: what is out of range is told by a status."""
+    for bad in _array(valid):
+        if "inf" in bad.label or "1e" in bad.label:
+            yield bad._replace(verdict=EITHER)
+        else:
+            yield bad
+
+
+def _number(valid: Any) -> Iterator[Bad]:
+    """One number, and no more."""
+    for bad in _array(valid):
+        if bad.label in ("one axis more", "five axes more", "one entry more", "twice") or bad.label == "nan":
+            yield bad._replace(verdict=REFUSED)
+        elif bad.label != "turned":
+            yield bad
+
+
+def _endless() -> list[Any]:
+    values: list[Any] = []
+    values.append(values)
+    return values
+
+
+def _whole(valid: Any) -> Iterator[Bad]:
+    """A whole number."""
+    wrong: tuple[Any, ...] = (
+        2.5,
+        float(valid),
+        "3",
+        True,
+        np.True_,
+        -1,
+        np.nan,
+        [valid],
+        np.array([valid]),
+        Decimal(3),
+    )
+    for value in (*wrong, -(10**30)):
+        yield Bad(f"{value!r}", value, REFUSED)
+    yield Bad("more than memory", 10**14, REFUSED)
+    yield Bad("more digits than a text may have", 10**5000, REFUSED)
+    same: tuple[Any, ...] = (np.int64(valid), np.uint8(valid), np.array(valid))
+    for value in same:
+        yield Bad(f"a whole number of numpy: {value!r}", value, SAME)
+
+
+def _cable(valid: Any) -> Iterator[Bad]:
+    """The index of a cable."""
+    yield from _whole(valid)
+    yield Bad("one too many", 8, REFUSED)
+
+
+def _seed(valid: Any) -> Iterator[Bad]:
+    """A seed: a whole number of any size."""
+    yield from (bad for bad in _whole(valid) if not bad.label.startswith("more"))
+
+
+def _index(valid: Any) -> Iterator[Bad]:
+    """An index along a batch of three."""
+    wrong: tuple[Any, ...] = (
+        (0, 1), 1.5, "a", 3, -4, 10**30, [3], [0.5], [[0]], [True], np.zeros(4, bool), np.zeros((3, 1), bool), "0",
+        slice("a", None), slice(0, 1, 0), np.array([0.0]), np.datetime64("2020-01-01"), True, ["0"], {0: 1},
+        (i for i in (0,)),
+    )  # fmt: skip
+    for value in wrong:
+        yield Bad(f"{value!r}", value, REFUSED)
+    for value in (np.int64(valid), np.array(valid), -3):
+        yield Bad(f"the same: {value!r}", value, SAME)
+    for value in ([], slice(5, 9), np.array([], dtype=int), [0, -1], np.ones(3, bool), slice(None, None, -1)):
+        yield Bad(f"{value!r}", value, EITHER)
+
+
+def _word(valid: Any) -> Iterator[Bad]:
+    """One of a few words."""
+    for value in (3, "", valid.upper() + "x", [valid], (valid,), np.array([valid, valid]), valid.encode(), True):
+        yield Bad(f"{value!r}", value, REFUSED)
+    yield Bad("a text of numpy", np.str_(valid), SAME)
+
+
+def _words(valid: Any) -> Iterator[Bad]:
+    """Several of a few words, each once."""
+    for value in (3, [], list(valid) * 2, "linear_density", [3], [None], [[valid[0]]], ["mass"], {valid[0]: 1}):
+        yield Bad(f"{value!r}", value, REFUSED)
+    yield Bad("a tuple", tuple(valid), SAME)
+
+
+def _text(valid: Any) -> Iterator[Bad]:
+    """Any text."""
+    wrong: tuple[Any, ...] = (3, True, [valid], np.array(valid), Path("name"))
+    for value in wrong:
+        yield Bad(f"{value!r}", value, REFUSED)
+    for text in ("", "a" * 3000, "\x1b[31m\n\ud800", "../../evil"):
+        yield Bad(f"{text!r:.20}", text, EITHER)
+
+
+def _file(valid: Any) -> Iterator[Bad]:
+    """A file's name."""
+    values: tuple[Any, ...] = (
+        3,
+        True,
+        "",
+        " ",
+        "\0",
+        "nothing/at/all.x",
+        "a" * 3000,
+        ".",
+        Path("."),
+        [str(valid)],
+        Path,
+    )
+    for value in values:
+        yield Bad(f"{value!r:.20}", value, REFUSED)
+    yield Bad("a path", Path(valid), SAME)
+
+
+def _callback(_: Any) -> Iterator[Bad]:
+    """A function that is told of the progress."""
+    for value in (True, 3, "print", [print], 0):
+        yield Bad(f"{value!r}", value, REFUSED)
+
+
+def _mapping(valid: Any) -> Iterator[Bad]:
+    """Names and what belongs to them."""
+    key, value = next(iter(valid.items()))
+    for wrong in (3, True, [(key, value)], {key: object()}, {key: b"a"}, [key]):
+        yield Bad(f"{wrong!r:.40}", wrong, REFUSED)
+    yield Bad("in order", OrderedDict(valid), SAME)
+
+
+def _object(valid: Any) -> Iterator[Bad]:
+    """An object of one of our kinds."""
+    kind = type(valid)
+    yield Bad("its class", kind, REFUSED)
+    yield Bad("its name", kind.__name__, REFUSED)
+    yield Bad("two in a list", [valid, 3], REFUSED)
+    yield Bad("an empty list", [], REFUSED)
+    yield Bad("0", 0, REFUSED)
+    yield Bad("an empty text", "", REFUSED)
+    yield Bad("False", False, REFUSED)
+    yield Bad("(1, 1, 2)", (1, 1, 2), REFUSED)
+    yield Bad("an array", np.ones((3, 3)), REFUSED)
+    for other in strangers():
+        if not isinstance(other, kind) and type(other).__bases__ != kind.__bases__:
+            yield Bad(f"a {type(other).__name__}", other, REFUSED)
+
+
+def _one(valid: Any) -> Iterator[Bad]:
+    """An object where a sequence of them is none."""
+    yield from _object(valid)
+    yield Bad("one in a list", [valid], REFUSED)
+
+
+def _motion(valid: Any) -> Iterator[Bad]:
+    """A pose or a path."""
+    yield from (bad for bad in _one(valid) if not isinstance(bad.value, sl.Pose | sl.Path))
+
+
+def _out(valid: Any) -> Iterator[Bad]:
+    """Memory to be filled."""
+    size = len(valid)
+    locked = np.empty(size)
+    locked.flags.writeable = False
+    for label, value in (
+        ("write-locked", locked),
+        ("integers", np.empty(size, dtype=np.int64)),
+        ("complex", np.empty(size, dtype=complex)),
+        ("single precision", np.empty(size, dtype=np.float32)),
+        ("too short", np.empty(size - 1)),
+        ("too long", np.empty(size + 1)),
+        ("one number", np.array(1.0)),
+        ("a list", [0.0] * size),
+        ("a number", 3.0),
+    ):
+        yield Bad(label, value, REFUSED)
+
+
+def _ax(valid: Any) -> Iterator[Bad]:
+    """Flat axes of matplotlib."""
+    yield from _one(valid)
+    yield Bad("a figure", valid.figure, REFUSED)
+    yield Bad("deep axes", Figure().add_subplot(projection="3d"), REFUSED)
+    yield Bad("round axes", Figure().add_subplot(projection="polar"), REFUSED)
+
+
+def _points(valid: Any) -> Iterator[Bad]:
+    """Names and the tensions of each."""
+    name, tensions = next(iter(valid.items()))
+    yield from (bad for bad in _mapping(valid))
+    for label, value in (("too few", tensions[:3]), ("a batch", np.stack((tensions, tensions))), ("one number", 1.0)):
+        yield Bad(label, {name: value}, REFUSED)
+    yield Bad("not known", {name: np.full(len(tensions), np.nan)}, EITHER)
+    yield Bad("none at all", {}, EITHER)
+
+
+def strangers() -> list[Any]:
+    """One object of each of our kinds; made once."""
+    if not _STRANGERS:
+        robot = sl.load_robot("cogiro")
+        pose = sl.Pose.from_euler([1.0, 1.0, 2.0], 0.0, 0.0, 0.0)
+        plan = sl.inverse(robot, pose)
+        path = sl.quintic_path([(0, 0, 1.5), (1, 1, 2)], durations=1.0, rate=3.0)
+        _STRANGERS.extend((robot, robot.cables, pose, plan, plan.state, plan.state.cables, path, sl.confirm(plan)))
+        _STRANGERS.extend((sl.Catenary(), sl.MinimumNorm(), sl.PoseBox([0, 0, 0], [1, 1, 1])))
+    return _STRANGERS
+
+
+_STRANGERS: list[Any] = []
+KINDS = {
+    name.removeprefix("_"): function
+    for name, function in globals().items()
+    if function in (_array, _number, _whole, _cable, _seed, _index, _word, _words, _text, _file, _callback, _mapping,
+                    _object, _one, _motion, _out, _ax, _points, _sample)
+}  # fmt: skip

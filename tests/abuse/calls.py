@@ -1,0 +1,481 @@
+"""Every public function, class and method of sagline with arguments that it takes."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from enum import Enum
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.figure import Figure
+
+import sagline as sl
+
+MAGIC = ("__getitem__",)  # of the methods with two underscores: those that a caller gives something
+
+
+class Argument(NamedTuple):
+    """A valid value, and what kind of values there are: the name of a function of `bad_values`."""
+
+    kind: str
+    value: Any
+    optional: bool = False
+
+
+class Call(NamedTuple):
+    """What is called, by keywords, each of its arguments valid; a new object is made for each call of a method."""
+
+    function: Callable[..., Any]
+    arguments: dict[str, Argument]
+
+    def with_one(self, name: str, value: Any) -> Any:
+        """The result of the call with one argument replaced."""
+        given = {key: argument.value for key, argument in self.arguments.items()}
+        return self.function(**{**given, name: value} if name else given)
+
+
+def public_names() -> set[str]:
+    """Names of what a caller calls with arguments: functions, constructors, methods; `plot.tensions` and the like.
+
+    Left out are results, which sagline makes (their constructors check nothing), exceptions, and statuses.
+    """
+    found = set()
+    for name in sl.__all__:
+        value = getattr(sl, name)
+        if isinstance(value, ModuleType):
+            found |= {f"{name}.{function}" for function in value.__all__}
+        elif inspect.isclass(value):
+            found |= _of_class(name, value)
+        elif callable(value) and inspect.signature(value).parameters:
+            found.add(name)
+    return found
+
+
+def _of_class(name: str, kind: type) -> set[str]:
+    if issubclass(kind, Exception | Enum | tuple):
+        return set()
+    found = set() if name in RESULTS or not inspect.signature(kind).parameters else {name}
+    for method, value in vars(kind).items():  # inherited ones are called once, where they are
+        function = value.__func__ if isinstance(value, classmethod) else value
+        public = not method.startswith("_") or method in MAGIC
+        if inspect.isfunction(function) and public and len(inspect.signature(function).parameters) > 1:
+            found.add(f"{name}.{method}")
+    return found
+
+
+# made by sagline
+RESULTS = frozenset(
+    {"CableFit", "CableState", "Confirmation", "EmpiricalFit", "Equilibria", "Equilibrium", "ForwardSolution"}
+    | {"Imported", "Modes", "Plan", "Stiffness", "TensionPolygon"}
+)
+# asked by sagline itself, with numbers of its own
+INTERNAL = frozenset({"TensionMethod.preference", "QuadraticProgram.preference"})
+
+
+@cache
+def calls(folder: Path) -> dict[str, Call]:
+    """The table; files are written to the folder."""
+    given = _Given(folder)
+    table: dict[str, Call] = {}
+    for part in (_cables, _robots, _motions, _kinematics, _solvers, _tensions, _statics, _articles, _files, _figures):
+        table |= part(given)
+    return table
+
+
+class _Given:
+    """Valid objects that calls share."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.robot = sl.load_robot("cogiro")
+        self.cable = sl.Cable(0.067, 44e3)
+        self.pose = sl.Pose.from_euler([1.0, 1.0, 2.0], 0.0, 0.0, 0.0)
+        self.poses = sl.Pose.from_euler([[1.0, 1.0, 2.0], [0.0, 1.0, 2.0], [0.5, 1.0, 2.0]], 0.0, 0.0, 0.0)
+        self.plan = sl.inverse(self.robot, self.pose)
+        self.path = sl.quintic_path([(0, 0, 1.5), (1, 1, 2)], durations=1.0, rate=4.0)
+        self.run = sl.inverse(self.robot, self.path)
+        self.hung = sl.Catenary().from_tension(self.cable, [10.0, 11.0, 12.0], 2.0, 100.0)
+        self.length = self.plan.unstrained_length
+
+
+def _all(**arguments: tuple[Any, ...]) -> dict[str, Argument]:
+    return {name: Argument(*argument) for name, argument in arguments.items()}
+
+
+def _cables(given: _Given) -> dict[str, Call]:
+    one, many = ("one", given.cable), ("array", [0.5, 0.75])
+    ends = {"span": ("array", 12.0), "rise": ("array", -4.0)}
+    gravity = ("number", 9.75)
+    return {
+        "Cable": Call(sl.Cable, _all(linear_density=many, axial_stiffness=many)),
+        "Cable.from_material": Call(
+            sl.Cable.from_material, _all(linear_density=many, youngs_modulus=many, section_area=many)
+        ),
+        "CableModel.from_tension": Call(
+            sl.Catenary().from_tension, _all(cable=one, **ends, chord_tension=("array", [50.0, 100.0]), gravity=gravity)
+        ),
+        "CableModel.from_length": Call(
+            sl.Parabolic().from_length,
+            _all(cable=one, **ends, unstrained_length=("array", [13.0, 13.5]), gravity=gravity),
+        ),
+        "CableModel.profile": Call(
+            sl.Elastic().profile, _all(cable=one, state=("one", given.hung), points=("whole", 5))
+        ),
+        "CableModel.terms": Call(sl.Catenary().terms, _all(gravity=gravity)),
+        "CableState.__getitem__": Call(given.hung.__getitem__, _all(index=("index", 0))),
+        "CableState.points": Call(given.hung.points, _all(count=("whole", 5))),
+        "Empirical": Call(sl.Empirical, _all(k_h=("number", 4.75), k_p=("number", 4.5))),
+    }
+
+
+def _robots(given: _Given) -> dict[str, Call]:
+    robot, numbers, box = given.robot, ("array", [3.0, 2.0, 4.0]), ("array", [[1.0, 2.0, 3.0], [1.5, 2.0, 3.0]])
+    fields = {
+        "name": ("text", "mine"),
+        "frame_anchors": ("array", robot.frame_anchors),
+        "platform_anchors": ("array", robot.platform_anchors),
+        "cables": ("one", robot.cables),
+        "mass": ("number", 90.0),
+        "inertia": ("array", np.diag([1.0, 2.0, 2.5])),
+        "center_of_mass": ("array", [0.0, 0.125, 0.25]),
+        "gravity": ("number", 9.75),
+        "motion_pattern": ("word", "3R3T"),
+        "tension_min": ("array", np.full(8, 10.0)),
+        "tension_max": ("array", np.full(8, 1000.0)),
+        "tension_limits_of": ("word", "frame_end"),
+        "platform_size": (*numbers, True),
+        "frame_size": (*numbers, True),
+        "test_box": ("one", sl.PoseBox([0, 0, 0], [1, 1, 1]), True),
+        "source": ("text", "a book"),
+        "assumed": ("mapping", {"mass": "weighed"}),
+        "notes": ("text", "none"),
+    }
+    flat = sl.Robot(
+        "flat",
+        np.eye(4, 3),
+        np.zeros((4, 3)),
+        sl.Cable(0.1, 1e5),
+        9.0,
+        motion_pattern="2T",
+        plane_normal=[0.0, 1.0, 0.0],
+    )
+    angle = ("array", [0.25, 0.5])
+    return {
+        "Robot": Call(sl.Robot, _all(**fields)),
+        "Robot.replace": Call(robot.replace, _all(**{name: fields[name] for name in ("mass", "tension_min", "name")})),
+        "Robot: plane": Call(flat.replace, _all(plane_normal=("array", [0.0, 0.0, 2.0]))),
+        "PoseBox": Call(sl.PoseBox, _all(low=("array", [0.0, 1.0, 2.0]), high=numbers, tilt=("number", 0.25))),
+        "Pose": Call(sl.Pose, _all(position=box, rotation=("array", np.eye(3)))),
+        "Pose.from_euler": Call(sl.Pose.from_euler, _all(position=box, alpha=angle, beta=angle, gamma=angle)),
+        "Pose.from_quaternion": Call(
+            sl.Pose.from_quaternion, _all(position=box, quaternion=("array", [0.0, 0.0, 0.0, 1.0]))
+        ),
+        "Pose.transform": Call(given.poses.transform, _all(points=box)),
+        "Pose.__getitem__": Call(given.poses.__getitem__, _all(index=("index", 0))),
+        "without_cables": Call(
+            lambda robot, cable: sl.without_cables(robot, 1, cable), _all(robot=("one", robot), cable=("cable", 3))
+        ),
+    }
+
+
+def _motions(given: _Given) -> dict[str, Call]:
+    stops = ("array", [[0.0, 0.0, 1.5], [1.0, 1.0, 2.0]])
+    size = len(given.path)
+    rates = {name: ("array", np.ones((size, 6))) for name in ("twist", "twist_rate")}
+    time, rate, durations = ("array", given.path.time), ("number", 8.0), ("array", 1.0)
+    limits = dict.fromkeys(("speed", "acceleration", "angular_speed"), ("number", 2.0, True))
+    return {
+        "Path": Call(
+            sl.Path, _all(time=time, pose=("one", given.path.pose), **rates, jerk=("array", np.ones((size, 6)), True))
+        ),
+        "path_from_samples": Call(sl.path_from_samples, _all(time=time, pose=("one", given.path.pose))),
+        "quintic_path": Call(sl.quintic_path, _all(waypoints=stops, durations=(*durations, True), rate=rate)),
+        "septic_path": Call(sl.septic_path, _all(waypoints=stops, durations=(*durations, True), rate=rate)),
+        "quintic_path: limits": Call(sl.quintic_path, _all(waypoints=stops, **limits, rate=rate)),
+        "article_path": Call(sl.article_path, _all(rate=rate)),
+    }
+
+
+def _kinematics(given: _Given) -> dict[str, Call]:
+    robot, model = ("object", given.robot), ("one", sl.Catenary())
+    wrench, lengths = ("array", [0.0, 0.0, -10.0, 0.0, 1.0, 0.0], True), ("array", given.length)
+    silent = ("callback", lambda done, of: None, True)
+    several = ("array", np.stack((given.length, given.length)))
+    measured = sl.MeasuredTension(given.plan.state.cables.frame_end_tension, 1.0, 1e-3)
+    return {
+        "inverse": Call(
+            sl.inverse,
+            _all(
+                robot=robot,
+                motion=("motion", given.poses),
+                model=model,
+                tension=("one", sl.Closest()),
+                wrench=wrench,
+                previous=("one", given.plan, True),
+                progress=silent,
+            ),
+        ),
+        "inverse: a path": Call(sl.inverse, _all(robot=robot, motion=("motion", given.path), wrench=wrench)),
+        "forward": Call(
+            sl.forward,
+            _all(
+                robot=robot,
+                unstrained_length=several,
+                start=("one", given.pose, True),
+                model=model,
+                wrench=wrench,
+                progress=silent,
+            ),
+        ),
+        "forward: measured": Call(
+            sl.forward,
+            _all(
+                robot=robot,
+                unstrained_length=lengths,
+                start=("one", given.pose, True),
+                tension_measured=("one", measured, True),
+            ),
+        ),
+        "equilibria": Call(
+            sl.equilibria,
+            _all(
+                robot=("one", given.robot),
+                unstrained_length=lengths,
+                model=model,
+                wrench=wrench,
+                starts=("whole", 3),
+                seed=("seed", 1),
+            ),
+        ),
+        "confirm": Call(sl.confirm, _all(plan=("one", given.run), progress=silent)),
+        "tension_polygon": Call(
+            sl.tension_polygon,
+            _all(
+                robot=("one", given.robot),
+                pose=("one", given.pose),
+                model=model,
+                wrench=wrench,
+                variable=("word", "chord"),
+            ),
+        ),
+        "MeasuredTension": Call(
+            sl.MeasuredTension,
+            _all(
+                frame_end_tension=("array", [100.0, 90.0]),
+                tension_deviation=("array", 1.0),
+                length_deviation=("array", 0.5),
+            ),
+        ),
+        "Equilibrium.__getitem__": Call(
+            sl.inverse(given.robot, given.poses).state.__getitem__, _all(index=("index", 0))
+        ),
+    }
+
+
+def _solvers(given: _Given) -> dict[str, Call]:
+    solver, tracker = sl.InverseSolver(given.robot), sl.ForwardSolver(given.robot, start=given.pose)
+    pose = {"position": ("sample", [1.0, 1.0, 2.0]), "quaternion": ("sample", [0.0, 0.0, 0.0, 1.0])}
+    wrench, model = ("sample", [0.0, 0.0, -10.0, 0.0, 1.0, 0.0], True), ("one", sl.Catenary(), True)
+    out = ("out", np.empty(8))
+
+    def alone(function: Callable[..., Any]) -> Callable[..., Any]:
+        def call(**arguments: Any) -> Any:
+            solver.reset()
+            return function(**arguments)
+
+        return call
+
+    def new() -> sl.ForwardSolver:  # its last equilibrium is forgotten by `reset`, not what it knows of it
+        return sl.ForwardSolver(given.robot, start=given.pose)
+
+    return {
+        "InverseSolver": Call(
+            lambda **a: (sl.InverseSolver(**a), None)[1],
+            _all(robot=("one", given.robot), model=model, tension=("one", sl.Closest(), True)),
+        ),
+        "InverseSolver.step": Call(alone(solver.step), _all(**pose, wrench=wrench)),
+        "InverseSolver.step_into": Call(alone(solver.step_into), _all(**pose, out=out, wrench=wrench)),
+        "ForwardSolver": Call(
+            lambda **a: (sl.ForwardSolver(**a), None)[1],
+            _all(robot=("one", given.robot), model=model, start=("one", given.pose, True)),
+        ),
+        "ForwardSolver.reset": Call(tracker.reset, _all(start=("one", given.pose, True))),
+        "ForwardSolver.step": Call(
+            lambda **a: new().step(**a), _all(unstrained_length=("array", given.length), wrench=wrench)
+        ),
+        "ForwardSolver.step_into": Call(
+            lambda **a: new().step_into(**a),
+            _all(
+                unstrained_length=("sample", given.length),
+                position=("out", np.empty(3)),
+                quaternion=("out", np.empty(4)),
+                wrench=wrench,
+            ),
+        ),
+    }
+
+
+def _tensions(given: _Given) -> dict[str, Call]:
+    common = {"variable": ("word", "chord"), "lowest_point_margin": ("number", 1.0, True)}
+    methods = ("AnalyticCenter", "Centroid", "ClosedForm", "Closest", "ImprovedClosedForm", "LowestMaximum")
+    table = {
+        name: Call(getattr(sl, name), _all(**common)) for name in (*methods, "LowestSum", "MinimumNorm", "Puncture")
+    }
+    each = ("array", np.ones(8))
+    polygon = sl.tension_polygon(given.robot, given.pose)
+    return table | {
+        "TensionMethod": Call(sl.MinimumNorm, _all(**common)),  # itself it is none
+        "PNorm": Call(sl.PNorm, _all(**common, p=("number", 4.0))),
+        "PolygonWalk": Call(sl.PolygonWalk, _all(**common, optimum=("word", "centroid"))),
+        "QuadraticProgram": Call(sl.QuadraticProgram, _all(**common, weights=each, target=each)),
+        "TensionPolygon.coordinates": Call(
+            polygon.coordinates, _all(chord_tension=("array", given.plan.chord_tension))
+        ),
+    }
+
+
+def _statics(given: _Given) -> dict[str, Call]:
+    state, robot, one, pose = (
+        ("one", given.run.state),
+        ("object", given.robot),
+        ("one", given.robot),
+        ("one", given.pose),
+    )
+    rates = {name: ("array", np.ones((3, 6))) for name in ("twist", "twist_rate")}
+    return {
+        "stiffness": Call(sl.stiffness, _all(state=state)),
+        "modes": Call(sl.modes, _all(state=state)),
+        "limit_margin": Call(sl.limit_margin, _all(state=state)),
+        "capacity_margin": Call(sl.capacity_margin, _all(state=state)),
+        "structure_matrix": Call(sl.structure_matrix, _all(robot=robot, pose=pose)),
+        "article_balance": Call(sl.article_balance, _all(robot=one, pose=pose, k_h=("number", 4.75))),
+        "unresisted_motion": Call(sl.unresisted_motion, _all(robot=one, pose=pose)),
+        "inertial_wrench": Call(sl.inertial_wrench, _all(robot=robot, pose=("one", given.poses), **rates)),
+    }
+
+
+def _articles(given: _Given) -> dict[str, Call]:
+    few = ("array", [8.0, 10.0, 12.0])
+    fit = sl.identify_empirical(given.cable, [8.0, 10.0], [-2.0, 1.0], [100.0, 200.0])
+    state = sl.Catenary().from_tension(given.cable, [8.0, 10.0, 12.0], -2.0, [50.0, 150.0, 300.0])
+    measured = {
+        "span": few,
+        "rise": ("array", np.full(3, -2.0)),
+        "unstrained_length": ("array", state.unstrained_length),
+        "tension": ("array", state.frame_end_tension),
+    }
+    errors = {"length_error": ("number", 0.001), "tension_error": ("number", 1.0), "gravity": ("number", 9.81)}
+    return {
+        "identify_empirical": Call(
+            sl.identify_empirical,
+            _all(
+                cable=("one", given.cable),
+                spans=few,
+                rises=("array", [-2.0, 1.0]),
+                tensions=("array", [100.0, 200.0]),
+                gravity=("number", 9.75),
+            ),
+        ),
+        "EmpiricalFit.tension_min": Call(fit.tension_min, _all(tolerance=("number", 1.0))),
+        "EmpiricalFit.weight_max": Call(
+            fit.weight_max, _all(tolerance=("number", 1.0), tension=("number", 100.0, True))
+        ),
+        "identify_cable": Call(
+            sl.identify_cable,
+            _all(
+                **measured,
+                **errors,
+                tension_at=("word", "frame_end"),
+                unknowns=("words", ["linear_density", "axial_stiffness"]),
+                start=("one", given.cable, True),
+            ),
+        ),
+    }
+
+
+def _files(given: _Given) -> dict[str, Call]:
+    folder, cable = given.folder, ("one", given.cable, True)
+    names = {name: str(folder / name) for name in ("run.nc", "robot.yaml", "path.csv", "cable.csv", "robot.wcrfx")}
+    given.run.save(names["run.nc"])
+    Path(names["robot.yaml"]).write_text(sl.dump_robot(given.robot), encoding="utf-8")
+    Path(names["path.csv"]).write_text("time,x,y,z\n0,0,0,1\n1,1,0,1\n", encoding="utf-8")
+    Path(names["cable.csv"]).write_text("span,rise,length,tension\n10,1,10.1,100\n", encoding="utf-8")
+    Path(names["robot.wcrfx"]).write_text(_WIREX, encoding="utf-8")
+    (folder / "swing_bodies.xml").write_text(_BODIES, encoding="utf-8")
+    (folder / "swing_cables.xml").write_text(_CABLES, encoding="utf-8")
+    return {
+        "Plan.save": Call(given.run.save, _all(file=("file", str(folder / "saved.nc")))),
+        "save_plan": Call(sl.save_plan, _all(plan=("one", given.run), file=("file", str(folder / "saved.nc")))),
+        "load_plan": Call(sl.load_plan, _all(file=("file", names["run.nc"]))),
+        "load_robot": Call(sl.load_robot, _all(name_or_path=("file", names["robot.yaml"]))),
+        "load_path": Call(sl.load_path, _all(file=("file", names["path.csv"]))),
+        "load_measurements": Call(sl.load_measurements, _all(file=("file", names["cable.csv"]))),
+        "load_wirex": Call(sl.load_wirex, _all(source=("file", names["robot.wcrfx"]), cables=cable)),
+        "load_caspr": Call(
+            sl.load_caspr,
+            _all(source=("file", str(folder / "swing_bodies.xml")), cables=cable, cable_set=("word", "basic", True)),
+        ),
+        "dump_robot": Call(sl.dump_robot, _all(robot=("one", given.robot))),
+        "dump_mjcf": Call(
+            sl.dump_mjcf,
+            _all(robot=("one", given.robot), pose=("one", given.pose), unstrained_length=("array", given.length, True)),
+        ),
+    }
+
+
+def _figures(given: _Given) -> dict[str, Call]:
+    from mpl_toolkits.mplot3d.axes3d import Axes3D
+
+    flat, deep = Figure().add_subplot(), Figure().add_subplot(projection="3d")
+    assert isinstance(deep, Axes3D)
+    ax, plan, path, proof = ("ax", flat, True), ("one", given.run), ("one", given.path), ("one", sl.confirm(given.run))
+    polygon, points = sl.tension_polygon(given.robot, given.pose), {"norm": given.plan.chord_tension}
+
+    def draw_all(confirmation: Any) -> None:
+        sl.plot.errors(confirmation)
+
+    def draw(function: Callable[..., Any]) -> Callable[..., Any]:
+        def call(**arguments: Any) -> None:
+            flat.clear()
+            deep.clear()
+            function(**arguments)
+
+        return call
+
+    table: dict[str, tuple[Callable[..., Any], dict[str, tuple[Any, ...]]]] = {
+        "tensions": (sl.plot.tensions, {"plan": plan, "quantity": ("word", "vertical_force"), "ax": ax}),
+        "lengths": (sl.plot.lengths, {"plan": plan, "quantity": ("word", "adjusting_length"), "ax": ax}),
+        "overview": (sl.plot.overview, {"plan": plan}),
+        "error": (sl.plot.error, {"confirmation": proof, "ax": ax}),
+        "errors": (draw_all, {"confirmation": proof}),
+        "path": (sl.plot.path, {"path": path, "ax": ax}),
+        "velocity": (sl.plot.velocity, {"path": path, "ax": ax}),
+        "polygon": (sl.plot.polygon, {"shape": ("one", polygon), "points": ("points", points, True), "ax": ax}),
+        "robot": (
+            sl.plot.robot,
+            {"robot": ("one", given.robot), "pose": ("one", given.pose, True), "ax": ("one", deep, True)},
+        ),
+        "save": (sl.plot.save, {"drawing": ("one", flat), "file": ("file", str(given.folder / "figure.svg"))}),
+    }
+    return {f"plot.{name}": Call(draw(function), _all(**arguments)) for name, (function, arguments) in table.items()}
+
+
+_WIREX = """<models version="0.32"><robot name="swing" motionpattern="3T"><geometry>
+<chain><base x="-1" y="-1" z="2"/><platform x="0" y="0" z="0"/></chain>
+<chain><base x="1" y="-1" z="2"/><platform x="0" y="0" z="0"/></chain>
+<chain><base x="0" y="1" z="2"/><platform x="0" y="0" z="0"/></chain>
+</geometry><platform mass="3"/></robot></models>"""
+_BODIES = """<links><link_rigid num="1" name="swing"><joint type="SPATIAL_EULER_XYZ" q_initial="0 0 1 0 0 0"/>
+<physical><mass>8</mass><com_location>0 0 0</com_location><end_location>0 0 0.3</end_location>
+<inertia ref="com"><Ixx>0.8</Ixx><Iyy>1</Iyy><Izz>0.5</Izz><Ixy>0</Ixy><Ixz>0</Ixz><Iyz>0</Iyz></inertia></physical>
+<parent><num>0</num><location>0 0 0</location></parent></link_rigid></links>"""
+_CABLES = """<cables default_cable_set="basic"><cable_set id="basic">
+<cable_ideal name="left" attachment_reference="joint">
+<properties><force_min>5</force_min><force_max>300</force_max></properties><attachments>
+<attachment><link>0</link><location>-3 0 4</location></attachment>
+<attachment><link>1</link><location>-0.2 0 0.1</location></attachment></attachments></cable_ideal>
+</cable_set></cables>"""

@@ -1,0 +1,128 @@
+"""Every argument of every public function, class and method, replaced by what nobody should give.
+
+What comes of it is a `SaglineError` of one short line, or the right answer: no other exception, no warning, no waiting.
+"""
+
+from __future__ import annotations
+
+import resource
+import time
+import warnings
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.errors import printable
+from tests.abuse.bad_values import REFUSED, SAME, Bad, bad_values
+from tests.abuse.calls import INTERNAL, Call, calls, public_names
+
+SLOWEST = 2.0  # s of processor time
+LONGEST = 300  # characters
+MOST_MEMORY = 500_000  # kB
+SHARE = 0.08  # of the cases that are tried each time; all of them in a long run
+SEED = 20260310
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Call]:
+    return calls(tmp_path_factory.mktemp("functions"))
+
+
+def test_every_public_callable_is_in_the_table(table: dict[str, Call]) -> None:
+    assert {name.split(":")[0] for name in table} == public_names() - INTERNAL
+
+
+def test_every_call_succeeds_as_it_is(table: dict[str, Call]) -> None:
+    for call in table.values():
+        call.with_one("", None)
+
+
+def test_there_are_a_thousand_cases_and_more(table: dict[str, Call]) -> None:
+    assert sum(len(list(_cases(call))) for call in table.values()) > 1000
+
+
+@pytest.mark.parametrize("share", [SHARE, pytest.param(1.0, marks=pytest.mark.soak)])
+def test_what_nobody_should_give_is_refused_or_answered(table: dict[str, Call], share: float) -> None:
+    generator, used = np.random.default_rng(SEED), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    found = []
+    for name, call in table.items():
+        chosen = [case for case in _cases(call) if generator.random() < share]
+        right = call.with_one("", None) if any(bad.verdict == SAME for _, bad in chosen) else None
+        for argument, bad in chosen:
+            if what := _fault(call, argument, bad, right):
+                found.append(f"{name}({argument}={bad.label}): {what}")
+    assert found == []
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - used < MOST_MEMORY
+
+
+def _cases(call: Call) -> Iterator[tuple[str, Bad]]:
+    for name, (kind, valid, optional) in call.arguments.items():
+        for bad in bad_values(kind, valid, optional):
+            yield name, bad
+
+
+def _fault(call: Call, argument: str, bad: Bad, right: Any) -> str:
+    """What is wrong with the outcome of a call; nothing where all is well."""
+    begin, error, result = time.process_time(), None, None
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        try:
+            result = call.with_one(argument, bad.value)
+        except sl.SaglineError as refusal:
+            error = refusal
+        except Exception as other:
+            return f"{type(other).__name__}: {other}"
+    if said:
+        return f"a warning: {said[0].message}"
+    if time.process_time() - begin > SLOWEST:
+        return f"{time.process_time() - begin:.1f} s"
+    if error is not None:
+        return _fault_of_text(str(error)) or (f"refused: {error}" if bad.verdict == SAME else "")
+    if bad.verdict == REFUSED:
+        return f"answered: {result!r:.200}"
+    if bad.verdict == SAME and not _same(result, right):
+        return f"another answer: {result!r:.200}"
+    return _fault_of_answer(result)
+
+
+def _fault_of_text(text: str) -> str:
+    if len(text) >= LONGEST or text != printable(text):
+        return f"{len(text)} characters: {text!r}"
+    return ""
+
+
+def _fault_of_answer(result: Any) -> str:
+    """An answer holds real numbers; it is not finite only where a status or a proof says why."""
+    arrays = list(_arrays(result))
+    if any(array.dtype.kind not in "fiubU" for array in arrays):
+        return "an answer of no real numbers"
+    status = getattr(result, "status", np.zeros(1))
+    told = np.any(np.asarray(status) != 0) if not isinstance(result, sl.Equilibria) else True
+    if not told and isinstance(result, sl.Pose | sl.Path | sl.Robot | sl.Cable):
+        bad = [array for array in arrays if array.dtype.kind == "f" and np.isnan(array).any()]
+        return f"an answer that is no number: {bad[0]}" if bad else ""
+    return ""
+
+
+def _arrays(value: Any) -> Iterator[np.ndarray[Any, Any]]:
+    if isinstance(value, np.ndarray | np.generic):
+        yield np.asarray(value)
+    elif is_dataclass(value):
+        for field in fields(value):
+            yield from _arrays(getattr(value, field.name))
+    elif isinstance(value, tuple | list):
+        for entry in value:
+            yield from _arrays(entry)
+
+
+def _same(one: Any, other: Any) -> bool:
+    ours, theirs = list(_arrays(one)), list(_arrays(other))
+    return type(one) is type(other) and len(ours) == len(theirs) and all(map(_equal, ours, theirs))
+
+
+def _equal(one: np.ndarray[Any, Any], other: np.ndarray[Any, Any]) -> bool:
+    return np.array_equal(one, other, equal_nan=one.dtype.kind == "f")

@@ -1,0 +1,76 @@
+"""Poses that a motion pattern does not have."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import sagline as sl
+
+SEED = 3
+NORMAL = np.array([1.0, 2.0, -2.0]) / 3.0
+
+
+def robot(pattern: Any) -> sl.Robot:
+    normal = NORMAL if pattern in ("1R2T", "2T") else None
+    generator = np.random.default_rng(SEED)
+    frame, platform = generator.uniform(-5, 5, (8, 3)), generator.uniform(-0.3, 0.3, (8, 3))
+    inertia = np.eye(3)
+    return sl.Robot("any", frame, platform, sl.Cable(0.05, 5e4), 10.0, inertia, motion_pattern=pattern,
+                    plane_normal=normal, tension_min=1.0)  # fmt: skip
+
+
+def poses(turn: Rotation, shift: np.ndarray) -> sl.Pose:
+    """Two poses, the second turned and shifted from a first that is oblique."""
+    first = Rotation.from_rotvec([0.3, -0.2, 0.5])
+    turns = Rotation.from_quat([first.as_quat(), (turn * first).as_quat()])
+    return sl.Pose(np.array([[0.1, 0.2, 0.3], np.array([0.1, 0.2, 0.3]) + shift]), turns)
+
+
+IN_PLANE = np.cross(NORMAL, [0.0, 0.0, 1.0])
+NONE = Rotation.identity()
+
+
+@pytest.mark.parametrize(
+    ("pattern", "turn", "shift", "words"),
+    [
+        ("3R3T", Rotation.from_rotvec([1.0, 1.0, 0.0]), NORMAL, ""),
+        ("3T", NONE, NORMAL, ""),
+        ("3T", Rotation.from_rotvec([0.0, np.radians(20.0), 0.0]), NORMAL, r"turned by 20 deg about \(0, 1, 0\)"),
+        ("1R2T", Rotation.from_rotvec(2.5 * NORMAL), IN_PLANE, ""),
+        ("1R2T", Rotation.from_rotvec(0.01 * IN_PLANE), IN_PLANE, "allowed: a turn about plane_normal"),
+        ("1R2T", Rotation.from_rotvec(2.5 * NORMAL), 0.25 * NORMAL, r"motion\[1\] is 0.25 m along plane_normal"),
+        ("2T", NONE, IN_PLANE, ""),
+        ("2T", Rotation.from_rotvec(0.1 * NORMAL), IN_PLANE, "allowed: no turn, by motion_pattern 2T"),
+        ("2T", NONE, -1e-3 * NORMAL, "-0.001 m along plane_normal"),
+    ],
+)
+def test_poses_between_which_no_motion_leads_are_refused(
+    pattern: str, turn: Rotation, shift: np.ndarray, words: str
+) -> None:
+    batch = poses(turn, shift)
+    if not words:
+        sl.inverse(robot(pattern), batch)
+        return
+    with pytest.raises(sl.InvalidValueError, match=words.replace("motion", "pose", 1) if "[1" in words else words):
+        sl.inverse(robot(pattern), batch)
+    for k in range(2):  # each alone is where somebody built the robot
+        sl.inverse(robot(pattern), batch[k])
+
+
+def test_a_pose_that_the_pattern_cannot_have_brought_about_is_told() -> None:
+    turned = sl.Pose([0.0, 0.0, 0.0], Rotation.from_rotvec([0.0, 0.0, np.radians(90.0)]))
+    (text,) = sl.inverse(robot("3T"), turned).warnings
+    assert text.startswith("the platform is turned by 90 deg about (0, 0, 1), which motion_pattern 3T does not do")
+    assert sl.inverse(robot("3R3T"), turned).warnings == ()
+
+
+def test_a_planar_robot_out_of_its_plane_is_told() -> None:
+    flat = sl.Robot("flat", [[-3, 0.5, 3], [3, 0.5, 3], [0, 0.5, 0]], np.zeros((3, 3)), sl.Cable(0.05, 5e4), 10.0,
+                    motion_pattern="2T", plane_normal=[0, 1, 0], tension_min=1.0)  # fmt: skip
+    assert sl.inverse(flat, sl.Pose([0.0, 0.5, 1.5], np.eye(3))).warnings == ()
+    (text,) = sl.inverse(flat, sl.Pose([0.0, 2.0, 1.5], np.eye(3))).warnings
+    assert text.startswith("the cables leave the plane of the robot by up to 1.5 m")

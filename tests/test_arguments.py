@@ -1,0 +1,112 @@
+"""The border between a caller's objects and ours."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.arguments import choice, file_path, instance, label, whole_number
+from sagline.arguments import text as text_of
+from sagline.errors import FileError, InvalidValueError, NoBatchError, NoSuchEntryError
+from sagline.indices import part_of
+
+ROBOT = sl.load_robot("cogiro")
+POSE = sl.Pose.from_euler([1.0, 1.0, 2.0], 0.0, 0.0, 0.0)
+PLAN = sl.inverse(ROBOT, POSE)
+
+
+ANY: Any = sl  # for calls that no type allows
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: ANY.stiffness(PLAN), "state is a Plan; allowed: an Equilibrium. Give plan.state."),
+        (lambda: ANY.modes(ANY.forward(ROBOT, PLAN.unstrained_length)), "Give solution.state."),
+        (lambda: ANY.capacity_margin(sl.confirm(PLAN)), "state is a Confirmation"),
+        (lambda: ANY.confirm(ANY.confirm(PLAN)), "Give confirmation.plan."),
+        (lambda: ANY.inverse(ROBOT, POSE, sl.Straight), "model is the class Straight.*Write Straight"),
+        (lambda: ANY.inverse(ROBOT, POSE, "exact"), "model is 'exact'; allowed: a CableModel"),
+        (lambda: ANY.inverse(ROBOT, POSE, tension="centroid"), "tension is 'centroid'"),
+        (lambda: ANY.inverse(ROBOT, POSE, tension=sl.Centroid), r"Write Centroid\(\)"),
+        (lambda: ANY.inverse(ROBOT, (1, 1, 2)), r"motion is \(1, 1, 2\); allowed: a Pose or a Path"),
+        (lambda: ANY.InverseSolver([ROBOT]), r"robot is \[a Robot\]; allowed: a Robot\. Load one"),
+        (lambda: ANY.ForwardSolver([ROBOT]), r"robot is \[a Robot\]"),
+        (lambda: ANY.tension_polygon([ROBOT], POSE), r"robot is \[a Robot\]"),
+        (lambda: ANY.inverse(ROBOT, POSE, progress=True), "progress is True; allowed: a function"),
+        (lambda: ANY.InverseSolver(ROBOT, 0), "model is 0"),
+        (lambda: ANY.CableModel(), "the interface alone"),
+        (lambda: ANY.TensionMethod(), "the interface alone"),
+    ],
+)
+def test_what_is_of_the_wrong_kind_is_named_with_the_way_to_the_right_one(call: Any, words: str) -> None:
+    with pytest.raises(InvalidValueError, match=words):
+        call()
+
+
+def test_what_is_of_the_right_kind_is_taken_as_it_is() -> None:
+    assert instance(ROBOT, sl.Robot, "robot") is ROBOT
+    assert choice(np.str_("3T"), "pattern", ("3T", "2T")) == "3T"
+    assert whole_number(np.int8(3), "points", 2) == 3
+
+
+BATCH = np.arange(12.0).reshape(4, 3)
+TAKEN = [0, -4, slice(1, 3), slice(None, None, -2), [3, 0], np.array([1, 1]), [], BATCH[:, 0] > 2]
+REFUSED = [4, -5, (0, 1), None, ..., 1.0, "0", True, [0, 4], [0.0], [[0]], np.ones(3, bool), {0}]
+
+
+@pytest.mark.parametrize("index", TAKEN)
+def test_an_index_takes_what_numpy_takes(index: Any) -> None:
+    np.testing.assert_array_equal(BATCH[part_of(index, BATCH.shape, "single row")], BATCH[index])
+
+
+@pytest.mark.parametrize("index", REFUSED)
+def test_an_index_that_names_no_entry_is_an_index_error(index: Any) -> None:
+    with pytest.raises(IndexError, match="allowed: -4 to 3, a slice"):
+        part_of(index, BATCH.shape, "single row")
+    with pytest.raises(NoSuchEntryError):
+        sl.inverse(ROBOT, sl.Pose(np.tile(POSE.position, (4, 1)), np.eye(3))).state[index]
+
+
+def test_a_single_pose_is_no_list() -> None:
+    for single in (POSE, PLAN.state, PLAN.state.cables[0]):
+        with pytest.raises(NoBatchError, match="has no length"):
+            list(single)
+        with pytest.raises(TypeError, match="cannot be indexed"):
+            single[0]
+
+
+@pytest.mark.parametrize("file", ["a" * 256, "x\0y", "\ud800", ".", "", "/", f"folder/{'a' * 300}/x"])
+def test_what_no_file_can_be_called_is_refused(file: str) -> None:
+    with pytest.raises(FileError):
+        file_path(file)
+
+
+def test_the_longest_names_are_names() -> None:
+    assert file_path("ä" * 127 + "a") == Path("ä" * 127 + "a")  # 255 bytes
+    assert file_path(".", folder=True) == Path(".")
+
+
+@pytest.mark.parametrize("text", ["", "cogiro", "größer 2", "名" * 100, "a-b_c.d/..", "👩\u200d🔬"])
+def test_what_a_name_may_be(text: str) -> None:
+    assert label(text, "name") == text
+
+
+@pytest.mark.parametrize("text", ["a" * 101, "a\nb", "a\tb", "\x1b[31m", "a\0", "\ud800", "\u202egnp", 5, None, b"a"])
+def test_what_is_no_name_of_anything(text: object) -> None:
+    with pytest.raises(
+        InvalidValueError, match=r"name is .*; allowed: one line of printable text, at most 100"
+    ) as caught:
+        label(text, "name")
+    assert len(str(caught.value)) < 300
+
+
+def test_texts_have_lines_but_no_control_characters() -> None:
+    assert text_of("two\n\tlines" * 1000, "notes") == "two\n\tlines" * 1000
+    for text in ("\x1b]0;x\x07", "a\rb", "\ud800", 5):
+        with pytest.raises(InvalidValueError, match="notes is"):
+            text_of(text, "notes")
