@@ -113,7 +113,7 @@ def test_the_proofs_are_kept(saved: FilePath) -> None:
     assert plan.needed is not None
     whole = a_plan()
     assert whole.bracket is not None
-    for name in ("farkas", "needed", "bracket", "at_border"):
+    for name in ("farkas", "needed", "bracket", "relief", "at_border"):
         np.testing.assert_array_equal(getattr(plan, name), getattr(whole, name))
     assert (whole.bracket[37:, 0] > 0).all()  # there is something to keep
     assert np.isnan(plan.farkas[:37]).all()
@@ -124,7 +124,7 @@ def test_the_proofs_are_kept(saved: FilePath) -> None:
 def test_a_file_from_before_proofs_were_kept(old: FilePath) -> None:
     saved = old
     with h5py.File(saved, "r+") as file:
-        del file["farkas"], file["needed"], file["bracket"], file["at_border"]
+        del file["farkas"], file["needed"], file["bracket"], file["relief"], file["at_border"]
     with pytest.warns(SaglineWarning, match=NOTICE):
         plan = sl.load_plan(saved)
     assert plan.farkas is None

@@ -196,6 +196,14 @@ PROOF = (
         infinite=True,
     ),
     Quantity(
+        "relief",
+        "relief",
+        ("axis",),
+        "N",
+        "smallest force that, added to the wrench, makes the pose feasible",
+        known=Known.SOMEWHERE,
+    ),
+    Quantity(
         "at_border",
         "at_border",
         (),

@@ -14,7 +14,6 @@ from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel, CableState
 from sagline.errors import InvalidValueError
 from sagline.kernels import codes, tables
-from sagline.kernels.inverse.verdicts import ENOUGH
 from sagline.kinematics.inverse_rows import decide_rows, solve_rows
 from sagline.kinematics.plan import Plan
 from sagline.memory import check_poses
@@ -119,12 +118,13 @@ def inverse(
         path=motion if isinstance(motion, Path) else None,
         tension=tension,
         status=locked(found.pose_status.reshape(pose.shape)),
-        shortfall=locked(verdicts.brackets[:, ENOUGH].reshape(pose.shape)),
+        shortfall=locked(verdicts.shortfall.reshape(pose.shape)),
         wrench_residual=locked(found.residuals.reshape(*pose.shape, 2)),
         blocking=locked(verdicts.blocking.reshape(*pose.shape, shared.cable_count)),
         farkas=locked(_in_world(verdicts.farkas, shared).reshape(*pose.shape, 6)),
         needed=locked(_in_world(found.needed, shared).reshape(*pose.shape, 6)),
         bracket=locked(verdicts.brackets.reshape(*pose.shape, 2)),
+        relief=locked(np.ascontiguousarray(_in_world(verdicts.reliefs, shared)[:, :3]).reshape(*pose.shape, 3)),
         at_border=locked(verdicts.at_border.reshape(pose.shape)),
     )
 
@@ -161,7 +161,9 @@ def _reference(robot: Robot, previous: Plan | None, variable: Variable) -> Array
         "horizontal": cables.horizontal_tension,
         "frame_end": cables.frame_end_tension,
     }[variable]
-    feasible = np.flatnonzero(np.atleast_1d(previous.feasible))
+    # where the way of sharing had no say, a path does not go on from either
+    at_border = np.zeros_like(previous.feasible) if previous.at_border is None else previous.at_border
+    feasible = np.flatnonzero(np.atleast_1d(previous.feasible & ~at_border))
     if not feasible.size:
         return np.full(robot.cable_count, np.nan)
     last: Array = np.atleast_2d(tensions)[feasible[-1]].copy()

@@ -10,7 +10,7 @@ from sagline.arrays import Array, Codes, Flags, locked
 from sagline.blocks import Progress, blocks
 from sagline.kernels import codes, tables
 from sagline.kernels.inverse.poses import Answers, inverse_poses
-from sagline.kernels.inverse.verdicts import decide_poses
+from sagline.kernels.inverse.verdicts import ENOUGH, PROVED, decide_poses
 from sagline.kernels.memory import memory_for
 from sagline.robot.pose import Pose
 from sagline.robot.several import Robots, first_of
@@ -112,12 +112,14 @@ class Verdicts(NamedTuple):
     Attributes:
         brackets: What is proved, and what suffices, of the smallest change of the force [N], (N, 2): 0 where a pose is
             solved, NaN where the load is not the reason that it is not.
+        reliefs: The force that suffices [N], along the free motions, (N, n), NaN where none is needed or known.
         farkas: Farkas vectors along the free motions, (N, n).
         blocking: Cables whose limits stand against the needed wrench, (N, m).
         at_border: Poses that were solved here, and not by the way of sharing, (N,).
     """
 
     brackets: Array
+    reliefs: Array
     farkas: Array
     blocking: Flags
     at_border: Flags
@@ -137,14 +139,21 @@ class Verdicts(NamedTuple):
         return cls(
             np.full((count, 2), np.nan),
             np.full((count, freedoms), np.nan),
+            np.full((count, freedoms), np.nan),
             np.zeros((count, cables), dtype=np.bool_),
             np.zeros(count, dtype=np.bool_),
         )
 
     @property
-    def answers(self) -> tuple[Array, Array, Flags]:
+    def shortfall(self) -> Array:
+        """Smallest change of the force that is known to suffice [N], (N,); infinite only where that is proved."""
+        proved, enough = self.brackets[:, PROVED], self.brackets[:, ENOUGH]
+        return np.where(np.isinf(enough) & np.isfinite(proved), np.nan, enough)
+
+    @property
+    def answers(self) -> tuple[Array, Array, Array, Flags]:
         """As the kernel takes them: a plain tuple."""
-        return self.brackets, self.farkas, self.blocking
+        return self.brackets, self.reliefs, self.farkas, self.blocking
 
 
 def covers_all(method: int, redundant: int) -> bool:

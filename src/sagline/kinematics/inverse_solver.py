@@ -17,7 +17,7 @@ from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
 from sagline.kernels import tables
 from sagline.kernels.inverse.poses import inverse_poses
-from sagline.kernels.inverse.verdicts import ENOUGH, decide_poses
+from sagline.kernels.inverse.verdicts import decide_poses
 from sagline.kernels.jit import machine_code
 from sagline.kernels.memory import memory_for
 from sagline.kinematics.caller import ARRAY, FLOAT, WHOLE, give, take
@@ -226,4 +226,4 @@ class InverseSolver:
         if status is PoseStatus.SOLVED:
             return 0.0
         decided = status in (PoseStatus.INFEASIBLE, PoseStatus.BORDERLINE)
-        return float(self._verdicts.brackets[0, ENOUGH]) if decided else nan
+        return float(self._verdicts.shortfall[0]) if decided else nan

@@ -27,8 +27,10 @@ class Gap(NamedTuple):
         first: Index of its first pose.
         last: Index of its last pose.
         status: Why its first pose has no answer.
-        shortfall: Largest shortfall in it [N]; infinite where no change of the force alone would do.
+        shortfall: Largest finite shortfall in it [N]; infinite where no change of the force alone would do at any of
+            its poses, NaN where it has none.
         cables: Indices of the cables that stand against the wrench somewhere in it.
+        hopeless: At how many of its poses no change of the force alone would do.
     """
 
     first: int
@@ -36,6 +38,7 @@ class Gap(NamedTuple):
     status: PoseStatus
     shortfall: float
     cables: tuple[int, ...]
+    hopeless: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,8 +51,8 @@ class Plan:
         tension: How the load was shared.
         status: Codes of `PoseStatus`, shape () or (N,).
         shortfall: Smallest change of the force on the platform that would make the pose feasible [N], shape () or
-            (N,), reached by tensions within their limits: 0 where it is feasible, infinite where no force alone would
-            do, NaN where that is not the reason.
+            (N,), reached by tensions within their limits: 0 where it is feasible, infinite where it is proved that no
+            force alone would do, NaN where that is not the reason or none was found.
         wrench_residual: Norms of the unbalanced force [N] and moment [N m] in the platform's free motions,
             shape (2,) or (N, 2).
         blocking: Cables at a limit that stands against the needed wrench: a wider one lessens the shortfall, shape
@@ -57,14 +60,18 @@ class Plan:
         farkas: Proof of each infeasible pose, shape (6,) or (N, 6), NaN elsewhere: with y = farkas, what the cables
             give along y, the sum of y . (J_i tau_i - G_i pull_i(tau_i)) with J the structure matrix and G_i what a
             pull takes away, stays below y . (needed - the pulls in it) for all chord tensions within their limits, on
-            the cables' exact curves. Its force part has length 1, so that the gap is in newtons. NaN also where one
+            the cables' exact curves. Tensions of less than a tenth of a cable's weight do not count, nor, where there
+            is no upper limit, those that stretch it to more than twice its length. Its force part has length 1, so
+            that the gap is in newtons. NaN also where one
             direction alone proves nothing and ranges of tensions were narrowed or split. None for a plan from a file
             that was written before files kept it.
         needed: The wrench J tau that the chord tensions must supply, shape (6,) or (N, 6): weight, given wrench and
             the cables' pulls T_z - tau sin phi; where there is no answer, at the tensions that leave least of it.
             None as above.
-        bracket: What is proved, and what suffices, of the shortfall [N], shape (2,) or (N, 2); the second is
-            `shortfall`. None as above.
+        bracket: What is proved, and what suffices, of the shortfall [N], shape (2,) or (N, 2); infinite where nothing
+            was found that does. None as above.
+        relief: The force of that size [N], in world axes: added to the wrench it makes the pose feasible, shape (3,) or
+            (N, 3); NaN where none is needed or known. None as above.
         at_border: Poses so near the border that the rounds of sharing found nothing: tensions were searched for on
             the cables' exact curves, and the way of sharing had no say, shape () or (N,). None as above.
     """
@@ -79,6 +86,7 @@ class Plan:
     farkas: Array | None = None
     needed: Array | None = None
     bracket: Array | None = None
+    relief: Array | None = None
     at_border: NDArray[np.bool_] | None = None
 
     @property
@@ -171,13 +179,15 @@ class Plan:
     def _gap(self, first: int, last: int) -> Gap:
         part = slice(first, last + 1)
         shortfall = np.atleast_1d(self.shortfall)[part]
+        finite, hopeless = shortfall[np.isfinite(shortfall)], int(np.isinf(shortfall).sum())
         cables = np.flatnonzero(np.atleast_2d(self.blocking)[part].any(axis=0))
         return Gap(
             first=first,
             last=last,
             status=PoseStatus(np.atleast_1d(self.status)[first]),
-            shortfall=float(np.nanmax(shortfall)) if not np.all(np.isnan(shortfall)) else float("nan"),
+            shortfall=float(finite.max()) if finite.size else np.inf if hopeless else np.nan,
             cables=tuple(int(i) for i in cables),
+            hopeless=hopeless,
         )
 
     def save(self, file: FilePath | str) -> None:

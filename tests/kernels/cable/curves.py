@@ -38,7 +38,7 @@ def random_curves(rng: np.random.Generator, m: int, model: int = CATENARY) -> Cu
 
 def with_turns(curves: Curves) -> Curves:
     """The same, its turns found."""
-    find_turns(curves, memory())
+    find_turns(curves, curves.cables.low, curves.cables.high, memory())
     return curves
 
 

@@ -77,21 +77,26 @@ def test_all_pulls_at_once_are_those_one_by_one() -> None:
     for _ in range(20):
         curves = random_curves(rng, 8)
         tau = np.sqrt(curves.cables.low * curves.cables.high)
-        pull, slope = np.empty(8), np.empty(8)
+        pull, slope, bend = np.empty(8), np.empty(8), np.empty(8)
         pulls_at(curves, tau, pull)
         expected = np.array([pulls_of(curves, i, tau[i : i + 1])[0] for i in range(8)])
         np.testing.assert_allclose(pull, expected, rtol=1e-12, atol=1e-12 * curves.cables.half_weight.max())
-        slopes_at(curves, tau, slope)
-        for i in range(8):  # a five-point difference of steps twenty times wider
+        slopes_at(curves, tau, slope, bend)
+        for i in range(8):  # five-point differences of steps twenty times wider
             h = 2e-3 * tau[i]
-            p = pulls_of(curves, i, tau[i] + h * np.array([-2, -1, 1, 2]))
-            assert slope[i] == pytest.approx((p[0] - 8 * p[1] + 8 * p[2] - p[3]) / (12 * h), rel=1e-6, abs=1e-9)
+            p = pulls_of(curves, i, tau[i] + h * np.array([-2, -1, 0, 1, 2]))
+            assert slope[i] == pytest.approx((p[0] - 8 * p[1] + 8 * p[3] - p[4]) / (12 * h), rel=1e-6, abs=1e-9)
+            second = (-p[0] + 16 * p[1] - 30 * p[2] + 16 * p[3] - p[4]) / (12 * h * h)
+            # near its zeros the rounding of the narrow difference shows: 1e-16 of the pull over 1e-8
+            assert bend[i] == pytest.approx(second, rel=1e-4, abs=1e-7 * curves.cables.half_weight[i] / tau[i] ** 2)
 
 
 @pytest.mark.parametrize("model", [STRAIGHT, EMPIRICAL, PARABOLIC])
 def test_other_models_pull_alike_at_every_tension(model: int) -> None:
     curves = with_turns(random_curves(np.random.default_rng(5), 4, model))
     assert np.isnan(curves.turns).all()
-    slope = np.empty(4)
-    slopes_at(curves, curves.cables.low * 2, slope)
-    np.testing.assert_array_equal(slope, 0.0)
+    slope, bend, pull, no_tension = np.empty(4), np.empty(4), np.empty(4), np.zeros(4)
+    slopes_at(curves, no_tension, slope, bend)
+    np.testing.assert_array_equal((slope, bend), 0.0)
+    pulls_at(curves, no_tension, pull)
+    np.testing.assert_allclose(pull, [pulls_of(curves, i, curves.cables.low[i : i + 1])[0] for i in range(4)])

@@ -337,7 +337,8 @@ def robot_terms(case: Case) -> tuple[Array, Array, Array]:
 
 def decided(case: Case, room: Room) -> Array:
     m, n = len(case.robot), len(case.freedom)
-    found = (np.full((1, 2), np.nan), np.full((1, n), np.nan), np.zeros((1, m), dtype=np.bool_))
+    nothing = np.full((1, n), np.nan)
+    found = (np.full((1, 2), np.nan), nothing, nothing.copy(), np.zeros((1, m), dtype=np.bool_))
     answers = new_answers(1, m, n)
     heavy = fixed(np.array([[0.0, 0.0, -1e5, 0.0, 0.0, 0.0]]))
     which = np.zeros(1, dtype=np.int64)

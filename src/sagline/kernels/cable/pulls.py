@@ -21,6 +21,7 @@ from sagline.kernels.memory import Memory, block
 
 SLOPE_STEP = 1e-4  # relative step of the central difference of the pull
 SHRINKINGS = 30
+TURN_ERROR = 1e-10  # of half the cable's weight: the pull at a turn is better known
 SHRINKS = 0.9  # of the section before: what shrinks less does not shrink
 SMALLEST_GAIN = 1e-15  # of the numbers at hand
 
@@ -36,7 +37,7 @@ class Curves(NamedTuple):
         model: Cable model.
         cables: The cables; what they carry is working space.
         turns: Of their pulls, (TURN_ROWS, m).
-        statuses: Working space, (m,).
+        statuses: How each cable's calculation ended, (m,).
     """
 
     model: Model
@@ -75,21 +76,32 @@ def pulls_at(curves: Curves, tau: Array, pull: Array) -> None:
         curves.cables.tau[i] = tau[i]
     hang_cables(curves.model, curves.cables, False, curves.statuses)
     for i in range(tau.size):
+        if curves.model.code != CATENARY:  # the same at every tension, one of zero included
+            curves.cables.pull[i] = pull_of_shallow(curves.model, curves.cables.chord[i], curves.cables.density[i])
         pull[i] = curves.cables.pull[i]
 
 
 @kernel
-def slopes_at(curves: Curves, tau: Array, slope: Array) -> None:
-    """Fill how the pulls grow with the chord tensions, (m,), by central differences."""
+def slopes_at(curves: Curves, tau: Array, slope: Array, bend: Array) -> None:
+    """Fill how the pulls grow with the chord tensions, (m,), and how the slopes do [1/N], by central differences."""
     cables = curves.cables
+    if curves.model.code != CATENARY:
+        for i in range(tau.size):
+            slope[i] = bend[i] = 0.0
+        return
     for i in range(tau.size):
         cables.last_pull[i] = tau[i] * (1.0 + SLOPE_STEP)
     pulls_at(curves, cables.last_pull, slope)
+    pulls_at(curves, tau, bend)
     for i in range(tau.size):
         cables.last_pull[i] = tau[i] * (1.0 - SLOPE_STEP)
     pulls_at(curves, cables.last_pull, cables.pull)
     for i in range(tau.size):
-        slope[i] = (slope[i] - cables.pull[i]) / (2.0 * SLOPE_STEP * tau[i])
+        step = SLOPE_STEP * tau[i]
+        above, below, here = slope[i], cables.pull[i], bend[i]
+        weighs = cables.half_weight[i] > 0.0
+        slope[i] = (above - below) / (2.0 * step) if weighs else 0.0
+        bend[i] = (above - 2.0 * here + below) / (step * step) if weighs else 0.0
 
 
 @kernel
@@ -108,11 +120,12 @@ def pull_at(curves: Curves, i: int, tau: float) -> float:
 def pull_range(curves: Curves, i: int, section: Section) -> tuple[float, float]:
     """Least and largest pull of cable i on a section of its chord tensions."""
     turns = curves.turns
+    beyond = TURN_ERROR * curves.cables.half_weight[i]
     least, most = min(section.at_low, section.at_high), max(section.at_low, section.at_high)
     if section.low < turns[LEAST_TENSION, i] < section.high:
-        least = min(least, turns[LEAST_PULL, i])
+        least = min(least, turns[LEAST_PULL, i] - beyond)
     if section.low < turns[MOST_TENSION, i] < section.high:
-        most = max(most, turns[MOST_PULL, i])
+        most = max(most, turns[MOST_PULL, i] + beyond)
     return least, most
 
 

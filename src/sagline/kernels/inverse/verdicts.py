@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from sagline.arrays import Array, Flags, Indices
+from sagline.arrays import Array, Codes, Flags, Indices
 from sagline.kernels import tables
 from sagline.kernels.algebra.strips import START
 from sagline.kernels.balance.freedom import translations_of
@@ -23,12 +23,16 @@ from sagline.kernels.cable.cables import Cables, new_cables
 from sagline.kernels.cable.pulls import new_curves, pulls_at
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import (
+    CABLE_NOT_CONVERGED,
     CABLE_SOLVED,
+    CABLE_TOO_SLACK,
     CHORD_TENSION,
     POSE_BORDERLINE,
     POSE_INFEASIBLE,
+    POSE_NOT_CONVERGED,
     POSE_NOT_COVERED,
     POSE_SOLVED,
+    POSE_TOO_SLACK,
 )
 from sagline.kernels.inverse.poses import Answers, LimitTerms, ModelTerms, Robots, measure_balance, write
 from sagline.kernels.inverse.rounds import limits_leave_room
@@ -53,7 +57,7 @@ def decide_poses(
     covers: bool,
     memory: tuple[Array, Indices],
     answers: Answers,
-    verdicts: tuple[Array, Array, Flags],
+    verdicts: tuple[Array, Array, Array, Flags],
 ) -> None:
     """Decide those of N poses that the rounds of sharing called infeasible, in chord tensions.
 
@@ -70,13 +74,13 @@ def decide_poses(
         memory: `memory_for` as many cables.
         answers: As in `inverse_poses`; filled anew for these poses.
         verdicts: Filled for these poses: what is proved and what suffices of the smallest change of the force [N],
-            (N, 2); Farkas vectors along the free motions, (N, n); whether a limit of a cable stands against the needed
-            wrench, (N, m).
+            (N, 2); that change, along the free motions, (N, n), and Farkas vectors, (N, n), NaN where there is none;
+            whether a limit of a cable stands against the needed wrench, (N, m).
     """
     limits = Limits(*limit_terms)
     freedom, bodies, robots = robot_terms
     results, statuses, residuals, needed, pose_statuses = answers
-    brackets, farkas, blocking = verdicts
+    brackets, reliefs, farkas, blocking = verdicts
     n = freedom.shape[0]
     m = statuses.shape[1]
     cables, rest = new_cables(Memory(*memory), m)
@@ -109,8 +113,11 @@ def decide_poses(
         curves, left = new_curves(model, cables, statuses[p], rest)
         status, brackets[p, PROVED], brackets[p, ENOUGH], proved = decide(curves, demand, change, left)
         pulls_at(curves, change.tau, change.pull)
+        if status == POSE_SOLVED:
+            status = status_of(statuses[p])
         if status == POSE_SOLVED and not covers:
             status = POSE_NOT_COVERED
+        if status != POSE_SOLVED and status != POSE_INFEASIBLE and status != POSE_BORDERLINE:
             brackets[p, PROVED] = brackets[p, ENOUGH] = math.nan
         if status == POSE_SOLVED:
             measure_balance(platform, cables, balance, residuals[p])
@@ -125,10 +132,24 @@ def decide_poses(
                 supplied += demand.hanging[k, i] * change.pull[i]
             needed[p, k] = supplied if k < translations else supplied * lever
             farkas[p, k] = math.nan
+            reliefs[p, k] = math.nan
+            if status != POSE_SOLVED and brackets[p, ENOUGH] < math.inf:
+                reliefs[p, k] = change.residual[k] if k < translations else 0.0
         if status == POSE_INFEASIBLE and proved:
             write_proof(demand, change, lever, farkas[p])
         if status == POSE_INFEASIBLE or status == POSE_BORDERLINE:
             block_cables(cables, demand, change, blocking[p])
+
+
+@glue
+def status_of(statuses: Codes) -> int:
+    """Status of a pose whose tensions balance, from those of its cables (m,)."""
+    gravest = CABLE_SOLVED
+    for i in range(statuses.size):
+        gravest = max(gravest, statuses[i])
+    if gravest == CABLE_TOO_SLACK:
+        return POSE_TOO_SLACK
+    return POSE_NOT_CONVERGED if gravest == CABLE_NOT_CONVERGED else POSE_SOLVED
 
 
 @glue

@@ -17,12 +17,13 @@ from sagline.arrays import Array
 from sagline.kernels.algebra.householder import factorize, orthogonal_factor, pseudo_inverse
 from sagline.kernels.cable.pulls import Curves, Section, most_along, pull_at, pull_range, slopes_at
 from sagline.kernels.cable.turns import find_turns
-from sagline.kernels.codes import CATENARY, POSE_BORDERLINE, POSE_INFEASIBLE, POSE_SOLVED
+from sagline.kernels.codes import CATENARY, POSE_BORDERLINE, POSE_INFEASIBLE, POSE_NOT_CONVERGED, POSE_SOLVED
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block
 from sagline.kernels.sharing.least_change import Change, Demand, least_change, length_of
 
 LOOSEST = 5.0  # largest X = wD/(2 tau): a cable fifteen times as long as its chord, which no winch pulls on
+PLENTY = 1e6  # of the largest force at hand: more than any cable carries that has no limit
 FEASIBLE = 1e-9  # of the largest force at hand: what is left of the balance is taken for none
 CERTAIN = 1e-14  # of the numbers at hand: limits that contradict by less may do so by rounding
 NODES = 300  # ranges looked at before the answer is that there is none
@@ -74,30 +75,34 @@ def along(columns: Array, direction: Array, i: int) -> float:
 def spare_along(curves: Curves, demand: Demand, range_: Array, direction: Array, tops: Array) -> float:
     """What the cables can give along a direction beyond the demand [N]: below zero it proves that nothing balances it.
 
-    Fills the most each cable gives, (m,).
+    It is the upper end of what rounding leaves open. Fills the most each cable gives, (m,).
     """
     spare = 0.0
+    size = 0.0
     for k in range(direction.size):
         spare -= direction[k] * demand.right[k]
-    size = abs(spare)
+        size += abs(direction[k] * demand.right[k])
     for i in range(tops.size):
         a, b = along(demand.matrix, direction, i), along(demand.hanging, direction, i)
         tops[i] = most_along(curves, i, section_of(range_, i), a, b)
         spare += tops[i]
-        size += abs(tops[i])
-    return spare if abs(spare) > CERTAIN * size else 0.0
+        size += abs(a) * range_[LARGEST, i] + abs(b) * max(abs(range_[AT_LEAST, i]), abs(range_[AT_LARGEST, i]))
+    return spare + CERTAIN * size
 
 
 @kernel
 def narrow(curves: Curves, demand: Demand, range_: Array, direction: Array, spare: float, tops: Array) -> bool:
-    """Take from a range the tensions with which a cable falls short of its best by more than is spare; False: all."""
+    """Take from a range the tensions with which a cable falls short of its best by more than is spare.
+
+    Returns:
+        Whether anything is left of it.
+    """
     if not spare < math.inf:
         return True
     for i in range(tops.size):
         a, b = along(demand.matrix, direction, i), along(demand.hanging, direction, i)
         least, most = pull_range(curves, i, section_of(range_, i))
-        rounding = CERTAIN * (abs(tops[i]) + spare + abs(b) * max(abs(least), abs(most)))
-        needed = tops[i] - spare - rounding + min(b * least, b * most)
+        needed = tops[i] - spare + min(b * least, b * most)
         if a > 0.0 and needed / a > range_[LEAST, i]:
             if needed / a > range_[LARGEST, i]:
                 return False
@@ -127,7 +132,7 @@ def narrow_free(curves: Curves, demand: Demand, range_: Array, change: Change, t
     rows, at = block(memory.numbers, 0, 2 * count + n + 2, n)
     diagonals, at = block(memory.numbers, at, 2, count)
     reduced, inverse = rows[:count], rows[count : 2 * count]
-    slopes_at(curves, change.tau, tops)
+    slopes_at(curves, change.tau, tops, curves.cables.slackness)
     count = 0
     for i in range(m):
         if range_[LEAST, i] < change.tau[i] < range_[LARGEST, i]:
@@ -180,17 +185,24 @@ def split(curves: Curves, waiting: Array, top: int, i: int, tau: float) -> None:
 
 
 @glue
-def first_range(curves: Curves, range_: Array) -> None:
-    """Fill the range that the limits allow, between all but slack (LOOSEST) and stretched to twice the length."""
+def first_range(curves: Curves, size: float, range_: Array) -> None:
+    """Fill the range that the limits allow, never a wider one, but for cables that are all but slack (LOOSEST).
+
+    Where there is no upper limit, sagging cables are stretched to twice their length at most, and others carry a
+    million times the largest force at hand.
+    """
     cables = curves.cables
     for i in range(cables.low.size):
-        if curves.model.code == CATENARY:
-            cables.low[i] = max(cables.low[i], cables.half_weight[i] / LOOSEST)
-        cables.high[i] = max(cables.low[i], min(cables.high[i], cables.stiffness[i]))
-        range_[LEAST, i] = cables.low[i]
-        range_[LARGEST, i] = cables.high[i]
-        range_[AT_LEAST, i] = pull_at(curves, i, cables.low[i])
-        range_[AT_LARGEST, i] = pull_at(curves, i, cables.high[i])
+        low, high = cables.low[i], cables.high[i]
+        sags = curves.model.code == CATENARY and cables.half_weight[i] > 0.0
+        if high == math.inf:
+            high = max(low, cables.stiffness[i] if sags else PLENTY * size)
+        if sags:
+            low = min(max(low, cables.half_weight[i] / LOOSEST), high)
+        range_[LEAST, i] = low
+        range_[LARGEST, i] = high
+        range_[AT_LEAST, i] = pull_at(curves, i, low)
+        range_[AT_LARGEST, i] = pull_at(curves, i, high)
 
 
 @glue
@@ -208,7 +220,7 @@ def come_near(curves: Curves, demand: Demand, range_: Array, trial: Change, memo
     left = math.inf
     if first > 0:
         left = least_change(curves, demand, range_, trial, memory)
-    if left < math.inf:
+    if left < math.inf or left != left:
         return left, length_of(trial.residual, first, n) <= FEASIBLE * demand.size
     moments = Demand(demand.matrix[first:], demand.hanging[first:], demand.right[first:], n - first, demand.size)
     part = Change(trial.tau, trial.pull, trial.residual[first:], trial.direction[first:])
@@ -229,8 +241,8 @@ def decide(curves: Curves, demand: Demand, change: Change, memory: Memory) -> tu
         memory: To work in.
 
     Returns:
-        POSE_SOLVED, POSE_INFEASIBLE or POSE_BORDERLINE; the bracket of the shortfall [N]; whether the direction alone
-        proves infeasibility.
+        POSE_SOLVED, POSE_INFEASIBLE, POSE_BORDERLINE, or POSE_NOT_CONVERGED where the arithmetic broke down; the
+        bracket of the shortfall [N]; whether the direction alone proves infeasibility, over the whole first range.
     """
     n, m = demand.matrix.shape
     search, rest = new_search(memory, m)
@@ -238,8 +250,8 @@ def decide(curves: Curves, demand: Demand, change: Change, memory: Memory) -> tu
     tau, at = block(rest.numbers, at, 3, max(m, n))
     rest = Memory(rest.numbers[at:], rest.counters)
     trial = Change(tau[0, :m], kept[0], tau[1, :n], tau[2, :n])
-    first_range(curves, search.ranges[0])
-    find_turns(curves, rest)
+    first_range(curves, demand.size, search.ranges[0])
+    find_turns(curves, search.ranges[0, LEAST], search.ranges[0, LARGEST], rest)
     for i in range(m):
         trial.tau[i] = change.tau[i]
     enough = math.inf
@@ -247,6 +259,8 @@ def decide(curves: Curves, demand: Demand, change: Change, memory: Memory) -> tu
     for node in range(NODES):
         range_ = search.ranges[top]
         left, balanced = come_near(curves, demand, range_, trial, rest)
+        if node == 0 and not (demand.size < math.inf and left == left):
+            return POSE_NOT_CONVERGED, 0.0, math.inf, False
         if node == 0 or (balanced and left < enough):
             for i in range(m):
                 change.tau[i] = trial.tau[i]

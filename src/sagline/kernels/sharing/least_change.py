@@ -21,7 +21,7 @@ from sagline.kernels.memory import Memory, block
 
 NEWTON_STEPS = 40
 HALVINGS = 12
-STEADINESS = 1e-4  # what a newton of changed tension weighs against one of changed wrench
+STEADINESS = 1e-8  # what the square of a newton of changed tension weighs against that of a changed wrench
 DECREASE = 1e-4  # share of a full step's promise that a step must keep
 STANDS = 1e-13  # of the largest force at hand: a step that promises less is none
 STEADY = 1e-6  # of what is left: tensions that move by less no longer turn its direction
@@ -51,7 +51,7 @@ class Change(NamedTuple):
     Attributes:
         tau: Chord tensions [N], (m,).
         pull: Their pulls [N], (m,).
-        residual: What they leave of the demand [N], (n,).
+        residual: What they leave of the demand [N], moments per lever arm, (n,).
         direction: y, along which the rest is; moments per lever arm, (n,).
     """
 
@@ -77,6 +77,8 @@ class Tangents(NamedTuple):
         unknowns: A right side, a target of zeros and the point, (3, d).
         held: Limits that the last point stands on.
         push: Slopes of the pulls, then what the limits push with, (m,).
+        bend: What the square of a change of each tension weighs, (m,).
+        multipliers: What the step before left, and what its hard rows cost [N], (n,).
         trial: Tensions, (m,), pulls, (m,), and residual of a step that is tried, (n,).
     """
 
@@ -92,6 +94,8 @@ class Tangents(NamedTuple):
     unknowns: Array
     held: Held
     push: Array
+    bend: Array
+    multipliers: Array
     trial: tuple[Array, Array, Array]
 
 
@@ -100,7 +104,7 @@ def new_tangents(memory: Memory, n: int, m: int, hard: int) -> tuple[Tangents, M
     """Room for a step with so many hard rows, and the memory that is left."""
     d = m - hard
     numbers = memory.numbers
-    wide, at = block(numbers, 0, n + 2 * hard + (m + 1) + d + STRIP_ROWS + 3, m)
+    wide, at = block(numbers, 0, n + 2 * hard + (m + 1) + d + STRIP_ROWS + 4, m)
     reduced = wide[n:]
     q = reduced[hard:]
     inverse = q[m + 1 :]
@@ -111,12 +115,12 @@ def new_tangents(memory: Memory, n: int, m: int, hard: int) -> tuple[Tangents, M
     soft, at = block(numbers, at, n - hard, d)
     normal, at = block(numbers, at, d, d)
     unknowns, at = block(numbers, at, 3, d)
-    left, at = block(numbers, at, 1, n)
+    left, at = block(numbers, at, 2, n)
     held, rest = new_held(Memory(numbers[at:], memory.counters), d)
     held.labels[0] = 0
     tangents = Tangents(
         wide[:n], reduced[:hard], diagonals, q[: m + 1], inverse[:hard], soft, normal, rows[:d], strips[:STRIP_ROWS],
-        unknowns, held, others[0], (others[1], others[2], left[0]),
+        unknowns, held, others[0], others[1], left[1], (others[2], others[3], left[0]),
     )  # fmt: skip
     return tangents, rest
 
@@ -141,16 +145,23 @@ def length_of(vector: Array, first: int, last: int) -> float:
 
 
 @glue
-def set_tangents(curves: Curves, demand: Demand, tau: Array, step: Tangents) -> bool:
-    """Fill the tangents at given tensions, and the normal matrix; False where the hard rows depend on each other."""
+def set_tangents(curves: Curves, demand: Demand, tau: Array, multipliers: Array, step: Tangents) -> bool:
+    """Fill the tangents at given tensions, and the normal matrix; False where the hard rows depend on each other.
+
+    The curves' bend counts with the multipliers (n,) of the step before, where it is against going on: without it the
+    steps go to and fro across a valley.
+    """
     n, m = step.matrix.shape
     soft = demand.soft
     hard = n - soft
     d = m - hard
-    slopes_at(curves, tau, step.push)
+    slopes_at(curves, tau, step.push, step.bend)
     for i in range(m):
+        along = 0.0
         for k in range(n):
             step.matrix[k, i] = demand.matrix[k, i] - demand.hanging[k, i] * step.push[i]
+            along += demand.hanging[k, i] * multipliers[k]
+        step.bend[i] = max(along * step.bend[i], 0.0) + STEADINESS
         for k in range(hard):
             step.reduced[k, i] = step.matrix[soft + k, i]
     if not factorize(step.reduced, step.diagonals):
@@ -167,7 +178,9 @@ def set_tangents(curves: Curves, demand: Demand, tau: Array, step: Tangents) -> 
             step.normal[j, b] = 0.0
             for k in range(soft):
                 step.normal[j, b] += step.soft[k, j] * step.soft[k, b]
-    return factor_positive(step.normal, STEADINESS * STEADINESS, step.normal)
+            for i in range(m):
+                step.normal[j, b] += step.q[i, hard + j] * step.bend[i] * step.q[i, hard + b]
+    return factor_positive(step.normal, 0.0, step.normal)
 
 
 @glue
@@ -188,6 +201,9 @@ def find_step(demand: Demand, ranges: Array, change: Change, step: Tangents) -> 
             left -= step.matrix[k, i] * base[i]
         for j in range(d):
             z[j] += step.soft[k, j] * left
+    for j in range(d):
+        for i in range(m):
+            z[j] -= step.q[i, hard + j] * step.bend[i] * base[i]
     solve_lower(step.normal, z)
     solve_upper(step.normal, z)
     for i in range(m):
@@ -231,7 +247,7 @@ def point_along(soft: int, change: Change, step: Tangents) -> float:
         for i in range(m):
             y[k] -= step.matrix[k, i] * (trial[i] - change.tau[i])
     for i in range(m):
-        along[i] = step.push[i] - STEADINESS * STEADINESS * (trial[i] - change.tau[i])
+        along[i] = step.push[i] - step.bend[i] * (trial[i] - change.tau[i])
         for k in range(soft):
             along[i] += y[k] * step.matrix[k, i]
     rest = length_of(y, 0, soft)
@@ -295,18 +311,23 @@ def least_change(curves: Curves, demand: Demand, ranges: Array, change: Change, 
         memory: To work in.
 
     Returns:
-        Length of what the soft rows leave [N]; infinite where hard rows and ranges contradict, on the tangents.
+        Length of what the soft rows leave [N]; infinite where hard rows and ranges contradict, on the tangents; NaN
+        where the hard rows depend on each other.
     """
     n, m = demand.matrix.shape
     soft = demand.soft
     step, _ = new_tangents(memory, n, m, n - soft)
     leave(curves, demand, change.tau, change.pull, change.residual)
+    for k in range(n):
+        step.multipliers[k] = 0.0
     for _ in range(NEWTON_STEPS):
-        if not set_tangents(curves, demand, change.tau, step):
+        if not set_tangents(curves, demand, change.tau, step.multipliers, step):
             return math.nan
         if not find_step(demand, ranges, change, step):
             return math.inf
         rest = point_along(soft, change, step)
+        for k in range(n):
+            step.multipliers[k] = rest * change.direction[k]
         if not take_step(curves, demand, rest, change, step):
             break
     return length_of(change.residual, 0, soft)
