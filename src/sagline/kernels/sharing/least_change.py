@@ -23,6 +23,7 @@ NEWTON_STEPS = 40
 HALVINGS = 12
 STEADINESS = 1e-8  # what the square of a newton of changed tension weighs against that of a changed wrench
 DECREASE = 1e-4  # share of a full step's promise that a step must keep
+STIFFEST = 1e3  # largest weight of a bend, which the normal matrix still bears beside that
 STANDS = 1e-13  # of the largest force at hand: a step that promises less is none
 STEADY = 1e-6  # of what is left: tensions that move by less no longer turn its direction
 
@@ -161,7 +162,7 @@ def set_tangents(curves: Curves, demand: Demand, tau: Array, multipliers: Array,
         for k in range(n):
             step.matrix[k, i] = demand.matrix[k, i] - demand.hanging[k, i] * step.push[i]
             along += demand.hanging[k, i] * multipliers[k]
-        step.bend[i] = max(along * step.bend[i], 0.0) + STEADINESS
+        step.bend[i] = min(max(along * step.bend[i], 0.0), STIFFEST) + STEADINESS
         for k in range(hard):
             step.reduced[k, i] = step.matrix[soft + k, i]
     if not factorize(step.reduced, step.diagonals):
