@@ -14,8 +14,7 @@ from rich.console import Console, RenderableType
 from rich.padding import Padding
 from rich.text import Text
 
-from sagline.cli.printable import is_seen, printable
-from sagline.errors import FileError, SaglineWarning
+from sagline.errors import FileError, SaglineWarning, printable
 from sagline.files.json_text import json_text
 
 if TYPE_CHECKING:
@@ -130,13 +129,11 @@ def show_data(text: str) -> None:
 
 def _fits(character: str) -> bool:
     """Whether a character of a JSON text may go out as it is."""
-    if character.isascii():
-        return character == "\n" or character.isprintable()
     try:
         character.encode(_encoding())
     except UnicodeEncodeError:
         return False
-    return is_seen(character)
+    return True
 
 
 def _emit(what: RenderableType, width: int | None = None) -> None:
