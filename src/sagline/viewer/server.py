@@ -20,7 +20,7 @@ PORT = 8080
 NAME = "sagline"
 LOUD = ("websockets.server", "asyncio")  # loggers
 
-_running: set[Server] = set()
+_running: list[Server] = []
 _quieted = ExitStack()  # what is quiet for the whole process while any server runs
 
 
@@ -54,7 +54,7 @@ def started(host: str = LOOPBACK, port: int = PORT, title: str = NAME) -> Server
             quieted.enter_context(_quiet())
         with redirect_stdout(StringIO()):
             server = Server(host, port, title)
-        _running.add(server)
+        _running.append(server)
         _quieted.push(quieted.pop_all())
     server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
     return server
@@ -64,7 +64,7 @@ def stop(server: Server) -> None:
     """Stop it and its threads; after the last one, logging and warnings are as they were before the first."""
     with redirect_stdout(StringIO()):
         server.stop()
-    _running.discard(server)
+    _running[:] = [other for other in _running if other is not server]
     if not _running:
         _quieted.close()
 
