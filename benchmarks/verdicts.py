@@ -13,8 +13,7 @@ from sagline.arrays import Array
 from sagline.kinematics.inverse_rows import decide_rows, solve_rows
 from sagline.statics.tables import pose_rows
 from sagline.tension.options import kernel_options
-from tests.tension.reference import random_poses
-from tests.tension.test_border import NAMES, found_border
+from tests.tension.reference import BORDER_ROBOTS, found_border, random_poses
 
 POSES = 2000
 OVERLOADS = (1e-3, 1e-6)  # of the weight, beyond the border
@@ -24,7 +23,11 @@ METHOD = sl.MinimumNorm()
 def main() -> None:
     """Print the table."""
     one_core()
-    show("Verdicts with sag", [row for name in NAMES for row in (in_the_open(name), *at_the_border(name))], Console())
+    show(
+        "Verdicts with sag",
+        [row for name in BORDER_ROBOTS for row in (in_the_open(name), *at_the_border(name))],
+        Console(),
+    )
 
 
 def in_the_open(name: str) -> Row:

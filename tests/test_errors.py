@@ -7,7 +7,7 @@ import pickle
 import numpy as np
 import pytest
 
-from sagline.errors import FileError, InvalidValueError, nearest, printable, shortened
+from sagline.errors import MOST, FileError, InvalidValueError, nearest, printable, shortened
 
 SEED = 7
 
@@ -30,7 +30,7 @@ def test_what_is_short_stays_when_something_long_is_cut() -> None:
     text = str(FileError("robot.yaml", "name is " + "y" * 1000 + "; allowed: a word", "Correct name."))
     assert text.startswith("robot.yaml: name is yyy")
     assert text.endswith("yyy; allowed: a word. Correct name.")
-    assert len(text) == 299
+    assert len(text) == MOST
     assert str(InvalidValueError("a", "b", "c", "D.")) == "a is b; allowed: c. D."
 
 
@@ -39,7 +39,7 @@ def test_a_long_part_loses_its_middle_and_the_others_nothing(long: int) -> None:
     parts = ["the item", "the value", "what is allowed", "What to do."]
     parts[long] = f"begin{'x' * 5000}end"
     text = str(InvalidValueError(*parts))
-    assert len(text) == 299
+    assert len(text) == MOST
     assert all(part in text for k, part in enumerate(parts) if k != long)
     assert "beginx" in text
     assert "…x" in text
@@ -64,7 +64,9 @@ def test_errors_keep_their_data_whole() -> None:
     assert again.reason.endswith("zz; allowed: > 0 kg")
 
 
-@pytest.mark.parametrize("text", ["", "plain", "Größe µ ² — …", "日本語", "a b\u00a0c", "👩\u200d🔬", "عربي"])
+@pytest.mark.parametrize(
+    "text", ["", "plain", "Größe µ ² — …", "日本語", "a b\u00a0c\u202fd", "−7.1 µm · 3 × 4", "عربي"]
+)
 def test_what_prints_stays(text: str) -> None:
     assert printable(text) == text
 
@@ -78,10 +80,23 @@ def test_what_prints_stays(text: str) -> None:
         ("\ud83d", r"\ud83d"),
         ("\u202egnp.exe\u2066", r"\u202egnp.exe\u2066"),
         ("\u2028\u2029\ufeff\ufffe", r"\u2028\u2029\ufeff\ufffe"),
+        ("\u200e\u200f\u061c\u200b\u200d", r"\u200e\u200f\u061c\u200b\u200d"),
+        ("\ue000\U000e0001", r"\ue000\U000e0001"),
     ],
 )
 def test_what_does_not_print_is_written_out(text: str, shown: str) -> None:
     assert printable(text) == shown
+
+
+def test_what_may_stay_stays() -> None:
+    assert printable("a\nb\x1b", "\n") == "a\nb\\x1b"
+
+
+def test_every_control_character_is_written_out() -> None:
+    for code in [*range(0x20), *range(0x7F, 0xA0), 0xDCFF]:
+        shown = printable(f"a{chr(code)}b")
+        assert shown.isprintable(), hex(code)
+        assert shown.startswith("a\\"), hex(code)
 
 
 def test_only_near_words_are_suggested() -> None:

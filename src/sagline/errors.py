@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import re
+import unicodedata
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Final
 
-_UNPRINTABLE = re.compile(  # what moves a cursor, ends a line, turns the reading direction, or cannot be encoded
-    "[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ufeff\ud800-\udfff\ufffe\uffff]"
-)
 _WORD: Final = 60  # letters of what was given that are looked at for a word that was meant
-MOST: Final = 299  # characters of a message; more is not read, and floods a terminal
+LONGEST: Final = 299  # characters of a line on a terminal; more is not read, and floods it
+HEAD: Final = "Error: "  # what a command writes before a message
+MOST: Final = LONGEST - len(HEAD)  # characters of a message
 LEAST: Final = 30  # of each of its parts that are kept, whatever the others take
 
 
@@ -96,21 +95,37 @@ class FileError(SaglineError):
         return f"{path}: {reason}. {next_step}"
 
 
-def printable(text: str) -> str:
+def printable(text: str, kept: str = "") -> str:
     r"""A text as a terminal may be given it: nothing in it moves the cursor, hides a letter or cannot be written.
 
     Args:
         text: Any text, from a file for instance.
+        kept: Characters that may stay, line ends for instance.
 
     Returns:
-        The text, with control characters, line ends and lone surrogates written out as Python writes them.
+        The text, with control characters, line ends, lone surrogates and all else that is not seen written out as
+        Python writes them.
 
     Examples:
         >>> from sagline.errors import printable
         >>> print(printable("a\x1b[31m\nb"))
         a\x1b[31m\nb
     """
-    return _UNPRINTABLE.sub(lambda found: repr(found[0])[1:-1], text)
+    if text.isprintable():
+        return text
+    return "".join(c if c in kept or is_seen(c) else c.encode("unicode_escape").decode() for c in text)
+
+
+def is_seen(character: str) -> bool:
+    """Whether a character shows, or is a space of any width.
+
+    Args:
+        character: One character.
+
+    Returns:
+        Whether; marks that only steer how others are read, such as U+200E and U+200B, do not show.
+    """
+    return character.isprintable() or unicodedata.category(character) == "Zs"
 
 
 def nearest(word: str, known: Iterable[str]) -> str | None:

@@ -13,9 +13,9 @@ from typing import Any, Final
 import numpy as np
 
 import sagline as sl
+from sagline.cli.values import pose_of
 from sagline.errors import SaglineError, printable
 from sagline.files.lengths_file import load_lengths
-from sagline.files.pose_text import parse_pose
 
 SECONDS: Final = 2.0  # of processor time; a wall clock would tell how busy the machine is
 MEGABYTES: Final = 500.0
@@ -143,7 +143,7 @@ READERS: Final = (
     Reader(
         "pose.txt",
         "1.5,-0.25,2,10,20,30",
-        lambda file: parse_pose(file.read_bytes().decode("utf-8", "surrogateescape")),
+        lambda file: pose_of(file.read_bytes().decode("utf-8", "surrogateescape")),
     ),
 )
 

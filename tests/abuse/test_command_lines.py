@@ -50,10 +50,10 @@ def stocked(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def short_of_work(stocked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Long commands stop once their arguments are accepted, or do a little of what they do."""
     short = sl.load_path(stocked / "short.yaml")
-    for module in ("article", "track"):
+    for module in ("run", "track"):
         monkeypatch.setattr(f"sagline.cli.{module}.article_path", lambda: short)
-    monkeypatch.setattr("sagline.cli.article.FIGURES", ())
-    monkeypatch.setattr("sagline.cli.article._figures", lambda *_: ())
+    monkeypatch.setattr("sagline.cli.run.FIGURES", ())
+    monkeypatch.setattr("sagline.cli.run._figures", lambda *_: ())
     monkeypatch.setattr("sagline.report.parts.Part.build", lambda part: Chapter(part.key, part.key, "", ()))
     monkeypatch.setattr("sagline.cli.tension.write_figures", lambda figures, folder: [])
     monkeypatch.setattr("sagline.cli.track.write_figures", lambda figures, folder: [])

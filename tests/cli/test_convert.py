@@ -58,7 +58,7 @@ def test_a_preset_becomes_a_mujoco_model(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "said"), [("cogiro", "0.4 mm away"), ("article-mixed", "19 mm away"), ("fast", "0.4 m away")]
+    ("name", "said"), [("cogiro", "0.4 mm away"), ("article-mixed", "19 mm away"), ("fast", "400 mm away")]
 )
 def test_what_straight_tendons_cost_is_told(name: str, said: str, tmp_path: Path) -> None:
     robot = load_robot(name)

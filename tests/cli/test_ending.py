@@ -13,9 +13,8 @@ import pytest
 from typer.testing import CliRunner
 
 import sagline as sl
-from sagline.cli.ending import ended, shortened
+from sagline.cli.ending import ended
 from sagline.cli.main import app
-from sagline.cli.printable import printable
 from sagline.cli.terminal import show_data
 
 COMMAND = [sys.executable, "-m", "sagline.cli"]
@@ -86,21 +85,18 @@ def test_what_was_written_before_is_named(tmp_path: Path, monkeypatch: pytest.Mo
     assert os.listdir("output") == ["cogiro-catenary.nc"]
 
 
-def test_the_middle_of_what_is_too_long_is_left_out() -> None:
-    assert shortened("a" * 10, 10) == "a" * 10
-    assert shortened("begin" + "x" * 500 + "end", 40).startswith("begin")
-    assert shortened("begin" + "x" * 500 + "end", 40).endswith("end")
-    assert len(shortened("x" * 500, 40)) == 40
+@pytest.mark.parametrize("length", [280, 292, 293, 5000])
+def test_an_error_is_cut_once_and_its_line_stays_short(length: int, capsys: pytest.CaptureFixture[str]) -> None:
+    error = sl.FileError("a", "x" * (length - len("a: . Next.")), "Next.")
 
+    def fail() -> None:
+        raise error
 
-def test_what_a_terminal_would_obey_is_written_out() -> None:
-    for code in [*range(0x20), *range(0x7F, 0xA0), 0x200E, 0x202E, 0x2028, 0x2066, 0xFEFF, 0xDCFF, 0xE000]:
-        shown = printable(f"a{chr(code)}b")
-        assert shown.isprintable(), hex(code)
-        assert shown.startswith("a\\"), hex(code)
-    for kept in ("Größe 5 m²", "a\u00a0b\u202fc", "名前", "−7.1 µm · 3 × 4"):
-        assert printable(kept) == kept
-    assert printable("a\nb\x1b", "\n") == "a\nb\\x1b"
+    assert ended(fail) == 2
+    line = capsys.readouterr().err
+    assert line == f"Error: {error}\n"
+    assert len(line) <= 300
+    assert line.count("…") == (length > 292)
 
 
 @pytest.mark.parametrize("command", ["show", "tension", "track", "forward"])

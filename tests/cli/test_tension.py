@@ -55,6 +55,16 @@ def test_infeasible_pose_says_why(folder: FilePath) -> None:
     assert not (folder / "output").exists()
 
 
+def test_large_forces_have_a_prefix_and_ordinary_spaces(folder: FilePath) -> None:
+    result = sagline("article-suspended", "--pose", "0,0,2", "--wrench", "0,0,-30000")
+    robot = sl.load_robot("article-suspended")
+    plan = sl.inverse(robot, sl.Pose([0, 0, 2], np.eye(3)), wrench=[0, 0, -30000, 0, 0, 0])
+    assert f"Shortfall {float(plan.shortfall) / 1e3:.4g} kN; blocking cables" in result.stderr
+    result = sagline("article-suspended", "--pose", "0,0,2", "--no-figures")
+    assert "balance it: " in result.stdout
+    assert "\u00a0" not in result.output
+
+
 def test_bad_pose() -> None:
     result = sagline("cogiro", "--pose", "1,2")
     assert result.exit_code == 2

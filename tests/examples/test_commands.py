@@ -58,8 +58,8 @@ def test_a_printed_command_runs(words: list[str], folder: Path, monkeypatch: pyt
 
     monkeypatch.setattr("sagline.cli.view.serve", serve)
     monkeypatch.setattr("sagline.report.parts.Part.build", lambda part: Chapter(part.key, part.key, "", ()))
-    monkeypatch.setattr("sagline.cli.article.FIGURES", ())
-    monkeypatch.setattr("sagline.cli.article._figures", lambda *_: ())
+    monkeypatch.setattr("sagline.cli.run.FIGURES", ())
+    monkeypatch.setattr("sagline.cli.run._figures", lambda *_: ())
     if words[0] == "new":
         (folder / words[1]).unlink(missing_ok=True)
     result = CliRunner().invoke(app, words)

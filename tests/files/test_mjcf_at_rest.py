@@ -8,7 +8,7 @@ from scipy.linalg import eigh
 from sagline.arrays import Array
 from sagline.cables.cable import Cable
 from sagline.cables.elastic import Elastic
-from sagline.files.mjcf import dump_mjcf
+from sagline.files.mjcf import _dynamics, dump_mjcf
 from sagline.files.robot_file import load_robot
 from sagline.kinematics.forward import forward
 from sagline.kinematics.inverse import inverse
@@ -178,3 +178,13 @@ def test_a_platform_end_at_its_frame_end_is_taken() -> None:
     bob = Robot("bob", frame, np.zeros((3, 3)), Cable(0.01, 2e4), 2.0, motion_pattern="3T")
     model, data = opened(dump_mjcf(bob, Pose.from_euler(frame[0], 0.0, 0.0, 0.0), [1e-6, 2.0, 2.0]))
     run(model, data, 0.01)
+
+
+def test_no_written_step_is_longer_than_the_robot_allows() -> None:
+    robot, generator = load_robot("cogiro"), np.random.default_rng(5)
+    pose, lengths = middle(robot), np.full(robot.cable_count, 10.0)
+    for factor in 10.0 ** generator.uniform(0.0, 6.0, 50):
+        stiff = robot.replace(cables=Cable(robot.cables.linear_density, factor * robot.cables.axial_stiffness))
+        written = opened(dump_mjcf(stiff, pose, lengths))[0].opt.timestep
+        allowed = _dynamics(stiff, pose, stiff.cables.axial_stiffness / lengths).step
+        assert 0.9 * allowed < written <= allowed * (1.0 + 1e-15)

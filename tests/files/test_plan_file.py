@@ -166,12 +166,12 @@ def test_files_that_are_no_plan(tmp_path: FilePath, saved: FilePath) -> None:
     os.mkfifo(tmp_path / "pipe.nc")
     reasons = {
         tmp_path / "missing.nc": "does not exist. Check its name",
-        tmp_path: "cannot be read .Is a directory",
+        tmp_path: "is a folder. Give the name of a file in it",
         half: "is no complete NetCDF file .*truncated.*it may have been cut off",
         text: "is no complete NetCDF file",
         other: "is no plan of sagline, it names no sagline_format",
-        tmp_path / "pipe.nc": "is no file. Check its name",  # opening it would wait for ever
-        FilePath("/dev/zero"): "is no file. Check its name",
+        tmp_path / "pipe.nc": "is a pipe, not a file. Name a file",  # opening it would wait for ever
+        FilePath("/dev/zero"): "is a device, not a file. Name a file",
         tmp_path / "zero\0byte.nc": "is no name that a file can have",
         tmp_path / ("x" * 300): "is no name that a file can have",
     }

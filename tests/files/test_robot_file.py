@@ -216,7 +216,7 @@ def test_a_broken_file_gets_one_clear_message(tmp_path: Path, content: bytes, me
 def test_what_is_no_file(tmp_path: Path) -> None:
     with pytest.raises(FileError, match=r"missing\.yaml: cannot be read \(No such file"):
         load_robot(tmp_path / "missing.yaml")
-    with pytest.raises(FileError, match=r"cannot be read \(Is a directory\)"):
+    with pytest.raises(FileError, match=r"is a folder\. Give the name"):
         load_robot(tmp_path)
     with pytest.raises(InvalidValueError, match="Did you mean article-mixed"):
         load_robot("article-mixd")

@@ -1,18 +1,23 @@
 """The balance and its sharing written out in NumPy and handed to other programs: the tests' independent reference."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import daqp
 import numpy as np
 from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
+from sagline.arrays import Array
 from sagline.cables.cable import Cable
 from sagline.files.robot_file import load_robot
+from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan
 from sagline.robot.catalogue import robot_names
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
+from sagline.tension.minimum_norm import MinimumNorm
+
+BORDER_ROBOTS = ["article-suspended", "article-mixed", "expo2015-lucia", "ipanema-1", "fast"]
 
 
 def random_poses(robot: Robot, count: int, rng: np.random.Generator, stretch: float = 1.0) -> Pose:
@@ -117,3 +122,36 @@ def planar(**changes: Any) -> Robot:
         "tension_max": 25.0,
     }
     return Robot(**{**fields, **changes})
+
+
+class Border(NamedTuple):
+    """Feasible poses and directions of load (N, 6), and the largest load along each that is found feasible (N,)."""
+
+    robot: Robot
+    poses: Pose
+    ways: Array
+    loads: Array
+
+
+def found_border(name: str, count: int, seed: int) -> Border:
+    """Grow the load from none, along a force of 1 N and some moment, until it is no longer feasible; then halve."""
+    robot = load_robot(name)
+    rng = np.random.default_rng(seed)
+    poses = random_poses(robot, 20 * count, rng)
+    poses = poses[np.flatnonzero(inverse(robot, poses, tension=MinimumNorm()).feasible)[:count]]
+    ways = rng.normal(size=(count, 6))
+    ways[:, 3:] *= 0.3 * np.ptp(robot.platform_anchors, axis=0).max()
+    ways /= np.linalg.norm(ways[:, :3], axis=1, keepdims=True)
+    low, high = np.zeros(count), np.full(count, 1e-3 * robot.mass * robot.gravity)
+    while (held := can_hold(robot, poses, ways * high[:, None])).any():
+        low, high = np.where(held, high, low), np.where(held, 2 * high, high)
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        held = can_hold(robot, poses, ways * middle[:, None])
+        low, high = np.where(held, middle, low), np.where(held, high, middle)
+    return Border(robot, poses, ways, low)
+
+
+def can_hold(robot: Robot, poses: Pose, wrench: Array) -> np.ndarray:
+    """At which poses the platform can be held with sag under a load (N, 6), by the verdict itself."""
+    return inverse(robot, poses, tension=MinimumNorm(), wrench=wrench).feasible

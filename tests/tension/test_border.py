@@ -1,56 +1,18 @@
 """The load at which the verdict turns, against a nonlinear program in the tensions, and confirmed by forward."""
 
-from typing import NamedTuple
-
 import numpy as np
 import pytest
 from scipy.optimize import minimize
 
 from sagline.arrays import Array
 from sagline.cables.catenary import Catenary
-from sagline.files.robot_file import load_robot
 from sagline.kinematics.forward import forward
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.status import PoseStatus
-from sagline.robot.pose import Pose
-from sagline.robot.robot import Robot
 from sagline.tension.minimum_norm import MinimumNorm
-from tests.tension.reference import random_poses, structure
+from tests.tension.reference import BORDER_ROBOTS, Border, found_border, structure
 
-NAMES = ["article-suspended", "article-mixed", "expo2015-lucia", "ipanema-1", "fast"]
 PRECISION = 1e-6  # of the weight
-
-
-class Border(NamedTuple):
-    """Feasible poses and directions of load (N, 6), and the largest load along each that is found feasible (N,)."""
-
-    robot: Robot
-    poses: Pose
-    ways: Array
-    loads: Array
-
-
-def found_border(name: str, count: int, seed: int) -> Border:
-    """Grow the load from none, along a force of 1 N and some moment, until it is no longer feasible; then halve."""
-    robot = load_robot(name)
-    rng = np.random.default_rng(seed)
-    poses = random_poses(robot, 20 * count, rng)
-    poses = poses[np.flatnonzero(inverse(robot, poses, tension=MinimumNorm()).feasible)[:count]]
-    ways = rng.normal(size=(count, 6))
-    ways[:, 3:] *= 0.3 * np.ptp(robot.platform_anchors, axis=0).max()
-    ways /= np.linalg.norm(ways[:, :3], axis=1, keepdims=True)
-    low, high = np.zeros(count), np.full(count, 1e-3 * robot.mass * robot.gravity)
-    while (held := is_feasible(robot, poses, ways * high[:, None])).any():
-        low, high = np.where(held, high, low), np.where(held, 2 * high, high)
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        held = is_feasible(robot, poses, ways * middle[:, None])
-        low, high = np.where(held, middle, low), np.where(held, high, middle)
-    return Border(robot, poses, ways, low)
-
-
-def is_feasible(robot: Robot, poses: Pose, wrench: Array) -> np.ndarray:
-    return inverse(robot, poses, tension=MinimumNorm(), wrench=wrench).feasible
 
 
 def largest_load(border: Border, i: int, start: Array) -> float:
@@ -120,12 +82,12 @@ def check_border(name: str, count: int, seed: int) -> None:
     assert (clearly.status == PoseStatus.INFEASIBLE).all()
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", BORDER_ROBOTS)
 def test_the_verdict_turns_where_a_nonlinear_program_says(name: str) -> None:
     check_border(name, 12, 41)
 
 
 @pytest.mark.soak
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", BORDER_ROBOTS)
 def test_two_hundred_verdicts_turn_where_a_nonlinear_program_says(name: str) -> None:
     check_border(name, 200, 42)

@@ -14,6 +14,7 @@ from sagline.arrays import Array, checked, locked, number
 from sagline.cables.cable import Cable
 from sagline.cables.catenary import Catenary
 from sagline.errors import InvalidValueError
+from sagline.numbers import n
 
 TensionAt = Literal["frame_end", "platform_end", "chord"]
 UNITS = {"linear_density": "kg/m", "axial_stiffness": "N", "length_offset": "m"}
@@ -63,7 +64,9 @@ class CableFit:
         found = []
         for name, value, error in zip(self.names, self.values, self.standard_error, strict=True):
             if name != "length_offset" and error > TOO_LOOSE * value:
-                found.append(f"{name} is not determined: {value:.3g} ± {error:.2g} {UNITS[name]}; {_ADVICE[name]}")
+                found.append(
+                    f"{name} is not determined: {n(value, unit=UNITS[name], uncertainty=error)}; {_ADVICE[name]}"
+                )
         correlation = self.correlation
         for i, first in enumerate(self.names):
             for j, second in enumerate(self.names[:i]):

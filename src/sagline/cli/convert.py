@@ -20,10 +20,13 @@ from sagline.files.robot_file import dump_robot, load_robot
 from sagline.files.whole import write_text
 from sagline.kinematics.confirm import confirm
 from sagline.kinematics.inverse import inverse
+from sagline.numbers import n
 from sagline.robot.pose import Pose
 
 if TYPE_CHECKING:
     from sagline.robot.robot import Robot
+
+LEAST = 1e-6  # m: a distance that is told is no smaller
 
 
 def convert(
@@ -98,8 +101,11 @@ def _mjcf(robot: Robot, at: list[float] | None) -> tuple[str, str]:
         text = dump_mjcf(robot, pose)
         proof = confirm(inverse(robot, pose, model=Elastic()))
     away = float(np.linalg.norm(proof.position_error))
-    distance = f"{away:.2g} m" if away >= 0.1 else f"{max(1e3 * away, 0.001):.2g} mm"
-    held = f"hold the platform {distance} away" if proof.held else "do not hold the platform near it"
+    held = (
+        f"hold the platform {n(1e3 * max(away, LEAST), '.2g', 'mm')} away"
+        if proof.held
+        else "do not hold the platform near it"
+    )
     return text, f"Sag and weight of the cables: sagging cables of these lengths {held}."
 
 

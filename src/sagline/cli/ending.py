@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from threading import ExceptHookArgs
 
 OUTSIDE, BAD_INPUT, UNEXPECTED, INTERRUPTED, CUT_OFF = 1, 2, 70, 130, 141  # the last as of SIGPIPE
-LONGEST = 299  # characters of a message
 REPORT = "the authors of sagline"
 
 
@@ -75,9 +74,11 @@ def _told(error: BaseException, debug: bool) -> int:
 
         traceback.print_exception(error)
     from sagline.cli.terminal import note
+    from sagline.errors import LONGEST, shortened
 
     head, text, code = _message(error)
-    note(head, shortened(text, LONGEST - len(head)), style="bold red")
+    (text,) = shortened((text,), LONGEST - len(head))
+    note(head, text, style="bold red")
     for line in getattr(error, "__notes__", ()):
         note("", line)
     return code
@@ -87,23 +88,24 @@ def _message(error: BaseException) -> tuple[str, str, int]:
     """Head, text and exit code."""
     from typer import Abort
 
-    from sagline.errors import SaglineError
+    from sagline.errors import HEAD, SaglineError, shortened
 
     if isinstance(error, SaglineError):
-        return "Error: ", str(error), BAD_INPUT
+        return HEAD, str(error), BAD_INPUT
     if isinstance(error, Abort):
-        return "Error: ", "the input ended before all was answered. Answer, or give the options.", BAD_INPUT
+        return HEAD, "the input ended before all was answered. Answer, or give the options.", BAD_INPUT
     if hasattr(error, "format_message"):  # of the command line itself
-        return "Error: ", _usage(error), BAD_INPUT
+        return HEAD, _usage(error), BAD_INPUT
     if isinstance(error, MemoryError):
         reason = f" ({error})" if str(error) else ""
-        return "Error: ", f"there is not enough memory{reason}. Take fewer poses or samples at a time.", BAD_INPUT
+        return HEAD, f"there is not enough memory{reason}. Take fewer poses or samples at a time.", BAD_INPUT
     if isinstance(error, OSError):
         what = error.filename if error.filename is not None else "standard output"
         step = "Check its name, its permissions and the space on the disk."
-        return "Error: ", f"{what}: {error.strerror or error}. {step}", BAD_INPUT
+        return HEAD, f"{what}: {error.strerror or error}. {step}", BAD_INPUT
     what = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
-    told = f"{shortened(what, 120)}. This is a mistake in sagline: please report it to {REPORT}, with the command"
+    (what,) = shortened((what,), 120)
+    told = f"{what}. This is a mistake in sagline: please report it to {REPORT}, with the command"
     return "Unexpected error: ", f"{told} and its files; the option --debug shows where it happened.", UNEXPECTED
 
 
@@ -117,9 +119,8 @@ def _usage(error: BaseException) -> str:
 
 def _interrupted() -> int:
     _give_up_unwritable()
-    exec(
-        ""
-    )  # forgets an interrupt inside another exec, for which Python would end itself by the signal, whatever we say
+    # forgets an interrupt inside another exec, for which Python would end itself by the signal, whatever we say
+    exec("")
     with suppress(OSError, ValueError, AttributeError):  # plain: the library that writes may be half loaded
         sys.stderr.write("Interrupted. What has been written is whole.\n")
         sys.stderr.flush()
@@ -136,11 +137,3 @@ def _give_up_unwritable() -> None:
             null = os.open(os.devnull, os.O_WRONLY)
             os.dup2(null, sys.stdout.fileno())
             os.close(null)
-
-
-def shortened(text: str, longest: int) -> str:
-    """A text without its middle, if it is too long: where it begins says what it is about, where it ends what to do."""
-    if len(text) <= longest:
-        return text
-    end = longest // 2
-    return f"{text[: longest - end - 5]} ... {text[-end:]}"

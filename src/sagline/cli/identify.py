@@ -14,6 +14,7 @@ from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.cli.values import quantity
 from sagline.files.measurements import Measurements, load_measurements
+from sagline.numbers import n
 
 STEPS = 25  # along each axis of the working range
 TOLERANCE = 5e-3  # m, of the position: the article's own is 6 mm
@@ -58,8 +59,8 @@ def identify(
     show_table(Grid(heads, rows, f"{len(data.span)} measurements", left=frozenset({0, 3})))
     show(f"chi-squared per degree of freedom: {written(cable.chi_squared, '.3g')} (about 1 if the errors are as given)")
     show(
-        f"The empirical model with k_h, k_p keeps a position error of {1e3 * TOLERANCE:g} mm in the measured range "
-        f"from T_x = {written(model.tension_min(TOLERANCE), '.3g')} N on."
+        f"The empirical model with k_h, k_p keeps a position error of {n(1e3 * TOLERANCE, 'g', 'mm')} in the "
+        f"measured range from T_x = {n(model.tension_min(TOLERANCE), '.3g', 'N')} on."
     )
     for warning in cable.warnings:
         note("Warning: ", warning, style="bold yellow")

@@ -12,7 +12,7 @@ from rich.text import Text
 from sagline.blocks import Progress as Told
 from sagline.cli.cold_start import compile_all
 from sagline.cli.compiling import Stage, first_run_text, heard
-from sagline.cli.printable import printable
+from sagline.errors import printable
 
 PATIENCE = 2.0  # s: work that takes longer shows a bar and the time left
 

@@ -12,7 +12,7 @@ import numpy as np
 import typer
 
 from sagline.arrays import Array, checked
-from sagline.cables.rope import ROPES
+from sagline.cables.rope import ROPES, SAFETY
 from sagline.cli.entries import INVERSE
 from sagline.cli.terminal import note, show, working
 from sagline.cli.values import quantity
@@ -22,7 +22,8 @@ from sagline.files.robot_file import dump_robot, parse_robot
 from sagline.files.whole import write_text
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan
-from sagline.robot.design import COUNTS, LAYOUTS, Design
+from sagline.numbers import n
+from sagline.robot.design import COUNTS, LAYOUTS, SLACK_LIMIT, Design
 from sagline.robot.pose import Pose
 from sagline.robot.pose_box import PoseBox
 from sagline.robot.robot import Robot
@@ -71,7 +72,7 @@ def new(file: Path, answers: dict[str, str | None], *, force: bool) -> Robot:
     """
     _refuse_existing(file, force=force)
     design, said = _answered(file.stem, answers)
-    with working("checking 343 poses of each of a few boxes", INVERSE):
+    with working(f"checking {GRID**3} poses of each of a few boxes", INVERSE):
         robot, middle = _boxed(design)
     text = _header(said) + dump_robot(robot)
     made = parse_robot(text, file)
@@ -185,16 +186,17 @@ def _explained(robot: Robot, design: Design, middle: Plan) -> tuple[list[str], f
     share = float(middle.feasible.mean())
     density, stiffness = float(robot.cables.linear_density[0]), float(robot.cables.axial_stiffness[0])
     lines = [
-        f"{robot.name}: {robot.cable_count} cables, {ROPES[design.rope].description}, {1e3 * design.diameter:g} mm: "
-        f"{1e3 * density:.3g} g/m, EA {1e-3 * stiffness:.4g} kN",
-        f"Tensions allowed: {robot.tension_min[0]:.3g} N (5 % of the weight) to {robot.tension_max[0]:.4g} N "
-        f"(a fifth of the breaking force)",
+        f"{robot.name}: {robot.cable_count} cables, {ROPES[design.rope].description}, "
+        f"{n(1e3 * design.diameter, 'g', 'mm')}: {n(1e3 * density, '.3g', 'g/m')}, EA {n(stiffness, unit='N')}",
+        f"Tensions allowed: {n(robot.tension_min[0], '.3g', 'N')} ({100 * SLACK_LIMIT:g} % of the weight) to "
+        f"{n(robot.tension_max[0], unit='N')} (the breaking force over a safety of {SAFETY:g})",
         f"Of the middle half of the frame, {100 * share:.0f} % of the level poses are feasible",
     ]
     if share > 0.0:
         tension = middle.chord_tension[middle.feasible]
         sag = middle.state.cables.sag[middle.feasible]
         lines.append(
-            f"There cables carry {tension.min():.3g} to {tension.max():.4g} N and sag by up to {1e3 * sag.max():.3g} mm"
+            f"There cables carry {n(tension.min(), '.3g', 'N')} to {n(tension.max(), unit='N')} "
+            f"and sag by up to {n(1e3 * sag.max(), '.3g', 'mm')}"
         )
     return lines, share

@@ -16,6 +16,7 @@ from sagline.kinematics.confirm import Confirmation, confirm
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Gap, Plan
 from sagline.motion.path import Path
+from sagline.numbers import n
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 
@@ -132,7 +133,7 @@ def gap_text(gap: Gap, plan: Plan) -> str:
     cables = "all cables" if len(gap.cables) == count else f"cables {', '.join(map(str, gap.cables))}"
     if np.isinf(gap.shortfall):
         return f"{when}: no change of the force alone would do; limits of {cables}"
-    return f"{when}: short by up to {gap.shortfall:.3g} N; limits of {cables}"
+    return f"{when}: short by up to {n(gap.shortfall, '.3g', 'N')}; limits of {cables}"
 
 
 def _range(values: Array) -> tuple[float, float]:

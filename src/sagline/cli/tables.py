@@ -14,8 +14,8 @@ from rich.measure import Measurement
 from rich.table import Table
 from rich.text import Text
 
-from sagline.cli.printable import printable
 from sagline.cli.terminal import FREE, show_pieces
+from sagline.errors import printable
 
 
 @dataclass(frozen=True, slots=True)

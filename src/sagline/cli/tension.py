@@ -14,15 +14,15 @@ from sagline.cli.entries import INVERSE, MARGINS, POLYGON, SHARING
 from sagline.cli.results import figure_files, write_figures
 from sagline.cli.tables import Grid, show_table
 from sagline.cli.terminal import note, show, show_json, working
-from sagline.cli.values import loaded, middle_of, wrench_of
+from sagline.cli.values import loaded, middle_of, pose_of, wrench_of
 from sagline.errors import InvalidValueError
 from sagline.files.names import file_stem
-from sagline.files.pose_text import parse_pose
 from sagline.files.robot_file import load_robot
 from sagline.files.whole import check_files, made_folder
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.polygon import tension_polygon
 from sagline.kinematics.status import PoseStatus
+from sagline.numbers import n
 from sagline.robot.pose import Pose
 from sagline.tension.margin import capacity_margin
 from sagline.tension.method import TensionMethod
@@ -54,7 +54,7 @@ def tension(
     Raises:
         SaglineError: If an input is wrong or the folder cannot be written.
     """
-    load, place = wrench_of(wrench), None if pose is None else parse_pose(pose)
+    load, place = wrench_of(wrench), None if pose is None else pose_of(pose)
     robot = loaded(load_robot(name), payload)
     place = middle_of(robot) if place is None else place
     drawn = figures and robot.cable_count == robot.degrees_of_freedom + 2
@@ -83,7 +83,7 @@ def tension(
         )
         return 0
     show_table(_grid(robot, plans))
-    show(f"Extra force in the worst direction before no tensions balance it: {margin:.4g} N")
+    show(f"Extra force in the worst direction before no tensions balance it: {n(margin, unit='N')}")
     if files:
         show(f"In {folder.resolve()}: {', '.join(file.name for file in files)}", whole=True)
     return 0
@@ -102,8 +102,10 @@ def _reason(robot: Robot, pose: Pose, plan: Plan) -> str:
     if status is PoseStatus.SINGULAR:
         return f"{status.text}. No cable resists {unresisted_motion(robot, pose).text}"
     if status is PoseStatus.INFEASIBLE:
-        cables = ", ".join(str(i) for i in np.flatnonzero(plan.blocking))
-        return f"{status.text}. Shortfall {float(plan.shortfall):.4g} N; blocking cables {cables}"
+        cables = "blocking cables " + ", ".join(str(i) for i in np.flatnonzero(plan.blocking))
+        known = np.isfinite(plan.shortfall)
+        told = f"Shortfall {n(plan.shortfall, unit='N')}; {cables}" if known else cables.capitalize()
+        return f"{status.text}. {told}"
     return status.text
 
 

@@ -14,9 +14,9 @@ from rich.console import Console, RenderableType
 from rich.padding import Padding
 from rich.text import Text
 
-from sagline.cli.printable import is_seen, printable
-from sagline.errors import FileError, SaglineWarning
+from sagline.errors import FileError, SaglineWarning, printable
 from sagline.files.json_text import json_text
+from sagline.numbers import SPACE
 
 if TYPE_CHECKING:
     from sagline.cli.line import Line
@@ -82,7 +82,7 @@ def notices() -> Iterator[None]:
 def note(head: str, text: str, style: str = "") -> None:
     """One line beside the result, on stderr; paths in it are not broken into lines."""
     with suppress(OSError):  # where nobody can be told, nothing is said
-        _err.print(Text.assemble((printable(head), style), printable(text)), soft_wrap=True)
+        _err.print(Text.assemble((printable(head), style), printable(text).replace(SPACE, " ")), soft_wrap=True)
 
 
 def show(what: str, indent: int = 0, style: str = "", *, whole: bool = False) -> None:
@@ -130,13 +130,11 @@ def show_data(text: str) -> None:
 
 def _fits(character: str) -> bool:
     """Whether a character of a JSON text may go out as it is."""
-    if character.isascii():
-        return character == "\n" or character.isprintable()
     try:
         character.encode(_encoding())
     except UnicodeEncodeError:
         return False
-    return is_seen(character)
+    return True
 
 
 def _emit(what: RenderableType, width: int | None = None) -> None:
@@ -144,7 +142,7 @@ def _emit(what: RenderableType, width: int | None = None) -> None:
     console = _out if _out.is_terminal else _wide
     with _refused(), console.capture() as captured:
         console.print(what, width=width, soft_wrap=width is None, crop=False)
-    _write(captured.get())
+    _write(captured.get().replace(SPACE, " "))  # what people search for in a pipe
 
 
 def _write(text: str) -> None:

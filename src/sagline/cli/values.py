@@ -10,6 +10,7 @@ import numpy as np
 from sagline.arrays import Array, checked
 from sagline.errors import InvalidValueError
 from sagline.files.quantity import in_si, plain_number
+from sagline.robot.inertia import with_mass
 from sagline.robot.pose import Pose
 
 if TYPE_CHECKING:
@@ -69,6 +70,17 @@ def middle_of(robot: Robot) -> Pose:
     return Pose((robot.test_box.low + robot.test_box.high) / 2, np.eye(3))
 
 
+def pose_of(text: str) -> Pose:
+    """A pose from X,Y,Z in meters, or X,Y,Z,A,B,C with the angles about z, y and x in degrees.
+
+    Raises:
+        InvalidValueError: If it is none.
+    """
+    step = "Give meters, and degrees about z, y and x: --pose 1,0,1.5 or --pose 1,0,1.5,10,0,0."
+    place = _three_or_six(text, "--pose", "m or degrees", FARTHEST, step)
+    return Pose.from_euler(place[:3], *np.radians(place[3:]))
+
+
 def wrench_of(text: str | None) -> Array | None:
     """A wrench from "fx,fy,fz" in N, or "fx,fy,fz,mx,my,mz" with moments in N m; None for none.
 
@@ -77,12 +89,8 @@ def wrench_of(text: str | None) -> Array | None:
     """
     if text is None:
         return None
-    parts = text.split(",")
-    if len(parts) not in (3, 6):
-        step = "Give newtons, and newton meters about the center of mass: --wrench 0,0,-50 or --wrench 0,0,-50,0,5,0."
-        raise InvalidValueError("--wrench", repr(text), "three or six numbers", step)
-    whole = numbers(parts, "--wrench", "N or N m", STRONGEST)
-    return np.array(whole + [0.0] * (6 - len(whole)))
+    step = "Give newtons, and newton meters about the center of mass: --wrench 0,0,-50 or --wrench 0,0,-50,0,5,0."
+    return np.array(_three_or_six(text, "--wrench", "N or N m", STRONGEST, step))
 
 
 def loaded(robot: Robot, payload: str | None) -> Robot:
@@ -97,5 +105,13 @@ def loaded(robot: Robot, payload: str | None) -> Robot:
     """
     if payload is None:
         return robot
-    mass = robot.mass + quantity(payload, "--payload", "kg", low=0.0)
-    return robot.replace(mass=mass, inertia=robot.inertia * (mass / robot.mass))
+    return with_mass(robot, robot.mass + quantity(payload, "--payload", "kg", low=0.0))
+
+
+def _three_or_six(text: str, item: str, unit: str, largest: float, step: str) -> list[float]:
+    """Plain numbers between commas; of three, three zeros follow."""
+    parts = text.split(",", maxsplit=6)
+    if len(parts) not in (3, 6):
+        raise InvalidValueError(item, repr(text), "three or six numbers", step)
+    whole = numbers(parts, item, unit, largest)
+    return whole + [0.0] * (6 - len(whole))

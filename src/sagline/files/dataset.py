@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sagline.errors import FileError
+from sagline.files.kinds import kind_of
 from sagline.files.seal import Seal, seal_of
 
 if TYPE_CHECKING:
@@ -33,8 +34,8 @@ def read_dataset(path: Path) -> tuple[Dataset, Seal]:
 def _seal(path: Path) -> Seal:
     """What a file's end says, before anything else in it is believed."""
     try:
-        if path.exists() and not path.is_file() and not path.is_dir():
-            raise FileError(path, "is no file", "Check its name.")  # opening a pipe would wait for its writer
+        if kind := kind_of(path.stat().st_mode):  # opening a pipe would wait for its writer
+            raise FileError(path, f"is {kind.text}", kind.next_step)
         found = seal_of(path)
     except FileNotFoundError:
         raise FileError(path, "does not exist", "Check its name.") from None

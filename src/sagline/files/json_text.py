@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from sagline.errors import is_seen
+
 _OTHERS = re.compile(r"[^\n -~]+")  # beside ASCII that prints; json escapes what of it is below the space
 
 
@@ -50,9 +52,4 @@ def json_text(what: Any) -> str:
         TypeError: If something in it has no form in JSON.
     """
     text = json.dumps(plain(what), indent=2, ensure_ascii=False, allow_nan=False)
-    return _OTHERS.sub(lambda found: _seen(found[0]), text)
-
-
-def _seen(text: str) -> str:
-    """A text in which what moves a cursor, turns the text around or is half a character is written as an escape."""
-    return "".join(c if c.isprintable() else json.dumps(c)[1:-1] for c in text)
+    return _OTHERS.sub(lambda found: "".join(c if is_seen(c) else json.dumps(c)[1:-1] for c in found[0]), text)

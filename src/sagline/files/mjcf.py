@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from decimal import ROUND_DOWN, Context
 from typing import NamedTuple
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Comment, Element, SubElement
@@ -29,6 +30,7 @@ _RADIUS = 0.002  # of ends of cables, which are only drawn, to the size of the r
 _THINNEST = 0.02  # of a box that is only drawn, to its longest edge
 _STEPS = 20.0  # in a period of the fastest motion
 _LONGEST_STEP = 0.002  # MuJoCo's own [s]
+_DOWN = Context(prec=2, rounding=ROUND_DOWN)  # how a step is written: it becomes no longer
 _STRETCH_DAMPING = 4.0  # half the bound of the frequencies, about the fastest there is, is damped critically
 _SWING_DAMPING = 0.4  # a fifth of critical
 _ROUNDING = 1e-12
@@ -80,7 +82,7 @@ def dump_mjcf(robot: Robot, pose: Pose, unstrained_length: ArrayLike | None = No
     root.append(Comment(_NOTE))
     SubElement(root, "compiler", angle="radian", inertiafromgeom="false")
     option = SubElement(root, "option", gravity=_text((0.0, 0.0, -robot.gravity)))
-    option.set("timestep", f"{dynamics.step:.2g}")
+    option.set("timestep", f"{_DOWN.create_decimal_from_float(dynamics.step):g}")
     option.set("integrator", "implicitfast")  # which takes damping implicitly: it never limits the step
     radius = _RADIUS * _add_view(root, robot)
     world = SubElement(root, "worldbody")

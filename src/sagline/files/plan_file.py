@@ -20,7 +20,7 @@ from sagline.cables.empirical import Empirical
 from sagline.cables.model import CableModel, CableState
 from sagline.cables.parabolic import Parabolic
 from sagline.cables.straight import Straight
-from sagline.errors import FileError, InvalidValueError, SaglineWarning
+from sagline.errors import FileError, InvalidValueError, SaglineWarning, printable
 from sagline.files.dataset import read_dataset
 from sagline.files.plan_checks import check_plan
 from sagline.files.plan_layout import JERK, MOTION, PARTS, PROOF, QUANTITIES, TIME, Quantity
@@ -106,7 +106,7 @@ def load_plan(file: os.PathLike[str] | str) -> Plan:
     except KeyError as error:
         raise FileError(path, f"has no {error.args[0]}", "Write it again; it is incomplete or was edited.") from None
     except InvalidValueError as error:
-        raise FileError(path, f"{error.item} is {error.value}; allowed: {error.allowed}", error.next_step) from None
+        raise FileError.of(path, error) from None
 
 
 def _dataset(plan: Plan) -> Dataset:
@@ -132,18 +132,13 @@ def _dataset(plan: Plan) -> Dataset:
 
 def _attributes(plan: Plan) -> dict[str, Any]:
     return {
-        "title": f"Cable lengths and tensions of {_printable(plan.state.one_robot.name)}",
+        "title": f"Cable lengths and tensions of {printable(plan.state.one_robot.name)}",
         "source": f"sagline {version('sagline')}",
         "sagline_format": FORMAT,
         **_written("model", plan.state.cables.model, MODELS),
         **_written("tension", plan.tension, METHODS),
         "robot": dump_robot(plan.state.one_robot),
     }
-
-
-def _printable(text: str) -> str:
-    """A text for people, as attributes can hold it: no zero bytes, no half characters."""
-    return "".join(c if c.isprintable() else "�" for c in text)
 
 
 def _written(

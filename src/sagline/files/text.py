@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import codecs
-import stat
 from pathlib import Path
 from typing import Final
 
 from sagline.errors import FileError
+from sagline.files.kinds import kind_of
 
 MEGABYTE: Final = 1_000_000
 _OTHER_TEXT: Final = {codecs.BOM_UTF16_LE: "UTF-16", codecs.BOM_UTF16_BE: "UTF-16"}
@@ -37,9 +37,8 @@ def read_bytes(path: Path, limit: float) -> bytes:
     """
     most = int(limit * MEGABYTE)
     try:
-        mode = path.stat().st_mode
-        if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
-            raise FileError(path, "is no regular file but a pipe or a device", "Give a file on a disk.")
+        if kind := kind_of(path.stat().st_mode):
+            raise FileError(path, f"is {kind.text}", kind.next_step)
         with path.open("rb") as file:
             data = file.read(most + 1)
     except (OSError, ValueError) as error:  # ValueError: a path with a zero byte or a lone surrogate

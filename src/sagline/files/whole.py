@@ -17,15 +17,8 @@ from contextvars import ContextVar
 from pathlib import Path
 
 from sagline.errors import FileError
+from sagline.files.kinds import kind_of
 from sagline.files.staging import SUFFIX, staging
-
-KINDS = {
-    stat.S_IFDIR: ("a folder", "Give the name of a file in it."),
-    stat.S_IFCHR: ("a device, not a file", "Name a file."),
-    stat.S_IFBLK: ("a device, not a file", "Name a file."),
-    stat.S_IFIFO: ("a pipe, not a file", "Name a file."),
-    stat.S_IFSOCK: ("a socket, not a file", "Name a file."),
-}
 
 _finished: ContextVar[list[Path] | None] = ContextVar("finished", default=None)
 
@@ -146,9 +139,8 @@ def check_file(file: os.PathLike[str] | str) -> Path:
     if stat.S_ISLNK(mode):
         leads = os.readlink(target)
         raise FileError(target, f"is a link, to {leads}", "Name the file itself, or remove the link.")
-    if not stat.S_ISREG(mode):
-        kind, step = KINDS.get(stat.S_IFMT(mode), ("no file", "Name a file."))
-        raise FileError(target, f"is {kind}", step)
+    if kind := kind_of(mode):
+        raise FileError(target, f"is {kind.text}", kind.next_step)
     if not os.access(target, os.W_OK):
         raise FileError(target, "is write-protected", "Change its permissions, or give another name.")
     return target

@@ -1,10 +1,15 @@
-"""Inertia matrices of simple bodies about their center of mass [kg m^2]."""
+"""Inertia matrices of simple bodies, and of loaded platforms, about their center of mass [kg m^2]."""
 
 from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sagline.arrays import Array
+
+if TYPE_CHECKING:
+    from sagline.robot.robot import Robot
 
 
 def box_inertia(mass: float, x: float, y: float, z: float) -> Array:
@@ -35,3 +40,19 @@ def cylinder_inertia(mass: float, radius: float, height: float) -> Array:
     """
     across = (3.0 * radius * radius + height * height) / 12.0
     return np.diag([across, across, 0.5 * radius * radius]) * mass
+
+
+def with_mass(robot: Robot, mass: float) -> Robot:
+    """A robot with another mass, spread as its own is: the inertia grows in proportion.
+
+    Args:
+        robot: The robot.
+        mass: Of the platform with its load [kg], > 0.
+
+    Returns:
+        The robot with that mass.
+
+    Raises:
+        InvalidValueError: If it is no such mass.
+    """
+    return robot.replace(mass=mass, inertia=robot.inertia * (mass / robot.mass))

@@ -8,11 +8,12 @@ import numpy as np
 
 from sagline.arrays import Array
 from sagline.kinematics.status import PoseStatus
+from sagline.numbers import n
 from sagline.robot.robot import Robot
 from sagline.tension.margin import capacity_margin
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.tension_scale import TensionScale
-from sagline.viewer.wording import ForceUnit, number, quantity
+from sagline.viewer.wording import ForceUnit, number
 
 LATER = "compiling …"
 _ALONE = 1e-9  # of a robot's highest tension: a tension this near to its limit is at it
@@ -122,7 +123,7 @@ def _summary(snapshot: Snapshot, *, capacity: bool) -> str:
         extra = unit.written(float(capacity_margin(snapshot.plan.state))) if capacity else LATER
         rows.append(("Spare force", f"{extra}, in any direction, the load shared anew" if capacity else extra))
     if (error := snapshot.error) is not None:
-        rows.append(("Really rests", f"{quantity(float(np.linalg.norm(error)), 'm')} off"))
+        rows.append(("Really rests", f"{n(np.linalg.norm(error), unit='m')} off"))
     return "<dl>" + "".join(f"<dt>{name}</dt><dd>{text}</dd>" for name, text in rows) + "</dl>"
 
 
@@ -197,7 +198,7 @@ def _material_line(snapshot: Snapshot) -> str:
 
 def _span(values: Array, unit: str) -> str:
     low, high = float(values.min()), float(values.max())
-    return quantity(low, unit) if low == high else f"{quantity(low, unit)} to {quantity(high, unit)}"
+    return n(low, unit=unit) if low == high else f"{n(low, unit=unit)} to {n(high, unit=unit)}"
 
 
 def _hex(color: Array) -> str:

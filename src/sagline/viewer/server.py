@@ -6,7 +6,8 @@ import errno
 import logging
 import socket
 import warnings
-from contextlib import redirect_stdout
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, redirect_stdout, suppress
 from io import StringIO
 
 import viser
@@ -17,6 +18,10 @@ from sagline.viewer import page
 LOOPBACK = "127.0.0.1"
 PORT = 8080
 NAME = "sagline"
+LOUD = ("websockets.server", "asyncio")  # loggers
+
+_running: list[Server] = []
+_quieted = ExitStack()  # what is quiet for the whole process while any server runs
 
 
 class Server(viser.ViserServer):
@@ -44,26 +49,47 @@ def started(host: str = LOOPBACK, port: int = PORT, title: str = NAME) -> Server
         InvalidValueError: If nothing can listen there; viser itself would take the next port, or wait for ever.
     """
     _check(host, port)
-    # a client that says nonsense is cut off or not heard, one that leaves gets no more; neither is news on the terminal
-    for name in ("websockets.server", "asyncio"):
-        logging.getLogger(name).setLevel(logging.CRITICAL)
-    warnings.filterwarnings("ignore", message="Queued a .* on a closed connection")
-    with redirect_stdout(StringIO()):
-        server = Server(host, port, title)
+    with ExitStack() as quieted:
+        if not _running:
+            quieted.enter_context(_quiet())
+        with redirect_stdout(StringIO()):
+            server = Server(host, port, title)
+        _running.append(server)
+        _quieted.push(quieted.pop_all())
     server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
     return server
 
 
 def stop(server: Server) -> None:
-    """Stop it and its threads."""
+    """Stop it and its threads; after the last one, logging and warnings are as they were before the first."""
     with redirect_stdout(StringIO()):
         server.stop()
+    _running[:] = [other for other in _running if other is not server]
+    if not _running:
+        _quieted.close()
 
 
 def url(server: Server, host: str) -> str:
     """The address to open in a browser on this machine."""
     shown = "localhost" if host in ("0.0.0.0", "::", "") else f"[{host}]" if ":" in host else host
     return f"http://{shown}:{server.get_port()}"
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """A client that says nonsense is cut off or not heard, one that leaves gets no more; neither is news to anybody."""
+    levels = {name: logging.getLogger(name).level for name in LOUD}
+    for name in LOUD:
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+    warnings.filterwarnings("ignore", message="Queued a .* on a closed connection")
+    ours = warnings.filters[0]
+    try:
+        yield
+    finally:
+        for name, level in levels.items():
+            logging.getLogger(name).setLevel(level)
+        with suppress(ValueError):  # somebody may have taken it away
+            warnings.filters.remove(ours)  # type: ignore[attr-defined]
 
 
 def _check(host: str, port: int) -> None:

@@ -10,6 +10,7 @@ from sagline.arrays import checked
 from sagline.cables.cable import Cable
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
+from sagline.robot.inertia import with_mass
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 from sagline.tension.methods import METHODS as ALL_METHODS
@@ -65,4 +66,4 @@ class Settings:
         if self.mass == robot.mass and self.density == self.stiffness == 1.0:
             return robot
         cables = Cable(robot.cables.linear_density * self.density, robot.cables.axial_stiffness * self.stiffness)
-        return robot.replace(mass=self.mass, inertia=robot.inertia * (self.mass / robot.mass), cables=cables)
+        return with_mass(robot, self.mass).replace(cables=cables)

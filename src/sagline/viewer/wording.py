@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import floor, isfinite, log10
+from math import isfinite
 from typing import NamedTuple
 
 from sagline.cables.catenary import Catenary
@@ -20,7 +20,6 @@ MODEL_NAMES: dict[type[CableModel], str] = {
     Elastic: "elastic, weightless",
     Straight: "straight",
 }
-_PREFIXES = {-1: "m", 0: "", 1: "k", 2: "M", 3: "G"}
 _NONE = "–"
 KILO_FROM = 1e5  # N: forces from here on are written in kilonewtons
 
@@ -58,14 +57,6 @@ def number(value: float, form: str) -> str:
         return _NONE
     text = f"{value:{form}}"
     return text if float(text.replace(",", "")) != 0.0 else text.removeprefix("-")
-
-
-def quantity(value: float, unit: str) -> str:
-    """A number to four digits with its unit, and the prefix that keeps it below a thousand."""
-    if not isfinite(value):
-        return _NONE
-    power = 0 if value == 0.0 else min(max(floor(log10(float(f"{abs(value):.3e}")) / 3.0), -1), 3)
-    return f"{number(value / 1000.0**power, '.4g')} {_PREFIXES[power]}{unit}"
 
 
 def model_name(model: CableModel) -> str:

@@ -33,7 +33,7 @@ def article(
         sagline article figures 6-9 --out results
         sagline article errata table 2
     """
-    from sagline.cli.report import write_report
+    from sagline.cli.article import write_report
 
     write_report(out, parts or [], as_json=as_json)
 

@@ -70,7 +70,7 @@ def run(out: OutOption = Path("output"), as_json: JsonOption = False) -> int:
 
     Tensions are the least norm of the horizontal tensions T_x, as the article's figures show them.
     """
-    from sagline.cli.article import run_article
+    from sagline.cli.run import run_article
 
     return run_article(out, as_json=as_json)
 
