@@ -12,13 +12,16 @@ from sagline.cli.summary import summary_grid
 from sagline.cli.tables import show_table
 from sagline.cli.terminal import note, show, show_json
 from sagline.files.whole import made_folder
+from sagline.kinematics.status import PoseStatus
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 FORMS = ("png", "svg")  # of a figure
+WIDEN = " Move the path, or widen the tension limits."
 MOST_GAPS = 5  # told in full
+WIDEN = " Move the path, or widen the tension limits."
 
 
 def write_plans(runs: Sequence[Run], folder: Path) -> list[Path]:
@@ -73,7 +76,8 @@ def _complaints(run: Run) -> int:
     if len(gaps) > MOST_GAPS:
         note(f"{name}: ", f"and {len(gaps) - MOST_GAPS} times more", style="bold red")
     if gaps:
-        note("", "The file keeps the feasible part and marks the rest. Move the path, or widen the tension limits.")
+        limits = all(gap.status is PoseStatus.INFEASIBLE for gap in gaps)
+        note("", "The file keeps the feasible part and marks the rest." + WIDEN * limits)
     if run.lost:
         what = f"{run.lost} of the planned poses are no stable equilibria: there the platform would leave its path"
         note(f"{name}: ", f"{what}; move it, or raise the tensions", style="bold red")

@@ -126,14 +126,18 @@ def summary(run: Run) -> Summary:
 def gap_text(gap: Gap, plan: Plan) -> str:
     """When a path leaves the feasible region, by how much, and which cables stand against it."""
     assert plan.path is not None
-    when = f"from {plan.path.time[gap.first]:g} s to {plan.path.time[gap.last]:g} s"
+    first, last = (f"{plan.path.time[k]:g} s" for k in (gap.first, gap.last))
+    when = f"from {first} to {last}" if gap.last > gap.first else f"at {first}"
     if np.isnan(gap.shortfall):
         return f"{when}: {gap.status.text}"
     count = plan.state.one_robot.cable_count
     cables = "all cables" if len(gap.cables) == count else f"cables {', '.join(map(str, gap.cables))}"
     if np.isinf(gap.shortfall):
         return f"{when}: no change of the force alone would do; limits of {cables}"
-    return f"{when}: short by up to {n(gap.shortfall, '.3g', 'N')}; limits of {cables}"
+    short = f"short by up to {n(gap.shortfall, '.3g', 'N')}"
+    if gap.hopeless:
+        short += f", and at {gap.hopeless} of {gap.last - gap.first + 1} poses no force alone would do"
+    return f"{when}: {short}; limits of {cables}"
 
 
 def _range(values: Array) -> tuple[float, float]:

@@ -67,6 +67,8 @@ def tension(
         reason = _reason(robot, place, least)
         margin = float(capacity_margin(least.state))
         shape = tension_polygon(robot, place, model.build(), load, variable.value) if drawn else None
+    for text in least.warnings:
+        note(f"{robot.name}: ", text)
     if not any(plan is not None and plan.feasible for plan in plans.values()):
         note("No tensions: ", reason, style="bold red")
         return OUTSIDE
@@ -103,9 +105,10 @@ def _reason(robot: Robot, pose: Pose, plan: Plan) -> str:
         return f"{status.text}. No cable resists {unresisted_motion(robot, pose).text}"
     if status is PoseStatus.INFEASIBLE:
         cables = "blocking cables " + ", ".join(str(i) for i in np.flatnonzero(plan.blocking))
-        known = np.isfinite(plan.shortfall)
-        told = f"Shortfall {n(plan.shortfall, unit='N')}; {cables}" if known else cables.capitalize()
-        return f"{status.text}. {told}"
+        if np.isfinite(plan.shortfall):
+            return f"{status.text}. Shortfall {n(plan.shortfall, unit='N')}; {cables}"
+        no_force = "No change of the force alone would do; " if np.isinf(plan.shortfall) else ""
+        return f"{status.text}. {no_force}{cables}"
     return status.text
 
 
