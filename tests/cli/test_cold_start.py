@@ -208,7 +208,7 @@ def test_however_the_command_ends_the_other_process_ends_too(way: signal.Signals
     parent.send_signal(way)
     assert parent.wait(timeout=60.0) != 0
     parent.stdout.close()
-    end = time.monotonic() + 60.0
+    end = time.monotonic() + 180.0  # it notices between two kernels, which may take long on a busy machine
     while FilePath(f"/proc/{child}").exists() or any(tmp_path.glob("compiling-*")):
         assert time.monotonic() < end, "the other process is still there"
         time.sleep(0.05)

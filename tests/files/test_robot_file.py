@@ -258,7 +258,7 @@ def test_any_robot_survives_the_dump_bit_for_bit(
         Cable(positive[:2], positive[2:4]),
         positive[4],
         motion_pattern="2T" if planar else "3T",
-        plane_normal=points[:3] if planar else None,
+        plane_normal=[1.0, *points[:2]] if planar else None,  # what is all but zero is no direction
         center_of_mass=points[3:6],
         gravity=positive[5],
         tension_max=[np.inf, positive[5]],

@@ -117,7 +117,7 @@ def test_planar_robots_get_a_plane(tmp_path: Path) -> None:
         ('radius="0.001"', 'radius="thin"', "cable thin: radius is 'thin'"),
         ('radius="0.001"', 'radius="-0.001"', "cable thin: radius is -0.001 m"),
         ("<controller", '<platform name="second" /><controller', "number of <platform> is 2; allowed: 1"),
-        ('Ixx="0.5"', 'Ixx="5"', r"principal moments 0.*, 5\.\d+ kg m\^2.*larger than the other two"),
+        ('Ixx="0.5"', 'Ixx="5"', r"principal moments 0.*larger than the other two"),
         ('Ixx="0.5"', 'Ixx="1_0"', "inertiatensor: Ixx is '1_0'; allowed: a number in kg m"),
         (' version="0.32"', "", "version of the format is missing; allowed: 0.31 or 0.32"),
         ('version="0.32"', 'version="9.99"', "version of the format is '9.99'; allowed: 0.31 or 0.32"),
