@@ -16,7 +16,7 @@ def app_entry() -> None:
         except OSError:
             os.open(os.devnull, os.O_RDONLY if descriptor == 1 else os.O_RDWR)
             if descriptor == 1:  # refuses whatever is written, so that nothing is lost without a word
-                sys.stdout = open(1, "w", encoding="utf-8", closefd=False)
+                sys.stdout = os.fdopen(1, "w", encoding="utf-8", closefd=False)
     debug = "--debug" in sys.argv
     sys.exit(ended(lambda: _command(debug), debug=debug, last=True))
 

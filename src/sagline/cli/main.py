@@ -48,6 +48,7 @@ class Command(TyperCommand):
         """The arguments; one that is empty is told by its name, before a path makes the current folder of it."""
         if not ctx.resilient_parsing:  # which is the shell's, for completion
             given, _, _ = self.make_parser(ctx).parse_args(args=list(args))
+            parameter: Any  # typer has a kind of its own
             for parameter in self.get_params(ctx):
                 value = given.get(parameter.name or "")
                 for text in value if isinstance(value, list | tuple) else (value,):
