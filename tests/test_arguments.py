@@ -91,9 +91,15 @@ def test_the_longest_names_are_names() -> None:
     assert file_path(".", folder=True) == Path(".")
 
 
-@pytest.mark.parametrize("text", ["", "cogiro", "größer 2", "名" * 100, "a-b_c.d/..", "👩\u200d🔬"])
+@pytest.mark.parametrize("text", ["cogiro", "größer 2", "名" * 100, "a-b_c.d/..", "👩\u200d🔬"])
 def test_what_a_name_may_be(text: str) -> None:
     assert label(text, "name") == text
+
+
+@pytest.mark.parametrize(("text", "shown"), [("", "empty"), (" ", "blank"), ("\u3000", "blank")])
+def test_a_name_says_something(text: str, shown: str) -> None:
+    with pytest.raises(InvalidValueError, match=f"name is {shown}; allowed: a text to call it by. Give a name."):
+        label(text, "name")
 
 
 @pytest.mark.parametrize("text", ["a" * 101, "a\nb", "a\tb", "\x1b[31m", "a\0", "\ud800", "\u202egnp", 5, None, b"a"])

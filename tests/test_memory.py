@@ -1,3 +1,4 @@
+import re
 import resource
 import tracemalloc
 from pathlib import Path
@@ -28,9 +29,19 @@ def test_what_does_not_fit_is_said_with_its_size(monkeypatch: pytest.MonkeyPatch
     check_memory("a path", 2.9e9, "Check the units.")
     with pytest.raises(sl.InvalidValueError) as caught:
         check_memory("a path", 6e9, "Check the units.")
-    assert str(caught.value) == (
-        "a path is a request for 6 GB of memory; allowed: <= 3 GB, which are free. Check the units."
-    )
+    assert str(caught.value) == ("the memory for a path is 6 GB; allowed: <= 3 GB, which are free. Check the units.")
+
+
+@pytest.mark.parametrize(("size", "free"), [(24.01e9, 24e9), (24e9 + 1024, 24e9), (5.1e12, 5.0e12), (1e8, 0.0)])
+def test_what_is_asked_and_what_is_free_differ_as_printed(
+    monkeypatch: pytest.MonkeyPatch, size: float, free: float
+) -> None:
+    monkeypatch.setattr(memory, "free_memory", lambda: free)
+    with pytest.raises(sl.InvalidValueError, match="the memory for position is ") as caught:
+        check_memory("position", size, "Give fewer poses.")
+    wanted, left = (float(number) for number in re.findall(r"(\S+) GB", str(caught.value)))
+    assert wanted > left
+    assert wanted == pytest.approx(size / 1e9, rel=1e-2)
 
 
 def test_paths_and_batches_ask_before_they_take(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -167,8 +167,10 @@ def label(value: Any, item: str) -> str:
         The name.
 
     Raises:
-        InvalidValueError: If it is no such text, or longer than 100 letters.
+        InvalidValueError: If it is no such text, empty, or longer than 100 letters.
     """
+    if isinstance(value, str) and not value.strip():
+        raise InvalidValueError(item, "empty" if not value else "blank", "a text to call it by", f"Give a {item}.")
     if not isinstance(value, str) or len(value) > LONGEST_TITLE or value != printable(value):
         allowed = f"one line of printable text, at most {LONGEST_TITLE} letters"
         raise InvalidValueError(item, brief(value), allowed, f"Choose another {item}.")

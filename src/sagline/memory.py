@@ -29,8 +29,9 @@ def check_memory(item: str, size: float, next_step: str) -> None:
         InvalidValueError: If less is free; the message gives both numbers.
     """
     if size > UNASKED and size > (free := free_memory()):
-        wanted, left = f"a request for {size / 1e9:.3g} GB of memory", f"<= {free / 1e9:.3g} GB, which are free"
-        raise InvalidValueError(item, wanted, left, next_step)
+        digits = next((k for k in range(3, 17) if f"{size:.{k}g}" != f"{free:.{k}g}"), 17)  # that tell the two apart
+        wanted, left = f"{size / 1e9:.{digits}g} GB", f"<= {free / 1e9:.{digits}g} GB, which are free"
+        raise InvalidValueError(f"the memory for {item}", wanted, left, next_step)
 
 
 def check_poses(count: int, cable_count: int) -> None:

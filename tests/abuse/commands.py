@@ -43,7 +43,7 @@ def prepare(folder: Path) -> None:
 
 def ended(*words: str) -> Result:
     """A command, run here."""
-    return CliRunner().invoke(app, words)
+    return CliRunner().invoke(app, words, input="\n" * 9)
 
 
 def tree(folder: Path) -> dict[str, str]:

@@ -26,7 +26,24 @@ COMMANDS: tuple[tuple[str, ...], ...] = (
     ("article", "figures", "6-7", "--out", "out"),
     ("convert", "cogiro", "--format", "mjcf", "--out", "out.xml"),
     ("tension", "cogiro", "--out", "out"),
-    ("new", "my_robot.yaml"),
+    (
+        "new",
+        "my_robot.yaml",
+        "--frame",
+        "6 x 4 x 3 m",
+        "--layout",
+        "top",
+        "--cables",
+        "8",
+        "--mass",
+        "30 kg",
+        "--platform",
+        "0.5 x 0.5 x 0.4 m",
+        "--rope",
+        "dyneema-sk78",
+        "--diameter",
+        "4 mm",
+    ),
 )
 INTERRUPTED = "Interrupted. What has been written is whole.\n"
 

@@ -230,7 +230,7 @@ def watched(self, signature):
     return load(self, signature)
 
 dispatcher.Dispatcher.compile = watched
-result = CliRunner().invoke(app, sys.argv[1:])
+result = CliRunner().invoke(app, sys.argv[1:], input="\\n" * 9)
 assert result.exit_code == 0, result.output
 print(*silent, sep="\\n", end="")
 """

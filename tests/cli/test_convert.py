@@ -95,10 +95,26 @@ def test_caspr_files_are_recognized(tmp_path: Path) -> None:
     ],
 )
 def test_bad_input_writes_nothing(wirex: Path, tmp_path: Path, arguments: list[str], message: str) -> None:
-    out = tmp_path / "out.txt"
+    out = tmp_path / ("out.xml" if "mjcf" in arguments else "out.yaml")
     code, stdout, stderr = run(str(wirex), "--out", str(out), *arguments)
     assert (code, stdout, out.exists()) == (2, "", False)
     assert message in " ".join(stderr.split())
+
+
+@pytest.mark.parametrize(
+    ("name", "form", "told"),
+    [
+        ("x.yaml", "mjcf", "x.yaml: is no name for a MuJoCo model. Let it end in .xml"),
+        ("x.txt", "mjcf", "is no name for a MuJoCo model"),
+        ("x.txt", "robot", "x.txt: is no name for a robot file. Let it end in .yaml"),
+        ("x.xml", "robot", "is no name for a robot file"),
+        ("x", "robot", "is no name for a robot file"),
+    ],
+)
+def test_the_ending_is_that_of_the_format(tmp_path: Path, name: str, form: str, told: str) -> None:
+    code, stdout, stderr = run("cogiro", "--out", str(tmp_path / name), "--format", form)
+    assert (code, stdout, list(tmp_path.iterdir())) == (2, "", [])
+    assert told in " ".join(stderr.split())
 
 
 def test_the_source_is_not_overwritten(wirex: Path) -> None:

@@ -149,14 +149,42 @@ def test_a_file_on_stdout_is_to_the_letter_but_for_a_terminal(monkeypatch: pytes
     assert raw.getvalue() == text.encode()
 
 
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["show", ""], "Invalid value for 'ROBOT': it is empty. Give ROBOT."),
+        (["track", "cogiro", ""], "'PATH': it is empty. Give PATH."),
+        (["track", "cogiro", "--out", ""], "'--out': it is empty. Give DIR."),
+        (["article", "--out="], "'--out': it is empty. Give DIR."),
+        (["article", "errata", " "], "it is empty. Give PART."),
+        (["convert", "cogiro", "--out", ""], "'--out': it is empty. Give FILE."),
+        (["convert", "cogiro", "--at", "1", "", "2"], "'--at': it is empty. Give X Y Z."),
+        (["tension", "cogiro", "--variable", "foo"], "'--variable': 'foo' is not one of 'chord'"),
+        (["track", "cogiro", "--model", "Straight"], "Did you mean straight?"),
+        (["track", "cogiro", "--tension", "minimum_norm"], "Did you mean minimum-norm?"),
+        (["tension", "cogiro", "--variable", "frame-end"], "Did you mean frame_end?"),
+    ],
+)
+def test_an_argument_is_told_by_its_name(
+    words: list[str], told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = CliRunner().invoke(app, words)
+    assert (result.exit_code, result.stdout, os.listdir(tmp_path)) == (2, "", [])
+    assert told in result.stderr
+    assert "Value error" not in result.stderr
+    assert result.stderr.count("\n") == 1
+
+
 @needs_full
-@pytest.mark.parametrize("words", [["robots"], ["robots", "--json"], ["--help"], ["convert", "cogiro"]])
+@pytest.mark.parametrize(
+    "words", [["robots"], ["robots", "--json"], ["--help"], ["--version"], ["show", "--help"], ["convert", "cogiro"]]
+)
 def test_a_full_disk_behind_stdout(words: list[str]) -> None:
     with open("/dev/full", "w") as full:
         done = subprocess.run([*COMMAND, *words], stdout=full, stderr=subprocess.PIPE, text=True)
     assert done.returncode == 2
-    assert done.stderr.startswith("Error: standard output")
-    assert "No space left on device" in done.stderr
+    assert done.stderr.startswith("Error: standard output: cannot be written (No space left on device). Give it a file")
     assert done.stderr.count("\n") == 1
 
 
@@ -171,9 +199,11 @@ def test_nobody_reads_any_more(words: list[str]) -> None:
 
 def test_stdout_and_stderr_may_be_closed() -> None:
     line = f'"{sys.executable}" -m sagline.cli'
-    done = subprocess.run(["sh", "-c", f"{line} robots >&-"], stderr=subprocess.PIPE, text=True)
-    assert done.returncode == 2
-    assert done.stderr.startswith("Error: standard output: cannot be written (it is closed).")
+    for words in ("robots", "robots --json", "--help", "--version", "show --help", "convert cogiro"):
+        done = subprocess.run(["sh", "-c", f"{line} {words} >&-"], stderr=subprocess.PIPE, text=True)
+        assert done.returncode == 2
+        assert done.stderr.startswith("Error: standard output: cannot be written (it is closed). Give it a file")
+        assert done.stderr.count("\n") == 1
     done = subprocess.run(["sh", "-c", f"{line} show nothing 2>&-"], stdout=subprocess.PIPE, text=True)
     assert (done.returncode, done.stdout) == (2, "")
 

@@ -27,7 +27,7 @@ def folder(tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch) -> FilePath:
 
 
 def new(*words: str) -> Any:
-    return CliRunner().invoke(app, ["new", *words])
+    return CliRunner().invoke(app, ["new", *words], input="\n" * 9)  # every question takes its default
 
 
 def test_options_become_the_robot(folder: FilePath) -> None:
@@ -88,6 +88,20 @@ def test_a_wrong_answer_writes_nothing(folder: FilePath, options: list[str], tol
     assert result.exit_code == 2
     assert told in " ".join(result.stderr.split())
     assert list(folder.iterdir()) == []
+
+
+def test_the_end_of_the_input_is_no_answer(folder: FilePath) -> None:
+    keys = ("frame", "layout", "cables", "platform", "mass", "rope", "diameter")
+    for count, key in enumerate(keys):
+        result = CliRunner().invoke(app, ["new", "mine.yaml"], input="\n" * count)
+        assert result.exit_code == 2
+        assert f"Error: --{key} is missing: the input ended; allowed: an option, or a line" in result.stderr
+        assert f"Add --{key} " in result.stderr
+        assert (result.stdout, result.stderr.count("\n")) == ("", 1)
+        assert list(folder.iterdir()) == []
+    assert CliRunner().invoke(app, ["new", "mine.yaml"], input="5 x 5 x 3 m\n" + "\n" * 6).exit_code == 0
+    frame = sl.load_robot(folder / "mine.yaml").frame_size
+    np.testing.assert_array_equal(frame, [5.0, 5.0, 3.0])
 
 
 def test_it_replaces_nothing_unasked(folder: FilePath) -> None:

@@ -90,3 +90,16 @@ def test_a_robot_of_too_few_cables_is_refused(folder: FilePath) -> None:
     result = sagline("five.yaml", "--no-figures")
     assert result.exit_code == 2
     assert result.stderr.startswith("Error: ")
+
+
+def test_the_number_of_ways_in_the_help_is_that_of_the_table() -> None:
+    from sagline.cli.commands.poses import tension
+    from sagline.cli.tension import ALONE
+    from sagline.tension.methods import METHODS
+
+    words = " ".join((tension.__doc__ or "").split())
+    assert len(ALONE) == 9
+    assert "in nine ways" in words
+    assert len(METHODS) - len(ALONE) == 3
+    assert "Three ways are left out" in words
+    assert all(name in words for name in METHODS.keys() - ALONE.keys())

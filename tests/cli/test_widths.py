@@ -88,7 +88,7 @@ def printed(words: list[str], width: int | None, monkeypatch: pytest.MonkeyPatch
             patched.setenv("COLUMNS", str(width))
         else:
             patched.setenv("COLUMNS", "1000")
-        result = CliRunner().invoke(app, words)
+        result = CliRunner().invoke(app, words, input="\n" * 9)
     assert result.exit_code in (0, 1), result.output
     return re.sub(r"\x1b\[[0-9;]*m", "", result.output)
 

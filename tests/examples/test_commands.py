@@ -62,7 +62,7 @@ def test_a_printed_command_runs(words: list[str], folder: Path, monkeypatch: pyt
     monkeypatch.setattr("sagline.cli.run._figures", lambda *_: ())
     if words[0] == "new":
         (folder / words[1]).unlink(missing_ok=True)
-    result = CliRunner().invoke(app, words)
+    result = CliRunner().invoke(app, words, input="\n" * 9)  # every question takes its default
     assert result.exit_code == 0, result.output
     assert len(served) == (words[0] == "view")
 

@@ -321,6 +321,6 @@ def test_waypoints_of_other_habits(tmp_path: FilePath, text: str, fragment: str)
     assert "Did you mean" not in str(caught.value)
 
 
-def test_a_rate_too_small_for_a_second_sample_is_both_ends(tmp_path: FilePath) -> None:
-    path = load_path(write(tmp_path, "tour.yaml", "rate: 1e-40\n" + HEAD + TWO))
-    assert path.time.tolist() == [0.0, 1.0]
+def test_a_rate_too_small_for_a_sample_between_is_refused(tmp_path: FilePath) -> None:
+    with pytest.raises(FileError, match="is 1 s, in which there is no sample; allowed: more than the time from one"):
+        load_path(write(tmp_path, "tour.yaml", "rate: 1e-40\n" + HEAD + TWO))

@@ -1,6 +1,7 @@
 import hashlib
 import io
 import os
+import re
 import resource
 import warnings
 from dataclasses import replace
@@ -167,8 +168,8 @@ def test_files_that_are_no_plan(tmp_path: FilePath, saved: FilePath) -> None:
     reasons = {
         tmp_path / "missing.nc": "does not exist. Check its name",
         tmp_path: "is a folder. Give the name of a file in it",
-        half: "is no complete NetCDF file .*truncated.*it may have been cut off",
-        text: "is no complete NetCDF file",
+        half: "is damaged, or was cut off. Run sagline track again",
+        text: "is another kind of file, no run of sagline track",
         other: "is no plan of sagline, it names no sagline_format",
         tmp_path / "pipe.nc": "is a pipe, not a file. Name a file",  # opening it would wait for ever
         FilePath("/dev/zero"): "is a device, not a file. Name a file",
@@ -264,7 +265,7 @@ def test_units_types_shapes_and_meanings_are_those_of_the_layout(old: FilePath) 
         unit: "unstrained_length: units is 'mm'; allowed: 'm'",
         meaning: r"pose_status is 0 \(infeasible\); allowed: 0 \(solved\)",
         single: "unstrained_length: type is float32; allowed: float64",
-        turned: "twist: shape is 41 pose × .* cable; allowed: 41 pose × 6 twist_part|no complete NetCDF",
+        turned: "twist: shape is 41 pose × .* cable; allowed: 41 pose × 6 twist_part|is damaged, or was cut off",
         order: "axis is .*z.*y.*x.*; allowed: x, y, z",
     }
     for edit, reason in edits.items():
@@ -297,7 +298,7 @@ def assert_refused(file: FilePath, reason: str) -> None:
 def test_what_another_program_has_changed_is_told(saved: FilePath) -> None:
     with h5py.File(saved, "r+") as file:
         file["unstrained_length"][0, 0] += 1e-12  # HDF5 cuts off what follows its part
-    assert_refused(saved, "run.nc: is not as it was written: its digest is missing. Take it from its source again")
+    assert_refused(saved, "run.nc: is not as it was written: its digest is missing. Run sagline track again")
     with xr.open_dataset(saved, engine="h5netcdf") as data:
         data.to_netcdf(saved.with_name("copy.nc"), engine="h5netcdf")
     assert_refused(saved.with_name("copy.nc"), "is not as it was written: its digest is missing")
@@ -308,7 +309,7 @@ def test_what_was_added_behind_is_told(saved: FilePath) -> None:
     saved.write_bytes(content + b"\n")
     assert_refused(saved, "is not as it was written: its digest is missing")
     saved.write_bytes(content[:-SEAL] + b"\0" + content[-SEAL:])
-    assert_refused(saved, "is not as it was written: its digest differs")
+    assert_refused(saved, "is not as it was written: it was damaged or edited. Run sagline track again")
 
 
 def test_the_digest_is_that_of_everything_before_it(saved: FilePath) -> None:
@@ -330,7 +331,26 @@ def test_what_could_not_be_read_again_is_not_written(tmp_path: FilePath) -> None
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("name", ["", "x" * 100, "../../evil", "机器人"])
+@pytest.mark.parametrize(
+    ("name", "data", "told"),
+    [
+        ("own_path.yaml", b"waypoints: []", "is a YAML file, no run of sagline track. Give the .nc file"),
+        ("lengths.csv", b"L0,L1", "is a CSV file, no run of sagline track"),
+        ("robot.xml", b"<a/>", "is an XML file, no run of sagline track"),
+        ("run.nc", b"", "is empty, no run of sagline track"),
+        ("run.nc", b"CDF\x01" + bytes(100), "is another kind of file, no run of sagline track"),
+        ("run.nc", b"\x89HDF\r\n\x1a\n" + bytes(100), "is damaged, or was cut off. Run sagline track again"),
+    ],
+)
+def test_another_file_is_told_by_what_it_is(tmp_path: FilePath, name: str, data: bytes, told: str) -> None:
+    (tmp_path / name).write_bytes(data)
+    with pytest.raises(sl.FileError) as caught:
+        sl.load_plan(tmp_path / name)
+    assert told in str(caught.value)
+    assert re.search("HDF|synchronously|signature|NetCDF", str(caught.value)) is None
+
+
+@pytest.mark.parametrize("name", ["x", "x" * 100, "../../evil", "机器人"])
 def test_robots_of_any_name(tmp_path: FilePath, name: str) -> None:
     robot = SUSPENDED.replace(name=name)
     sl.inverse(robot, sl.Pose([0.0, 0.0, 1.5], np.eye(3))).save(tmp_path / "run.nc")

@@ -181,7 +181,9 @@ def test_ways_to_give_the_inertia(inertia: object, expected: object) -> None:
         ({"inertia": {"box": [1, 0, 1]}}, "inertia.box\\[1\\] is 0 m"),
         ({"inertia": ...}, "inertia is missing"),
         ({"tension_min": "2 kN"}, "tension_min\\[0\\] is 2000 N; allowed: <= tension_max\\[0\\], 1000 N"),
-        ({"motion_pattern": 3}, "motion_pattern is 3; allowed: a valid string"),
+        ({"motion_pattern": 3}, 'motion_pattern is 3; allowed: text. Put it in quotes: motion_pattern: "..."'),
+        ({"name": ""}, "name is empty; allowed: a text to call it by"),
+        ({"name": 12}, 'name is 12; allowed: text. Put it in quotes: name: "..."'),
         ({"assumed": {"masss": "x"}}, "assumed: field is 'masss'"),
         ({"test_box": {"low": [0, 0, 0], "high": [1, 1, "1 kg"]}}, "test_box.high\\[2\\] is '1 kg'"),
     ],
@@ -244,7 +246,7 @@ POSITIVE = st.floats(1e-12, 1e12)
     st.lists(NUMBER, min_size=12, max_size=12, unique=True),
     st.lists(POSITIVE, min_size=6, max_size=6),
     st.text(st.characters(codec="utf-8", exclude_categories=("Cc", "Cs", "Cn")), max_size=100).filter(
-        lambda text: text == printable(text)
+        lambda text: text == printable(text) and text.strip() != ""
     ),
     st.booleans(),
 )

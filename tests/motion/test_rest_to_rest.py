@@ -203,7 +203,7 @@ def test_the_slower_of_translation_and_rotation_decides_segment_by_segment() -> 
     assert ratios[[0, 2]] == pytest.approx(1.0, rel=1e-5)
 
 
-@pytest.mark.parametrize(("total", "samples"), [(1.0, 101), (0.996, 101), (1.004, 102), (0.003, 2), (0.29, 30)])
+@pytest.mark.parametrize(("total", "samples"), [(1.0, 101), (0.996, 101), (1.004, 102), (0.013, 3), (0.29, 30)])
 def test_the_grid_ends_exactly_at_the_end(total: float, samples: int) -> None:
     path = quintic_path([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)], durations=total, rate=100.0)
     assert len(path) == samples
@@ -211,6 +211,16 @@ def test_the_grid_ends_exactly_at_the_end(total: float, samples: int) -> None:
     np.testing.assert_array_equal(path.time[:-1], np.arange(samples - 1) / 100.0)
     np.testing.assert_array_equal(path.pose.position[-1], [1.0, 0.0, 0.0])
     np.testing.assert_array_equal(path.twist[-1], 0.0)
+
+
+@pytest.mark.parametrize("durations", [[0.003, 1.0], [1.0, 0.003], [0.01, 1.0], [1.0, 1e-9]])
+@pytest.mark.parametrize("make", [quintic_path, septic_path])
+def test_a_motion_that_no_sample_sees_is_refused(make: Maker, durations: list[float]) -> None:
+    k = int(np.argmin(durations))
+    with pytest.raises(InvalidValueError, match=rf"waypoints\[{k}\] to waypoints\[{k + 1}\] is {durations[k]:g} s, in"):
+        make(CORNERS[:3], durations=durations, rate=100.0)
+    dwell = [CORNERS[0], CORNERS[1], CORNERS[1]] if k else [CORNERS[0], CORNERS[0], CORNERS[1]]
+    assert len(make(dwell, durations=durations, rate=100.0)) >= 101  # a rest has nothing to be seen
 
 
 def test_the_grid_is_one_for_all_segments() -> None:

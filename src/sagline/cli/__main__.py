@@ -14,7 +14,9 @@ def app_entry() -> None:
         try:
             os.fstat(descriptor)
         except OSError:
-            os.open(os.devnull, os.O_RDWR)
+            os.open(os.devnull, os.O_RDONLY if descriptor == 1 else os.O_RDWR)
+            if descriptor == 1:  # refuses whatever is written, so that nothing is lost without a word
+                sys.stdout = os.fdopen(1, "w", encoding="utf-8", closefd=False)
     debug = "--debug" in sys.argv
     sys.exit(ended(lambda: _command(debug), debug=debug, last=True))
 

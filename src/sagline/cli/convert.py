@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from sagline.robot.robot import Robot
 
 LEAST = 1e-6  # m: a distance that is told is no smaller
+ENDINGS = {Format.ROBOT: (".yaml", ".yml"), Format.MJCF: (".xml", ".mjcf")}
 
 
 def convert(
@@ -45,6 +46,9 @@ def convert(
     """
     if out is not None and Path(source).exists() and out.resolve() == Path(source).resolve():
         raise FileError(out, "is the file to convert", "Name another file with --out.")
+    if out is not None and out.suffix.lower() not in ENDINGS[form]:
+        kind = "a robot file" if form is Format.ROBOT else "a MuJoCo model"
+        raise FileError(out, f"is no name for {kind}", f"Let it end in {ENDINGS[form][0]}, or choose another --format.")
     if at is not None and form is Format.ROBOT:
         raise InvalidValueError(
             "--at", "given for a robot file", "--format mjcf", "A robot file holds no pose: leave it out."

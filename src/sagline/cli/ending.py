@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Callable
 from contextlib import suppress
@@ -100,7 +101,11 @@ def _message(error: BaseException) -> tuple[str, str, int]:
         reason = f" ({error})" if str(error) else ""
         return HEAD, f"there is not enough memory{reason}. Take fewer poses or samples at a time.", BAD_INPUT
     if isinstance(error, OSError):
-        what = error.filename if error.filename is not None else "standard output"
+        if error.filename is None:
+            from sagline.cli.terminal import unwritable
+
+            return "Error: ", str(unwritable(error)), BAD_INPUT
+        what = error.filename
         step = "Check its name, its permissions and the space on the disk."
         return HEAD, f"{what}: {error.strerror or error}. {step}", BAD_INPUT
     what = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
@@ -110,7 +115,12 @@ def _message(error: BaseException) -> tuple[str, str, int]:
 
 
 def _usage(error: BaseException) -> str:
-    text = str(error.format_message()).strip()  # type: ignore[attr-defined]
+    text = str(error.format_message()).strip().replace(" Value error, ", " ", 1)  # type: ignore[attr-defined]
+    if found := re.search(r"'([^']*)' is not one of (.*)", text):
+        from sagline.errors import nearest
+
+        near = nearest(found[1].replace("_", "-"), re.findall(r"'([^']*)'", found[2]))
+        text += f" Did you mean {near}?" if near else ""
     text = text if text.endswith((".", "?")) else f"{text}."
     context = getattr(error, "ctx", None)
     command = "sagline" if context is None else context.command_path

@@ -34,7 +34,7 @@ Start here:
     sagline examples --out DIR           files to try the commands with
     sagline track cogiro own_path.yaml   a robot along a path of your own
     sagline forward cogiro lengths.csv   from measured lengths to poses
-    sagline tension cogiro               every way of sharing a load
+    sagline tension cogiro               ways of sharing a load compared
     sagline article                      the article redone, as one page
     sagline view cogiro                  drag a platform in the browser
     sagline new my_robot.yaml            a robot of your own, by questions
@@ -42,7 +42,19 @@ Start here:
 
 
 class Command(TyperCommand):
-    """A subcommand whose help names its arguments as its examples do, without braces and types around them."""
+    """A subcommand that takes no empty text, and whose help names its arguments as its examples do, without braces."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """The arguments; one that is empty is told by its name, before a path makes the current folder of it."""
+        if not ctx.resilient_parsing:  # which is the shell's, for completion
+            given, _, _ = self.make_parser(ctx).parse_args(args=list(args))
+            parameter: Any  # typer has a kind of its own
+            for parameter in self.get_params(ctx):
+                value = given.get(parameter.name or "")
+                for text in value if isinstance(value, list | tuple) else (value,):
+                    if isinstance(text, str) and not text.strip():
+                        raise typer.BadParameter(f"it is empty. Give {parameter.metavar}.", ctx, parameter)
+        return super().parse_args(ctx, args)
 
     def get_help(self, ctx: Any) -> str:
         """The help."""

@@ -64,11 +64,12 @@ def new(file: Path, answers: dict[str, str | None], *, force: bool) -> Robot:
 
     Args:
         file: The robot file to be, my_robot.yaml.
-        answers: What the options say; what is None is asked on a terminal, and takes its default elsewhere.
+        answers: What the options say; what is None is asked; an empty line takes the default.
         force: Whether a file that exists is replaced.
 
     Raises:
-        SaglineError: If an answer is wrong, or the file exists or cannot be written; nothing has been written then.
+        SaglineError: If an answer is wrong or missing, or the file exists or cannot be written; nothing has been
+            written then.
     """
     _refuse_existing(file, force=force)
     design, said = _answered(file.stem, answers)
@@ -100,13 +101,13 @@ def _refuse_existing(file: Path, *, force: bool) -> None:
 
 
 def _answered(name: str, answers: dict[str, str | None]) -> tuple[Design, dict[str, str]]:
-    """The design and what it was made from; a wrong answer to a question is told, and the question asked again."""
-    asks = sys.stdin.isatty() and sys.stderr.isatty()
+    """The design and what it was made from; on a terminal a wrong answer is told, and the question asked again."""
+    asks = sys.stdin is not None and sys.stdin.isatty() and sys.stderr.isatty()
     said: dict[str, str] = {}
     for question in QUESTIONS:
         given = answers.get(question.key)
         while question.key not in said:
-            text = given if given is not None else _asked(question) if asks else question.default
+            text = given if given is not None else _asked(question) if asks else _read(question)
             try:
                 design = _design(name, {**said, question.key: text})
             except InvalidValueError as error:
@@ -120,6 +121,17 @@ def _answered(name: str, answers: dict[str, str | None]) -> tuple[Design, dict[s
 
 def _asked(question: Question) -> str:
     return str(typer.prompt(question.text, default=question.default, err=True))
+
+
+def _read(question: Question) -> str:
+    """The answer of a program or file on the other end: a line, an empty one for the default."""
+    line = "" if sys.stdin is None or sys.stdin.isatty() else sys.stdin.readline()
+    if line:
+        return line.strip() or question.default
+    option = f"--{question.key}"
+    allowed = f'an option, or a line that answers "{question.text}"'
+    step = f'Add {option} "{question.default}", for instance.'
+    raise InvalidValueError(option, "missing: the input ended", allowed, step)
 
 
 def _design(name: str, said: dict[str, str]) -> Design:

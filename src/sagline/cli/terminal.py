@@ -166,8 +166,15 @@ def _refused() -> Iterator[None]:
     except BrokenPipeError:
         raise
     except OSError as error:
-        step = "Give it a file with space, a pipe or a terminal."
-        raise FileError("standard output", f"cannot be written ({error.strerror or error})", step) from None
+        raise unwritable(error) from None
+
+
+def unwritable(error: OSError) -> FileError:
+    """What to say where stdout takes nothing."""
+    reason = "it is closed" if error.errno == errno.EBADF else error.strerror or error
+    return FileError(
+        "standard output", f"cannot be written ({reason})", "Give it a file with space, a pipe or a terminal."
+    )
 
 
 def _encoding() -> str:

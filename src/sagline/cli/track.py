@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from sagline.cli.choices import Model, Tension, Variable
 from sagline.cli.entries import FORWARD, needed_for
 from sagline.cli.lengths import plan_text
@@ -12,6 +14,7 @@ from sagline.cli.results import figure_files, tell, write_figures, write_plans
 from sagline.cli.study import Run, run_along, run_name
 from sagline.cli.terminal import working
 from sagline.cli.values import loaded, wrench_of
+from sagline.errors import FileError
 from sagline.files.path_file import load_path
 from sagline.files.robot_file import load_robot
 from sagline.files.whole import check_files, write_text
@@ -21,6 +24,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from sagline.motion.path import Path as MotionPath
+    from sagline.robot.robot import Robot
+
+TOO_FAR = 100.0  # times the robot's size, as of measured lengths
 FIGURES = ("path", "velocity", "cables", "error")
 
 
@@ -46,6 +53,8 @@ def track(
     load = wrench_of(wrench)
     machine = loaded(load_robot(robot), payload)
     way = article_path() if path is None else load_path(path)
+    if path is not None:
+        _check_unit(path, way, machine)
     cable = model.build()
     name = run_name(machine, cable)
     drawn = [f"{name}-{figure}" for figure in FIGURES] if figures else []
@@ -61,6 +70,18 @@ def track(
         if figures:
             files += write_figures(dict(zip(drawn, _figures(run), strict=True)), folder)
     return tell([run], files, folder, as_json=as_json)
+
+
+def _check_unit(file: Path, way: MotionPath, robot: Robot) -> None:
+    """Refuse a path so far from the robot that it must be in another unit."""
+    size = float(np.linalg.norm(np.ptp(robot.frame_anchors, axis=0)))
+    away = np.linalg.norm(way.pose.position - robot.frame_anchors.mean(axis=0), axis=1)
+    k = int(np.argmax(away))
+    if away[k] > TOO_FAR * size:
+        reason = (
+            f"leads {away[k]:.4g} m away from {robot.name}, whose frame measures {size:.3g} m, at {way.time[k]:g} s"
+        )
+        raise FileError(file, reason, "If these are millimeters, write the unit: x [mm] in CSV, 1500 mm in YAML.")
 
 
 def _figures(run: Run) -> tuple[Figure | Axes, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from sagline.errors import FileError
 from sagline.files.kinds import kind_of
@@ -12,6 +12,13 @@ from sagline.files.seal import Seal, seal_of
 if TYPE_CHECKING:
     from xarray import Dataset
 
+AGAIN: Final = "Run sagline track again, or take the file from where it came."
+_BEGIN: Final = b"\x89HDF\r\n\x1a\n"  # of every file in NetCDF-4
+_KINDS: Final = {
+    **dict.fromkeys((".yaml", ".yml"), "a YAML file"),
+    **dict.fromkeys((".xml", ".wcrfx"), "an XML file"),
+    **{f".{kind}": f"a {kind.upper()} file" for kind in ("csv", "json", "png", "svg")},
+}
 INFLATION = 1000  # times the size of a file that its numbers may take in memory: nobody packs them so well
 
 
@@ -43,7 +50,7 @@ def _seal(path: Path) -> Seal:
         reason = getattr(error, "strerror", None) or error
         raise FileError(path, f"cannot be read ({reason})", "Check its name and its permissions.") from None
     if found is Seal.BROKEN:
-        raise FileError(path, "is not as it was written: its digest differs", "Take it from its source again.")
+        raise FileError(path, "is not as it was written: it was damaged or edited", AGAIN)
     return found
 
 
@@ -60,7 +67,14 @@ def _opened(path: Path) -> Dataset:
                 raise ValueError(f"{size} bytes that say to hold {data.nbytes:.2g}")
             return data.load()
     except Exception as error:  # h5py, h5netcdf and xarray have no error of their own for a damaged file: any will do
-        reason = next(iter(str(error).splitlines()), type(error).__name__)
-        raise FileError(
-            path, f"is no complete NetCDF file ({reason})", "Write it again; it may have been cut off."
-        ) from None
+        raise FileError(path, *_cause(path)) from error
+
+
+def _cause(path: Path) -> tuple[str, str]:
+    """Why a file is none of ours, and what to do; what the libraries say of it is for those who know its format."""
+    with path.open("rb") as file:
+        begin = file.read(len(_BEGIN))
+    if begin == _BEGIN:
+        return "is damaged, or was cut off", AGAIN
+    kind = _KINDS.get(path.suffix.lower(), "empty" if not begin else "another kind of file")
+    return f"is {kind}, no run of sagline track", "Give the .nc file that sagline track wrote."

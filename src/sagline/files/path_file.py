@@ -11,7 +11,7 @@ import numpy as np
 from sagline.arguments import file_path
 from sagline.arrays import Array, checked
 from sagline.errors import FileError, InvalidValueError
-from sagline.files.path_table import QUATERNION_TOLERANCE, path_from_table
+from sagline.files.path_table import FARTHEST, QUATERNION_TOLERANCE, path_from_table
 from sagline.files.quantity import in_si
 from sagline.files.schema import Entry, validated
 from sagline.files.table import TABLE_LIMIT
@@ -29,6 +29,7 @@ TIMING_UNITS = {
     "angular_speed": "rad/s",
     "angular_acceleration": "rad/s^2",
 }
+UNITS_STEP = "Check its unit: numbers are meters, millimeters are written as 1500 mm."
 PROFILES = {"quintic": quintic_path, "septic": septic_path}
 
 
@@ -114,6 +115,8 @@ def _path_from_yaml(path: FilePath, text: str) -> Path:
 
 def _pose(waypoint: _Waypoint, item: str) -> Pose:
     position = _numbers(waypoint.position, 3, "m", f"{item}.position")
+    if (far := float(np.abs(position).max())) > FARTHEST:
+        raise InvalidValueError(f"{item}.position", f"{far:g} m away", f"up to {FARTHEST:g} m", UNITS_STEP)
     if waypoint.quaternion is None:
         euler = waypoint.euler or _Euler()
         angles = [in_si(angle, "rad", f"{item}.euler.{name}") for name, angle in euler]

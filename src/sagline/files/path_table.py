@@ -16,6 +16,7 @@ PLACE = ("time", "x", "y", "z")
 EULER = ("alpha", "beta", "gamma")
 QUATERNION = ("qx", "qy", "qz", "qw")
 UNITS = dict(zip(PLACE + EULER + QUATERNION, ("s", "m", "m", "m", "rad", "rad", "rad", "", "", "", ""), strict=True))
+FARTHEST = 1e6  # m; beyond all machines
 _LEAST_STEP = 1e-12  # s; over less, differences of positions tell no velocity
 QUATERNION_TOLERANCE = 1e-3  # of a length 1, printed with three decimals; more is a mistake
 
@@ -41,6 +42,9 @@ def path_from_table(path: FilePath, text: str) -> Path:
     table.refuse(late, "time", time, "s", "a time after that of the row before")
     if time.size < 2:
         raise FileError(path, f"number of samples {time.size}; allowed: at least two", "Add the samples of the path.")
+    for name in PLACE[1:]:
+        values = table.columns[name]
+        table.refuse(np.abs(values) > FARTHEST, name, values, "m", f"up to {FARTHEST:g} m; millimeters are {name} [mm]")
     position = np.stack(place, axis=-1)
     if "alpha" in table.columns:
         return path_from_samples(time, Pose.from_euler(position, *(table.columns[name] for name in EULER)))

@@ -21,7 +21,7 @@ from sagline.cables.model import CableModel, CableState
 from sagline.cables.parabolic import Parabolic
 from sagline.cables.straight import Straight
 from sagline.errors import FileError, InvalidValueError, SaglineWarning, printable
-from sagline.files.dataset import read_dataset
+from sagline.files.dataset import AGAIN, read_dataset
 from sagline.files.plan_checks import check_plan
 from sagline.files.plan_layout import JERK, MOTION, PARTS, PROOF, QUANTITIES, TIME, Quantity
 from sagline.files.robot_file import dump_robot, parse_robot
@@ -187,7 +187,7 @@ def _check_format(path: FilePath, attributes: Mapping[str, Any], found_seal: Sea
         text = f"{path} is from before plans carried a digest: damage to it need not show. Save it again to have one."
         warnings.warn(text, SaglineWarning, stacklevel=3)
     elif found_seal is Seal.MISSING:
-        raise FileError(path, "is not as it was written: its digest is missing", "Take it from its source again.")
+        raise FileError(path, "is not as it was written: its digest is missing", AGAIN)
 
 
 def _plan(path: FilePath, data: Dataset, robot: Robot) -> Plan:

@@ -62,6 +62,8 @@ def _explained(mistake: ErrorDetails, schema: type[Entry]) -> tuple[str, str]:
         case "model_type":
             known = list(_at(schema, where).model_fields)
             return f"{key} is {reprlib.repr(mistake['input'])}; allowed: keys {', '.join(known)}", "Give it as keys."
+        case "string_type":
+            return f"{key} is {reprlib.repr(mistake['input'])}; allowed: text", f'Put it in quotes: {key}: "..."'
         case _:
             wanted = mistake["msg"].removeprefix("Input should be ")
             return f"{key} is {reprlib.repr(mistake['input'])}; allowed: {wanted}", f"Correct {key}."

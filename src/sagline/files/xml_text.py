@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import re
 from pathlib import Path
 from typing import Final, NoReturn
@@ -17,6 +18,9 @@ from sagline.files.text import read_bytes
 
 _LIMIT: Final = 4.0  # MB; the largest of CASPR's files has 0.1
 _ENCODING = re.compile(r"utf-?8|utf-?16|us-ascii|ascii|latin-?1|iso-8859-1?[0-9]|(windows-|cp)125[0-8]", re.IGNORECASE)
+
+_DECLARED = re.compile(rb"""\s*<\?xml[^>]*?encoding\s*=\s*["']([A-Za-z0-9._-]+)""")
+_CUT_OFF: Final = (3, 4, 5, 6, 20)  # expat: no element found, a token, character or section that does not end
 
 
 def read_xml(path: Path) -> Element:
@@ -44,9 +48,7 @@ def read_xml(path: Path) -> Element:
     try:
         parser.Parse(data, True)
     except (expat.ExpatError, LookupError, ValueError) as error:  # the last two: an encoding that is none of this file
-        raise FileError(
-            path, f"is no complete XML ({error})", "Check that this is the file you mean; it may have been cut off."
-        ) from None
+        raise FileError(path, *_cause(error, data)) from None
     except _RefusedError as error:
         raise FileError(path, *error.args) from None
     return builder.close()
@@ -115,6 +117,32 @@ def only_child(parent: Element, tag: str, item: str) -> Element:
     return found[0]
 
 
+def _cause(error: Exception, data: bytes) -> tuple[str, str]:
+    """What is wrong with bytes that expat does not take, and what to do."""
+    if not data.strip():
+        return "is empty", "Write it again; it may have been cut off."
+    declared = _DECLARED.match(data)
+    encoding = "utf-8" if declared is None else declared[1].decode()
+    if data[:2] not in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
+        if not data.removeprefix(codecs.BOM_UTF8).lstrip().startswith(b"<"):
+            return "is no XML file", "Check that this is the file you mean."
+        if not _decodes(data, encoding):
+            return f"is not {encoding} text, as an XML file that says {'so' if declared else 'nothing'} must be", (
+                "Save it as UTF-8."
+            )
+    if getattr(error, "code", None) in _CUT_OFF:
+        return f"is no complete XML ({error})", "Check that this is the file you mean; it may have been cut off."
+    return f"is no complete XML ({error})", "Check that this is the file you mean, and correct it there."
+
+
+def _decodes(data: bytes, encoding: str) -> bool:
+    """Whether bytes that begin with one-byte letters are text in this encoding."""
+    try:
+        return not encoding.lower().startswith(("utf-16", "utf16")) and bool(data.decode(encoding))
+    except (LookupError, UnicodeError):
+        return False
+
+
 class _RefusedError(Exception):
     """Stops the parser: what is wrong, and the next step."""
 
@@ -125,4 +153,4 @@ def _refuse_entity(name: str, *_: object) -> NoReturn:
 
 def _check_encoding(version: str, encoding: str | None, standalone: int) -> None:
     if encoding is not None and not _ENCODING.fullmatch(encoding):
-        raise _RefusedError(f"is no complete XML (unknown encoding {encoding})", "Save it as UTF-8.")
+        raise _RefusedError(f"is in an unknown encoding, {encoding}", "Save it as UTF-8.")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Hashable
 from itertools import chain
 from pathlib import Path
@@ -42,9 +43,7 @@ def parse_mapping(text: str, origin: Path | str) -> dict[Any, Any]:
     try:
         data = yaml.load(text, Loader=_PlainLoader)
     except yaml.MarkedYAMLError as error:
-        place = "" if error.problem_mark is None else f"line {error.problem_mark.line + 1}: "
-        reason = f"is not complete YAML ({place}{error.problem or error.context})"
-        raise FileError(origin, reason, "Correct it; it may have been cut off.") from None
+        raise FileError(origin, *_cause(error, text)) from None
     except (yaml.YAMLError, RecursionError, ValueError, OverflowError) as error:  # the last two: \UFFFFFFFF
         raise FileError(
             origin, f"is not YAML as read here ({_reason(error, text)})", "Check that this is the file you mean."
@@ -54,6 +53,27 @@ def parse_mapping(text: str, origin: Path | str) -> dict[Any, Any]:
     if not isinstance(data, dict):
         raise FileError(origin, "has no keys at its top level", "Check that this is the file you mean.")
     return data
+
+
+def _cause(error: yaml.MarkedYAMLError, text: str) -> tuple[str, str]:
+    """What is wrong with a text that YAML does not take, and what to do: PyYAML's own words where they are plain."""
+    mark, problem = error.problem_mark or error.context_mark, str(error.problem or error.context)
+    index, place = (len(text), "") if mark is None else (mark.index, f"line {mark.line + 1}: ")
+    if isinstance(error, yaml.scanner.ScannerError | yaml.parser.ParserError):
+        line = text.splitlines()[mark.line] if mark is not None and mark.line < len(text.splitlines()) else ""
+        if "\t" in line[: len(line) - len(line.lstrip())] or text[index : index + 1] == "\t":
+            return f"is not YAML ({place}a tab stands where blanks must)", "Indent by blanks, not by tabs."
+        if not text[index:].strip():
+            return f"is not complete YAML ({place}{problem})", "Correct its end; it may have been cut off."
+        return f"is not YAML ({place}{problem})", "Correct this line, or the indentation and the quotes before it."
+    if tag := re.search(r"constructor for the tag '(?:tag:yaml\.org,2002:)?(.*)'", problem):
+        return f"{place}the tag {tag[1]} stands before a value; tags are not read", "Write the value without it."
+    if "unhashable" in problem:
+        return f"{place}a key is a list or a mapping; allowed: a word", "Give it a word as its key."
+    if "another document" in problem:
+        return f"{place}a second document begins, at ---; allowed: one", "Keep one of them."
+    step = "Remove one of the two." if "given twice" in problem else "Correct this line."
+    return f"{place}{problem.removeprefix('found ')}", step
 
 
 def _reason(error: Exception, text: str) -> str:

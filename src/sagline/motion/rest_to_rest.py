@@ -8,7 +8,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array, checked, number
+from sagline.arrays import Array, Flags, checked, number
 from sagline.errors import InvalidValueError
 from sagline.memory import check_memory
 from sagline.motion.path import Path
@@ -58,7 +58,8 @@ def quintic_path(
 
     Raises:
         InvalidValueError: If a value is out of range, both or neither of durations and limits are given, a segment
-            moves or turns without a limit on it, or two consecutive waypoints are the same while limits are given.
+            moves or turns without a limit on it or has no sample between its ends, or two consecutive waypoints are
+            the same while limits are given.
 
     Source:
         docs/model.md, section 7.
@@ -139,7 +140,9 @@ def _rest_to_rest(
         )
     times = segments.durations_within(*limits) if durations is None else _checked_durations(durations, len(segments))
     ends = np.cumsum(times)
-    return segments.sampled(_time_grid(float(ends[-1]), rate), ends, times)
+    grid = _time_grid(float(ends[-1]), rate)
+    _check_sampled(grid, ends, times, segments.moves)
+    return segments.sampled(grid, ends, times)
 
 
 def _as_pose(waypoints: Pose | Sequence[Pose] | ArrayLike) -> Pose:
@@ -168,6 +171,20 @@ def _checked_durations(durations: ArrayLike, segments: int) -> Array:
             "Give one duration from each waypoint to the next.",
         )
     return np.broadcast_to(given, (segments,))
+
+
+def _check_sampled(grid: Array, ends: Array, times: Array, moves: Flags) -> None:
+    """Refuse a segment that moves without a sample between its ends: no answer would know of its motion."""
+    rounding = 1e-9 * ends[-1]
+    inside = np.searchsorted(grid, ends - rounding) - np.searchsorted(grid, ends - times + rounding)
+    if (unseen := np.flatnonzero((inside < 1) & moves)).size:
+        k = int(unseen[0])
+        raise InvalidValueError(
+            f"the time from waypoints[{k}] to waypoints[{k + 1}]",
+            f"{times[k]:.4g} s, in which there is no sample",
+            "more than the time from one sample to the next",
+            "Check the units of durations, limits and rate; or give a higher rate.",
+        )
 
 
 def _time_grid(total: float, rate: float) -> Array:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sagline.arrays import Array, locked, number
+from sagline.arrays import Array, Flags, locked, number
 from sagline.errors import InvalidValueError
 from sagline.motion.path import Path
 from sagline.motion.profile import Profile
@@ -64,6 +64,12 @@ class Segments:
     def __len__(self) -> int:
         """Number of segments S."""
         return len(self.start)
+
+    @property
+    def moves(self) -> Flags:
+        """Whether each segment moves or turns, shape (S,)."""
+        moves: Flags = np.linalg.norm(np.hstack((self.move, self.turn)), axis=1) > STILL
+        return moves
 
     def durations_within(
         self,

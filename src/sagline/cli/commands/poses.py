@@ -61,7 +61,10 @@ def tension(
     figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the polygon, as PNG and SVG.")] = True,
     as_json: JsonOption = False,
 ) -> int:
-    """Share the load of one pose in every way, and draw the polygon of feasible tensions with all of them in it.
+    """Share the load of one pose in nine ways, and draw the polygon of feasible tensions with all of them in it.
+
+    Three ways are left out: at one pose, without targets, Closest and QuadraticProgram choose what MinimumNorm
+    does; PolygonWalk, by its optimum, what LowestSum, MinimumNorm or Centroid does.
 
     For example:
 

@@ -54,6 +54,8 @@ def new(
 ) -> int:
     r"""Make a robot file of your own: asks for what no option says, checks it, explains it.
 
+    Without a terminal, answers are the lines of the input; an empty line takes the default.
+
     For example:
 
         sagline new my_robot.yaml
