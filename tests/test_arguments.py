@@ -91,7 +91,7 @@ def test_the_longest_names_are_names() -> None:
     assert file_path(".", folder=True) == Path(".")
 
 
-@pytest.mark.parametrize("text", ["cogiro", "größer 2", "名" * 100, "a-b_c.d/..", "👩\u200d🔬"])
+@pytest.mark.parametrize("text", ["cogiro", "größer 2", "名" * 100, "a-b_c.d/.."])
 def test_what_a_name_may_be(text: str) -> None:
     assert label(text, "name") == text
 

@@ -26,6 +26,7 @@ SHARE = 250  # of all, in make test
 SLOWEST = 2.0  # s, of the processor: other tests run beside
 START = 1.5  # s, that a process takes to load
 LARGEST = 500 * 1024  # kB
+ANSWERS = "\n" * 40  # to the questions of `new`: what it suggests
 
 
 @pytest.fixture(scope="module")
@@ -96,7 +97,7 @@ class Bench:
     def faults(self, case: Case) -> list[str]:
         """What is wrong with how a command line ends."""
         start = time.process_time()
-        result = CliRunner().invoke(app, case.words)
+        result = CliRunner().invoke(app, case.words, input=ANSWERS)
         seconds = time.process_time() - start
         written = snapshot(self.top) != self.before
         found = [f"{seconds:.1f} s"] if seconds > SLOWEST else []
@@ -159,7 +160,7 @@ def test_every_command_and_option_is_tried(stocked: Path, tmp_path: Path) -> Non
     try:
         for case in lines:  # as they stand they work: what is refused above is refused for what was put in
             assert bench.faults(case) == []
-            assert CliRunner().invoke(app, case.words).exit_code == 0, case.name
+            assert CliRunner().invoke(app, case.words, input=ANSWERS).exit_code == 0, case.name
             bench.renew()
     finally:
         os.chdir(here)
