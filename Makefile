@@ -9,7 +9,7 @@ FOUND = $(shell for p in python3 python3.13 python3.12 python3.11 python3.14; do
 PYTHON ?= $(FOUND)
 
 .DEFAULT_GOAL := help
-.PHONY: help env run article test check format bench soak docs clean
+.PHONY: help env run article test coverage check format bench soak docs clean
 
 help: ## show this list
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{ printf "  make %-8s %s\n", $$1, $$2 }'
@@ -30,7 +30,10 @@ run: env ## the main job: the article's test, its table, runs and figures in OUT
 article: env ## the article's figures, tables and errata redone, as one page in OUT
 	$(BIN)/sagline article --out $(OUT)
 
-test: env check ## all checks, then the whole test suite with its coverage
+test: env check ## all checks, then the whole test suite
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile
+
+coverage: env ## the test suite again, and which lines it runs
 	$(BIN)/python -m pytest --cov --numprocesses auto --dist loadfile
 
 check: env ## style, types and the direction of imports

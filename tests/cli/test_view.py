@@ -46,11 +46,11 @@ def test_it_serves_a_page_and_stops_at_ctrl_c_mid_drag() -> None:
         client = Client(port)
         client.grab()
         client.drag([0.5, 0.0, 2.0])
-        assert any("Feasible" in str(message) for message in client.heard(20.0))
+        assert any("Feasible" in str(message) for message in client.heard(120.0))
         client.drag([0.6, 0.0, 2.0])
         client.send(b"\xff nonsense")
         process.send_signal(signal.SIGINT)
-        said, complained = process.communicate(timeout=20.0)
+        said, complained = process.communicate(timeout=120.0)
         assert process.returncode == 0
         assert "Traceback" not in said + complained
         assert "Stopped." in complained

@@ -142,9 +142,9 @@ def test_a_film_shows_the_run_and_leaves_the_scene_as_it_was(
     run = Run.of(sl.inverse(robot, sl.quintic_path(ends, durations=[2.0], rate=20)))
     with opened(browser, robot, run) as (page, viewer):
         page.get_by_text("Take away").click()
-        with page.expect_download() as download:
+        with page.expect_download(timeout=240_000) as download:
             page.get_by_role("button", name="Film of the run (GIF)").click()
-            page.get_by_text("Picture 1 of 3").wait_for()
+            page.get_by_text("Picture 1 of 3").wait_for(timeout=240_000)
             assert page.get_by_label("Follow the run").is_checked()
         download.value.save_as(tmp_path / "film.gif")
         page.get_by_text("Picture 3 of 3").wait_for(state="detached")
