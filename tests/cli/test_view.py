@@ -89,8 +89,8 @@ def test_a_run_from_before_digests_is_played_with_a_note(
     told = (
         f"Note: {file} is from before plans carried a digest: damage to it need not show. Save it again to have one.\n"
     )
-    assert capsys.readouterr().err == told
-    assert CliRunner().invoke(app, ["lengths", str(file)]).stderr == told
+    assert capsys.readouterr().err.startswith(told)  # what is compiled may be told as well
+    assert CliRunner().invoke(app, ["lengths", str(file)]).stderr.startswith(told)
 
 
 @pytest.mark.parametrize("wrong", [["nothing-like-it"], ["cogiro", "missing.nc"], ["cogiro", "--port", "99999"]])
