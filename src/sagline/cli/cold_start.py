@@ -21,6 +21,7 @@ from sagline.cli.compiling import Stage, heard
 from sagline.cli.entries import ENTRIES
 
 PREFIX = "compiling-"
+REMOVE = "import shutil, sys; shutil.rmtree(sys.argv[1], ignore_errors=True)"
 
 
 def cold(names: Sequence[str]) -> list[str]:
@@ -172,7 +173,8 @@ def _end_with_parent() -> None:
 
     os.read(0, 1)  # nothing is ever written: it returns when the other process has ended
     if FOLDER.parent.name.startswith(PREFIX):
-        shutil.rmtree(FOLDER.parent, ignore_errors=True)
+        # another program in this process: nothing compiles on and writes a file behind what is removed
+        os.execv(sys.executable, [sys.executable, "-c", REMOVE, str(FOLDER.parent)])
     os._exit(1)
 
 

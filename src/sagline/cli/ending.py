@@ -104,7 +104,7 @@ def _message(error: BaseException) -> tuple[str, str, int]:
         if error.filename is None:
             from sagline.cli.terminal import unwritable
 
-            return "Error: ", str(unwritable(error)), BAD_INPUT
+            return HEAD, str(unwritable(error)), BAD_INPUT
         what = error.filename
         step = "Check its name, its permissions and the space on the disk."
         return HEAD, f"{what}: {error.strerror or error}. {step}", BAD_INPUT

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FORMS = ("png", "svg")  # of a figure
-WIDEN = " Move the path, or widen the tension limits."
 MOST_GAPS = 5  # told in full
 WIDEN = " Move the path, or widen the tension limits."
 

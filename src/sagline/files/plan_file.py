@@ -20,7 +20,7 @@ from sagline.cables.empirical import Empirical
 from sagline.cables.model import CableModel, CableState
 from sagline.cables.parabolic import Parabolic
 from sagline.cables.straight import Straight
-from sagline.errors import FileError, InvalidValueError, SaglineWarning, printable
+from sagline.errors import FileError, InvalidValueError, SaglineWarning
 from sagline.files.dataset import AGAIN, read_dataset
 from sagline.files.plan_checks import check_plan
 from sagline.files.plan_layout import JERK, MOTION, PARTS, PROOF, QUANTITIES, TIME, Quantity
@@ -81,7 +81,7 @@ def load_plan(file: os.PathLike[str] | str) -> Plan:
         file: The NetCDF file.
 
     Returns:
-        The plan; its proofs, `farkas` and `needed`, are None in a file that was written before files kept them.
+        The plan; its proofs, from `farkas` on, are None in a file that was written before files kept them.
 
     Raises:
         FileError: If the file is missing, cut off, no NetCDF file, no plan, of a newer format, or not as it was
@@ -132,7 +132,7 @@ def _dataset(plan: Plan) -> Dataset:
 
 def _attributes(plan: Plan) -> dict[str, Any]:
     return {
-        "title": f"Cable lengths and tensions of {printable(plan.state.one_robot.name)}",
+        "title": f"Cable lengths and tensions of {plan.state.one_robot.name}",
         "source": f"sagline {version('sagline')}",
         "sagline_format": FORMAT,
         **_written("model", plan.state.cables.model, MODELS),
