@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from sagline.robot.pose import Pose
     from sagline.robot.pose_box import PoseBox
     from sagline.robot.robot import Robot
+    from sagline.robot.winch import Winch
     from sagline.statics.balance import ArticleBalance, article_balance, structure_matrix
     from sagline.statics.stiffness import Modes, Stiffness, modes, stiffness
     from sagline.statics.wrench import inertial_wrench
@@ -123,6 +124,7 @@ __all__ = [
     "Straight",
     "TensionMethod",
     "TensionPolygon",
+    "Winch",
     "__version__",
     "article_balance",
     "article_path",
@@ -211,6 +213,7 @@ _HOMES = {
     "Straight": "sagline.cables.straight",
     "TensionMethod": "sagline.tension.method",
     "TensionPolygon": "sagline.tension.polygon",
+    "Winch": "sagline.robot.winch",
     "article_balance": "sagline.statics.balance",
     "article_path": "sagline.motion.planar",
     "capacity_margin": "sagline.tension.margin",

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import instance
+from sagline.arguments import instance, optional
 from sagline.arrays import SMALLEST, Array, checked, exactly, locked
 from sagline.cables.cable import Cable
 from sagline.errors import InvalidValueError
 from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.unit import unit
+from sagline.robot.winch import Winch
 
 _SYMMETRY = 1e-9  # largest difference of mirrored elements, relative to the largest element
 _ROUNDED = 0.01  # what moments printed with three digits may lack: a thin plate's largest is the sum of the others
@@ -84,6 +85,23 @@ def cables(given: Cable, count: int) -> Cable:
             "Give the cable's mass per length; to leave its weight out, compute with the model Elastic or Straight.",
         )
     return Cable(density, stiffness)
+
+
+def winches(given: Winch | None, count: int) -> Winch | None:
+    """The winches, one a cable, or none.
+
+    Args:
+        given: Winches of all cables, one for all, or None.
+        count: Number of cables m.
+
+    Returns:
+        Winch with fields of shape (m,), or None.
+
+    Raises:
+        InvalidValueError: If it is no Winch, or of another count.
+    """
+    winch = optional(given, Winch, "winches")
+    return None if winch is None else winch.per_cable(count)
 
 
 def inertia(given: ArrayLike | None, pattern: str, normal: Array | None) -> Array:

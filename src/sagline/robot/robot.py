@@ -17,6 +17,7 @@ from sagline.errors import InvalidValueError
 from sagline.robot import checks
 from sagline.robot.pattern import MOTION_PATTERNS, MotionPattern, freedom_matrix
 from sagline.robot.pose_box import PoseBox
+from sagline.robot.winch import Winch
 
 TensionLimitsOf = Literal["chord", "frame_end"]
 
@@ -30,6 +31,8 @@ class Robot:
         frame_anchors: Frame ends of the cables in the world [m], z up, shape (m, 3).
         platform_anchors: Platform ends of the cables in the platform frame [m], shape (m, 3).
         cables: Material of the cables, fields of shape (m,).
+        winches: Pulleys, dead cable, drums and motors behind the frame anchors, fields of shape (m,); None where cables
+            start at the frame anchors and their lengths are given to them directly.
         mass: Mass of the platform [kg], > 0.
         inertia: Inertia about the center of mass in the platform frame [kg m^2], shape (3, 3): positive
             definite, no principal moment larger than the other two together. Only the moment about plane_normal need
@@ -53,6 +56,7 @@ class Robot:
     frame_anchors: Array
     platform_anchors: Array
     cables: Cable
+    winches: Winch | None
     mass: float
     inertia: Array
     center_of_mass: Array
@@ -78,6 +82,7 @@ class Robot:
         mass: float,
         inertia: ArrayLike | None = None,
         *,
+        winches: Winch | None = None,
         center_of_mass: ArrayLike = (0.0, 0.0, 0.0),
         gravity: float = 9.81,
         motion_pattern: MotionPattern = "3R3T",
@@ -102,6 +107,7 @@ class Robot:
             mass: Mass of the platform [kg], > 0.
             inertia: About the center of mass in the platform frame [kg m^2], shape (3, 3); may be left out where the
                 platform cannot turn.
+            winches: The machine behind the frame anchors, one for all cables or one a cable; None for none.
             center_of_mass: In the platform frame [m], shape (3,).
             gravity: Acceleration along -z [m/s^2], >= 0.
             motion_pattern: "3R3T", "3T", "1R2T" or "2T".
@@ -142,6 +148,7 @@ class Robot:
             "frame_anchors": frame,
             "platform_anchors": platform,
             "cables": checks.cables(cables, len(frame)),
+            "winches": checks.winches(winches, len(frame)),
             "mass": number(mass, "mass", "kg", above=0.0),
             "inertia": checks.inertia(inertia, pattern, normal),
             "center_of_mass": exactly(center_of_mass, "center_of_mass", "m", (3,)),

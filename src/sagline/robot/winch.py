@@ -1,0 +1,302 @@
+"""The machine between encoder and cable: motor, gear, drum, dead cable and pulley."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sagline.arrays import Array, broadcast_shape, checked, locked
+from sagline.errors import InvalidValueError
+from sagline.robot.unit import unit
+
+UPRIGHT: Final = 1e-9  # how far from vertical a swivel axis may be, as the sine of an angle
+
+
+class Rule(NamedTuple):
+    """What a field's values must be.
+
+    Attributes:
+        unit: Their unit.
+        low: The least value, or None.
+        above: A bound they must exceed, or None.
+    """
+
+    unit: str
+    low: float | None = None
+    above: float | None = None
+
+
+# every field but the swivel axis, in order
+RULES: Final[Mapping[str, Rule]] = MappingProxyType(
+    {
+        "pulley_radius": Rule("m", low=0.0),
+        "pulley_friction": Rule("", low=0.0),
+        "dead_cable": Rule("m", low=0.0),
+        "dead_rise": Rule("m"),
+        "drum_radius": Rule("m", above=0.0),
+        "drum_width": Rule("m", above=0.0),
+        "groove_pitch": Rule("m", above=0.0),
+        "layers": Rule("", low=1.0),
+        "drum_distance": Rule("m", above=0.0),
+        "drum_offset": Rule("m"),
+        "gear": Rule(""),
+        "counts_per_turn": Rule("", above=0.0),
+        "count_zero": Rule(""),
+        "length_zero": Rule("m", above=0.0),
+        "cable_length": Rule("m", above=0.0),
+        "winding_tension": Rule("N", low=0.0),
+        "inertia": Rule("kg m^2", above=0.0),
+        "torque_limit": Rule("N m", above=0.0),
+        "speed_limit": Rule("rad/s", above=0.0),
+        "friction": Rule("N", low=0.0),
+        "position_gain": Rule("1/s", low=0.0),
+        "speed_gain": Rule("N s/m", low=0.0),
+        "integral_gain": Rule("N/m", low=0.0),
+        "load_cell_range": Rule("N", above=0.0),
+        "load_cell_deviation": Rule("N", low=0.0),
+        "load_cell_bias": Rule("N"),
+        "load_cell_gain": Rule("", above=0.0),
+    }
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Winch:
+    """One winch with its pulley, or those of all cables: every field that is given has one shape, () or (m,).
+
+    A field that is None is not known: what needs it says so by name.
+
+    Attributes:
+        pulley_radius: Radius of the pulley at the frame, to the middle of the cable [m], >= 0; 0 for an eyelet. The
+            pulley swivels about a vertical axis through the frame anchor, where the cable enters it.
+        swivel_axis: Unit vector along the cable's travel where it enters the pulley, shape (..., 3): up (0, 0, 1), from
+            a drum below, or down (0, 0, -1).
+        pulley_friction: Coefficient mu of the cable's friction on the pulley: tensions on its two sides differ by
+            exp(mu psi), psi the wrap angle, the larger one on the side that the cable runs to.
+        dead_cable: Length of the straight guided run from drum to pulley [m], >= 0.
+        dead_rise: Height of the pulley's entry above the drum [m], within dead_cable; downward negative.
+        drum_radius: Radius of the drum at the bottom of the cable [m]; None where the drum is not known.
+        drum_width: Width that the cable may fill, along the drum's axis [m].
+        groove_pitch: How far along its axis a turn of the drum moves the cable [m].
+        layers: How many layers the drum takes, a whole number >= 1.
+        drum_distance: From the drum to the first pulley, across the drum's axis [m]; None: the cable leaves the drum at
+            a fixed place.
+        drum_offset: Where the cable leaves the full drum, along its axis, from the middle of the first pulley [m].
+        gear: Turns of the encoder for a turn of the drum, not zero; negative where counts fall as cable is let out.
+        counts_per_turn: Counts of the encoder for one of its turns.
+        count_zero: Counts at which length_zero is off the drum.
+        length_zero: Length of cable off the drum at count_zero, at the winding tension [m]; `home` finds it.
+        cable_length: All there is of the cable, on the drum and off it, at the winding tension [m].
+        winding_tension: Tension at which the cable lies on the drum [N], >= 0.
+        inertia: Moment of inertia of motor, gear and drum at the motor's shaft [kg m^2].
+        torque_limit: Largest torque of the motor at its shaft [N m].
+        speed_limit: Largest speed of the motor's shaft [rad/s].
+        friction: Of the whole drive, as a force at the cable where it leaves the drum [N], >= 0.
+        position_gain: k_p of the drive's position loop, at the cable [1/s].
+        speed_gain: k_v of its speed loop, at the cable [N s/m].
+        integral_gain: k_i of its speed loop, at the cable [N/m].
+        load_cell_range: Largest tension that the load cell reads [N].
+        load_cell_deviation: Standard deviation of a reading [N], >= 0.
+        load_cell_bias: What it reads without load [N].
+        load_cell_gain: What it reads of a newton.
+    """
+
+    pulley_radius: Array
+    swivel_axis: Array
+    pulley_friction: Array
+    dead_cable: Array
+    dead_rise: Array
+    drum_radius: Array | None
+    drum_width: Array | None
+    groove_pitch: Array | None
+    layers: Array
+    drum_distance: Array | None
+    drum_offset: Array
+    gear: Array
+    counts_per_turn: Array | None
+    count_zero: Array
+    length_zero: Array | None
+    cable_length: Array | None
+    winding_tension: Array
+    inertia: Array | None
+    torque_limit: Array | None
+    speed_limit: Array | None
+    friction: Array
+    position_gain: Array | None
+    speed_gain: Array | None
+    integral_gain: Array | None
+    load_cell_range: Array | None
+    load_cell_deviation: Array
+    load_cell_bias: Array
+    load_cell_gain: Array
+
+    def __init__(
+        self,
+        pulley_radius: ArrayLike = 0.0,
+        *,
+        swivel_axis: ArrayLike = (0.0, 0.0, 1.0),
+        pulley_friction: ArrayLike = 0.0,
+        dead_cable: ArrayLike = 0.0,
+        dead_rise: ArrayLike = 0.0,
+        drum_radius: ArrayLike | None = None,
+        drum_width: ArrayLike | None = None,
+        groove_pitch: ArrayLike | None = None,
+        layers: ArrayLike = 1.0,
+        drum_distance: ArrayLike | None = None,
+        drum_offset: ArrayLike = 0.0,
+        gear: ArrayLike = 1.0,
+        counts_per_turn: ArrayLike | None = None,
+        count_zero: ArrayLike = 0.0,
+        length_zero: ArrayLike | None = None,
+        cable_length: ArrayLike | None = None,
+        winding_tension: ArrayLike = 0.0,
+        inertia: ArrayLike | None = None,
+        torque_limit: ArrayLike | None = None,
+        speed_limit: ArrayLike | None = None,
+        friction: ArrayLike = 0.0,
+        position_gain: ArrayLike | None = None,
+        speed_gain: ArrayLike | None = None,
+        integral_gain: ArrayLike | None = None,
+        load_cell_range: ArrayLike | None = None,
+        load_cell_deviation: ArrayLike = 0.0,
+        load_cell_bias: ArrayLike = 0.0,
+        load_cell_gain: ArrayLike = 1.0,
+    ) -> None:
+        """Check every field once, and give all that are known one shape.
+
+        Args:
+            pulley_radius: As the attributes, in SI; one number for all cables, or one a cable.
+            swivel_axis: Up or down, of any length but zero.
+            pulley_friction: See the attributes.
+            dead_cable: See the attributes.
+            dead_rise: See the attributes.
+            drum_radius: See the attributes.
+            drum_width: See the attributes.
+            groove_pitch: See the attributes.
+            layers: See the attributes.
+            drum_distance: See the attributes.
+            drum_offset: See the attributes.
+            gear: See the attributes.
+            counts_per_turn: See the attributes.
+            count_zero: See the attributes.
+            length_zero: See the attributes.
+            cable_length: See the attributes.
+            winding_tension: See the attributes.
+            inertia: See the attributes.
+            torque_limit: See the attributes.
+            speed_limit: See the attributes.
+            friction: See the attributes.
+            position_gain: See the attributes.
+            speed_gain: See the attributes.
+            integral_gain: See the attributes.
+            load_cell_range: See the attributes.
+            load_cell_deviation: See the attributes.
+            load_cell_bias: See the attributes.
+            load_cell_gain: See the attributes.
+
+        Raises:
+            InvalidValueError: If a value is out of its range, the dead cable rises by more than its length, a gear is
+                zero, a swivel axis is not vertical, or the shapes do not fit.
+
+        Examples:
+            >>> import sagline as sl
+            >>> winch = sl.Winch(pulley_radius=0.05, dead_cable=[4.0, 5.0])
+            >>> winch.pulley_radius
+            array([0.05, 0.05])
+        """
+        given = {name: value for name, value in locals().items() if name in RULES and value is not None}
+        values = {name: _checked(value, name) for name, value in given.items()}
+        axis = _vertical(swivel_axis)
+        shape = broadcast_shape("winches", axis.shape[:-1], *(value.shape for value in values.values()))
+        if len(shape) > 1:
+            raise InvalidValueError("winches", f"of shape {shape}", "shape () or (m,)", "Give one value a cable.")
+        for name in RULES:
+            value = None if name not in values else locked(np.array(np.broadcast_to(values[name], shape)))
+            object.__setattr__(self, name, value)
+        object.__setattr__(self, "swivel_axis", locked(np.array(np.broadcast_to(axis, (*shape, 3)))))
+        _check_rise(self.dead_cable, self.dead_rise)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of every field that is given, () or (m,)."""
+        return self.pulley_radius.shape
+
+    def per_cable(self, count: int) -> Winch:
+        """The winches of so many cables, one value a cable.
+
+        Args:
+            count: Number of cables m.
+
+        Returns:
+            Winch with fields of shape (m,).
+
+        Raises:
+            InvalidValueError: If the fields have another length.
+        """
+        if self.shape not in ((), (1,), (count,)):
+            allowed = f"one value, or {count}, one a cable"
+            raise InvalidValueError("winches", f"{self.shape[0]} values", allowed, "Give every cable its winch.")
+        if self.shape == (count,):
+            return self
+        fields = {name: getattr(self, name) for name in RULES}
+        spread = {name: np.broadcast_to(value, (count,)) for name, value in fields.items() if value is not None}
+        return Winch(**spread, swivel_axis=np.broadcast_to(self.swivel_axis, (count, 3)))
+
+    def __reduce__(self) -> tuple[Any, tuple[dict[str, Any]]]:
+        """Pickle through the constructor, so that a loaded winch is checked and locked too."""
+        return _from_fields, ({name: getattr(self, name) for name in self.__slots__},)
+
+
+def _from_fields(values: dict[str, Any]) -> Winch:
+    return Winch(**values)
+
+
+def _checked(value: ArrayLike, name: str) -> Array:
+    """The values of one field."""
+    rule, item = RULES[name], f"winches: {name}"
+    low, above = (-np.inf if bound is None else bound for bound in (rule.low, rule.above))
+    array = checked(value, item, rule.unit, low=low, above=above)
+    if name == "layers" and (array != np.floor(array)).any():
+        raise InvalidValueError(item, array, "whole numbers", "Give how many layers the drum takes.")
+    if name == "gear" and not array.all():
+        step = "Give the encoder's turns for one of the drum; negative where counts fall as cable is let out."
+        raise InvalidValueError(item, "0", "not 0", step)
+    return array
+
+
+def _vertical(given: ArrayLike) -> Array:
+    """Unit vectors of the swivel axes, which are vertical."""
+    axis = checked(given, "winches: swivel_axis", "", shape=(3,))
+    length = np.linalg.norm(axis, axis=-1)
+    if not length.all():
+        raise InvalidValueError(
+            "winches: swivel_axis", "the zero vector", "up or down", "Give [0, 0, 1] or [0, 0, -1]."
+        )
+    axis = unit(axis)
+    if (np.hypot(axis[..., 0], axis[..., 1]) > UPRIGHT).any():
+        slanted = axis.reshape(-1, 3)[np.argmax(np.hypot(axis[..., 0], axis[..., 1]).reshape(-1))]
+        raise InvalidValueError(
+            "winches: swivel_axis",
+            f"({', '.join(f'{x:.3g}' for x in slanted)})",
+            "up or down",
+            "A pulley that swivels about a slanted axis, or that does not swivel, is not modeled: its cable leaves the "
+            "vertical plane. Give [0, 0, 1] or [0, 0, -1].",
+        )
+    return np.stack((np.zeros_like(axis[..., 2]), np.zeros_like(axis[..., 2]), np.sign(axis[..., 2])), axis=-1)
+
+
+def _check_rise(dead_cable: Array, dead_rise: Array) -> None:
+    steep = np.flatnonzero(np.abs(dead_rise) > dead_cable)
+    if steep.size:
+        i = int(steep[0])
+        raise InvalidValueError(
+            f"winches: dead_rise[{i}]",
+            f"{dead_rise.flat[i]:g} m",
+            f"within +-{dead_cable.flat[i]:g} m, its dead_cable",
+            "A straight run rises by no more than its length; correct one of the two.",
+        )
