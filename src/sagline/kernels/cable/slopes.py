@@ -8,8 +8,8 @@ from typing import NamedTuple
 from sagline.kernels.algebra.hyperbolic import atanhc_excess
 from sagline.kernels.cable.catenary import slack_series
 from sagline.kernels.cable.models import pull_of_shallow
-from sagline.kernels.cable.stiffness import PlaneStiffness, shallow_slopes
-from sagline.kernels.cable.terms import Force, Material, Model
+from sagline.kernels.cable.stiffness import shallow_slopes
+from sagline.kernels.cable.terms import Force, Material, Model, PlaneStiffness
 from sagline.kernels.codes import CATENARY, ELASTIC
 from sagline.kernels.jit import formula
 

@@ -8,9 +8,10 @@ from sagline.arrays import Array, Indices
 from sagline.kernels import tables
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable import rows as t
+from sagline.kernels.cable.over_pulleys import material_at
 from sagline.kernels.cable.rows import CABLE_ROWS
 from sagline.kernels.cable.slopes import Pair, force_slopes
-from sagline.kernels.cable.stiffness import force_of, material_at, plane_of
+from sagline.kernels.cable.stiffness import force_of, plane_of
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import STRAIGHT
 from sagline.kernels.forward.platform import end_stiffness, platform_stiffness, unbalance
