@@ -27,7 +27,8 @@ BODY_COLUMNS = 5
 # pose row: position of the platform origin [m], unit quaternion, scalar last
 POSE_COLUMNS = 7
 
-# rows of the result of one pose, each of m values; the last three are filled only where something is behind a cable
+# rows of the result of one pose, each of m values; those from WRAP on only where something is behind a cable
 SPAN, RISE, LENGTH, HORIZONTAL, VERTICAL, TENSION = 0, 1, 2, 3, 4, 5
 WRAP, WRAPPED, DEAD = 6, 7, 8  # wrap angle [rad], unstrained length on the pulley and behind it [m]
-RESULT_ROWS = 9
+SINE = 9  # sin phi of the chord that touches the pulley
+RESULT_ROWS = 10

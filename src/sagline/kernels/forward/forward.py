@@ -181,6 +181,7 @@ def store(problem: Problem, rows: Array, p: int, results: Array, statuses: Codes
             results[tables.WRAP, p, i] = rows[t.WRAP, i]
             results[tables.WRAPPED, p, i] = wrapped
             results[tables.DEAD, p, i] = dead
+            results[tables.SINE, p, i] = rows[g.SINE, i]
 
 
 @entry

@@ -64,7 +64,7 @@ def inverse_poses(
         otherwise: None for the ways of sharing nearest to a reference, in chord or horizontal tensions: all others are
             then left out of the machine code. True for any.
         answers: Filled: span and rise of the free spans, length of all cable off the drum, T_x, T_z, tau, and where
-            anything is behind a cable the three rows of what is, (RESULT_ROWS, N, m); status of each cable, (N, m);
+            anything is behind a cable the rows of what is, (RESULT_ROWS, N, m); status of each cable, (N, m);
             norms of the unbalanced force [N] and moment [N m] along the free motions, (N, 2); the wrench that J tau
             had to supply, along them, (N, n); status of each pose, (N,).
         first: Pose to begin with.
@@ -153,6 +153,8 @@ def write_behind(solved: bool, model: Model, cables: Cables, results: Array, p: 
             results[tables.WRAP, p, i] = math.atan2(wrap.sine, wrap.cosine)
             results[tables.WRAPPED, p, i] = wrapped
             results[tables.DEAD, p, i] = dead
+            results[tables.SINE, p, i] = cables.sine[i]
             results[tables.LENGTH, p, i] += wrapped + dead
         else:
-            results[tables.WRAP, p, i] = results[tables.WRAPPED, p, i] = results[tables.DEAD, p, i] = math.nan
+            results[tables.WRAP, p, i] = results[tables.WRAPPED, p, i] = math.nan
+            results[tables.DEAD, p, i] = results[tables.SINE, p, i] = math.nan
