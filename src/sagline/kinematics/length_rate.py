@@ -65,7 +65,8 @@ def _lengths(state: Equilibrium, tension: TensionMethod, moment: Instant) -> Arr
     rows, loads = pose_rows(moment.pose), locked(moment.wrench)
     if not isinstance(tension, Closest):
         none = np.full(first_of(state.robot).cable_count, np.nan)
-        return solve_rows(state.robot, tension, options, rows, loads, none).results[tables.LENGTH]
+        lengths: Array = solve_rows(state.robot, tension, options, rows, loads, none).results[tables.LENGTH]
+        return lengths
     held = np.where(np.isnan(state.chord_tension), np.nan, shared_tension(state, tension.variable))
     return np.array(
         [
