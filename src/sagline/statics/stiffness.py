@@ -35,7 +35,7 @@ class Stiffness:
         density_sensitivity: d(motion)/d(linear density) of each cable, shape (..., 6, m) [m^2/kg, rad m/kg].
         stiffness_sensitivity: d(motion)/d(axial stiffness) of each cable, shape (..., 6, m) [m/N, rad/N].
         pulley_radius_sensitivity: d(motion)/d(pulley radius) of each cable, the length off the drum held, shape
-            (..., 6, m) [m/m, rad/m]; of the shallow models as of the weightless one.
+            (..., 6, m) [m/m, rad/m]; of the shallow models as of the exact one, as is the next.
         dead_cable_sensitivity: d(motion)/d(length of the dead cable) in the same way, shape (..., 6, m) [m/m, rad/m].
         cable_stiffness: dT/dB of each cable, T the force on its platform end, B that end's position, world axes, shape
             (..., m, 3, 3) [N/m].

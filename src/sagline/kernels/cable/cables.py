@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sagline.arrays import Array
-from sagline.kernels.cable.pulley import Pulley, Wrap
+from sagline.kernels.cable.pulley import Pulley
 from sagline.kernels.cable.terms import Chord, Material
 from sagline.kernels.jit import glue
 from sagline.kernels.memory import Memory, block
@@ -100,12 +100,6 @@ def chord_of(cables: Cables, i: int) -> Chord:
 def free_chord_of(cables: Cables, i: int) -> Chord:
     """The chord of one cable's free span."""
     return Chord(cables.free_chord[i], cables.free_sine[i], cables.free_cosine[i])
-
-
-@glue
-def wrap_of(cables: Cables, i: int) -> Wrap:
-    """How far one cable lies on its pulley."""
-    return Wrap(cables.wrap_sine[i], cables.wrap_cosine[i])
 
 
 @glue

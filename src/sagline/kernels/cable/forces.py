@@ -16,7 +16,7 @@ from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.catenary import SMALL_HALLEY_STEP, relative_excess
 from sagline.kernels.cable.models import from_length
-from sagline.kernels.cable.over_pulleys import ask, forget_misses, settle
+from sagline.kernels.cable.over_pulleys import ask, begin_passes, settle
 from sagline.kernels.cable.pulley import anything_behind
 from sagline.kernels.cable.terms import Material, Model
 from sagline.kernels.codes import CABLE_SOLVED, CATENARY
@@ -114,7 +114,7 @@ def cable_forces(model: Model, cables: Array, rows: Array) -> None:
     for i in range(cables.shape[0]):
         rows[t.SOFT, i] = cables[i, tables.STIFFNESS]
     if machine:
-        forget_misses(rows)
+        begin_passes(cables, rows)
     for _ in range(PASSES if machine else 1):
         if machine:
             ask(model, cables, rows)

@@ -14,7 +14,7 @@ from sagline.kernels.cable.catenary import (
     ordinary_pull_ratio,
 )
 from sagline.kernels.cable.models import from_tension
-from sagline.kernels.cable.pulley import Pulley, free_chord, wrap_of_chord, wrap_of_force
+from sagline.kernels.cable.pulley import Pulley, free_rise, free_span
 from sagline.kernels.cable.terms import Chord, Material, Model
 from sagline.kernels.codes import CABLE_SOLVED, CATENARY, ELASTIC, STRAIGHT
 from sagline.kernels.jit import glue, kernel
@@ -34,25 +34,27 @@ def leave_pulleys(model: Model, cables: Cables, fresh: bool) -> None:
     The forces are those of the last length and pull (fresh: of first order) at the present chord tensions. Cables of
     the shallow models leave along their chord.
     """
-    exact = model.code == CATENARY
+    exact = 1.0 if model.code == CATENARY else 0.0
     for i in range(cables.tau.size):
         chord, pulley = chord_of(cables, i), pulley_of(cables, i)
+        half_density = 0.5 * cables.density[i] * model.gravity
         horizontal = cables.tau[i] * chord.cosine
-        hanging = -cables.half_weight[i]
+        hanging = -half_density * chord.length
         if not fresh:
-            length = cables.ratio[i] * cables.free_chord[i]
-            hanging = cables.pull[i] - 2.0 * cables.half_weight[i] / chord.length * length
-        wrap = wrap_of_force(pulley, horizontal, cables.tau[i] * chord.sine + hanging)
-        if not exact:
-            wrap = wrap_of_chord(pulley, chord)
-        free = free_chord(pulley, chord, wrap)
-        cables.wrap_sine[i] = wrap.sine
-        cables.wrap_cosine[i] = wrap.cosine
-        cables.free_chord[i] = free.length
-        cables.free_sine[i] = free.sine
-        cables.free_cosine[i] = free.cosine
-        cables.free_tau[i] = horizontal / free.cosine
-        cables.free_half_weight[i] = cables.half_weight[i] * (free.length / chord.length)
+            hanging = cables.pull[i] - 2.0 * half_density * cables.ratio[i] * cables.free_chord[i]
+        vertical_a = cables.tau[i] * chord.sine + exact * hanging
+        inverse = 1.0 / math.sqrt(horizontal * horizontal + vertical_a * vertical_a)
+        sine, cosine = horizontal * inverse, pulley.entry * vertical_a * inverse
+        span, rise = free_span(pulley, chord, cosine), free_rise(pulley, chord, sine)
+        length = math.sqrt(span * span + rise * rise)
+        inverse = 1.0 / length
+        cables.wrap_sine[i] = sine
+        cables.wrap_cosine[i] = cosine
+        cables.free_chord[i] = length
+        cables.free_sine[i] = rise * inverse
+        cables.free_cosine[i] = span * inverse
+        cables.free_tau[i] = horizontal / span * length
+        cables.free_half_weight[i] = half_density * length
 
 
 @glue
@@ -121,8 +123,12 @@ def hang_cable(model: Model, chord: Chord, material: Material, pulley: Pulley, t
     if pulley.radius > 0.0 and model.code == CATENARY:
         horizontal, weight = tau * chord.cosine, material.density * model.gravity
         for _ in range(CONTACTS):
-            wrap = wrap_of_force(pulley, horizontal, tau * chord.sine + pull - weight * length)
-            free = free_chord(pulley, chord, wrap)
+            vertical_a = tau * chord.sine + pull - weight * length
+            tension = math.sqrt(horizontal * horizontal + vertical_a * vertical_a)
+            span = free_span(pulley, chord, pulley.entry * vertical_a / tension)
+            rise = free_rise(pulley, chord, horizontal / tension)
+            line = math.sqrt(span * span + rise * rise)
+            free = Chord(line, rise / line, span / line)
             length, own, status = from_tension(model, free, material, horizontal / free.cosine)
             pull = horizontal / free.cosine * free.sine + own - tau * chord.sine
     return length, pull, status

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from sagline.arrays import Array
 from sagline.kernels import tables
+from sagline.kernels.algebra.angle import angle
 from sagline.kernels.cable.terms import Chord, Force, Material, Model
 from sagline.kernels.codes import CATENARY, STRAIGHT
 from sagline.kernels.jit import formula, kernel
@@ -35,10 +36,11 @@ class Pulley(NamedTuple):
 
 
 class Wrap(NamedTuple):
-    """How far a cable lies on its pulley: sine and cosine of the wrap angle psi."""
+    """How far a cable lies on its pulley: the wrap angle psi [rad], its sine and its cosine."""
 
     sine: float
     cosine: float
+    angle: float
 
 
 class Behind(NamedTuple):
@@ -95,33 +97,24 @@ def any_behind(robots: Array) -> bool:
 
 
 @formula
-def wrap_of_chord(pulley: Pulley, chord: Chord) -> Wrap:
-    """Where the chord touches, the tangent from the platform end."""
-    return Wrap(chord.cosine, pulley.entry * chord.sine)
+def free_span(pulley: Pulley, chord: Chord, cosine: float) -> float:
+    """Horizontal distance from where a cable leaves its pulley to its platform end [m]; cosine of the wrap angle.
+
+    chord: that of the tangent from the platform end.
+    """
+    return chord.length * chord.cosine + pulley.radius * (cosine - pulley.entry * chord.sine)
 
 
 @formula
-def wrap_of_force(pulley: Pulley, horizontal: float, vertical_a: float) -> Wrap:
-    """Where a cable leaves along the force F_A; where it has none, straight on."""
-    tension = math.sqrt(horizontal * horizontal + vertical_a * vertical_a)
-    inverse = 1.0 / tension if tension > 0.0 else 0.0
-    return Wrap(horizontal * inverse, pulley.entry * vertical_a * inverse)
-
-
-@formula
-def free_chord(pulley: Pulley, chord: Chord, wrap: Wrap) -> Chord:
-    """From where a cable leaves its pulley to its platform end, whose tangent is the chord."""
-    x = chord.length * chord.cosine + pulley.radius * (wrap.cosine - pulley.entry * chord.sine)
-    z = chord.length * chord.sine + pulley.radius * (pulley.entry * (chord.cosine - wrap.sine))
-    length = math.sqrt(x * x + z * z)
-    return Chord(length, z / length, x / length)
+def free_rise(pulley: Pulley, chord: Chord, sine: float) -> float:
+    """Height of the platform end above where a cable leaves its pulley [m]; sine of the wrap angle."""
+    return chord.length * chord.sine + pulley.radius * (pulley.entry * (chord.cosine - sine))
 
 
 @formula
 def straight_behind(pulley: Pulley, chord: Chord) -> float:
     """Length behind where the chord touches, of a cable that is not strained [m]."""
-    wrapped = pulley.radius * math.atan2(chord.cosine, pulley.entry * chord.sine) if pulley.radius > 0.0 else 0.0
-    return wrapped + pulley.dead
+    return pulley.radius * angle(chord.cosine, pulley.entry * chord.sine) + pulley.dead
 
 
 @formula
@@ -136,19 +129,18 @@ def behind(pulley: Pulley, weight: float, stiffness: float, tension: float, wrap
     radius, entry, dead, rise = pulley
     strained = 1.0 + tension / stiffness
     square = strained * strained
-    angle = math.atan2(wrap.sine, wrap.cosine) if radius > 0.0 else 0.0
     beta = weight * radius / stiffness
-    falls = entry * beta * (1.0 - wrap.cosine - angle * wrap.sine)
+    falls = entry * beta * (1.0 - wrap.cosine - wrap.angle * wrap.sine)
     first = math.sqrt(square - 2.0 * entry * beta * wrap.sine)  # where it enters
     last = math.sqrt(first * first - 2.0 * weight * rise / stiffness)  # where it leaves the drum
-    return Behind(radius * (angle - falls / square) / strained, 2.0 * dead / (first + last))
+    return Behind(radius * (wrap.angle - falls / square) / strained, 2.0 * dead / (first + last))
 
 
 @formula
 def behind_cable(model: Model, material: Material, pulley: Pulley, tension: float, wrap: Wrap) -> Behind:
     """The same of a cable of any model; only the exact one weighs there, and the straight one does not stretch."""
     if model.code == STRAIGHT:
-        return Behind(pulley.radius * math.atan2(wrap.sine, wrap.cosine), pulley.dead)
+        return Behind(pulley.radius * wrap.angle, pulley.dead)
     weight = material.density * model.gravity if model.code == CATENARY else 0.0
     return behind(pulley, weight, material.stiffness, tension, wrap)
 
@@ -158,10 +150,9 @@ def softness(pulley: Pulley, weight: float, stiffness: float, tension: float, wr
     """S: how much unstrained length the part behind P gives for a newton more of H, E_A^2 S that at P [m/N]."""
     radius, entry, dead, rise = pulley
     strained = 1.0 + tension / stiffness
-    angle = math.atan2(wrap.sine, wrap.cosine) if radius > 0.0 else 0.0
     first = math.sqrt(strained * strained - 2.0 * entry * weight * radius / stiffness * wrap.sine)
     last = math.sqrt(first * first - 2.0 * weight * rise / stiffness)
-    on_pulley = radius * angle / (strained * strained * strained)
+    on_pulley = radius * wrap.angle / (strained * strained * strained)
     return (on_pulley + 2.0 * dead / ((first + last) * first * last)) / stiffness
 
 
@@ -170,14 +161,13 @@ def energy_behind(pulley: Pulley, weight: float, stiffness: float, tension: floa
     """Energy [J] of the part behind P, and of lifting the free one (of unstrained length `free`) to P; z from A."""
     radius, entry, dead, rise = pulley
     strained = 1.0 + tension / stiffness
-    angle = math.atan2(wrap.sine, wrap.cosine) if radius > 0.0 else 0.0
     height = entry * radius * wrap.sine
     beta = weight * radius / stiffness
     first = math.sqrt(strained * strained - 2.0 * entry * beta * wrap.sine) - 1.0
     last = math.sqrt((1.0 + first) * (1.0 + first) - 2.0 * weight * rise / stiffness) - 1.0
     whole = tension + 0.5 * tension * tension / stiffness - weight * height  # H
     wrapped, run = behind(pulley, weight, stiffness, tension, wrap)
-    on_pulley = tension * angle + entry * weight * radius * (1.0 - wrap.cosine - angle * wrap.sine) / strained
+    on_pulley = tension * wrap.angle + entry * weight * radius * (1.0 - wrap.cosine - wrap.angle * wrap.sine) / strained
     total = first + last
     on_run = total + total + total + 2.0 * (first * first + first * last + last * last)
     return (
@@ -209,8 +199,8 @@ def length_behind_by(
     radius, entry, dead, rise = pulley
     vertical_a = force.vertical - weight * free
     tension = math.sqrt(force.horizontal * force.horizontal + vertical_a * vertical_a)
-    sine, cosine = wrap_of_force(pulley, force.horizontal, vertical_a)
-    angle = math.atan2(sine, cosine)
+    sine, cosine = force.horizontal / tension, entry * vertical_a / tension
+    wrapped = angle(sine, cosine)
     strained = 1.0 + tension / stiffness
     cube = strained * strained * strained
     beta = weight * radius / stiffness
@@ -220,11 +210,11 @@ def length_behind_by(
     angle_by = -entry * sine / tension * vertical_by
     strained_by = (entry * cosine * vertical_by - (strained - 1.0) * change.stiffness) / stiffness
     beta_by = (change.weight * radius + weight * change.radius - beta * change.stiffness) / stiffness
-    falls = 1.0 - cosine - angle * sine
-    per_radius = angle / strained - entry * beta * falls / cube
+    falls = 1.0 - cosine - wrapped * sine
+    per_radius = wrapped / strained - entry * beta * falls / cube
     wrapped_by = change.radius * per_radius + radius * (
-        angle_by * (1.0 / strained + entry * beta * angle * cosine / cube)
-        - strained_by * (angle / (strained * strained) - 3.0 * entry * beta * falls / (cube * strained))
+        angle_by * (1.0 / strained + entry * beta * wrapped * cosine / cube)
+        - strained_by * (wrapped / (strained * strained) - 3.0 * entry * beta * falls / (cube * strained))
         - entry * falls * beta_by / cube
     )
     first_by = (strained * strained_by - entry * (beta_by * sine + beta * cosine * angle_by)) / first
@@ -250,13 +240,12 @@ def end_by(
     more = length_behind_by(pulley, weight, material.stiffness, force, free, change, 1.0)[1] - still
     grown = (change.length - still) / (1.0 + more)
     turned = length_behind_by(pulley, weight, material.stiffness, force, free, change, grown)[0]
-    sine, cosine = wrap_of_force(pulley, force.horizontal, vertical_a)
     # the free span grows at P, where it is strained by E_A, and P goes along the tangent
     feed = strained * grown + pulley.radius * turned
     softer = -free * change.stiffness / (material.stiffness * material.stiffness)
     x = softer * force.horizontal + by_weight.x * change.weight
     z = softer * (force.vertical - 0.5 * weight * free) + by_weight.z * change.weight
     return Motion(
-        x + feed * along_x + change.radius * (1.0 - cosine),
-        z + feed * along_z + change.radius * pulley.entry * sine,
+        x + feed * along_x + change.radius * (1.0 - pulley.entry * along_z),
+        z + feed * along_z + change.radius * pulley.entry * along_x,
     )

@@ -133,7 +133,7 @@ def force_slopes(
 def slopes_over(
     model: Model, material: Material, pulley: Pulley, free: float, force: Force, plane: PlaneStiffness
 ) -> tuple[ForceSlopes, MachineSlopes]:
-    """The five of a cable that may have something behind it; of the shallow models as of the weightless one.
+    """The five of a cable that may have something behind it; of the shallow models as of the exact one.
 
     Args:
         model: Cable model.
@@ -143,7 +143,7 @@ def slopes_over(
         force: On the platform end.
         plane: Stiffness of the whole cable.
     """
-    weight = material.density * model.gravity if model.code == CATENARY else 0.0
+    weight = 0.0 if model.code == ELASTIC else material.density * model.gravity
     by_weight = Motion(0.0, 0.0)
     if weight > 0.0:
         x, z = catenary_by_weight(force.horizontal, force.vertical, free, weight, material.stiffness)

@@ -45,7 +45,7 @@ def add_wound(model: Model, cables: Array, lengths: Array, rows: Array, wrench: 
     for i in range(cables.shape[0]):
         span, rise, length = rows[g.SPAN, i], rows[g.RISE, i], rows[t.LENGTH, i]
         if machine:
-            x, z = fed(model, cables, rows, i)
+            x, z, _gives = fed(model, cables, rows, i)
             slope = gives_way(plane_of(rows, i), Pair(x, z))
         else:
             material, force = material_at(cables, i), force_of(rows, i)

@@ -10,11 +10,12 @@ import math
 
 from sagline.arrays import Array, Codes, Indices
 from sagline.kernels import tables
+from sagline.kernels.algebra.angle import angle
 from sagline.kernels.balance.freedom import turns
 from sagline.kernels.balance.setting import Balance, Limits, Platform, need, new_balance, set_pose
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable.cables import Cables, free_chord_of, material_of, new_cables, pulley_of, wrap_of
-from sagline.kernels.cable.pulley import any_behind, behind_cable
+from sagline.kernels.cable.cables import Cables, material_of, new_cables, pulley_of
+from sagline.kernels.cable.pulley import Wrap, any_behind, behind_cable
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import CABLE_SOLVED, CATENARY, CLOSEST, POSE_NO_CHORD, POSE_SINGULAR, POSE_SOLVED
 from sagline.kernels.inverse.rounds import remember, share_and_hang
@@ -140,21 +141,36 @@ def write(solved: bool, model: Model, cables: Cables, balance: Balance, results:
 @glue
 def write_behind(solved: bool, model: Model, cables: Cables, results: Array, p: int) -> None:
     """Write the free spans, and add to their lengths what is on the pulleys and behind them."""
-    for i in range(cables.tau.size):
-        if solved:
-            free, material, wrap = free_chord_of(cables, i), material_of(cables, i), wrap_of(cables, i)
-            hanging = cables.pull[i] - material.density * model.gravity * cables.ratio[i] * free.length
-            tension = math.hypot(cables.tau[i] * cables.cosine[i], cables.tau[i] * cables.sine[i] + hanging)
-            if model.code != CATENARY:
-                tension = cables.tau[i]
-            wrapped, dead = behind_cable(model, material, pulley_of(cables, i), tension, wrap)
-            results[tables.SPAN, p, i] = free.length * free.cosine
-            results[tables.RISE, p, i] = free.length * free.sine
-            results[tables.WRAP, p, i] = math.atan2(wrap.sine, wrap.cosine)
-            results[tables.WRAPPED, p, i] = wrapped
-            results[tables.DEAD, p, i] = dead
-            results[tables.SINE, p, i] = cables.sine[i]
-            results[tables.LENGTH, p, i] += wrapped + dead
-        else:
+    m = cables.tau.size
+    for i in range(m):
+        if not solved:
             results[tables.WRAP, p, i] = results[tables.WRAPPED, p, i] = math.nan
             results[tables.DEAD, p, i] = results[tables.SINE, p, i] = math.nan
+    if solved:
+        tension = cables.last_pull  # where the cables leave; nobody asks for the pulls before any more
+        for i in range(m):
+            tension[i] = cables.tau[i]
+        if model.code == CATENARY:
+            for i in range(m):
+                x, z = cables.free_tau[i] * cables.free_cosine[i], cables.free_tau[i] * cables.free_sine[i]
+                length = cables.ratio[i] * cables.free_chord[i]
+                z += cables.free_pull[i] - cables.density[i] * model.gravity * length
+                tension[i] = math.sqrt(x * x + z * z)
+        for i in range(m):
+            results[tables.SPAN, p, i] = cables.free_chord[i] * cables.free_cosine[i]
+        for i in range(m):
+            results[tables.RISE, p, i] = cables.free_chord[i] * cables.free_sine[i]
+        for i in range(m):
+            results[tables.WRAP, p, i] = angle(cables.wrap_sine[i], cables.wrap_cosine[i])
+        for i in range(m):
+            wrap = Wrap(cables.wrap_sine[i], cables.wrap_cosine[i], results[tables.WRAP, p, i])
+            wrapped, _dead = behind_cable(model, material_of(cables, i), pulley_of(cables, i), tension[i], wrap)
+            results[tables.WRAPPED, p, i] = wrapped
+        for i in range(m):
+            wrap = Wrap(cables.wrap_sine[i], cables.wrap_cosine[i], 0.0)
+            _wrapped, dead = behind_cable(model, material_of(cables, i), pulley_of(cables, i), tension[i], wrap)
+            results[tables.DEAD, p, i] = dead
+        for i in range(m):
+            results[tables.LENGTH, p, i] += results[tables.WRAPPED, p, i] + results[tables.DEAD, p, i]
+        for i in range(m):
+            results[tables.SINE, p, i] = cables.sine[i]
