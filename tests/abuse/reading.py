@@ -44,7 +44,25 @@ platform_anchors:
   - [0.1, -0.1, 0.2]
   - [0.1, 0.1, 0.2]
   - [-0.1, 0.1, 0.2]
-cables: {linear_density: 67 g/m, youngs_modulus: 2 GPa, section_area: [22 mm^2, 22e-6, 22 mm², 22e-6 m^2]}
+cables:
+  linear_density: 67 g/m
+  youngs_modulus: 2 GPa
+  section_area: [22 mm^2, 22e-6, 22 mm², 22e-6 m^2]
+  diameter: 6.5 mm
+  expansion: [-12e-6, 0, 1e-5 1/K, 0]
+winches:
+  pulley_radius: [40 mm, 0.05, 0, 4 cm]
+  swivel_axis: [up, [0, 0, 1], down, [0, 0, -2]]
+  dead_cable: [4, 3 m, 2.5, 3]
+  dead_rise: -2
+  drum_radius: 60 mm
+  groove_pitch: 6 mm
+  layers: [1, 2, 1, 1]
+  gear: [20, -20, 20, 20]
+  counts_per_turn: 131072
+  inertia: 0.277 kg cm^2
+  speed_limit: 3000 rpm
+  friction: 15
 mass: 12.5
 inertia: {Ixx: 0.5, Iyy: 0.6, Izz: 0.7, Ixy: 0.01}
 center_of_mass: [0, 0.01, -3 cm]
