@@ -381,6 +381,7 @@ def test_a_row_too_few_or_a_wrong_unit_of_any_key_of_a_winch_is_named(key: str) 
     for count in (2, 4, 0):
         with pytest.raises(FileError, match=rf"winches(: {key})? is ({count} values|of shape)"):
             parse_robot(edited(winches={"dead_cable": 30, key: [row] * count}), "robot.yaml")
+    wrong: Any
     for wrong in ("5 parsec^2", "fast", True, None, {}, [None] * 3, float("nan")):
         with pytest.raises(FileError, match=rf"winches.{key}(\[0\])? is .*; allowed: "):
             parse_robot(edited(winches={key: wrong}), "robot.yaml")
