@@ -43,7 +43,7 @@ def test_every_value_stands_beside_its_unit() -> None:
 
 
 def test_winches_are_shown_with_their_units(tmp_path: Path) -> None:
-    winches = sl.Winch([0.05] * 7 + [0.04], swivel_axis=[0, 0, -1], inertia=2.77e-5, gear=-20)
+    winches = sl.Winch([0.05] * 7 + [0.04], swivel_axis=[0, 0, -1], inertia=2.77e-5, gear=-20, counts_per_turn=2**17)
     thick = sl.Cable(0.065, 7e5, diameter=0.004)
     robot = sl.load_robot("cogiro").replace(winches=winches, cables=thick, assumed={"winches": "a guess"})
     (tmp_path / "wound.yaml").write_text(sl.dump_robot(robot))
@@ -61,6 +61,7 @@ def test_winches_are_shown_with_their_units(tmp_path: Path) -> None:
         "swivel axis down",
         "inertia 2.77e-05 kg m²",
         "gear -20",
+        "counts per turn 131072",
         "diameter 0.004 m",
     ):
         assert line in text

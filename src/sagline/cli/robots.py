@@ -159,16 +159,16 @@ def _winches(robot: Robot, winches: Winch) -> Grid:
     parts = _parts(winches)
     ways = ["up" if axis[2] > 0.0 else "down" for axis in winches.swivel_axis]
     parts["swivel_axis"]["value"] = ways if len(set(ways)) > 1 else ways[0]
-    rows = [[name.replace("_", " "), _spread(entry["value"]), entry["unit"]] for name, entry in parts.items()]
+    rows = [[name.replace("_", " "), _spread(entry["value"], digits=9), entry["unit"]] for name, entry in parts.items()]
     title = _marked(robot, "winches")
     return Grid(["", "value", "unit"], rows, title, left=frozenset(range(3)), prose=frozenset({1}))
 
 
-def _spread(value: Any) -> str:
-    """One value for all cables, or all of them."""
+def _spread(value: Any, digits: int = 5) -> str:
+    """One value for all cables, or all of them; counts need more digits than lengths."""
     if isinstance(value, str | list):
         return value if isinstance(value, str) else f"({', '.join(value)})"
-    return f"{value[0]:.5g}" if np.all(value == value[0]) else _numbers(value)
+    return f"{value[0]:.{digits}g}" if np.all(value == value[0]) else _numbers(value, digits)
 
 
 def _text(field: str, value: Any) -> str:
@@ -185,8 +185,8 @@ def _text(field: str, value: Any) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _numbers(row: Any) -> str:
-    return "(" + ", ".join(f"{number:.5g}" for number in row) + ")"
+def _numbers(row: Any, digits: int = 5) -> str:
+    return "(" + ", ".join(f"{number:.{digits}g}" for number in row) + ")"
 
 
 def _anchors(robot: Robot) -> Grid:
