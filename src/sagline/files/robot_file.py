@@ -6,14 +6,12 @@ import os
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from sagline.arguments import brief, file_path, instance
 from sagline.errors import FileError, InvalidValueError, nearest
 from sagline.files.robot_schema import SWIVEL_AXES, RobotEntry
 from sagline.files.schema import validated
 from sagline.files.text import exists, read_text
-from sagline.files.yaml_text import YAML_LIMIT, parse_mapping
+from sagline.files.yaml_text import YAML_LIMIT, dump_mapping, parse_mapping
 from sagline.robot.catalogue import preset_text, robot_names
 from sagline.robot.robot import Robot
 from sagline.robot.winch import Winch
@@ -113,7 +111,7 @@ def dump_robot(robot: Robot) -> str:
             data[key] = value.tolist()
     if (box := robot.test_box) is not None:
         data["test_box"] = {"low": box.low.tolist(), "high": box.high.tolist(), "tilt": box.tilt}
-    return yaml.safe_dump(data, sort_keys=False, default_flow_style=None, allow_unicode=True, width=120)
+    return dump_mapping(data)
 
 
 def _on_base(data: dict[Any, Any], origin: Path | str) -> dict[Any, Any]:
