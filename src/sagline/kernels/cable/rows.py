@@ -13,4 +13,11 @@ STATUS = LENGTH + 4  # how the cable's calculation ended
 # of `cable_forces`; PARAMETER is h, kept from pose to pose, NaN where there was none
 PARAMETER, KAPPA, EXCESS, FIRST, SECOND = LENGTH + 5, LENGTH + 6, LENGTH + 7, LENGTH + 8, LENGTH + 9
 XX, XZ, ZX, ZZ = LENGTH + 10, LENGTH + 11, LENGTH + 12, LENGTH + 13  # in-plane stiffness [N/m]
-CABLE_ROWS = LENGTH + 14
+SOFT = LENGTH + 14  # EA that `cable_forces` computes with [N]
+# Of cables over pulleys. What a cable without one is asked for in its stead: span and rise [m], length [m]; and what is
+# added to them so that the answer is that of the cable, kept from pose to pose.
+ASKED_SPAN, ASKED_RISE, ASKED_LENGTH = LENGTH + 15, LENGTH + 16, LENGTH + 17
+OFF_X, OFF_Z, OFF_LENGTH = LENGTH + 18, LENGTH + 19, LENGTH + 20
+FREE_SPAN, FREE_RISE, FREE_LENGTH, WRAP = LENGTH + 21, LENGTH + 22, LENGTH + 23, LENGTH + 24  # of the free span; psi
+ACROSS = LENGTH + 25  # stiffness normal to the plane [N/m]
+CABLE_ROWS = LENGTH + 26
