@@ -6,7 +6,10 @@ from scipy.spatial.transform import Rotation
 from sagline.arrays import Array
 from sagline.errors import InvalidValueError
 from sagline.files.robot_file import dump_robot, load_robot
+from sagline.kinematics.forward import forward
+from sagline.kinematics.inverse import inverse
 from sagline.robot.catalogue import preset_text, robot_names
+from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
 PUBLISHED = {
@@ -173,3 +176,22 @@ def test_the_articles_path_is_feasible(name: str, x: float, y: float) -> None:
 def test_an_unknown_preset_suggests_the_nearest() -> None:
     with pytest.raises(InvalidValueError, match=r"robot is 'cogirro'; allowed: .*Did you mean cogiro\?"):
         preset_text("cogirro")
+
+
+@pytest.mark.parametrize("name", PULLEYS)
+def test_the_platform_rests_where_lengths_over_pulleys_put_it(name: str) -> None:
+    robot, rng = load_robot(f"{name}-pulleys"), np.random.default_rng(12)
+    box = robot.test_box
+    assert box is not None
+    positions = rng.uniform(box.low, box.high, size=(20, 3))
+    plan = inverse(robot, Pose.from_euler(positions, 0.0, 0.0, 0.0))
+    assert plan.feasible.mean() >= 0.9
+    away = Pose.from_euler(positions[plan.feasible] + 0.05, 0.02, 0.0, 0.0)
+    found = forward(robot, plan.unstrained_length[plan.feasible], start=away)
+    assert found.solved.all()
+    np.testing.assert_allclose(found.pose.position, positions[plan.feasible], rtol=0, atol=1e-9)
+    # the cable lies on the pulley: it is longer than from the anchor, by less than half the pulley's circumference
+    points = inverse(load_robot(name), Pose.from_euler(positions, 0.0, 0.0, 0.0), tension=plan.tension)
+    longer = (plan.unstrained_length - points.unstrained_length)[plan.feasible & points.feasible]
+    assert (np.abs(longer) < np.pi * PULLEYS[name]).all()
+    assert np.abs(longer).max() > 0.2 * PULLEYS[name]
