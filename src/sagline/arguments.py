@@ -39,6 +39,7 @@ HOW_TO_GET: Final = MappingProxyType(
         "Robot": 'Load one by its name or file: load_robot("cogiro").',
         "TensionMethod": "Give one of the methods, MinimumNorm() for instance.",
         "TensionPolygon": "Make one: tension_polygon(robot, pose).",
+        "Winch": "Give Winch(pulley_radius, dead_cable=...), or None.",
     }
 )
 LONGEST_TITLE: Final = 100  # letters of a name; it becomes part of file names

@@ -333,7 +333,7 @@ def strangers() -> list[Any]:
         plan = sl.inverse(robot, pose)
         path = sl.quintic_path([(0, 0, 1.5), (1, 1, 2)], durations=1.0, rate=3.0)
         _STRANGERS.extend((robot, robot.cables, pose, plan, plan.state, plan.state.cables, path, sl.confirm(plan)))
-        _STRANGERS.extend((sl.Catenary(), sl.MinimumNorm(), sl.PoseBox([0, 0, 0], [1, 1, 1])))
+        _STRANGERS.extend((sl.Catenary(), sl.MinimumNorm(), sl.PoseBox([0, 0, 0], [1, 1, 1]), sl.Winch()))
     return _STRANGERS
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import sagline as sl
+from sagline.robot.winch import RULES
 
 MAGIC = ("__getitem__",)  # of the methods with two underscores: those that a caller gives something
 
@@ -110,11 +111,13 @@ def _cables(given: _Given) -> dict[str, Call]:
     one, many = ("one", given.cable), ("array", [0.5, 0.75])
     ends = {"span": ("array", 12.0), "rise": ("array", -4.0)}
     gravity = ("number", 9.75)
+    rope = {"diameter": ("array", 0.25, True), "expansion": ("array", [-0.5, 0.5], True)}
     return {
-        "Cable": Call(sl.Cable, _all(linear_density=many, axial_stiffness=many)),
+        "Cable": Call(sl.Cable, _all(linear_density=many, axial_stiffness=many, **rope)),
         "Cable.from_material": Call(
-            sl.Cable.from_material, _all(linear_density=many, youngs_modulus=many, section_area=many)
+            sl.Cable.from_material, _all(linear_density=many, youngs_modulus=many, section_area=many, **rope)
         ),
+        "Cable.replace": Call(sl.Cable([0.5, 0.75], 4e4).replace, _all(linear_density=many, **rope)),
         "CableModel.from_tension": Call(
             sl.Catenary().from_tension, _all(cable=one, **ends, chord_tension=("array", [50.0, 100.0]), gravity=gravity)
         ),
@@ -139,6 +142,7 @@ def _robots(given: _Given) -> dict[str, Call]:
         "frame_anchors": ("array", robot.frame_anchors),
         "platform_anchors": ("array", robot.platform_anchors),
         "cables": ("one", robot.cables),
+        "winches": ("one", sl.Winch(0.05), True),
         "mass": ("number", 90.0),
         "inertia": ("array", np.diag([1.0, 2.0, 2.5])),
         "center_of_mass": ("array", [0.0, 0.125, 0.25]),
@@ -164,7 +168,15 @@ def _robots(given: _Given) -> dict[str, Call]:
         plane_normal=[0.0, 1.0, 0.0],
     )
     angle = ("array", [0.25, 0.5])
+    wound: dict[str, tuple[Any, ...]] = {
+        name: ("array", [2.0, 1.0], not rule.needed) for name, rule in RULES.items() if name != "dead_rise"
+    }
+    wound |= {"dead_rise": ("array", [0.5, -0.25]), "swivel_axis": ("array", [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])}
+    winch = sl.Winch(0.05, dead_cable=[3.0, 4.0])
     return {
+        "Winch": Call(sl.Winch, _all(**wound)),
+        "Winch.replace": Call(winch.replace, _all(**{name: wound[name] for name in ("gear", "drum_radius")})),
+        "Winch.per_cable": Call(sl.Winch(0.05).per_cable, _all(count=("whole", 3))),
         "Robot": Call(sl.Robot, _all(**fields)),
         "Robot.replace": Call(robot.replace, _all(**{name: fields[name] for name in ("mass", "tension_min", "name")})),
         "Robot: plane": Call(flat.replace, _all(plane_normal=("array", [0.0, 0.0, 2.0]))),

@@ -44,7 +44,25 @@ platform_anchors:
   - [0.1, -0.1, 0.2]
   - [0.1, 0.1, 0.2]
   - [-0.1, 0.1, 0.2]
-cables: {linear_density: 67 g/m, youngs_modulus: 2 GPa, section_area: [22 mm^2, 22e-6, 22 mm², 22e-6 m^2]}
+cables:
+  linear_density: 67 g/m
+  youngs_modulus: 2 GPa
+  section_area: [22 mm^2, 22e-6, 22 mm², 22e-6 m^2]
+  diameter: 6.5 mm
+  expansion: [-12e-6, 0, 1e-5 1/K, 0]
+winches:
+  pulley_radius: [40 mm, 0.05, 0, 4 cm]
+  swivel_axis: [up, [0, 0, 1], down, [0, 0, -2]]
+  dead_cable: [4, 3 m, 2.5, 3]
+  dead_rise: -2
+  drum_radius: 60 mm
+  groove_pitch: 6 mm
+  layers: [1, 2, 1, 1]
+  gear: [20, -20, 20, 20]
+  counts_per_turn: 131072
+  inertia: 0.277 kg cm^2
+  speed_limit: 3000 rpm
+  friction: 15
 mass: 12.5
 inertia: {Ixx: 0.5, Iyy: 0.6, Izz: 0.7, Ixy: 0.01}
 center_of_mass: [0, 0.01, -3 cm]
@@ -77,7 +95,8 @@ WIREX = """<?xml version="1.0" ?>
 <models version="0.32">
   <robot name="shelf" motionpattern="3R3T" generator="by hand">
     <geometry>
-      <chain id="1"><base x="-2" y="-1" z="3" radius="0.05" /><platform x="-0.1" y="-0.1" z="0.2" /></chain>
+      <chain id="1"><base x="-2" y="-1" z="3" a33="1" radius="0.05" />
+        <platform x="-0.1" y="-0.1" z="0.2" /></chain>
       <chain id="2" cable_id="2"><base x="2" y="-1" z="3" /><platform x="0.1" y="-0.1" z="0.2" /></chain>
       <chain id="3"><base x="0" y="1.5" z="3" radius="0" /><platform x="0" y="0.1" z="0.2" /></chain>
     </geometry>
@@ -88,7 +107,8 @@ WIREX = """<?xml version="1.0" ?>
   </robot>
   <cable name="thin" elasticity="2.5e10" radius="0.001" weight="0.01" minimum_load="4" breaking_load="900" />
   <cable name="thick" elasticity="1e10" radius="0.002" weight="0.03" minimum_load="6" breaking_load="2500" />
-  <winch name="small"><cable f_max="800" /></winch>
+  <winch name="small"><cable f_max="800" /><motor inertia="0.002" gear_ratio="0.1" />
+    <drum r_drum="0.06" l_drum="0.24" nr_groove="40" /></winch>
 </models>
 """
 
@@ -98,6 +118,9 @@ def _caspr_cable(name: str, frame: str, platform: str) -> str:
         f"<attachment><link>{k}</link><location>{place}</location></attachment>"
         for k, place in enumerate((frame, platform))
     )
+    if name == "a":
+        entry = "<cable_entry_vector>0 0 -1</cable_entry_vector><pulley_radius>0.04</pulley_radius></attachment>"
+        ends = ends.replace("</attachment>", entry, 1).replace("attachment>", "attachment_base_pulley>", 2)
     limits = "<force_min>5</force_min><force_max>300</force_max><K>9e4</K>"
     return (
         f'<cable_linear_spring name="{name}" attachment_reference="com"><properties>{limits}</properties>'

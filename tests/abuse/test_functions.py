@@ -102,7 +102,7 @@ def _fault_of_answer(result: Any) -> str:
         return "an answer of no real numbers"
     status = getattr(result, "status", np.zeros(1))
     told = np.any(np.asarray(status) != 0) if not isinstance(result, sl.Equilibria) else True
-    if not told and isinstance(result, sl.Pose | sl.Path | sl.Robot | sl.Cable):
+    if not told and isinstance(result, sl.Pose | sl.Path | sl.Robot | sl.Cable | sl.Winch):
         bad = [array for array in arrays if array.dtype.kind == "f" and np.isnan(array).any()]
         return f"an answer that is no number: {bad[0]}" if bad else ""
     return ""

@@ -64,6 +64,24 @@ def test_a_plan_comes_back_to_the_last_bit(
     assert_same(plan, sl.load_plan(str(tmp_path / "run.nc")))
 
 
+def test_winches_and_thick_cables_come_back(tmp_path: FilePath) -> None:
+    winches = sl.Winch(np.linspace(0.03, 0.1, 8), dead_cable=4.1, dead_rise=1 / 3, drum_radius=0.06, gear=-20)
+    thick = SUSPENDED.cables.replace(diameter=np.linspace(0.003, 0.004, 8), expansion=-1.1e-5)
+    robot = SUSPENDED.replace(winches=winches, cables=thick)
+    plan = sl.inverse(robot, sl.Pose.from_euler([[0.0, 0.0, 1.5], [1.0, 2.0, 1.5]], 0.0, 0.0, 0.0))
+    plan.save(tmp_path / "run.nc")
+    loaded = sl.load_plan(tmp_path / "run.nc")
+    assert_same(plan, loaded)
+    read = loaded.state.one_robot
+    for mine, theirs in ((robot.cables, read.cables), (robot.winches, read.winches)):
+        assert mine is not None
+        assert theirs is not None
+        assert {name: field.tobytes() for name, field in mine.known().items()} == {
+            name: field.tobytes() for name, field in theirs.known().items()
+        }
+    assert loaded.state.cables.cable is read.cables
+
+
 def test_what_a_reader_finds(saved: FilePath) -> None:
     plan = a_plan()
     with xr.open_dataset(saved, engine="h5netcdf") as data:

@@ -15,6 +15,7 @@ from sagline.files.robot_file import dump_robot, load_robot, parse_robot
 from sagline.robot.catalogue import robot_names
 from sagline.robot.pose_box import PoseBox
 from sagline.robot.robot import Robot
+from sagline.robot.winch import Winch
 
 TEXT = """
 name: pendulum
@@ -36,8 +37,10 @@ def edited(**changes: Any) -> str:
 
 def arrays_of(robot: Robot) -> dict[str, Any]:
     values = {field.name: getattr(robot, field.name) for field in fields(robot)}
-    cables, box = values.pop("cables"), values.pop("test_box")
-    values |= {"density": cables.linear_density, "stiffness": cables.axial_stiffness}
+    cables, box, winches = values.pop("cables"), values.pop("test_box"), values.pop("winches")
+    values |= {f"cables.{key}": field for key, field in cables.known().items()}
+    if winches is not None:
+        values |= {f"winches.{key}": field for key, field in winches.known().items()}
     return values if box is None else values | {"low": box.low, "high": box.high, "tilt": box.tilt}
 
 
@@ -80,6 +83,7 @@ QUANTITIES: dict[str, tuple[Any, Any]] = {
     "cables.section_area": (22e-6, "22 mm^2"),
     "cables.radius": (2e-3, "2 mm"),
     "cables.diameter": (4e-3, "0.4 cm"),
+    "cables.expansion": ([-1.2e-5, 0.0, 1.1e-5], ["-12e-6 1/K", 0, "0.011 1/kK"]),
     "inertia.matrix": (np.diag([0.1, 0.2, 0.25]).tolist(), [["1000 kg cm^2", 0, 0], [0, 0.2, 0], [0, 0, 0.25]]),
     "inertia.diagonal": ([0.1, 0.2, 0.25], ["100 g*m^2", 0.2, "2500 kg*cm^2"]),
     "inertia.Ixx": (0.1, "1000 kg*cm^2"),
@@ -90,6 +94,34 @@ QUANTITIES: dict[str, tuple[Any, Any]] = {
     "test_box.low": ([-1, -1, 1], ["-100 cm", -1, "1000 mm"]),
     "test_box.high": ([1, 1, 2], ["100 cm", 1, "2000 mm"]),
     "test_box.tilt": (0.1, "0.1 rad"),
+    "winches.pulley_radius": ([0.05, 0.0, 0.04], ["50 mm", 0, "4 cm"]),
+    "winches.swivel_axis": ([[0, 0, 1], [0, 0, -1], [0, 0, 2]], ["up", "down", [0, 0, "1"]]),
+    "winches.pulley_friction": (0.05, "0.05"),
+    "winches.dead_cable": ([4, 5.5, 3], ["400 cm", "5500 mm", 3]),
+    "winches.dead_rise": (-2.5, "-25 dm"),
+    "winches.drum_radius": (0.06, "60 mm"),
+    "winches.drum_width": (0.4, "40 cm"),
+    "winches.groove_pitch": (0.006, "6 mm"),
+    "winches.layers": ([1, 2, 1], [1, "2", 1]),
+    "winches.drum_distance": (0.8, "800 mm"),
+    "winches.drum_offset": (-0.06, "-60 mm"),
+    "winches.gear": ([20, -20, 12.5], [20, "-20", 12.5]),
+    "winches.counts_per_turn": (131072, "131072"),
+    "winches.count_zero": (-5000, "-5e3"),
+    "winches.length_zero": (7.5, "750 cm"),
+    "winches.cable_length": (30, "0.03 km"),
+    "winches.winding_tension": (50, "0.05 kN"),
+    "winches.inertia": (2.77e-5, "0.277 kg cm^2"),
+    "winches.torque_limit": (3.82, "382 N cm"),
+    "winches.speed_limit": (100 * np.pi, "3000 rpm"),
+    "winches.friction": (15, "0.015 kN"),
+    "winches.position_gain": (20, "0.02 1/ms"),
+    "winches.speed_gain": (900, "0.9 N s/mm"),
+    "winches.integral_gain": (4000, "4 N/mm"),
+    "winches.load_cell_range": (2000, "2 kN"),
+    "winches.load_cell_deviation": (2.5, "250 cN"),
+    "winches.load_cell_bias": (-1.5, "-1500 mN"),
+    "winches.load_cell_gain": (1.01, "1.01"),
 }
 BESIDE: dict[str, dict[str, Any]] = {
     "cables.linear_density": {"axial_stiffness": 1e4},
@@ -98,6 +130,7 @@ BESIDE: dict[str, dict[str, Any]] = {
     "cables.section_area": {"linear_density": 0.1, "youngs_modulus": 1e9},
     "cables.radius": {"linear_density": 0.1, "youngs_modulus": 1e9},
     "cables.diameter": {"linear_density": 0.1, "youngs_modulus": 1e9},
+    "cables.expansion": {"linear_density": 0.1, "axial_stiffness": 1e4},
     "inertia.matrix": {},
     "inertia.diagonal": {},
     "inertia.box": {},
@@ -108,12 +141,13 @@ BESIDE: dict[str, dict[str, Any]] = {
     "test_box.low": {"high": [1, 1, 2]},
     "test_box.high": {"low": [-1, -1, 1]},
     "test_box.tilt": {"low": [-1, -1, 1], "high": [1, 1, 2]},
+    "winches.dead_rise": {"dead_cable": 3},
 }
 
 
 def with_quantity(key: str, value: Any) -> Robot:
     outer, _, inner = key.partition(".")
-    return parse_robot(edited(**{outer: {**BESIDE[key], inner: value} if inner else value}), "robot.yaml")
+    return parse_robot(edited(**{outer: {**BESIDE.get(key, {}), inner: value} if inner else value}), "robot.yaml")
 
 
 @pytest.mark.parametrize("key", QUANTITIES)
@@ -128,6 +162,40 @@ def test_a_tilt_in_degrees() -> None:
     box = with_quantity("test_box.tilt", "30 deg").test_box
     assert box is not None
     assert box.tilt == pytest.approx(np.pi / 6, rel=1e-15)
+
+
+def test_the_block_has_every_field_of_the_winch() -> None:
+    assert {f"winches.{field.name}" for field in fields(Winch)} == {key for key in QUANTITIES if "winches" in key}
+
+
+@pytest.mark.parametrize(
+    ("section", "diameter"),
+    [
+        ({"axial_stiffness": 1e4}, None),
+        ({"axial_stiffness": 1e4, "diameter": "4 mm"}, 4e-3),
+        ({"youngs_modulus": 1e9, "section_area": 3e-6, "diameter": [0.003, 0.004, 0.005]}, [3e-3, 4e-3, 5e-3]),
+        ({"youngs_modulus": 1e9, "radius": "2 mm"}, 4e-3),
+        ({"youngs_modulus": 1e9, "diameter": "4 mm"}, 4e-3),
+    ],
+)
+def test_the_diameter_is_known_where_it_is_given(section: dict[str, object], diameter: object) -> None:
+    found = parse_robot(edited(cables={"linear_density": 0.1, **section}), "robot.yaml").cables.diameter
+    if diameter is None:
+        assert found is None
+    else:
+        assert found is not None
+        np.testing.assert_allclose(found, np.broadcast_to(np.array(diameter), 3), rtol=1e-15)
+
+
+def test_one_block_is_for_all_cables() -> None:
+    block = {"pulley_radius": "50 mm", "dead_cable": [4, 5, 6], "swivel_axis": "down", "gear": -20}
+    winches = parse_robot(edited(winches=block), "robot.yaml").winches
+    assert winches is not None
+    np.testing.assert_allclose(winches.pulley_radius, [0.05, 0.05, 0.05], rtol=1e-15)
+    np.testing.assert_array_equal(winches.dead_cable, [4, 5, 6])
+    np.testing.assert_array_equal(winches.swivel_axis, [[0, 0, -1]] * 3)
+    np.testing.assert_array_equal(winches.gear, [-20, -20, -20])
+    assert winches.drum_radius is None
 
 
 @pytest.mark.parametrize(
@@ -177,6 +245,39 @@ def test_ways_to_give_the_inertia(inertia: object, expected: object) -> None:
         ({"cables": {"linear_density": 1, "axial_stiffness": "5 Pa"}}, "cables.axial_stiffness is '5 Pa'"),
         ({"cables": {"linear_density": 1}}, "cables: stiffness is given by nothing; allowed: axial_stiffness; or"),
         ({"cables": {"linear_density": 1, "youngs_modulus": 1, "radius": -1}}, "cables.radius is -1 m"),
+        (
+            {"cables": {"linear_density": 1, "youngs_modulus": 1, "radius": 1, "diameter": 2}},
+            "given by diameter and radius and youngs_modulus",
+        ),
+        ({"cables": {"linear_density": 1, "axial_stiffness": 1, "diameter": "4 kg"}}, "cables.diameter is '4 kg'"),
+        ({"cables": {"linear_density": 1, "axial_stiffness": 1, "diameter": 0}}, "diameter is 0 m; allowed: > 0 m"),
+        (
+            {"cables": {"linear_density": [1, 1, 1], "axial_stiffness": 1, "expansion": [0, 0]}},
+            "expansion is not of one shape",
+        ),
+        ({"cables": {"linear_density": 1, "axial_stiffness": 1, "expansion": "1e-5"}, "mass": ...}, "mass is missing"),
+        (
+            {"winches": {"pulley_radius": "50 mm", "dead_cable": [1, 2]}},
+            "winches is 2 values; allowed: one value, or 3",
+        ),
+        (
+            {"winches": {"pulley_radius": [0.05, 0.05, 0.05], "dead_cable": [1, 2]}},
+            "winches: dead_cable is 2 values; allowed: one value, or 3, as pulley_radius has",
+        ),
+        ({"winches": {"drum_radiu": 1}}, "winches.drum_radiu is an unknown key.*mean drum_radius"),
+        ({"winches": {"pulley_radius": "50 kg"}}, "winches.pulley_radius is '50 kg'; allowed: a number in m"),
+        ({"winches": {"inertia": "3 kg m"}}, "winches.inertia is '3 kg m'"),
+        ({"winches": {"gear": [20, 0, 20]}}, "winches: gear\\[1\\] is 0; allowed: not 0. Give the encoder's turns"),
+        ({"winches": {"counts_per_turn": 0}}, "winches: counts_per_turn is 0; allowed: > 0"),
+        ({"winches": {"layers": [1, 1, 2.5]}}, "winches: layers\\[2\\] is 2.5; allowed: whole numbers"),
+        ({"winches": {"drum_radius": None}}, "winches.drum_radius is None"),
+        ({"winches": {"swivel_axis": "sideways"}}, "swivel_axis is 'sideways'; allowed: up, down, or a vector"),
+        ({"winches": {"swivel_axis": [0, 1, 1]}}, "winches: swivel_axis.*allowed: up or down.*not modeled"),
+        ({"winches": {"swivel_axis": [0, 0, 0]}}, "winches: swivel_axis is the zero vector"),
+        ({"winches": {"swivel_axis": ["up", "down"]}}, "winches is 2 values"),
+        ({"winches": {"dead_cable": 2, "dead_rise": [1, -3, 1]}}, "winches: dead_rise\\[1\\] is -3 m; allowed: within"),
+        ({"winches": 3}, "winches is 3; allowed: keys pulley_radius"),
+        ({"winches": []}, "winches is \\[\\]; allowed: keys pulley_radius"),
         ({"inertia": {"box": [1, 1, 1], "Ixx": 1}}, "inertia is given by Ixx and box; allowed: matrix; or"),
         ({"inertia": {"box": [1, 0, 1]}}, "inertia.box\\[1\\] is 0 m"),
         ({"inertia": ...}, "inertia is missing"),
@@ -237,6 +338,55 @@ def test_presets_survive_the_dump_bit_for_bit(name: str) -> None:
     assert_same(parse_robot(dump_robot(robot), "dump"), robot)
 
 
+def test_a_file_may_begin_with_a_preset() -> None:
+    cogiro = load_robot("cogiro")
+    text = "name: mine\nbase: cogiro\ncables: {linear_density: 0.07, axial_stiffness: 800 kN}\nassumed: {mass: a guess}"
+    robot = parse_robot(text, "robot.yaml")
+    np.testing.assert_allclose(robot.cables.axial_stiffness, np.full(8, 8e5), rtol=1e-15)
+    assert "cables" in cogiro.assumed
+    # what is given now is assumed no more
+    assert dict(robot.assumed) == {key: why for key, why in cogiro.assumed.items() if key != "cables"} | {
+        "mass": "a guess"
+    }
+    assert_same(robot.replace(cables=cogiro.cables, name="cogiro", assumed=cogiro.assumed), cogiro)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("base: cogiro", "name is missing. Add the key name"),
+        ("base: cogero\nname: x", "base is 'cogero'; allowed: article-mixed.*Did you mean cogiro"),
+        ("base: [cogiro]\nname: x", r"base is \['cogiro'\]; allowed: article-mixed.*Name one of them"),
+        ("base:\nname: x", "base is None; allowed"),
+        ("base: 3\nname: x", "base is 3; allowed"),
+        ("base: ../cogiro\nname: x", "base is '../cogiro'; allowed"),
+        ("base: cogiro\nname: x\nmas: 3", "mas is an unknown key.*mean mass"),
+        ("base: cogiro\nname: x\nassumed: 3", "assumed is 3"),
+        ("base: cogiro\nname: x\nframe_anchors: [[0, 0, 3]]", "platform_anchors is 8 points"),
+    ],
+)
+def test_a_base_that_will_not_do(text: str, message: str) -> None:
+    with pytest.raises(FileError, match=f"^robot.yaml: {message}"):
+        parse_robot(text, "robot.yaml")
+
+
+WINCH_KEYS = [key.partition(".")[2] for key in QUANTITIES if key.startswith("winches.")]
+
+
+@pytest.mark.parametrize("key", WINCH_KEYS)
+def test_a_row_too_few_or_a_wrong_unit_of_any_key_of_a_winch_is_named(key: str) -> None:
+    good, _ = QUANTITIES[f"winches.{key}"]
+    vector = key == "swivel_axis"
+    row = good[0] if vector else np.ravel(good)[0].item()
+    for count in (2, 4, 0):
+        with pytest.raises(FileError, match=rf"winches(: {key})? is ({count} values|of shape)"):
+            parse_robot(edited(winches={"dead_cable": 30, key: [row] * count}), "robot.yaml")
+    wrong: Any
+    for wrong in ("5 parsec^2", "fast", True, None, {}, [None] * 3, float("nan")):
+        with pytest.raises(FileError, match=rf"winches.{key}(\[0\])? is .*; allowed: "):
+            parse_robot(edited(winches={key: wrong}), "robot.yaml")
+
+
 NUMBER = st.floats(-1e9, 1e9)
 POSITIVE = st.floats(1e-12, 1e12)
 
@@ -249,16 +399,22 @@ POSITIVE = st.floats(1e-12, 1e12)
         lambda text: text == printable(text) and text.strip() != ""
     ),
     st.booleans(),
+    st.booleans(),
 )
 def test_any_robot_survives_the_dump_bit_for_bit(
-    points: list[float], positive: list[float], text: str, planar: bool
+    points: list[float], positive: list[float], text: str, planar: bool, wound: bool
 ) -> None:
+    drum: dict[str, Any] = (
+        {"drum_radius": positive[:2], "gear": -positive[2], "count_zero": points[:2], "layers": [1, 3]} if wound else {}
+    )
+    winches = Winch(positive[4:], dead_rise=-0.0, swivel_axis=[[0, 0, 1], [0, 0, -1]], inertia=positive[0], **drum)
     robot = Robot(
         text,
         np.reshape(points[:6], (2, 3)),
         np.reshape(points[6:], (2, 3)),
-        Cable(positive[:2], positive[2:4]),
+        Cable(positive[:2], positive[2:4], diameter=positive[1:3] if wound else None, expansion=points[:2]),
         positive[4],
+        winches=winches if planar or wound else None,
         motion_pattern="2T" if planar else "3T",
         plane_normal=[1.0, *points[:2]] if planar else None,  # what is all but zero is no direction
         center_of_mass=points[3:6],

@@ -123,4 +123,4 @@ def vertical_and_level() -> Erratum:
 def simulated_cable() -> Cable:
     """The simulation's cable."""
     cables = load_robot(ROBOTS[0]).cables
-    return Cable(cables.linear_density[0], cables.axial_stiffness[0])
+    return cables._part(0, cables.linear_density.shape)

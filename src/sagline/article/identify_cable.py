@@ -186,11 +186,8 @@ def _fit(data: _Measured, names: tuple[str, ...], known: Cable, length_error: fl
 
     def cable_of(x: Array) -> tuple[Cable, float]:
         given = dict(zip(names, x, strict=True))
-        density, stiffness = (
-            np.exp(given[name]) if name in given else getattr(known, name)
-            for name in ("linear_density", "axial_stiffness")
-        )
-        return Cable(density, stiffness), 1e-3 * float(given.get("length_offset", 0.0))
+        offset = 1e-3 * float(given.pop("length_offset", 0.0))
+        return known.replace(**{name: np.exp(logarithm) for name, logarithm in given.items()}), offset
 
     def residuals(x: Array) -> Array:
         cable, offset = cable_of(x)

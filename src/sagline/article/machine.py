@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 
 from sagline.arrays import Array
-from sagline.cables.cable import Cable
 from sagline.errors import InvalidValueError
 from sagline.kinematics.forward import forward
 from sagline.kinematics.inverse import inverse
@@ -100,12 +99,14 @@ def _with_robot(machine: Machine, **changes: object) -> Machine:
 
 def _modulus(machine: Machine, percent: float) -> Machine:
     cables = machine.robot.cables
-    return _with_robot(machine, cables=Cable(cables.linear_density, cables.axial_stiffness * (1.0 + 0.01 * percent)))
+    changed = cables.replace(axial_stiffness=cables.axial_stiffness * (1.0 + 0.01 * percent))
+    return _with_robot(machine, cables=changed)
 
 
 def _density(machine: Machine, percent: float) -> Machine:
     cables = machine.robot.cables
-    return _with_robot(machine, cables=Cable(cables.linear_density * (1.0 + 0.01 * percent), cables.axial_stiffness))
+    changed = cables.replace(linear_density=cables.linear_density * (1.0 + 0.01 * percent))
+    return _with_robot(machine, cables=changed)
 
 
 def _load(machine: Machine, kilograms: float) -> Machine:

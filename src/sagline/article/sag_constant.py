@@ -142,7 +142,7 @@ def stretch_study(cable: Cable, end: End, tensions: Array) -> StretchStudy:
         Gia Luan & Truong Thinh 2020, (33) to (38), figures 8 and 9.
     """
     model, chord_tension = Catenary(), tensions * end.chord / end.span
-    stiff = model.from_tension(Cable(cable.linear_density, UNSTRETCHABLE), *end, chord_tension, GRAVITY)
+    stiff = model.from_tension(cable.replace(axial_stiffness=UNSTRETCHABLE), *end, chord_tension, GRAVITY)
     soft = model.from_tension(cable, *end, chord_tension, GRAVITY)
     mean_force = np.hypot(soft.horizontal_tension, soft.vertical_force - 0.5 * soft.cable_weight)
     stretch = soft.unstrained_length / cable.axial_stiffness

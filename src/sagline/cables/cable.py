@@ -1,25 +1,30 @@
-"""The material of a cable: what it weighs and how stiff it is."""
+"""The material of a cable: what it weighs, how stiff it is, and how thick where that is known."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sagline.arguments import choice
 from sagline.arrays import Array, broadcast_shape, checked, locked
 from sagline.memory import check_memory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cable:
-    """One cable's material, or that of many: both fields share one shape.
+    """One cable's material, or that of many: every field that is given has one shape.
 
     Attributes:
         linear_density: Mass per unstrained length [kg/m], shape (...), >= 0.
         axial_stiffness: Young's modulus times section area EA [N], shape (...), > 0.
+        diameter: Diameter of the rope [m], shape (...), > 0; None where it is not known. What is wound on a drum needs
+            it, and nothing that hangs.
+        expansion: Coefficient of thermal expansion [1/K], shape (...), negative for most fibers; None where it is not
+            known.
 
     Examples:
         Braided fiber of 67 g/m and 44 kN, and two cables at once:
@@ -35,38 +40,70 @@ class Cable:
 
     linear_density: Array
     axial_stiffness: Array
+    diameter: Array | None
+    expansion: Array | None
 
-    def __init__(self, linear_density: ArrayLike, axial_stiffness: ArrayLike) -> None:
-        """Check and broadcast the two fields.
+    def __init__(
+        self,
+        linear_density: ArrayLike,
+        axial_stiffness: ArrayLike,
+        *,
+        diameter: ArrayLike | None = None,
+        expansion: ArrayLike | None = None,
+    ) -> None:
+        """Check and broadcast the fields.
 
         Args:
             linear_density: Mass per unstrained length [kg/m], shape (...), >= 0.
             axial_stiffness: EA [N], > 0; a shape that broadcasts with that of linear_density.
+            diameter: [m], > 0, a shape that broadcasts with the others, or None.
+            expansion: [1/K], a shape that broadcasts with the others, or None.
 
         Raises:
-            InvalidValueError: If a density is negative, a stiffness not positive, or the shapes do not broadcast.
+            InvalidValueError: If a density is negative, a stiffness or a diameter not positive, or the shapes do not
+                broadcast.
         """
-        density = checked(linear_density, "linear_density", "kg/m", low=0.0)
-        stiffness = checked(axial_stiffness, "axial_stiffness", "N", above=0.0)
-        shape = broadcast_shape("linear_density and axial_stiffness", density.shape, stiffness.shape)
-        check_memory("linear_density and axial_stiffness", 16.0 * math.prod(shape), "Give fewer cables.")
-        for name, field in (("linear_density", density), ("axial_stiffness", stiffness)):
-            object.__setattr__(self, name, locked(np.array(np.broadcast_to(field, shape), order="C")))
+        values = {
+            "linear_density": checked(linear_density, "linear_density", "kg/m", low=0.0),
+            "axial_stiffness": checked(axial_stiffness, "axial_stiffness", "N", above=0.0),
+        }
+        if diameter is not None:
+            values["diameter"] = checked(diameter, "diameter", "m", above=0.0)
+        if expansion is not None:
+            values["expansion"] = checked(expansion, "expansion", "1/K")
+        item = " and ".join(values)
+        shape = broadcast_shape(item, *(field.shape for field in values.values()))
+        check_memory(item, 8.0 * len(values) * math.prod(shape), "Give fewer cables.")
+        for name in self.__slots__:
+            field = values.get(name)
+            whole = None if field is None else locked(np.array(np.broadcast_to(field, shape), order="C"))
+            object.__setattr__(self, name, whole)
 
     @classmethod
-    def from_material(cls, linear_density: ArrayLike, youngs_modulus: ArrayLike, section_area: ArrayLike) -> Cable:
-        """A cable from its Young's modulus and section area; all three arguments broadcast to one shape (...).
+    def from_material(
+        cls,
+        linear_density: ArrayLike,
+        youngs_modulus: ArrayLike,
+        section_area: ArrayLike,
+        *,
+        diameter: ArrayLike | None = None,
+        expansion: ArrayLike | None = None,
+    ) -> Cable:
+        """A cable from its Young's modulus and section area; all arguments broadcast to one shape (...).
 
         Args:
             linear_density: Mass per unstrained length [kg/m], >= 0.
             youngs_modulus: E [Pa], > 0: of the rope as a whole, which is below that of its fibers or wires.
             section_area: A [m^2], > 0: what E was measured on, for a rope usually its fibers or metal alone.
+            diameter: Of the rope [m], > 0; None where it is not known. No section area follows from it.
+            expansion: Thermal expansion [1/K], or None.
 
         Returns:
             Cable of axial stiffness EA.
 
         Raises:
-            InvalidValueError: If a density is negative, a modulus or area not positive, or the shapes do not broadcast.
+            InvalidValueError: If a density is negative, a modulus, area or diameter not positive, or the shapes do not
+                broadcast.
 
         Examples:
             >>> import sagline as sl
@@ -79,7 +116,38 @@ class Cable:
         modulus = checked(youngs_modulus, "youngs_modulus", "Pa", above=0.0)
         area = checked(section_area, "section_area", "m^2", above=0.0)
         broadcast_shape("youngs_modulus and section_area", modulus.shape, area.shape)
-        return cls(linear_density, modulus * area)
+        return cls(linear_density, modulus * area, diameter=diameter, expansion=expansion)
+
+    def replace(self, **changes: Any) -> Cable:
+        """A cable with some fields changed, checked like a new one.
+
+        Args:
+            changes: Fields of `Cable` and their new values.
+
+        Returns:
+            A new cable; this one stays as it is.
+
+        Raises:
+            InvalidValueError: If there is no such field, or the new values are none the constructor accepts.
+
+        Examples:
+            >>> import sagline as sl
+            >>> rope = sl.Cable(0.067, 44e3, diameter=0.006)
+            >>> worn = rope.replace(axial_stiffness=0.9 * rope.axial_stiffness)
+            >>> print(worn.axial_stiffness, worn.diameter)
+            39600.0 0.006
+        """
+        for field in changes:
+            choice(field, "field", self.__slots__)
+        return replace(self, **changes)
+
+    def known(self) -> dict[str, Array]:
+        """The fields that are known, by their names.
+
+        Returns:
+            linear_density and axial_stiffness, and of diameter and expansion those that are not None.
+        """
+        return {name: field for name in self.__slots__ if (field := getattr(self, name)) is not None}
 
     def _part(self, index: int | slice | NDArray[Any], shape: tuple[int, ...]) -> Cable:
         """The material of a part of a batch of that shape; one without the batch's first axis stays what it is."""
@@ -87,11 +155,17 @@ class Cable:
         if len(own) < len(shape):
             return self
         part = object.__new__(Cable)
-        for name in ("linear_density", "axial_stiffness"):
-            field = np.broadcast_to(getattr(self, name), (shape[0], *own[1:]))
-            object.__setattr__(part, name, locked(field[index, ...]))
+        for name in self.__slots__:
+            field = getattr(self, name)
+            if field is not None:
+                field = locked(np.broadcast_to(field, (shape[0], *own[1:]))[index, ...])
+            object.__setattr__(part, name, field)
         return part
 
-    def __reduce__(self) -> tuple[type[Cable], tuple[Array, Array]]:
+    def __reduce__(self) -> tuple[Any, tuple[dict[str, Array]]]:
         """Pickle through the constructor, so that a loaded cable is checked and locked too."""
-        return Cable, (self.linear_density, self.axial_stiffness)
+        return _from_fields, (self.known(),)
+
+
+def _from_fields(values: dict[str, Array]) -> Cable:
+    return Cable(**values)

@@ -47,7 +47,7 @@ class Rope:
             InvalidValueError: If the diameter is not one positive number.
         """
         square = float(checked(diameter, "diameter", "m", shape=(), above=0.0)) ** 2
-        return Cable(self.density_factor * square, self.stiffness_factor * square)
+        return Cable(self.density_factor * square, self.stiffness_factor * square, diameter=diameter)
 
     def breaking_force(self, diameter: float) -> float:
         """Least force at which a new rope breaks.

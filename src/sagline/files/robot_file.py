@@ -6,16 +6,15 @@ import os
 from pathlib import Path
 from typing import Any
 
-import yaml
-
-from sagline.arguments import file_path, instance
-from sagline.errors import FileError, InvalidValueError
-from sagline.files.robot_schema import RobotEntry
+from sagline.arguments import brief, file_path, instance
+from sagline.errors import FileError, InvalidValueError, nearest
+from sagline.files.robot_schema import SWIVEL_AXES, RobotEntry
 from sagline.files.schema import validated
 from sagline.files.text import exists, read_text
-from sagline.files.yaml_text import YAML_LIMIT, parse_mapping
+from sagline.files.yaml_text import YAML_LIMIT, dump_mapping, parse_mapping
 from sagline.robot.catalogue import preset_text, robot_names
 from sagline.robot.robot import Robot
+from sagline.robot.winch import Winch
 
 
 def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
@@ -28,11 +27,17 @@ def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
         platform_anchors: [[-0.1, 0, 0.1], ...]
         cables: {linear_density: 67 g/m, youngs_modulus: 2 GPa, section_area: 22 mm^2}
             # or axial_stiffness; radius or diameter instead of section_area; a number, or a list of one a cable
+            # beside them diameter, which drums need, and expansion [1/K]
+        winches: {pulley_radius: 50 mm, swivel_axis: up, drum_radius: 60 mm, gear: 20, counts_per_turn: 131072}
+            # its keys are the fields of `Winch`: one value for all cables, or a list of one a cable
         mass: 50 kg
         inertia: {box: [0.3, 0.3, 0.5]}
             # or cylinder_radius and cylinder_height (along z), Ixx ... Iyz, three numbers, or a 3 x 3 matrix
         tension_min: 20 N
         assumed: {tension_min: the winch's data sheet gives none}
+
+    A file may begin with a preset and say what is other, `base: cogiro` beside its own name: what it does not say is
+    the preset's, and so is what is assumed of that.
 
     Args:
         name_or_path: One of `robot_names()`, or the path of a file. A path object, and a text that ends in .yaml
@@ -70,7 +75,7 @@ def parse_robot(text: str, origin: Path | str) -> Robot:
     Raises:
         FileError: If the text is no robot file; the message names the line, or the key and the value.
     """
-    entry = validated(parse_mapping(text, origin), RobotEntry, origin)
+    entry = validated(_on_base(parse_mapping(text, origin), origin), RobotEntry, origin)
     try:
         return entry.robot()
     except InvalidValueError as error:
@@ -94,7 +99,9 @@ def dump_robot(robot: Robot) -> str:
     instance(robot, Robot, "robot")
     data: dict[str, Any] = {"name": robot.name, "source": robot.source, "notes": robot.notes}
     data["assumed"] = dict(robot.assumed)
-    data["cables"] = {key: getattr(robot.cables, key).tolist() for key in ("linear_density", "axial_stiffness")}
+    data["cables"] = {key: field.tolist() for key, field in robot.cables.known().items()}
+    if robot.winches is not None:
+        data["winches"] = _winches(robot.winches)
     for key in ("mass", "gravity", "motion_pattern", "tension_limits_of"):
         data[key] = getattr(robot, key)
     for key in ("inertia", "center_of_mass", "tension_min", "tension_max", "frame_anchors", "platform_anchors"):
@@ -104,7 +111,37 @@ def dump_robot(robot: Robot) -> str:
             data[key] = value.tolist()
     if (box := robot.test_box) is not None:
         data["test_box"] = {"low": box.low.tolist(), "high": box.high.tolist(), "tilt": box.tilt}
-    return yaml.safe_dump(data, sort_keys=False, default_flow_style=None, allow_unicode=True, width=120)
+    return dump_mapping(data)
+
+
+def _on_base(data: dict[Any, Any], origin: Path | str) -> dict[Any, Any]:
+    """A file's keys over those of the preset that it names as its base, if it does."""
+    if "base" not in data:
+        return data
+    name = data.pop("base")
+    if name not in robot_names():
+        near = nearest(name, robot_names()) if isinstance(name, str) else None
+        step = f"Did you mean {near}?" if near else "Name one of them, or leave base out."
+        raise FileError(origin, f"base is {brief(name)}; allowed: {', '.join(robot_names())}", step)
+    base = _on_base(parse_mapping(preset_text(name), f"preset {name}"), origin)
+    del base["name"]  # two robots of one name would overwrite each other's files
+    assumed = {field: why for field, why in base.get("assumed", {}).items() if field not in data}
+    own = data.get("assumed", {})
+    return {**base, **data, "assumed": {**assumed, **own} if isinstance(own, dict) else own}
+
+
+def _winches(winches: Winch) -> dict[str, Any]:
+    """What a file must say of winches: what a winch of nothing but pulleys does not have anyway."""
+    plain = Winch().per_cable(len(winches.pulley_radius)).known()
+    data = {
+        key: field.tolist()
+        for key, field in winches.known().items()
+        if key == "pulley_radius" or key not in plain or field.tobytes() != plain[key].tobytes()
+    }
+    if "swivel_axis" in data:
+        words = {tuple(axis): word for word, axis in SWIVEL_AXES.items()}
+        data["swivel_axis"] = [words[tuple(axis)] for axis in data["swivel_axis"]]
+    return data
 
 
 def _is_name(text: str, path: Path) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import reprlib
 from typing import Any, Final
 
 import numpy as np
@@ -10,11 +11,12 @@ from pydantic import Field, model_validator
 from sagline.arrays import Array, checked, exactly, number
 from sagline.cables.cable import Cable
 from sagline.errors import InvalidValueError
-from sagline.files.quantity import in_si
+from sagline.files.quantity import in_si, plain_number
 from sagline.files.schema import Entry
 from sagline.robot.inertia import box_inertia, cylinder_inertia
 from sagline.robot.pose_box import PoseBox
 from sagline.robot.robot import Robot
+from sagline.robot.winch import RULES, Winch
 
 _UNITS: Final = {
     "frame_anchors": "m",
@@ -33,13 +35,17 @@ _UNITS: Final = {
     "cables.section_area": "m^2",
     "cables.radius": "m",
     "cables.diameter": "m",
+    "cables.expansion": "1/K",
     "inertia.box": "m",
     "inertia.cylinder_radius": "m",
     "inertia.cylinder_height": "m",
     "test_box.low": "m",
     "test_box.high": "m",
     "test_box.tilt": "rad",
+    "winches.swivel_axis": "",
+    **{f"winches.{name}": rule.unit for name, rule in RULES.items()},
 }  # every other key of inertia is in kg m^2
+SWIVEL_AXES: Final = {"up": [0.0, 0.0, 1.0], "down": [0.0, 0.0, -1.0]}  # the words for the axes that there are
 
 
 class _RobotPart(Entry):
@@ -73,19 +79,77 @@ class _Cables(_RobotPart):
     section_area: Any = None
     radius: Any = None
     diameter: Any = None
+    expansion: Any = None
 
     def cable(self) -> Cable:
-        """The cables, from whichever way their stiffness is given."""
+        """The cables, from whichever way their stiffness is given; a diameter gives it where nothing else does."""
         ways = (("axial_stiffness",), *(("youngs_modulus", key) for key in ("section_area", "radius", "diameter")))
-        *_, section = self.only_way("cables: stiffness", ways, beside=("linear_density",))
+        beside = ["linear_density", "expansion"]
+        if self.model_fields_set & {"axial_stiffness", "section_area"}:
+            beside.append("diameter")
+        *_, section = self.only_way("cables: stiffness", ways, beside=tuple(beside))
         density = self.given("linear_density", "cables.")
         width = self.given(section, "cables.")
+        known = {key: self.given(key, "cables.") for key in ("diameter", "expansion") if key in self.model_fields_set}
         if section == "axial_stiffness":
-            return Cable(density, width)
+            return Cable(density, width, **known)
         if section != "section_area":
             radius = checked(width, f"cables.{section}", "m", above=0.0) * (0.5 if section == "diameter" else 1.0)
+            known.setdefault("diameter", 2.0 * radius)
             width = np.pi * radius**2
-        return Cable.from_material(density, self.given("youngs_modulus", "cables."), width)
+        return Cable.from_material(density, self.given("youngs_modulus", "cables."), width, **known)
+
+
+class _Winches(_RobotPart):
+    """The machine behind the frame anchors; each value one number for all cables, or a list."""
+
+    pulley_radius: Any = None
+    swivel_axis: Any = None
+    pulley_friction: Any = None
+    dead_cable: Any = None
+    dead_rise: Any = None
+    drum_radius: Any = None
+    drum_width: Any = None
+    groove_pitch: Any = None
+    layers: Any = None
+    drum_distance: Any = None
+    drum_offset: Any = None
+    gear: Any = None
+    counts_per_turn: Any = None
+    count_zero: Any = None
+    length_zero: Any = None
+    cable_length: Any = None
+    winding_tension: Any = None
+    inertia: Any = None
+    torque_limit: Any = None
+    speed_limit: Any = None
+    friction: Any = None
+    position_gain: Any = None
+    speed_gain: Any = None
+    integral_gain: Any = None
+    load_cell_range: Any = None
+    load_cell_deviation: Any = None
+    load_cell_bias: Any = None
+    load_cell_gain: Any = None
+
+    def winches(self) -> Winch:
+        """The winches; what is left out takes the winch's own default."""
+        if "swivel_axis" in self.model_fields_set:
+            self.swivel_axis = _vectors(self.swivel_axis)
+        keys = [key for key in _Winches.model_fields if key in self.model_fields_set]
+        return Winch(**{key: self.given(key, "winches.") for key in keys})
+
+
+def _vectors(value: object) -> object:
+    """Swivel axes whose words, for all cables or in a list, have become vectors."""
+    if isinstance(value, list):
+        return [_vectors(entry) for entry in value]
+    if not isinstance(value, str) or plain_number(value) is not None:
+        return value
+    if value not in SWIVEL_AXES:
+        allowed = f"{', '.join(SWIVEL_AXES)}, or a vector of three numbers"
+        raise InvalidValueError("winches.swivel_axis", reprlib.repr(value), allowed, "Say which way the cable enters.")
+    return SWIVEL_AXES[value]
 
 
 class _Inertia(_RobotPart):
@@ -147,6 +211,7 @@ class RobotEntry(_RobotPart):
     frame_anchors: Any
     platform_anchors: Any
     cables: _Cables
+    winches: _Winches | None = None
     mass: Any
     inertia: _Inertia | None = None
     center_of_mass: Any = None
@@ -174,6 +239,8 @@ class RobotEntry(_RobotPart):
         """
         fields = {key: self.given(key) if key in _UNITS else getattr(self, key) for key in self.model_fields_set}
         fields["cables"] = self.cables.cable()
+        if self.winches is not None:
+            fields["winches"] = self.winches.winches()
         if self.inertia is not None:
             mass = number(fields["mass"], "mass", "kg", above=0.0)
             fields["inertia"] = self.inertia.about_center(mass)

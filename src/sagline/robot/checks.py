@@ -75,16 +75,15 @@ def cables(given: Cable, count: int) -> Cable:
         InvalidValueError: If it is no Cable, has another count, or a cable weighs nothing.
     """
     instance(given, Cable, "cables")
-    density = per_cable(given.linear_density, "cables: linear_density", count)
-    stiffness = per_cable(given.axial_stiffness, "cables: axial_stiffness", count)
-    if not density.all():
+    fields = {name: per_cable(field, f"cables: {name}", count) for name, field in given.known().items()}
+    if not (density := fields["linear_density"]).all():
         raise InvalidValueError(
             f"cables: linear_density[{int(np.argmin(density))}]",
             "0 kg/m",
             "> 0 kg/m",
             "Give the cable's mass per length; to leave its weight out, compute with the model Elastic or Straight.",
         )
-    return Cable(density, stiffness)
+    return given.replace(**fields)
 
 
 def winches(given: Winch | None, count: int) -> Winch | None:

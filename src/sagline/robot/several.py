@@ -143,12 +143,13 @@ def cables_of(robot: Robots) -> Cable:
         robot: The robot or robots.
 
     Returns:
-        Cable with fields of shape (m,), or (N, m) for several robots.
+        Cable with fields of shape (m,), or (N, m) for several robots; of these a field is known where all know it.
     """
     if isinstance(robot, Robot):
         return robot.cables
-    materials = [one.cables for one in robot]
-    return Cable([c.linear_density for c in materials], [c.axial_stiffness for c in materials])
+    materials = [one.cables.known() for one in robot]
+    names = [name for name in materials[0] if all(name in material for material in materials)]
+    return Cable(**{name: np.stack([material[name] for material in materials]) for name in names})
 
 
 def anything_behind(robot: Robots) -> bool:

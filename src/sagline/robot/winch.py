@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from sagline.arrays import Array, broadcast_shape, checked, locked
+from sagline.arguments import choice, whole_number
+from sagline.arrays import Array, checked, locked
 from sagline.errors import InvalidValueError
+from sagline.memory import check_memory
 from sagline.robot.unit import unit
 
 UPRIGHT: Final = 1e-9  # how far from vertical a swivel axis may be, as the sine of an angle
@@ -24,43 +26,45 @@ class Rule(NamedTuple):
         unit: Their unit.
         low: The least value, or None.
         above: A bound they must exceed, or None.
+        needed: Whether the field cannot be left unknown, None.
     """
 
     unit: str
     low: float | None = None
     above: float | None = None
+    needed: bool = False
 
 
 # every field but the swivel axis, in order
 RULES: Final[Mapping[str, Rule]] = MappingProxyType(
     {
-        "pulley_radius": Rule("m", low=0.0),
-        "pulley_friction": Rule("", low=0.0),
-        "dead_cable": Rule("m", low=0.0),
-        "dead_rise": Rule("m"),
+        "pulley_radius": Rule("m", low=0.0, needed=True),
+        "pulley_friction": Rule("", low=0.0, needed=True),
+        "dead_cable": Rule("m", low=0.0, needed=True),
+        "dead_rise": Rule("m", needed=True),
         "drum_radius": Rule("m", above=0.0),
         "drum_width": Rule("m", above=0.0),
         "groove_pitch": Rule("m", above=0.0),
-        "layers": Rule("", low=1.0),
+        "layers": Rule("", low=1.0, needed=True),
         "drum_distance": Rule("m", above=0.0),
-        "drum_offset": Rule("m"),
-        "gear": Rule(""),
+        "drum_offset": Rule("m", needed=True),
+        "gear": Rule("", needed=True),
         "counts_per_turn": Rule("", above=0.0),
-        "count_zero": Rule(""),
+        "count_zero": Rule("", needed=True),
         "length_zero": Rule("m", above=0.0),
         "cable_length": Rule("m", above=0.0),
-        "winding_tension": Rule("N", low=0.0),
+        "winding_tension": Rule("N", low=0.0, needed=True),
         "inertia": Rule("kg m^2", above=0.0),
         "torque_limit": Rule("N m", above=0.0),
         "speed_limit": Rule("rad/s", above=0.0),
-        "friction": Rule("N", low=0.0),
+        "friction": Rule("N", low=0.0, needed=True),
         "position_gain": Rule("1/s", low=0.0),
         "speed_gain": Rule("N s/m", low=0.0),
         "integral_gain": Rule("N/m", low=0.0),
         "load_cell_range": Rule("N", above=0.0),
-        "load_cell_deviation": Rule("N", low=0.0),
-        "load_cell_bias": Rule("N"),
-        "load_cell_gain": Rule("", above=0.0),
+        "load_cell_deviation": Rule("N", low=0.0, needed=True),
+        "load_cell_bias": Rule("N", needed=True),
+        "load_cell_gain": Rule("", above=0.0, needed=True),
     }
 )
 
@@ -209,12 +213,12 @@ class Winch:
             >>> winch.pulley_radius
             array([0.05, 0.05])
         """
-        given = {name: value for name, value in locals().items() if name in RULES and value is not None}
-        values = {name: _checked(value, name) for name, value in given.items()}
+        given = locals()
+        values = {
+            name: _checked(given[name], name) for name, rule in RULES.items() if rule.needed or given[name] is not None
+        }
         axis = _vertical(swivel_axis)
-        shape = broadcast_shape("winches", axis.shape[:-1], *(value.shape for value in values.values()))
-        if len(shape) > 1:
-            raise InvalidValueError("winches", f"of shape {shape}", "shape () or (m,)", "Give one value a cable.")
+        shape = _shape({name: value.shape for name, value in values.items()} | {"swivel_axis": axis.shape[:-1]})
         for name in RULES:
             value = None if name not in values else locked(np.array(np.broadcast_to(values[name], shape)))
             object.__setattr__(self, name, value)
@@ -241,20 +245,57 @@ class Winch:
             Winch with fields of shape (m,).
 
         Raises:
-            InvalidValueError: If the fields have another length.
+            InvalidValueError: If the fields have another length, or the count is no whole number >= 1.
         """
+        count = whole_number(count, "count", 1)
+        check_memory("winches", 8.0 * len(RULES) * count, "Give fewer cables.")
         if self.shape not in ((), (1,), (count,)):
             allowed = f"one value, or {count}, one a cable"
             raise InvalidValueError("winches", f"{self.shape[0]} values", allowed, "Give every cable its winch.")
         if self.shape == (count,):
             return self
-        fields = {name: getattr(self, name) for name in RULES}
-        spread = {name: np.broadcast_to(value, (count,)) for name, value in fields.items() if value is not None}
-        return Winch(**spread, swivel_axis=np.broadcast_to(self.swivel_axis, (count, 3)))
+        length = len(self.shape)
+        return self.replace(
+            **{name: np.broadcast_to(field, (count, *field.shape[length:])) for name, field in self.known().items()}
+        )
+
+    def _part(self, index: NDArray[Any]) -> Winch:
+        """The winches of some of the cables, of fields of shape (m,)."""
+        return self.replace(**{name: field[index] for name, field in self.known().items()})
+
+    def replace(self, **changes: Any) -> Winch:
+        """A winch with some fields changed, checked like a new one.
+
+        Args:
+            changes: Fields of `Winch` and their new values.
+
+        Returns:
+            A new winch; this one stays as it is.
+
+        Raises:
+            InvalidValueError: If there is no such field, or the new values are none the constructor accepts.
+
+        Examples:
+            >>> import sagline as sl
+            >>> winch = sl.Winch(pulley_radius=0.05, dead_cable=[4.0, 5.0])
+            >>> winch.replace(pulley_radius=0.06).pulley_radius
+            array([0.06, 0.06])
+        """
+        for field in changes:
+            choice(field, "field", self.__slots__)
+        return replace(self, **changes)
+
+    def known(self) -> dict[str, Array]:
+        """The fields that are known, by their names, in order.
+
+        Returns:
+            Those that are not None.
+        """
+        return {name: field for name in self.__slots__ if (field := getattr(self, name)) is not None}
 
     def __reduce__(self) -> tuple[Any, tuple[dict[str, Any]]]:
         """Pickle through the constructor, so that a loaded winch is checked and locked too."""
-        return _from_fields, ({name: getattr(self, name) for name in self.__slots__},)
+        return _from_fields, (self.known(),)
 
 
 def _from_fields(values: dict[str, Any]) -> Winch:
@@ -266,12 +307,29 @@ def _checked(value: ArrayLike, name: str) -> Array:
     rule, item = RULES[name], f"winches: {name}"
     low, above = (-np.inf if bound is None else bound for bound in (rule.low, rule.above))
     array = checked(value, item, rule.unit, low=low, above=above)
-    if name == "layers" and (array != np.floor(array)).any():
-        raise InvalidValueError(item, array, "whole numbers", "Give how many layers the drum takes.")
-    if name == "gear" and not array.all():
+    wrong = array != np.floor(array) if name == "layers" else array == 0.0 if name == "gear" else np.zeros(array.shape)
+    if wrong.any():
+        index = tuple(int(i) for i in np.argwhere(wrong)[0])
+        if index:
+            item += f"[{', '.join(map(str, index))}]"
+        if name == "layers":
+            raise InvalidValueError(item, f"{array[index]:g}", "whole numbers", "Give how many layers the drum takes.")
         step = "Give the encoder's turns for one of the drum; negative where counts fall as cable is let out."
         raise InvalidValueError(item, "0", "not 0", step)
     return array
+
+
+def _shape(shapes: dict[str, tuple[int, ...]]) -> tuple[int, ...]:
+    """The one shape of all fields, () or (m,)."""
+    longest = max(shapes, key=lambda name: shapes[name])
+    for name, shape in shapes.items():
+        if len(shape) > 1 or 0 in shape:
+            step = "Give one value, or one a cable."
+            raise InvalidValueError(f"winches: {name}", f"of shape {shape}", "shape () or (m,)", step)
+        if shape not in ((), (1,), shapes[longest]):
+            allowed = f"one value, or {shapes[longest][0]}, as {longest} has"
+            raise InvalidValueError(f"winches: {name}", f"{shape[0]} values", allowed, "Give one value a cable.")
+    return shapes[longest]
 
 
 def _vertical(given: ArrayLike) -> Array:

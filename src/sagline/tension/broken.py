@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from sagline.arguments import instance, whole_number
-from sagline.cables.cable import Cable
 from sagline.errors import InvalidValueError
 from sagline.robot.robot import Robot
 
@@ -31,7 +30,8 @@ def without_cables(robot: Robot, *cables: int) -> Robot:
     return robot.replace(
         frame_anchors=robot.frame_anchors[kept],
         platform_anchors=robot.platform_anchors[kept],
-        cables=Cable(robot.cables.linear_density[kept], robot.cables.axial_stiffness[kept]),
+        cables=robot.cables._part(kept, kept.shape),
+        winches=None if robot.winches is None else robot.winches._part(kept),
         tension_min=robot.tension_min[kept],
         tension_max=robot.tension_max[kept],
     )

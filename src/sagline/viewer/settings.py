@@ -7,7 +7,6 @@ from types import MappingProxyType
 from typing import Final
 
 from sagline.arrays import checked
-from sagline.cables.cable import Cable
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.robot.inertia import with_mass
@@ -65,5 +64,7 @@ class Settings:
         """
         if self.mass == robot.mass and self.density == self.stiffness == 1.0:
             return robot
-        cables = Cable(robot.cables.linear_density * self.density, robot.cables.axial_stiffness * self.stiffness)
-        return with_mass(robot, self.mass).replace(cables=cables)
+        cables = robot.cables
+        density, stiffness = cables.linear_density * self.density, cables.axial_stiffness * self.stiffness
+        changed = cables.replace(linear_density=density, axial_stiffness=stiffness)
+        return with_mass(robot, self.mass).replace(cables=changed)
