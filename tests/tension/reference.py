@@ -50,6 +50,14 @@ def ropes(robot: Robot, ends: np.ndarray) -> np.ndarray:
     return np.asarray(anchors - ends)
 
 
+def clear_of_pulleys(robot: Robot, poses: Pose) -> np.ndarray:
+    """Which poses (N,) keep all platform ends away from the swivel axes by more than twice the radius."""
+    radius = np.zeros(robot.cable_count) if robot.winches is None else robot.winches.pulley_radius
+    ends = poses.position[:, None] + robot.platform_anchors @ np.swapaxes(poses.rotation.as_matrix(), 1, 2)
+    span = np.hypot(*np.moveaxis(ends - robot.frame_anchors, -1, 0)[:2])
+    return np.asarray((span > 2.0 * radius).all(axis=1))
+
+
 def structure(robot: Robot, pose: Pose) -> np.ndarray:
     """J (6, m) of one pose: columns (u; r x u)."""
     turn = pose.rotation.as_matrix()

@@ -10,6 +10,7 @@ import math
 
 from sagline.arrays import Array, Indices
 from sagline.kernels import tables
+from sagline.kernels.algebra.angle import angle
 from sagline.kernels.algebra.cholesky import factor_positive
 from sagline.kernels.balance.freedom import components_along
 from sagline.kernels.cable import geometry as g
@@ -155,3 +156,9 @@ def fit_poses(
             answer.results[tables.SPAN, p, i] = space.rows[g.SPAN, i]
             answer.results[tables.RISE, p, i] = space.rows[g.RISE, i]
             answer.results[tables.LENGTH, p, i] = batch.lengths[p, i]
+            pulley, chord = pulley_at(problem.cables, i), chord_at(space.rows, i)
+            wrapped = angle(chord.cosine, pulley.entry * chord.sine)
+            answer.results[tables.WRAP, p, i] = wrapped
+            answer.results[tables.WRAPPED, p, i] = pulley.radius * wrapped
+            answer.results[tables.DEAD, p, i] = pulley.dead
+            answer.results[tables.SINE, p, i] = chord.sine
