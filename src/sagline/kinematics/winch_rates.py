@@ -98,7 +98,7 @@ def winch_rates(plan: Plan) -> WinchRates:
         raise InvalidValueError("plan", "one of poses without times", "one along a path", "Plan along a Path.")
     drums = drums_of(robot)
     winches, stretch = drums.winches, 1.0 + drums.rest_strain
-    _, travel = drums.turns(plan.unstrained_length * stretch, "unstrained length")
+    _, travel = drums.turns(plan.unstrained_length * stretch)
     lever = travel / (2.0 * np.pi)
     speed = rate * stretch / lever
     acceleration = winches.gear * _differences(plan.path.time, rate * stretch) / lever

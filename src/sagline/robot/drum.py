@@ -40,13 +40,11 @@ class Drums:
     fewest: Array
     most: Array
 
-    def turns(self, length: Array, item: str, step: str = "") -> tuple[Array, Array]:
+    def turns(self, length: Array) -> tuple[Array, Array]:
         """Turns on the drums, and their travel.
 
         Args:
             length: Lengths off the drums [m], shape (N, m); NaN is answered by NaN.
-            item: What they are, for the message.
-            step: What else to do where they do not fit.
 
         Returns:
             Turns, and by how much one of them changes the length [m], both of shape (N, m).
@@ -54,19 +52,13 @@ class Drums:
         Raises:
             InvalidValueError: If a drum cannot hold what is left, or has not so much cable.
         """
-        turns, travel = np.empty(length.shape), np.empty(length.shape)
-        drum.turns_of_lengths(self.table, self.starts, kernel_input(length, length.shape), turns, travel)
-        wrong = (turns > self.most + ROUNDING) | (turns < self.fewest - ROUNDING)
-        if wrong.any():
-            p, i = (int(index) for index in np.argwhere(wrong)[0])
-            limits = np.array([self.fewest, np.minimum(self.most, np.finfo(float).max)])
-            ends = self.lengths(limits)[:, i] / (1.0 + self.rest_strain[i])
-            raise InvalidValueError(
-                _at(item, p, i, len(length)),
-                f"{length[p, i] / (1.0 + self.rest_strain[i]):.6g} m",
-                f"{ends[1]:.6g} to {ends[0]:.6g} m",
-                self._reason(i, full=bool(turns[p, i] > self.most[i])) + step,
-            )
+        turns, travel = self._turns(length)
+        if (wrong := self._off(turns)) is not None:
+            sample, i = wrong
+            stretch = 1.0 + self.rest_strain[i]
+            low, high = self._ends(i) / stretch
+            item = _at("unstrained length", sample, i, len(length))
+            raise self._refusal(item, f"{length[wrong] / stretch:.6g} m", f"{low:.6g} to {high:.6g} m", turns, wrong)
         return turns, travel
 
     def lengths(self, turns: Array) -> Array:
@@ -83,7 +75,7 @@ class Drums:
                 much cable.
         """
         zero, rate = self._zero()
-        turns, _ = self.turns(length, "unstrained length")
+        turns, _ = self.turns(length)
         found: Array = self.winches.count_zero + (zero - turns) * rate
         return found
 
@@ -95,29 +87,51 @@ class Drums:
         """
         zero, rate = self._zero()
         turns = zero - (counts - self.winches.count_zero) / rate
-        wrong = (turns > self.most + ROUNDING) | (turns < self.fewest - ROUNDING)
-        if wrong.any():
-            p, i = (int(index) for index in np.argwhere(wrong)[0])
-            ends = sorted(self.winches.count_zero[i] + (zero[i] - np.array([self.fewest[i], self.most[i]])) * rate[i])
-            raise InvalidValueError(
-                _at("counts", p, i, len(counts)),
-                f"{counts[p, i]:.12g}",
-                f"{ends[0]:.12g} to {ends[1]:.12g}",
-                self._reason(i, full=bool(turns[p, i] > self.most[i])),
-            )
+        if (wrong := self._off(turns)) is not None:
+            sample, i = wrong
+            ends = self.winches.count_zero[i] + (zero[i] - np.array([self.fewest[i], self.most[i]])) * rate[i]
+            allowed = f"{np.ceil(ends.min()):.0f} to {np.floor(ends.max()):.0f}"
+            raise self._refusal(_at("counts", sample, i, len(counts)), f"{counts[wrong]:.12g}", allowed, turns, wrong)
         return self.lengths(turns)
 
     def _zero(self) -> tuple[Array, Array]:
         """Turns on the drums at the zeros of their counts, and counts for a turn let out, both of shape (m,)."""
         per_turn, length = _given(self.winches, "counts_per_turn"), _given(self.winches, "length_zero", _ZERO_STEP)
-        turns, _ = self.turns(length[None], "winches: length_zero", " Or find the zeros anew with home.")
+        turns, _ = self._turns(length[None])
+        if (wrong := self._off(turns)) is not None:
+            low, high = self._ends(wrong[1])
+            item, allowed = f"winches: length_zero[{wrong[1]}]", f"{low:.6g} to {high:.6g} m"
+            raise self._refusal(item, f"{length[wrong[1]]:.6g} m", allowed, turns, wrong)
         return turns[0], self.winches.gear * per_turn
 
-    def _reason(self, cable: int, *, full: bool) -> str:
-        if not full:
-            return f"There are {_given(self.winches, 'cable_length')[cable]:g} m of cable, winches: cable_length."
-        layers = f"{self.winches.layers[cable]:.0f} layer{'s' * (self.winches.layers[cable] > 1.0)}"
-        return f"The drum is full with {layers}, {self.most[cable]:g} turns; give it more layers or less cable_length."
+    def _turns(self, length: Array) -> tuple[Array, Array]:
+        turns, travel = np.empty(length.shape), np.empty(length.shape)
+        drum.turns_of_lengths(self.table, self.starts, kernel_input(length, length.shape), turns, travel)
+        return turns, travel
+
+    def _off(self, turns: Array) -> tuple[int, int] | None:
+        """The first sample and cable that is on no drum."""
+        wrong = (turns > self.most + ROUNDING) | (turns < self.fewest - ROUNDING)
+        if not wrong.any():
+            return None
+        sample, cable = np.argwhere(wrong)[0]
+        return int(sample), int(cable)
+
+    def _ends(self, cable: int) -> Array:
+        """Least and greatest length off a drum [m]."""
+        most = float(self.most[cable])
+        low = self.lengths(np.full((1, len(self.most)), most))[0, cable] if most < np.inf else 0.0
+        return np.array([max(low, 0.0), self.starts[cable, 0]])
+
+    def _refusal(self, item: str, value: str, allowed: str, turns: Array, wrong: tuple[int, int]) -> InvalidValueError:
+        cable = wrong[1]
+        whole = _given(self.winches, "cable_length")[cable]
+        step = f"There are {whole:g} m of cable, winches: cable_length; correct that, or what was given."
+        if turns[wrong] > self.most[cable]:
+            count = int(self.winches.layers[cable])
+            full = f"{count} layer{'s' * (count > 1)}, {self.most[cable]:g} turns"
+            step = f"The drum is full with {full}; give it more layers, or less cable_length."
+        return InvalidValueError(item, value, allowed, step)
 
 
 def drums_of(robot: Robot) -> Drums:

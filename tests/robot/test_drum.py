@@ -1,0 +1,43 @@
+"""Tension at the drum against the cable's own differential equation; what the tables of drums hold."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import sagline as sl
+from sagline.robot.drum import drum_tension, drums_of
+from tests.kinematics.winches import wound
+
+
+@pytest.mark.parametrize("rise", [3.0, -2.5])
+def test_the_tension_at_the_drum_is_that_of_a_guided_cable(rise: float) -> None:
+    robot = wound("article-prototype", dead_cable=3.5, dead_rise=rise)
+    # R = 0 and the dead cable beside the frame anchor: the state of the hanging cable is what it is without them
+    plan = sl.inverse(robot.replace(winches=None), sl.Pose.from_euler([0.3, 0.2, 1.5], 0, 0, 0))
+    state = sl.Equilibrium(robot, plan.state.pose, plan.state.wrench, plan.state.cables)
+    weight, stiffness = robot.cables.linear_density * robot.gravity, robot.cables.axial_stiffness
+    begin = plan.state.cables.frame_end_tension
+    along = solve_ivp(  # dT/dz = weight of a meter of stretched cable
+        lambda z, tension: weight / (1.0 + tension / stiffness), (0.0, -rise), begin, rtol=1e-12, atol=1e-10
+    )
+    np.testing.assert_allclose(drum_tension(state), along.y[:, -1], rtol=1e-10)
+    assert np.sign(drum_tension(state) - begin) == pytest.approx(-np.sign(rise))
+
+
+def test_where_layers_begin() -> None:
+    drums = drums_of(wound())
+    assert drums.starts.shape == (8, 5)
+    np.testing.assert_allclose(drums.lengths(np.full((1, 8), 40.0))[0], drums.starts[:, 2], rtol=1e-15)
+    np.testing.assert_allclose(drums.turns(drums.starts[:, 1:2].T)[0][0], 20.0, rtol=1e-14)
+    # nested in an equilateral triangle, four millimeters of rope on a pitch radius of fifty: 6.9 % a layer
+    assert drums.table[0, 1] / drums.table[0, 0] == pytest.approx(0.069, abs=5e-4)
+
+
+def test_every_cable_has_its_own_drum() -> None:
+    layers = np.array([4, 4, 5, 4, 6, 4, 4, 4])
+    robot = wound(layers=layers, drum_radius=np.linspace(0.048, 0.08, 8))
+    drums = drums_of(robot)
+    alone = drums_of(wound(layers=6, drum_radius=np.linspace(0.048, 0.08, 8)[4]))
+    turns = np.linspace(0.0, 119.0, 40)[:, None] * np.ones(8)
+    np.testing.assert_array_equal(drums.lengths(turns)[:, 4], alone.lengths(turns)[:, 4])
+    np.testing.assert_array_equal(drums.most, 20.0 * layers)
