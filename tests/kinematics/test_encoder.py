@@ -175,7 +175,7 @@ def test_poses_without_an_answer_have_no_counts(robot: sl.Robot) -> None:
         ),
         (
             {"cable_length": 37.0, "length_zero": 13.0},
-            r"sample 0, cable \d: unstrained length is .* The drum is full with 4 layers, 80 turns; give it more",
+            r"sample 0, cable \d: unstrained length is .* The drum is full with 4 layers, 80 turns; correct it",
         ),
     ],
 )
@@ -205,14 +205,14 @@ def test_counts_that_run_off_the_drum_are_told_with_what_it_takes(robot: sl.Robo
     counts[2, 1] = -5e6
     with pytest.raises(sl.InvalidValueError) as caught:
         sl.lengths_from_counts(robot, counts)
-    assert caught.value.item == "sample 2, cable 1: counts"
+    assert caught.value.item == "sample 2, cable 1: count"
     low, high = (float(word) for word in caught.value.allowed.split(" to "))
     for end in (low, high):  # as far as the message says one may go
         counts[2, 1] = end
         sl.lengths_from_counts(robot, counts)
     for end in (low - 1.0, high + 1.0):
         counts[2, 1] = end
-        with pytest.raises(sl.InvalidValueError, match="sample 2, cable 1: counts is"):
+        with pytest.raises(sl.InvalidValueError, match="sample 2, cable 1: count is"):
             sl.lengths_from_counts(robot, counts)
 
 

@@ -91,7 +91,7 @@ class Drums:
             sample, i = wrong
             ends = self.winches.count_zero[i] + (zero[i] - np.array([self.fewest[i], self.most[i]])) * rate[i]
             allowed = f"{np.ceil(ends.min()):.0f} to {np.floor(ends.max()):.0f}"
-            raise self._refusal(_at("counts", sample, i, len(counts)), f"{counts[wrong]:.12g}", allowed, turns, wrong)
+            raise self._refusal(_at("count", sample, i, len(counts)), f"{counts[wrong]:.12g}", allowed, turns, wrong)
         return self.lengths(turns)
 
     def _zero(self) -> tuple[Array, Array]:
@@ -130,7 +130,7 @@ class Drums:
         if turns[wrong] > self.most[cable]:
             count = int(self.winches.layers[cable])
             full = f"{count} layer{'s' * (count > 1)}, {self.most[cable]:g} turns"
-            step = f"The drum is full with {full}; give it more layers, or less cable_length."
+            step = f"The drum is full with {full}; correct it, or give more layers or less cable_length."
         return InvalidValueError(item, value, allowed, step)
 
 

@@ -19,7 +19,7 @@ DRUM_COLUMNS = 7
 DEEP_LENGTH, DEEP_PATH, DEEP_STRAIN, TOP_STRAIN = range(4)
 MEMORY_ROWS = 4
 STEPS = 60  # a convex function of one variable: Newton needs two or three
-SETTLED = 1e-9  # turns, or of all turns: the step after would be its square
+SETTLED = 1e-8  # turns, or of all turns: the step after would be its square
 
 
 @formula
@@ -41,14 +41,6 @@ def exit_place(drum: Array, layer: int, turns: float) -> tuple[float, float]:
     if layer % 2 == 0:
         return drum[OFFSET] + drum[GROOVE_PITCH] * turns, drum[GROOVE_PITCH]
     return drum[OFFSET] + drum[GROOVE_PITCH] * (drum[LAYER_TURNS] - turns), -drum[GROOVE_PITCH]
-
-
-@formula
-def travel_of(drum: Array, layer: int, turns: float) -> float:
-    """By how much a turn of the drum changes the length off the drum [m]."""
-    place, advance = exit_place(drum, layer, turns)
-    run = math.sqrt(drum[DISTANCE] * drum[DISTANCE] + place * place)
-    return turn_length(drum, layer) + advance * place / run
 
 
 @formula
@@ -80,13 +72,17 @@ def turns_of_lengths(drums: Array, starts: Array, length: Array, turns_out: Arra
             layer = 0
             while layer < last and length[p, i] < starts[i, layer + 1]:
                 layer += 1
-            missing = starts[i, layer] - length[p, i]
-            turns = missing / turn_length(drum, layer)
-            travel = travel_of(drum, layer, turns)
+            turn, distance = turn_length(drum, layer), drum[DISTANCE]
+            first, advance = exit_place(drum, layer, 0.0)
+            missing = starts[i, layer] - length[p, i] + detour(distance, first)
+            turns = (starts[i, layer] - length[p, i]) / turn
+            travel = turn
             for _ in range(STEPS):
-                step = (missing - wound(drum, layer, turns)) / travel
+                place = first + advance * turns
+                run = math.sqrt(distance * distance + place * place)
+                travel = turn + advance * place / run
+                step = (missing - turn * turns - place * place / (run + distance)) / travel
                 turns += step
-                travel = travel_of(drum, layer, turns)
                 if abs(step) <= SETTLED * max(abs(turns), 1.0):
                     break
             below = layer * drum[LAYER_TURNS] if layer > 0 else 0.0
