@@ -41,3 +41,12 @@ def test_every_cable_has_its_own_drum() -> None:
     turns = np.linspace(0.0, 119.0, 40)[:, None] * np.ones(8)
     np.testing.assert_array_equal(drums.lengths(turns)[:, 4], alone.lengths(turns)[:, 4])
     np.testing.assert_array_equal(drums.most, 20.0 * layers)
+
+
+@pytest.mark.parametrize("offset", [-0.11, 0.0, 0.05])
+def test_nothing_jumps_where_a_layer_ends(offset: float) -> None:
+    drums = drums_of(wound(drum_offset=offset))
+    ends = 20.0 * np.arange(1, 4)[:, None] * np.ones(8)
+    before, after = drums.lengths(ends - 1e-9), drums.lengths(ends + 1e-9)
+    np.testing.assert_allclose(before, after, rtol=0.0, atol=1e-8)
+    assert (before > after).all()
