@@ -96,7 +96,8 @@ WIREX = """<?xml version="1.0" ?>
 <models version="0.32">
   <robot name="shelf" motionpattern="3R3T" generator="by hand">
     <geometry>
-      <chain id="1"><base x="-2" y="-1" z="3" radius="0.05" /><platform x="-0.1" y="-0.1" z="0.2" /></chain>
+      <chain id="1"><base x="-2" y="-1" z="3" a33="1" radius="0.05" />
+        <platform x="-0.1" y="-0.1" z="0.2" /></chain>
       <chain id="2" cable_id="2"><base x="2" y="-1" z="3" /><platform x="0.1" y="-0.1" z="0.2" /></chain>
       <chain id="3"><base x="0" y="1.5" z="3" radius="0" /><platform x="0" y="0.1" z="0.2" /></chain>
     </geometry>
@@ -107,7 +108,8 @@ WIREX = """<?xml version="1.0" ?>
   </robot>
   <cable name="thin" elasticity="2.5e10" radius="0.001" weight="0.01" minimum_load="4" breaking_load="900" />
   <cable name="thick" elasticity="1e10" radius="0.002" weight="0.03" minimum_load="6" breaking_load="2500" />
-  <winch name="small"><cable f_max="800" /></winch>
+  <winch name="small"><cable f_max="800" /><motor inertia="0.002" gear_ratio="0.1" />
+    <drum r_drum="0.06" l_drum="0.24" nr_groove="40" /></winch>
 </models>
 """
 
@@ -117,6 +119,9 @@ def _caspr_cable(name: str, frame: str, platform: str) -> str:
         f"<attachment><link>{k}</link><location>{place}</location></attachment>"
         for k, place in enumerate((frame, platform))
     )
+    if name == "a":
+        entry = "<cable_entry_vector>0 0 -1</cable_entry_vector><pulley_radius>0.04</pulley_radius></attachment>"
+        ends = ends.replace("</attachment>", entry, 1).replace("attachment>", "attachment_base_pulley>", 2)
     limits = "<force_min>5</force_min><force_max>300</force_max><K>9e4</K>"
     return (
         f'<cable_linear_spring name="{name}" attachment_reference="com"><properties>{limits}</properties>'

@@ -185,9 +185,7 @@ def test_show_holds_every_value(name: str) -> None:
     np.testing.assert_array_equal(shown["axial_stiffness"]["value"], robot.cables.axial_stiffness)
     assert (shown["mass"], shown["mass"]["unit"]) == ({**shown["mass"], "value": robot.mass}, "kg")
     told = {field for field in shown if isinstance(shown[field], dict) and "assumed" in shown[field]}
-    assert told == set(robot.assumed) - {"cables"} | (
-        {"linear_density", "axial_stiffness"} if "cables" in robot.assumed else set()
-    )
+    assert told == set(robot.assumed) - {"cables"} | (set(robot.cables.known()) if "cables" in robot.assumed else set())
     text = " ".join(sagline("show", name).stdout.split())
     assert " ".join(robot.source.split()) in text
     for field, why in robot.assumed.items():

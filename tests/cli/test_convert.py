@@ -11,7 +11,7 @@ from sagline.kinematics.forward import forward
 from sagline.robot.pose import Pose
 
 WIREX = """<models version="0.32"><robot name="swing" motionpattern="3T"><geometry>
-<chain><base x="-1" y="-1" z="2" radius="0.02"/><platform x="0" y="0" z="0"/></chain>
+<chain><base x="-1" y="-1" z="2" radius="0.02" a13="1" a31="-1" a33="0"/><platform x="0" y="0" z="0"/></chain>
 <chain><base x="1" y="-1" z="2" radius="0.02"/><platform x="0" y="0" z="0"/></chain>
 <chain><base x="0" y="1" z="2" radius="0.02"/><platform x="0" y="0" z="0"/></chain>
 </geometry><platform mass="3"/></robot></models>"""
@@ -34,8 +34,10 @@ def test_a_wirex_file_becomes_a_robot_file(wirex: Path, tmp_path: Path) -> None:
     code, stdout, stderr = run(str(wirex), "--out", str(out))
     assert (code, stdout) == (0, "")
     assert "Assumed: cables: linear density and axial stiffness of a 4 mm steel rope" in stderr
-    assert "Lost: The pulleys (radius 0.02 m)" in stderr
+    assert "Lost: The pulley of chain 1 (radius 0.02 m), whose axis is not vertical" in stderr
     robot = load_robot(out)
+    assert robot.winches is not None
+    assert robot.winches.pulley_radius.tolist() == [0.0, 0.02, 0.02]
     np.testing.assert_array_equal(robot.frame_anchors, [[-1, -1, 2], [1, -1, 2], [0, 1, 2]])
     assert (robot.mass, "cables" in robot.assumed) == (3.0, True)
 

@@ -1,6 +1,7 @@
 """`sagline show`: every value with its unit."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 from typer.testing import CliRunner
@@ -17,6 +18,8 @@ UNITS = {
     "inertia": "kg m²",
     "gravity": "m/s²",
     "linear_density": "kg/m",
+    "diameter": "m",
+    "expansion": "1/K",
 }
 
 
@@ -37,6 +40,31 @@ def test_every_value_stands_beside_its_unit() -> None:
     for name, unit in (("mass", "kg"), ("gravity", "m/s²"), ("axial stiffness", "N"), ("tension max", "N")):
         (line,) = (line for line in text.splitlines() if line.strip().removesuffix("│").lstrip("│ ").startswith(name))
         assert line.rstrip(" │").split()[-1] == unit, line
+
+
+def test_winches_are_shown_with_their_units(tmp_path: Path) -> None:
+    winches = sl.Winch([0.05] * 7 + [0.04], swivel_axis=[0, 0, -1], inertia=2.77e-5, gear=-20, counts_per_turn=2**17)
+    thick = sl.Cable(0.065, 7e5, diameter=0.004)
+    robot = sl.load_robot("cogiro").replace(winches=winches, cables=thick, assumed={"winches": "a guess"})
+    (tmp_path / "wound.yaml").write_text(sl.dump_robot(robot))
+    record = json.loads(shown(str(tmp_path / "wound.yaml"), "--json"))
+    assert record["winches"]["assumed"] == "a guess"
+    assert record["winches"]["value"]["inertia"] == {"value": [2.77e-5] * 8, "unit": "kg m²"}
+    assert record["winches"]["value"]["swivel_axis"]["value"] == [[0.0, 0.0, -1.0]] * 8
+    assert "drum_radius" not in record["winches"]["value"]
+    assert record["diameter"] == {"value": [0.004] * 8, "unit": "m"}
+    assert json.loads(shown("cogiro", "--json"))["winches"] is None
+    text = " ".join(shown(str(tmp_path / "wound.yaml")).split())
+    for line in (
+        "winches *",
+        "pulley radius (0.05, 0.05, 0.05, 0.05, 0.05, 0.05, 0.05, 0.04) m",
+        "swivel axis down",
+        "inertia 2.77e-05 kg m²",
+        "gear -20",
+        "counts per turn 131072",
+        "diameter 0.004 m",
+    ):
+        assert line in text
 
 
 def test_a_tilt_is_shown_in_degrees() -> None:

@@ -94,10 +94,60 @@ def test_what_was_lost_is_told(folder: Path) -> None:
         "end location (0 0 0.3 m)",
         "joint's q_initial",
         "other sets of cables: one",
-        "cable_ideal rear: its pulley",
+        "cable_ideal rear: its pulley, without pulley_radius and cable_entry_vector",
         "cable_passive_linear_spring spring 1: no cable on a winch",
     ):
         assert what in lost
+
+
+def entered(vector: str, radius: str = "0.04", tag: str = "attachment_base_pulley") -> str:
+    entry = f"<cable_entry_vector>{vector}</cable_entry_vector>"
+    fixed = f"<fixed_location>0 2 4</fixed_location><pulley_radius>{radius}</pulley_radius>"
+    attachments = f"<{tag}><link>0</link>{fixed}{entry}</{tag}>" + point(1, "0 0.2 0")
+    return cable("cable_ideal", "rear", "joint", LIMITS, attachments)
+
+
+@pytest.mark.parametrize(("vector", "axis"), [("0 0 1", 1.0), ("0.0 0 -2", -1.0), ("0 -0 0.5", 1.0)])
+def test_a_pulley_that_is_entered_vertically(folder: Path, vector: str, axis: float) -> None:
+    (folder / "cables" / "gondola_cables.xml").write_text(cables_file(IDEAL, SPRING, entered(vector)))
+    imported = load_caspr(folder)
+    winches = imported.robot.winches
+    assert winches is not None
+    assert winches.pulley_radius.tolist() == [0.0, 0.0, 0.04]
+    assert winches.swivel_axis.tolist() == [[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0, 0.0, axis]]
+    assert imported.robot.frame_anchors[2].tolist() == [0.0, 2.0, 4.0]
+    assert "pulley" not in " ".join(imported.lost)
+
+
+@pytest.mark.parametrize(
+    ("pulley", "told"),
+    [
+        (entered("1 0 0"), "its pulley, that is not entered vertically; the cable starts at"),
+        (entered("0 0.01 1"), "its pulley, that is not entered vertically"),
+        (entered("0 0 0"), "its pulley, that is not entered vertically"),
+        (entered("0 0 1", tag="attachment_roller"), "its pulley, of a kind unknown here, <attachment_roller>"),
+        (PULLEY, "its pulley, without pulley_radius and cable_entry_vector"),
+    ],
+)
+def test_a_pulley_that_is_not_ours_is_lost_and_told(folder: Path, pulley: str, told: str) -> None:
+    (folder / "cables" / "gondola_cables.xml").write_text(cables_file(IDEAL, SPRING, pulley))
+    imported = load_caspr(folder)
+    assert imported.robot.winches is None
+    assert f"cable_ideal rear: {told}" in " ".join(imported.lost)
+
+
+@pytest.mark.parametrize(
+    ("pulley", "message"),
+    [
+        (entered("0 0"), "cable_ideal rear: cable_entry_vector is '0 0'; allowed: 3 numbers"),
+        (entered("0 0 1", "wide"), "cable_ideal rear: pulley_radius is 'wide'; allowed: a number in m"),
+        (entered("0 0 1", "-0.1"), r"winches: pulley_radius\[2\] is -0.1 m; allowed: >= 0 m"),
+    ],
+)
+def test_a_pulley_that_will_not_do(folder: Path, pulley: str, message: str) -> None:
+    (folder / "cables" / "gondola_cables.xml").write_text(cables_file(IDEAL, SPRING, pulley))
+    with pytest.raises(FileError, match=message):
+        load_caspr(folder)
 
 
 @pytest.mark.parametrize("file", ["gondola_bodies.xml", "cables/gondola_cables.xml"])

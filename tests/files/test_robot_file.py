@@ -338,6 +338,55 @@ def test_presets_survive_the_dump_bit_for_bit(name: str) -> None:
     assert_same(parse_robot(dump_robot(robot), "dump"), robot)
 
 
+def test_a_file_may_begin_with_a_preset() -> None:
+    cogiro = load_robot("cogiro")
+    text = "name: mine\nbase: cogiro\ncables: {linear_density: 0.07, axial_stiffness: 800 kN}\nassumed: {mass: a guess}"
+    robot = parse_robot(text, "robot.yaml")
+    np.testing.assert_allclose(robot.cables.axial_stiffness, np.full(8, 8e5), rtol=1e-15)
+    assert "cables" in cogiro.assumed
+    # what is given now is assumed no more
+    assert dict(robot.assumed) == {key: why for key, why in cogiro.assumed.items() if key != "cables"} | {
+        "mass": "a guess"
+    }
+    assert_same(robot.replace(cables=cogiro.cables, name="cogiro", assumed=cogiro.assumed), cogiro)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("base: cogiro", "name is missing. Add the key name"),
+        ("base: cogero\nname: x", "base is 'cogero'; allowed: article-mixed.*Did you mean cogiro"),
+        ("base: [cogiro]\nname: x", r"base is \['cogiro'\]; allowed: article-mixed.*Name one of them"),
+        ("base:\nname: x", "base is None; allowed"),
+        ("base: 3\nname: x", "base is 3; allowed"),
+        ("base: ../cogiro\nname: x", "base is '../cogiro'; allowed"),
+        ("base: cogiro\nname: x\nmas: 3", "mas is an unknown key.*mean mass"),
+        ("base: cogiro\nname: x\nassumed: 3", "assumed is 3"),
+        ("base: cogiro\nname: x\nframe_anchors: [[0, 0, 3]]", "platform_anchors is 8 points"),
+    ],
+)
+def test_a_base_that_will_not_do(text: str, message: str) -> None:
+    with pytest.raises(FileError, match=f"^robot.yaml: {message}"):
+        parse_robot(text, "robot.yaml")
+
+
+WINCH_KEYS = [key.partition(".")[2] for key in QUANTITIES if key.startswith("winches.")]
+
+
+@pytest.mark.parametrize("key", WINCH_KEYS)
+def test_a_row_too_few_or_a_wrong_unit_of_any_key_of_a_winch_is_named(key: str) -> None:
+    good, _ = QUANTITIES[f"winches.{key}"]
+    vector = key == "swivel_axis"
+    row = good[0] if vector else np.ravel(good)[0].item()
+    for count in (2, 4, 0):
+        with pytest.raises(FileError, match=rf"winches(: {key})? is ({count} values|of shape)"):
+            parse_robot(edited(winches={"dead_cable": 30, key: [row] * count}), "robot.yaml")
+    wrong: Any
+    for wrong in ("5 parsec^2", "fast", True, None, {}, [None] * 3, float("nan")):
+        with pytest.raises(FileError, match=rf"winches.{key}(\[0\])? is .*; allowed: "):
+            parse_robot(edited(winches={key: wrong}), "robot.yaml")
+
+
 NUMBER = st.floats(-1e9, 1e9)
 POSITIVE = st.floats(1e-12, 1e12)
 

@@ -63,8 +63,94 @@ def test_what_was_lost_is_told(tmp_path: Path) -> None:
     imported = load(tmp_path)
     lost = " ".join(imported.lost)
     assert imported.robot.notes == f"Not taken over: {lost}"
-    for what in ("The pulleys (radius 0.05 m)", "The winches", "The cables' damping", "The controller"):
+    for what in ("The winch's gear, speeds", "The cables' damping", "The controller"):
         assert what in lost
+    assert "pulley" not in lost
+
+
+PULLEYS_GONE = ((' a33="1" radius="0.05"', ' a33="1"'), ('z="3" radius="0.05"', 'z="3"'))
+
+
+def test_pulleys_and_thick_cables(tmp_path: Path) -> None:
+    robot = load(tmp_path).robot
+    assert robot.winches is not None
+    assert robot.winches.pulley_radius.tolist() == [0.05, 0.05, 0.0]
+    assert robot.winches.swivel_axis.tolist() == [[0.0, 0.0, 1.0]] * 3
+    assert robot.winches.drum_radius is None
+    assert robot.cables.diameter is not None
+    assert robot.cables.diameter.tolist() == [0.002, 0.004, 0.002]
+    assert "winches" not in robot.assumed
+    points = load(tmp_path, *PULLEYS_GONE)
+    assert points.robot.winches is None
+    assert load(tmp_path, ('radius="0.002"', "")).robot.cables.diameter is None
+
+
+AXES = 'a11="1" a22="1" a33="1"'
+TURNED = 'a11="1.000000" a12="0" a13="0" a21="0" a22="-1.000000" a23="0" a31="0" a32="0" a33="-1.000000"'  # about x
+AROUND = 'a11="0" a12="-1" a13="0" a21="1" a22="0" a23="0" a31="0" a32="0" a33="1"'  # about z
+
+
+@pytest.mark.parametrize(
+    ("matrix", "axis"),
+    [
+        (AXES, 1.0),
+        (TURNED, -1.0),
+        (AROUND, 1.0),
+        ("", 1.0),  # as WireX itself takes what is not there
+        ('a11="0" a13="1" a22="1" a31="-1" a33="0"', None),
+        ('a11="1" a22="0.995004" a23="-0.099833" a32="0.099833" a33="0.995004"', None),
+        ('a11="0" a22="0" a33="0"', None),
+        ('a13="0.001" a33="0.9999995"', None),
+    ],
+)
+def test_only_pulleys_about_a_vertical_axis_are_taken(tmp_path: Path, matrix: str, axis: float | None) -> None:
+    imported = load(tmp_path, (AXES, matrix))
+    winches = imported.robot.winches
+    assert winches is not None
+    told = [line for line in imported.lost if "The pulley of chain 1 (radius 0.05 m), whose axis is not vert" in line]
+    assert len(told) == (axis is None)
+    assert winches.pulley_radius.tolist() == [0.05 if axis else 0.0, 0.05, 0.0]
+    assert winches.swivel_axis[0].tolist() == [0.0, 0.0, axis or 1.0]
+
+
+# as WireX 2 writes a winch: all of its attributes, zero where it does not know
+DRIVE = (
+    '<winch id="1" name="small" description=""><cable nr_cables="1" f_max="800" l_min="0" max_velocity="4" />'
+    '<motor motor_type="servo" inertia="0.002" mass="5" max_power="2000" angular_velocity="300" gear_ratio="0.1" />'
+    '<drum r_drum="0.06" l_drum="0.24" nr_groove="40" dfriction="0" sfriction="0" backlash="0" /></winch>'
+)
+
+
+def test_drum_and_motor_of_the_winch(tmp_path: Path) -> None:
+    imported = load(tmp_path, (WINCH, DRIVE))
+    winches = imported.robot.winches
+    assert winches is not None
+    for name, value in (("drum_radius", 0.06), ("drum_width", 0.24), ("groove_pitch", 0.006), ("inertia", 0.002)):
+        np.testing.assert_allclose(getattr(winches, name), [value] * 3, rtol=1e-15, err_msg=name)
+    assert winches.gear.tolist() == [1.0] * 3  # which shaft its ratio turns faster is not said
+    assert "The winch's gear" in imported.lost[0]
+
+
+def test_a_drum_without_pulleys(tmp_path: Path) -> None:
+    winches = load(tmp_path, (WINCH, DRIVE), *PULLEYS_GONE).robot.winches
+    assert winches is not None
+    assert winches.pulley_radius.tolist() == [0.0] * 3
+    assert winches.drum_radius is not None
+
+
+def test_a_zero_is_no_drum(tmp_path: Path) -> None:
+    zeros = DRIVE.replace("0.06", "0.000000").replace("0.24", "0.000000").replace('"40"', '"0"').replace("0.002", "0")
+    winches = load(tmp_path, (WINCH, zeros)).robot.winches
+    assert winches is not None
+    assert all(getattr(winches, name) is None for name in ("drum_radius", "drum_width", "groove_pitch", "inertia"))
+    assert load(tmp_path, (WINCH, zeros), *PULLEYS_GONE).robot.winches is None
+
+
+def test_which_of_several_winches_a_cable_has_is_not_known(tmp_path: Path) -> None:
+    imported = load(tmp_path, (WINCH, DRIVE + DRIVE))
+    assert imported.robot.winches is not None
+    assert imported.robot.winches.drum_radius is None
+    assert "does not say which cable has which" in imported.lost[0]
 
 
 def test_what_is_missing_is_assumed_and_said(tmp_path: Path) -> None:
@@ -115,6 +201,11 @@ def test_planar_robots_get_a_plane(tmp_path: Path) -> None:
         ('Iyz="-0.02"', "", "inertiatensor: I"),
         ('f_max="800"', 'f_max="5"', r"tension_min\[1\] is 6 N"),
         ('radius="0.001"', 'radius="thin"', "cable thin: radius is 'thin'"),
+        ('a33="1" radius="0.05"', 'a33="1" radius="wide"', "chain 1: base: radius is 'wide'"),
+        ('a33="1" radius="0.05"', 'a33="1" radius="-0.05"', r"winches: pulley_radius\[0\] is -0.05 m; allowed: >= 0 m"),
+        ('a33="1"', 'a33="up"', "chain 1: base: a33 is 'up'; allowed: a number"),
+        (WINCH, DRIVE.replace("0.06", "wide"), "winch: drum: r_drum is 'wide'"),
+        (WINCH, DRIVE.replace("0.06", "-1"), "winches: drum_radius is -1 m; allowed: > 0 m"),
         ('radius="0.001"', 'radius="-0.001"', "cable thin: radius is -0.001 m"),
         ("<controller", '<platform name="second" /><controller', "number of <platform> is 2; allowed: 1"),
         ('Ixx="0.5"', 'Ixx="5"', r"principal moments 0.*larger than the other two"),

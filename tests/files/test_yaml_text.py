@@ -2,9 +2,10 @@ import math
 import time
 
 import pytest
+import yaml
 
 from sagline.errors import FileError
-from sagline.files.yaml_text import parse_mapping
+from sagline.files.yaml_text import dump_mapping, parse_mapping
 
 
 @pytest.mark.parametrize(
@@ -125,3 +126,74 @@ def test_what_is_no_such_yaml(text: str, message: str) -> None:
     with pytest.raises(FileError, match=message) as caught:
         parse_mapping(text, "x.yaml")
     assert ("cut off" in str(caught.value)) == ("cut off" in message or message == "is empty")
+
+
+WORDS = (
+    *[
+        "1e5",
+        "NAN",
+        "nan",
+        ".nan",
+        "NaN",
+        "inf",
+        "-inf",
+        "Inf",
+        "+.INF",
+        "12",
+        "-0.5",
+        "1.",
+        ".5",
+        "+3",
+        "010",
+        "1_000",
+        "0x10",
+        "1:30",
+        "2024-05-01",
+        "yes",
+        "no",
+        "on",
+        "off",
+        "y",
+    ],
+    *[
+        "true",
+        "False",
+        "TRUE",
+        "null",
+        "~",
+        "<<",
+        "=",
+        "#a",
+        "&a",
+        "*a",
+        "!a",
+        "[a",
+        "{a",
+        "%a",
+        "@a",
+        "`a",
+        "?",
+        ":",
+        "-",
+        "µ",
+        "名",
+        "1e400",
+    ],
+    *("", " ", " a ", "1e5 ", "- a", "a: b", "a #b", "'", '"', "a\nb", "a\tb", "9" * 60, "9" * 61),
+)
+
+
+@pytest.mark.parametrize("word", WORDS)
+def test_a_text_stays_a_text(word: str) -> None:
+    data = {"name": word, word: [word, {"in": word}]}
+    for given in (data, {"outer": data}):
+        text = dump_mapping(given)
+        assert parse_mapping(text, "here") == given
+        assert yaml.safe_load(text) == given
+        assert "!!" not in text
+
+
+def test_a_number_stays_that_number() -> None:
+    numbers = [1e5, -0.0, 0.1 + 0.2, 1e-320, 1e22, 1e300, 5e-324, float("inf"), 12, -7, True, False, None]
+    found = parse_mapping(dump_mapping({"numbers": numbers}), "here")["numbers"]
+    assert repr(found) == repr(numbers)

@@ -32,7 +32,7 @@ def test_plans_are_confirmed_and_found_again_without_a_start(name: str) -> None:
     assert position_error(near, pose).max() < 1e-11
     assert angle_error(near, pose).max() < 1e-11
     assert near.wrench_residual.max() < newtons(robot)
-    np.testing.assert_allclose(near.state.cables.chord_tension, plan.chord_tension, rtol=1e-7)
+    np.testing.assert_allclose(near.state.chord_tension, plan.chord_tension, rtol=1e-7)
     assert near.solved.all()
     far = sl.forward(robot, plan.unstrained_length)
     assert far.solved.all()

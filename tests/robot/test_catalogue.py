@@ -5,8 +5,11 @@ from scipy.spatial.transform import Rotation
 
 from sagline.arrays import Array
 from sagline.errors import InvalidValueError
-from sagline.files.robot_file import load_robot
+from sagline.files.robot_file import dump_robot, load_robot
+from sagline.kinematics.forward import forward
+from sagline.kinematics.inverse import inverse
 from sagline.robot.catalogue import preset_text, robot_names
+from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
 PUBLISHED = {
@@ -36,6 +39,7 @@ PUBLISHED = {
     "ipanema-2": (60.0, 0.0225, 5e5, (50, 3000), (3, [-3.993982, -2.914584, 4.718823]), (4, [-0.848, 0.1, 0.45])),
     "ipanema-3": (30.0, 0.0225, 5e5, (100, 3000), (2, [8.224, -5.492, 3.25]), (6, [0.095, -0.745, 0.26])),
 }
+PULLEYS = {"expo2015-lucia": 0.01, "ipanema-2": 0.25, "ipanema-3": 0.1}  # radius [m], as the sources give it
 ARTICLE = {
     # name: frame, density, E A from Table 1
     "article-mixed": ([15, 11, 6], 0.067, 2e9 * 22e-6),
@@ -44,8 +48,34 @@ ARTICLE = {
 }
 
 
-def test_thirteen_presets() -> None:
-    assert list(robot_names()) == sorted([*PUBLISHED, *ARTICLE])
+def test_sixteen_presets() -> None:
+    assert list(robot_names()) == sorted([*PUBLISHED, *ARTICLE, *(f"{name}-pulleys" for name in PULLEYS)])
+
+
+@pytest.mark.parametrize("name", PULLEYS)
+def test_the_same_robot_with_its_pulleys(name: str) -> None:
+    points, wheels = load_robot(name), load_robot(f"{name}-pulleys")
+    assert wheels.winches is not None
+    np.testing.assert_array_equal(wheels.winches.pulley_radius, np.full(8, PULLEYS[name]))
+    np.testing.assert_array_equal(wheels.winches.swivel_axis, [[0.0, 0.0, 1.0]] * 8)
+    np.testing.assert_array_equal(wheels.winches.dead_cable, np.zeros(8))
+    assert "winches" in wheels.assumed
+    bare = wheels.replace(winches=None, name=name, notes=points.notes, assumed=points.assumed)
+    assert dump_robot(bare) == dump_robot(points)
+    assert points.winches is None
+    assert f"{PULLEYS[name]:g} m" in points.notes
+
+
+def test_the_servos_of_the_prototype() -> None:
+    """The article's 400 W; 3.82 N m, 3000 turns a minute and 0.277 kg cm^2 are those of a common motor of the class."""
+    winches = load_robot("article-prototype").winches
+    assert winches is not None
+    speed = 3000.0 * 2.0 * np.pi / 60.0
+    expected = {"torque_limit": 3.82, "speed_limit": speed, "inertia": 2.77e-5, "gear": 20.0, "drum_radius": 0.03}
+    expected |= {"counts_per_turn": 2.0**17, "friction": 15.0, "pulley_radius": 0.0, "dead_cable": 0.0}
+    for field, value in expected.items():
+        np.testing.assert_allclose(getattr(winches, field), np.full(8, value), rtol=1e-15, err_msg=field)
+    assert "400 W" in load_robot("article-prototype").assumed["winches"]
 
 
 @pytest.mark.parametrize("name", PUBLISHED)
@@ -146,3 +176,22 @@ def test_the_articles_path_is_feasible(name: str, x: float, y: float) -> None:
 def test_an_unknown_preset_suggests_the_nearest() -> None:
     with pytest.raises(InvalidValueError, match=r"robot is 'cogirro'; allowed: .*Did you mean cogiro\?"):
         preset_text("cogirro")
+
+
+@pytest.mark.parametrize("name", PULLEYS)
+def test_the_platform_rests_where_lengths_over_pulleys_put_it(name: str) -> None:
+    robot, rng = load_robot(f"{name}-pulleys"), np.random.default_rng(12)
+    box = robot.test_box
+    assert box is not None
+    positions = rng.uniform(box.low, box.high, size=(20, 3))
+    plan = inverse(robot, Pose.from_euler(positions, 0.0, 0.0, 0.0))
+    assert plan.feasible.mean() >= 0.9
+    away = Pose.from_euler(positions[plan.feasible] + 0.05, 0.02, 0.0, 0.0)
+    found = forward(robot, plan.unstrained_length[plan.feasible], start=away)
+    assert found.solved.all()
+    np.testing.assert_allclose(found.pose.position, positions[plan.feasible], rtol=0, atol=1e-9)
+    # the cable lies on the pulley: it is longer than from the anchor, by less than half the pulley's circumference
+    points = inverse(load_robot(name), Pose.from_euler(positions, 0.0, 0.0, 0.0), tension=plan.tension)
+    longer = (plan.unstrained_length - points.unstrained_length)[plan.feasible & points.feasible]
+    assert (np.abs(longer) < np.pi * PULLEYS[name]).all()
+    assert np.abs(longer).max() > 0.2 * PULLEYS[name]

@@ -12,6 +12,7 @@ from sagline.cli.terminal import show, show_json
 from sagline.files.robot_file import load_robot
 from sagline.robot.catalogue import robot_names
 from sagline.robot.robot import Robot
+from sagline.robot.winch import RULES, Winch
 
 WHOLE = {  # fields and their units; one value, or one that holds for all cables
     "motion_pattern": "",
@@ -22,6 +23,8 @@ WHOLE = {  # fields and their units; one value, or one that holds for all cables
     "gravity": "m/s²",
     "linear_density": "kg/m",
     "axial_stiffness": "N",
+    "diameter": "m",
+    "expansion": "1/K",
     "tension_min": "N",
     "tension_max": "N",
     "tension_limits_of": "",
@@ -30,7 +33,7 @@ WHOLE = {  # fields and their units; one value, or one that holds for all cables
     "test_box": "m",
 }
 ANCHORS = {"frame_anchors": "m", "platform_anchors": "m"}
-MATERIAL = ("linear_density", "axial_stiffness")  # fields of the robot's cables
+MATERIAL = ("linear_density", "axial_stiffness", "diameter", "expansion")  # fields of the robot's cables
 PER_CABLE = (*MATERIAL, "tension_min", "tension_max")
 
 
@@ -65,6 +68,8 @@ def show_robot(name: str, *, as_json: bool) -> None:
         show_json(_record(robot))
         return
     show_table(_values(robot))
+    if robot.winches is not None:
+        show_table(_winches(robot, robot.winches))
     show_table(_anchors(robot))
     for label, text in (("Source", robot.source), ("Notes", robot.notes)):
         if text:
@@ -122,9 +127,18 @@ def _record(robot: Robot) -> dict[str, Any]:
         if field == "test_box" and value is not None:
             value = {"low": value.low, "high": value.high, "tilt_rad": value.tilt}
         record[field] = {"value": value, "unit": unit}
-        if (why := _assumption(robot, field)) is not None:
+        if (why := _assumption(robot, field)) is not None and value is not None:
             record[field]["assumed"] = why
+    record["winches"] = None if robot.winches is None else {"unit": "", "value": _parts(robot.winches)}
+    if robot.winches is not None and "winches" in robot.assumed:
+        record["winches"]["assumed"] = robot.assumed["winches"]
     return record
+
+
+def _parts(winches: Winch) -> dict[str, Any]:
+    """What is known of the winches, each with its unit."""
+    units = {name: rule.unit.replace("^2", "²") for name, rule in RULES.items()}
+    return {name: {"value": field, "unit": units.get(name, "")} for name, field in winches.known().items()}
 
 
 def _marked(robot: Robot, field: str) -> str:
@@ -141,6 +155,22 @@ def _values(robot: Robot) -> Grid:
     return Grid(["", "value", "unit"], rows, robot.name, left=frozenset(range(3)), prose=frozenset({1}))
 
 
+def _winches(robot: Robot, winches: Winch) -> Grid:
+    parts = _parts(winches)
+    ways = ["up" if axis[2] > 0.0 else "down" for axis in winches.swivel_axis]
+    parts["swivel_axis"]["value"] = ways if len(set(ways)) > 1 else ways[0]
+    rows = [[name.replace("_", " "), _spread(entry["value"], digits=9), entry["unit"]] for name, entry in parts.items()]
+    title = _marked(robot, "winches")
+    return Grid(["", "value", "unit"], rows, title, left=frozenset(range(3)), prose=frozenset({1}))
+
+
+def _spread(value: Any, digits: int = 5) -> str:
+    """One value for all cables, or all of them; counts need more digits than lengths."""
+    if isinstance(value, str | list):
+        return value if isinstance(value, str) else f"({', '.join(value)})"
+    return f"{value[0]:.{digits}g}" if np.all(value == value[0]) else _numbers(value, digits)
+
+
 def _text(field: str, value: Any) -> str:
     if field == "inertia" and not np.any(value - np.diag(np.diag(value))):
         return f"diagonal {_numbers(np.diag(value))}"
@@ -149,14 +179,14 @@ def _text(field: str, value: Any) -> str:
     if field.endswith("size"):
         return " × ".join(f"{edge:g}" for edge in value)
     if field in PER_CABLE:
-        return f"{value[0]:.5g}" if np.all(value == value[0]) else _numbers(value)
+        return _spread(value)
     if isinstance(value, np.ndarray):
         return "\n".join(_numbers(row) for row in np.atleast_2d(value))
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _numbers(row: Any) -> str:
-    return "(" + ", ".join(f"{number:.5g}" for number in row) + ")"
+def _numbers(row: Any, digits: int = 5) -> str:
+    return "(" + ", ".join(f"{number:.{digits}g}" for number in row) + ")"
 
 
 def _anchors(robot: Robot) -> Grid:

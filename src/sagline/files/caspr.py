@@ -18,6 +18,7 @@ from sagline.files.text import exists
 from sagline.files.xml_text import number, numbers, only_child, read_xml
 from sagline.robot.pattern import MotionPattern
 from sagline.robot.robot import Robot
+from sagline.robot.winch import UPRIGHT, Winch
 
 _X, _Y, _Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 _JOINTS: Final[dict[str, tuple[MotionPattern, tuple[float, float, float] | None]]] = {
@@ -37,7 +38,8 @@ def load_caspr(source: str | os.PathLike[str], cables: Cable | None = None, cabl
     """Read a robot of CASPR that has one platform.
 
     CASPR's cables weigh nothing, and its ideal ones do not stretch: where the caller gives no `cables`, what the files
-    leave out is that of a 4 mm steel rope, and the robot says so in `assumed`.
+    leave out is that of a 4 mm steel rope, and the robot says so in `assumed`. Pulleys that swivel about a vertical
+    axis are the robot's.
 
     Args:
         source: The robot's folder, or its file of bodies or of cables; the other file is looked for beside it.
@@ -76,12 +78,19 @@ class _Platform(NamedTuple):
     lost: tuple[str, ...]
 
 
+class _Pulley(NamedTuple):
+    radius: float = 0.0
+    swivel_axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    unlike: str = ""  # what keeps it from being one of ours
+
+
 class _Leg(NamedTuple):
     frame_anchor: Array
     platform_anchor: Array
     tension_min: float
     tension_max: float
     axial_stiffness: float  # NaN where the file gives none
+    pulley: _Pulley
 
 
 def _files(source: Path) -> tuple[Path, Path]:
@@ -183,8 +192,8 @@ def _legs(chosen: Element, center: Array) -> tuple[list[_Leg], tuple[str, ...]]:
         if element.tag not in ("cable_ideal", "cable_linear_spring"):
             lost.append(f"{item}: its law of stiffness; only its ends and its limits are taken.")
         legs.append(_leg(element, item, center))
-        if any(end.tag != "attachment" for end in element.iterfind("attachments/*")):
-            lost.append(f"{item}: its pulley; the cable starts at the pulley's fixed point.")
+        if unlike := legs[-1].pulley.unlike:
+            lost.append(f"{item}: its pulley, {unlike}; the cable starts at the pulley's fixed point.")
     return legs, tuple(lost)
 
 
@@ -193,10 +202,13 @@ def _leg(element: Element, item: str, center: Array) -> _Leg:
     if len(ends) != 2:
         raise InvalidValueError(f"{item}: number of attachments", len(ends), "2", "sagline's cables are not routed.")
     points: dict[str, Array] = {}
+    pulley = _Pulley()
     for end in ends:
         link = (end.findtext("link") or "0").strip()
         place = end.findtext("location") or end.findtext("fixed_location")
         points[link] = numbers(place, 3, f"{item}: location on link {link}", "m")
+        if end.tag != "attachment":
+            pulley = _pulley(end, link, item)
     if set(points) != {"0", "1"}:
         raise InvalidValueError(f"{item}: links", ", ".join(points), "0, 1", "A cable joins base and platform.")
     if element.get("attachment_reference") == "com":
@@ -207,7 +219,20 @@ def _leg(element: Element, item: str, center: Array) -> _Leg:
     # CASPR divides K by the cable's length: it is an axial stiffness in N
     stiffness = element.findtext("properties/K") if element.tag == "cable_linear_spring" else None
     known = float("nan") if stiffness is None else number(stiffness, f"{item}: K", "N")
-    return _Leg(points["0"], points["1"], low, high, known)
+    return _Leg(points["0"], points["1"], low, high, known, pulley)
+
+
+def _pulley(end: Element, link: str, item: str) -> _Pulley:
+    """The pulley at an end of a cable; CASPR's turns about the direction in which the cable enters it, as ours do."""
+    if end.tag != "attachment_base_pulley" or link != "0":
+        return _Pulley(unlike=f"of a kind unknown here, <{end.tag}>")
+    if end.find("pulley_radius") is None or end.find("cable_entry_vector") is None:
+        return _Pulley(unlike="without pulley_radius and cable_entry_vector")
+    radius = number(end.findtext("pulley_radius"), f"{item}: pulley_radius", "m")
+    entry = numbers(end.findtext("cable_entry_vector"), 3, f"{item}: cable_entry_vector", "")
+    if not entry[2] or np.hypot(entry[0], entry[1]) > UPRIGHT * abs(entry[2]):
+        return _Pulley(unlike="that is not entered vertically")
+    return _Pulley(radius, (0.0, 0.0, float(np.sign(entry[2]))))
 
 
 def _robot(name: str, platform: _Platform, legs: list[_Leg], cables: Cable | None) -> Robot:
@@ -219,6 +244,8 @@ def _robot(name: str, platform: _Platform, legs: list[_Leg], cables: Cable | Non
         cables = Cable(STEEL_ROPE_DENSITY, np.where(unknown, STEEL_ROPE_STIFFNESS, stiffness))
         what = "linear density and axial stiffness" if unknown.any() else "linear density"
         assumed["cables"] = f"{what} of a 4 mm steel rope; the CASPR file gives none"
+    radii = [leg.pulley.radius for leg in legs]
+    axes = [leg.pulley.swivel_axis for leg in legs]
     return Robot(
         name,
         [leg.frame_anchor for leg in legs],
@@ -226,6 +253,7 @@ def _robot(name: str, platform: _Platform, legs: list[_Leg], cables: Cable | Non
         cables,
         platform.mass,
         platform.inertia,
+        winches=Winch(radii, swivel_axis=axes) if any(radii) else None,
         center_of_mass=platform.center_of_mass,
         motion_pattern=pattern,
         plane_normal=normal,

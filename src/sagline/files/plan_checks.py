@@ -9,7 +9,7 @@ import numpy as np
 
 from sagline.arrays import Flags
 from sagline.errors import InvalidValueError
-from sagline.files.plan_layout import JERK, MOTION, PARTS, PROOF, QUANTITIES, TIME, Known, Quantity
+from sagline.files.plan_layout import JERK, MACHINE, MOTION, PARTS, PROOF, QUANTITIES, TIME, Known, Quantity
 from sagline.kinematics.status import PoseStatus
 
 if TYPE_CHECKING:
@@ -29,7 +29,8 @@ def present(data: Dataset) -> tuple[Quantity, ...]:
         All that a plan has, the proofs that are there, and those of a path if there is one.
     """
     motion = (TIME, *MOTION) if TIME.name in data.variables else ()
-    return (*QUANTITIES, *motion, *(some for some in (*PROOF, JERK) if some.name in data.variables))
+    machine = MACHINE if MACHINE[0].name in data.variables else ()
+    return (*QUANTITIES, *machine, *motion, *(some for some in (*PROOF, JERK) if some.name in data.variables))
 
 
 def check_plan(data: Dataset, cables: int) -> None:

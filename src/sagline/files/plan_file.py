@@ -23,15 +23,17 @@ from sagline.cables.straight import Straight
 from sagline.errors import FileError, InvalidValueError, SaglineWarning
 from sagline.files.dataset import AGAIN, read_dataset
 from sagline.files.plan_checks import check_plan
-from sagline.files.plan_layout import JERK, MOTION, PARTS, PROOF, QUANTITIES, TIME, Quantity
+from sagline.files.plan_layout import JERK, MACHINE, MOTION, PARTS, PROOF, QUANTITIES, TIME, Quantity
 from sagline.files.robot_file import dump_robot, parse_robot
 from sagline.files.seal import Seal, seal
 from sagline.files.whole import written_whole
 from sagline.kinematics.plan import Plan
 from sagline.motion.path import Path
+from sagline.robot.contact import Contact
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
+from sagline.robot.several import anything_behind
 from sagline.tension.method import TensionMethod
 from sagline.tension.methods import METHODS
 
@@ -41,6 +43,7 @@ if TYPE_CHECKING:
 FORMAT = 2  # raised whenever an older sagline could misread the file; 2: with a digest
 MODELS = {model.__name__: model for model in (Straight, Elastic, Empirical, Parabolic, Catenary)}
 HEADERS = 1 << 18  # bytes, more than all names and attributes take beside the robot
+FREE = {"unstrained_length": "free_length", "chord_tension": "free_chord_tension"}  # of cables over pulleys
 STATE_ARRAYS = ("span", "rise", "unstrained_length", "horizontal_tension", "vertical_force", "chord_tension")
 
 Choice = TypeVar("Choice", CableModel, TensionMethod)
@@ -119,7 +122,8 @@ def _dataset(plan: Plan) -> Dataset:
 
     proof = tuple(quantity for quantity in PROOF if quantity.of(plan) is not None)
     motion = () if plan.path is None else MOTION if plan.path.jerk is None else (*MOTION, JERK)
-    quantities = QUANTITIES + proof + motion
+    machine = () if plan.state.contact is None else MACHINE
+    quantities = QUANTITIES + machine + proof + motion
     used = {part for quantity in quantities for part in quantity.parts} & PARTS.keys()
     coordinates: dict[str, Any] = {part: (part, list(PARTS[part])) for part in sorted(used)}
     cables = np.arange(plan.state.one_robot.cable_count)
@@ -197,20 +201,25 @@ def _plan(path: FilePath, data: Dataset, robot: Robot) -> Plan:
     if data.sizes["cable"] != robot.cable_count:
         raise FileError(path, f"has {data.sizes['cable']} cables, its robot {robot.cable_count}", "Write it again.")
     check_plan(data, robot.cable_count)
+    behind = MACHINE[0].name in data.variables
+    if behind != anything_behind(robot):
+        said, has = ("is", "none of its") if behind else ("is not", "some of its")
+        raise FileError(path, f"{said} of cables over pulleys, but {has} robot's are", AGAIN)
     pose = Pose.from_quaternion(values("position"), values("quaternion"))
     cables = CableState(
         model=_read(path, data, "model", MODELS),
         cable=robot.cables,
         gravity=robot.gravity,
-        **{name: values(name) for name in STATE_ARRAYS},
+        **{name: values(FREE.get(name, name) if behind else name) for name in STATE_ARRAYS},
         status=values("cable_status"),
     )
+    contact = Contact(*(values(field.name) for field in fields(Contact))) if behind else None
     motion = None
     if TIME.name in data.variables:
         jerk = values(JERK.name) if JERK.name in data.variables else None
         motion = Path(values("time"), pose, values("twist"), values("twist_rate"), jerk)
     return Plan(
-        state=Equilibrium(robot, pose, values("wrench"), cables),
+        state=Equilibrium(robot, pose, values("wrench"), cables, contact),
         path=motion,
         tension=_read(path, data, "tension", METHODS),
         status=values("pose_status"),

@@ -89,7 +89,7 @@ class Quantity(NamedTuple):
 QUANTITIES = (
     Quantity(
         "unstrained_length",
-        "state.cables.unstrained_length",
+        "unstrained_length",
         ("cable",),
         "m",
         "unstrained length L to wind",
@@ -98,7 +98,7 @@ QUANTITIES = (
     ),
     Quantity(
         "chord_tension",
-        "state.cables.chord_tension",
+        "chord_tension",
         ("cable",),
         "N",
         "tension along the chord, T_x / cos phi",
@@ -164,6 +164,63 @@ QUANTITIES = (
         ("quaternion_part",),
         "1",
         "rotation from platform to world, scalar last",
+    ),
+)
+
+# of a plan whose cables have something behind them
+MACHINE = (
+    Quantity(
+        "free_length",
+        "free_length",
+        ("cable",),
+        "m",
+        "unstrained length of the hanging cable",
+        known=Known.SOLVED,
+        low=0.0,
+    ),
+    Quantity(
+        "free_chord_tension",
+        "state.cables.chord_tension",
+        ("cable",),
+        "N",
+        "tension along the chord of the hanging cable, from where it leaves its pulley",
+        known=Known.SOLVED,
+        low=0.0,
+    ),
+    Quantity(
+        "wrap_angle",
+        "wrap_angle",
+        ("cable",),
+        "rad",
+        "angle over which the cable lies on its pulley",
+        known=Known.SOLVED,
+        low=0.0,
+    ),
+    Quantity(
+        "wrapped_length",
+        "state.contact.wrapped_length",
+        ("cable",),
+        "m",
+        "unstrained length on the pulley",
+        known=Known.SOLVED,
+        low=0.0,
+    ),
+    Quantity(
+        "dead_length",
+        "state.contact.dead_length",
+        ("cable",),
+        "m",
+        "unstrained length between pulley and drum",
+        known=Known.SOLVED,
+        low=0.0,
+    ),
+    Quantity(
+        "chord_sine",
+        "state.contact.chord_sine",
+        ("cable",),
+        "1",
+        "sine of the slope of the chord that touches the pulley",
+        known=Known.SOLVED,
     ),
 )
 

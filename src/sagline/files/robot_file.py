@@ -6,14 +6,12 @@ import os
 from pathlib import Path
 from typing import Any
 
-import yaml
-
-from sagline.arguments import file_path, instance
-from sagline.errors import FileError, InvalidValueError
+from sagline.arguments import brief, file_path, instance
+from sagline.errors import FileError, InvalidValueError, nearest
 from sagline.files.robot_schema import SWIVEL_AXES, RobotEntry
 from sagline.files.schema import validated
 from sagline.files.text import exists, read_text
-from sagline.files.yaml_text import YAML_LIMIT, parse_mapping
+from sagline.files.yaml_text import YAML_LIMIT, dump_mapping, parse_mapping
 from sagline.robot.catalogue import preset_text, robot_names
 from sagline.robot.robot import Robot
 from sagline.robot.winch import Winch
@@ -37,6 +35,9 @@ def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
             # or cylinder_radius and cylinder_height (along z), Ixx ... Iyz, three numbers, or a 3 x 3 matrix
         tension_min: 20 N
         assumed: {tension_min: the winch's data sheet gives none}
+
+    A file may begin with a preset and say what is other, `base: cogiro` beside its own name: what it does not say is
+    the preset's, and so is what is assumed of that.
 
     Args:
         name_or_path: One of `robot_names()`, or the path of a file. A path object, and a text that ends in .yaml
@@ -74,7 +75,7 @@ def parse_robot(text: str, origin: Path | str) -> Robot:
     Raises:
         FileError: If the text is no robot file; the message names the line, or the key and the value.
     """
-    entry = validated(parse_mapping(text, origin), RobotEntry, origin)
+    entry = validated(_on_base(parse_mapping(text, origin), origin), RobotEntry, origin)
     try:
         return entry.robot()
     except InvalidValueError as error:
@@ -110,7 +111,23 @@ def dump_robot(robot: Robot) -> str:
             data[key] = value.tolist()
     if (box := robot.test_box) is not None:
         data["test_box"] = {"low": box.low.tolist(), "high": box.high.tolist(), "tilt": box.tilt}
-    return yaml.safe_dump(data, sort_keys=False, default_flow_style=None, allow_unicode=True, width=120)
+    return dump_mapping(data)
+
+
+def _on_base(data: dict[Any, Any], origin: Path | str) -> dict[Any, Any]:
+    """A file's keys over those of the preset that it names as its base, if it does."""
+    if "base" not in data:
+        return data
+    name = data.pop("base")
+    if name not in robot_names():
+        near = nearest(name, robot_names()) if isinstance(name, str) else None
+        step = f"Did you mean {near}?" if near else "Name one of them, or leave base out."
+        raise FileError(origin, f"base is {brief(name)}; allowed: {', '.join(robot_names())}", step)
+    base = _on_base(parse_mapping(preset_text(name), f"preset {name}"), origin)
+    del base["name"]  # two robots of one name would overwrite each other's files
+    assumed = {field: why for field, why in base.get("assumed", {}).items() if field not in data}
+    own = data.get("assumed", {})
+    return {**base, **data, "assumed": {**assumed, **own} if isinstance(own, dict) else own}
 
 
 def _winches(winches: Winch) -> dict[str, Any]:

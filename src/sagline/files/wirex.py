@@ -19,6 +19,7 @@ from sagline.files.xml_text import number, only_child, read_xml
 from sagline.robot.inertia import box_inertia
 from sagline.robot.pattern import MOTION_PATTERNS, PLANAR, ROTATING, MotionPattern
 from sagline.robot.robot import Robot
+from sagline.robot.winch import UPRIGHT, Winch
 
 _AXES: Final = ("x", "y", "z")
 _FLATTEST: Final = 0.1  # least edge of the assumed box over its largest: anchors may lie in a plane, a body does not
@@ -31,8 +32,8 @@ def load_wirex(source: str | os.PathLike[str], cables: Cable | None = None) -> I
 
     WireX asks for no material, no inertia and no limits: what a file leaves out is assumed, and the robot says so in
     `assumed`. Moments of inertia that are missing are taken as large as the largest that is given, the others as zero;
-    where none is given, the platform is a box around its anchors. Its winches are kept as the tension limit they give,
-    its pulleys as the points they stand at.
+    where none is given, the platform is a box around its anchors. Pulleys that swivel about a vertical axis are the
+    robot's; of a winch its largest force, its drum and the inertia of its motor.
 
     Args:
         source: The `.wcrfx` file.
@@ -84,6 +85,7 @@ def _robot(root: Element, name: str, cables: Cable | None) -> Imported:
     low, high = _limits(root, materials, assumed)
     mass = _given(platform, "mass", "platform", "kg")
     anchors = [_point(chain, "platform", k) for k, chain in enumerate(chains)]
+    winches, lost = _winches(root, chains)
     result = Robot(
         robot.get("name") or name,
         [_point(chain, "base", k) for k, chain in enumerate(chains)],
@@ -91,6 +93,7 @@ def _robot(root: Element, name: str, cables: Cable | None) -> Imported:
         _cables(materials, assumed) if cables is None else cables,
         mass,
         _inertia(platform, mass, np.ptp(anchors, axis=0), assumed) if pattern in ROTATING else None,
+        winches=winches,
         center_of_mass=_center(platform, assumed),
         motion_pattern=pattern,
         plane_normal=(0.0, 0.0, 1.0) if pattern in PLANAR else None,
@@ -99,7 +102,7 @@ def _robot(root: Element, name: str, cables: Cable | None) -> Imported:
         source=f"WireX file {root.get('version', '')}".strip(),
         assumed=assumed,
     )
-    return imported(result, _lost(root, chains))
+    return imported(result, (*lost, *_lost(root)))
 
 
 def _value(element: Element | None, key: str, item: str, unit: str) -> float | None:
@@ -132,7 +135,7 @@ def _material(root: Element, chain: Element, k: int) -> Element:
 
 
 def _cables(materials: list[Element], assumed: dict[str, str]) -> Cable:
-    density, stiffness = [], []
+    density, stiffness, diameter = [], [], []
     for element in materials:
         item = f"cable {element.get('name', '')}".strip()
         modulus = _value(element, "elasticity", item, "Pa")
@@ -141,6 +144,7 @@ def _cables(materials: list[Element], assumed: dict[str, str]) -> Cable:
             raise InvalidValueError(f"{item}: radius", f"{radius:g} m", ">= 0 m", "Correct it in the file.")
         density.append(_value(element, "weight", item, "kg/m"))
         stiffness.append(None if not modulus or not radius else modulus * np.pi * radius**2)
+        diameter.append(2.0 * (radius or 0.0))
     missing = [
         word
         for word, values in (("linear density", density), ("axial stiffness", stiffness))
@@ -149,8 +153,59 @@ def _cables(materials: list[Element], assumed: dict[str, str]) -> Cable:
     if missing:
         assumed["cables"] = f"{' and '.join(missing)} of a 4 mm steel rope; the WireX file gives none"
     return Cable(
-        [value or STEEL_ROPE_DENSITY for value in density], [value or STEEL_ROPE_STIFFNESS for value in stiffness]
+        [value or STEEL_ROPE_DENSITY for value in density],
+        [value or STEEL_ROPE_STIFFNESS for value in stiffness],
+        diameter=diameter if all(diameter) else None,
     )
+
+
+def _winches(root: Element, chains: list[Element]) -> tuple[Winch | None, tuple[str, ...]]:
+    """Pulleys and drums, and what is lost of them."""
+    lost, radii, axes = [], [], []
+    for k, chain in enumerate(chains):
+        item = f"chain {k + 1}: base"
+        base = only_child(chain, "base", f"chain {k + 1}")
+        radius, axis = _value(base, "radius", item, "m") or 0.0, _axis(base, item)
+        if axis is None and radius:
+            lost.append(
+                f"The pulley of chain {k + 1} (radius {radius:g} m), whose axis is not vertical: its cable starts "
+                "at the point of <base>."
+            )
+        radii.append(0.0 if axis is None else radius)
+        axes.append((0.0, 0.0, 1.0) if axis is None else axis)
+    found = root.findall("winch")
+    drive = _drive(found[0]) if len(found) == 1 else {}
+    if len(found) == 1:
+        taken = "; its largest force, drum and motor's inertia are taken, where they are given"
+        lost.append(f"The winch's gear, speeds, power and sensors{taken}.")
+    elif found:
+        lost.append("The winches, for the file does not say which cable has which; the first one's force is taken.")
+    if not any(radii) and not drive:
+        return None, tuple(lost)
+    return Winch(radii, swivel_axis=axes, **drive), tuple(lost)
+
+
+def _axis(base: Element, item: str) -> tuple[float, float, float] | None:
+    """The way the cable enters its pulley, z of the matrix a11 to a33; up without one, and None if not vertical."""
+    if base.get("a33") is None:
+        return (0.0, 0.0, 1.0)
+    upright = _given(base, "a33", item, "")
+    # of a rotation: where z stays vertical, the last row is as bare as the last column, whichever of them is z
+    sideways = max(abs(_value(base, key, item, "") or 0.0) for key in ("a13", "a23", "a31", "a32"))
+    return None if sideways > UPRIGHT * abs(upright) or not upright else (0.0, 0.0, float(np.sign(upright)))
+
+
+def _drive(winch: Element) -> dict[str, float]:
+    """Drum and motor; a zero is how a file says that it does not know."""
+    drum, motor = winch.find("drum"), winch.find("motor")
+    width, grooves = _value(drum, "l_drum", "winch: drum", "m"), _value(drum, "nr_groove", "winch: drum", "")
+    fields = {
+        "drum_radius": _value(drum, "r_drum", "winch: drum", "m"),
+        "drum_width": width,
+        "groove_pitch": width / grooves if width and grooves else None,
+        "inertia": _value(motor, "inertia", "winch: motor", "kg m^2"),
+    }
+    return {name: value for name, value in fields.items() if value}
 
 
 def _pattern(robot: Element, assumed: dict[str, str]) -> MotionPattern:
@@ -216,15 +271,8 @@ def _inertia(platform: Element, mass: float, size: Array, assumed: dict[str, str
     return matrix
 
 
-def _lost(root: Element, chains: list[Element]) -> tuple[str, ...]:
+def _lost(root: Element) -> tuple[str, ...]:
     lost = []
-    bases = [base for chain in chains if (base := chain.find("base")) is not None]
-    radii = sorted({value for base in bases if (value := _value(base, "radius", "base", "m"))})
-    if radii:
-        shown = ", ".join(f"{radius:g}" for radius in radii)
-        lost.append(f"The pulleys (radius {shown} m) and their directions: cables start at the points of <base>.")
-    if root.find("winch") is not None:
-        lost.append("The winches: drums, motors, speeds; only their largest force is taken.")
     if any(element.get("damping") for element in root.findall("cable")):
         lost.append("The cables' damping, cost and largest length.")
     if root.find("robot/controller") is not None:

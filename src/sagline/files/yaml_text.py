@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Hashable
+from collections.abc import Hashable, Mapping
 from itertools import chain
 from pathlib import Path
 from typing import Any, ClassVar, Final
@@ -53,6 +53,25 @@ def parse_mapping(text: str, origin: Path | str) -> dict[Any, Any]:
     if not isinstance(data, dict):
         raise FileError(origin, "has no keys at its top level", "Check that this is the file you mean.")
     return data
+
+
+def dump_mapping(data: Mapping[str, Any]) -> str:
+    """A mapping as YAML text that `parse_mapping` reads as the same: a word it would take for a number is quoted.
+
+    Args:
+        data: Texts, numbers, truth values, None, and lists and mappings of them.
+
+    Returns:
+        The text; what other YAML readers would take for more than a word is quoted too.
+
+    Examples:
+        >>> from sagline.files.yaml_text import dump_mapping
+        >>> print(dump_mapping({"name": "1e5", "mass": 1e5}), end="")
+        {name: '1e5', mass: 100000.0}
+    """
+    return yaml.dump(
+        dict(data), Dumper=_PlainDumper, sort_keys=False, default_flow_style=None, allow_unicode=True, width=120
+    )
 
 
 def _cause(error: yaml.MarkedYAMLError, text: str) -> tuple[str, str]:
@@ -108,11 +127,7 @@ class _PlainLoader(yaml.SafeLoader):
         return node
 
     def resolve(self, kind: type[yaml.Node], value: str | None, implicit: Any) -> str:
-        if kind is yaml.ScalarNode and value is not None and implicit[0]:  # neither quoted nor tagged
-            if value in _WORDS:
-                return _WORDS[value]
-            return f"{_TAG}{'str' if plain_number(value) is None else 'float'}"
-        return f"{_TAG}seq" if kind is yaml.SequenceNode else f"{_TAG}map" if kind is yaml.MappingNode else f"{_TAG}str"
+        return _resolved(kind, value, implicit)
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
         # PyYAML keeps the last of two equal keys and says nothing; a !!map of something else it refuses itself
@@ -130,6 +145,25 @@ class _PlainLoader(yaml.SafeLoader):
         if number is None:  # for whom the text is meant says what is wrong with it
             return text
         return int(text) if text.lstrip("+-").isdecimal() else number
+
+
+class _PlainDumper(yaml.SafeDumper):
+    """Quotes what either reader, the one above or PyYAML's own, would take for something else than a text."""
+
+    def resolve(self, kind: type[yaml.Node], value: str | None, implicit: Any) -> str:
+        ours = _resolved(kind, value, implicit)
+        return ours if ours != f"{_TAG}str" else str(super().resolve(kind, value, implicit))  # type: ignore[no-untyped-call]
+
+
+def _resolved(kind: type[yaml.Node], value: str | None, implicit: Any) -> str:
+    """The tag of a value that has none."""
+    if kind is yaml.ScalarNode and value is not None and implicit[0]:  # neither quoted nor tagged
+        if value in _WORDS:
+            return _WORDS[value]
+        if plain_number(value) is None:
+            return f"{_TAG}str"
+        return f"{_TAG}{'int' if value.lstrip('+-').isdecimal() else 'float'}"
+    return f"{_TAG}seq" if kind is yaml.SequenceNode else f"{_TAG}map" if kind is yaml.MappingNode else f"{_TAG}str"
 
 
 def _extent(node: yaml.Node, known: dict[int, tuple[int, int] | None]) -> tuple[int, int]:

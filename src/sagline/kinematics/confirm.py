@@ -85,7 +85,7 @@ def confirm(plan: Plan, *, progress: Progress | None = None) -> Confirmation:
     parts = []
     for rows in blocks(len(lengths), BLOCK):
         part, told = state[rows], None if progress is None else _from(rows.start, len(lengths), progress)
-        found = forward(part.robot, part.cables.unstrained_length, part.pose, wrench=part.wrench, progress=told)
+        found = forward(part.robot, part.unstrained_length, part.pose, wrench=part.wrench, progress=told)
         parts.append((found.pose.position, found.pose.quaternion, found.status, found.wrench_residual))
     position, quaternion, status, residual = (locked(np.concatenate(each)) for each in zip(*parts, strict=True))
     return Confirmation(plan, Pose._adopt(position, quaternion), status, residual)

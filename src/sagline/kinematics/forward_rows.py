@@ -8,7 +8,7 @@ import numpy as np
 
 from sagline.arrays import Array, Codes, Flags, Indices, locked
 from sagline.blocks import Progress, blocks, rows_of
-from sagline.cables.model import CableModel, CableState
+from sagline.cables.model import CableModel
 from sagline.kernels import codes, tables
 from sagline.kernels.cable.rows import CABLE_ROWS
 from sagline.kernels.forward.fit import fit_poses
@@ -27,9 +27,10 @@ from sagline.kernels.forward.problem import (
 from sagline.kernels.memory import memory_for
 from sagline.kinematics.forward_solution import ForwardSolution
 from sagline.kinematics.forward_status import STABLE
+from sagline.kinematics.hung import hung
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
-from sagline.robot.several import Robots, cables_of, first_of
+from sagline.robot.several import Robots, first_of
 from sagline.statics.tables import body_table, cable_table
 
 BLOCK = 1 << 13  # cables solved at once: from a few to some 130 ms, after which an interrupt is heard
@@ -117,31 +118,6 @@ class Found(NamedTuple):
         """Whether each sample is a stable equilibrium, (N,)."""
         return np.isin(self.pose_status, STABLE)
 
-    def cables(self, robot: Robots, model: CableModel, shape: tuple[int, ...]) -> CableState:
-        """The cables of the batch in the caller's shape.
-
-        Args:
-            robot: The robot, or one a sample.
-            model: Cable model.
-            shape: () for a single sample, (N,) for a batch.
-
-        Returns:
-            State with fields of shape (m,) or (N, m).
-        """
-        wide = (*shape, self.cable_status.shape[1])
-        return CableState(
-            model=model,
-            cable=cables_of(robot),
-            gravity=first_of(robot).gravity,
-            span=locked(self.results[tables.SPAN].reshape(wide)),
-            rise=locked(self.results[tables.RISE].reshape(wide)),
-            unstrained_length=locked(self.results[tables.LENGTH].reshape(wide)),
-            horizontal_tension=locked(self.results[tables.HORIZONTAL].reshape(wide)),
-            vertical_force=locked(self.results[tables.VERTICAL].reshape(wide)),
-            chord_tension=locked(self.results[tables.TENSION].reshape(wide)),
-            status=locked(self.cable_status.reshape(wide)),
-        )
-
     def solution(
         self,
         robot: Robots,
@@ -165,8 +141,9 @@ class Found(NamedTuple):
         pose = Pose._adopt(self.poses[:, :3].reshape(*shape, 3), self.poses[:, 3:].reshape(*shape, 4))
         whole = locked(np.ascontiguousarray(np.broadcast_to(load, (*shape, 6))))
         residuals = self.numbers[:, [FORCE_RESIDUAL, MOMENT_RESIDUAL]]
+        cables, contact = hung(robot, model, self.results, self.cable_status, shape)
         return ForwardSolution(
-            state=Equilibrium(robot, pose, whole, self.cables(robot, model, shape)),
+            state=Equilibrium(robot, pose, whole, cables, contact),
             status=locked(self.pose_status.reshape(shape)),
             stiffness_min=locked(self.numbers[:, STIFFNESS_MIN].reshape(shape)),
             energy=locked(self.numbers[:, ENERGY].reshape(shape)),

@@ -11,9 +11,10 @@ from sagline.arguments import brief, callback, instance, optional
 from sagline.arrays import Array, locked
 from sagline.blocks import Progress
 from sagline.cables.catenary import Catenary
-from sagline.cables.model import CableModel, CableState
+from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
 from sagline.kernels import codes, tables
+from sagline.kinematics.hung import hung
 from sagline.kinematics.inverse_rows import decide_rows, solve_rows
 from sagline.kinematics.plan import Plan
 from sagline.memory import check_poses
@@ -22,12 +23,12 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot
-from sagline.robot.several import cables_of, first_of, one_a_pose
+from sagline.robot.several import first_of, one_a_pose
 from sagline.statics.balance import refuse_missing_chords
 from sagline.statics.tables import pose_rows
 from sagline.statics.wrench import external_wrench, inertial_wrench
 from sagline.tension.closest import Closest
-from sagline.tension.method import TensionMethod, Variable
+from sagline.tension.method import TensionMethod, Variable, shared_tension
 from sagline.tension.options import kernel_options
 
 _CATENARY = Catenary()
@@ -100,21 +101,10 @@ def inverse(
     if (found.pose_status == codes.POSE_NO_CHORD).any():
         refuse_missing_chords(np.hypot(found.results[tables.SPAN], found.results[tables.RISE]), pose)
     verdicts = decide_rows(robots, options, rows, loads, found, progress)
-    cables = CableState(
-        model=model,
-        cable=cables_of(robots),
-        gravity=shared.gravity,
-        span=found.row(tables.SPAN, pose),
-        rise=found.row(tables.RISE, pose),
-        unstrained_length=found.row(tables.LENGTH, pose),
-        horizontal_tension=found.row(tables.HORIZONTAL, pose),
-        vertical_force=found.row(tables.VERTICAL, pose),
-        chord_tension=found.row(tables.TENSION, pose),
-        status=locked(found.cable_status.reshape(*pose.shape, shared.cable_count)),
-    )
+    cables, contact = hung(robots, model, found.results, found.cable_status, pose.shape)
     whole = locked(np.ascontiguousarray(np.broadcast_to(load, (*pose.shape, 6))))
     return Plan(
-        state=Equilibrium(robots, pose, whole, cables),
+        state=Equilibrium(robots, pose, whole, cables, contact),
         path=motion if isinstance(motion, Path) else None,
         tension=tension,
         status=locked(found.pose_status.reshape(pose.shape)),
@@ -156,11 +146,7 @@ def _reference(robot: Robot, previous: Plan | None, variable: Variable) -> Array
             f"{robot.cable_count} cables",
             "Continue a plan of this robot.",
         )
-    tensions = {
-        "chord": cables.chord_tension,
-        "horizontal": cables.horizontal_tension,
-        "frame_end": cables.frame_end_tension,
-    }[variable]
+    tensions = shared_tension(previous.state, variable)
     # where the way of sharing had no say, a path does not go on from either
     at_border = np.zeros_like(previous.feasible) if previous.at_border is None else previous.at_border
     feasible = np.flatnonzero(np.atleast_1d(previous.feasible & ~at_border))

@@ -6,13 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, Codes, Flags, locked
+from sagline.arrays import Array, Codes, Flags
 from sagline.blocks import Progress, blocks
 from sagline.kernels import codes, tables
 from sagline.kernels.inverse.poses import Answers, inverse_poses
 from sagline.kernels.inverse.verdicts import ENOUGH, PROVED, decide_poses
 from sagline.kernels.memory import memory_for
-from sagline.robot.pose import Pose
 from sagline.robot.several import Robots, first_of
 from sagline.statics.tables import robot_terms
 from sagline.tension.method import TensionMethod
@@ -55,18 +54,6 @@ class Found(NamedTuple):
     def answers(self) -> Answers:
         """As the kernel takes it: a plain tuple."""
         return self.results, self.cable_status, self.residuals, self.needed, self.pose_status
-
-    def row(self, row: int, pose: Pose) -> Array:
-        """One row of the results in the caller's shape.
-
-        Args:
-            row: Which, as in kernels.tables.
-            pose: One pose or a batch of N: whose shape.
-
-        Returns:
-            Array of shape (m,) or (N, m), write-locked.
-        """
-        return locked(self.results[row].reshape(*pose.shape, self.results.shape[2]))
 
 
 def solve_rows(

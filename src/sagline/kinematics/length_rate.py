@@ -6,15 +6,15 @@ import numpy as np
 
 from sagline.arrays import Array, Flags, Indices, locked
 from sagline.kernels import tables
-from sagline.kinematics.instants import Instants, instants
+from sagline.kinematics.instants import Instant, Instants, instants
 from sagline.kinematics.inverse_rows import solve_rows
 from sagline.kinematics.tension_rate import closest_rates, placed
 from sagline.motion.path import Path
 from sagline.robot.equilibrium import Equilibrium
-from sagline.robot.several import first_of
+from sagline.robot.several import first_of, robot_at
 from sagline.statics.tables import pose_rows
 from sagline.tension.closest import Closest
-from sagline.tension.method import TensionMethod
+from sagline.tension.method import TensionMethod, shared_tension
 from sagline.tension.options import kernel_options
 
 
@@ -42,7 +42,7 @@ def length_rate(state: Equilibrium, path: Path, tension: TensionMethod, feasible
     near = instants(state.robot, path, state.wrench)
     kept = np.flatnonzero(feasible)
     rates = np.full(state.cables.shape, np.nan)
-    if not isinstance(tension, Closest):
+    if not isinstance(tension, Closest) or state.contact is not None:
         rates[kept] = _solved_again(state, tension, near)[kept]
     elif kept.size:
         rates[kept] = _followed(state[kept], tension, near, kept)
@@ -50,20 +50,32 @@ def length_rate(state: Equilibrium, path: Path, tension: TensionMethod, feasible
 
 
 def _solved_again(state: Equilibrium, tension: TensionMethod, near: Instants) -> Array:
-    """Rates of a method without memory; to one side, where the path leaves the feasible poses at the other."""
-    options = kernel_options(state.robot, state.cables.model, tension)
-    lengths = state.cables.unstrained_length
-    none = np.full(first_of(state.robot).cable_count, np.nan)
-    before, after = (
-        solve_rows(state.robot, tension, options, pose_rows(moment.pose), locked(moment.wrench), none).results[
-            tables.LENGTH
-        ]
-        for moment in (near.before, near.after)
-    )
+    """Rates from poses solved again an instant before and after; to one side, where the path leaves the feasible."""
+    lengths = state.unstrained_length
+    before, after = (_lengths(state, tension, moment) for moment in (near.before, near.after))
     sides = (after - before) / (2.0 * near.step)
     ahead, behind = (after - lengths) / near.step, (lengths - before) / near.step
     rates: Array = np.where(np.isnan(sides), np.where(np.isnan(ahead), behind, ahead), sides)
     return rates
+
+
+def _lengths(state: Equilibrium, tension: TensionMethod, moment: Instant) -> Array:
+    """Lengths at an instant, (N, m); `Closest` starts at every sample from the tensions that the sample has."""
+    options = kernel_options(state.robot, state.cables.model, tension)
+    rows, loads = pose_rows(moment.pose), locked(moment.wrench)
+    if not isinstance(tension, Closest):
+        none = np.full(first_of(state.robot).cable_count, np.nan)
+        lengths: Array = solve_rows(state.robot, tension, options, rows, loads, none).results[tables.LENGTH]
+        return lengths
+    held = np.where(np.isnan(state.chord_tension), np.nan, shared_tension(state, tension.variable))
+    return np.array(
+        [
+            solve_rows(
+                robot_at(state.robot, i), tension, options, rows[i : i + 1], loads[i : i + 1], held[i].copy()
+            ).results[tables.LENGTH, 0]
+            for i in range(len(rows))
+        ]
+    )
 
 
 def _followed(state: Equilibrium, tension: TensionMethod, near: Instants, kept: Indices) -> Array:

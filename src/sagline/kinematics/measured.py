@@ -139,9 +139,9 @@ class _Fit(NamedTuple):
 
     def misfit(self, found: Found) -> Array:
         """What lengths and tensions miss of their readings, in standard deviations."""
-        cables = found.solution(self.robot, self.model, self.load, ()).state.cables
-        tensions = (cables.frame_end_tension - self.readings) / self.tension_deviation
-        lengths = (cables.unstrained_length - self.lengths) / self.length_deviation
+        state = found.solution(self.robot, self.model, self.load, ()).state
+        tensions = (state.cables.frame_end_tension - self.readings) / self.tension_deviation
+        lengths = (state.unstrained_length - self.lengths) / self.length_deviation
         return np.concatenate((lengths, tensions[~np.isnan(tensions)]))
 
     def moved(self, found: Found, step: Array) -> Found | None:

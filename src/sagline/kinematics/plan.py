@@ -96,8 +96,8 @@ class Plan:
 
     @property
     def unstrained_length(self) -> Array:
-        """L: lengths to wind [m]."""
-        return self.state.cables.unstrained_length
+        """L: lengths to wind [m]: all cable off the drum, with what is wrapped on pulleys, and dead cable."""
+        return self.state.unstrained_length
 
     @property
     def horizontal_tension(self) -> Array:
@@ -112,7 +112,22 @@ class Plan:
     @property
     def chord_tension(self) -> Array:
         """Tau = T_x/cos phi [N]."""
-        return self.state.cables.chord_tension
+        return self.state.chord_tension
+
+    @property
+    def free_length(self) -> Array:
+        """Unstrained length of the hanging cables [m], from their exit points to their platform ends."""
+        return self.state.free_length
+
+    @property
+    def exit_point(self) -> Array:
+        """Where the cables leave the frame, world axes [m], shape (m, 3) or (N, m, 3)."""
+        return self.state.exit_point
+
+    @property
+    def wrap_angle(self) -> Array | None:
+        """Psi, over which the cables lie on their pulleys [rad]; None where there are none."""
+        return None if self.state.contact is None else self.state.contact.wrap_angle
 
     @property
     def length_rate(self) -> Array | None:

@@ -111,8 +111,7 @@ def polygon_at(
 
 def _pulls(plan: Plan) -> Array:
     """T_z - tau sin phi of the cables [N], as kernels take it."""
-    cables = plan.state.cables
-    return locked(cables.vertical_force - cables.chord_tension * cables.rise / cables.chord)
+    return plan.state.pull
 
 
 def _sides_of(

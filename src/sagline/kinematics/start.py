@@ -10,6 +10,7 @@ from sagline.cables.model import CableModel
 from sagline.kernels import codes
 from sagline.kernels.forward.problem import ENERGY
 from sagline.kinematics.forward_rows import BLOCK, Found, solve_rows
+from sagline.kinematics.hung import hung as hung_cables
 from sagline.robot.equilibrium import limited_tension
 from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.pose import Pose
@@ -158,7 +159,8 @@ def outside_limits(robot: Robots, model: CableModel, found: Found) -> Indices:
         Counts (N,); 0 for straight cables, whose tensions are not known.
     """
     limits = limits_of(robot)
-    tension = limited_tension(robot, found.cables(robot, model, found.pose_status.shape))
+    cables = hung_cables(robot, model, found.results, found.cable_status, found.pose_status.shape)[0]
+    tension = limited_tension(robot, cables)
     low = (1.0 - _LIMIT_SLACK) * limits.low
     high = (1.0 + _LIMIT_SLACK) * limits.high
     count: Indices = ((tension < low) | (tension > high)).sum(axis=1)

@@ -5,13 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import numpy as np
+
 from sagline.arrays import Array, locked
 from sagline.cables.model import CableState
 from sagline.errors import InvalidValueError
 from sagline.indices import length_of, part_of
+from sagline.robot.contact import Contact
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.robot.several import Index, Robots, first_of, robots_at
+from sagline.robot.several import Index, Robots, anchors_of, first_of, pulleys_of, robots_at
+
+_TINY = 1e-300
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,13 +31,60 @@ class Equilibrium:
         pose: Pose of the platform, single or a batch of N.
         wrench: External plus inertial wrench on the platform about its center of mass, world axes, without
             gravity: force [N], moment [N m], shape (6,) or (N, 6).
-        cables: State of the cables, fields of shape (m,) or (N, m).
+        cables: State of the hanging cables, from where they leave the frame to their platform ends, fields of shape
+            (m,) or (N, m).
+        contact: What is behind them, on pulleys and as dead cable; None where nothing is: a cable then starts at its
+            frame anchor and is all there is off the drum.
     """
 
     robot: Robot | tuple[Robot, ...]
     pose: Pose
     wrench: Array
     cables: CableState
+    contact: Contact | None = None
+
+    @property
+    def unstrained_length(self) -> Array:
+        """L: all cable off the drum, hanging, wrapped and dead [m], shape (m,) or (N, m)."""
+        if self.contact is None:
+            return self.cables.unstrained_length
+        return locked(self.free_length + (self.contact.wrapped_length + self.contact.dead_length))
+
+    @property
+    def free_length(self) -> Array:
+        """Unstrained length of the hanging cables [m], shape (m,) or (N, m)."""
+        return self.cables.unstrained_length
+
+    @property
+    def chord_tension(self) -> Array:
+        """Tau = T_x/cos phi [N], shape (m,) or (N, m); over a pulley phi is that of the tangent from the platform end.
+
+        The tension that is shared, and that limits on the chord name.
+        """
+        return self.cables.chord_tension if self.contact is None else self.contact.chord_tension
+
+    @property
+    def pull(self) -> Array:
+        """What the weight of the cables adds to the vertical force at their ends, T_z - tau sin phi [N]."""
+        cables = self.cables
+        sine = cables.rise / cables.chord if self.contact is None else self.contact.chord_sine
+        return locked(cables.vertical_force - self.chord_tension * sine)
+
+    @property
+    def exit_point(self) -> Array:
+        """Where the cables leave the frame, world axes [m], shape (m, 3) or (N, m, 3): pulleys, or frame anchors."""
+        anchors = anchors_of(self.robot)
+        shape = (*self.cables.shape, 3)
+        if self.contact is None:
+            return locked(np.array(np.broadcast_to(anchors.frame, shape)))
+        ends = self.pose.position[..., None, :] + anchors.platform @ np.swapaxes(self.pose.matrix, -1, -2)
+        level = (ends - anchors.frame)[..., :2]
+        outward = level / np.maximum(np.linalg.norm(level, axis=-1, keepdims=True), _TINY)
+        radius, entry = pulleys_of(self.robot)
+        wrap = self.contact.wrap_angle
+        away = outward * (radius * (1.0 - np.cos(wrap)))[..., None]
+        point: Array = anchors.frame + np.concatenate((away, (radius * entry * np.sin(wrap))[..., None]), axis=-1)
+        return locked(point)
 
     @property
     def one_robot(self) -> Robot:
@@ -65,7 +117,9 @@ class Equilibrium:
             NoSuchEntryError: If there is no such pose; it is an IndexError too.
         """
         part = part_of(index, self.pose.shape, "single equilibrium")
-        return Equilibrium(robots_at(self.robot, part), self.pose[part], locked(self.wrench[part]), self.cables[part])
+        contact = None if self.contact is None else self.contact.part(part)
+        robot, wrench = robots_at(self.robot, part), locked(self.wrench[part])
+        return Equilibrium(robot, self.pose[part], wrench, self.cables[part], contact)
 
     def __iter__(self) -> Iterator[Equilibrium]:
         """The poses of a batch, one by one."""
@@ -74,7 +128,9 @@ class Equilibrium:
     @property
     def limited_tension(self) -> Array:
         """The tension that the robot's limits name [N], shape (m,) or (N, m): along the chord, or at the frame end."""
-        return limited_tension(self.robot, self.cables)
+        if first_of(self.robot).tension_limits_of == "chord":
+            return self.chord_tension
+        return self.cables.frame_end_tension
 
 
 def limited_tension(robot: Robots, cables: CableState) -> Array:

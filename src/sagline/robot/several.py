@@ -152,6 +152,19 @@ def cables_of(robot: Robots) -> Cable:
     return Cable(**{name: np.stack([material[name] for material in materials]) for name in names})
 
 
+def anything_behind(robot: Robots) -> bool:
+    """Whether a cable of the robot or robots runs over a pulley, or has dead cable behind its frame anchor.
+
+    Args:
+        robot: The robot or robots.
+
+    Returns:
+        False where all cables start at their frame anchors.
+    """
+    robots = (robot,) if isinstance(robot, Robot) else robot
+    return any(one.winches is not None and one.winches.anything_behind for one in robots)
+
+
 class Bodies(NamedTuple):
     """What moves: the platform's inertia, once for all poses or, for several robots, with a leading axis N.
 
@@ -208,6 +221,35 @@ def anchors_of(robot: Robots) -> Anchors:
     if isinstance(robot, Robot):
         return Anchors(robot.frame_anchors, robot.platform_anchors)
     return Anchors(np.stack([one.frame_anchors for one in robot]), np.stack([one.platform_anchors for one in robot]))
+
+
+class Pulleys(NamedTuple):
+    """The pulleys of the cables; of radius 0 where there are none.
+
+    Attributes:
+        radius: R [m], shape (m,) or, for several robots, (N, m).
+        entry: +1 where a cable comes from below, -1 from above, of the same shape.
+    """
+
+    radius: Array
+    entry: Array
+
+
+def pulleys_of(robot: Robots) -> Pulleys:
+    """Pulleys of the robot or robots.
+
+    Args:
+        robot: The robot or robots.
+
+    Returns:
+        Pulleys, with a leading axis N for several robots.
+    """
+    if isinstance(robot, Robot):
+        if robot.winches is None:
+            return Pulleys(np.zeros(robot.cable_count), np.ones(robot.cable_count))
+        return Pulleys(robot.winches.pulley_radius, robot.winches.swivel_axis[:, 2])
+    each = [pulleys_of(one) for one in robot]
+    return Pulleys(np.stack([one.radius for one in each]), np.stack([one.entry for one in each]))
 
 
 class Limits(NamedTuple):

@@ -235,6 +235,11 @@ class Winch:
         """Shape of every field that is given, () or (m,)."""
         return self.pulley_radius.shape
 
+    @property
+    def anything_behind(self) -> bool:
+        """Whether a cable runs over a pulley, or has dead cable behind it."""
+        return bool(self.pulley_radius.any() or self.dead_cable.any())
+
     def per_cable(self, count: int) -> Winch:
         """The winches of so many cables, one value a cable.
 

@@ -9,7 +9,15 @@ import numpy as np
 from sagline.arrays import Array, locked
 from sagline.blocks import blocks, rows_of
 from sagline.kernels import tables
-from sagline.kernels.forward.sensitivity import BY_DENSITY, BY_LENGTH, BY_STIFFNESS, describe_states
+from sagline.kernels.forward.sensitivity import (
+    BY_DEAD,
+    BY_DENSITY,
+    BY_LENGTH,
+    BY_RADIUS,
+    BY_STIFFNESS,
+    DATA,
+    describe_states,
+)
 from sagline.kernels.memory import memory_for
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.several import first_of
@@ -28,6 +36,8 @@ class CableSlopes(NamedTuple):
         by_length: dT/dL, shape (..., m, 3) [N/m].
         by_density: dT/d(rho), shape (..., m, 3) [N m/kg].
         by_stiffness: dT/d(EA), shape (..., m, 3) [1].
+        by_radius: dT/dR of the pulley, shape (..., m, 3) [N/m].
+        by_dead: dT by the length of the dead cable, shape (..., m, 3) [N/m].
         levers: From the center of mass to the platform ends, shape (..., m, 3) [m].
         force: T, on the platform ends, shape (..., m, 3) [N].
     """
@@ -37,6 +47,8 @@ class CableSlopes(NamedTuple):
     by_length: Array
     by_density: Array
     by_stiffness: Array
+    by_radius: Array
+    by_dead: Array
     levers: Array
     force: Array
 
@@ -52,11 +64,11 @@ def cable_slopes(state: Equilibrium) -> CableSlopes:
     """
     shared, cables = first_of(state.robot), state.cables
     bodies, robots = body_table(state.robot), cable_table(state.robot)
-    poses, lengths = pose_rows(state.pose), np.atleast_2d(cables.unstrained_length)
+    poses, lengths = pose_rows(state.pose), np.atleast_2d(state.unstrained_length)
     shape, (count, m) = state.pose.shape, lengths.shape
     matrices = np.empty((count, 6, 6))
     stiffness = np.empty((count, m, 3, 3))
-    slopes = np.empty((count, 3, m, 3))
+    slopes = np.empty((count, DATA, m, 3))
     levers = np.empty((count, m, 3))
     lengths, wrenches = locked(lengths.view()), locked(np.atleast_2d(state.wrench).view())
     code, memory = (cables.model.code, *cables.model.parameters), memory_for(m)
@@ -75,6 +87,8 @@ def cable_slopes(state: Equilibrium) -> CableSlopes:
         slopes[:, BY_LENGTH].reshape(*shape, m, 3),
         slopes[:, BY_DENSITY].reshape(*shape, m, 3),
         slopes[:, BY_STIFFNESS].reshape(*shape, m, 3),
+        slopes[:, BY_RADIUS].reshape(*shape, m, 3),
+        slopes[:, BY_DEAD].reshape(*shape, m, 3),
         levers.reshape(*shape, m, 3),
         np.concatenate((sideways, cables.vertical_force[..., None]), axis=-1),
     )

@@ -34,6 +34,9 @@ class Stiffness:
         length_sensitivity: d(motion)/dL of each cable, shape (..., 6, m) [m/m, rad/m].
         density_sensitivity: d(motion)/d(linear density) of each cable, shape (..., 6, m) [m^2/kg, rad m/kg].
         stiffness_sensitivity: d(motion)/d(axial stiffness) of each cable, shape (..., 6, m) [m/N, rad/N].
+        pulley_radius_sensitivity: d(motion)/d(pulley radius) of each cable, the length off the drum held, shape
+            (..., 6, m) [m/m, rad/m]; of the shallow models as of the exact one, as is the next.
+        dead_cable_sensitivity: d(motion)/d(length of the dead cable) in the same way, shape (..., 6, m) [m/m, rad/m].
         cable_stiffness: dT/dB of each cable, T the force on its platform end, B that end's position, world axes, shape
             (..., m, 3, 3) [N/m].
         frame_anchor_sensitivity: d(motion)/d(frame anchor, world axes) at fixed lengths, shape (..., 6, m, 3)
@@ -52,6 +55,8 @@ class Stiffness:
     length_sensitivity: Array
     density_sensitivity: Array
     stiffness_sensitivity: Array
+    pulley_radius_sensitivity: Array
+    dead_cable_sensitivity: Array
     cable_stiffness: Array
     frame_anchor_sensitivity: Array
     platform_anchor_sensitivity: Array
@@ -115,6 +120,8 @@ def stiffness(state: Equilibrium) -> Stiffness:
         length_sensitivity=locked(by_length),
         density_sensitivity=locked(-compliance @ on_platform(slopes.by_density, slopes.levers)),
         stiffness_sensitivity=locked(-compliance @ on_platform(slopes.by_stiffness, slopes.levers)),
+        pulley_radius_sensitivity=locked(-compliance @ on_platform(slopes.by_radius, slopes.levers)),
+        dead_cable_sensitivity=locked(-compliance @ on_platform(slopes.by_dead, slopes.levers)),
         cable_stiffness=locked(slopes.blocks),
         frame_anchor_sensitivity=locked(_by_frame_anchor(slopes, compliance)),
         platform_anchor_sensitivity=locked(_by_platform_anchor(state, slopes, compliance)),

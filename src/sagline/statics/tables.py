@@ -70,5 +70,15 @@ def _cable_rows(robot: Robot) -> Array:
         robot.cables.axial_stiffness[:, None],
         robot.tension_min[:, None],
         robot.tension_max[:, None],
+        _behind(robot),
     )
     return np.hstack(columns)
+
+
+def _behind(robot: Robot) -> Array:
+    """What stands behind the frame anchors: pulley radius, entry, dead cable and its rise, (m, 4)."""
+    if robot.winches is None:
+        return np.zeros((robot.cable_count, 4))
+    winches = robot.winches
+    entry = winches.swivel_axis[:, 2]
+    return np.stack((winches.pulley_radius, entry, winches.dead_cable, winches.dead_rise), axis=1)

@@ -68,15 +68,15 @@ def capacity_margin(state: Equilibrium) -> Array:
     Source:
         Bouchard, Gosselin & Moore 2010; Guay, Cardou, Cruz-Ruiz & Caro 2014.
     """
-    shared, cables = first_of(instance(state, Equilibrium, "state").robot), state.cables
+    shared, model = first_of(instance(state, Equilibrium, "state").robot), state.cables.model
     rows = pose_rows(state.pose)
-    pulls = np.atleast_2d(cables.vertical_force - cables.chord_tension * cables.rise / cables.chord)
+    pulls = np.atleast_2d(state.pull)
     margins = np.empty(len(rows))
     wrenches, memory = np.atleast_2d(state.wrench), memory_for(shared.cable_count)
     freedom, bodies, robots = robot_terms(state.robot)
     for part in blocks(len(rows), BLOCK):
         margins_of_poses(
-            (cables.model.code, *cables.model.parameters),
+            (model.code, *model.parameters),
             (LIMITS_OF[shared.tension_limits_of], np.nan),
             (freedom, rows_of(bodies, part), rows_of(robots, part)),
             rows[part],

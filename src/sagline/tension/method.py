@@ -11,6 +11,7 @@ from sagline.arguments import choice
 from sagline.arrays import Array, locked, number
 from sagline.errors import InvalidValueError
 from sagline.kernels import codes
+from sagline.robot.equilibrium import Equilibrium
 
 Variable = Literal["chord", "horizontal", "frame_end"]
 VARIABLES = {
@@ -87,3 +88,21 @@ class TensionMethod:
     def validity(self) -> float:
         """T_adj as kernels know it: NaN for none."""
         return float("nan") if self.lowest_point_margin is None else float(self.lowest_point_margin)
+
+
+def shared_tension(state: Equilibrium, variable: Variable) -> Array:
+    """Tensions of a state in the variable in which the load is shared.
+
+    Args:
+        state: A single state or a batch.
+        variable: "chord", "horizontal" or "frame_end".
+
+    Returns:
+        Tensions [N], shape (m,) or (N, m).
+    """
+    match variable:
+        case "chord":
+            return state.chord_tension
+        case "horizontal":
+            return state.cables.horizontal_tension
+    return state.cables.frame_end_tension

@@ -26,7 +26,7 @@ class RunPanel:
         self, server: viser.ViserServer, run: Run, changed: Callable[[], None], toggled: Callable[[], None]
     ) -> None:
         """Build the panel; `changed` is called when a value changes, `toggled` when play or pause is pressed."""
-        lengths = run.plan.state.cables.unstrained_length
+        lengths = run.plan.unstrained_length
         self._tensions = _tensions(run)
         self._lengths = CourseFigure.of("Unstrained length [m]", run.time, lengths)
         self._key = CourseFigure.key(lengths.shape[-1]) + block(

@@ -11,6 +11,7 @@ import math
 from sagline.kernels.jit import formula
 
 POLYNOMIAL_LIMIT = 4.0  # of h^2
+EXCESS_LIMIT = 0.0625  # of u^2
 
 
 @formula
@@ -96,15 +97,21 @@ def atanhc(u: float) -> float:
 
 
 @formula
+def atanhc_excess_polynomial(y: float) -> float:
+    """The difference atanh(u)/u - 1 for y = u^2 <= 0.0625: sixteen terms, the rest is below 1e-19."""
+    q = y * y
+    r = q * q
+    a = 1 / 3 + r * (1 / 11 + r * (1 / 19 + r * (1 / 27)))
+    b = 1 / 5 + r * (1 / 13 + r * (1 / 21 + r * (1 / 29)))
+    c = 1 / 7 + r * (1 / 15 + r * (1 / 23 + r * (1 / 31)))
+    d = 1 / 9 + r * (1 / 17 + r * (1 / 25 + r * (1 / 33)))
+    return y * ((a + y * b) + q * (c + y * d))
+
+
+@formula
 def atanhc_excess(u: float) -> float:
     """atanh(u)/u - 1, to full relative precision for u <= 0.25 and to 1e-14 above, for 0 <= u < 1."""
     y = u * u
-    if y <= 0.0625:  # sixteen terms: below 1e-19
-        q = y * y
-        r = q * q
-        a = 1 / 3 + r * (1 / 11 + r * (1 / 19 + r * (1 / 27)))
-        b = 1 / 5 + r * (1 / 13 + r * (1 / 21 + r * (1 / 29)))
-        c = 1 / 7 + r * (1 / 15 + r * (1 / 23 + r * (1 / 31)))
-        d = 1 / 9 + r * (1 / 17 + r * (1 / 25 + r * (1 / 33)))
-        return y * ((a + y * b) + q * (c + y * d))
+    if y <= EXCESS_LIMIT:
+        return atanhc_excess_polynomial(y)
     return math.atanh(u) / u - 1.0

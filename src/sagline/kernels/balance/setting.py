@@ -15,10 +15,11 @@ from sagline.kernels.algebra.householder import factorize, minimum_norm, orthogo
 from sagline.kernels.algebra.strips import HIGH, LOW, START, STRIP_ROWS
 from sagline.kernels.balance.wrench import along_freedom, fill_structure_matrix, needed_wrench, rows_along_freedom
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable.cables import Cables, chord_of, material_of
+from sagline.kernels.cable.cables import Cables, chord_of, material_of, pulley_of
 from sagline.kernels.cable.geometry import cable_geometry
 from sagline.kernels.cable.hanging import chord_tension_at_frame_end
 from sagline.kernels.cable.models import pull_of_shallow
+from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import (
     FRAME_END_TENSION,
@@ -155,12 +156,18 @@ def place_cables(model: Model, limits: Limits, robot: Array, geometry: Array, ca
         cables.cosine[i] = geometry[g.COSINE, i]
         cables.density[i] = robot[i, tables.DENSITY]
         cables.stiffness[i] = robot[i, tables.STIFFNESS]
+        behind = pulley_at(robot, i)
+        cables.radius[i] = behind.radius
+        cables.entry[i] = behind.entry
+        cables.dead[i] = behind.dead
+        cables.rise[i] = behind.rise
         cables.half_weight[i] = 0.5 * robot[i, tables.DENSITY] * model.gravity * chord
         cables.pull[i] = pull_of_shallow(model, chord, robot[i, tables.DENSITY])
         low, high = robot[i, tables.TENSION_MIN], robot[i, tables.TENSION_MAX]
         if limits.quantity == LIMITS_OF_FRAME_END:
-            low = chord_tension_at_frame_end(model, chord_of(cables, i), material_of(cables, i), low)
-            high = chord_tension_at_frame_end(model, chord_of(cables, i), material_of(cables, i), high)
+            line, material, pulley = chord_of(cables, i), material_of(cables, i), pulley_of(cables, i)
+            low = chord_tension_at_frame_end(model, line, material, pulley, low)
+            high = chord_tension_at_frame_end(model, line, material, pulley, high)
         if not math.isnan(limits.validity):
             # on a vertical cable T_x is zero, and so is a margin of zero
             margin = limits.validity / cables.cosine[i] if limits.validity > 0.0 else 0.0

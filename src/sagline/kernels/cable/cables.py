@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sagline.arrays import Array
+from sagline.kernels.cable.pulley import Pulley
 from sagline.kernels.cable.terms import Chord, Material
 from sagline.kernels.jit import glue
 from sagline.kernels.memory import Memory, block
@@ -13,23 +14,40 @@ from sagline.kernels.memory import Memory, block
 class Cables(NamedTuple):
     """Words for the cables of one pose, each of m values.
 
+    The free span of a cable runs from where it leaves its pulley to its platform end. Where nothing is behind any
+    cable the free spans are the cables themselves, and the words for them name the same memory.
+
     Attributes:
+        machine: Whether anything is behind a cable, for all of them.
         density: [kg/m].
         stiffness: EA [N].
         half_weight: wD/2 [N].
-        chord: D [m].
+        chord: D [m]; over a pulley that of the tangent from the platform end.
         sine: sin phi.
         cosine: cos phi.
         low: Lower limit of the chord tension [N].
         high: Upper limit of the chord tension [N], may be infinite.
         tau: Chord tension [N].
-        ratio: L/D.
+        ratio: L/D of the free span.
         pull: T_z - tau sin phi [N].
         last_pull: The same in the round before [N].
-        slackness: X = wD/(2 tau).
-        strain: e = tau/EA.
+        slackness: X = wD/(2 tau) of the free span.
+        strain: e = tau/EA of the free span.
+        free_half_weight: wD/2 of the free span [N].
+        free_chord: D of the free span [m].
+        free_sine: sin phi of the free span.
+        free_cosine: cos phi of the free span.
+        free_tau: Chord tension of the free span [N].
+        free_pull: T_z - tau sin phi of the free span [N].
+        wrap_sine: Sine of the wrap angle psi.
+        wrap_cosine: Cosine of psi.
+        radius: Of the pulley [m].
+        entry: +1 where a cable enters its pulley from below, -1 from above.
+        dead: Length of dead cable [m].
+        rise: Height of the frame anchor above the drum [m].
     """
 
+    machine: bool
     density: Array
     stiffness: Array
     half_weight: Array
@@ -44,15 +62,30 @@ class Cables(NamedTuple):
     last_pull: Array
     slackness: Array
     strain: Array
+    free_half_weight: Array
+    free_chord: Array
+    free_sine: Array
+    free_cosine: Array
+    free_tau: Array
+    free_pull: Array
+    wrap_sine: Array
+    wrap_cosine: Array
+    radius: Array
+    entry: Array
+    dead: Array
+    rise: Array
 
 
 @glue
-def new_cables(memory: Memory, m: int) -> tuple[Cables, Memory]:
-    """Room for m cables, and the memory that is left."""
-    rows, at = block(memory.numbers, 0, 14, m)
+def new_cables(memory: Memory, m: int, machine: bool) -> tuple[Cables, Memory]:
+    """Room for m cables, behind which there may be something (machine), and the memory that is left."""
+    own, at = block(memory.numbers, 0, 20, m)
+    other, at = block(memory.numbers, at, 6, m)
+    free = other if machine else own[:6]
     cables = Cables(
-        rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6],
-        rows[7], rows[8], rows[9], rows[10], rows[11], rows[12], rows[13],
+        machine, own[6], own[7], own[0], own[1], own[2], own[3], own[8], own[9], own[4], own[10], own[5], own[11],
+        own[12], own[13], free[0], free[1], free[2], free[3], free[4], free[5], own[18], own[19], own[14], own[15],
+        own[16], own[17],
     )  # fmt: skip
     return cables, Memory(memory.numbers[at:], memory.counters)
 
@@ -61,6 +94,18 @@ def new_cables(memory: Memory, m: int) -> tuple[Cables, Memory]:
 def chord_of(cables: Cables, i: int) -> Chord:
     """The chord of one cable."""
     return Chord(cables.chord[i], cables.sine[i], cables.cosine[i])
+
+
+@glue
+def free_chord_of(cables: Cables, i: int) -> Chord:
+    """The chord of one cable's free span."""
+    return Chord(cables.free_chord[i], cables.free_sine[i], cables.free_cosine[i])
+
+
+@glue
+def pulley_of(cables: Cables, i: int) -> Pulley:
+    """What is behind one cable."""
+    return Pulley(cables.radius[i], cables.entry[i], cables.dead[i], cables.rise[i])
 
 
 @glue

@@ -12,7 +12,9 @@ import math
 from sagline.arrays import Array
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable import rows as t
-from sagline.kernels.cable.stiffness import force_of, material_at, series_excess
+from sagline.kernels.cable.over_pulleys import energy_over, material_at
+from sagline.kernels.cable.pulley import anything_behind
+from sagline.kernels.cable.stiffness import force_of, series_excess
 from sagline.kernels.cable.terms import Force, Material, Model
 from sagline.kernels.codes import CATENARY, ELASTIC
 from sagline.kernels.jit import formula
@@ -62,10 +64,18 @@ def energy_of_cables(model: Model, cables: Array, rows: Array) -> tuple[float, f
         cables: Rows of the cable_table, (m, CABLE_COLUMNS).
         rows: As in `sagline.kernels.cable.rows`, (CABLE_ROWS, m), after `cable_forces`.
     """
+    machine = anything_behind(cables)
     energy = 0.0
     size = 0.0
     for i in range(cables.shape[0]):
-        span, rise, force = rows[g.SPAN, i], rows[g.RISE, i], force_of(rows, i)
-        energy += cable_energy(model, span, rise, material_at(cables, i), rows[t.LENGTH, i], force)
+        span = rows[t.FREE_SPAN, i] if machine else rows[g.SPAN, i]
+        rise = rows[t.FREE_RISE, i] if machine else rows[g.RISE, i]
+        length = rows[t.FREE_LENGTH, i] if machine else rows[t.LENGTH, i]
+        force = force_of(rows, i)
+        energy += cable_energy(model, span, rise, material_at(cables, i), length, force)
         size += abs(force.horizontal * span) + abs(force.vertical * rise)
+        if machine:
+            behind = energy_over(model, cables, rows, i)
+            energy += behind
+            size += abs(behind)
     return energy, size

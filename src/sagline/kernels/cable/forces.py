@@ -7,6 +7,7 @@ had there, in loops without branches, which vectorize; whoever has not arrived b
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from sagline.arrays import Array
 from sagline.kernels import tables
@@ -15,12 +16,16 @@ from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.catenary import SMALL_HALLEY_STEP, relative_excess
 from sagline.kernels.cable.models import from_length
+from sagline.kernels.cable.over_pulleys import ask, begin_passes, settle
+from sagline.kernels.cable.pulley import anything_behind
 from sagline.kernels.cable.terms import Material, Model
 from sagline.kernels.codes import CABLE_SOLVED, CATENARY
 from sagline.kernels.jit import formula, glue
 
 CLOSE = 0.1  # relative first step within which two Halley steps are trusted
 ORDINARY = 2.0  # of h: up to here the polynomials are exact
+PASSES = 30  # over pulleys; one or two from a pose close by
+MISSED = 1e-13  # of a cable's length: a platform end missed by less is met
 
 
 @formula
@@ -53,21 +58,30 @@ def square_share(part: float, length: float) -> float:
     return ratio * ratio
 
 
+class Asked(NamedTuple):
+    """The cables that are solved, each of m values: span, rise and unstrained length [m], EA [N]."""
+
+    span: Array
+    rise: Array
+    length: Array
+    stiffness: Array
+
+
 @glue
-def step_twice(gravity: float, cables: Array, rows: Array) -> None:
+def step_twice(gravity: float, cables: Array, asked: Asked, rows: Array) -> None:
     """Two Halley steps for every cable from the remembered parameter; one result a loop, so that each vectorizes."""
     m = cables.shape[0]
     for i in range(m):
-        rows[t.KAPPA, i] = 0.5 * cables[i, tables.DENSITY] * gravity * rows[t.LENGTH, i] / cables[i, tables.STIFFNESS]
+        rows[t.KAPPA, i] = 0.5 * cables[i, tables.DENSITY] * gravity * asked.length[i] / asked.stiffness[i]
     for i in range(m):
-        rows[t.EXCESS, i] = relative_excess(rows[g.SPAN, i], rows[g.RISE, i], rows[t.LENGTH, i])
+        rows[t.EXCESS, i] = relative_excess(asked.span[i], asked.rise[i], asked.length[i])
     for i in range(m):
-        xi2 = square_share(rows[g.SPAN, i], rows[t.LENGTH, i])
-        zeta2 = square_share(rows[g.RISE, i], rows[t.LENGTH, i])
+        xi2 = square_share(asked.span[i], asked.length[i])
+        zeta2 = square_share(asked.rise[i], asked.length[i])
         rows[t.FIRST, i] = halley_step(rows[t.PARAMETER, i], xi2, zeta2, rows[t.KAPPA, i], rows[t.EXCESS, i])
     for i in range(m):
-        xi2 = square_share(rows[g.SPAN, i], rows[t.LENGTH, i])
-        zeta2 = square_share(rows[g.RISE, i], rows[t.LENGTH, i])
+        xi2 = square_share(asked.span[i], asked.length[i])
+        zeta2 = square_share(asked.rise[i], asked.length[i])
         rows[t.SECOND, i] = halley_step(rows[t.FIRST, i], xi2, zeta2, rows[t.KAPPA, i], rows[t.EXCESS, i])
 
 
@@ -83,16 +97,41 @@ def has_arrived(rows: Array, i: int) -> bool:
 def cable_forces(model: Model, cables: Array, rows: Array) -> None:
     """Fill T_x, T_z, tau and status of every cable of a pose from its geometry and length.
 
+    Cables over pulleys are solved in passes, as cables that start where the chord touches; docs/model.md, section 10.
+
     Args:
         model: Cable model.
         cables: Rows of the cable_table, (m, CABLE_COLUMNS).
         rows: As in `sagline.kernels.cable.rows`, (CABLE_ROWS, m).
     """
+    machine = anything_behind(cables)
+    asked = Asked(
+        rows[t.ASKED_SPAN] if machine else rows[g.SPAN],
+        rows[t.ASKED_RISE] if machine else rows[g.RISE],
+        rows[t.ASKED_LENGTH] if machine else rows[t.LENGTH],
+        rows[t.SOFT],
+    )
+    for i in range(cables.shape[0]):
+        rows[t.SOFT, i] = cables[i, tables.STIFFNESS]
+    if machine:
+        begin_passes(cables, rows)
+    for _ in range(PASSES if machine else 1):
+        if machine:
+            ask(model, cables, rows)
+        solve_asked(model, cables, asked, rows)
+        if machine and settle(model, cables, rows) <= MISSED:
+            break
+
+
+@glue
+def solve_asked(model: Model, cables: Array, asked: Asked, rows: Array) -> None:
+    """Fill T_x, T_z, tau and status of the cables that are asked for."""
     exact = model.code == CATENARY
     if exact:
-        step_twice(model.gravity, cables, rows)
+        step_twice(model.gravity, cables, asked, rows)
     for i in range(cables.shape[0]):
-        span, rise, chord, length = rows[g.SPAN, i], rows[g.RISE, i], rows[g.CHORD, i], rows[t.LENGTH, i]
+        span, rise, length = asked.span[i], asked.rise[i], asked.length[i]
+        chord = math.sqrt(span * span + rise * rise)
         density = cables[i, tables.DENSITY]
         weight = density * model.gravity
         if exact and has_arrived(rows, i):
@@ -106,7 +145,7 @@ def cable_forces(model: Model, cables: Array, rows: Array) -> None:
             rows[t.STATUS, i] = CABLE_SOLVED
             rows[t.PARAMETER, i] = h
             continue
-        force, status = from_length(model, span, rise, Material(density, cables[i, tables.STIFFNESS]), length)
+        force, status = from_length(model, span, rise, Material(density, asked.stiffness[i]), length)
         rows[t.HORIZONTAL, i] = force.horizontal
         rows[t.VERTICAL, i] = force.vertical
         rows[t.TENSION, i] = force.tension

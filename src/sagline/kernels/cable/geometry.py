@@ -9,7 +9,7 @@ from sagline.kernels import tables
 from sagline.kernels.jit import entry, formula
 
 # docs/model.md, section 1. Rows of a geometry array, each of m values.
-SPAN, RISE, CHORD, SINE, COSINE = 0, 1, 2, 3, 4  # x_B, z_B, D, sin phi, cos phi
+SPAN, RISE, CHORD, SINE, COSINE = 0, 1, 2, 3, 4  # x_B, z_B, D, sin phi, cos phi of the chord
 AZIMUTH_X, AZIMUTH_Y = 5, 6  # horizontal unit vector from frame end to platform end: cos theta, sin theta
 LEVER_X, LEVER_Y, LEVER_Z = 7, 8, 9  # r, from the center of mass to the platform end, world axes
 GEOMETRY_ROWS = 10
@@ -31,8 +31,29 @@ def rotation_matrix(pose: Array, rotation: Array) -> None:
 
 
 @formula
+def tangent(radius: float, entry: float, span: float, rise: float) -> tuple[float, float, float]:
+    """Length, sin phi and cos phi of the line from a pulley that touches it and ends at a point; NaN if there is none.
+
+    The pulley stands in the cable's vertical plane; span and rise count from where the cable enters it, entry is +1
+    for one that comes from below. No tangent leads to a point inside the pulley, or past its near side: straight
+    below (above, for a cable from above) a cable hangs twice the radius from where it enters.
+    """
+    across = span - radius
+    along = entry * rise
+    square = across * across + along * along
+    length2 = square - radius * radius
+    length = math.sqrt(length2) if length2 > 0.0 else math.nan
+    cosine = (radius * along + length * across) / square  # sin psi
+    sine = entry * (length * along - radius * across) / square  # s cos psi
+    return (length, sine, cosine) if cosine > 0.0 else (math.nan, math.nan, math.nan)
+
+
+@formula
 def cable_geometry(cables: Array, body: Array, pose: Array, rotation: Array, geometry: Array) -> None:
-    """Fill the geometry rows (GEOMETRY_ROWS, m) of one pose; a vertical cable gets azimuth 0."""
+    """Fill the geometry rows (GEOMETRY_ROWS, m) of one pose; a vertical cable gets azimuth 0.
+
+    The chord of a cable over a pulley is the tangent from its platform end; NaN where there is none.
+    """
     rotation_matrix(pose, rotation)
     for i in range(cables.shape[0]):
         bx = cables[i, tables.PLATFORM_X]
@@ -42,14 +63,22 @@ def cable_geometry(cables: Array, body: Array, pose: Array, rotation: Array, geo
         dy = pose[1] + rotation[1, 0] * bx + rotation[1, 1] * by + rotation[1, 2] * bz - cables[i, tables.FRAME_Y]
         dz = pose[2] + rotation[2, 0] * bx + rotation[2, 1] * by + rotation[2, 2] * bz - cables[i, tables.FRAME_Z]
         span = math.sqrt(dx * dx + dy * dy)
-        chord = math.sqrt(span * span + dz * dz)
-        geometry[SPAN, i] = span
-        geometry[RISE, i] = dz
-        geometry[CHORD, i] = chord
-        geometry[SINE, i] = dz / chord
-        geometry[COSINE, i] = span / chord
         geometry[AZIMUTH_X, i] = dx / span if span > 0.0 else 1.0
         geometry[AZIMUTH_Y, i] = dy / span if span > 0.0 else 0.0
+        if cables[i, tables.PULLEY_RADIUS] > 0.0:
+            chord, sine, cosine = tangent(cables[i, tables.PULLEY_RADIUS], cables[i, tables.ENTRY], span, dz)
+            geometry[SPAN, i] = chord * cosine
+            geometry[RISE, i] = chord * sine
+            geometry[CHORD, i] = chord
+            geometry[SINE, i] = sine
+            geometry[COSINE, i] = cosine
+        else:
+            chord = math.sqrt(span * span + dz * dz)
+            geometry[SPAN, i] = span
+            geometry[RISE, i] = dz
+            geometry[CHORD, i] = chord
+            geometry[SINE, i] = dz / chord
+            geometry[COSINE, i] = span / chord
         bx -= body[tables.CENTER_X]
         by -= body[tables.CENTER_Y]
         bz -= body[tables.CENTER_Z]

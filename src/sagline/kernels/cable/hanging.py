@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from sagline.arrays import Codes
-from sagline.kernels.cable.cables import Cables, chord_of, material_of
+from sagline.kernels.cable.cables import Cables, chord_of, free_chord_of, material_of, pulley_of
 from sagline.kernels.cable.catenary import (
     TAUT_STRAIN,
     is_ordinary,
@@ -14,6 +14,7 @@ from sagline.kernels.cable.catenary import (
     ordinary_pull_ratio,
 )
 from sagline.kernels.cable.models import from_tension
+from sagline.kernels.cable.pulley import Pulley, free_rise, free_span
 from sagline.kernels.cable.terms import Chord, Material, Model
 from sagline.kernels.codes import CABLE_SOLVED, CATENARY, ELASTIC, STRAIGHT
 from sagline.kernels.jit import glue, kernel
@@ -21,19 +22,52 @@ from sagline.kernels.jit import glue, kernel
 # Relative change of tension within which one Newton step from the last ratio will do: it leaves 3e-8 of the ratio at
 # X = 2, 5e-15 at X = 0.01, and the square of a smaller change, so that rounds which stand still end in the last digit.
 NEAR = 1e-3
+CONTACTS = 4  # passes after which a cable leaves its pulley where its force says: the gap is 1e-4, 4e-8, 1e-11, 0
 LIMIT_STEPS = 30
 LIMIT_PRECISION = 1e-13  # relative
 
 
 @glue
-def hang_cables(model: Model, cables: Cables, near: bool, statuses: Codes) -> int:
+def leave_pulleys(model: Model, cables: Cables, fresh: bool) -> None:
+    """Fill the free spans and their tensions, from where the forces at the pulleys say that the cables leave them.
+
+    The forces are those of the last length and pull (fresh: of first order) at the present chord tensions. Cables of
+    the shallow models leave along their chord.
+    """
+    exact = 1.0 if model.code == CATENARY else 0.0
+    for i in range(cables.tau.size):
+        chord, pulley = chord_of(cables, i), pulley_of(cables, i)
+        half_density = 0.5 * cables.density[i] * model.gravity
+        horizontal = cables.tau[i] * chord.cosine
+        hanging = -half_density * chord.length
+        if not fresh:
+            hanging = cables.pull[i] - 2.0 * half_density * cables.ratio[i] * cables.free_chord[i]
+        vertical_a = cables.tau[i] * chord.sine + exact * hanging
+        inverse = 1.0 / math.sqrt(horizontal * horizontal + vertical_a * vertical_a)
+        sine, cosine = horizontal * inverse, pulley.entry * vertical_a * inverse
+        span, rise = free_span(pulley, chord, cosine), free_rise(pulley, chord, sine)
+        length = math.sqrt(span * span + rise * rise)
+        inverse = 1.0 / length
+        cables.wrap_sine[i] = sine
+        cables.wrap_cosine[i] = cosine
+        cables.free_chord[i] = length
+        cables.free_sine[i] = rise * inverse
+        cables.free_cosine[i] = span * inverse
+        cables.free_tau[i] = horizontal / span * length
+        cables.free_half_weight[i] = half_density * length
+
+
+@glue
+def hang_cables(model: Model, cables: Cables, fresh: bool, near: bool, statuses: Codes) -> int:
     """Fill slackness, strain, ratio and pull of all cables, and the statuses (m,), at their chord tensions.
 
-    Ordinary catenaries go through loops without branches, which vectorize; the others follow one by one.
+    Ordinary catenaries go through loops without branches, which vectorize; the others follow one by one. Cables leave
+    their pulleys where the lengths and pulls before said.
 
     Args:
         model: Cable model.
         cables: The cables of one pose.
+        fresh: Whether there are no lengths and pulls yet.
         near: Whether their ratios are the answer at tensions less than NEAR away.
         statuses: Filled.
 
@@ -41,51 +75,76 @@ def hang_cables(model: Model, cables: Cables, near: bool, statuses: Codes) -> in
         The gravest status.
     """
     m = cables.tau.size
+    if cables.machine:
+        leave_pulleys(model, cables, fresh)
     for i in range(m):
-        cables.slackness[i] = cables.half_weight[i] / cables.tau[i]
+        cables.slackness[i] = cables.free_half_weight[i] / cables.free_tau[i]
     for i in range(m):
-        cables.strain[i] = cables.tau[i] / cables.stiffness[i]
+        cables.strain[i] = cables.free_tau[i] / cables.stiffness[i]
     if model.code == CATENARY:
         stretched = 0
         if not near:
             for i in range(m):
                 cables.ratio[i] = ordinary_length_ratio(
-                    cables.slackness[i], cables.sine[i], cables.cosine[i], cables.strain[i]
+                    cables.slackness[i], cables.free_sine[i], cables.free_cosine[i], cables.strain[i]
                 )
             for i in range(m):
                 stretched += 1 if cables.strain[i] > TAUT_STRAIN else 0
         if near or stretched > 0:
             for i in range(m):
                 cables.ratio[i] = ordinary_length_ratio_near(
-                    cables.slackness[i], cables.sine[i], cables.cosine[i], cables.strain[i], cables.ratio[i]
+                    cables.slackness[i], cables.free_sine[i], cables.free_cosine[i], cables.strain[i], cables.ratio[i]
                 )
         for i in range(m):
-            cables.pull[i] = cables.tau[i] * ordinary_pull_ratio(
-                cables.slackness[i], cables.sine[i], cables.strain[i], cables.ratio[i]
+            cables.free_pull[i] = cables.free_tau[i] * ordinary_pull_ratio(
+                cables.slackness[i], cables.free_sine[i], cables.strain[i], cables.ratio[i]
             )
     gravest = CABLE_SOLVED
     for i in range(m):
         statuses[i] = CABLE_SOLVED
         if model.code != CATENARY or not is_ordinary(cables.slackness[i], cables.strain[i]):
-            length, pull, status = from_tension(model, chord_of(cables, i), material_of(cables, i), cables.tau[i])
-            cables.ratio[i] = length / cables.chord[i]
-            cables.pull[i] = pull
+            free = free_chord_of(cables, i)
+            length, pull, status = from_tension(model, free, material_of(cables, i), cables.free_tau[i])
+            cables.ratio[i] = length / free.length
+            cables.free_pull[i] = pull
             statuses[i] = status
             gravest = max(gravest, status)
+    if cables.machine:
+        for i in range(m):
+            vertical = cables.free_tau[i] * cables.free_sine[i] + cables.free_pull[i]
+            cables.pull[i] = vertical - cables.tau[i] * cables.sine[i]
     return gravest
 
 
 @kernel
-def frame_end_tension(model: Model, chord: Chord, material: Material, tau: float) -> float:
-    """Tension at the frame end of a cable at a chord tension [N]."""
+def hang_cable(model: Model, chord: Chord, material: Material, pulley: Pulley, tau: float) -> tuple[float, float, int]:
+    """Free unstrained length [m], pull T_z - tau sin phi [N] and status of one cable at a chord tension."""
+    length, pull, status = from_tension(model, chord, material, tau)
+    if pulley.radius > 0.0 and model.code == CATENARY:
+        horizontal, weight = tau * chord.cosine, material.density * model.gravity
+        for _ in range(CONTACTS):
+            vertical_a = tau * chord.sine + pull - weight * length
+            tension = math.sqrt(horizontal * horizontal + vertical_a * vertical_a)
+            span = free_span(pulley, chord, pulley.entry * vertical_a / tension)
+            rise = free_rise(pulley, chord, horizontal / tension)
+            line = math.sqrt(span * span + rise * rise)
+            free = Chord(line, rise / line, span / line)
+            length, own, status = from_tension(model, free, material, horizontal / free.cosine)
+            pull = horizontal / free.cosine * free.sine + own - tau * chord.sine
+    return length, pull, status
+
+
+@kernel
+def frame_end_tension(model: Model, chord: Chord, material: Material, pulley: Pulley, tau: float) -> float:
+    """Tension at the frame end of a cable's free span at a chord tension [N]."""
     if model.code == STRAIGHT or model.code == ELASTIC:
         return tau
-    length, pull, _status = from_tension(model, chord, material, tau)
+    length, pull, _status = hang_cable(model, chord, material, pulley, tau)
     return math.hypot(tau * chord.cosine, tau * chord.sine + pull - material.density * model.gravity * length)
 
 
 @kernel
-def chord_tension_at_frame_end(model: Model, chord: Chord, material: Material, tension: float) -> float:
+def chord_tension_at_frame_end(model: Model, chord: Chord, material: Material, pulley: Pulley, tension: float) -> float:
     """Chord tension at which the tension at the frame end has a given value, on the taut side.
 
     A sagging cable's frame-end tension has a least value, near wD cos(phi)/2; what lies below it is met there.
@@ -100,7 +159,7 @@ def chord_tension_at_frame_end(model: Model, chord: Chord, material: Material, t
     if tension <= 1.01 * across or tau <= 0.0:
         return max(tau, 0.0)
     for _ in range(LIMIT_STEPS):
-        value = frame_end_tension(model, chord, material, tau)
+        value = frame_end_tension(model, chord, material, pulley, tau)
         step = (value - tension) * value / (tau - along)
         new = tau - step
         tau = new if new > 0.5 * tau else 0.5 * tau

@@ -11,9 +11,9 @@ import math
 from typing import NamedTuple
 
 from sagline.arrays import Array, Codes
-from sagline.kernels.cable.cables import Cables, chord_of, material_of
-from sagline.kernels.cable.hanging import hang_cables
-from sagline.kernels.cable.models import from_tension, pull_of_shallow
+from sagline.kernels.cable.cables import Cables, chord_of, material_of, pulley_of
+from sagline.kernels.cable.hanging import CONTACTS, hang_cable, hang_cables
+from sagline.kernels.cable.models import pull_of_shallow
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import CATENARY
 from sagline.kernels.jit import glue, kernel
@@ -74,7 +74,8 @@ def pulls_at(curves: Curves, tau: Array, pull: Array) -> None:
     """Fill the pulls (m,) at chord tensions (m,), and let the cables carry them."""
     for i in range(tau.size):
         curves.cables.tau[i] = tau[i]
-    hang_cables(curves.model, curves.cables, False, curves.statuses)
+    for k in range(CONTACTS + 1 if curves.cables.machine else 1):
+        hang_cables(curves.model, curves.cables, k == 0, False, curves.statuses)
     for i in range(tau.size):
         if curves.model.code != CATENARY:  # the same at every tension, one of zero included
             curves.cables.pull[i] = pull_of_shallow(curves.model, curves.cables.chord[i], curves.cables.density[i])
@@ -112,7 +113,9 @@ def pull_at(curves: Curves, i: int, tau: float) -> float:
         return pull_of_shallow(curves.model, cables.chord[i], cables.density[i])
     if tau == math.inf:
         return 0.0
-    _length, pull, _status = from_tension(curves.model, chord_of(cables, i), material_of(cables, i), tau)
+    _length, pull, _status = hang_cable(
+        curves.model, chord_of(cables, i), material_of(cables, i), pulley_of(cables, i), tau
+    )
     return pull
 
 

@@ -8,8 +8,9 @@ from typing import NamedTuple
 from sagline.kernels.algebra.hyperbolic import atanhc_excess
 from sagline.kernels.cable.catenary import slack_series
 from sagline.kernels.cable.models import pull_of_shallow
-from sagline.kernels.cable.stiffness import PlaneStiffness, shallow_slopes
-from sagline.kernels.cable.terms import Force, Material, Model
+from sagline.kernels.cable.pulley import Change, Motion, Pulley, end_by
+from sagline.kernels.cable.stiffness import shallow_slopes
+from sagline.kernels.cable.terms import Force, Material, Model, PlaneStiffness
 from sagline.kernels.codes import CATENARY, ELASTIC
 from sagline.kernels.jit import formula
 
@@ -27,6 +28,13 @@ class ForceSlopes(NamedTuple):
     by_length: Pair
     by_density: Pair
     by_stiffness: Pair
+
+
+class MachineSlopes(NamedTuple):
+    """Derivatives of the force on the platform end by R and the dead cable [N/m]."""
+
+    by_radius: Pair
+    by_dead: Pair
 
 
 @formula
@@ -119,3 +127,41 @@ def force_slopes(
         )
     along = tension / (stiffness * math.hypot(span, rise))
     return ForceSlopes(by_length, Pair(0.0, 0.0), Pair(along * span, along * rise))
+
+
+@formula
+def slopes_over(
+    model: Model, material: Material, pulley: Pulley, free: float, force: Force, plane: PlaneStiffness
+) -> tuple[ForceSlopes, MachineSlopes]:
+    """The five of a cable that may have something behind it; of the shallow models as of the exact one.
+
+    Args:
+        model: Cable model.
+        material: What the cable is made of.
+        pulley: What is behind it.
+        free: Unstrained length of the free span [m].
+        force: On the platform end.
+        plane: Stiffness of the whole cable.
+    """
+    weight = 0.0 if model.code == ELASTIC else material.density * model.gravity
+    by_weight = Motion(0.0, 0.0)
+    if weight > 0.0:
+        x, z = catenary_by_weight(force.horizontal, force.vertical, free, weight, material.stiffness)
+        by_weight = Motion(x, z)
+    if force.horizontal == 0.0 and force.vertical == weight * free:  # no force at P
+        none = Pair(0.0, 0.0)
+        return ForceSlopes(none, none, none), MachineSlopes(none, none)
+    heavier = model.gravity if weight > 0.0 else 0.0
+    length = end_by(pulley, material, weight, force, free, Change(1.0, 0.0, 0.0, 0.0, 0.0), by_weight)
+    density = end_by(pulley, material, weight, force, free, Change(0.0, heavier, 0.0, 0.0, 0.0), by_weight)
+    stiffness = end_by(pulley, material, weight, force, free, Change(0.0, 0.0, 1.0, 0.0, 0.0), by_weight)
+    radius = end_by(pulley, material, weight, force, free, Change(0.0, 0.0, 0.0, 1.0, 0.0), by_weight)
+    dead = end_by(pulley, material, weight, force, free, Change(0.0, 0.0, 0.0, 0.0, 1.0), by_weight)
+    return (
+        ForceSlopes(
+            gives_way(plane, Pair(length.x, length.z)),
+            gives_way(plane, Pair(density.x, density.z)),
+            gives_way(plane, Pair(stiffness.x, stiffness.z)),
+        ),
+        MachineSlopes(gives_way(plane, Pair(radius.x, radius.z)), gives_way(plane, Pair(dead.x, dead.z))),
+    )

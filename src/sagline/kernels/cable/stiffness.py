@@ -10,25 +10,17 @@ import math
 from typing import NamedTuple
 
 from sagline.arrays import Array
-from sagline.kernels import tables
 from sagline.kernels.algebra.hyperbolic import atanhc_excess
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.catenary import slack_series
 from sagline.kernels.cable.models import pull_of_shallow, sag_of_shallow
+from sagline.kernels.cable.over_pulleys import across_pulley, material_at, series
+from sagline.kernels.cable.pulley import anything_behind
 from sagline.kernels.cable.shallow import stretching_tension
-from sagline.kernels.cable.terms import Force, Material, Model
+from sagline.kernels.cable.terms import Force, Material, Model, PlaneStiffness
 from sagline.kernels.codes import CATENARY, ELASTIC, EMPIRICAL, STRAIGHT
 from sagline.kernels.jit import formula, kernel
-
-
-class PlaneStiffness(NamedTuple):
-    """Stiffness of a cable's platform end in the cable's vertical plane [N/m]: rows force, columns displacement."""
-
-    xx: float
-    xz: float
-    zx: float
-    zz: float
 
 
 class ShallowSlopes(NamedTuple):
@@ -45,12 +37,6 @@ class ShallowSlopes(NamedTuple):
 def force_of(rows: Array, i: int) -> Force:
     """What acts on the platform end of one cable of a pose."""
     return Force(rows[t.HORIZONTAL, i], rows[t.VERTICAL, i], rows[t.TENSION, i])
-
-
-@formula
-def material_at(cables: Array, i: int) -> Material:
-    """What one cable of the cable_table is made of."""
-    return Material(cables[i, tables.DENSITY], cables[i, tables.STIFFNESS])
 
 
 @formula
@@ -185,11 +171,17 @@ def cable_stiffness(
 
 @formula
 def stiffnesses_in_plane(model: Model, cables: Array, rows: Array) -> None:
-    """Fill the in-plane stiffness of every cable of a pose, after `cable_forces`."""
+    """Fill the stiffness of every cable of a pose in its plane and normal to it, after `cable_forces`."""
+    machine = anything_behind(cables)
     for i in range(cables.shape[0]):
-        plane = cable_stiffness(
-            model, rows[g.SPAN, i], rows[g.RISE, i], material_at(cables, i), rows[t.LENGTH, i], force_of(rows, i)
-        )
+        span = rows[t.FREE_SPAN, i] if machine else rows[g.SPAN, i]
+        rise = rows[t.FREE_RISE, i] if machine else rows[g.RISE, i]
+        length = rows[t.FREE_LENGTH, i] if machine else rows[t.LENGTH, i]
+        plane = cable_stiffness(model, span, rise, material_at(cables, i), length, force_of(rows, i))
+        rows[t.ACROSS, i] = rows[t.TENSION, i] / rows[g.CHORD, i]
+        if machine:
+            plane = series(model, cables, rows, i, plane)
+            rows[t.ACROSS, i] = across_pulley(cables, rows, i)
         rows[t.XX, i] = plane.xx
         rows[t.XZ, i] = plane.xz
         rows[t.ZX, i] = plane.zx

@@ -64,3 +64,12 @@ class Force(NamedTuple):
     horizontal: float
     vertical: float
     tension: float
+
+
+class PlaneStiffness(NamedTuple):
+    """Stiffness of a cable's platform end in the cable's vertical plane [N/m]: rows force, columns displacement."""
+
+    xx: float
+    xz: float
+    zx: float
+    zz: float

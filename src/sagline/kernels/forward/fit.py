@@ -14,6 +14,8 @@ from sagline.kernels.algebra.cholesky import factor_positive
 from sagline.kernels.balance.freedom import components_along
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.geometry import cable_geometry
+from sagline.kernels.cable.over_pulleys import chord_at
+from sagline.kernels.cable.pulley import pulley_at, straight_behind
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import CABLE_NO_TENSION, FORWARD_FITTED, FORWARD_NO_LENGTHS, FORWARD_NOT_CONVERGED, STRAIGHT
 from sagline.kernels.forward.newton import solve_step
@@ -36,7 +38,7 @@ from sagline.kernels.forward.problem import (
     problem_at,
     row_of,
 )
-from sagline.kernels.jit import entry, glue, kernel
+from sagline.kernels.jit import entry, formula, glue, kernel
 from sagline.kernels.memory import Memory
 
 FIT_STEPS = 200
@@ -45,19 +47,25 @@ SMALL_STEP = 1e-14  # in the problem's units
 NOTHING = 1e-13  # share of the cost whose gain ends a fit
 
 
+@formula
+def straight_length(cables: Array, rows: Array, i: int) -> float:
+    """Length of a straight cable that is not strained [m], with what is behind it."""
+    return rows[g.CHORD, i] + straight_behind(pulley_at(cables, i), chord_at(rows, i))
+
+
 @kernel
 def misfit(cables: Array, body: Array, lengths: Array, pose: Array, rotation: Array, rows: Array) -> float:
     """Half the sum of squared length errors [m^2] at a pose, whose geometry it fills."""
     cable_geometry(cables, body, pose, rotation, rows)
     total = 0.0
     for i in range(lengths.shape[0]):
-        error = rows[g.CHORD, i] - lengths[i]
+        error = straight_length(cables, rows, i) - lengths[i]
         total += 0.5 * error * error
     return total
 
 
 @glue
-def normal_equations(free: Array, lengths: Array, space: Space) -> None:
+def normal_equations(free: Array, cables: Array, lengths: Array, space: Space) -> None:
     """Fill matrix J^T J (n, n) and part J^T e (n,) of the length errors e along the free motions."""
     rows, matrix, part = space.rows, space.matrix, space.part
     full, row = space.gradient, space.step
@@ -71,7 +79,7 @@ def normal_equations(free: Array, lengths: Array, space: Space) -> None:
             full[j] = 0.0
         add_force(rows, i, rows[g.COSINE, i], rows[g.SINE, i], full)
         components_along(free, full, row)
-        error = rows[g.CHORD, i] - lengths[i]
+        error = straight_length(cables, rows, i) - lengths[i]
         for j in range(n):
             part[j] += row[j] * error
             for k in range(n):
@@ -84,7 +92,7 @@ def fit_pose(problem: Problem, lengths: Array, pose: Array, space: Space) -> tup
     cables, body, free = problem.cables, problem.body, problem.free
     rotation, rows = space.rotation, space.rows
     cost = misfit(cables, body, lengths, pose, rotation, rows)
-    normal_equations(free, lengths, space)
+    normal_equations(free, cables, lengths, space)
     largest = 0.0
     for j in range(space.part.shape[0]):
         largest = max(largest, space.matrix[j, j])
@@ -105,7 +113,7 @@ def fit_pose(problem: Problem, lengths: Array, pose: Array, space: Space) -> tup
             gain = cost - new
             cost = new
             damping = 0.1 * damping if damping > 1e-14 * largest else 0.0
-            normal_equations(free, lengths, space)
+            normal_equations(free, cables, lengths, space)
             fitted = gain <= NOTHING * cost
         else:
             fitted = length <= 1e-7  # squares of errors are rounded off at the root of the last digit

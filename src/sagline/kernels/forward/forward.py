@@ -14,6 +14,8 @@ from sagline.kernels.algebra.eigenvalues import extreme_eigenvalues
 from sagline.kernels.balance.freedom import components_along, symmetric_part, turns
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable import rows as t
+from sagline.kernels.cable.over_pulleys import behind_at
+from sagline.kernels.cable.pulley import anything_behind
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import (
     CATENARY,
@@ -162,15 +164,24 @@ def remember(chain: Chain, pose: Array, wrench: Array) -> None:
 
 
 @glue
-def store(rows: Array, p: int, results: Array, statuses: Codes) -> None:
+def store(problem: Problem, rows: Array, p: int, results: Array, statuses: Codes) -> None:
     """Write one sample's cables."""
     for i in range(rows.shape[1]):
         statuses[p, i] = int(rows[t.STATUS, i])
         results[tables.SPAN, p, i] = rows[g.SPAN, i]
         results[tables.RISE, p, i] = rows[g.RISE, i]
-    for k in range(tables.RESULT_ROWS - tables.LENGTH):  # length and forces follow each other in both
+    for k in range(tables.WRAP - tables.LENGTH):  # length and forces follow each other in both
         for i in range(rows.shape[1]):
             results[tables.LENGTH + k, p, i] = rows[t.LENGTH + k, i]
+    if anything_behind(problem.cables):
+        for i in range(rows.shape[1]):
+            wrapped, dead = behind_at(problem.model, problem.cables, rows, i)
+            results[tables.SPAN, p, i] = rows[t.FREE_SPAN, i]
+            results[tables.RISE, p, i] = rows[t.FREE_RISE, i]
+            results[tables.WRAP, p, i] = rows[t.WRAP, i]
+            results[tables.WRAPPED, p, i] = wrapped
+            results[tables.DEAD, p, i] = dead
+            results[tables.SINE, p, i] = rows[g.SINE, i]
 
 
 @entry
@@ -217,7 +228,7 @@ def forward_poses(
         answer.numbers[p, ITERATIONS] = steps
         answer.pose_statuses[p] = status
         copy_pose(pose, answer.poses[p])
-        store(kept.rows, p, answer.results, answer.statuses)
+        store(problem, kept.rows, p, answer.results, answer.statuses)
         kept.last[0] = math.nan
         if status != FORWARD_NOT_CONVERGED:
             copy_pose(pose, start)

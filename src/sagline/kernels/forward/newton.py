@@ -17,8 +17,10 @@ from sagline.kernels.algebra.elimination import solve_general
 from sagline.kernels.balance.freedom import components_along, matrix_along, norm, symmetric_part
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable import rows as t
-from sagline.kernels.cable.slopes import force_by_length
-from sagline.kernels.cable.stiffness import force_of, material_at, plane_of
+from sagline.kernels.cable.over_pulleys import fed, material_at
+from sagline.kernels.cable.pulley import anything_behind
+from sagline.kernels.cable.slopes import Pair, force_by_length, gives_way
+from sagline.kernels.cable.stiffness import force_of, plane_of
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import CATENARY, ELASTIC
 from sagline.kernels.forward.platform import add_force, platform_stiffness, take_step, unbalance
@@ -39,9 +41,15 @@ LAST_DIGIT = 1e-15  # a step that rounding hides
 @glue
 def add_wound(model: Model, cables: Array, lengths: Array, rows: Array, wrench: Array) -> None:
     """Add to a wrench (6,) what new lengths (m,) do to the cables' forces, to first order."""
+    machine = anything_behind(cables)
     for i in range(cables.shape[0]):
         span, rise, length = rows[g.SPAN, i], rows[g.RISE, i], rows[t.LENGTH, i]
-        slope = force_by_length(model, span, rise, material_at(cables, i), length, force_of(rows, i), plane_of(rows, i))
+        if machine:
+            x, z, _gives = fed(model, cables, rows, i)
+            slope = gives_way(plane_of(rows, i), Pair(x, z))
+        else:
+            material, force = material_at(cables, i), force_of(rows, i)
+            slope = force_by_length(model, span, rise, material, length, force, plane_of(rows, i))
         wound = lengths[i] - length
         add_force(rows, i, wound * slope.x, wound * slope.z, wrench)
 

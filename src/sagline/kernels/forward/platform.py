@@ -84,7 +84,7 @@ def platform_energy(
 def end_stiffness(rows: Array, i: int) -> tuple[Triple, Triple, Triple]:
     """Stiffness of cable i against displacements of its platform end in world axes [N/m], row by row."""
     xx, xz, zx, zz = plane_of(rows, i)
-    across = rows[t.TENSION, i] / rows[g.CHORD, i]
+    across = rows[t.ACROSS, i]
     c, s = rows[g.AZIMUTH_X, i], rows[g.AZIMUTH_Y, i]
     mixed = (xx - across) * c * s
     return (

@@ -8,9 +8,11 @@ from sagline.arrays import Array, Indices
 from sagline.kernels import tables
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable import rows as t
+from sagline.kernels.cable.over_pulleys import material_at
+from sagline.kernels.cable.pulley import anything_behind, pulley_at
 from sagline.kernels.cable.rows import CABLE_ROWS
-from sagline.kernels.cable.slopes import Pair, force_slopes
-from sagline.kernels.cable.stiffness import force_of, material_at, plane_of
+from sagline.kernels.cable.slopes import Pair, force_slopes, slopes_over
+from sagline.kernels.cable.stiffness import force_of, plane_of
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import STRAIGHT
 from sagline.kernels.forward.platform import end_stiffness, platform_stiffness, unbalance
@@ -19,7 +21,8 @@ from sagline.kernels.jit import entry, formula, glue
 from sagline.kernels.memory import block
 
 # which datum changes
-BY_LENGTH, BY_DENSITY, BY_STIFFNESS = 0, 1, 2
+BY_LENGTH, BY_DENSITY, BY_STIFFNESS, BY_RADIUS, BY_DEAD = 0, 1, 2, 3, 4
+DATA = 5
 
 
 @formula
@@ -32,7 +35,7 @@ def turn_out(pair: Pair, rows: Array, i: int, vector: Array) -> None:
 
 @glue
 def describe_cable(model: Model, cables: Array, rows: Array, i: int, block: Array, slopes: Array, lever: Array) -> None:
-    """Fill block (3, 3), slopes (3, m, 3) and lever (3,) of cable i, after `platform_stiffness`."""
+    """Fill block (3, 3), slopes (DATA, m, 3) and lever (3,) of cable i, after `platform_stiffness`."""
     across = end_stiffness(rows, i)
     for j in range(3):
         block[0, j] = across[0][j]
@@ -40,7 +43,13 @@ def describe_cable(model: Model, cables: Array, rows: Array, i: int, block: Arra
         block[2, j] = across[2][j]
         lever[j] = rows[g.LEVER_X + j, i]
     span, rise, length = rows[g.SPAN, i], rows[g.RISE, i], rows[t.LENGTH, i]
-    own = force_slopes(model, span, rise, material_at(cables, i), length, force_of(rows, i), plane_of(rows, i))
+    material, force, plane = material_at(cables, i), force_of(rows, i), plane_of(rows, i)
+    free = rows[t.FREE_LENGTH, i] if anything_behind(cables) else length
+    own, machine = slopes_over(model, material, pulley_at(cables, i), free, force, plane)
+    if not anything_behind(cables):
+        own = force_slopes(model, span, rise, material, length, force, plane)
+    turn_out(machine.by_radius, rows, i, slopes[BY_RADIUS, i])
+    turn_out(machine.by_dead, rows, i, slopes[BY_DEAD, i])
     turn_out(own.by_length, rows, i, slopes[BY_LENGTH, i])
     turn_out(own.by_density, rows, i, slopes[BY_DENSITY, i])
     turn_out(own.by_stiffness, rows, i, slopes[BY_STIFFNESS, i])
@@ -64,7 +73,7 @@ def describe_states(
         room: `memory_for` as many cables.
         matrices: Filled: stiffness of the platform, (N, 6, 6).
         blocks: Filled: stiffness of every cable's platform end in world axes, (N, m, 3, 3).
-        slopes: Filled: dT of every cable by its three data, (N, 3, m, 3).
+        slopes: Filled: dT of every cable by its data, (N, DATA, m, 3).
         levers: Filled: from the center of mass to the platform ends, (N, m, 3).
     """
     batch = Given(*given)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sagline.kernels.balance.setting import Balance, factor_balance, scale_limits
-from sagline.kernels.cable.cables import Cables, chord_of, material_of
+from sagline.kernels.cable.cables import Cables, chord_of, material_of, pulley_of
 from sagline.kernels.cable.hanging import frame_end_tension
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.jit import kernel
@@ -18,11 +18,11 @@ def linearize_ends(model: Model, sharing: Sharing, cables: Cables, balance: Bala
     """Set the balance up again, in frame-end tensions as they run near the present chord tensions; False: rank lost."""
     for i in range(cables.tau.size):
         tau = cables.tau[i]
-        chord, material = chord_of(cables, i), material_of(cables, i)
-        above = frame_end_tension(model, chord, material, tau * (1.0 + SLOPE_STEP))
-        below = frame_end_tension(model, chord, material, tau * (1.0 - SLOPE_STEP))
+        chord, material, pulley = chord_of(cables, i), material_of(cables, i), pulley_of(cables, i)
+        above = frame_end_tension(model, chord, material, pulley, tau * (1.0 + SLOPE_STEP))
+        below = frame_end_tension(model, chord, material, pulley, tau * (1.0 - SLOPE_STEP))
         slope = (above - below) / (2.0 * SLOPE_STEP * tau)
-        balance.offset[i] = frame_end_tension(model, chord, material, tau) - slope * tau
+        balance.offset[i] = frame_end_tension(model, chord, material, pulley, tau) - slope * tau
         balance.scale[i] = slope * sharing.weight[i]
         scale_limits(cables, balance, i)
     return factor_balance(balance)

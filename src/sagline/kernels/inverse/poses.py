@@ -10,12 +10,14 @@ import math
 
 from sagline.arrays import Array, Codes, Indices
 from sagline.kernels import tables
+from sagline.kernels.algebra.angle import angle
 from sagline.kernels.balance.freedom import turns
 from sagline.kernels.balance.setting import Balance, Limits, Platform, need, new_balance, set_pose
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable.cables import Cables, new_cables
+from sagline.kernels.cable.cables import Cables, material_of, new_cables, pulley_of
+from sagline.kernels.cable.pulley import Wrap, any_behind, behind_cable
 from sagline.kernels.cable.terms import Model
-from sagline.kernels.codes import CABLE_SOLVED, CLOSEST, POSE_NO_CHORD, POSE_SINGULAR, POSE_SOLVED
+from sagline.kernels.codes import CABLE_SOLVED, CATENARY, CLOSEST, POSE_NO_CHORD, POSE_SINGULAR, POSE_SOLVED
 from sagline.kernels.inverse.rounds import remember, share_and_hang
 from sagline.kernels.jit import entry, glue
 from sagline.kernels.memory import Memory
@@ -62,9 +64,10 @@ def inverse_poses(
         room: `memory_for` as many cables.
         otherwise: None for the ways of sharing nearest to a reference, in chord or horizontal tensions: all others are
             then left out of the machine code. True for any.
-        answers: Filled: span, rise, length, T_x, T_z, tau, (RESULT_ROWS, N, m); status of each cable, (N, m); norms of
-            the unbalanced force [N] and moment [N m] along the free motions, (N, 2); the wrench that J tau had to
-            supply, along them, (N, n); status of each pose, (N,).
+        answers: Filled: span and rise of the free spans, length of all cable off the drum, T_x, T_z, tau, and where
+            anything is behind a cable the rows of what is, (RESULT_ROWS, N, m); status of each cable, (N, m);
+            norms of the unbalanced force [N] and moment [N m] along the free motions, (N, 2); the wrench that J tau
+            had to supply, along them, (N, n); status of each pose, (N,).
         first: Pose to begin with.
         last: Pose to end before.
     """
@@ -74,7 +77,8 @@ def inverse_poses(
     results, statuses, residuals, needed, pose_statuses = answers
     m = statuses.shape[1]
     n = freedom.shape[0]
-    cables, rest = new_cables(Memory(*room), m)
+    machine = any_behind(robots)
+    cables, rest = new_cables(Memory(*room), m, machine)
     balance, rest = new_balance(rest, m, n)
     near, rest = new_nearness(rest, previous, m - n)
     others = None if otherwise is None else new_room(sharing.method, rest, m, m - n)
@@ -98,7 +102,7 @@ def inverse_poses(
             supplied = status != POSE_NO_CHORD and status != POSE_SINGULAR
             needed[p, k] = balance.right[k] if supplied else math.nan
         pose_statuses[p] = status
-        write(status == POSE_SOLVED, cables, balance, results, p)
+        write(status == POSE_SOLVED, model, cables, balance, results, p)
 
 
 @glue
@@ -120,13 +124,53 @@ def measure_balance(platform: Platform, cables: Cables, balance: Balance, residu
 
 
 @glue
-def write(solved: bool, cables: Cables, balance: Balance, results: Array, p: int) -> None:
+def write(solved: bool, model: Model, cables: Cables, balance: Balance, results: Array, p: int) -> None:
     """Write one pose's answer; no plausible numbers where there is none: span and rise stay, the rest is NaN."""
     for i in range(cables.tau.size):
         tension = cables.tau[i] if solved else math.nan
         results[tables.SPAN, p, i] = balance.geometry[g.SPAN, i]
         results[tables.RISE, p, i] = balance.geometry[g.RISE, i]
-        results[tables.LENGTH, p, i] = cables.ratio[i] * cables.chord[i] if solved else math.nan
+        results[tables.LENGTH, p, i] = cables.ratio[i] * cables.free_chord[i] if solved else math.nan
         results[tables.HORIZONTAL, p, i] = tension * cables.cosine[i]
         results[tables.VERTICAL, p, i] = tension * cables.sine[i] + cables.pull[i]
         results[tables.TENSION, p, i] = tension
+    if cables.machine:
+        write_behind(solved, model, cables, results, p)
+
+
+@glue
+def write_behind(solved: bool, model: Model, cables: Cables, results: Array, p: int) -> None:
+    """Write the free spans, and add to their lengths what is on the pulleys and behind them."""
+    m = cables.tau.size
+    for i in range(m):
+        if not solved:
+            results[tables.WRAP, p, i] = results[tables.WRAPPED, p, i] = math.nan
+            results[tables.DEAD, p, i] = results[tables.SINE, p, i] = math.nan
+    if solved:
+        tension = cables.last_pull  # where the cables leave; nobody asks for the pulls before any more
+        for i in range(m):
+            tension[i] = cables.tau[i]
+        if model.code == CATENARY:
+            for i in range(m):
+                x, z = cables.free_tau[i] * cables.free_cosine[i], cables.free_tau[i] * cables.free_sine[i]
+                length = cables.ratio[i] * cables.free_chord[i]
+                z += cables.free_pull[i] - cables.density[i] * model.gravity * length
+                tension[i] = math.sqrt(x * x + z * z)
+        for i in range(m):
+            results[tables.SPAN, p, i] = cables.free_chord[i] * cables.free_cosine[i]
+        for i in range(m):
+            results[tables.RISE, p, i] = cables.free_chord[i] * cables.free_sine[i]
+        for i in range(m):
+            results[tables.WRAP, p, i] = angle(cables.wrap_sine[i], cables.wrap_cosine[i])
+        for i in range(m):
+            wrap = Wrap(cables.wrap_sine[i], cables.wrap_cosine[i], results[tables.WRAP, p, i])
+            wrapped, _dead = behind_cable(model, material_of(cables, i), pulley_of(cables, i), tension[i], wrap)
+            results[tables.WRAPPED, p, i] = wrapped
+        for i in range(m):
+            wrap = Wrap(cables.wrap_sine[i], cables.wrap_cosine[i], 0.0)
+            _wrapped, dead = behind_cable(model, material_of(cables, i), pulley_of(cables, i), tension[i], wrap)
+            results[tables.DEAD, p, i] = dead
+        for i in range(m):
+            results[tables.LENGTH, p, i] += results[tables.WRAPPED, p, i] + results[tables.DEAD, p, i]
+        for i in range(m):
+            results[tables.SINE, p, i] = cables.sine[i]

@@ -6,7 +6,7 @@ import math
 
 from sagline.arrays import Codes
 from sagline.kernels.balance.setting import Balance, Platform, need, start_from_minimum_norm
-from sagline.kernels.cable.cables import Cables, chord_of, material_of
+from sagline.kernels.cable.cables import Cables, chord_of, material_of, pulley_of
 from sagline.kernels.cable.hanging import NEAR, frame_end_tension, hang_cables
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import (
@@ -70,7 +70,7 @@ def share_and_hang(
         if status != POSE_SOLVED:
             break
         moved, largest = take_tensions(cables, balance)
-        gravest = hang_cables(model, cables, hung and moved < NEAR, statuses)
+        gravest = hang_cables(model, cables, not hung, hung and moved < NEAR, statuses)
         if gravest == CABLE_TOO_SLACK or gravest == CABLE_NOT_CONVERGED:
             status = POSE_TOO_SLACK if gravest == CABLE_TOO_SLACK else POSE_NOT_CONVERGED
             break
@@ -144,4 +144,6 @@ def remember(model: Model, sharing: Sharing, cables: Cables, room: Room | None, 
         if sharing.variable == HORIZONTAL_TENSION:
             near.previous[i] = cables.tau[i] * cables.cosine[i]
         elif room is not None and sharing.variable == FRAME_END_TENSION:
-            near.previous[i] = frame_end_tension(model, chord_of(cables, i), material_of(cables, i), cables.tau[i])
+            near.previous[i] = frame_end_tension(
+                model, chord_of(cables, i), material_of(cables, i), pulley_of(cables, i), cables.tau[i]
+            )

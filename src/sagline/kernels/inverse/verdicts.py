@@ -20,6 +20,7 @@ from sagline.kernels.balance.setting import (
 from sagline.kernels.balance.wrench import along_freedom
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.cables import Cables, new_cables
+from sagline.kernels.cable.pulley import any_behind
 from sagline.kernels.cable.pulls import new_curves, pulls_at
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import (
@@ -83,7 +84,7 @@ def decide_poses(
     brackets, reliefs, farkas, blocking = verdicts
     n = freedom.shape[0]
     m = statuses.shape[1]
-    cables, rest = new_cables(Memory(*memory), m)
+    cables, rest = new_cables(Memory(*memory), m, any_behind(robots))
     balance, rest = new_balance(rest, m, n)
     rows, at = block(rest.numbers, 0, 2 * n + 3, m)
     vectors, at = block(rest.numbers, at, 3, n)
@@ -121,7 +122,7 @@ def decide_poses(
             brackets[p, PROVED] = brackets[p, ENOUGH] = math.nan
         if status == POSE_SOLVED:
             measure_balance(platform, cables, balance, residuals[p])
-            write(True, cables, balance, results, p)
+            write(True, model, cables, balance, results, p)
         else:
             for i in range(m):
                 statuses[p, i] = CABLE_SOLVED

@@ -1,0 +1,258 @@
+"""The cables of one pose over pulleys, of given unstrained lengths; docs/model.md, section 10.
+
+A cable is solved as one that starts where its chord touches the pulley, is shorter by what is behind that point and
+softer by the share it has of the stretch. What that one misses is added to what is asked for, pass by pass; from a pose
+close by it was missed there already, and one or two passes do. Loops of one result each, without branches, vectorize.
+"""
+
+from __future__ import annotations
+
+import math
+
+from sagline.arrays import Array
+from sagline.kernels import tables
+from sagline.kernels.algebra.angle import angle
+from sagline.kernels.algebra.hyperbolic import EXCESS_LIMIT, atanhc_excess_polynomial
+from sagline.kernels.cable import geometry as g
+from sagline.kernels.cable import rows as t
+from sagline.kernels.cable.catenary import catenary_end
+from sagline.kernels.cable.models import from_tension
+from sagline.kernels.cable.pulley import (
+    Behind,
+    Wrap,
+    behind_cable,
+    energy_behind,
+    free_rise,
+    free_span,
+    from_axis,
+    pulley_at,
+    softness,
+    straight_behind,
+)
+from sagline.kernels.cable.terms import Chord, Material, Model, PlaneStiffness
+from sagline.kernels.codes import CATENARY, ELASTIC
+from sagline.kernels.jit import formula, glue
+
+LEAST_FREE = 1e-3  # of a cable's length: what is asked for is never shorter
+TINY = 1e-300  # N: divides no force at all
+ORDINARY_END = math.sqrt(EXCESS_LIMIT)  # of u = wL/(T_A + T_B): up to here the series of P1 is a polynomial
+
+
+@formula
+def material_at(cables: Array, i: int) -> Material:
+    """What one cable of the cable_table is made of."""
+    return Material(cables[i, tables.DENSITY], cables[i, tables.STIFFNESS])
+
+
+@formula
+def chord_at(rows: Array, i: int) -> Chord:
+    """The chord of one cable of a pose."""
+    return Chord(rows[g.CHORD, i], rows[g.SINE, i], rows[g.COSINE, i])
+
+
+@formula
+def wrap_at(rows: Array, i: int) -> Wrap:
+    """How far one cable of a pose lies on its pulley, after `settle`."""
+    return Wrap(rows[t.WRAP_SINE, i], rows[t.WRAP_COSINE, i], rows[t.WRAP, i])
+
+
+@glue
+def begin_passes(cables: Array, rows: Array) -> None:
+    """Fill what is behind the chords, and forget what was missed where the pose before left no parameter."""
+    for i in range(rows.shape[1]):
+        rows[t.BEHIND, i] = straight_behind(pulley_at(cables, i), chord_at(rows, i))
+    for i in range(rows.shape[1]):
+        if math.isnan(rows[t.PARAMETER, i]) or math.isnan(rows[t.OFF_X, i] + rows[t.OFF_Z, i] + rows[t.OFF_LENGTH, i]):
+            rows[t.OFF_X, i] = rows[t.OFF_Z, i] = rows[t.OFF_LENGTH, i] = 0.0
+
+
+@glue
+def ask(model: Model, cables: Array, rows: Array) -> None:
+    """Fill the cables that are solved in the stead of those over pulleys."""
+    m = rows.shape[1]
+    for i in range(m):
+        length = rows[t.LENGTH, i]
+        rows[t.ASKED_LENGTH, i] = max(length - rows[t.BEHIND, i], LEAST_FREE * length)
+    for i in range(m):
+        rows[t.SOFT, i] = cables[i, tables.STIFFNESS] / (1.0 + rows[t.BEHIND, i] / rows[t.ASKED_LENGTH, i])
+    if model.code == CATENARY:
+        for i in range(m):
+            rows[t.ASKED_SPAN, i] = rows[g.SPAN, i] + rows[t.OFF_X, i]
+        for i in range(m):
+            half = 0.5 * cables[i, tables.DENSITY] * model.gravity * rows[t.ASKED_LENGTH, i]
+            lift = rows[t.BEHIND, i] * half / cables[i, tables.STIFFNESS]
+            rows[t.ASKED_RISE, i] = rows[g.RISE, i] + (lift + rows[t.OFF_Z, i])
+    else:
+        for i in range(m):
+            rows[t.ASKED_SPAN, i] = rows[g.SPAN, i]
+        for i in range(m):
+            rows[t.ASKED_RISE, i] = rows[g.RISE, i]
+        for i in range(m):
+            rows[t.ASKED_LENGTH, i] += rows[t.OFF_LENGTH, i]
+
+
+@glue
+def settle(model: Model, cables: Array, rows: Array) -> float:
+    """Fill the forces and free spans from those of the cables asked for; returns the largest miss, of the length.
+
+    A miss is added to what is asked for next time: of the exact cable by how much its platform end is missed, of the
+    shallow ones by how much their length.
+    """
+    if model.code == CATENARY:
+        leave_by_force(model, cables, rows)
+        end_exactly(model, cables, rows)
+        return missed_ends(rows)
+    return missed_lengths(model, cables, rows)
+
+
+@glue
+def leave_by_force(model: Model, cables: Array, rows: Array) -> None:
+    """Fill where exact cables leave their pulleys, from T_x and T_zA, and their free spans and lengths."""
+    m = rows.shape[1]
+    for i in range(m):  # T_zA
+        rows[t.VERTICAL, i] -= cables[i, tables.DENSITY] * model.gravity * rows[t.ASKED_LENGTH, i]
+    for i in range(m):
+        x, z = rows[t.HORIZONTAL, i], rows[t.VERTICAL, i]
+        rows[t.LEAVING, i] = math.sqrt(x * x + z * z)
+    for i in range(m):
+        rows[t.WRAP_SINE, i] = rows[t.HORIZONTAL, i] / (rows[t.LEAVING, i] + TINY)
+    for i in range(m):
+        rows[t.WRAP_COSINE, i] = cables[i, tables.ENTRY] * rows[t.VERTICAL, i] / (rows[t.LEAVING, i] + TINY)
+    for i in range(m):
+        rows[t.WRAP, i] = angle(rows[t.WRAP_SINE, i] + TINY, rows[t.WRAP_COSINE, i])
+    for i in range(m):
+        material = material_at(cables, i)
+        wrapped, dead = behind_cable(model, material, pulley_at(cables, i), rows[t.LEAVING, i], wrap_at(rows, i))
+        rows[t.FREE_LENGTH, i] = rows[t.LENGTH, i] - (wrapped + dead)
+    for i in range(m):  # T_z
+        rows[t.VERTICAL, i] += cables[i, tables.DENSITY] * model.gravity * rows[t.FREE_LENGTH, i]
+    for i in range(m):
+        rows[t.FREE_SPAN, i] = free_span(pulley_at(cables, i), chord_at(rows, i), rows[t.WRAP_COSINE, i])
+    for i in range(m):
+        rows[t.FREE_RISE, i] = free_rise(pulley_at(cables, i), chord_at(rows, i), rows[t.WRAP_SINE, i])
+    for i in range(m):
+        if rows[g.SPAN, i] > 0.0:
+            rows[t.TENSION, i] = rows[t.HORIZONTAL, i] / rows[g.COSINE, i]
+
+
+@glue
+def end_exactly(model: Model, cables: Array, rows: Array) -> None:
+    """Fill where the free spans of exact cables end; `catenary_end`, its ordinary cases in loops that vectorize."""
+    m = rows.shape[1]
+    for i in range(m):
+        x, z = rows[t.HORIZONTAL, i], rows[t.VERTICAL, i]
+        rows[t.TOTAL, i] = rows[t.LEAVING, i] + math.sqrt(x * x + z * z)
+    for i in range(m):
+        weight_length = cables[i, tables.DENSITY] * model.gravity * rows[t.FREE_LENGTH, i]
+        u = weight_length / rows[t.TOTAL, i]
+        gives = 1.0 / cables[i, tables.STIFFNESS] + 2.0 / rows[t.TOTAL, i] * (1.0 + atanhc_excess_polynomial(u * u))
+        rows[t.END_X, i] = rows[t.HORIZONTAL, i] * rows[t.FREE_LENGTH, i] * gives
+    for i in range(m):
+        weight_length = cables[i, tables.DENSITY] * model.gravity * rows[t.FREE_LENGTH, i]
+        gives = 1.0 / cables[i, tables.STIFFNESS] + 2.0 / rows[t.TOTAL, i]
+        rows[t.END_Z, i] = (rows[t.VERTICAL, i] - 0.5 * weight_length) * rows[t.FREE_LENGTH, i] * gives
+    for i in range(m):
+        weight, free = cables[i, tables.DENSITY] * model.gravity, rows[t.FREE_LENGTH, i]
+        if not weight * free <= ORDINARY_END * rows[t.TOTAL, i]:
+            rows[t.END_X, i], rows[t.END_Z, i] = catenary_end(
+                rows[t.HORIZONTAL, i], rows[t.VERTICAL, i], free, weight, cables[i, tables.STIFFNESS]
+            )
+
+
+@glue
+def missed_ends(rows: Array) -> float:
+    """Add by how much the platform ends are missed to what is asked for; returns the most, of a cable's length."""
+    largest = 0.0
+    for i in range(rows.shape[1]):
+        x, z = rows[t.FREE_SPAN, i] - rows[t.END_X, i], rows[t.FREE_RISE, i] - rows[t.END_Z, i]
+        rows[t.OFF_X, i] += x
+        rows[t.OFF_Z, i] += z
+        miss = abs(x) + abs(z)
+        if not miss <= largest * rows[t.LENGTH, i]:
+            largest = miss / rows[t.LENGTH, i]
+    return largest
+
+
+@glue
+def missed_lengths(model: Model, cables: Array, rows: Array) -> float:
+    """The same of cables that leave along their chord: shallow ones, and weightless ones, which miss nothing."""
+    largest = 0.0
+    for i in range(rows.shape[1]):
+        material, pulley, chord = material_at(cables, i), pulley_at(cables, i), chord_at(rows, i)
+        tension = rows[t.TENSION, i]
+        sine, cosine = chord.cosine, pulley.entry * chord.sine
+        rows[t.LEAVING, i] = tension
+        rows[t.WRAP_SINE, i] = sine
+        rows[t.WRAP_COSINE, i] = cosine
+        rows[t.WRAP, i] = angle(sine, cosine)
+        rows[t.FREE_SPAN, i] = rows[g.SPAN, i]
+        rows[t.FREE_RISE, i] = rows[g.RISE, i]
+        wrapped, dead = behind_cable(model, material, pulley, tension, wrap_at(rows, i))
+        free = rows[t.LENGTH, i] - (wrapped + dead)
+        rows[t.FREE_LENGTH, i] = free
+        if model.code != ELASTIC and tension > 0.0:
+            miss = free - from_tension(model, chord, material, tension)[0]
+            rows[t.OFF_LENGTH, i] += miss
+            largest = max(largest, abs(miss) / rows[t.LENGTH, i])
+    return largest
+
+
+@formula
+def weight_of(model: Model, material: Material) -> float:
+    """Weight per length that the part behind P has [N/m]: the exact cable's alone."""
+    return material.density * model.gravity if model.code == CATENARY else 0.0
+
+
+@formula
+def behind_at(model: Model, cables: Array, rows: Array, i: int) -> Behind:
+    """Unstrained cable behind P, after `settle`."""
+    return behind_cable(model, material_at(cables, i), pulley_at(cables, i), rows[t.LEAVING, i], wrap_at(rows, i))
+
+
+@formula
+def fed(model: Model, cables: Array, rows: Array, i: int) -> tuple[float, float, float]:
+    """How the platform end moves at a fixed force for a meter of cable more, x and z, and for a newton more of H.
+
+    The last is along the first, of which it is the share by which the part behind P gives way.
+    """
+    material, pulley, wrap, tension = material_at(cables, i), pulley_at(cables, i), wrap_at(rows, i), rows[t.LEAVING, i]
+    weight = weight_of(model, material)
+    strained = 1.0 + tension / material.stiffness
+    soft = softness(pulley, weight, material.stiffness, tension, wrap)
+    along = pulley.entry * wrap.cosine
+    more = strained / (1.0 + weight * along * strained * soft)
+    return more * wrap.sine, more * along, soft * strained / more
+
+
+@formula
+def series(model: Model, cables: Array, rows: Array, i: int, plane: PlaneStiffness) -> PlaneStiffness:
+    """In-plane stiffness of a cable, whose free span's is given, with the part behind P that gives way along it."""
+    if not rows[t.LEAVING, i] > 0.0:
+        return plane
+    x, z, gives = fed(model, cables, rows, i)
+    left_x, left_z = plane.xx * x + plane.xz * z, plane.zx * x + plane.zz * z
+    right_x, right_z = plane.xx * x + plane.zx * z, plane.xz * x + plane.zz * z
+    share = gives / (1.0 + gives * (x * left_x + z * left_z))
+    return PlaneStiffness(
+        plane.xx - share * left_x * right_x,
+        plane.xz - share * left_x * right_z,
+        plane.zx - share * left_z * right_x,
+        plane.zz - share * left_z * right_z,
+    )
+
+
+@formula
+def across_pulley(cables: Array, rows: Array, i: int) -> float:
+    """Stiffness of a cable normal to its plane [N/m]: the whole plane turns about the swivel axis."""
+    pulley = pulley_at(cables, i)
+    if pulley.radius == 0.0:
+        return rows[t.TENSION, i] / rows[g.CHORD, i]
+    return rows[t.HORIZONTAL, i] / from_axis(pulley, chord_at(rows, i))
+
+
+@formula
+def energy_over(model: Model, cables: Array, rows: Array, i: int) -> float:
+    """Energy [J] that the part behind P adds to that of the free span."""
+    material, tension = material_at(cables, i), rows[t.LEAVING, i]
+    weight, free = weight_of(model, material), rows[t.FREE_LENGTH, i]
+    return energy_behind(pulley_at(cables, i), weight, material.stiffness, tension, wrap_at(rows, i), free)

@@ -1,0 +1,251 @@
+"""A cable over the pulley at its frame anchor, and the straight run behind it; docs/model.md, section 10.
+
+The pulley swivels about a vertical axis through the anchor A, where the cable enters it, and so stands in the cable's
+vertical plane. The cable leaves it at P along the force there, F_A = (T_x, T_zA): that force alone says where.
+Nothing rubs: H = T + T^2/(2 EA) - w z is one number along all of a cable, and -H its energy's slope by its length.
+With beta = w R/EA and E_A = 1 + T_A/EA, what is neglected on the pulley is of the order R beta^2.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from sagline.arrays import Array
+from sagline.kernels import tables
+from sagline.kernels.algebra.angle import angle
+from sagline.kernels.cable.terms import Chord, Force, Material, Model
+from sagline.kernels.codes import CATENARY, STRAIGHT
+from sagline.kernels.jit import formula, kernel
+
+
+class Pulley(NamedTuple):
+    """What stands behind one frame anchor.
+
+    Attributes:
+        radius: R [m]; 0 for an eyelet.
+        entry: s, +1 where the cable enters from below, -1 from above.
+        dead: Length of the straight run from drum to anchor [m].
+        rise: Height of the anchor above the drum [m].
+    """
+
+    radius: float
+    entry: float
+    dead: float
+    rise: float
+
+
+class Wrap(NamedTuple):
+    """How far a cable lies on its pulley: the wrap angle psi [rad], its sine and its cosine."""
+
+    sine: float
+    cosine: float
+    angle: float
+
+
+class Behind(NamedTuple):
+    """Unstrained cable behind the point P where it leaves the pulley [m]."""
+
+    wrapped: float
+    dead: float
+
+
+class Change(NamedTuple):
+    """What changes of one cable: L [m], w [N/m], EA [N], R [m], dead cable [m]."""
+
+    length: float
+    weight: float
+    stiffness: float
+    radius: float
+    dead: float
+
+
+class Motion(NamedTuple):
+    """Of the platform end in the cable's plane, at a fixed force on it."""
+
+    x: float
+    z: float
+
+
+@formula
+def pulley_at(cables: Array, i: int) -> Pulley:
+    """What stands behind one cable of the cable_table."""
+    return Pulley(
+        cables[i, tables.PULLEY_RADIUS],
+        cables[i, tables.ENTRY],
+        cables[i, tables.DEAD_CABLE],
+        cables[i, tables.DEAD_RISE],
+    )
+
+
+@kernel
+def anything_behind(cables: Array) -> bool:
+    """Whether a cable of a robot's cable_table (m, CABLE_COLUMNS) has a pulley or dead cable."""
+    total = 0.0
+    for i in range(cables.shape[0]):
+        total += cables[i, tables.PULLEY_RADIUS] + cables[i, tables.DEAD_CABLE]
+    return total > 0.0
+
+
+@kernel
+def any_behind(robots: Array) -> bool:
+    """Whether one of several robots' cables has, (1 or N, m, CABLE_COLUMNS)."""
+    for p in range(robots.shape[0]):
+        if anything_behind(robots[p]):
+            return True
+    return False
+
+
+@formula
+def free_span(pulley: Pulley, chord: Chord, cosine: float) -> float:
+    """Horizontal distance from where a cable leaves its pulley to its platform end [m]; cosine of the wrap angle.
+
+    chord: that of the tangent from the platform end.
+    """
+    return chord.length * chord.cosine + pulley.radius * (cosine - pulley.entry * chord.sine)
+
+
+@formula
+def free_rise(pulley: Pulley, chord: Chord, sine: float) -> float:
+    """Height of the platform end above where a cable leaves its pulley [m]; sine of the wrap angle."""
+    return chord.length * chord.sine + pulley.radius * (pulley.entry * (chord.cosine - sine))
+
+
+@formula
+def straight_behind(pulley: Pulley, chord: Chord) -> float:
+    """Length behind where the chord touches, of a cable that is not strained [m]."""
+    return pulley.radius * angle(chord.cosine, pulley.entry * chord.sine) + pulley.dead
+
+
+@formula
+def from_axis(pulley: Pulley, chord: Chord) -> float:
+    """Horizontal distance of the platform end from the swivel axis [m]."""
+    return chord.length * chord.cosine + pulley.radius * (1.0 - pulley.entry * chord.sine)
+
+
+@formula
+def behind(pulley: Pulley, weight: float, stiffness: float, tension: float, wrap: Wrap) -> Behind:
+    """Unstrained length on the pulley and behind it, from the tension at P; weight per length, 0 for weightless."""
+    radius, entry, dead, rise = pulley
+    strained = 1.0 + tension / stiffness
+    square = strained * strained
+    beta = weight * radius / stiffness
+    falls = entry * beta * (1.0 - wrap.cosine - wrap.angle * wrap.sine)
+    first = math.sqrt(square - 2.0 * entry * beta * wrap.sine)  # where it enters
+    last = math.sqrt(first * first - 2.0 * weight * rise / stiffness)  # where it leaves the drum
+    return Behind(radius * (wrap.angle - falls / square) / strained, 2.0 * dead / (first + last))
+
+
+@formula
+def behind_cable(model: Model, material: Material, pulley: Pulley, tension: float, wrap: Wrap) -> Behind:
+    """The same of a cable of any model; only the exact one weighs there, and the straight one does not stretch."""
+    if model.code == STRAIGHT:
+        return Behind(pulley.radius * wrap.angle, pulley.dead)
+    weight = material.density * model.gravity if model.code == CATENARY else 0.0
+    return behind(pulley, weight, material.stiffness, tension, wrap)
+
+
+@formula
+def softness(pulley: Pulley, weight: float, stiffness: float, tension: float, wrap: Wrap) -> float:
+    """S: how much unstrained length the part behind P gives for a newton more of H, E_A^2 S that at P [m/N]."""
+    radius, entry, dead, rise = pulley
+    strained = 1.0 + tension / stiffness
+    first = math.sqrt(strained * strained - 2.0 * entry * weight * radius / stiffness * wrap.sine)
+    last = math.sqrt(first * first - 2.0 * weight * rise / stiffness)
+    on_pulley = radius * wrap.angle / (strained * strained * strained)
+    return (on_pulley + 2.0 * dead / ((first + last) * first * last)) / stiffness
+
+
+@formula
+def energy_behind(pulley: Pulley, weight: float, stiffness: float, tension: float, wrap: Wrap, free: float) -> float:
+    """Energy [J] of the part behind P, and of lifting the free one (of unstrained length `free`) to P; z from A."""
+    radius, entry, dead, rise = pulley
+    strained = 1.0 + tension / stiffness
+    height = entry * radius * wrap.sine
+    beta = weight * radius / stiffness
+    first = math.sqrt(strained * strained - 2.0 * entry * beta * wrap.sine) - 1.0
+    last = math.sqrt((1.0 + first) * (1.0 + first) - 2.0 * weight * rise / stiffness) - 1.0
+    whole = tension + 0.5 * tension * tension / stiffness - weight * height  # H
+    wrapped, run = behind(pulley, weight, stiffness, tension, wrap)
+    on_pulley = tension * wrap.angle + entry * weight * radius * (1.0 - wrap.cosine - wrap.angle * wrap.sine) / strained
+    total = first + last
+    on_run = total + total + total + 2.0 * (first * first + first * last + last * last)
+    return (
+        weight * free * height
+        + radius * on_pulley
+        + stiffness * dead * on_run / (3.0 * (2.0 + total))
+        - whole * (wrapped + run)
+    )
+
+
+@formula
+def length_behind_by(
+    pulley: Pulley, weight: float, stiffness: float, force: Force, free: float, change: Change, grown: float
+) -> tuple[float, float]:
+    """How wrap angle and unstrained cable behind P follow a change at a fixed force on the platform end.
+
+    Args:
+        pulley: What stands behind.
+        weight: Weight per length [N/m].
+        stiffness: EA [N].
+        force: On the platform end, which stays.
+        free: Unstrained length of the free span [m].
+        change: What changes; its length plays no part here.
+        grown: By how much the free span's unstrained length grows.
+
+    Returns:
+        Changes of psi, and of the length behind P.
+    """
+    radius, entry, dead, rise = pulley
+    vertical_a = force.vertical - weight * free
+    tension = math.sqrt(force.horizontal * force.horizontal + vertical_a * vertical_a)
+    sine, cosine = force.horizontal / tension, entry * vertical_a / tension
+    wrapped = angle(sine, cosine)
+    strained = 1.0 + tension / stiffness
+    cube = strained * strained * strained
+    beta = weight * radius / stiffness
+    first = math.sqrt(strained * strained - 2.0 * entry * beta * sine)
+    last = math.sqrt(first * first - 2.0 * weight * rise / stiffness)
+    vertical_by = -(free * change.weight + weight * grown)
+    angle_by = -entry * sine / tension * vertical_by
+    strained_by = (entry * cosine * vertical_by - (strained - 1.0) * change.stiffness) / stiffness
+    beta_by = (change.weight * radius + weight * change.radius - beta * change.stiffness) / stiffness
+    falls = 1.0 - cosine - wrapped * sine
+    per_radius = wrapped / strained - entry * beta * falls / cube
+    wrapped_by = change.radius * per_radius + radius * (
+        angle_by * (1.0 / strained + entry * beta * wrapped * cosine / cube)
+        - strained_by * (wrapped / (strained * strained) - 3.0 * entry * beta * falls / (cube * strained))
+        - entry * falls * beta_by / cube
+    )
+    first_by = (strained * strained_by - entry * (beta_by * sine + beta * cosine * angle_by)) / first
+    last_by = (first * first_by - rise * (change.weight - weight * change.stiffness / stiffness) / stiffness) / last
+    total = first + last
+    dead_by = 2.0 * (change.dead - dead * (first_by + last_by) / total) / total
+    return angle_by, wrapped_by + dead_by
+
+
+@kernel
+def end_by(
+    pulley: Pulley, material: Material, weight: float, force: Force, free: float, change: Change, by_weight: Motion
+) -> Motion:
+    """How the platform end moves at a fixed force on it when a cable's own data change; docs/model.md, section 10.
+
+    by_weight: how it moves by w alone at a fixed free length [m^2/N].
+    """
+    vertical_a = force.vertical - weight * free
+    tension = math.sqrt(force.horizontal * force.horizontal + vertical_a * vertical_a)
+    along_x, along_z = force.horizontal / tension, vertical_a / tension
+    strained = 1.0 + tension / material.stiffness
+    still = length_behind_by(pulley, weight, material.stiffness, force, free, change, 0.0)[1]
+    more = length_behind_by(pulley, weight, material.stiffness, force, free, change, 1.0)[1] - still
+    grown = (change.length - still) / (1.0 + more)
+    turned = length_behind_by(pulley, weight, material.stiffness, force, free, change, grown)[0]
+    # the free span grows at P, where it is strained by E_A, and P goes along the tangent
+    feed = strained * grown + pulley.radius * turned
+    softer = -free * change.stiffness / (material.stiffness * material.stiffness)
+    x = softer * force.horizontal + by_weight.x * change.weight
+    z = softer * (force.vertical - 0.5 * weight * free) + by_weight.z * change.weight
+    return Motion(
+        x + feed * along_x + change.radius * (1.0 - pulley.entry * along_z),
+        z + feed * along_z + change.radius * pulley.entry * along_x,
+    )

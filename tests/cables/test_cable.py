@@ -1,0 +1,122 @@
+"""The material of cables, and what is kept of it where a cable is made from another."""
+
+import pickle
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sagline.article.identify_cable import identify_cable
+from sagline.article.machine import PARAMETERS, Machine, Parameter
+from sagline.cables.cable import Cable
+from sagline.cables.catenary import Catenary
+from sagline.cables.rope import ROPES
+from sagline.errors import InvalidValueError
+from sagline.files.robot_file import dump_robot, load_robot, parse_robot
+from sagline.robot.inertia import with_mass
+from sagline.robot.robot import Robot
+from sagline.tension.broken import without_cables
+from sagline.viewer.settings import Settings
+
+FIELDS = ("linear_density", "axial_stiffness", "diameter", "expansion")
+THICKNESS, GROWTH = np.linspace(0.003, 0.01, 8), np.linspace(-1.2e-5, 1.2e-5, 8)
+THICK = Cable(np.linspace(0.05, 0.1, 8), 44e3, diameter=THICKNESS, expansion=GROWTH)
+
+
+def test_all_fields_have_one_shape_and_what_is_not_known_is_none() -> None:
+    cable = Cable([0.05, 0.1], 44e3, expansion=-1.2e-5)
+    assert cable.diameter is None
+    assert cable.expansion is not None
+    assert cable.expansion.tolist() == [-1.2e-5, -1.2e-5]
+    assert list(cable.known()) == ["linear_density", "axial_stiffness", "expansion"]
+    wide = Cable(0.05, 44e3, diameter=[0.003, 0.004])
+    assert wide.linear_density.tolist() == [0.05, 0.05]
+    with pytest.raises(ValueError, match="read-only"):
+        wide.linear_density[0] = 1.0
+
+
+def test_from_material_knows_them_too() -> None:
+    cable = Cable.from_material(0.067, 2e9, [22e-6, 11e-6], diameter=0.0065, expansion=1e-5)
+    np.testing.assert_allclose(cable.axial_stiffness, [44e3, 22e3], rtol=1e-15)
+    assert (cable.known()["diameter"].tolist(), cable.known()["expansion"].tolist()) == ([0.0065] * 2, [1e-5] * 2)
+    assert Cable.from_material(0.067, 2e9, 22e-6).diameter is None
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "message"),
+    [
+        ("linear_density", -1.0, r"linear_density is -1 kg/m; allowed: >= 0 kg/m"),
+        ("axial_stiffness", 0.0, r"axial_stiffness is 0 N; allowed: > 0 N"),
+        ("diameter", 0.0, r"diameter is 0 m; allowed: > 0 m"),
+        ("diameter", [0.004, -0.004], r"diameter\[1\] is -0.004 m; allowed: > 0 m"),
+        ("diameter", [0.004, np.nan], r"diameter\[1\] is nan m"),
+        ("diameter", "4 mm", "diameter is '4 mm'; allowed: numbers"),
+        ("expansion", np.inf, "expansion is inf 1/K; allowed: finite"),
+        ("expansion", {}, "expansion is {}; allowed: numbers"),
+        ("expansion", [1e-5, 1e-5, 1e-5], "expansion is not of one shape, but"),
+    ],
+)
+def test_what_no_cable_is_made_of(field: str, value: Any, message: str) -> None:
+    good = Cable([0.1, 0.2], 1e4, diameter=0.004, expansion=0.0)
+    with pytest.raises(InvalidValueError, match=message):
+        good.replace(**{field: value})
+    with pytest.raises(InvalidValueError, match=message):
+        Cable(**{**good.known(), field: value})
+
+
+def test_replace_leaves_the_original() -> None:
+    stiff = THICK.replace(axial_stiffness=50e3, expansion=None)
+    assert stiff.axial_stiffness.tolist() == [50e3] * 8
+    assert stiff.expansion is None
+    assert THICK.axial_stiffness.tolist() == [44e3] * 8
+    np.testing.assert_array_equal(stiff.known()["diameter"], THICKNESS)
+    with pytest.raises(InvalidValueError, match="field is 'thickness'; allowed: linear_density, axial_stiffness, diam"):
+        THICK.replace(thickness=1.0)
+
+
+def changed(parameter: Parameter, robot: Robot) -> Robot:
+    return parameter.changed(Machine(robot), parameter.typical).robot
+
+
+PROTOTYPE = load_robot("article-prototype").replace(cables=THICK)
+# every way to make cables of others, and which of them are left
+WAYS: dict[str, Callable[[Robot], Robot]] = {
+    "a file": lambda robot: parse_robot(dump_robot(robot), "robot.yaml"),
+    "a pickle": lambda robot: pickle.loads(pickle.dumps(robot)),
+    "another mass": lambda robot: with_mass(robot, 60.0),
+    "the viewer's sliders": Settings(mass=50.0, density=1.5, stiffness=0.5).applied,
+    "broken cables": lambda robot: without_cables(robot, 3),
+    **{f"another {parameter.name}": partial(changed, parameter) for parameter in PARAMETERS},
+}
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_cable_made_from_another_is_as_thick(way: str) -> None:
+    cables, kept = WAYS[way](PROTOTYPE).cables, [0, 1, 2, 4, 5, 6, 7] if way == "broken cables" else list(range(8))
+    np.testing.assert_array_equal(cables.known()["diameter"], THICKNESS[kept])
+    np.testing.assert_array_equal(cables.known()["expansion"], GROWTH[kept])
+
+
+def test_part_of_a_batch() -> None:
+    batch = Catenary().from_tension(THICK, 10.0, -4.0, 500.0)
+    assert batch[3].cable.known()["diameter"] == THICKNESS[3]
+    np.testing.assert_array_equal(batch[2:5].cable.known()["expansion"], GROWTH[2:5])
+    bare = Catenary().from_tension(THICK.replace(diameter=None), 10.0, -4.0, 500.0)
+    assert bare[3].cable.diameter is None
+
+
+def test_a_rope_knows_its_diameter() -> None:
+    for rope in ROPES.values():
+        assert rope.cable(0.006).diameter == 0.006
+        assert rope.cable(0.006).expansion is None
+
+
+def test_a_cable_that_was_identified_is_as_thick_as_the_one_it_starts_from() -> None:
+    rope, spans, tensions = Cable(0.067, 44e3, diameter=0.0065), np.array([8.0, 10.0, 12.0]), [50.0, 150.0, 300.0]
+    length = Catenary().from_tension(rope, spans, -2.0, np.array(tensions)).unstrained_length
+    start = rope.replace(linear_density=0.05, axial_stiffness=5e4)
+    fit = identify_cable(spans, np.full(3, -2.0), length, tensions, tension_at="chord", start=start)
+    assert fit.cable.diameter == 0.0065
+    np.testing.assert_allclose(fit.cable.linear_density, 0.067, rtol=1e-4)
