@@ -78,13 +78,23 @@ def test_at_home_the_counts_are_those_that_were_read(robot: sl.Robot) -> None:
 
 
 @pytest.mark.parametrize("name", ["cogiro", "article-prototype", "article-mixed", "ipanema-1"])
-def test_homing_finds_the_lengths_of_a_plan_from_its_tensions(name: str) -> None:
-    robot = sl.load_robot(name).replace(winches=sl.Winch())
+@pytest.mark.parametrize(
+    "winch",
+    [
+        sl.Winch(),
+        sl.Winch(0.05, dead_cable=5.0, dead_rise=4.0),
+        sl.Winch(0.05, swivel_axis=[0.0, 0.0, -1.0], dead_cable=5.0, dead_rise=-1.0),
+    ],
+    ids=["bare", "from below", "from above"],
+)
+@pytest.mark.parametrize("model", [sl.Catenary(), sl.Elastic(), sl.Parabolic()], ids=["exact", "elastic", "parabolic"])
+def test_homing_finds_the_lengths_of_a_plan_from_its_tensions(name: str, winch: sl.Winch, model: sl.CableModel) -> None:
+    robot = sl.load_robot(name).replace(winches=winch)
     assert robot.test_box is not None
     box = robot.test_box
     pose = sl.Pose(box.low + 0.4 * (box.high - box.low), np.eye(3))
-    plan = sl.inverse(robot, pose)
-    winches = sl.home(robot, pose, plan.state.cables.frame_end_tension).winches
+    plan = sl.inverse(robot, pose, model)
+    winches = sl.home(robot, pose, plan.state.cables.frame_end_tension, model=model).winches
     assert winches is not None
     assert winches.length_zero is not None
     np.testing.assert_allclose(winches.length_zero, plan.unstrained_length, rtol=1e-12)

@@ -12,16 +12,31 @@ from tests.kinematics.winches import wound
 @pytest.mark.parametrize("rise", [3.0, -2.5])
 def test_the_tension_at_the_drum_is_that_of_a_guided_cable(rise: float) -> None:
     robot = wound("article-prototype", dead_cable=3.5, dead_rise=rise)
-    # R = 0 and the dead cable beside the frame anchor: the state of the hanging cable is what it is without them
-    plan = sl.inverse(robot.replace(winches=None), sl.Pose.from_euler([0.3, 0.2, 1.5], 0, 0, 0))
-    state = sl.Equilibrium(robot, plan.state.pose, plan.state.wrench, plan.state.cables)
+    state = sl.inverse(robot, sl.Pose.from_euler([0.3, 0.2, 1.5], 0, 0, 0)).state
     weight, stiffness = robot.cables.linear_density * robot.gravity, robot.cables.axial_stiffness
-    begin = plan.state.cables.frame_end_tension
+    begin = state.cables.frame_end_tension
     along = solve_ivp(  # dT/dz = weight of a meter of stretched cable
         lambda z, tension: weight / (1.0 + tension / stiffness), (0.0, -rise), begin, rtol=1e-12, atol=1e-10
     )
     np.testing.assert_allclose(drum_tension(state), along.y[:, -1], rtol=1e-10)
     assert np.sign(drum_tension(state) - begin) == pytest.approx(-np.sign(rise))
+    # the dead cable is as long as its tensions say: strains between that of the frame end and that of the drum
+    assert state.contact is not None
+    mean = 3.5 / (1.0 + 0.5 * (begin + drum_tension(state)) / stiffness)
+    np.testing.assert_allclose(state.contact.dead_length, mean, rtol=1e-7)
+
+
+@pytest.mark.parametrize("axis", [1.0, -1.0])
+def test_over_a_pulley_the_tension_goes_with_the_height_of_the_exit(axis: float) -> None:
+    robot = wound("article-prototype", pulley_radius=0.2, swivel_axis=[0.0, 0.0, axis])
+    state = sl.inverse(robot, sl.Pose.from_euler([0.3, 0.2, 1.5], 0, 0, 0)).state
+    weight = robot.cables.linear_density * robot.gravity
+    higher = state.exit_point[:, 2] - robot.frame_anchors[:, 2]
+    assert (np.sign(higher) == axis).all()
+    stretched = 1.0 + state.cables.frame_end_tension / robot.cables.axial_stiffness
+    np.testing.assert_allclose(
+        state.cables.frame_end_tension - drum_tension(state), weight * higher / stretched, rtol=1e-4
+    )
 
 
 def test_where_layers_begin() -> None:

@@ -10,17 +10,18 @@ from numpy.typing import ArrayLike
 from sagline.arguments import instance
 from sagline.arrays import Array, checked
 from sagline.cables.catenary import Catenary
-from sagline.cables.model import CableModel, CableState
+from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
+from sagline.kernels.cable.geometry import GEOMETRY_ROWS
+from sagline.kernels.cable.homing import lengths_at_frame_ends
 from sagline.robot.checks import per_cable
 from sagline.robot.drum import warmth
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
+from sagline.statics.tables import body_table, cable_table, pose_rows
 
 _CATENARY = Catenary()
-STEPS: Final = 100
-SETTLED: Final = 1e-13  # relative change of a tension
-SLOPE_STEP: Final = 1e-5
+MISSED: Final = 1e-9  # of a tension: a cable that misses it by more cannot have it
 
 
 def home(
@@ -72,39 +73,22 @@ def home(
     m = robot.cable_count
     tension = per_cable(checked(frame_end_tension, "frame_end_tension", "N", above=0.0), "frame_end_tension", m)
     zero = per_cable(checked(counts, "counts", ""), "counts", m)
-    length = _hung(robot, pose, tension, instance(model, CableModel, "model")).unstrained_length
+    length = _lengths(robot, pose, tension, instance(model, CableModel, "model"))
     strain = winches.winding_tension / robot.cables.axial_stiffness
     at_rest = length * (1.0 + strain) / warmth(robot, temperature)
     return robot.replace(winches=winches.replace(count_zero=zero, length_zero=at_rest))
 
 
-def _hung(robot: Robot, pose: Pose, tension: Array, model: CableModel) -> CableState:
-    """The cables at a pose, with given tensions at their frame ends.
-
-    That tension is a convex function of the chord tension: from above, Newton comes down on the tighter of the two
-    cables that have it, without passing it.
-    """
-    reach = pose.transform(robot.platform_anchors) - robot.frame_anchors
-    span, rise = np.hypot(reach[:, 0], reach[:, 1]), reach[:, 2]
-
-    def hung(chord_tension: Array) -> CableState:
-        return model.from_tension(robot.cables, span, rise, chord_tension, robot.gravity)
-
-    weight = robot.cables.linear_density * robot.gravity * np.hypot(span, rise)
-    chord = tension + weight
-    for _ in range(STEPS):
-        low, high = (hung(chord * factor).frame_end_tension for factor in (1.0 - SLOPE_STEP, 1.0 + SLOPE_STEP))
-        slope = (high - low) / (2.0 * SLOPE_STEP * chord)
-        step = (hung(chord).frame_end_tension - tension) / slope
-        lost = ~(slope > 0.0) | ~(step < chord)
-        if lost.any():
-            break
-        chord = chord - step
-        if (np.abs(step) <= SETTLED * chord).all():
-            return hung(chord)
-    missed = lost if lost.any() else np.abs(step) > 1e3 * SETTLED * chord
+def _lengths(robot: Robot, pose: Pose, tension: Array, model: CableModel) -> Array:
+    """Unstrained lengths off the drums at a pose, with given tensions at the frame ends."""
+    m = robot.cable_count
+    held, length = np.empty(m), np.empty(m)
+    table, body = cable_table(robot)[0], body_table(robot)[0]
+    room = np.empty((3, 3)), np.empty((GEOMETRY_ROWS, m))
+    lengths_at_frame_ends(model.terms(robot.gravity), table, body, pose_rows(pose)[0], tension, held, length, *room)
+    missed = ~(np.abs(held - tension) <= MISSED * tension) | ~(length > 0.0)
     if not missed.any():
-        return hung(chord)
+        return length
     i = int(np.argmax(missed))
     raise InvalidValueError(
         f"cable {i}: frame_end_tension",

@@ -221,8 +221,7 @@ def drum_tension(state: Equilibrium) -> Array:
     """
     robot, cables = state.one_robot, state.cables
     height = robot.frame_anchors[:, 2]
-    exit_point = getattr(state, "exit_point", None)
-    leaving = height if exit_point is None else exit_point[..., 2]
+    leaving = state.exit_point[..., 2]
     drum_height = height if robot.winches is None else height - robot.winches.dead_rise
     stiffness = robot.cables.axial_stiffness
     weight = 0.0 if cables.model.weightless else robot.cables.linear_density * robot.gravity
