@@ -74,16 +74,23 @@ def test_samples_without_an_answer_are_left_out_and_counted() -> None:
     np.testing.assert_array_equal(rows_of(result.stdout)[1][:, 1:], sl.encoder_counts(plan)[plan.feasible])
 
 
-def test_winches_that_are_too_slow_are_told() -> None:
-    robot = wound(length_zero=11.0, speed_limit=150.0)
+def test_what_is_too_much_for_the_winches_is_told() -> None:
+    robot = wound(length_zero=11.0, speed_limit=150.0, torque_limit=1.7, inertia=1e-4)
     sl.inverse(robot, PATH).save("fast.nc")
     result = sagline("encoder", "fast.nc", "--out", "counts.csv")
-    exceeding = sl.winch_rates(sl.inverse(robot, PATH)).exceeding
-    first = PATH.time[np.argmax(exceeding)]
-    assert 0 < exceeding.sum() < 17
+    rates = sl.winch_rates(sl.inverse(robot, PATH))
     assert result.exit_code == 1
-    assert f"Too much for the winches: {exceeding.sum()} of 17 samples, the first at {first:g} s" in result.stderr
+    for limit, beyond in (("speed_limit", rates.too_fast), ("torque_limit", rates.too_strong)):
+        assert beyond is not None
+        samples, cables = beyond.any(axis=1), [str(k) for k in range(8) if beyond[:, k].any()]
+        assert 0 < samples.sum() < 17
+        first = PATH.time[np.argmax(samples)]
+        told = f"Beyond {limit}: {samples.sum()} of 17 samples, the first at {first:g} s, of cables {', '.join(cables)}"
+        assert told in result.stderr
     assert Path("counts.csv").exists()
+    enough = robot.winches.replace(speed_limit=1e3, torque_limit=1e3)  # type: ignore[union-attr]
+    sl.inverse(robot.replace(winches=enough), PATH).save("slow.nc")
+    assert sagline("encoder", "slow.nc").exit_code == 0
 
 
 @pytest.mark.parametrize(

@@ -49,13 +49,14 @@ def write_counts(file: Path, winding: Winding, out: Path | None) -> int:
     if plan.path is None or winches is None or (winches.speed_limit is None and winches.torque_limit is None):
         return code
     with working(f"{file.name}: speeds and torques of the winches", *needed_for(plan.tension)):
-        exceeding = winch_rates(plan).exceeding
-    if not exceeding.any():
-        return code
-    first = plan.path.time[np.argmax(exceeding)]
-    many = f"{exceeding.sum():,} of {exceeding.size:,} samples, the first at {first:g} s"
-    note("Too much for the winches: ", f"{many}; go slower, or see winch_rates", style="bold red")
-    return OUTSIDE
+        rates = winch_rates(plan)
+    for beyond, limit in ((rates.too_fast, "speed_limit"), (rates.too_strong, "torque_limit")):
+        if beyond is not None and beyond.any():
+            samples = beyond.any(axis=1)
+            first, cables = plan.path.time[np.argmax(samples)], ", ".join(map(str, np.flatnonzero(beyond.any(axis=0))))
+            many = f"{samples.sum():,} of {samples.size:,} samples, the first at {first:g} s, of cables {cables}"
+            note(f"Beyond {limit}: ", f"{many}; winch_rates tells by how much", style="bold red")
+    return OUTSIDE if rates.exceeding.any() else code
 
 
 def write_rows(plan: Plan, name: str, rows: Sequence[Sequence[float]], out: Path | None) -> int:
