@@ -100,6 +100,25 @@ def test_homing_finds_the_lengths_of_a_plan_from_its_tensions(name: str, winch: 
     np.testing.assert_allclose(winches.length_zero, plan.unstrained_length, rtol=1e-12)
 
 
+def test_over_pulleys_and_dead_cable_counts_lead_back_to_the_pose() -> None:
+    behind: dict[str, Any] = {
+        "pulley_radius": 0.05,
+        "dead_cable": 5.0,
+        "dead_rise": 4.0,
+        "cable_length": 33.0,
+        "counts_per_turn": 1e7,
+    }
+    robot = wound(**behind)
+    read = sl.inverse(robot, POSE).state.cables.frame_end_tension
+    robot = sl.home(robot, POSE, read, 12345.0)
+    poses = sl.Pose.from_euler([[1.0, 1.0, 2.0], [-2.0, 0.5, 2.5], [3.0, -1.0, 1.5]], 0.0, 0.0, 0.0)
+    counts = sl.encoder_counts(sl.inverse(robot, poses))
+    np.testing.assert_array_equal(counts[0], np.full(8, 12345.0))
+    found = sl.forward(robot, sl.lengths_from_counts(robot, counts), start=poses)
+    assert found.solved.all()
+    np.testing.assert_allclose(found.pose.position, poses.position, rtol=0.0, atol=1e-8)
+
+
 def test_warm_cables_are_longer(robot: sl.Robot, plan: sl.Plan) -> None:
     counts = sl.encoder_counts(plan)
     lengths = sl.lengths_from_counts(robot, counts)
