@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ WINCHES = [
     sl.Winch(0.1, dead_cable=4.0, dead_rise=-1.0, swivel_axis=[0, 0, -1]),
     sl.Winch(dead_cable=4.0),
 ]
+NO_FORCE, NO_LENGTH = np.zeros(6), np.zeros(8)
 POSE = sl.Pose.from_euler((1.5, 1.0, 2.0), 0.1, -0.1, 0.3)
 
 
@@ -113,11 +115,15 @@ def test_the_energy_s_slopes_are_the_position_and_the_tensions(winch: sl.Winch, 
         assert found.solved
         return float(found.energy)
 
-    lengths, still = plan.unstrained_length, np.zeros(6)
+    lengths = plan.unstrained_length
+
+    def energy_by(step: float, force: Array = NO_FORCE, length: Array = NO_LENGTH) -> float:
+        return energy(step * force, lengths + step * length)
+
     center = POSE.transform(robot.center_of_mass)
     for k in range(3):
         step = np.eye(6)[k]
-        assert slope(lambda h, step=step: energy(h * step, lengths), 1.0) == pytest.approx(-center[k], abs=1e-7)
+        assert slope(partial(energy_by, force=step), 1.0) == pytest.approx(-center[k], abs=1e-7)
     weight = 0.0 if isinstance(model, sl.Elastic) else robot.cables.linear_density * robot.gravity
     cables = plan.state.cables
     tension = cables.frame_end_tension
@@ -125,7 +131,7 @@ def test_the_energy_s_slopes_are_the_position_and_the_tensions(winch: sl.Winch, 
     whole = tension + 0.5 * tension**2 / robot.cables.axial_stiffness - weight * height
     for i in (0, 5):
         step = np.eye(8)[i]
-        found = slope(lambda h, step=step: energy(still, lengths + h * step), 1e-4)
+        found = slope(partial(energy_by, length=step), 1e-4)
         # the frame end, where the energy counts from, is where the weight of what is let out comes from
         assert found == pytest.approx(-whole[i], rel=2e-6)
 
@@ -165,6 +171,9 @@ def test_the_platform_follows_its_data_as_differences_say(winch: sl.Winch) -> No
     def moved(by: float) -> sl.Robot:
         return robot.replace(frame_anchors=robot.frame_anchors + by * np.outer(cable, [1.0, 0.0, 0.0]))
 
+    def pushed(wrench: Array, by: float) -> Array:
+        return motion(robot, lengths, by * wrench)
+
     differences = {
         "length_sensitivity": slopes(lambda h: motion(robot, lengths + h * cable), 2e-3),
         "density_sensitivity": slopes(lambda h: motion(changed("linear_density", h), lengths), 2e-3),
@@ -182,7 +191,7 @@ def test_the_platform_follows_its_data_as_differences_say(winch: sl.Winch) -> No
         np.testing.assert_allclose(column, expected, rtol=0.0, atol=3e-7 * np.abs(expected).max(), err_msg=name)
     for k in range(6):
         wrench = np.eye(6)[k]
-        expected = slopes(lambda h, wrench=wrench: motion(robot, lengths, h * wrench), 2.0)
+        expected = slopes(partial(pushed, wrench), 2.0)
         scale = np.abs(expected).max()
         np.testing.assert_allclose(found.compliance[:, k], expected, rtol=0.0, atol=3e-7 * scale)
     matrix = found.matrix
