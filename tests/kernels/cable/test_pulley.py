@@ -144,7 +144,7 @@ def there_and_back(count: int, seed: int) -> tuple[Array, Array, Array, Array]:
         leaving = math.hypot(horizontal, vertical - weight * free)
         rows[t.LENGTH, i] = free + sum(behind_cable(model, material, over, leaving, wrap(angle)))
     for _ in range(2):  # from where the last pose left it, as the platform's own steps do
-        cable_forces(model, cables, rows)
+        cable_forces(model, cables, rows, True)
     # one rounding of the length moves the tension by its stiffness along the chord, of the free span in series
     stiff = 1.0 / (chord / cables[:, tables.STIFFNESS] + chord * (half_weight * np.cos(slope) / tension) ** 2 / tension)
     expected = np.finfo(float).eps * (stiff * rows[t.LENGTH] + tension)

@@ -10,7 +10,7 @@ from sagline.kernels.algebra.angle import angle
 from sagline.kernels.cable.geometry import CHORD, COSINE, SINE, cable_geometry
 from sagline.kernels.cable.hanging import chord_tension_at_frame_end, hang_cable
 from sagline.kernels.cable.pulley import Wrap, behind_cable, pulley_at
-from sagline.kernels.cable.terms import Chord, Material, Model, Terms
+from sagline.kernels.cable.terms import Chord, Material, Terms, model_of
 from sagline.kernels.codes import CATENARY, ELASTIC, STRAIGHT
 from sagline.kernels.jit import entry
 
@@ -40,7 +40,7 @@ def lengths_at_frame_ends(
         rotation: Room, (3, 3).
         geometry: Room, (GEOMETRY_ROWS, m).
     """
-    model = Model(*terms)
+    model = model_of(terms)
     cable_geometry(cables, body, pose, rotation, geometry)
     for i in range(tension.size):
         chord = Chord(geometry[CHORD, i], geometry[SINE, i], geometry[COSINE, i])

@@ -143,7 +143,7 @@ def fit_poses(
             continue
         if not chained:
             copy_pose(row_of(batch.starts, p), start)
-        problem = problem_at(Model(STRAIGHT, 0.0, 0.0, 0.0), batch, p, free, arcs)
+        problem = problem_at(Model(STRAIGHT, 0.0, 0.0, 0.0, None), batch, p, free, arcs)
         copy_pose(start, pose)
         answer.numbers[p, ENERGY], answer.numbers[p, ITERATIONS], fitted = fit_pose(
             problem, batch.lengths[p], pose, space
