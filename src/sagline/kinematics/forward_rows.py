@@ -107,7 +107,9 @@ class Found(NamedTuple):
         """
         return cls(
             np.empty((count, tables.POSE_COLUMNS)),
-            np.empty((tables.RESULT_ROWS, count, cables)),
+            np.zeros(
+                (tables.RESULT_ROWS, count, cables)
+            ),  # of a robot with nothing behind its cables not all is written
             np.empty((count, cables), dtype=np.int8),
             np.empty((count, FORWARD_NUMBERS)),
             np.empty(count, dtype=np.int8),
