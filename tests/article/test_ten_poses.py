@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
@@ -268,6 +270,21 @@ def test_what_ten_poses_cannot_tell(study: TenPoses) -> None:
     scatter = study.best(2).rms * np.sqrt(30 / 22)
     deviation = scatter * np.sqrt(np.diag(np.linalg.inv(matrix.T @ matrix)))
     np.testing.assert_allclose(study.limits.single_zero, deviation, rtol=1e-3)
+
+
+def test_the_documentation_tells_the_same_numbers(study: TenPoses) -> None:
+    text = (Path(__file__).parents[2] / "docs" / "article.md").read_text(encoding="utf-8")
+    rows = [
+        line.split("|")[1:-1] for line in text.splitlines() if line.startswith(("| anchor height", "| zero of the l"))
+    ]
+    told = [study.best(1), study.best(2), study.explanations[1][1], study.best(3)]
+    for (_, *cells), found in zip(rows, told, strict=True):
+        numbers = f"{1e3 * found.rms:.1f} mm", f"{1e3 * found.left_out:.1f} mm", f"{found.aicc:.1f}"
+        assert tuple(cell.strip() for cell in cells) == numbers
+    least, most = 1e3 * study.limits.single_zero.min(), 1e3 * study.limits.single_zero.max()
+    assert f"to {least:.0f} to {most:.0f} mm" in text
+    assert f"do {100.0 * study.limits.imitated:.1f} % of what a pulley does" in text
+    assert f"{sum(len(group) for group in study.explanations)} models" in text
 
 
 def test_the_tour_stops_at_the_ten_poses() -> None:

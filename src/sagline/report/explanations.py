@@ -26,8 +26,8 @@ def explained(study: TenPoses, draw: Drawings) -> Finding:
     second = study.explanations[1][1]
     alone = {found.parameters[0].name: found for found in study.explanations[0]}
     beside = {name: study.explanation(ZERO, PULLEY, name) for name in (DEAD, MODULUS, LOAD)}
-    far = max(abs(_value(beside[name], name)) / _deviation(beside[name], name) for name in (MODULUS, LOAD))
-    far = float(np.ceil(10.0 * far)) / 10.0
+    ratios = [_ratio(beside[name], name) for name in (MODULUS, LOAD)]
+    far = float(np.ceil(10.0 * max(ratios))) / 10.0
     inside = min(found.aicc for found in study.explanations[2] if not found.at_limit.any())
     count = sum(len(group) for group in study.explanations)
     return Finding(
@@ -38,10 +38,11 @@ def explained(study: TenPoses, draw: Drawings) -> Finding:
         measured=f"All {count} models of one to three of the ten parameters, alike for all cables, fitted with exact "
         f"cables on exact pulleys. Of {_left(study.measured_rms)} (root mean square of all coordinates) the best "
         f"single parameter leaves {_left(one.rms)}: {_values(one)}. Two leave {_left(two.rms)}: {_values(two)}; a pose "
-        f"that is left out of the fit is predicted to {_left(two.left_out)}.\n\nA third is not worth its place. The "
-        f"best runs to the limit of what we think plausible and leaves {_left(three.rms)} (left-out pose "
-        f"{_left(three.left_out)}): {_values(three)}. Where three stay inside their limits, AICc, which charges for "
-        f"parameters, is {n(inside - two.aicc, '.1f')} higher at least. Beside pulleys and zeros, dead cable fits as "
+        f"that is left out of the fit is predicted to {_left(two.left_out)}.\n\nA third parameter tells "
+        f"nothing sure. The best three, {_values(three)}, leave {_left(three.rms)} (left-out pose "
+        f"{_left(three.left_out)}) by running to the limit of what we think plausible: that is our limit, not a "
+        f"finding. Where three stay inside, AICc, which charges for parameters, is {n(inside - two.aicc, '.1f')} "
+        f"higher than for the best two, at least. Beside pulleys and zeros, dead cable fits as "
         f"{_told(beside[DEAD], DEAD)} and explains nothing; E ({_told(beside[MODULUS], MODULUS)}) and load "
         f"({_told(beside[LOAD], LOAD)}) stay within {n(far, '.1f')} standard deviations of "
         f"nominal.\n\nThe pattern is geometric, as pulleys that the plan did not know or a wrong height of the anchors "
@@ -103,25 +104,16 @@ def untold(study: TenPoses) -> Finding:
 def _table(study: TenPoses) -> Table:
     shown = [group if k == 0 else group[:SHOWN] for k, group in enumerate(study.explanations)]
     rest = study.table.error - study.model_error
-    left, worst = np.sqrt(np.mean(rest**2)), np.linalg.norm(rest, axis=1).max()
-    score = information(left, rest.size, 0)
-    rows = [("nothing", n(1e3 * left, ".2f"), n(1e3 * worst, ".1f"), n(1e3 * left, ".2f"), n(score, ".1f"), "none")]
-    rows += [
-        (
-            f"{count}: {_values(found)}",
-            n(1e3 * found.rms, ".2f"),
-            n(1e3 * found.worst, ".1f"),
-            n(1e3 * found.left_out, ".2f"),
-            n(found.aicc, ".1f"),
-            ", ".join(p.name for p, limit in zip(found.parameters, found.at_limit, strict=True) if limit) or "none",
-        )
-        for count, group in zip(COUNTS, shown, strict=True)
-        for found in group
-    ]
+    rms, worst = float(np.sqrt(np.mean(rest**2))), float(np.linalg.norm(rest, axis=1).max())
+    found = [("nothing off", rms, worst, rms, information(rms, rest.size, 0))]
+    found += [(_values(one), one.rms, one.worst, one.left_out, one.aicc) for group in shown for one in group]
     return Table(
-        f"By nothing, by one, and the best {SHOWN} by two and by three; standard uncertainties in parentheses",
-        ("explanation", "left, rms [mm]", "left, worst pose [mm]", "left-out pose, rms [mm]", "AICc", "at a limit"),
-        rows,
+        f"Nothing, one parameter, and the best {SHOWN} by two and by three; standard uncertainties in parentheses",
+        ("off by", "left, rms [mm]", "left, worst pose [mm]", "left-out pose, rms [mm]", "AICc"),
+        [
+            (text, n(1e3 * left, ".2f"), n(1e3 * far, ".1f"), n(1e3 * out, ".2f"), n(aicc, ".1f"))
+            for text, left, far, out, aicc in found
+        ],
     )
 
 
@@ -161,18 +153,18 @@ def _values(found: Explanation) -> str:
 
 
 def _told(found: Explanation, name: str) -> str:
-    """A value with its standard uncertainty, or without where it stands at a limit."""
-    unit = next(parameter.unit for parameter in found.parameters if parameter.name == name)
-    deviation = _deviation(found, name)
-    return n(_value(found, name), "+.3g", unit, uncertainty=deviation if np.isfinite(deviation) else None)
+    """A value with its standard uncertainty, or that it stands at a limit."""
+    k = [parameter.name for parameter in found.parameters].index(name)
+    value, unit = found.values[k], found.parameters[k].unit
+    if found.at_limit[k]:
+        return f"{n(value, '+.3g', unit)} (limit)"
+    return n(value, unit=unit, uncertainty=found.deviation[k])
 
 
-def _value(found: Explanation, name: str) -> float:
-    return float(found.values[[parameter.name for parameter in found.parameters].index(name)])
-
-
-def _deviation(found: Explanation, name: str) -> float:
-    return float(found.deviation[[parameter.name for parameter in found.parameters].index(name)])
+def _ratio(found: Explanation, name: str) -> float:
+    """How many standard deviations a value is from nominal."""
+    k = [parameter.name for parameter in found.parameters].index(name)
+    return float(abs(found.values[k]) / found.deviation[k])
 
 
 def _left(length: float) -> str:
