@@ -241,6 +241,17 @@ def test_errors_that_were_made_are_found_again(study: TenPoses) -> None:
         assert found.left_out < 1e-6
 
 
+def test_a_fit_that_does_not_settle_says_so(study: TenPoses, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sagline.article.explanations.NEWTON_STEPS", 1)
+    pulley = next(p for p in PARAMETERS if p.name == PULLEY)
+    with pytest.raises(sl.InvalidValueError, match="fit of pulley radius is still moving after 1 steps"):
+        explanations(
+            lambda errors: rest(ROBOT, study.plan, study.home, errors) - study.table.desired,
+            study.table.error,
+            [(pulley,)],
+        )
+
+
 def test_information_counts_parameters_and_scatter() -> None:
     assert information(1e-3, 30, 0) == pytest.approx(2.0 + 4.0 / 28.0)  # ln 1 = 0, one unknown: the scatter
     assert information(np.e * 1e-3, 30, 2) == pytest.approx(60.0 + 6.0 + 24.0 / 26.0)

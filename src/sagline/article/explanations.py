@@ -10,6 +10,7 @@ import numpy as np
 
 from sagline.arrays import Array, Flags
 from sagline.article.machine import Errors, Parameter
+from sagline.errors import InvalidValueError
 
 STEP = 0.01  # of a plausible error, for the slopes
 NEWTON_STEPS = 20
@@ -74,6 +75,9 @@ def explanations(error_of: ErrorOf, measured: Array, models: Sequence[Model]) ->
 
     Returns:
         An explanation a model.
+
+    Raises:
+        InvalidValueError: If a fit does not settle.
     """
     values, slopes = _start(error_of, measured, models)
     steps = [np.zeros(len(model)) for model in models]
@@ -91,6 +95,14 @@ def explanations(error_of: ErrorOf, measured: Array, models: Sequence[Model]) ->
         moving = far
         if not moving:
             break
+    else:
+        names = ", ".join(parameter.name for parameter in models[moving[0]])
+        raise InvalidValueError(
+            f"the fit of {names}",
+            f"still moving after {NEWTON_STEPS} steps",
+            "fits that settle",
+            "Leave this model out.",
+        )
     found = error_of([_errors(*of) for of in zip(models, values, strict=True)])
     return tuple(_explanation(*of, measured) for of in zip(models, values, slopes, found, strict=True))
 
