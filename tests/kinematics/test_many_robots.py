@@ -270,8 +270,9 @@ def test_robots_with_and_without_pulleys_in_one_batch(monkeypatch: pytest.Monkey
         found = sl.forward(robots, lengths, start=poses)
     for k, robot in enumerate(robots):
         alone = sl.forward(robot, lengths[k], start=poses[k])
-        np.testing.assert_array_equal(found.state.cables.unstrained_length[k], alone.state.cables.unstrained_length)
-        np.testing.assert_array_equal(found.state.cables.horizontal_tension[k], alone.state.cables.horizontal_tension)
+        for name in ("unstrained_length", "horizontal_tension"):  # beside pulleys a bare cable rounds differently
+            together, single = getattr(found.state.cables, name)[k], getattr(alone.state.cables, name)
+            np.testing.assert_allclose(together, single, rtol=1e-12)
     assert found.state.contact is not None
     np.testing.assert_array_equal(found.state.contact.wrapped_length[[0, 2]], 0.0)
     np.testing.assert_array_equal(found.state.contact.dead_length[[0, 2]], 0.0)

@@ -107,7 +107,7 @@ class Found(NamedTuple):
         """
         return cls(
             np.empty((count, tables.POSE_COLUMNS)),
-            np.zeros((tables.RESULT_ROWS, count, cables)),  # not all is written where nothing is behind a cable
+            np.empty((tables.RESULT_ROWS, count, cables)),
             np.empty((count, cables), dtype=np.int8),
             np.empty((count, FORWARD_NUMBERS)),
             np.empty(count, dtype=np.int8),
