@@ -198,6 +198,20 @@ def test_the_platform_follows_its_data_as_differences_say(winch: sl.Winch) -> No
     assert np.abs(matrix - matrix.T).max() < 1e-12 * np.abs(matrix).max()
 
 
+@pytest.mark.parametrize("winch", WINCHES)
+def test_tensions_where_cables_leave_follow_the_lengths_as_differences_say(winch: sl.Winch) -> None:
+    robot = cogiro(winch, softer=0.05)
+    plan = sl.inverse(robot, POSE)
+    lengths, cable = plan.unstrained_length, np.eye(8)[3]
+
+    def tensions(by: float) -> Array:
+        return sl.forward(robot, lengths + by * cable, start=POSE).state.cables.frame_end_tension
+
+    expected = slopes(tensions, 2e-3)
+    found = sl.stiffness(plan.state).tension_sensitivity[:, 3]
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=3e-7 * np.abs(expected).max())
+
+
 def test_a_radius_that_vanishes_leaves_the_cable_at_its_anchor() -> None:
     bare = sl.inverse(cogiro(sl.Winch()), POSE)
     errors = [
