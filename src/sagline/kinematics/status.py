@@ -24,7 +24,10 @@ class PoseStatus(Status):
         "a cable would carry less than a thousandth of its own weight; raise tension_min",
     )
     NOT_CONVERGED = codes.POSE_NOT_CONVERGED, "the tensions did not settle; please report this robot and pose"
-    NO_CHORD = codes.POSE_NO_CHORD, "both ends of a cable coincide; move the platform away from the anchor"
+    NO_CHORD = (
+        codes.POSE_NO_CHORD,
+        "both ends of a cable coincide, or one is inside its pulley; move the platform away from the anchor",
+    )
     NOT_COVERED = (
         codes.POSE_NOT_COVERED,
         "there are tensions within the limits, but the chosen way of sharing does not find them; "
