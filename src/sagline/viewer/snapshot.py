@@ -156,6 +156,6 @@ def taken_at(
     try:
         plan = inverse(robot, pose, settings.model, settings.tension, wrench, reference)
     except CableGeometryError as error:
-        return Snapshot(robot, pose, None, None, "" if robot.winches is None else str(error))
+        return Snapshot(robot, pose, None, None, "" if robot.winches is None else str(error).removeprefix("pose, "))
     approximate = confirmed and not isinstance(settings.model, Catenary) and bool(plan.feasible)
     return Snapshot(robot, pose, plan, confirm(plan).pose if approximate else None)
