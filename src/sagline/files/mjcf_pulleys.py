@@ -24,10 +24,10 @@ from sagline.statics.chords import refuse_missing_chords, touching_angle
 
 NOTE = (
     "Its pulleys are cylinders that stand as the platform has turned them at the pose it starts from, and do not "
-    "swivel: forces and stiffness are the robot's there, and in the planes of the cables; far from there lengths are "
-    "off by a share of the radius that grows with the square of the angle to those planes. What of a cable is not in "
-    "its tendon (dead cable, and some of what lies on the pulley) counts in its stiffness and is taken off its "
-    "springlength. Nothing rubs on the pulleys, and there are no drums. "
+    "swivel: forces and stiffness are the robot's there; elsewhere lengths are right in the planes of the pulleys "
+    "alone, and off by an amount that grows with the cube of the way there. What of a cable is not in its tendon (dead "
+    "cable, and some of what lies on the pulley) counts in its stiffness and is taken off its springlength. Nothing "
+    "rubs on the pulleys, and there are no drums. "
 )
 _OFF = 0.05  # of the radius: a tendon that begins nearer to its cylinder would not be laid on it
 _WIDTH = 0.2  # of a pulley as it is drawn, to its radius
