@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from sagline.article.identify_cable import CableFit, identify_cable
     from sagline.cables.cable import Cable
     from sagline.cables.catenary import Catenary
+    from sagline.cables.creep import Creep
     from sagline.cables.elastic import Elastic
     from sagline.cables.empirical import Empirical
     from sagline.cables.model import CableModel, CableState
@@ -27,17 +28,20 @@ if TYPE_CHECKING:
     from sagline.files.robot_file import dump_robot, load_robot
     from sagline.files.wirex import load_wirex
     from sagline.kinematics.confirm import Confirmation, confirm
+    from sagline.kinematics.encoder import encoder_counts, lengths_from_counts
     from sagline.kinematics.equilibria import Equilibria, equilibria
     from sagline.kinematics.forward import forward
     from sagline.kinematics.forward_solution import ForwardSolution
     from sagline.kinematics.forward_solver import ForwardSolver, ForwardStep
     from sagline.kinematics.forward_status import ForwardStatus
+    from sagline.kinematics.home import home
     from sagline.kinematics.inverse import inverse
     from sagline.kinematics.inverse_solver import InverseSolver, InverseStep
     from sagline.kinematics.measured import MeasuredTension
     from sagline.kinematics.plan import Gap, Plan
     from sagline.kinematics.polygon import tension_polygon
     from sagline.kinematics.status import PoseStatus
+    from sagline.kinematics.winch_rates import WinchRates, winch_rates
     from sagline.motion.path import Path
     from sagline.motion.planar import article_path
     from sagline.motion.rest_to_rest import quintic_path, septic_path
@@ -85,6 +89,7 @@ __all__ = [
     "ClosedForm",
     "Closest",
     "Confirmation",
+    "Creep",
     "Elastic",
     "Empirical",
     "EmpiricalFit",
@@ -125,6 +130,7 @@ __all__ = [
     "TensionMethod",
     "TensionPolygon",
     "Winch",
+    "WinchRates",
     "__version__",
     "article_balance",
     "article_path",
@@ -132,12 +138,15 @@ __all__ = [
     "confirm",
     "dump_mjcf",
     "dump_robot",
+    "encoder_counts",
     "equilibria",
     "forward",
+    "home",
     "identify_cable",
     "identify_empirical",
     "inertial_wrench",
     "inverse",
+    "lengths_from_counts",
     "limit_margin",
     "load_caspr",
     "load_measurements",
@@ -156,6 +165,7 @@ __all__ = [
     "structure_matrix",
     "tension_polygon",
     "unresisted_motion",
+    "winch_rates",
     "without_cables",
 ]
 
@@ -174,6 +184,7 @@ _HOMES = {
     "ClosedForm": "sagline.tension.closed_form",
     "Closest": "sagline.tension.closest",
     "Confirmation": "sagline.kinematics.confirm",
+    "Creep": "sagline.cables.creep",
     "Elastic": "sagline.cables.elastic",
     "Empirical": "sagline.cables.empirical",
     "EmpiricalFit": "sagline.article.identify",
@@ -214,18 +225,22 @@ _HOMES = {
     "TensionMethod": "sagline.tension.method",
     "TensionPolygon": "sagline.tension.polygon",
     "Winch": "sagline.robot.winch",
+    "WinchRates": "sagline.kinematics.winch_rates",
     "article_balance": "sagline.statics.balance",
     "article_path": "sagline.motion.planar",
     "capacity_margin": "sagline.tension.margin",
     "confirm": "sagline.kinematics.confirm",
     "dump_mjcf": "sagline.files.mjcf",
     "dump_robot": "sagline.files.robot_file",
+    "encoder_counts": "sagline.kinematics.encoder",
     "equilibria": "sagline.kinematics.equilibria",
     "forward": "sagline.kinematics.forward",
+    "home": "sagline.kinematics.home",
     "identify_cable": "sagline.article.identify_cable",
     "identify_empirical": "sagline.article.identify",
     "inertial_wrench": "sagline.statics.wrench",
     "inverse": "sagline.kinematics.inverse",
+    "lengths_from_counts": "sagline.kinematics.encoder",
     "limit_margin": "sagline.tension.margin",
     "load_caspr": "sagline.files.caspr",
     "load_measurements": "sagline.files.measurements",
@@ -244,6 +259,7 @@ _HOMES = {
     "structure_matrix": "sagline.statics.balance",
     "tension_polygon": "sagline.kinematics.polygon",
     "unresisted_motion": "sagline.tension.singular",
+    "winch_rates": "sagline.kinematics.winch_rates",
     "without_cables": "sagline.tension.broken",
 }
 

@@ -30,6 +30,7 @@ HOW_TO_GET: Final = MappingProxyType(
         "CableModel": "Give one of the models, Catenary() for instance.",
         "CableState": "Take that of a model: Catenary().from_tension(...).",
         "Confirmation": "Make one of a plan: confirm(plan).",
+        "Creep": "Give Creep(axial_stiffness, time), or None.",
         "Equilibrium": "Take that of a plan or a solution: plan.state.",
         "MeasuredTension": "Give MeasuredTension(frame_end_tension, tension_deviation, length_deviation).",
         "Path": "Make one, with quintic_path(waypoints, speed=1.0) for instance.",

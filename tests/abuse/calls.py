@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 
 import sagline as sl
 from sagline.robot.winch import RULES
+from tests.kinematics.winches import wound
 
 MAGIC = ("__getitem__",)  # of the methods with two underscores: those that a caller gives something
 
@@ -71,7 +72,7 @@ def _of_class(name: str, kind: type) -> set[str]:
 # made by sagline
 RESULTS = frozenset(
     {"CableFit", "CableState", "Confirmation", "EmpiricalFit", "Equilibria", "Equilibrium", "ForwardSolution"}
-    | {"Imported", "Modes", "Plan", "Stiffness", "TensionPolygon"}
+    | {"Imported", "Modes", "Plan", "Stiffness", "TensionPolygon", "WinchRates"}
 )
 # asked by sagline itself, with numbers of its own
 INTERNAL = frozenset({"TensionMethod.preference", "QuadraticProgram.preference"})
@@ -82,7 +83,19 @@ def calls(folder: Path) -> dict[str, Call]:
     """The table; files are written to the folder."""
     given = _Given(folder)
     table: dict[str, Call] = {}
-    for part in (_cables, _robots, _motions, _kinematics, _solvers, _tensions, _statics, _articles, _files, _figures):
+    for part in (
+        _cables,
+        _robots,
+        _motions,
+        _kinematics,
+        _winding,
+        _solvers,
+        _tensions,
+        _statics,
+        _articles,
+        _files,
+        _figures,
+    ):
         table |= part(given)
     return table
 
@@ -284,6 +297,44 @@ def _kinematics(given: _Given) -> dict[str, Call]:
         ),
         "Equilibrium.__getitem__": Call(
             sl.inverse(given.robot, given.poses).state.__getitem__, _all(index=("index", 0))
+        ),
+    }
+
+
+def _winding(given: _Given) -> dict[str, Call]:
+    robot = wound()
+    plan, run = sl.inverse(robot, given.pose), sl.inverse(robot, given.path)
+    counts, tension = sl.encoder_counts(run, "remembered"), sl.winch_rates(run).drum_tension
+    warmer, creep = ("array", np.linspace(-2.0, 5.0, 8)), sl.Creep([1e6, 4e5], [30.0, 1200.0])
+    return {
+        "encoder_counts": Call(
+            sl.encoder_counts,
+            _all(plan=("one", run), winding=("word", "remembered"), temperature=warmer, creep=("one", creep, True)),
+        ),
+        "lengths_from_counts": Call(
+            sl.lengths_from_counts,
+            _all(robot=("one", robot), counts=("array", counts), winding=("word", "constant"), temperature=warmer),
+        ),
+        "lengths_from_counts: remembered": Call(
+            lambda **a: sl.lengths_from_counts(robot, winding="remembered", **a),
+            _all(counts=("array", counts), drum_tension=("array", tension)),
+        ),
+        "home": Call(
+            sl.home,
+            _all(
+                robot=("one", robot),
+                pose=("one", given.pose),
+                frame_end_tension=("array", plan.state.cables.frame_end_tension),
+                counts=("array", np.arange(8.0)),
+                model=("one", sl.Catenary()),
+                temperature=warmer,
+            ),
+        ),
+        "winch_rates": Call(sl.winch_rates, _all(plan=("one", run))),
+        "Creep": Call(sl.Creep, _all(axial_stiffness=("array", [1e6, 4e5]), time=("array", [30.0, 1200.0]))),
+        "Creep.strain": Call(
+            creep.strain,
+            _all(time=("array", [0.0, 1.0, 2.5]), tension=("array", [10.0, 20.0, 15.0])),
         ),
     }
 

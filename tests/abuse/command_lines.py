@@ -13,6 +13,7 @@ from sagline.cli.main import app
 LINES = {
     "track": ["track", "cogiro", "short.yaml", "--no-figures"],
     "lengths": ["lengths", "run.nc"],
+    "encoder": ["encoder", "wound.nc"],
     "run": ["run"],
     "article": ["article", "figure", "3"],
     "identify": ["identify", "cable.csv"],

@@ -11,6 +11,7 @@ from typer.testing import CliRunner, Result
 
 import sagline as sl
 from sagline.cli.main import app
+from tests.kinematics.winches import wound
 
 PATH = """\
 waypoints:
@@ -23,6 +24,7 @@ Written = Callable[[str], dict[str, str]]  # name of a command -> its files and 
 ROBOT, MIXED = "article-suspended", "article-mixed"
 COMMANDS = {
     "track": ("track", ROBOT, "path.yaml", "--out", "out"),
+    "encoder": ("encoder", "wound.nc", "--out", "out/counts.csv"),
     "forward": ("forward", ROBOT, "lengths.csv", "--out", "out"),
     "tension": ("tension", MIXED, "--pose", "1,0.5,2.5", "--out", "out"),
     "article": ("article", "errata", "--out", "out"),
@@ -38,6 +40,7 @@ def prepare(folder: Path) -> None:
     plan = sl.inverse(sl.load_robot(ROBOT), sl.Pose([[0.0, 0.0, 1.5], [0.1, 0.0, 1.5]], np.stack([np.eye(3)] * 2)))
     head = ",".join(f"L{i} [m]" for i in range(plan.unstrained_length.shape[1]))
     np.savetxt(folder / "lengths.csv", plan.unstrained_length, delimiter=",", header=head, comments="")
+    sl.inverse(wound(), sl.Pose([0.0, 0.0, 2.0], np.eye(3))).save(folder / "wound.nc")
     (folder / "out").mkdir()
 
 

@@ -15,7 +15,7 @@ import numpy as np
 import sagline as sl
 from sagline.cli.values import pose_of
 from sagline.errors import SaglineError, printable
-from sagline.files.lengths_file import load_lengths
+from sagline.files.lengths_file import load_counts, load_lengths
 
 SECONDS: Final = 2.0  # of processor time; a wall clock would tell how busy the machine is
 MEGABYTES: Final = 500.0
@@ -90,6 +90,7 @@ waypoints:
 """
 PATH = "time [s],x [mm],y,z,alpha [deg],beta,gamma\n0,0,0.5,1,0,0,0\n0.5,10,0.5,1,1,0,0\n1,20,0.5,1.5,2,0.1,-0.25\n"
 LENGTHS = "time,L0,L1 [mm],L2,L3\n0,2.5,2500,2.75,3\n0.1,2.5,2510.5,2.75,3e0\n"
+COUNTS = "time,C0,C1,C2,C3\n0,-250,2500,2750.5,3e3\n0.1,2500,-2510,2750,3\n"
 MEASURED = "span [m],rise,length [m],tension [kN]\n10,-2.5,10.4,0.1\n12,3.25,12.6,0.2\n"
 WIREX = """<?xml version="1.0" ?>
 <models version="0.32">
@@ -159,6 +160,7 @@ READERS: Final = (
     Reader("tour.yaml", WAYPOINTS, sl.load_path),
     Reader("tour.csv", PATH, sl.load_path),
     Reader("lengths.csv", LENGTHS, lambda file: load_lengths(file, 4, 5.0)),
+    Reader("counts.csv", COUNTS, lambda file: load_counts(file, 4)),
     Reader("cable.csv", MEASURED, sl.load_measurements),
     Reader("shelf.wcrfx", WIREX, sl.load_wirex),
     Reader("gondola_bodies.xml", CASPR_BODIES, _caspr_beside("gondola_cables.xml", CASPR_CABLES)),

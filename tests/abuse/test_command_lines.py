@@ -20,6 +20,7 @@ from sagline.cli.examples import example_files
 from sagline.cli.main import app
 from sagline.report.blocks import Chapter
 from tests.abuse.command_lines import LINES, Case, cases, commands
+from tests.kinematics.winches import wound
 
 SHORT = "durations: 1\nrate: 4\nwaypoints: [{position: [0, 0, 1.5]}, {position: [1, 0, 1.5]}]\n"
 SHARE = 250  # of all, in make test
@@ -38,6 +39,7 @@ def stocked(tmp_path_factory: pytest.TempPathFactory) -> Path:
             shutil.copy(file, folder)
     (folder / "short.yaml").write_text(SHORT)
     sl.inverse(sl.load_robot("cogiro"), sl.load_path(folder / "short.yaml")).save(folder / "run.nc")
+    sl.inverse(wound(), sl.load_path(folder / "short.yaml")).save(folder / "wound.nc")
     (folder / "broken.nc").write_bytes((folder / "run.nc").read_bytes()[:700])
     (folder / "broken.yaml").write_text("name: [\n")
     (folder / "empty.csv").write_text("")

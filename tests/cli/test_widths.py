@@ -25,6 +25,7 @@ from sagline.cli.examples import write_examples
 from sagline.cli.main import app
 from sagline.cli.tables import Grid
 from tests.abuse.command_lines import LINES
+from tests.kinematics.winches import wound
 
 WIDTHS = (60, 80, 120)
 SHORT = "durations: 1\nrate: 4\nwaypoints: [{position: [0, 0, 1.5]}, {position: [1, 0, 1.5]}]\n"
@@ -37,6 +38,7 @@ COMMANDS = (
     ["run"],
     ["identify", "cable.csv"],
     ["forward", "cogiro", "lengths.csv"],
+    ["forward", "wound.yaml", "counts.csv", "--counts"],
     ["tension", "cogiro", "--no-figures"],
     ["tension", "many.yaml", "--pose", "0,0,2", "--no-figures"],
     ["robots"],
@@ -66,6 +68,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         tension_max=np.tile(robot.tension_max, 3),
     )
     (place / "many.yaml").write_text(sl.dump_robot(many))
+    (place / "wound.yaml").write_text(sl.dump_robot(wound()))
+    counts = sl.encoder_counts(sl.inverse(wound(), sl.load_path(place / "short.yaml").pose))
+    head = ",".join(f"C{k}" for k in range(8))
+    np.savetxt(place / "counts.csv", counts, delimiter=",", header=head, comments="", fmt="%.0f")
     return place
 
 

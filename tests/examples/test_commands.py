@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -18,6 +19,7 @@ from sagline.cli.examples import KINDS, example_files
 from sagline.cli.main import app
 from sagline.report.blocks import Chapter
 from tests.abuse.command_lines import commands
+from tests.kinematics.winches import wound
 
 ROOT = Path(__file__).parents[2]
 
@@ -47,6 +49,16 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place
 
 
+def with_winches(place: Path) -> None:
+    """A robot of one's own, with drums; a run of it, and its counts."""
+    (place / "my_robot.yaml").write_text(sl.dump_robot(wound()))
+    plan = sl.inverse(wound(), sl.Pose.from_euler([[0.0, 0.0, 2.0], [0.1, 0.0, 2.0]], 0.0, 0.0, 0.0))
+    (place / "output").mkdir(exist_ok=True)
+    plan.save(place / "output" / "my-robot-catenary.nc")
+    header = ",".join(f"C{k}" for k in range(8))
+    np.savetxt(place / "counts.csv", sl.encoder_counts(plan), delimiter=",", header=header, comments="")
+
+
 @pytest.mark.parametrize("words", printed(), ids=" ".join)
 def test_a_printed_command_runs(words: list[str], folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
@@ -62,6 +74,8 @@ def test_a_printed_command_runs(words: list[str], folder: Path, monkeypatch: pyt
     monkeypatch.setattr("sagline.cli.run._figures", lambda *_: ())
     if words[0] == "new":
         (folder / words[1]).unlink(missing_ok=True)
+    if words[0] == "encoder" or "--counts" in words:
+        with_winches(folder)
     result = CliRunner().invoke(app, words, input="\n" * 9)  # every question takes its default
     assert result.exit_code == 0, result.output
     assert len(served) == (words[0] == "view")

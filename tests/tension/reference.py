@@ -35,11 +35,34 @@ def presets() -> list[Robot]:
     return [load_robot(name) for name in robot_names()]
 
 
+def ropes(robot: Robot, ends: np.ndarray) -> np.ndarray:
+    """From platform ends (..., m, 3) to where straight cables touch their pulleys, or to the frame anchors."""
+    anchors = robot.frame_anchors
+    if robot.winches is not None:
+        radius, entry = robot.winches.pulley_radius, robot.winches.swivel_axis[:, 2]
+        span = np.hypot(*np.moveaxis(ends - anchors, -1, 0)[:2])
+        outward = (ends - anchors) * [1.0, 1.0, 0.0] / span[..., None]
+        across, drop = span - radius, -entry * (ends - anchors)[..., 2]  # from the middle of the pulley
+        # how far past its top (its bottom, for a cable from above) the cable goes before it leaves
+        past = np.arctan2(drop, across) + np.arcsin(radius / np.hypot(across, drop))
+        up = np.array([0.0, 0.0, 1.0]) * entry[:, None]
+        anchors = anchors + radius[:, None] * ((1.0 + np.sin(past))[..., None] * outward + np.cos(past)[..., None] * up)
+    return np.asarray(anchors - ends)
+
+
+def clear_of_pulleys(robot: Robot, poses: Pose) -> np.ndarray:
+    """Which poses (N,) keep all platform ends away from the swivel axes by more than twice the radius."""
+    radius = np.zeros(robot.cable_count) if robot.winches is None else robot.winches.pulley_radius
+    ends = poses.position[:, None] + robot.platform_anchors @ np.swapaxes(poses.rotation.as_matrix(), 1, 2)
+    span = np.hypot(*np.moveaxis(ends - robot.frame_anchors, -1, 0)[:2])
+    return np.asarray((span > 2.0 * radius).all(axis=1))
+
+
 def structure(robot: Robot, pose: Pose) -> np.ndarray:
     """J (6, m) of one pose: columns (u; r x u)."""
     turn = pose.rotation.as_matrix()
     lever = (robot.platform_anchors - robot.center_of_mass) @ turn.T
-    rope = robot.frame_anchors - (pose.position + robot.platform_anchors @ turn.T)
+    rope = ropes(robot, pose.position + robot.platform_anchors @ turn.T)
     unit = rope / np.linalg.norm(rope, axis=1, keepdims=True)
     return np.asarray(np.concatenate((unit.T, np.cross(lever, unit).T)))
 
@@ -48,7 +71,7 @@ def structures(robot: Robot, poses: Pose) -> np.ndarray:
     """J (N, 6, m) of a batch."""
     turn = poses.rotation.as_matrix()
     lever = (robot.platform_anchors - robot.center_of_mass) @ np.swapaxes(turn, 1, 2)
-    rope = robot.frame_anchors - (poses.position[:, None] + robot.platform_anchors @ np.swapaxes(turn, 1, 2))
+    rope = ropes(robot, poses.position[:, None] + robot.platform_anchors @ np.swapaxes(turn, 1, 2))
     unit = rope / np.linalg.norm(rope, axis=2, keepdims=True)
     both = np.concatenate((np.swapaxes(unit, 1, 2), np.swapaxes(np.cross(lever, unit), 1, 2)), axis=1)
     return np.asarray(both)

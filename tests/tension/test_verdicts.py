@@ -22,7 +22,7 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.tension.margin import capacity_margin
 from sagline.tension.minimum_norm import MinimumNorm
-from tests.tension.reference import is_feasible, presets, random_poses, structures
+from tests.tension.reference import clear_of_pulleys, is_feasible, presets, random_poses, structures
 
 MARGIN = 1e-9  # of the upper limit: what the verdict may be wrong by
 
@@ -36,6 +36,8 @@ class Sample(NamedTuple):
 def sampled(robot: Robot, count: int, rng: np.random.Generator, model: CableModel) -> Sample:
     """Random poses in and around the test box, under random wrenches."""
     poses = random_poses(robot, count, rng, stretch=1.5)
+    poses = poses[clear_of_pulleys(robot, poses)]
+    count = len(poses)
     load = rng.normal(size=(count, 6)) * rng.uniform(0, 0.5, (count, 1)) * robot.mass * robot.gravity
     load[:, 3:] *= np.ptp(robot.platform_anchors, axis=0).max()
     plan = inverse(robot, poses, model=model, tension=MinimumNorm(), wrench=load)
@@ -101,7 +103,7 @@ def disagreeing(sample: Sample) -> list[int]:
 @pytest.mark.parametrize("robot", presets(), ids=lambda robot: robot.name)
 def test_a_linear_program_agrees(robot: Robot) -> None:
     sample = sampled(robot, 770, np.random.default_rng(20), Elastic())
-    assert 10 < sample.plan.feasible.sum() < 760
+    assert 10 < sample.plan.feasible.sum() < len(sample.plan.status) - 10
     assert not len(unproved(sample))
     assert not disagreeing(sample)
 

@@ -41,6 +41,13 @@ class Variable(StrEnum):
     FRAME_END = "frame_end"
 
 
+class Winding(StrEnum):
+    """What lies on the drums of winches."""
+
+    CONSTANT = "constant"
+    REMEMBERED = "remembered"
+
+
 class Tension(StrEnum):
     """Ways of sharing the load, with their default options."""
 

@@ -1,4 +1,4 @@
-"""`sagline forward`: from measured lengths to the poses in which the platform rests."""
+"""`sagline forward`: from measured lengths or counts to the poses in which the platform rests."""
 
 from __future__ import annotations
 
@@ -13,13 +13,15 @@ from sagline.cli.entries import FIT, FORWARD
 from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.cli.values import loaded, wrench_of
-from sagline.files.lengths_file import Lengths, load_lengths
+from sagline.files.lengths_file import Lengths, load_counts, load_lengths
 from sagline.files.names import file_stem
 from sagline.files.robot_file import load_robot
 from sagline.files.whole import check_files, made_folder, write_text
+from sagline.kinematics.encoder import lengths_from_counts
 from sagline.kinematics.forward import forward as solve
 from sagline.kinematics.forward_solution import ForwardSolution
 from sagline.kinematics.forward_status import ForwardStatus
+from sagline.robot.robot import Robot
 
 SHOWN = 12  # rows of the table on the terminal; the file has them all
 FINE = (ForwardStatus.SOLVED, ForwardStatus.FITTED)
@@ -29,7 +31,15 @@ Cell = float | str
 
 
 def forward(
-    name: str, file: Path, model: Model, wrench: str | None, payload: str | None, folder: Path, *, as_json: bool
+    name: str,
+    file: Path,
+    model: Model,
+    wrench: str | None,
+    payload: str | None,
+    folder: Path,
+    *,
+    counts: bool,
+    as_json: bool,
 ) -> int:
     """Find the poses, tell, and write them; returns the exit code.
 
@@ -40,8 +50,7 @@ def forward(
     """
     load = wrench_of(wrench)
     robot = loaded(load_robot(name), payload)
-    size = float(np.linalg.norm(np.ptp(robot.frame_anchors, axis=0)))
-    lengths = load_lengths(file, robot.cable_count, size)
+    lengths = _counted(file, robot) if counts else _measured(file, robot)
     target = folder / f"{file_stem(robot.name, 'poses')}.csv"
     check_files(folder, [target.name])
     entry = FIT if model is Model.STRAIGHT else FORWARD
@@ -66,6 +75,15 @@ def forward(
     status = ForwardStatus(int(found.status[lost[0]]))
     note(f"{len(lost)} of {len(found.status)} samples, the first in row {lost[0] + 1}: ", status.text, style="bold red")
     return OUTSIDE
+
+
+def _measured(file: Path, robot: Robot) -> Lengths:
+    return load_lengths(file, robot.cable_count, float(np.linalg.norm(np.ptp(robot.frame_anchors, axis=0))))
+
+
+def _counted(file: Path, robot: Robot) -> Lengths:
+    read = load_counts(file, robot.cable_count)
+    return Lengths(read.time, lengths_from_counts(robot, read.counts))
 
 
 def _rows(lengths: Lengths, found: ForwardSolution) -> list[list[Cell]]:

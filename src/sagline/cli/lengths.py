@@ -1,20 +1,25 @@
-"""`sagline lengths`: the planned lengths of a run, as `sagline forward` and controllers read them."""
+"""`sagline lengths` and `sagline encoder`: what a run winds, as `sagline forward` and controllers read it."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sagline.arrays import Array
+from sagline.cli.choices import Winding
 from sagline.cli.csv_text import csv_text
 from sagline.cli.ending import OUTSIDE
-from sagline.cli.terminal import note, show_data
+from sagline.cli.entries import needed_for
+from sagline.cli.terminal import note, show_data, working
 from sagline.errors import FileError
 from sagline.files.plan_file import load_plan
 from sagline.files.whole import write_text
+from sagline.kinematics.encoder import encoder_counts
 from sagline.kinematics.status import PoseStatus
+from sagline.kinematics.winch_rates import winch_rates
 
 if TYPE_CHECKING:
     from sagline.kinematics.plan import Plan
@@ -26,18 +31,51 @@ def write_lengths(file: Path, out: Path | None) -> int:
     Raises:
         SaglineError: If the run cannot be read, none of it is feasible, or the file cannot be written.
     """
-    if out is not None and out.exists() and out.resolve() == file.resolve():
-        raise FileError(out, "is the run itself", "Name another file with --out.")
-    plan = load_plan(file)
+    plan = _plan_of(file, out)
+    return write_rows(plan, "L{} [m]", np.atleast_2d(plan.unstrained_length).tolist(), out)
+
+
+def write_counts(file: Path, winding: Winding, out: Path | None) -> int:
+    """Write times and counts of the encoders in the same way.
+
+    Raises:
+        SaglineError: As above, or if the robot's winches cannot say the counts.
+    """
+    plan = _plan_of(file, out)
+    counts = np.atleast_2d(encoder_counts(plan, winding.value))
+    whole = [[int(count) if count == count else count for count in row] for row in counts.tolist()]
+    code = write_rows(plan, "C{}", whole, out)
+    winches = plan.state.one_robot.winches
+    if plan.path is None or winches is None or (winches.speed_limit is None and winches.torque_limit is None):
+        return code
+    with working(f"{file.name}: speeds and torques of the winches", *needed_for(plan.tension)):
+        rates = winch_rates(plan)
+    for beyond, limit in ((rates.too_fast, "speed_limit"), (rates.too_strong, "torque_limit")):
+        if beyond is not None and beyond.any():
+            samples = beyond.any(axis=1)
+            first, cables = plan.path.time[np.argmax(samples)], ", ".join(map(str, np.flatnonzero(beyond.any(axis=0))))
+            many = f"{samples.sum():,} of {samples.size:,} samples, the first at {first:g} s, of cables {cables}"
+            note(f"Beyond {limit}: ", f"{many}; winch_rates tells by how much", style="bold red")
+    return OUTSIDE if rates.exceeding.any() else code
+
+
+def write_rows(plan: Plan, name: str, rows: Sequence[Sequence[float]], out: Path | None) -> int:
+    """Write a column for each cable at the feasible samples, with their times; returns the exit code.
+
+    Args:
+        plan: The plan.
+        name: Of a column, with {} where the cable's number goes.
+        rows: Of all samples.
+        out: File to write; None for stdout.
+    """
     kept = np.atleast_1d(plan.feasible)
-    if not kept.any():
-        raise FileError(file, "has no feasible sample, and so no lengths", "Plan another path, or raise the limits.")
-    lengths = np.atleast_2d(plan.unstrained_length)
-    names = [f"L{k} [m]" for k in range(lengths.shape[-1])]
+    header = [name.format(k) for k in range(len(rows[0]))]
+    body = [row for row, is_kept in zip(rows, kept, strict=True) if is_kept]
     if plan.path is None:
-        text = csv_text([names, *lengths[kept].tolist()])
+        text = csv_text([header, *body])
     else:
-        text = csv_text([["time [s]", *names], *np.column_stack((plan.path.time, lengths))[kept].tolist()])
+        time = plan.path.time[kept].tolist()
+        text = csv_text([["time [s]", *header], *([t, *row] for t, row in zip(time, body, strict=True))])
     if out is None:
         show_data(text)
     else:
@@ -46,6 +84,16 @@ def write_lengths(file: Path, out: Path | None) -> int:
         return 0
     note("Left out: ", f"{np.sum(~kept):,} of {kept.size:,} samples, which are not feasible", style="bold red")
     return OUTSIDE
+
+
+def _plan_of(file: Path, out: Path | None) -> Plan:
+    """The plan in a run, some of which is feasible; the file to write is another one."""
+    if out is not None and out.exists() and out.resolve() == file.resolve():
+        raise FileError(out, "is the run itself", "Name another file with --out.")
+    plan = load_plan(file)
+    if not plan.feasible.any():
+        raise FileError(file, "has no feasible sample, and so no lengths", "Plan another path, or raise the limits.")
+    return plan
 
 
 def plan_text(plan: Plan) -> str:

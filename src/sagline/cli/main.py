@@ -16,7 +16,7 @@ from typer.core import TyperCommand, TyperGroup
 from sagline.cli.commands.article import article, identify
 from sagline.cli.commands.poses import forward, tension
 from sagline.cli.commands.robots import convert, examples, new, robots, show
-from sagline.cli.commands.track import lengths, run, track
+from sagline.cli.commands.track import encoder, lengths, run, track
 from sagline.cli.commands.view import view
 from sagline.cli.ending import ended
 from sagline.files.whole import finished_files
@@ -135,7 +135,7 @@ def sagline(
 
 
 for command in (
-    track, lengths, run, article, identify, forward, tension, robots, show, examples, new, convert, view,
+    track, lengths, encoder, run, article, identify, forward, tension, robots, show, examples, new, convert, view,
 ):  # fmt: skip
     text = _help(command.__doc__)
     app.command(cls=Command, help=text, short_help=text.partition("\n\n")[0])(command)

@@ -1,4 +1,4 @@
-"""Measured lengths in CSV: one row a sample, one column a cable."""
+"""Measured lengths, or counts of encoders, in CSV: one row a sample, one column a cable."""
 
 from __future__ import annotations
 
@@ -25,6 +25,18 @@ class Lengths(NamedTuple):
     unstrained_length: Array
 
 
+class Counts(NamedTuple):
+    """N samples of the counts of m encoders.
+
+    Attributes:
+        time: [s], shape (N,); None where the file has none.
+        counts: Shape (N, m).
+    """
+
+    time: Array | None
+    counts: Array
+
+
 def load_lengths(file: os.PathLike[str] | str, cable_count: int, size: float = np.inf) -> Lengths:
     """Read a CSV file with a column for each cable, L0, L1, ..., and perhaps the time.
 
@@ -42,18 +54,46 @@ def load_lengths(file: os.PathLike[str] | str, cable_count: int, size: float = n
         FileError: If it cannot be read, a column is missing or unknown, a length is not positive or in
             millimeters without saying so, or the times do not increase; the message names the line.
     """
+    table, names = _read(file, "L", "m", cable_count)
+    for name in names:
+        table.refuse(table.columns[name] <= 0.0, name, table.columns[name], "m", "> 0 m")
+        table.refuse_millimeters(name, size, f"the robot's {size:.3g} m")
+    return Lengths(*_samples(table, names))
+
+
+def load_counts(file: os.PathLike[str] | str, cable_count: int) -> Counts:
+    """Read a CSV file with a column for each encoder, C0, C1, ..., and perhaps the time.
+
+    Args:
+        file: The file.
+        cable_count: Number of cables m of the robot.
+
+    Returns:
+        Times [s], if there are any, and counts.
+
+    Raises:
+        FileError: If it cannot be read, a column is missing or unknown, or the times do not increase; the message
+            names the line.
+    """
+    return Counts(*_samples(*_read(file, "C", "", cable_count)))
+
+
+def _read(file: os.PathLike[str] | str, letter: str, unit: str, cable_count: int) -> tuple[Table, list[str]]:
+    """A table with a column for each cable, and their names."""
     path = Path(file)
-    names = [f"L{k}" for k in range(cable_count)]
-    table = Table.read(path, read_text(path, TABLE_LIMIT), {"time": "s", **dict.fromkeys(names, "m")})
+    names = [f"{letter}{k}" for k in range(cable_count)]
+    table = Table.read(path, read_text(path, TABLE_LIMIT), {"time": "s", **dict.fromkeys(names, unit)})
     if missing := [name for name in names if name not in table.columns]:
         raise line_error(path, table.header, f"missing column {', '.join(missing)}; the robot has {cable_count} cables")
     if not table.lines:
         raise line_error(path, table.header, "no rows below the columns' names; allowed: at least one")
-    for name in names:
-        table.refuse(table.columns[name] <= 0.0, name, table.columns[name], "m", "> 0 m")
-        table.refuse_millimeters(name, size, f"the robot's {size:.3g} m")
+    return table, names
+
+
+def _samples(table: Table, names: list[str]) -> tuple[Array | None, Array]:
+    """Times, and a row a sample."""
     time = table.columns.get("time")
     if time is not None:
         late = np.diff(time, prepend=-np.inf) <= 0.0
         table.refuse(late, "time", time, "s", "a time after that of the row before")
-    return Lengths(time, locked(np.stack([table.columns[name] for name in names], axis=-1)))
+    return time, locked(np.stack([table.columns[name] for name in names], axis=-1))

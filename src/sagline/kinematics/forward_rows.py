@@ -30,7 +30,7 @@ from sagline.kinematics.forward_status import STABLE
 from sagline.kinematics.hung import hung
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
-from sagline.robot.several import Robots, first_of
+from sagline.robot.several import Robots, anything_behind, first_of
 from sagline.statics.tables import body_table, cable_table
 
 BLOCK = 1 << 13  # cables solved at once: from a few to some 130 ms, after which an interrupt is heard
@@ -181,7 +181,7 @@ def solve_rows(
     """
     count, m = lengths.shape
     allowed = first_of(robot).freedom if freedom is None else freedom
-    bodies, cables = body_table(robot), cable_table(robot)
+    bodies, cables, behind = body_table(robot), cable_table(robot), anything_behind(robot) or None
     chain, memory = new_chain(m, len(allowed)), memory_for(m)  # the chain goes on from block to block
     found = Found.empty(count, m)
     for part in blocks(count, max(1, BLOCK // m), progress):
@@ -191,7 +191,7 @@ def solve_rows(
         if model.code == codes.STRAIGHT:
             fit_poses(chained, given, chain, memory, block.arrays)
         else:
-            forward_poses((model.code, *model.parameters), chained, given, chain, memory, block.arrays)
+            forward_poses((model.code, *model.parameters, behind), chained, given, chain, memory, block.arrays)
         found.keep(part, block)
         if chained:
             starts = block.last_pose(starts)

@@ -23,6 +23,7 @@ from sagline.kinematics.forward_status import STABLE, ForwardStatus
 from sagline.kinematics.start import search
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
+from sagline.robot.several import anything_behind
 from sagline.robot.wheels import dead_cable
 from sagline.statics.tables import body_table, cable_table, pose_rows
 
@@ -84,7 +85,7 @@ class ForwardSolver:
         self._numbers = np.empty((1, FORWARD_NUMBERS))
         self._status: Codes = np.empty(1, dtype=np.int8)
         self._arguments: tuple[Any, ...] = (
-            (self._model.code, *self._model.parameters),
+            (self._model.code, *self._model.parameters, anything_behind(robot) or None),
             True,  # a chain goes on from what it remembers of the last equilibrium
             (
                 robot.freedom,

@@ -82,19 +82,24 @@ class Winch:
             a drum below, or down (0, 0, -1).
         pulley_friction: Coefficient mu of the cable's friction on the pulley: tensions on its two sides differ by
             exp(mu psi), psi the wrap angle, the larger one on the side that the cable runs to.
-        dead_cable: Length of the straight guided run from drum to pulley [m], >= 0.
+        dead_cable: Length of the straight guided run from drum to pulley [m], >= 0; where it leaves the drum opposite
+            the first pulley.
         dead_rise: Height of the pulley's entry above the drum [m], within dead_cable; downward negative.
         drum_radius: Radius of the drum at the bottom of the cable [m]; None where the drum is not known.
-        drum_width: Width that the cable may fill, along the drum's axis [m].
+        drum_width: Width that the cable may fill, along the drum's axis [m], >= groove_pitch; a layer has drum_width
+            over groove_pitch turns, which need not be whole. None: wide enough for one layer.
         groove_pitch: How far along its axis a turn of the drum moves the cable [m].
         layers: How many layers the drum takes, a whole number >= 1.
         drum_distance: From the drum to the first pulley, across the drum's axis [m]; None: the cable leaves the drum at
             a fixed place.
-        drum_offset: Where the cable leaves the full drum, along its axis, from the middle of the first pulley [m].
+        drum_offset: Where the cable leaves the empty drum, at its first groove, along its axis from the middle of the
+            first pulley [m]; the grooves of the first layer go on to the positive side. -drum_width/2 for a drum with
+            its middle opposite the pulley.
         gear: Turns of the encoder for a turn of the drum, not zero; negative where counts fall as cable is let out.
         counts_per_turn: Counts of the encoder for one of its turns.
         count_zero: Counts at which length_zero is off the drum.
-        length_zero: Length of cable off the drum at count_zero, at the winding tension [m]; `home` finds it.
+        length_zero: Length of cable off the drum at count_zero, at the winding tension, with dead_cable for the run
+            to the pulley [m]; `home` finds it.
         cable_length: All there is of the cable, on the drum and off it, at the winding tension [m].
         winding_tension: Tension at which the cable lies on the drum [N], >= 0.
         inertia: Moment of inertia of motor, gear and drum at the motor's shaft [kg m^2].

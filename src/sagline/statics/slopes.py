@@ -20,7 +20,7 @@ from sagline.kernels.forward.sensitivity import (
 )
 from sagline.kernels.memory import memory_for
 from sagline.robot.equilibrium import Equilibrium
-from sagline.robot.several import first_of
+from sagline.robot.several import anything_behind, first_of
 from sagline.statics.tables import body_table, cable_table, pose_rows
 
 BLOCK = 1 << 12  # samples at once: a tenth of a second, after which an interrupt is heard
@@ -65,13 +65,14 @@ def cable_slopes(state: Equilibrium) -> CableSlopes:
     shared, cables = first_of(state.robot), state.cables
     bodies, robots = body_table(state.robot), cable_table(state.robot)
     poses, lengths = pose_rows(state.pose), np.atleast_2d(state.unstrained_length)
+    behind = anything_behind(state.robot) or None
     shape, (count, m) = state.pose.shape, lengths.shape
     matrices = np.empty((count, 6, 6))
     stiffness = np.empty((count, m, 3, 3))
     slopes = np.empty((count, DATA, m, 3))
     levers = np.empty((count, m, 3))
     lengths, wrenches = locked(lengths.view()), locked(np.atleast_2d(state.wrench).view())
-    code, memory = (cables.model.code, *cables.model.parameters), memory_for(m)
+    code, memory = (cables.model.code, *cables.model.parameters, behind), memory_for(m)
     for part in blocks(count, BLOCK):
         own = (rows_of(bodies, part), rows_of(robots, part), lengths[part], poses[part], rows_of(wrenches, part))
         found = (matrices[part], stiffness[part], slopes[part], levers[part])

@@ -6,10 +6,10 @@ import numpy as np
 
 from sagline.arrays import Array
 from sagline.kernels.cable import models, pulls, turns
-from sagline.kernels.cable.cables import Cables
 from sagline.kernels.cable.pulls import TURN_ROWS, Curves
 from sagline.kernels.cable.terms import Chord, Material, Model
 from sagline.kernels.codes import CATENARY
+from tests.kernels.cable.room import plain_cables
 from tests.kernels.compiled import from_python, memory
 
 GRAVITY = 9.81
@@ -28,8 +28,8 @@ def random_curves(rng: np.random.Generator, m: int, model: int = CATENARY) -> Cu
     high = low * 10 ** rng.uniform(0.3, 3, m)
     stiffness = high / 10 ** rng.uniform(-5, -2, m)
     sine = np.where(rng.uniform(size=m) < 0.05, -1.0, np.sin(slope))
-    cables = Cables(*(np.full(m, np.nan) for _ in Cables._fields))._replace(
-        density=density, stiffness=stiffness, half_weight=half_weight, chord=chord, sine=sine,
+    cables = plain_cables(
+        m, np.nan, density=density, stiffness=stiffness, half_weight=half_weight, chord=chord, sine=sine,
         cosine=np.sqrt(1 - sine * sine), low=low, high=high,
     )  # fmt: skip
     turned = np.full((TURN_ROWS, m), np.nan)

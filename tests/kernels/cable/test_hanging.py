@@ -10,6 +10,7 @@ from sagline.kernels.cable import hanging as h
 from sagline.kernels.cable import models
 from sagline.kernels.cable.cables import Cables, new_cables
 from sagline.kernels.cable.catenary import ORDINARY_STRAIN, TAUT_STRAIN
+from sagline.kernels.cable.pulley import Pulley
 from sagline.kernels.cable.terms import Chord, Material, Model
 from sagline.kernels.codes import CABLE_SOLVED, CABLE_TOO_SLACK, CATENARY, ELASTIC, EMPIRICAL, PARABOLIC, STRAIGHT
 from tests.kernels.cable.exact import length_and_pull
@@ -24,10 +25,11 @@ room_for = from_python(new_cables)
 GRAVITY = 9.81
 EXACT = Model(CATENARY, 0.0, 0.0, GRAVITY)
 LAST_DIGITS = 6e-15
+NO_PULLEY = Pulley(0.0, 1.0, 0.0, 0.0)
 
 
 def cables_of(density: Array, stiffness: Array, chord: Array, sine: Array, tau: Array) -> Cables:
-    cables: Cables = room_for(memory(), tau.size)[0]
+    cables: Cables = room_for(memory(), tau.size, False)[0]
     cables.density[:], cables.stiffness[:], cables.chord[:] = density, stiffness, chord
     cables.sine[:], cables.cosine[:], cables.tau[:] = sine, np.sqrt(1.0 - sine * sine), tau
     cables.half_weight[:] = 0.5 * density * GRAVITY * chord
@@ -36,7 +38,7 @@ def cables_of(density: Array, stiffness: Array, chord: Array, sine: Array, tau: 
 
 def hang(cables: Cables, model: Model = EXACT, near: bool = False) -> tuple[int, Codes]:
     statuses = np.full(cables.tau.size, -1, dtype=np.int8)
-    return hang_cables(model, cables, near, statuses), statuses
+    return hang_cables(model, cables, not near, near, statuses), statuses
 
 
 def assert_exact(cables: Cables) -> None:
@@ -154,20 +156,22 @@ def test_limits_of_the_frame_end_as_chord_tensions(code: int, case: tuple[float,
     weight = density * GRAVITY
     least = 0.5 * weight * length * chord.cosine
     for tension in (1.5 * weight * length, 3.0 * weight * length, 300.0 * weight * length):
-        tau = chord_tension_at_frame_end(model, chord, material, tension)
+        tau = chord_tension_at_frame_end(model, chord, material, NO_PULLEY, tension)
         whole, pull, _ = from_tension(model, chord, material, tau)
         end = math.hypot(tau * chord.cosine, tau * sine + pull - weight * whole)  # what the frame feels
-        assert frame_end_tension(model, chord, material, tau) == pytest.approx(end, rel=1e-14)
+        assert frame_end_tension(model, chord, material, NO_PULLEY, tau) == pytest.approx(end, rel=1e-14)
         assert end == pytest.approx(tension, rel=1e-12)
         assert tau > 0.5 * weight * length * sine  # the taut side
     for tension in (0.0, 0.5 * least, least):  # less than any taut cable has: where it is least
-        assert chord_tension_at_frame_end(model, chord, material, tension) == max(0.5 * weight * length * sine, 0.0)
-    assert chord_tension_at_frame_end(model, chord, material, math.inf) == math.inf
+        assert chord_tension_at_frame_end(model, chord, material, NO_PULLEY, tension) == max(
+            0.5 * weight * length * sine, 0.0
+        )
+    assert chord_tension_at_frame_end(model, chord, material, NO_PULLEY, math.inf) == math.inf
 
 
 def test_weightless_cables_have_one_tension() -> None:
     chord = Chord(5.0, 0.6, 0.8)
     for model, density in ((Model(ELASTIC, 0.0, 0.0, GRAVITY), 0.5), (EXACT, 0.0)):
         material = Material(density, 44e3)
-        assert chord_tension_at_frame_end(model, chord, material, 70.0) == 70.0
-        assert frame_end_tension(model, chord, material, 70.0) == pytest.approx(70.0, rel=1e-15)
+        assert chord_tension_at_frame_end(model, chord, material, NO_PULLEY, 70.0) == 70.0
+        assert frame_end_tension(model, chord, material, NO_PULLEY, 70.0) == pytest.approx(70.0, rel=1e-15)

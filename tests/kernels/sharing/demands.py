@@ -5,19 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from sagline.arrays import Array
-from sagline.kernels.cable.cables import Cables
 from sagline.kernels.cable.pulls import TURN_ROWS, Curves
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import STRAIGHT
 from sagline.kernels.sharing.least_change import Change, Demand
+from tests.kernels.cable.room import plain_cables
 
 
 def weightless(low: Array, high: Array) -> Curves:
     """Curves of cables without weight between limits (m,)."""
     m = len(low)
-    cables = Cables(*(np.ones(m) for _ in Cables._fields))._replace(
-        density=np.zeros(m), half_weight=np.zeros(m), stiffness=np.full(m, 1e6), low=low.copy(), high=high.copy()
-    )
+    given = {"density": np.zeros(m), "half_weight": np.zeros(m), "stiffness": np.full(m, 1e6)}
+    cables = plain_cables(m, 1.0, **given, low=low.copy(), high=high.copy())
     return Curves(Model(STRAIGHT, 0.0, 0.0, 9.81), cables, np.full((TURN_ROWS, m), np.nan), np.zeros(m, dtype=np.int8))
 
 

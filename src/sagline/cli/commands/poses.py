@@ -24,6 +24,10 @@ def forward(
     lengths: Annotated[
         Path, typer.Argument(metavar="CSV", help="Columns L0, L1, ... and perhaps time; units in brackets: L0 [mm].")
     ],
+    counts: Annotated[
+        bool,
+        typer.Option("--counts", help="The columns are C0, C1, ...: counts of the encoders of the robot's winches."),
+    ] = False,
     model: ModelOption = Model.CATENARY,
     wrench: WrenchOption = None,
     payload: PayloadOption = None,
@@ -38,10 +42,11 @@ def forward(
     For example:
 
         sagline forward cogiro lengths.csv --out poses
+        sagline forward my_robot.yaml counts.csv --counts
     """
     from sagline.cli.forward import forward as run
 
-    return run(robot, lengths, model, wrench, payload, out, as_json=as_json)
+    return run(robot, lengths, model, wrench, payload, out, counts=counts, as_json=as_json)
 
 
 def tension(

@@ -1,4 +1,4 @@
-"""`sagline track`, `sagline run`, `sagline lengths`: along a path."""
+"""`sagline track`, `sagline run`, `sagline lengths`, `sagline encoder`: along a path."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from sagline.cli.choices import Model, Tension, Variable
+from sagline.cli.choices import Model, Tension, Variable, Winding
 from sagline.cli.options import (
     JsonOption,
     ModelOption,
@@ -92,3 +92,31 @@ def lengths(
     from sagline.cli.lengths import write_lengths
 
     return write_lengths(plan, out)
+
+
+def encoder(
+    plan: Annotated[Path, typer.Argument(metavar="RUN.nc", help="A run written by sagline track.", show_default=False)],
+    winding: Annotated[
+        Winding,
+        typer.Option(
+            metavar="WINDING",
+            help="What lies on the drums: constant, cable at the winches' winding_tension; remembered, cable wound "
+            "along the run at the tension it had there.",
+        ),
+    ] = Winding.CONSTANT,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE", help="File to write. Default: stdout.", show_default=False)
+    ] = None,
+) -> int:
+    """Take the counts of the encoders out of a run: a row a sample, for the drives.
+
+    The robot's winches must say drum_radius, groove_pitch, counts_per_turn and length_zero, its cables their diameter.
+    Rows are feasible ones. Exit code 1 where some are not, or winches would exceed their speed_limit or torque_limit.
+
+    For example:
+
+        sagline encoder output/my-robot-catenary.nc --out counts.csv
+    """
+    from sagline.cli.lengths import write_counts
+
+    return write_counts(plan, winding, out)

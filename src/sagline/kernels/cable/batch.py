@@ -14,7 +14,7 @@ from sagline.kernels.cable.catenary import (
     ordinary_pull_ratio,
 )
 from sagline.kernels.cable.models import from_length, from_tension
-from sagline.kernels.cable.terms import Chord, Material, Model, Terms
+from sagline.kernels.cable.terms import Chord, Material, Terms, model_of
 from sagline.kernels.codes import CABLE_SOLVED, CATENARY
 from sagline.kernels.jit import entry, kernel
 
@@ -53,7 +53,7 @@ def batch_from_tension(
     is solved again, one by one. One result a loop: with more, the compiler gives up on vectorizing.
     buffer is room, (BUFFERS, CHUNK).
     """
-    model = Model(*terms)
+    model = model_of(terms)
     count = length_out.shape[0]
     x, z, rho, ea, tau = buffer[0], buffer[1], buffer[2], buffer[3], buffer[4]
     chord, sine, cosine, half = buffer[5], buffer[6], buffer[7], buffer[8]
@@ -115,7 +115,7 @@ def batch_from_length(
     status_out: Codes,
 ) -> None:
     """Chord tension, forces on the platform end and status of every cable at its unstrained length."""
-    model = Model(*terms)
+    model = model_of(terms)
     x = min(span.shape[0] - 1, 1)
     z = min(rise.shape[0] - 1, 1)
     d = min(density.shape[0] - 1, 1)

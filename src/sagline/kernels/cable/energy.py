@@ -13,7 +13,6 @@ from sagline.arrays import Array
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.over_pulleys import energy_over, material_at
-from sagline.kernels.cable.pulley import anything_behind
 from sagline.kernels.cable.stiffness import force_of, series_excess
 from sagline.kernels.cable.terms import Force, Material, Model
 from sagline.kernels.codes import CATENARY, ELASTIC
@@ -56,26 +55,27 @@ def cable_energy(model: Model, span: float, rise: float, material: Material, len
 
 
 @formula
-def energy_of_cables(model: Model, cables: Array, rows: Array) -> tuple[float, float]:
+def energy_of_cables(model: Model, cables: Array, rows: Array, behind: bool | None) -> tuple[float, float]:
     """Energy [J] of all cables of a pose, and the sum of the parts that cancel in it.
 
     Args:
         model: Cable model.
         cables: Rows of the cable_table, (m, CABLE_COLUMNS).
         rows: As in `sagline.kernels.cable.rows`, (CABLE_ROWS, m), after `cable_forces`.
+        behind: That of the model, by itself, so that what it rules out is not compiled.
     """
-    machine = anything_behind(cables)
+    x = g.SPAN if behind is None else t.FREE_SPAN
+    z = g.RISE if behind is None else t.FREE_RISE
+    whole = t.LENGTH if behind is None else t.FREE_LENGTH
     energy = 0.0
     size = 0.0
     for i in range(cables.shape[0]):
-        span = rows[t.FREE_SPAN, i] if machine else rows[g.SPAN, i]
-        rise = rows[t.FREE_RISE, i] if machine else rows[g.RISE, i]
-        length = rows[t.FREE_LENGTH, i] if machine else rows[t.LENGTH, i]
+        span, rise, length = rows[x, i], rows[z, i], rows[whole, i]
         force = force_of(rows, i)
         energy += cable_energy(model, span, rise, material_at(cables, i), length, force)
         size += abs(force.horizontal * span) + abs(force.vertical * rise)
-        if machine:
-            behind = energy_over(model, cables, rows, i)
-            energy += behind
-            size += abs(behind)
+        if behind is not None:
+            more = energy_over(model, cables, rows, i)
+            energy += more
+            size += abs(more)
     return energy, size

@@ -17,7 +17,6 @@ from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.catenary import SMALL_HALLEY_STEP, relative_excess
 from sagline.kernels.cable.models import from_length
 from sagline.kernels.cable.over_pulleys import ask, begin_passes, settle
-from sagline.kernels.cable.pulley import anything_behind
 from sagline.kernels.cable.terms import Material, Model
 from sagline.kernels.codes import CABLE_SOLVED, CATENARY
 from sagline.kernels.jit import formula, glue
@@ -94,7 +93,7 @@ def has_arrived(rows: Array, i: int) -> bool:
 
 
 @formula
-def cable_forces(model: Model, cables: Array, rows: Array) -> None:
+def cable_forces(model: Model, cables: Array, rows: Array, behind: bool | None) -> None:
     """Fill T_x, T_z, tau and status of every cable of a pose from its geometry and length.
 
     Cables over pulleys are solved in passes, as cables that start where the chord touches; docs/model.md, section 10.
@@ -103,24 +102,19 @@ def cable_forces(model: Model, cables: Array, rows: Array) -> None:
         model: Cable model.
         cables: Rows of the cable_table, (m, CABLE_COLUMNS).
         rows: As in `sagline.kernels.cable.rows`, (CABLE_ROWS, m).
+        behind: That of the model, by itself, so that what it rules out is not compiled.
     """
-    machine = anything_behind(cables)
-    asked = Asked(
-        rows[t.ASKED_SPAN] if machine else rows[g.SPAN],
-        rows[t.ASKED_RISE] if machine else rows[g.RISE],
-        rows[t.ASKED_LENGTH] if machine else rows[t.LENGTH],
-        rows[t.SOFT],
-    )
-    for i in range(cables.shape[0]):
-        rows[t.SOFT, i] = cables[i, tables.STIFFNESS]
-    if machine:
+    if behind is None:
+        bare = Asked(rows[g.SPAN], rows[g.RISE], rows[t.LENGTH], cables[:, tables.STIFFNESS])
+        solve_asked(model, cables, bare, rows)
+    else:
+        asked = Asked(rows[t.ASKED_SPAN], rows[t.ASKED_RISE], rows[t.ASKED_LENGTH], rows[t.SOFT])
         begin_passes(cables, rows)
-    for _ in range(PASSES if machine else 1):
-        if machine:
+        for _ in range(PASSES):
             ask(model, cables, rows)
-        solve_asked(model, cables, asked, rows)
-        if machine and settle(model, cables, rows) <= MISSED:
-            break
+            solve_asked(model, cables, asked, rows)
+            if settle(model, cables, rows) <= MISSED:
+                break
 
 
 @glue

@@ -22,7 +22,10 @@ from sagline.kernels.jit import glue, kernel
 # Relative change of tension within which one Newton step from the last ratio will do: it leaves 3e-8 of the ratio at
 # X = 2, 5e-15 at X = 0.01, and the square of a smaller change, so that rounds which stand still end in the last digit.
 NEAR = 1e-3
-CONTACTS = 4  # passes after which a cable leaves its pulley where its force says: the gap is 1e-4, 4e-8, 1e-11, 0
+CONTACTS = (
+    40  # passes until a cable leaves its pulley where its force says; the gap of a taut one is 1e-4, 4e-8, 1e-11, 0
+)
+SAME_PULL = 1e-16  # of the tension: a pull that changes by no more stands still
 LIMIT_STEPS = 30
 LIMIT_PRECISION = 1e-13  # relative
 
@@ -130,7 +133,10 @@ def hang_cable(model: Model, chord: Chord, material: Material, pulley: Pulley, t
             line = math.sqrt(span * span + rise * rise)
             free = Chord(line, rise / line, span / line)
             length, own, status = from_tension(model, free, material, horizontal / free.cosine)
+            before = pull
             pull = horizontal / free.cosine * free.sine + own - tau * chord.sine
+            if not abs(pull - before) > SAME_PULL * tau:
+                break
     return length, pull, status
 
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from sagline.arrays import Array, Codes
 from sagline.kernels.cable.cables import Cables, chord_of, material_of, pulley_of
-from sagline.kernels.cable.hanging import CONTACTS, hang_cable, hang_cables
+from sagline.kernels.cable.hanging import hang_cable, hang_cables
 from sagline.kernels.cable.models import pull_of_shallow
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import CATENARY
@@ -20,6 +20,7 @@ from sagline.kernels.jit import glue, kernel
 from sagline.kernels.memory import Memory, block
 
 SLOPE_STEP = 1e-4  # relative step of the central difference of the pull
+EXITS = 4  # passes over pulleys: for X up to 1 the pull is then known to 1e-9 of the tension
 SHRINKINGS = 30
 TURN_ERROR = 1e-10  # of half the cable's weight: the pull at a turn is better known
 SHRINKS = 0.9  # of the section before: what shrinks less does not shrink
@@ -74,7 +75,7 @@ def pulls_at(curves: Curves, tau: Array, pull: Array) -> None:
     """Fill the pulls (m,) at chord tensions (m,), and let the cables carry them."""
     for i in range(tau.size):
         curves.cables.tau[i] = tau[i]
-    for k in range(CONTACTS + 1 if curves.cables.machine else 1):
+    for k in range(EXITS if curves.cables.machine else 1):
         hang_cables(curves.model, curves.cables, k == 0, False, curves.statuses)
     for i in range(tau.size):
         if curves.model.code != CATENARY:  # the same at every tension, one of zero included

@@ -8,7 +8,7 @@ from sagline.arrays import Array
 from sagline.kernels.cable.catenary import catenary_end
 from sagline.kernels.cable.models import sag_of_shallow
 from sagline.kernels.cable.shallow import shallow_length_ratio
-from sagline.kernels.cable.terms import Model, Terms
+from sagline.kernels.cable.terms import Model, Terms, model_of
 from sagline.kernels.codes import CATENARY, ELASTIC, EMPIRICAL, STRAIGHT
 from sagline.kernels.jit import entry, kernel
 
@@ -36,7 +36,7 @@ def shape_points(
     points_out: Array,
 ) -> None:
     """Points (cables, points, 2) at equal steps of unstrained length; the shallow models draw a parabola."""
-    model = Model(*terms)
+    model = model_of(terms)
     count = points_out.shape[1]
     for i in range(points_out.shape[0]):
         for k in range(count):
@@ -91,7 +91,7 @@ def sags(
     sag_out: Array,
 ) -> None:
     """Largest drop below the chord of every cable."""
-    model = Model(*terms)
+    model = model_of(terms)
     for i in range(sag_out.shape[0]):
         weight = density[i] * model.gravity
         if model.code == CATENARY and weight > 0.0:
@@ -117,7 +117,7 @@ def closures(
 
     Catenary: distance of its computed end from the platform end. Others: the error in length.
     """
-    model = Model(*terms)
+    model = model_of(terms)
     for i in range(residual_out.shape[0]):
         chord = math.hypot(span[i], rise[i])
         if model.code == STRAIGHT:

@@ -16,7 +16,6 @@ from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.catenary import slack_series
 from sagline.kernels.cable.models import pull_of_shallow, sag_of_shallow
 from sagline.kernels.cable.over_pulleys import across_pulley, material_at, series
-from sagline.kernels.cable.pulley import anything_behind
 from sagline.kernels.cable.shallow import stretching_tension
 from sagline.kernels.cable.terms import Force, Material, Model, PlaneStiffness
 from sagline.kernels.codes import CATENARY, ELASTIC, EMPIRICAL, STRAIGHT
@@ -170,16 +169,16 @@ def cable_stiffness(
 
 
 @formula
-def stiffnesses_in_plane(model: Model, cables: Array, rows: Array) -> None:
+def stiffnesses_in_plane(model: Model, cables: Array, rows: Array, behind: bool | None) -> None:
     """Fill the stiffness of every cable of a pose in its plane and normal to it, after `cable_forces`."""
-    machine = anything_behind(cables)
+    x = g.SPAN if behind is None else t.FREE_SPAN
+    z = g.RISE if behind is None else t.FREE_RISE
+    whole = t.LENGTH if behind is None else t.FREE_LENGTH
     for i in range(cables.shape[0]):
-        span = rows[t.FREE_SPAN, i] if machine else rows[g.SPAN, i]
-        rise = rows[t.FREE_RISE, i] if machine else rows[g.RISE, i]
-        length = rows[t.FREE_LENGTH, i] if machine else rows[t.LENGTH, i]
+        span, rise, length = rows[x, i], rows[z, i], rows[whole, i]
         plane = cable_stiffness(model, span, rise, material_at(cables, i), length, force_of(rows, i))
         rows[t.ACROSS, i] = rows[t.TENSION, i] / rows[g.CHORD, i]
-        if machine:
+        if behind is not None:
             plane = series(model, cables, rows, i, plane)
             rows[t.ACROSS, i] = across_pulley(cables, rows, i)
         rows[t.XX, i] = plane.xx

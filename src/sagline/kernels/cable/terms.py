@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from sagline.kernels.jit import glue
+
 Terms = tuple[int, float, float, float]  # a Model as it comes from Python: numba knows plain tuples three times faster
 
 
@@ -18,12 +20,21 @@ class Model(NamedTuple):
         k_h: The empirical model's constant of the pull.
         k_p: The empirical model's constant of the sag.
         gravity: [m/s^2].
+        behind: Whether cables of given lengths may have something behind them; None leaves that out of the machine
+            code, which then is that of bare cables.
     """
 
     code: int
     k_h: float
     k_p: float
     gravity: float
+    behind: bool | None = None
+
+
+@glue
+def model_of(terms: Terms) -> Model:
+    """A cable model as it comes from Python."""
+    return Model(terms[0], terms[1], terms[2], terms[3], None)
 
 
 class Material(NamedTuple):

@@ -10,6 +10,7 @@ import math
 
 from sagline.arrays import Array, Indices
 from sagline.kernels import tables
+from sagline.kernels.algebra.angle import angle
 from sagline.kernels.algebra.cholesky import factor_positive
 from sagline.kernels.balance.freedom import components_along
 from sagline.kernels.cable import geometry as g
@@ -142,7 +143,7 @@ def fit_poses(
             continue
         if not chained:
             copy_pose(row_of(batch.starts, p), start)
-        problem = problem_at(Model(STRAIGHT, 0.0, 0.0, 0.0), batch, p, free, arcs)
+        problem = problem_at(Model(STRAIGHT, 0.0, 0.0, 0.0, None), batch, p, free, arcs)
         copy_pose(start, pose)
         answer.numbers[p, ENERGY], answer.numbers[p, ITERATIONS], fitted = fit_pose(
             problem, batch.lengths[p], pose, space
@@ -155,3 +156,9 @@ def fit_poses(
             answer.results[tables.SPAN, p, i] = space.rows[g.SPAN, i]
             answer.results[tables.RISE, p, i] = space.rows[g.RISE, i]
             answer.results[tables.LENGTH, p, i] = batch.lengths[p, i]
+            pulley, chord = pulley_at(problem.cables, i), chord_at(space.rows, i)
+            wrapped = angle(chord.cosine, pulley.entry * chord.sine)
+            answer.results[tables.WRAP, p, i] = wrapped
+            answer.results[tables.WRAPPED, p, i] = pulley.radius * wrapped
+            answer.results[tables.DEAD, p, i] = pulley.dead
+            answer.results[tables.SINE, p, i] = chord.sine

@@ -15,7 +15,6 @@ from sagline.kernels.balance.freedom import components_along, symmetric_part, tu
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.over_pulleys import behind_at
-from sagline.kernels.cable.pulley import anything_behind
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import (
     CATENARY,
@@ -40,6 +39,7 @@ from sagline.kernels.forward.problem import (
     STIFFNESS_MIN,
     Chain,
     ChainArrays,
+    ForwardTerms,
     Found,
     FoundArrays,
     Given,
@@ -173,7 +173,7 @@ def store(problem: Problem, rows: Array, p: int, results: Array, statuses: Codes
     for k in range(tables.WRAP - tables.LENGTH):  # length and forces follow each other in both
         for i in range(rows.shape[1]):
             results[tables.LENGTH + k, p, i] = rows[t.LENGTH + k, i]
-    if anything_behind(problem.cables):
+    if problem.model.behind is not None:
         for i in range(rows.shape[1]):
             wrapped, dead = behind_at(problem.model, problem.cables, rows, i)
             results[tables.SPAN, p, i] = rows[t.FREE_SPAN, i]
@@ -186,7 +186,7 @@ def store(problem: Problem, rows: Array, p: int, results: Array, statuses: Codes
 
 @entry
 def forward_poses(
-    model: tuple[int, float, float],
+    model: ForwardTerms,
     chained: bool,
     given: GivenArrays,
     chain: ChainArrays,
@@ -197,7 +197,7 @@ def forward_poses(
 
     Args:
         model: Cable model and the empirical one's constants; the shallow ones go downhill as exact cables and are
-            polished as what they are.
+            polished as what they are. Whether anything may be behind the cables: True, or None for never.
         chained: Whether each sample starts where the last solved one ended, the first at starts[0].
         given: `Given`.
         chain: `Chain`; a chain of samples continues from it where it starts at the remembered pose.
@@ -205,7 +205,7 @@ def forward_poses(
         found: `Found`, filled.
     """
     batch, answer, kept = Given(*given), Found(*found), Chain(*chain)
-    code, k_h, k_p = model
+    code, k_h, k_p, behind = model
     count, m = batch.lengths.shape
     space, rest = new_space(Memory(*room), kept.rows, kept.factor)
     motions, rest = new_motions(rest, batch.freedom.shape[0])
@@ -220,8 +220,8 @@ def forward_poses(
             kept.last[0] = math.nan
             for i in range(m):
                 kept.rows[t.PARAMETER, i] = math.nan
-        problem = problem_at(Model(code, k_h, k_p, 0.0), batch, p, free, arcs)
-        exact = Model(ELASTIC if code == ELASTIC else CATENARY, 0.0, 0.0, problem.model.gravity)
+        problem = problem_at(Model(code, k_h, k_p, 0.0, behind), batch, p, free, arcs)
+        exact = Model(ELASTIC if code == ELASTIC else CATENARY, 0.0, 0.0, problem.model.gravity, behind)
         steps, size = find_pose(problem, exact, batch.lengths[p], start, kept, space, pose)
         status = describe(problem, pose, arcs, size, space, answer.numbers[p])
         fill_residuals(batch.freedom, space.gradient, answer.numbers[p])

@@ -18,7 +18,6 @@ from sagline.kernels.balance.freedom import components_along, matrix_along, norm
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.over_pulleys import fed, material_at
-from sagline.kernels.cable.pulley import anything_behind
 from sagline.kernels.cable.slopes import Pair, force_by_length, gives_way
 from sagline.kernels.cable.stiffness import force_of, plane_of
 from sagline.kernels.cable.terms import Model
@@ -41,10 +40,9 @@ LAST_DIGIT = 1e-15  # a step that rounding hides
 @glue
 def add_wound(model: Model, cables: Array, lengths: Array, rows: Array, wrench: Array) -> None:
     """Add to a wrench (6,) what new lengths (m,) do to the cables' forces, to first order."""
-    machine = anything_behind(cables)
     for i in range(cables.shape[0]):
         span, rise, length = rows[g.SPAN, i], rows[g.RISE, i], rows[t.LENGTH, i]
-        if machine:
+        if model.behind is not None:
             x, z, _gives = fed(model, cables, rows, i)
             slope = gives_way(plane_of(rows, i), Pair(x, z))
         else:

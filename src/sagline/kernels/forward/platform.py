@@ -34,7 +34,7 @@ def unbalance(
     is to be compared with.
     """
     cable_geometry(cables, body, pose, rotation, rows)
-    cable_forces(model, cables, rows)
+    cable_forces(model, cables, rows, model.behind)
     weight = body[tables.MASS] * model.gravity
     for k in range(6):
         gradient[k] = -wrench[k]
@@ -69,7 +69,7 @@ def platform_energy(
     Cables, weight and given force; NaN where the model has none. The work of a given moment is left out: constant in
     world axes, it has none but along a motion.
     """
-    energy, size = energy_of_cables(model, cables, rows)
+    energy, size = energy_of_cables(model, cables, rows, model.behind)
     for k in range(3):
         center = pose[k]
         for j in range(3):
@@ -111,7 +111,7 @@ def platform_stiffness(model: Model, cables: Array, rows: Array, stiffness: Arra
 
     Its skew part is half the moment of the cables' forces: zero in an equilibrium without a given moment.
     """
-    stiffnesses_in_plane(model, cables, rows)
+    stiffnesses_in_plane(model, cables, rows, model.behind)
     for j in range(6):
         for k in range(6):
             stiffness[j, k] = 0.0

@@ -22,6 +22,7 @@ FORWARD_NUMBERS = 5
 LAST_WRENCH = tables.POSE_COLUMNS
 LAST_COLUMNS = LAST_WRENCH + 6
 
+ForwardTerms = tuple[int, float, float, bool | None]  # code, k_h, k_p; whether anything may be behind the cables
 GivenArrays = tuple[Array, Array, Array, Array, Array, Array]  # as they come from Python: exact tuples are fastest
 FoundArrays = tuple[Array, Array, Codes, Array, Codes]
 ChainArrays = tuple[Array, Array, Array]
@@ -163,7 +164,7 @@ def row_of(array: Array, p: int) -> Array:
 def problem_at(model: Model, given: Given, p: int, free: Array, arcs: Array) -> Problem:
     """Sample p of a batch as a problem; the model's gravity becomes that of its body. Fills the free motions."""
     body, cables = row_of(given.bodies, p), row_of(given.robots, p)
-    placed = Model(model.code, model.k_h, model.k_p, body[tables.GRAVITY])
+    placed = Model(model.code, model.k_h, model.k_p, body[tables.GRAVITY], model.behind)
     unit = fill_free(given.freedom, cables, body, given.lengths[p], free, arcs)
     return Problem(placed, free, cables, body, row_of(given.wrenches, p), unit)
 

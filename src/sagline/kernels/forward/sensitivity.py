@@ -9,14 +9,14 @@ from sagline.kernels import tables
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.over_pulleys import material_at
-from sagline.kernels.cable.pulley import anything_behind, pulley_at
+from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.cable.rows import CABLE_ROWS
 from sagline.kernels.cable.slopes import Pair, force_slopes, slopes_over
 from sagline.kernels.cable.stiffness import force_of, plane_of
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import STRAIGHT
 from sagline.kernels.forward.platform import end_stiffness, platform_stiffness, unbalance
-from sagline.kernels.forward.problem import Given, GivenArrays, row_of
+from sagline.kernels.forward.problem import ForwardTerms, Given, GivenArrays, row_of
 from sagline.kernels.jit import entry, formula, glue
 from sagline.kernels.memory import block
 
@@ -44,9 +44,9 @@ def describe_cable(model: Model, cables: Array, rows: Array, i: int, block: Arra
         lever[j] = rows[g.LEVER_X + j, i]
     span, rise, length = rows[g.SPAN, i], rows[g.RISE, i], rows[t.LENGTH, i]
     material, force, plane = material_at(cables, i), force_of(rows, i), plane_of(rows, i)
-    free = rows[t.FREE_LENGTH, i] if anything_behind(cables) else length
+    free = length if model.behind is None else rows[t.FREE_LENGTH, i]
     own, machine = slopes_over(model, material, pulley_at(cables, i), free, force, plane)
-    if not anything_behind(cables):
+    if model.behind is None:
         own = force_slopes(model, span, rise, material, length, force, plane)
     turn_out(machine.by_radius, rows, i, slopes[BY_RADIUS, i])
     turn_out(machine.by_dead, rows, i, slopes[BY_DEAD, i])
@@ -57,7 +57,7 @@ def describe_cable(model: Model, cables: Array, rows: Array, i: int, block: Arra
 
 @entry
 def describe_states(
-    model: tuple[int, float, float],
+    model: ForwardTerms,
     given: GivenArrays,
     room: tuple[Array, Indices],
     matrices: Array,
@@ -68,7 +68,7 @@ def describe_states(
     """What N samples feel; NaN without lengths and for straight cables.
 
     Args:
-        model: Cable model and the empirical one's constants.
+        model: Cable model and the empirical one's constants; whether anything may be behind the cables, or None.
         given: `Given`, its starts the poses.
         room: `memory_for` as many cables.
         matrices: Filled: stiffness of the platform, (N, 6, 6).
@@ -77,7 +77,7 @@ def describe_states(
         levers: Filled: from the center of mass to the platform ends, (N, m, 3).
     """
     batch = Given(*given)
-    code, k_h, k_p = model
+    code, k_h, k_p, behind = model
     count, m = batch.lengths.shape
     numbers = room[0]
     rotation, at = block(numbers, 0, 3, 3)
@@ -91,7 +91,7 @@ def describe_states(
             levers[p] = math.nan
             continue
         body, cables = row_of(batch.bodies, p), row_of(batch.robots, p)
-        placed = Model(code, k_h, k_p, body[tables.GRAVITY])
+        placed = Model(code, k_h, k_p, body[tables.GRAVITY], behind)
         for i in range(m):
             rows[t.LENGTH, i] = batch.lengths[p, i]
             rows[t.PARAMETER, i] = math.nan  # an answer must not depend on the sample before

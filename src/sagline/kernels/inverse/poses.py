@@ -86,7 +86,7 @@ def inverse_poses(
         body = bodies[min(p, bodies.shape[0] - 1)]
         wrench = wrenches[min(p, wrenches.shape[0] - 1)]
         platform = Platform(freedom, body, robots[min(p, robots.shape[0] - 1)], poses[p], wrench)
-        model = Model(model_terms[0], model_terms[1], model_terms[2], body[tables.GRAVITY])
+        model = Model(model_terms[0], model_terms[1], model_terms[2], body[tables.GRAVITY], None)
         for i in range(m):
             statuses[p, i] = CABLE_SOLVED
         status = set_pose(model, limits, sharing.variable, sharing.weight, platform, cables, balance)

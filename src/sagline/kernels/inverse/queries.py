@@ -65,7 +65,7 @@ def polygon_of_pose(
     cables, rest = new_cables(Memory(*room), m, any_behind(robots))
     balance, rest = new_balance(rest, m, freedom.shape[0])
     platform = Platform(freedom, bodies[0], robots[0], pose, wrench)
-    model = Model(model_terms[0], model_terms[1], model_terms[2], bodies[0, tables.GRAVITY])
+    model = Model(model_terms[0], model_terms[1], model_terms[2], bodies[0, tables.GRAVITY], None)
     set_pose(model, Limits(*limit_terms), sharing.variable, sharing.weight, platform, cables, balance)
     if not math.isnan(tensions[0]):
         for i in range(m):
@@ -120,7 +120,7 @@ def margins_of_poses(
         body = bodies[min(p, bodies.shape[0] - 1)]
         wrench = wrenches[min(p, wrenches.shape[0] - 1)]
         platform = Platform(freedom, body, robots[min(p, robots.shape[0] - 1)], poses[p], wrench)
-        model = Model(model_terms[0], model_terms[1], model_terms[2], body[tables.GRAVITY])
+        model = Model(model_terms[0], model_terms[1], model_terms[2], body[tables.GRAVITY], None)
         placed = set_pose(model, limits, CHORD_TENSION, weight, platform, cables, balance) != POSE_NO_CHORD
         if placed and not math.isnan(pulls[p, 0]):
             for i in range(m):

@@ -97,7 +97,7 @@ def decide_poses(
         body = bodies[min(p, bodies.shape[0] - 1)]
         wrench = wrenches[min(p, wrenches.shape[0] - 1)]
         platform = Platform(freedom, body, robots[min(p, robots.shape[0] - 1)], poses[p], wrench)
-        model = Model(model_terms[0], model_terms[1], model_terms[2], body[tables.GRAVITY])
+        model = Model(model_terms[0], model_terms[1], model_terms[2], body[tables.GRAVITY], None)
         set_pose(model, limits, CHORD_TENSION, weight, platform, cables, balance)
         if not limits_leave_room(cables):
             brackets[p, PROVED], brackets[p, ENOUGH] = math.inf, math.inf

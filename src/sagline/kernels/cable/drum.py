@@ -1,0 +1,172 @@
+"""Cable on a drum: how many turns of it lie there at a length off the drum, and what they remember of their tension.
+
+Turns count from the drum's first groove, where the cable is fastened: the more cable is on the drum, the more turns.
+Layer k lies in the grooves between the turns of the layer below it, and goes back where that one came from.
+docs/model.md, section 10.
+"""
+
+from __future__ import annotations
+
+import math
+
+from sagline.arrays import Array
+from sagline.kernels.jit import entry, formula
+
+# columns of the table of drums
+PITCH_RADIUS, LAYER_RISE, GROOVE_PITCH, LAYER_TURNS, LAYERS, DISTANCE, OFFSET = range(7)
+DRUM_COLUMNS = 7
+# rows of what a drum remembers: a piece of cable from its deeper end, where it began to be wound in, to its upper one
+DEEP_LENGTH, DEEP_PATH, DEEP_STRAIN, TOP_STRAIN = range(4)
+MEMORY_ROWS = 4
+STEPS = 60  # a convex function of one variable: Newton needs two or three
+SETTLED = 1e-8  # turns, or of all turns: the step after would be its square
+
+
+@formula
+def detour(distance: float, offset: float) -> float:
+    """How much longer the run to the pulley is for its being slanted; without end the distance, it is none [m]."""
+    return offset * offset / (math.sqrt(distance * distance + offset * offset) + distance)
+
+
+@formula
+def turn_length(drum: Array, layer: int) -> float:
+    """Length of one turn of a layer, a helix [m]."""
+    circle = 2.0 * math.pi * (drum[PITCH_RADIUS] + layer * drum[LAYER_RISE])
+    return math.sqrt(circle * circle + drum[GROOVE_PITCH] * drum[GROOVE_PITCH])
+
+
+@formula
+def exit_place(drum: Array, layer: int, turns: float) -> tuple[float, float]:
+    """Where the cable leaves after so many turns of a layer, from the pulley's middle, and how it goes on in a turn."""
+    if layer % 2 == 0:
+        return drum[OFFSET] + drum[GROOVE_PITCH] * turns, drum[GROOVE_PITCH]
+    return drum[OFFSET] + drum[GROOVE_PITCH] * (drum[LAYER_TURNS] - turns), -drum[GROOVE_PITCH]
+
+
+@formula
+def wound(drum: Array, layer: int, turns: float) -> float:
+    """By how much the first turns of a layer shorten the length off the drum [m]; convex in the turns, and rising."""
+    first, _ = exit_place(drum, layer, 0.0)
+    place, _ = exit_place(drum, layer, turns)
+    distance = drum[DISTANCE]
+    return turn_length(drum, layer) * turns + (detour(distance, place) - detour(distance, first))
+
+
+@entry
+def turns_of_lengths(drums: Array, starts: Array, length: Array, turns_out: Array, travel_out: Array) -> None:
+    """Turns on each drum, and its travel in a turn [m], at lengths off the drum.
+
+    Beyond the empty drum turns are negative, beyond its last layer more than that holds.
+
+    Args:
+        drums: Table, (m, DRUM_COLUMNS).
+        starts: Length off the drum where each layer begins, (m, layers + 1): falling.
+        length: At the winding tension [m], (N, m).
+        turns_out: (N, m).
+        travel_out: [m], (N, m).
+    """
+    for p in range(length.shape[0]):
+        for i in range(length.shape[1]):
+            drum = drums[i]
+            last = int(drum[LAYERS]) - 1
+            layer = 0
+            while layer < last and length[p, i] < starts[i, layer + 1]:
+                layer += 1
+            turn, distance = turn_length(drum, layer), drum[DISTANCE]
+            first, advance = exit_place(drum, layer, 0.0)
+            missing = starts[i, layer] - length[p, i] + detour(distance, first)
+            turns = (starts[i, layer] - length[p, i]) / turn
+            travel = turn
+            for _ in range(STEPS):
+                place = first + advance * turns
+                run = math.sqrt(distance * distance + place * place)
+                travel = turn + advance * place / run
+                step = (missing - turn * turns - place * place / (run + distance)) / travel
+                turns += step
+                if abs(step) <= SETTLED * max(abs(turns), 1.0):
+                    break
+            below = layer * drum[LAYER_TURNS] if layer > 0 else 0.0
+            turns_out[p, i] = below + turns
+            travel_out[p, i] = travel
+
+
+@entry
+def lengths_of_turns(drums: Array, starts: Array, turns: Array, length_out: Array) -> None:
+    """Lengths off the drum at so many turns on it, as above."""
+    for p in range(turns.shape[0]):
+        for i in range(turns.shape[1]):
+            drum = drums[i]
+            layer = 0
+            if turns[p, i] > drum[LAYER_TURNS]:
+                layer = int(min(turns[p, i] / drum[LAYER_TURNS], drum[LAYERS] - 1.0))
+            below = layer * drum[LAYER_TURNS] if layer > 0 else 0.0
+            length_out[p, i] = starts[i, layer] - wound(drum, layer, turns[p, i] - below)
+
+
+@entry
+def follow_memory(
+    given: Array, strain: Array, rest_strain: Array, unstrained: bool, found_out: Array, memory: Array
+) -> None:
+    """From unstrained lengths off the drum to those at the tensions with which the rest was wound, or back.
+
+    Cable that is wound in keeps its strain, which changes evenly from sample to sample, until it is paid out again;
+    below what was ever off the drum lies cable of one strain. Samples that are NaN are left out.
+
+    Args:
+        given: Lengths off the drum [m], (N, m): unstrained ones, or those along the path of winding.
+        strain: Of the cable at the drum, at each sample, (N, m).
+        rest_strain: Of the cable that lies on the drum at first, (m,).
+        unstrained: Which of the two lengths are given.
+        found_out: The others [m], (N, m).
+        memory: Room, (MEMORY_ROWS, N).
+    """
+    for i in range(given.shape[1]):
+        depth, begun = 0, False
+        length = path = last = base_length = base_path = 0.0
+        for p in range(given.shape[0]):
+            value, now = given[p, i], strain[p, i]
+            found_out[p, i] = math.nan
+            if not (abs(value) < math.inf and abs(now) < math.inf):
+                continue
+            if not begun:
+                begun, last = True, now
+                length = value if unstrained else value / (1.0 + rest_strain[i])
+                path = length * (1.0 + rest_strain[i]) if unstrained else value
+                base_length, base_path = length, path
+            elif value < (length if unstrained else path):
+                memory[DEEP_LENGTH, depth], memory[DEEP_PATH, depth] = length, path
+                memory[DEEP_STRAIN, depth], memory[TOP_STRAIN, depth] = last, now
+                stretch = 1.0 + 0.5 * (last + now)
+                depth += 1
+                if unstrained:
+                    length, path = value, path - (length - value) * stretch
+                else:
+                    length, path = length - (path - value) / stretch, value
+            else:
+                row = DEEP_LENGTH if unstrained else DEEP_PATH
+                while depth > 0 and value >= memory[row, depth - 1]:
+                    depth -= 1
+                    length = memory[DEEP_LENGTH, depth]
+                if depth == 0:
+                    stretch = 1.0 + rest_strain[i]
+                    if unstrained:
+                        length, path = value, base_path + (value - base_length) * stretch
+                    else:
+                        length, path = base_length + (value - base_path) / stretch, value
+                else:
+                    top = depth - 1
+                    deep = memory[DEEP_STRAIN, top]
+                    whole = memory[DEEP_LENGTH, top] - length
+                    slope = (memory[TOP_STRAIN, top] - deep) / whole if whole > 0.0 else 0.0
+                    if unstrained:
+                        left = memory[DEEP_LENGTH, top] - value
+                        length = value
+                        path = memory[DEEP_PATH, top] - left * (1.0 + deep + 0.5 * slope * left)
+                    else:
+                        missing = memory[DEEP_PATH, top] - value
+                        begin = 1.0 + deep
+                        left = 2.0 * missing / (begin + math.sqrt(begin * begin + 2.0 * slope * missing))
+                        length, path = memory[DEEP_LENGTH, top] - left, value
+                    memory[TOP_STRAIN, top] = deep + slope * left
+            last = now
+            found_out[p, i] = path if unstrained else length

@@ -1,0 +1,171 @@
+"""From a plan's lengths to the counts of the encoders, and back."""
+
+from __future__ import annotations
+
+from typing import Final, Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sagline.arguments import choice, instance, optional
+from sagline.arrays import Array, kernel_input, locked, numbers
+from sagline.cables.creep import Creep
+from sagline.errors import InvalidValueError
+from sagline.kernels.cable.drum import MEMORY_ROWS, follow_memory
+from sagline.kinematics.plan import Plan
+from sagline.robot.drum import Drums, drum_tension, drums_of, warmth
+from sagline.robot.robot import Robot
+
+Winding = Literal["constant", "remembered"]
+LARGEST: Final = 2.0**53  # counts: beyond, whole numbers are no longer told apart
+
+
+def encoder_counts(
+    plan: Plan, winding: Winding = "constant", *, temperature: ArrayLike = 0.0, creep: Creep | None = None
+) -> Array:
+    """Counts of the encoders at which the drums have let out a plan's lengths.
+
+    Args:
+        plan: A plan of a robot whose winches have a drum, counts and the zeros of both.
+        winding: What lies on the drum. "constant": cable wound at the winches' winding_tension. "remembered": cable
+            wound along the plan too, each meter at the tension it had at the drum when it was wound in; below it, what
+            was never off the drum since the first sample, at winding_tension.
+        temperature: By how much the cables are warmer than where the lengths of the winches hold [K], a number or one
+            a cable.
+        creep: How cables become longer along the plan's path, from nothing at its first sample; None for not at all.
+
+    Returns:
+        Whole counts, shape (m,) or (N, m), as floats; NaN where the plan has no answer.
+
+    Raises:
+        InvalidValueError: If the robot's winches or cables lack what is needed (the message names it), a drum cannot
+            hold the cable that is left or has not so much, or creep is given for a plan without a path.
+
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("cogiro")
+        >>> winch = sl.Winch(
+        ...     drum_radius=0.06,
+        ...     groove_pitch=0.006,
+        ...     gear=10.0,
+        ...     counts_per_turn=4096,
+        ...     length_zero=8.0,
+        ... )
+        >>> rope = robot.cables.replace(diameter=0.004)
+        >>> robot = robot.replace(winches=winch, cables=rope)
+        >>> plan = sl.inverse(robot, sl.Pose.from_euler([1, 1, 2], 0, 0, 0))
+        >>> counts = sl.encoder_counts(plan)
+        >>> back = sl.lengths_from_counts(robot, counts)
+        >>> off = abs(back - plan.unstrained_length).max()
+        >>> print(counts[0], f"{1e6 * off:.1f} um")
+        320530.0 4.6 um
+
+    Source:
+        docs/model.md, section 10.
+    """
+    robot = instance(plan, Plan, "plan").state.one_robot
+    choice(winding, "winding", get_args(Winding))
+    optional(creep, Creep, "creep")
+    drums = drums_of(robot)
+    longer = warmth(robot, temperature)
+    if creep is not None:
+        longer = longer * (1.0 + _crept(plan, creep))
+    shape = plan.unstrained_length.shape
+    length = np.atleast_2d(plan.unstrained_length / longer)
+    if winding == "constant":
+        path = length * (1.0 + drums.rest_strain)
+    else:
+        path = _followed(drums, robot, length, drum_tension(plan.state), unstrained=True)
+    return locked(np.rint(drums.counts(path)).reshape(shape))
+
+
+def lengths_from_counts(
+    robot: Robot,
+    counts: ArrayLike,
+    winding: Winding = "constant",
+    *,
+    drum_tension: ArrayLike | None = None,
+    temperature: ArrayLike = 0.0,
+) -> Array:
+    """Unstrained lengths of the cable off the drums at counts of the encoders: what `forward` takes.
+
+    Args:
+        robot: A robot whose winches have a drum, counts and the zeros of both.
+        counts: Shape (m,) or (N, m); NaN where there is none.
+        winding: As of `encoder_counts`; "remembered" needs the tensions.
+        drum_tension: Of the cables where they leave the drum, at each sample [N], of the shape of counts: for
+            winding="remembered" alone. That of a plan is `winch_rates(plan).drum_tension`.
+        temperature: By how much the cables are warmer than where the lengths of the winches hold [K].
+
+    Returns:
+        L [m], of the shape of counts. Where cables creep, multiply by 1 + `Creep.strain`.
+
+    Raises:
+        InvalidValueError: If the robot's winches or cables lack what is needed (the message names it), counts run off a
+            drum, are no whole number of rows, or tensions are missing.
+
+    Source:
+        docs/model.md, section 10.
+    """
+    drums = drums_of(instance(robot, Robot, "robot"))
+    choice(winding, "winding", get_args(Winding))
+    rows = _rows(robot, counts, "counts", "")
+    path = drums.lengths_at(np.atleast_2d(rows))
+    longer = warmth(robot, temperature)
+    if (winding == "remembered") != (drum_tension is not None):
+        given = "not given" if drum_tension is None else "given"
+        allowed = 'given with winding="remembered", and only then'
+        raise InvalidValueError("drum_tension", given, allowed, "Give both or neither.")
+    if drum_tension is None:
+        length = path / (1.0 + drums.rest_strain)
+    else:
+        tension = _rows(robot, drum_tension, "drum_tension", "N")
+        if tension.shape != rows.shape:
+            shapes = f"of shape {tension.shape}"
+            raise InvalidValueError("drum_tension", shapes, f"shape {rows.shape}, as counts", "Give one a count.")
+        length = _followed(drums, robot, path, tension, unstrained=False)
+    return locked((length * longer).reshape(rows.shape))
+
+
+def _followed(drums: Drums, robot: Robot, given: Array, tension: Array, *, unstrained: bool) -> Array:
+    """Lengths with the drums' memory of tensions, (N, m)."""
+    strain = np.atleast_2d(tension / robot.cables.axial_stiffness)
+    if (loose := strain <= -1.0).any():
+        p, i = (int(index) for index in np.argwhere(loose)[0])
+        shown = f"{np.atleast_2d(tension)[p, i]:g} N"
+        raise InvalidValueError(
+            f"sample {p}, cable {i}: drum_tension", shown, ">= 0 N", "No cable is pushed; correct the tension."
+        )
+    found, paths = np.empty(given.shape), kernel_input(given, given.shape)
+    follow_memory(
+        paths,
+        kernel_input(strain, given.shape),
+        drums.rest_strain,
+        unstrained,
+        found,
+        np.empty((MEMORY_ROWS, len(given))),
+    )
+    return found
+
+
+def _crept(plan: Plan, creep: Creep) -> Array:
+    if plan.path is None:
+        step = "Plan along a Path, or leave creep out."
+        raise InvalidValueError("creep", "given for a plan without a path", "times to creep in", step)
+    return creep.strain(plan.path.time, plan.state.cables.chord_tension)
+
+
+def _rows(robot: Robot, value: ArrayLike, item: str, unit: str) -> Array:
+    """Numbers of shape (m,) or (N, m), NaN among them."""
+    array, m = numbers(value, item, unit), robot.cable_count
+    if array.ndim not in (1, 2) or array.shape[-1] != m:
+        step = f"Give one for each of the {m} cables of {robot.name}."
+        raise InvalidValueError(item, f"of shape {array.shape}", f"shape ({m},) or (N, {m})", step)
+    wrong = np.abs(array) > LARGEST
+    if wrong.any():
+        index = tuple(int(k) for k in np.argwhere(wrong)[0])
+        where = f"sample {index[0]}, " if array.ndim == 2 else ""
+        shown = f"{array[index]:g} {unit}".rstrip()
+        allowed = f"within +-{LARGEST:.0f} {unit}".rstrip()
+        raise InvalidValueError(f"{where}cable {index[-1]}: {item}", shown, allowed, "Correct it, or give NaN.")
+    return array

@@ -1,0 +1,281 @@
+"""Drums of a robot: between the length of cable off a drum, its turns, and the counts of its encoder."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from sagline.arrays import Array, checked, kernel_input, locked
+from sagline.errors import InvalidValueError
+from sagline.kernels.cable import drum
+from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.robot import Robot
+from sagline.robot.winch import Winch
+
+MOST_LAYERS: Final = 1000
+ROUNDING: Final = 1e-6  # turns by which a drum may be more than full, or emptier than empty
+_ZERO_STEP: Final = "Give it, or find it with home(robot, pose, frame_end_tension)."
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Drums:
+    """The drums of m cables. Lengths are those off the drum, at the tension of winding.
+
+    Attributes:
+        winches: Their data, fields of shape (m,).
+        table: As kernels take them, shape (m, DRUM_COLUMNS).
+        starts: Length off the drum where each layer begins [m], shape (m, layers + 1); -inf where there is no end.
+        rest_strain: Strain of the cable on the drum, shape (m,).
+        fewest: Turns on the empty drum, shape (m,): 0, or -inf where it is not known how much cable there is.
+        most: Turns on the full drum, shape (m,); inf where that is not known.
+    """
+
+    winches: Winch
+    table: Array
+    starts: Array
+    rest_strain: Array
+    fewest: Array
+    most: Array
+
+    def turns(self, length: Array) -> tuple[Array, Array]:
+        """Turns on the drums, and their travel.
+
+        Args:
+            length: Lengths off the drums [m], shape (N, m); NaN is answered by NaN.
+
+        Returns:
+            Turns, and by how much one of them changes the length [m], both of shape (N, m).
+
+        Raises:
+            InvalidValueError: If a drum cannot hold what is left, or has not so much cable.
+        """
+        turns, travel = self._turns(length)
+        if (wrong := self._off(turns)) is not None:
+            sample, i = wrong
+            stretch = 1.0 + self.rest_strain[i]
+            low, high = self._ends(i) / stretch
+            item = _at("unstrained length", sample, i, len(length))
+            raise self._refusal(item, f"{length[wrong] / stretch:.6g} m", f"{low:.6g} to {high:.6g} m", turns, wrong)
+        return turns, travel
+
+    def lengths(self, turns: Array) -> Array:
+        """Lengths off the drums [m] at so many turns on them, shape (N, m)."""
+        length = np.empty(turns.shape)
+        drum.lengths_of_turns(self.table, self.starts, kernel_input(turns, turns.shape), length)
+        return length
+
+    def counts(self, length: Array) -> Array:
+        """Counts of the encoders at lengths off the drums, both of shape (N, m), not rounded.
+
+        Raises:
+            InvalidValueError: If a field is missing that counts need, or a drum cannot hold what is left or has not so
+                much cable.
+        """
+        zero, rate = self._zero()
+        turns, _ = self.turns(length)
+        found: Array = self.winches.count_zero + (zero - turns) * rate
+        return found
+
+    def lengths_at(self, counts: Array) -> Array:
+        """Lengths off the drums [m] at counts of the encoders, both of shape (N, m).
+
+        Raises:
+            InvalidValueError: If a field is missing, or counts run off a drum.
+        """
+        zero, rate = self._zero()
+        turns = zero - (counts - self.winches.count_zero) / rate
+        if (wrong := self._off(turns)) is not None:
+            sample, i = wrong
+            ends = self.winches.count_zero[i] + (zero[i] - np.array([self.fewest[i], self.most[i]])) * rate[i]
+            allowed = f"{np.ceil(ends.min()):.0f} to {np.floor(ends.max()):.0f}"
+            raise self._refusal(_at("count", sample, i, len(counts)), f"{counts[wrong]:.12g}", allowed, turns, wrong)
+        return self.lengths(turns)
+
+    def _zero(self) -> tuple[Array, Array]:
+        """Turns on the drums at the zeros of their counts, and counts for a turn let out, both of shape (m,)."""
+        per_turn, length = _given(self.winches, "counts_per_turn"), _given(self.winches, "length_zero", _ZERO_STEP)
+        turns, _ = self._turns(length[None])
+        if (wrong := self._off(turns)) is not None:
+            low, high = self._ends(wrong[1])
+            item, allowed = f"winches: length_zero[{wrong[1]}]", f"{low:.6g} to {high:.6g} m"
+            raise self._refusal(item, f"{length[wrong[1]]:.6g} m", allowed, turns, wrong)
+        return turns[0], self.winches.gear * per_turn
+
+    def _turns(self, length: Array) -> tuple[Array, Array]:
+        turns, travel = np.empty(length.shape), np.empty(length.shape)
+        drum.turns_of_lengths(self.table, self.starts, kernel_input(length, length.shape), turns, travel)
+        return turns, travel
+
+    def _off(self, turns: Array) -> tuple[int, int] | None:
+        """The first sample and cable that is on no drum."""
+        wrong = (turns > self.most + ROUNDING) | (turns < self.fewest - ROUNDING)
+        if not wrong.any():
+            return None
+        sample, cable = np.argwhere(wrong)[0]
+        return int(sample), int(cable)
+
+    def _ends(self, cable: int) -> Array:
+        """Least and greatest length off a drum [m]."""
+        most = float(self.most[cable])
+        low = self.lengths(np.full((1, len(self.most)), most))[0, cable] if most < np.inf else 0.0
+        return np.array([max(low, 0.0), self.starts[cable, 0]])
+
+    def _refusal(self, item: str, value: str, allowed: str, turns: Array, wrong: tuple[int, int]) -> InvalidValueError:
+        cable = wrong[1]
+        whole = _given(self.winches, "cable_length")[cable]
+        step = f"There are {whole:g} m of cable, winches: cable_length; correct that, or what was given."
+        if turns[wrong] > self.most[cable]:
+            count = int(self.winches.layers[cable])
+            full = f"{count} layer{'s' * (count > 1)}, {self.most[cable]:g} turns"
+            step = f"The drum is full with {full}; correct it, or give more layers or less cable_length."
+        return InvalidValueError(item, value, allowed, step)
+
+
+def drums_of(robot: Robot) -> Drums:
+    """The drums of a robot.
+
+    Args:
+        robot: The robot. Its winches need drum_radius and groove_pitch, its cables a diameter; several layers need
+            drum_width too, and these or a wandering exit cable_length.
+
+    Returns:
+        Drums.
+
+    Raises:
+        InvalidValueError: If data are missing, the message names them; or they do not fit together.
+    """
+    winches, diameter = robot.winches, robot.cables.diameter
+    names = ["drum_radius", "groove_pitch"]
+    if winches is not None and (winches.layers > 1.0).any():
+        names += ["drum_width", "cable_length"]
+    elif winches is not None and winches.drum_distance is not None:
+        names += ["cable_length"]
+    missing = [f"winches: {name}" for name in names if winches is None or getattr(winches, name) is None]
+    if diameter is None:
+        missing.append("cables: diameter")
+    if winches is None or diameter is None or missing:
+        step = "Give them in the robot file, or with robot.replace(winches=Winch(...), cables=Cable(...))."
+        raise InvalidValueError(", ".join(missing), "not given", "known, to say what lies on a drum", step)
+    return Drums(winches, *_tables(winches, diameter), *_limits(winches, robot))
+
+
+def _tables(winches: Winch, diameter: Array) -> tuple[Array, Array]:
+    """The drums as kernels take them, and where their layers begin."""
+    pitch, width = _given(winches, "groove_pitch"), winches.drum_width
+    _check_width(winches, pitch)
+    if (winches.layers > MOST_LAYERS).any():
+        i = int(np.argmax(winches.layers))
+        many = f"{winches.layers[i]:g}"
+        raise InvalidValueError(f"winches: layers[{i}]", many, f"1 to {MOST_LAYERS}", "Correct it.")
+    table = np.empty((len(pitch), drum.DRUM_COLUMNS))
+    table[:, drum.PITCH_RADIUS] = _given(winches, "drum_radius") + 0.5 * diameter
+    table[:, drum.LAYER_RISE] = 0.5 * math.sqrt(3.0) * diameter  # each turn lies between two of those below
+    table[:, drum.GROOVE_PITCH] = pitch
+    table[:, drum.LAYER_TURNS] = np.inf if width is None else width / pitch
+    table[:, drum.LAYERS] = winches.layers
+    table[:, drum.DISTANCE] = np.inf if winches.drum_distance is None else winches.drum_distance
+    table[:, drum.OFFSET] = winches.drum_offset
+    return locked(table), _layer_starts(winches, table)
+
+
+def _layer_starts(winches: Winch, table: Array) -> Array:
+    """Where the layers begin: all the cable less what lies below, less the slant of the run to the pulley there."""
+    count = np.arange(int(winches.layers.max()) + 1)
+    known = winches.cable_length if winches.cable_length is not None else winches.length_zero
+    whole = np.zeros(len(table)) if known is None else known  # without cable_length, turns count from length_zero
+    circle = 2.0 * np.pi * (table[:, drum.PITCH_RADIUS] + count[:, None] * table[:, drum.LAYER_RISE])
+    layer = np.hypot(circle, table[:, drum.GROOVE_PITCH]) * table[:, drum.LAYER_TURNS]
+    below = np.concatenate((np.zeros((1, len(table))), np.cumsum(layer[:-1], axis=0)))
+    width = 0.0 if winches.drum_width is None else winches.drum_width
+    place, distance = table[:, drum.OFFSET] + width * (count[:, None] % 2), table[:, drum.DISTANCE]
+    slant = place**2 / (np.hypot(distance, place) + distance)
+    return locked(np.ascontiguousarray((whole - below - slant).T))
+
+
+def _limits(winches: Winch, robot: Robot) -> tuple[Array, Array, Array]:
+    """Strain of the cable on the drums, and turns on the empty and the full ones."""
+    strain = locked(winches.winding_tension / robot.cables.axial_stiffness)
+    if winches.cable_length is None:
+        endless = np.full(strain.shape, np.inf)
+        return strain, locked(-endless), locked(endless)
+    turns = np.inf if winches.drum_width is None else winches.drum_width / _given(winches, "groove_pitch")
+    return strain, locked(np.zeros(strain.shape)), locked(np.broadcast_to(turns * winches.layers, strain.shape).copy())
+
+
+def drum_tension(state: Equilibrium) -> Array:
+    """Tension of the cables where they leave the drum, without friction.
+
+    Along a cable without friction T + T^2/(2 EA) - w z is constant, z the height.
+
+    Args:
+        state: Robot with winches, and its cables.
+
+    Returns:
+        Tensions [N], shape (m,) or (N, m); negative where a slack cable hangs down from a drum.
+
+    Source:
+        docs/model.md, section 10.
+    """
+    robot, cables = state.one_robot, state.cables
+    height = robot.frame_anchors[:, 2]
+    leaving = state.exit_point[..., 2]
+    drum_height = height if robot.winches is None else height - robot.winches.dead_rise
+    stiffness = robot.cables.axial_stiffness
+    weight = 0.0 if cables.model.weightless else robot.cables.linear_density * robot.gravity
+    strain = cables.frame_end_tension / stiffness
+    gained = strain * (2.0 + strain) + 2.0 * weight * (drum_height - leaving) / stiffness  # (1 + strain)^2 - 1
+    return locked(stiffness * gained / (1.0 + np.sqrt(np.maximum(1.0 + gained, 0.0))))
+
+
+def warmth(robot: Robot, temperature: Any) -> Array | float:
+    """By what factor cables are longer than where lengths hold.
+
+    Args:
+        robot: The robot.
+        temperature: Difference to there [K], a number or one a cable.
+
+    Returns:
+        1 + expansion times the difference, shape (m,) or a number.
+
+    Raises:
+        InvalidValueError: If the temperature is wrong, or the expansion of the cables is not known.
+    """
+    difference = checked(temperature, "temperature", "K")
+    if difference.shape not in ((), (robot.cable_count,)):
+        allowed = f"shape () or ({robot.cable_count},)"
+        raise InvalidValueError("temperature", f"of shape {difference.shape}", allowed, "Give one, or one a cable.")
+    if not difference.any():
+        return 1.0
+    if robot.cables.expansion is None:
+        step = "Give it in the robot file or with Cable(..., expansion=...), or leave temperature out."
+        raise InvalidValueError("cables: expansion", "not given", "known where a temperature is given", step)
+    factor: Array = 1.0 + robot.cables.expansion * difference
+    if not (factor > 0.0).all():
+        shown = f"{np.ravel(difference)[0]:g} K"
+        raise InvalidValueError("temperature", shown, "at which cables have a length", "Correct it, or expansion.")
+    return factor
+
+
+def _given(winches: Winch, name: str, step: str = "Give it in the robot's winches.") -> Array:
+    value: Array | None = getattr(winches, name)
+    if value is None:
+        raise InvalidValueError(f"winches: {name}", "not given", "one value, or one a cable", step)
+    return value
+
+
+def _check_width(winches: Winch, pitch: Array) -> None:
+    if winches.drum_width is not None and (narrow := winches.drum_width < pitch).any():
+        i = int(np.argmax(narrow))
+        raise InvalidValueError(
+            f"winches: drum_width[{i}]",
+            f"{winches.drum_width[i]:g} m",
+            f">= {pitch[i]:g} m, its groove_pitch",
+            "A layer has a turn at least; correct one of the two.",
+        )
+
+
+def _at(item: str, sample: int, cable: int, samples: int) -> str:
+    return f"{f'sample {sample}, ' if samples > 1 else ''}cable {cable}: {item}"

@@ -1,0 +1,144 @@
+"""`sagline encoder` and `sagline forward --counts`: a run to counts, and counts to poses."""
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import sagline as sl
+from sagline.cli.main import app
+from sagline.files.lengths_file import load_counts
+from tests.kinematics.winches import wound
+
+PATH = sl.quintic_path([(0.0, 0.0, 1.5), (1.5, 0.5, 2.0)], durations=2.0, rate=8.0)
+
+
+def sagline(*words: str) -> Any:
+    return CliRunner().invoke(app, words)
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Every test runs in a folder of its own with a robot that has winches, and a run of it."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "80")
+    robot = wound(length_zero=11.0)
+    Path("my_robot.yaml").write_text(sl.dump_robot(robot))
+    sl.inverse(robot, PATH).save("run.nc")
+    return tmp_path
+
+
+def rows_of(text: str) -> tuple[list[str], np.ndarray]:
+    header, *rows = csv.reader(text.splitlines())
+    return header, np.array([[float(cell) for cell in row] for row in rows])
+
+
+@pytest.mark.parametrize("winding", ["constant", "remembered"])
+def test_counts_of_a_run_are_those_of_the_library(winding: Any) -> None:
+    result = sagline("encoder", "run.nc", "--winding", winding)
+    assert (result.exit_code, result.stderr) == (0, "")
+    plan = sl.load_plan("run.nc")
+    assert plan.path is not None
+    header, rows = rows_of(result.stdout)
+    assert header == ["time [s]", *(f"C{k}" for k in range(8))]
+    np.testing.assert_array_equal(rows[:, 0], plan.path.time)
+    np.testing.assert_array_equal(rows[:, 1:], sl.encoder_counts(plan, winding))
+    assert "." not in result.stdout.splitlines()[5].partition(",")[2]  # whole numbers are written as such
+
+
+def test_counts_lead_forward_to_the_planned_poses() -> None:
+    poses = sl.inverse(wound(length_zero=11.0), PATH.pose)  # at rest: forward knows of no inertia
+    poses.save("rest.nc")
+    assert sagline("encoder", "rest.nc", "--out", "counts.csv").exit_code == 0
+    assert sagline("encoder", "rest.nc").stdout == Path("counts.csv").read_text()
+    result = sagline("forward", "my_robot.yaml", "counts.csv", "--counts", "--json")
+    assert result.exit_code == 0, result.output
+    found = json.loads(result.stdout)["poses"]
+    np.testing.assert_allclose(
+        [[pose[axis] for axis in "xyz"] for pose in found], PATH.pose.position, atol=2e-5
+    )  # a count is 8 micrometers of cable
+
+
+def test_samples_without_an_answer_are_left_out_and_counted() -> None:
+    path = sl.quintic_path([(0.0, 0.0, 1.5), (9.0, 0.5, 2.0)], durations=2.0, rate=8.0)
+    sl.inverse(wound(length_zero=11.0), path).save("far.nc")
+    plan = sl.load_plan("far.nc")
+    result = sagline("encoder", "far.nc")
+    assert result.exit_code == 1
+    lost = int(np.sum(~plan.feasible))
+    assert f"Left out: {lost} of 17 samples" in result.stderr
+    np.testing.assert_array_equal(rows_of(result.stdout)[1][:, 1:], sl.encoder_counts(plan)[plan.feasible])
+
+
+def test_what_is_too_much_for_the_winches_is_told() -> None:
+    robot = wound(length_zero=11.0, speed_limit=150.0, torque_limit=1.7, inertia=1e-4)
+    sl.inverse(robot, PATH).save("fast.nc")
+    result = sagline("encoder", "fast.nc", "--out", "counts.csv")
+    rates = sl.winch_rates(sl.inverse(robot, PATH))
+    assert result.exit_code == 1
+    for limit, beyond in (("speed_limit", rates.too_fast), ("torque_limit", rates.too_strong)):
+        assert beyond is not None
+        samples, cables = beyond.any(axis=1), [str(k) for k in range(8) if beyond[:, k].any()]
+        assert 0 < samples.sum() < 17
+        first = PATH.time[np.argmax(samples)]
+        told = f"Beyond {limit}: {samples.sum()} of 17 samples, the first at {first:g} s, of cables {', '.join(cables)}"
+        assert told in result.stderr
+    assert Path("counts.csv").exists()
+    enough = robot.winches.replace(speed_limit=1e3, torque_limit=1e3)  # type: ignore[union-attr]
+    sl.inverse(robot.replace(winches=enough), PATH).save("slow.nc")
+    assert sagline("encoder", "slow.nc").exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["encoder", "bare.nc"], "winches: drum_radius, winches: groove_pitch, cables: diameter is not given"),
+        (["encoder", "nothere.nc"], "nothere.nc"),
+        (["encoder", "run.nc", "--out", "run.nc"], "is the run itself"),
+        (["encoder", "run.nc", "--winding", "loose"], "'loose' is not one of 'constant', 'remembered'"),
+        (["forward", "my_robot.yaml", "lengths.csv", "--counts"], "unknown column 'L0'"),
+        (
+            ["forward", "my_robot.yaml", "far.csv", "--counts"],
+            "sample 1, cable 3: count is 9000000000; allowed: -2415336 to 1516823. The drum is full",
+        ),
+        (["forward", "cogiro", "far.csv", "--counts"], "winches: drum_radius, winches: groove_pitch, cables: diameter"),
+    ],
+)
+def test_what_is_wrong_ends_with_2_and_writes_nothing(folder: Path, words: list[str], told: str) -> None:
+    sl.inverse(sl.load_robot("cogiro"), PATH).save("bare.nc")
+    Path("lengths.csv").write_text(",".join(f"L{k}" for k in range(8)) + "\n" + ",".join("9" * 8) + "\n")
+    header = ",".join(f"C{k}" for k in range(8))
+    Path("far.csv").write_text(f"{header}\n{','.join(['100000'] * 8)}\n0,0,0,9e9,0,0,0,0\n")
+    before = sorted(folder.iterdir())
+    result = sagline(*words)
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert told in " ".join(result.stderr.split())
+    assert sorted(folder.iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("C0,C1\n1,2\n", "line 1: missing column C2; the robot has 3 cables"),
+        ("C0,C1,C2\n", "no rows below"),
+        ("C0 [mm],C1,C2\n1,2,3\n", r"the unit of C0 is \[mm\]; allowed: none"),
+        ("C0,C1,C2\n1,x,3\n", "line 2: C1 is x; allowed: a number"),
+        ("time,C0,C1,C2\n1,1,2,3\n1,1,2,3\n", "line 3: time is 1 s"),
+    ],
+)
+def test_a_wrong_file_of_counts_is_named_with_its_line(text: str, told: str) -> None:
+    Path("counts.csv").write_text(text)
+    with pytest.raises(sl.FileError, match=told):
+        load_counts("counts.csv", 3)
+
+
+def test_counts_may_be_negative() -> None:
+    Path("counts.csv").write_text("time [ms],C0,C1\n0,-5,7\n10,0,1e3\n")
+    read = load_counts("counts.csv", 2)
+    assert read.time is not None
+    assert read.time.tolist() == [0.0, 0.01]
+    assert read.counts.tolist() == [[-5.0, 7.0], [0.0, 1000.0]]

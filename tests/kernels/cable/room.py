@@ -1,0 +1,24 @@
+"""Cables with nothing behind them, written down as kernels take them: free spans and cables are the same memory."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sagline.arrays import Array
+from sagline.kernels.cable.cables import Cables
+
+SAME = {
+    "free_half_weight": "half_weight",
+    "free_chord": "chord",
+    "free_sine": "sine",
+    "free_cosine": "cosine",
+    "free_tau": "tau",
+    "free_pull": "pull",
+}
+
+
+def plain_cables(m: int, fill: float, **given: Array) -> Cables:
+    """Words for m cables, those given as they are and all others of one value."""
+    words = {name: given.get(name, np.full(m, fill)) for name in Cables._fields if name != "machine"}
+    words |= {free: words[own] for free, own in SAME.items()}
+    return Cables(machine=False, **words)

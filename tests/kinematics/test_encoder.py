@@ -1,0 +1,262 @@
+"""Counts of encoders: both ways, over layers, with memory, warmth and creep."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.article.ten_poses import tour
+from sagline.kinematics.plan import Plan
+from sagline.robot.drum import drums_of
+from tests.kinematics.winches import wound
+
+POSE = sl.Pose.from_euler([1.0, 1.0, 2.0], 0.0, 0.0, 0.0)
+
+
+@pytest.fixture(scope="module")
+def robot() -> sl.Robot:
+    return wound()
+
+
+@pytest.fixture(scope="module")
+def plan(robot: sl.Robot) -> sl.Plan:
+    return sl.inverse(robot, sl.quintic_path([(0, 0, 1.5), (3, 1, 2.5), (-3, -1, 1.5)], durations=3.0, rate=20.0))
+
+
+def test_a_million_counts_come_back_over_four_layers(robot: sl.Robot) -> None:
+    drums = drums_of(robot)
+    assert drums.most[0] == pytest.approx(80.0)
+    rng = np.random.default_rng(5)
+    turns = rng.uniform(0.0, 80.0, (125_000, 8))
+    counts = np.rint(drums.counts(drums.lengths(turns)))
+    length = sl.lengths_from_counts(robot, counts)
+    back = drums.counts(length * (1.0 + drums.rest_strain))
+    assert counts.size == 1_000_000
+    np.testing.assert_array_equal(np.rint(back), counts)
+    assert np.abs(back - counts).max() < 1e-6
+    assert [np.ptp(counts[:, i]) > 79.9 * 12 * 4096 for i in range(2)] == [True, True]
+
+
+def test_a_plan_comes_back_to_half_a_count(robot: sl.Robot, plan: sl.Plan) -> None:
+    counts = sl.encoder_counts(plan)
+    np.testing.assert_array_equal(counts, np.rint(counts))
+    back = sl.lengths_from_counts(robot, counts)
+    half = 0.5 * 2.0 * np.pi * (0.05 + 3 * 0.0035) / (12 * 4096)
+    assert 0.5 * half < np.abs(back - plan.unstrained_length).max() < half
+    np.testing.assert_array_equal(sl.encoder_counts(sl.inverse(robot, plan.state.pose[0])), counts[0])
+
+
+def test_one_layer_with_a_fixed_exit_is_a_line() -> None:
+    robot = wound(drum_width=None, layers=None, drum_distance=None, cable_length=None, gear=-3.0)
+    plan = sl.inverse(robot, POSE)
+    turns = (plan.unstrained_length * (1.0 + 160.0 / robot.cables.axial_stiffness) - 10.0) / np.hypot(
+        2.0 * np.pi * 0.05, 0.004
+    )
+    np.testing.assert_array_equal(sl.encoder_counts(plan), np.rint(1e5 - turns * 3.0 * 4096))
+
+
+def test_counts_rise_with_the_length_where_the_gear_is_positive_and_fall_where_it_is_not(plan: sl.Plan) -> None:
+    counts = sl.encoder_counts(plan)
+    with np.errstate(invalid="ignore"):
+        way = np.sign(np.diff(counts, axis=0)) * np.sign(np.diff(plan.unstrained_length, axis=0))
+    assert set(way[:, 0].tolist()) <= {1.0, 0.0}
+    assert set(way[:, 1].tolist()) <= {-1.0, 0.0}
+
+
+def test_at_home_the_counts_are_those_that_were_read(robot: sl.Robot) -> None:
+    read = np.arange(8) * 1000.0 - 3500.0
+    at_home = sl.inverse(robot, POSE)
+    tension = at_home.state.cables.frame_end_tension
+    zeroed = sl.home(robot, POSE, tension, read, temperature=10.0)
+    np.testing.assert_array_equal(sl.encoder_counts(sl.inverse(zeroed, POSE), temperature=10.0), read)
+    np.testing.assert_allclose(
+        sl.lengths_from_counts(zeroed, read, temperature=10.0), at_home.unstrained_length, rtol=1e-13
+    )
+    assert robot.winches is not None
+    np.testing.assert_array_equal(robot.winches.count_zero, np.full(8, 1e5))  # the one given stays as it is
+
+
+@pytest.mark.parametrize("name", ["cogiro", "article-prototype", "article-mixed", "ipanema-1"])
+@pytest.mark.parametrize(
+    "winch",
+    [
+        sl.Winch(),
+        sl.Winch(0.05, dead_cable=5.0, dead_rise=4.0),
+        sl.Winch(0.05, swivel_axis=[0.0, 0.0, -1.0], dead_cable=5.0, dead_rise=-1.0),
+    ],
+    ids=["bare", "from below", "from above"],
+)
+@pytest.mark.parametrize("model", [sl.Catenary(), sl.Elastic(), sl.Parabolic()], ids=["exact", "elastic", "parabolic"])
+def test_homing_finds_the_lengths_of_a_plan_from_its_tensions(name: str, winch: sl.Winch, model: sl.CableModel) -> None:
+    robot = sl.load_robot(name).replace(winches=winch)
+    assert robot.test_box is not None
+    box = robot.test_box
+    pose = sl.Pose(box.low + 0.4 * (box.high - box.low), np.eye(3))
+    plan = sl.inverse(robot, pose, model)
+    winches = sl.home(robot, pose, plan.state.cables.frame_end_tension, model=model).winches
+    assert winches is not None
+    assert winches.length_zero is not None
+    np.testing.assert_allclose(winches.length_zero, plan.unstrained_length, rtol=1e-12)
+
+
+def test_over_pulleys_and_dead_cable_counts_lead_back_to_the_pose() -> None:
+    behind: dict[str, Any] = {
+        "pulley_radius": 0.05,
+        "dead_cable": 5.0,
+        "dead_rise": 4.0,
+        "cable_length": 33.0,
+        "counts_per_turn": 1e7,
+    }
+    robot = wound(**behind)
+    read = sl.inverse(robot, POSE).state.cables.frame_end_tension
+    robot = sl.home(robot, POSE, read, 12345.0)
+    poses = sl.Pose.from_euler([[1.0, 1.0, 2.0], [-2.0, 0.5, 2.5], [3.0, -1.0, 1.5]], 0.0, 0.0, 0.0)
+    counts = sl.encoder_counts(sl.inverse(robot, poses))
+    np.testing.assert_array_equal(counts[0], np.full(8, 12345.0))
+    found = sl.forward(robot, sl.lengths_from_counts(robot, counts), start=poses)
+    assert found.solved.all()
+    np.testing.assert_allclose(found.pose.position, poses.position, rtol=0.0, atol=1e-8)
+
+
+def test_warm_cables_are_longer(robot: sl.Robot, plan: sl.Plan) -> None:
+    counts = sl.encoder_counts(plan)
+    lengths = sl.lengths_from_counts(robot, counts)
+    warm = sl.lengths_from_counts(robot, counts, temperature=np.arange(8.0))
+    np.testing.assert_allclose(warm / lengths - 1.0, np.broadcast_to(1.2e-5 * np.arange(8.0), warm.shape), atol=1e-15)
+    back = sl.lengths_from_counts(robot, sl.encoder_counts(plan, temperature=25.0), temperature=25.0)
+    np.testing.assert_allclose(back, plan.unstrained_length, rtol=0.0, atol=4e-6)
+
+
+def test_crept_cables_are_longer(robot: sl.Robot, plan: sl.Plan) -> None:
+    creep = sl.Creep(3e5, 2.0)
+    assert plan.path is not None
+    strain = creep.strain(plan.path.time, plan.chord_tension)
+    back = sl.lengths_from_counts(robot, sl.encoder_counts(plan, creep=creep)) * (1.0 + strain)
+    assert strain.max() > 1e-3
+    np.testing.assert_allclose(back, plan.unstrained_length, rtol=0.0, atol=4e-6)
+
+
+def test_memory_both_ways(robot: sl.Robot, plan: sl.Plan) -> None:
+    counts = sl.encoder_counts(plan, "remembered")
+    assert np.abs(counts - sl.encoder_counts(plan)).max() > 10.0
+    tension = sl.winch_rates(plan).drum_tension
+    back = sl.lengths_from_counts(robot, counts, "remembered", drum_tension=tension)
+    np.testing.assert_allclose(back, plan.unstrained_length, rtol=0.0, atol=4e-6)
+
+
+def memory_matters(plan: Plan, winding_tension: float) -> float:
+    """Largest difference that the drums' memory makes along a plan [m]."""
+    robot = plan.state.one_robot
+    winch = sl.Winch(
+        drum_radius=0.05,
+        groove_pitch=0.006,
+        counts_per_turn=1e8,
+        length_zero=4.0,
+        winding_tension=winding_tension,
+    )
+    there = robot.replace(cables=robot.cables.replace(diameter=0.002), winches=winch)
+    along = sl.inverse(there, plan.path, plan.state.cables.model, plan.tension)  # type: ignore[arg-type]
+    np.testing.assert_array_equal(along.unstrained_length, plan.unstrained_length)
+    off = sl.lengths_from_counts(there, sl.encoder_counts(along, "remembered"))
+    return float(np.abs(off - plan.unstrained_length).max())
+
+
+def test_on_the_prototypes_tour_the_memory_is_worth_twelve_millimeters() -> None:
+    plan = tour().plan
+    tension = plan.state.cables.frame_end_tension
+    assert (tension.min(), tension.max()) == pytest.approx((71.0, 768.0), abs=0.5)
+    assert plan.state.one_robot.cables.axial_stiffness == pytest.approx(14e3)
+    # wound at the mean tension of the home pose, and at that of the whole tour
+    assert 1e3 * memory_matters(plan, tension[0].mean()) == pytest.approx(10.9, abs=0.1)
+    assert 1e3 * memory_matters(plan, tension.mean()) == pytest.approx(13.4, abs=0.1)
+
+
+def test_poses_without_an_answer_have_no_counts(robot: sl.Robot) -> None:
+    poses = sl.Pose.from_euler([[1.0, 1.0, 2.0], [30.0, 0.0, 2.0], [0.0, 1.0, 2.0]], 0.0, 0.0, 0.0)
+    counts = sl.encoder_counts(sl.inverse(robot, poses))
+    assert np.isnan(counts).all(axis=1).tolist() == [False, True, False]
+    assert np.isnan(sl.lengths_from_counts(robot, counts)).all(axis=1).tolist() == [False, True, False]
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"drum_radius": None, "groove_pitch": None}, "winches: drum_radius, winches: groove_pitch is not given"),
+        ({"drum_width": None}, "winches: drum_width is not given"),
+        ({"cable_length": None}, "winches: cable_length is not given"),
+        ({"layers": None, "cable_length": None}, "winches: cable_length is not given"),
+        ({"counts_per_turn": None}, "winches: counts_per_turn is not given; allowed: one value, or one a cable"),
+        ({"length_zero": None}, r"winches: length_zero is not given; .* find it with home\(robot, pose, frame_end"),
+        ({"drum_width": 0.003}, r"winches: drum_width\[0\] is 0.003 m; allowed: >= 0.004 m, its groove_pitch"),
+        ({"layers": 5000}, r"winches: layers\[0\] is 5000; allowed: 1 to 1000"),
+        (
+            {"layers": 2},
+            r"winches: length_zero\[0\] is 10 m; allowed: 14.* to 27.* m. The drum is full with 2 layers, 40",
+        ),
+        (
+            {"length_zero": 30.0},
+            r"winches: length_zero\[0\] is 30 m; allowed: .* There are 28 m of cable, winches: cable_l",
+        ),
+        (
+            {"cable_length": 13.0},
+            "sample 1, cable 0: unstrained length is 14.* m; allowed: 0 to 12.* m. There are 13 m of cable",
+        ),
+        (
+            {"cable_length": 37.0, "length_zero": 13.0},
+            r"sample 0, cable \d: unstrained length is .* The drum is full with 4 layers, 80 turns; correct it",
+        ),
+    ],
+)
+def test_what_is_missing_or_does_not_fit_is_named(changes: dict[str, Any], told: str) -> None:
+    poses = sl.Pose.from_euler([[0.0, 0.0, 2.0], [4.0, 3.0, 2.0]], 0.0, 0.0, 0.0)
+    with pytest.raises(sl.InvalidValueError, match=told):
+        sl.encoder_counts(sl.inverse(wound(**changes), poses))
+
+
+def test_a_robot_without_winches_or_diameter_says_what_it_lacks() -> None:
+    robot = sl.load_robot("cogiro")
+    told = "winches: drum_radius, winches: groove_pitch, cables: diameter is not given; .* in the robot file, or with"
+    with pytest.raises(sl.InvalidValueError, match=told):
+        sl.encoder_counts(sl.inverse(robot, POSE))
+    thin = wound().replace(cables=robot.cables)
+    with pytest.raises(sl.InvalidValueError, match=r"^cables: diameter is not given"):
+        sl.lengths_from_counts(thin, np.zeros(8))
+    with pytest.raises(sl.InvalidValueError, match=r"winches is not given; .*Winch"):
+        sl.home(robot, POSE, 300.0)
+    cold = wound().replace(cables=robot.cables.replace(diameter=0.004))
+    with pytest.raises(sl.InvalidValueError, match="cables: expansion is not given"):
+        sl.lengths_from_counts(cold, np.full(8, 1e5), temperature=3.0)
+
+
+def test_counts_that_run_off_the_drum_are_told_with_what_it_takes(robot: sl.Robot) -> None:
+    counts = np.full((3, 8), 1e5)
+    counts[2, 1] = -5e6
+    with pytest.raises(sl.InvalidValueError) as caught:
+        sl.lengths_from_counts(robot, counts)
+    assert caught.value.item == "sample 2, cable 1: count"
+    low, high = (float(word) for word in caught.value.allowed.split(" to "))
+    for end in (low, high):  # as far as the message says one may go
+        counts[2, 1] = end
+        sl.lengths_from_counts(robot, counts)
+    for end in (low - 1.0, high + 1.0):
+        counts[2, 1] = end
+        with pytest.raises(sl.InvalidValueError, match="sample 2, cable 1: count is"):
+            sl.lengths_from_counts(robot, counts)
+
+
+@pytest.mark.parametrize("tension", [1e-3, 1.0])
+def test_no_cable_hangs_with_less_tension_than_its_own_weight_gives(robot: sl.Robot, tension: float) -> None:
+    with pytest.raises(
+        sl.InvalidValueError, match=r"cable 0: frame_end_tension is .* N; allowed: what a cable can have"
+    ):
+        sl.home(robot, POSE, tension)
+
+
+def test_memory_needs_tensions_and_constant_winding_none(robot: sl.Robot) -> None:
+    with pytest.raises(sl.InvalidValueError, match="drum_tension is not given"):
+        sl.lengths_from_counts(robot, np.full(8, 1e5), "remembered")
+    with pytest.raises(sl.InvalidValueError, match="drum_tension is given"):
+        sl.lengths_from_counts(robot, np.full(8, 1e5), drum_tension=np.ones(8))
+    with pytest.raises(sl.InvalidValueError, match="creep is given for a plan without a path"):
+        sl.encoder_counts(sl.inverse(robot, POSE), creep=sl.Creep(1e6, 1.0))

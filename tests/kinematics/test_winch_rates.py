@@ -1,0 +1,106 @@
+"""Speeds against differences of counts, torques against the balance of power."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.robot.drum import drums_of
+from tests.kinematics.winches import wound
+
+LIMITS: dict[str, Any] = {"inertia": 2e-4, "friction": 15.0, "speed_limit": 350.0, "torque_limit": 2.0}
+
+
+@pytest.fixture(scope="module")
+def plan() -> sl.Plan:
+    path = sl.quintic_path([(0, 0, 1.5), (3, 1, 2.5)], durations=3.0, rate=200.0)
+    return sl.inverse(wound(**LIMITS), path)
+
+
+@pytest.fixture(scope="module")
+def rates(plan: sl.Plan) -> sl.WinchRates:
+    return sl.winch_rates(plan)
+
+
+def differences(plan: sl.Plan, values: np.ndarray) -> np.ndarray:
+    """Central differences between samples, of second order."""
+    assert plan.path is not None
+    return np.asarray((values[2:] - values[:-2]) / (plan.path.time[2:] - plan.path.time[:-2])[:, None])
+
+
+def test_speeds_are_differences_of_counts(plan: sl.Plan, rates: sl.WinchRates) -> None:
+    drums = drums_of(plan.state.one_robot)
+    counts = drums.counts(plan.unstrained_length * (1.0 + drums.rest_strain))
+    assert rates.count_rate is not None
+    scale = np.abs(rates.count_rate).max()
+    off = np.abs(differences(plan, counts) - rates.count_rate[1:-1])
+    turns, _ = drums.turns(plan.unstrained_length * (1.0 + drums.rest_strain))
+    layer = np.floor(turns / 20.0)
+    same = layer[2:] == layer[:-2]  # where a layer ends the speed jumps
+    assert not same.all()
+    assert off[same].max() < 2e-4 * scale
+    np.testing.assert_allclose(rates.count_rate, rates.motor_speed / (2.0 * np.pi) * 4096.0, rtol=1e-14)
+    np.testing.assert_allclose(rates.motor_speed, rates.drum_speed * np.array([12.0, -12.0] * 4), rtol=1e-14)
+    np.testing.assert_allclose(
+        differences(plan, rates.motor_speed)[same], rates.motor_acceleration[1:-1][same],
+        atol=1e-3 * np.abs(rates.motor_acceleration).max(),
+    )  # fmt: skip
+
+
+def test_power_goes_into_cable_friction_and_inertia(plan: sl.Plan, rates: sl.WinchRates) -> None:
+    assert rates.motor_torque is not None
+    assert plan.length_rate is not None
+    pull = plan.length_rate * (1.0 + 160.0 / plan.state.one_robot.cables.axial_stiffness)
+    motor = rates.motor_torque * rates.motor_speed
+    spent = 15.0 * np.abs(pull) - rates.drum_tension * pull + 2e-4 * rates.motor_speed * rates.motor_acceleration
+    np.testing.assert_allclose(motor, spent, rtol=0.0, atol=1e-10 * np.abs(motor).max())
+    assert np.abs(spent + rates.drum_tension * pull).max() > 0.02 * np.abs(motor).max()
+
+
+def test_the_motor_holds_the_cable_with_the_radius_of_its_layer(plan: sl.Plan, rates: sl.WinchRates) -> None:
+    assert rates.motor_torque is not None
+    drums = drums_of(plan.state.one_robot)
+    turns, _ = drums.turns(plan.unstrained_length * (1.0 + drums.rest_strain))
+    radius = 0.05 + np.floor(turns / 20.0) * 0.004 * np.sqrt(3.0) / 2.0
+    assert np.unique(radius).size > 1
+    pull = 15.0 * np.sign(rates.drum_speed) - rates.drum_tension
+    expected = 2e-4 * rates.motor_acceleration + pull * radius / np.array([12.0, -12.0] * 4)
+    np.testing.assert_allclose(rates.motor_torque, expected, rtol=1e-3, atol=1e-3)
+    # without pulleys and dead cable the tension at the drum is that at the frame end
+    np.testing.assert_allclose(rates.drum_tension, plan.state.cables.frame_end_tension, rtol=1e-14)
+
+
+def test_what_exceeds_a_limit_is_told(rates: sl.WinchRates) -> None:
+    assert rates.too_fast is not None
+    assert rates.too_strong is not None
+    assert rates.motor_torque is not None
+    np.testing.assert_array_equal(rates.too_fast, np.abs(rates.motor_speed) > 350.0)
+    np.testing.assert_array_equal(rates.too_strong, np.abs(rates.motor_torque) > 2.0)
+    assert 0 < rates.too_fast.sum() < rates.too_fast.size
+    assert 0 < rates.too_strong.sum() < rates.too_strong.size
+    np.testing.assert_array_equal(rates.exceeding, (rates.too_fast | rates.too_strong).any(axis=1))
+
+
+def test_what_is_not_known_is_none(plan: sl.Plan) -> None:
+    robot = wound(counts_per_turn=None, length_zero=None)
+    rates = sl.winch_rates(sl.inverse(robot, plan.path))  # type: ignore[arg-type]
+    assert (rates.motor_torque, rates.count_rate, rates.too_fast, rates.too_strong) == (None,) * 4
+    assert not rates.exceeding.any()
+    np.testing.assert_array_equal(rates.drum_speed, sl.winch_rates(plan).drum_speed)
+
+
+def test_samples_without_an_answer_have_no_rates() -> None:
+    path = sl.quintic_path([(0, 0, 1.5), (9, 1, 2.5), (0, 0, 1.5)], durations=3.0, rate=20.0)
+    plan = sl.inverse(wound(**LIMITS), path)
+    assert 0 < plan.feasible.sum() < plan.feasible.size
+    rates = sl.winch_rates(plan)
+    for values in (rates.drum_speed, rates.motor_acceleration, rates.motor_torque):
+        assert values is not None
+        np.testing.assert_array_equal(np.isfinite(values).all(axis=1), plan.feasible)
+    assert not rates.exceeding[~plan.feasible].any()
+
+
+def test_poses_without_times_have_no_rates(plan: sl.Plan) -> None:
+    with pytest.raises(sl.InvalidValueError, match="plan is one of poses without times; allowed: one along a path"):
+        sl.winch_rates(sl.inverse(wound(), plan.state.pose[0]))

@@ -1,0 +1,67 @@
+"""Tension at the drum against the cable's own differential equation; what the tables of drums hold."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import sagline as sl
+from sagline.robot.drum import drum_tension, drums_of
+from tests.kinematics.winches import wound
+
+
+@pytest.mark.parametrize("rise", [3.0, -2.5])
+def test_the_tension_at_the_drum_is_that_of_a_guided_cable(rise: float) -> None:
+    robot = wound("article-prototype", dead_cable=3.5, dead_rise=rise)
+    state = sl.inverse(robot, sl.Pose.from_euler([0.3, 0.2, 1.5], 0, 0, 0)).state
+    weight, stiffness = robot.cables.linear_density * robot.gravity, robot.cables.axial_stiffness
+    begin = state.cables.frame_end_tension
+    along = solve_ivp(  # dT/dz = weight of a meter of stretched cable
+        lambda z, tension: weight / (1.0 + tension / stiffness), (0.0, -rise), begin, rtol=1e-12, atol=1e-10
+    )
+    np.testing.assert_allclose(drum_tension(state), along.y[:, -1], rtol=1e-10)
+    assert np.sign(drum_tension(state) - begin) == pytest.approx(-np.sign(rise))
+    # the dead cable is as long as its tensions say: strains between that of the frame end and that of the drum
+    assert state.contact is not None
+    mean = 3.5 / (1.0 + 0.5 * (begin + drum_tension(state)) / stiffness)
+    np.testing.assert_allclose(state.contact.dead_length, mean, rtol=1e-7)
+
+
+@pytest.mark.parametrize("axis", [1.0, -1.0])
+def test_over_a_pulley_the_tension_goes_with_the_height_of_the_exit(axis: float) -> None:
+    robot = wound("article-prototype", pulley_radius=0.2, swivel_axis=[0.0, 0.0, axis])
+    state = sl.inverse(robot, sl.Pose.from_euler([0.3, 0.2, 1.5], 0, 0, 0)).state
+    weight = robot.cables.linear_density * robot.gravity
+    higher = state.exit_point[:, 2] - robot.frame_anchors[:, 2]
+    assert (np.sign(higher) == axis).all()
+    stretched = 1.0 + state.cables.frame_end_tension / robot.cables.axial_stiffness
+    np.testing.assert_allclose(
+        state.cables.frame_end_tension - drum_tension(state), weight * higher / stretched, rtol=1e-4
+    )
+
+
+def test_where_layers_begin() -> None:
+    drums = drums_of(wound())
+    assert drums.starts.shape == (8, 5)
+    np.testing.assert_allclose(drums.lengths(np.full((1, 8), 40.0))[0], drums.starts[:, 2], rtol=1e-15)
+    np.testing.assert_allclose(drums.turns(drums.starts[:, 1:2].T)[0][0], 20.0, rtol=1e-14)
+    # nested in an equilateral triangle, four millimeters of rope on a pitch radius of fifty: 6.9 % a layer
+    assert drums.table[0, 1] / drums.table[0, 0] == pytest.approx(0.069, abs=5e-4)
+
+
+def test_every_cable_has_its_own_drum() -> None:
+    layers = np.array([4, 4, 5, 4, 6, 4, 4, 4])
+    robot = wound(layers=layers, drum_radius=np.linspace(0.048, 0.08, 8))
+    drums = drums_of(robot)
+    alone = drums_of(wound(layers=6, drum_radius=np.linspace(0.048, 0.08, 8)[4]))
+    turns = np.linspace(0.0, 119.0, 40)[:, None] * np.ones(8)
+    np.testing.assert_array_equal(drums.lengths(turns)[:, 4], alone.lengths(turns)[:, 4])
+    np.testing.assert_array_equal(drums.most, 20.0 * layers)
+
+
+@pytest.mark.parametrize("offset", [-0.11, 0.0, 0.05])
+def test_nothing_jumps_where_a_layer_ends(offset: float) -> None:
+    drums = drums_of(wound(drum_offset=offset))
+    ends = 20.0 * np.arange(1, 4)[:, None] * np.ones(8)
+    before, after = drums.lengths(ends - 1e-9), drums.lengths(ends + 1e-9)
+    np.testing.assert_allclose(before, after, rtol=0.0, atol=1e-8)
+    assert (before > after).all()
