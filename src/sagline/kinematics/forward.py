@@ -21,7 +21,8 @@ from sagline.memory import check_poses
 from sagline.robot.pose import Pose
 from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot
-from sagline.robot.several import check_count, first_of, together
+from sagline.robot.several import Robots, check_count, first_of, together
+from sagline.robot.wheels import dead_cable
 from sagline.statics.tables import pose_rows
 from sagline.statics.wrench import external_wrench
 
@@ -60,11 +61,10 @@ def forward(
         ForwardSolution, single or with a leading axis N.
 
     Raises:
-        InvalidValueError: If a length is not positive or single lengths of a sample are NaN (the message names the
-            cable), several robots do not fit together (it names which), an argument is of the wrong kind or shape,
-            the start is outside the motions of the robot's pattern, or so many samples need more memory than is free.
-            cable), several robots do not fit together (it names which), an argument is of the wrong shape, or so many
-            samples need more memory than is free.
+        InvalidValueError: If a length is not positive, or no longer than the dead cable behind its pulley, or single
+            lengths of a sample are NaN (the message names the cable), several robots do not fit together (it names
+            which), an argument is of the wrong kind or shape, the start is outside the motions of the robot's pattern,
+            or so many samples need more memory than is free.
 
     Source:
         docs/model.md, section 6.
@@ -82,7 +82,7 @@ def forward(
         optional(value, kind, item)
     instance(model, CableModel, "model")
     callback(progress, "progress")
-    lengths = checked_lengths(first_of(robots), unstrained_length)
+    lengths = checked_lengths(robots, unstrained_length)
     shape = lengths.shape[:-1]
     count = shape[0] if shape else None
     check_count(robots, count)
@@ -102,11 +102,11 @@ def forward(
     return found.solution(robots, model, load, shape, covariance)
 
 
-def checked_lengths(robot: Robot, lengths: ArrayLike) -> Array:
-    """The caller's lengths, shape (m,) or (N, m), positive or whole rows of NaN.
+def checked_lengths(robot: Robots, lengths: ArrayLike) -> Array:
+    """The caller's lengths, shape (m,) or (N, m), positive and beyond the dead cable, or whole rows of NaN.
 
     Args:
-        robot: Gives the number of cables, and its name to messages.
+        robot: Gives the number of cables, their dead cable, and its name to messages; or one a sample.
         lengths: What the caller gave [m].
 
     Returns:
@@ -116,13 +116,14 @@ def checked_lengths(robot: Robot, lengths: ArrayLike) -> Array:
         InvalidValueError: If they are not; the message names the cable and, of many, the sample.
     """
     array = numbers(lengths, "unstrained_length", "m")
-    m = robot.cable_count
+    shared, dead = first_of(robot), dead_cable(robot)
+    m = shared.cable_count
     if array.ndim not in (1, 2) or array.shape[-1] != m:
         raise InvalidValueError(
             "unstrained_length",
             f"of shape {array.shape}",
             f"shape ({m},) or (N, {m})",
-            f"Give one length for each of the {m} cables of {robot.name}.",
+            f"Give one length for each of the {m} cables of {shared.name}.",
         )
     absent = np.isnan(array).all(axis=-1, keepdims=True)
     wrong = ~((array >= SMALLEST) & (array < LARGEST)) & ~absent
@@ -135,7 +136,30 @@ def checked_lengths(robot: Robot, lengths: ArrayLike) -> Array:
             "> 0 m, finite; or NaN for all cables of a sample",
             "Correct the length of this cable.",
         )
+    short = array <= dead if dead.shape[:-1] in ((), array.shape[:-1]) else np.zeros(array.shape, dtype=bool)
+    if (short & (dead > 0.0)).any():
+        raise dead_only(array, np.broadcast_to(dead, array.shape))
     return locked(array)
+
+
+def dead_only(lengths: Array, dead: Array) -> InvalidValueError:
+    """The error of a length that would not reach from drum to pulley.
+
+    Args:
+        lengths: Unstrained lengths [m], shape (m,) or (N, m).
+        dead: Dead cable [m], of the same shape; no less than one of the lengths.
+
+    Returns:
+        The error, to be raised: it names the cable and, of many, the sample.
+    """
+    index = tuple(int(i) for i in np.argwhere((lengths <= dead) & (dead > 0.0))[0])
+    sample = f"sample {index[0]}, " if lengths.ndim == 2 else ""
+    return InvalidValueError(
+        f"{sample}cable {index[-1]}: unstrained length",
+        f"{lengths[index]:.9g} m",
+        f"> {dead[index]:.9g} m, the dead cable behind its pulley",
+        "Give all cable off the drum, or correct its dead_cable.",
+    )
 
 
 def start_rows(start: Pose, lengths: Array) -> Array:

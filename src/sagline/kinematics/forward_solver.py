@@ -17,12 +17,14 @@ from sagline.kernels.forward.forward import forward_poses
 from sagline.kernels.forward.problem import FORCE_RESIDUAL, FORWARD_NUMBERS, MOMENT_RESIDUAL, STIFFNESS_MIN
 from sagline.kernels.memory import memory_for
 from sagline.kinematics.caller import give, take
+from sagline.kinematics.forward import dead_only
 from sagline.kinematics.forward_rows import new_chain
 from sagline.kinematics.forward_status import STABLE, ForwardStatus
 from sagline.kinematics.start import search
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.robot.several import anything_behind
+from sagline.robot.wheels import dead_cable
 from sagline.statics.tables import body_table, cable_table, pose_rows
 
 
@@ -74,6 +76,7 @@ class ForwardSolver:
                 "model", "Straight()", "a model with forces", "Use forward() to fit straight cables."
             )
         m = robot.cable_count
+        self._dead = None if robot.winches is None else dead_cable(robot)
         self._lengths = np.ones((1, m))
         self._start = np.zeros((1, tables.POSE_COLUMNS))
         self._wrench = np.zeros((1, 6))
@@ -128,9 +131,12 @@ class ForwardSolver:
             A fresh result whose arrays belong to the caller.
 
         Raises:
-            InvalidValueError: If a length is not positive (the message names its index), or a shape is wrong.
+            InvalidValueError: If a length is not positive, or no longer than its dead cable (the message names the
+                cable), or a shape is wrong.
         """
         lengths = self._checked(unstrained_length)
+        if self._dead is not None and not (lengths > self._dead).all():
+            raise dead_only(lengths, self._dead)
         load = None if wrench is None else exactly(wrench, "wrench", "N or N m", (6,))
         position, quaternion = np.empty(3), np.empty(4)
         status = self.step_into(lengths, position, quaternion, load)
