@@ -21,7 +21,7 @@ from sagline.memory import check_poses
 from sagline.robot.pose import Pose
 from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot
-from sagline.robot.several import Robots, check_count, first_of, together
+from sagline.robot.several import Robots, anything_behind, check_count, first_of, together
 from sagline.robot.wheels import dead_cable
 from sagline.statics.tables import pose_rows
 from sagline.statics.wrench import external_wrench
@@ -86,7 +86,7 @@ def forward(
     shape = lengths.shape[:-1]
     count = shape[0] if shape else None
     check_count(robots, count)
-    check_poses(count or 1, lengths.shape[-1])
+    check_poses(count or 1, lengths.shape[-1], anything_behind(robots))
     load = external_wrench(wrench, count)
     samples, loads = np.atleast_2d(lengths), np.atleast_2d(load)
     if start is None:
@@ -136,8 +136,8 @@ def checked_lengths(robot: Robots, lengths: ArrayLike) -> Array:
             "> 0 m, finite; or NaN for all cables of a sample",
             "Correct the length of this cable.",
         )
-    short = array <= dead if dead.shape[:-1] in ((), array.shape[:-1]) else np.zeros(array.shape, dtype=bool)
-    if (short & (dead > 0.0)).any():
+    fitting = dead.shape[:-1] in ((), array.shape[:-1])  # who gives other counts is told so later
+    if fitting and ((array <= dead) & (dead > 0.0)).any():
         raise dead_only(array, np.broadcast_to(dead, array.shape))
     return locked(array)
 

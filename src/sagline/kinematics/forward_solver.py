@@ -75,17 +75,17 @@ class ForwardSolver:
             raise InvalidValueError(
                 "model", "Straight()", "a model with forces", "Use forward() to fit straight cables."
             )
-        m = robot.cable_count
+        m, behind = robot.cable_count, anything_behind(robot)
         self._dead = None if robot.winches is None else dead_cable(robot)
         self._lengths = np.ones((1, m))
         self._start = np.zeros((1, tables.POSE_COLUMNS))
         self._wrench = np.zeros((1, 6))
         self._pose = np.empty((1, tables.POSE_COLUMNS))
-        self._results = np.empty((tables.RESULT_ROWS, 1, m))
+        self._results = np.empty((tables.RESULT_ROWS if behind else tables.BARE_ROWS, 1, m))
         self._numbers = np.empty((1, FORWARD_NUMBERS))
         self._status: Codes = np.empty(1, dtype=np.int8)
         self._arguments: tuple[Any, ...] = (
-            (self._model.code, *self._model.parameters, anything_behind(robot) or None),
+            (self._model.code, *self._model.parameters, behind or None),
             True,  # a chain goes on from what it remembers of the last equilibrium
             (
                 robot.freedom,

@@ -23,7 +23,7 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot
-from sagline.robot.several import first_of, one_a_pose
+from sagline.robot.several import anything_behind, first_of, one_a_pose
 from sagline.statics.chords import refuse_missing_chords
 from sagline.statics.tables import pose_rows
 from sagline.statics.wrench import external_wrench, inertial_wrench
@@ -92,7 +92,7 @@ def inverse(
     options = kernel_options(robots, model, method)
     rows = pose_rows(pose)
     count = len(rows)
-    check_poses(count, shared.cable_count)
+    check_poses(count, shared.cable_count, anything_behind(robots))
     load = external_wrench(wrench, count if pose.shape else None)
     if isinstance(motion, Path):
         load = locked(inertial_wrench(robots, pose, motion.twist, motion.twist_rate) + load)
