@@ -47,11 +47,13 @@ class Instants(NamedTuple):
     Attributes:
         before: A step before.
         after: A step after.
+        later: Two steps after.
         step: The step [s].
     """
 
     before: Instant
     after: Instant
+    later: Instant
     step: float
 
 
@@ -78,7 +80,7 @@ def instants(robot: Robots, path: Path, wrench: Array) -> Instants:
         inertial = inertial_wrench(robot, pose, twist, path.twist_rate + h * jerk)
         return Instant(pose, inertial + external + h * external_rate)
 
-    return Instants(at(-step), at(step), step)
+    return Instants(at(-step), at(step), at(2.0 * step), step)
 
 
 def _rate(time: Array, values: Array) -> Array:

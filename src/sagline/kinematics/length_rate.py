@@ -6,7 +6,7 @@ import numpy as np
 
 from sagline.arrays import Array, Flags, Indices, locked
 from sagline.kernels import tables
-from sagline.kinematics.instants import Instant, Instants, instants
+from sagline.kinematics.instants import Instants, instants
 from sagline.kinematics.inverse_rows import solve_rows
 from sagline.kinematics.tension_rate import closest_rates, placed
 from sagline.motion.path import Path
@@ -24,7 +24,7 @@ def length_rate(state: Equilibrium, path: Path, tension: TensionMethod, feasible
     Geometry and tensions both change: L(t) = L(pose(t), tau(t)). A method that depends on the pose alone is solved
     again an instant before and after each sample, where the path's twist, its rate and its jerk lead; `Closest` follows
     the tensions it has, so that its tensions' rates are solved for: of all that keep the balance, the smallest, with
-    cables held at the limits that they would cross.
+    cables held at the limits that they would cross. Over pulleys the path is followed for two more steps instead.
 
     Args:
         state: Robot, poses, wrench and cables along the path.
@@ -42,8 +42,10 @@ def length_rate(state: Equilibrium, path: Path, tension: TensionMethod, feasible
     near = instants(state.robot, path, state.wrench)
     kept = np.flatnonzero(feasible)
     rates = np.full(state.cables.shape, np.nan)
-    if not isinstance(tension, Closest) or state.contact is not None:
+    if not isinstance(tension, Closest):
         rates[kept] = _solved_again(state, tension, near)[kept]
+    elif state.contact is not None:
+        rates[kept] = _walked(state, tension, near)[kept]
     elif kept.size:
         rates[kept] = _followed(state[kept], tension, near, kept)
     return locked(rates)
@@ -51,31 +53,33 @@ def length_rate(state: Equilibrium, path: Path, tension: TensionMethod, feasible
 
 def _solved_again(state: Equilibrium, tension: TensionMethod, near: Instants) -> Array:
     """Rates from poses solved again an instant before and after; to one side, where the path leaves the feasible."""
-    lengths = state.unstrained_length
-    before, after = (_lengths(state, tension, moment) for moment in (near.before, near.after))
+    options, lengths = kernel_options(state.robot, state.cables.model, tension), state.unstrained_length
+    none = np.full(first_of(state.robot).cable_count, np.nan)
+    before, after = (
+        solve_rows(state.robot, tension, options, pose_rows(moment.pose), locked(moment.wrench), none).results[
+            tables.LENGTH
+        ]
+        for moment in (near.before, near.after)
+    )
     sides = (after - before) / (2.0 * near.step)
     ahead, behind = (after - lengths) / near.step, (lengths - before) / near.step
     rates: Array = np.where(np.isnan(sides), np.where(np.isnan(ahead), behind, ahead), sides)
     return rates
 
 
-def _lengths(state: Equilibrium, tension: TensionMethod, moment: Instant) -> Array:
-    """Lengths at an instant, (N, m); `Closest` starts at every sample from the tensions that the sample has."""
-    options = kernel_options(state.robot, state.cables.model, tension)
-    rows, loads = pose_rows(moment.pose), locked(moment.wrench)
-    if not isinstance(tension, Closest):
-        none = np.full(first_of(state.robot).cable_count, np.nan)
-        lengths: Array = solve_rows(state.robot, tension, options, rows, loads, none).results[tables.LENGTH]
-        return lengths
-    held = np.where(np.isnan(state.chord_tension), np.nan, shared_tension(state, tension.variable))
-    return np.array(
-        [
-            solve_rows(
-                robot_at(state.robot, i), tension, options, rows[i : i + 1], loads[i : i + 1], held[i].copy()
-            ).results[tables.LENGTH, 0]
-            for i in range(len(rows))
-        ]
-    )
+def _walked(state: Equilibrium, tension: TensionMethod, near: Instants) -> Array:
+    """Rates of `Closest` over pulleys, from two steps on: backward it would leave the limits that hold it."""
+    options, lengths = kernel_options(state.robot, state.cables.model, tension), state.unstrained_length
+    held = shared_tension(state, tension.variable)
+    rows = np.stack([pose_rows(moment.pose) for moment in (near.after, near.later)], axis=1)
+    loads = np.stack([moment.wrench for moment in (near.after, near.later)], axis=1)
+    rates = np.full(lengths.shape, np.nan)
+    for i in np.flatnonzero(~np.isnan(lengths[:, 0])):
+        given = (robot_at(state.robot, int(i)), tension, options, locked(rows[i].copy()), locked(loads[i].copy()))
+        after, later = solve_rows(*given, held[i].copy()).results[tables.LENGTH]
+        twice = (4.0 * after - later - 3.0 * lengths[i]) / (2.0 * near.step)
+        rates[i] = np.where(np.isnan(twice), (after - lengths[i]) / near.step, twice)
+    return rates
 
 
 def _followed(state: Equilibrium, tension: TensionMethod, near: Instants, kept: Indices) -> Array:

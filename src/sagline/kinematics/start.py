@@ -159,8 +159,8 @@ def outside_limits(robot: Robots, model: CableModel, found: Found) -> Indices:
         Counts (N,); 0 for straight cables, whose tensions are not known.
     """
     limits = limits_of(robot)
-    cables = hung_cables(robot, model, found.results, found.cable_status, found.pose_status.shape)[0]
-    tension = limited_tension(robot, cables)
+    cables, contact = hung_cables(robot, model, found.results, found.cable_status, found.pose_status.shape)
+    tension = limited_tension(robot, cables, contact)
     low = (1.0 - _LIMIT_SLACK) * limits.low
     high = (1.0 + _LIMIT_SLACK) * limits.high
     count: Indices = ((tension < low) | (tension > high)).sum(axis=1)

@@ -118,19 +118,20 @@ class Equilibrium:
     @property
     def limited_tension(self) -> Array:
         """The tension that the robot's limits name [N], shape (m,) or (N, m): along the chord, or at the frame end."""
-        if first_of(self.robot).tension_limits_of == "chord":
-            return self.chord_tension
-        return self.cables.frame_end_tension
+        return limited_tension(self.robot, self.cables, self.contact)
 
 
-def limited_tension(robot: Robots, cables: CableState) -> Array:
+def limited_tension(robot: Robots, cables: CableState, contact: Contact | None = None) -> Array:
     """The tension that a robot's limits name: along the chord, or at the frame end.
 
     Args:
         robot: The robot, or several that fit together.
         cables: State of their cables, fields of shape (m,) or (N, m).
+        contact: What is behind them, or None.
 
     Returns:
         Tensions [N], of the shape of the cables' fields.
     """
-    return cables.chord_tension if first_of(robot).tension_limits_of == "chord" else cables.frame_end_tension
+    if first_of(robot).tension_limits_of == "frame_end":
+        return cables.frame_end_tension
+    return cables.chord_tension if contact is None else contact.chord_tension

@@ -16,9 +16,9 @@ from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.catenary import SMALL_HALLEY_STEP, relative_excess
 from sagline.kernels.cable.models import from_length
-from sagline.kernels.cable.over_pulleys import ask, begin_passes, settle
+from sagline.kernels.cable.over_pulleys import ask, begin_passes, take_answers
 from sagline.kernels.cable.terms import Material, Model
-from sagline.kernels.codes import CABLE_SOLVED, CATENARY
+from sagline.kernels.codes import CABLE_NOT_CONVERGED, CABLE_SOLVED, CATENARY
 from sagline.kernels.jit import formula, glue
 
 CLOSE = 0.1  # relative first step within which two Halley steps are trusted
@@ -110,11 +110,16 @@ def cable_forces(model: Model, cables: Array, rows: Array, behind: bool | None) 
     else:
         asked = Asked(rows[t.ASKED_SPAN], rows[t.ASKED_RISE], rows[t.ASKED_LENGTH], rows[t.SOFT])
         begin_passes(cables, rows)
+        missed = math.inf
         for _ in range(PASSES):
             ask(model, cables, rows)
             solve_asked(model, cables, asked, rows)
-            if settle(model, cables, rows) <= MISSED:
+            missed = take_answers(model, cables, rows)
+            if missed <= MISSED:
                 break
+        if not missed <= MISSED:
+            for i in range(cables.shape[0]):
+                rows[t.STATUS, i] = CABLE_NOT_CONVERGED
 
 
 @glue

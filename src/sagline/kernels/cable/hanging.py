@@ -22,10 +22,9 @@ from sagline.kernels.jit import glue, kernel
 # Relative change of tension within which one Newton step from the last ratio will do: it leaves 3e-8 of the ratio at
 # X = 2, 5e-15 at X = 0.01, and the square of a smaller change, so that rounds which stand still end in the last digit.
 NEAR = 1e-3
-CONTACTS = (
-    40  # passes until a cable leaves its pulley where its force says; the gap of a taut one is 1e-4, 4e-8, 1e-11, 0
-)
-SAME_PULL = 1e-16  # of the tension: a pull that changes by no more stands still
+# passes until a cable leaves its pulley where its force says; a taut one is 1e-4, 4e-8, 1e-11, 0 off
+CONTACTS = 40
+SAME_PULL = 4e-16  # of the tension: a pull that changes by no more stands still
 LIMIT_STEPS = 30
 LIMIT_PRECISION = 1e-13  # relative
 

@@ -52,7 +52,7 @@ def chord_at(rows: Array, i: int) -> Chord:
 
 @formula
 def wrap_at(rows: Array, i: int) -> Wrap:
-    """How far one cable of a pose lies on its pulley, after `settle`."""
+    """How far one cable of a pose lies on its pulley, after `take_answers`."""
     return Wrap(rows[t.WRAP_SINE, i], rows[t.WRAP_COSINE, i], rows[t.WRAP, i])
 
 
@@ -92,7 +92,7 @@ def ask(model: Model, cables: Array, rows: Array) -> None:
 
 
 @glue
-def settle(model: Model, cables: Array, rows: Array) -> float:
+def take_answers(model: Model, cables: Array, rows: Array) -> float:
     """Fill the forces and free spans from those of the cables asked for; returns the largest miss, of the length.
 
     A miss is added to what is asked for next time: of the exact cable by how much its platform end is missed, of the
@@ -159,6 +159,12 @@ def end_exactly(model: Model, cables: Array, rows: Array) -> None:
             )
 
 
+@formula
+def larger(one: float, other: float) -> float:
+    """The larger of two, NaN if either is."""
+    return other if not other <= one and not math.isnan(one) else one
+
+
 @glue
 def missed_ends(rows: Array) -> float:
     """Add by how much the platform ends are missed to what is asked for; returns the most, of a cable's length."""
@@ -167,9 +173,7 @@ def missed_ends(rows: Array) -> float:
         x, z = rows[t.FREE_SPAN, i] - rows[t.END_X, i], rows[t.FREE_RISE, i] - rows[t.END_Z, i]
         rows[t.OFF_X, i] += x
         rows[t.OFF_Z, i] += z
-        miss = abs(x) + abs(z)
-        if not miss <= largest * rows[t.LENGTH, i]:
-            largest = miss / rows[t.LENGTH, i]
+        largest = larger(largest, (abs(x) + abs(z)) / rows[t.LENGTH, i])
     return largest
 
 
@@ -193,7 +197,7 @@ def missed_lengths(model: Model, cables: Array, rows: Array) -> float:
         if model.code != ELASTIC and tension > 0.0:
             miss = free - from_tension(model, chord, material, tension)[0]
             rows[t.OFF_LENGTH, i] += miss
-            largest = max(largest, abs(miss) / rows[t.LENGTH, i])
+            largest = larger(largest, abs(miss) / rows[t.LENGTH, i])
     return largest
 
 
@@ -205,7 +209,7 @@ def weight_of(model: Model, material: Material) -> float:
 
 @formula
 def behind_at(model: Model, cables: Array, rows: Array, i: int) -> Behind:
-    """Unstrained cable behind P, after `settle`."""
+    """Unstrained cable behind P, after `take_answers`."""
     return behind_cable(model, material_at(cables, i), pulley_at(cables, i), rows[t.LEAVING, i], wrap_at(rows, i))
 
 

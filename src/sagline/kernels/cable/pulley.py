@@ -79,7 +79,7 @@ def pulley_at(cables: Array, i: int) -> Pulley:
 
 
 @kernel
-def anything_behind(cables: Array) -> bool:
+def robot_has_machine(cables: Array) -> bool:
     """Whether a cable of a robot's cable_table (m, CABLE_COLUMNS) has a pulley or dead cable."""
     total = 0.0
     for i in range(cables.shape[0]):
@@ -88,10 +88,10 @@ def anything_behind(cables: Array) -> bool:
 
 
 @kernel
-def any_behind(robots: Array) -> bool:
+def robots_have_machine(robots: Array) -> bool:
     """Whether one of several robots' cables has, (1 or N, m, CABLE_COLUMNS)."""
     for p in range(robots.shape[0]):
-        if anything_behind(robots[p]):
+        if robot_has_machine(robots[p]):
             return True
     return False
 
@@ -124,16 +124,21 @@ def from_axis(pulley: Pulley, chord: Chord) -> float:
 
 
 @formula
+def strains(pulley: Pulley, weight: float, stiffness: float, tension: float, sine: float) -> tuple[float, float, float]:
+    """E = 1 + e at P, where the cable enters the pulley, and where it leaves the drum; sine of the wrap angle."""
+    leaving = 1.0 + tension / stiffness
+    entering = math.sqrt(leaving * leaving - 2.0 * pulley.entry * weight * pulley.radius / stiffness * sine)
+    return leaving, entering, math.sqrt(entering * entering - 2.0 * weight * pulley.rise / stiffness)
+
+
+@formula
 def behind(pulley: Pulley, weight: float, stiffness: float, tension: float, wrap: Wrap) -> Behind:
     """Unstrained length on the pulley and behind it, from the tension at P; weight per length, 0 for weightless."""
-    radius, entry, dead, rise = pulley
-    strained = 1.0 + tension / stiffness
-    square = strained * strained
-    beta = weight * radius / stiffness
-    falls = entry * beta * (1.0 - wrap.cosine - wrap.angle * wrap.sine)
-    first = math.sqrt(square - 2.0 * entry * beta * wrap.sine)  # where it enters
-    last = math.sqrt(first * first - 2.0 * weight * rise / stiffness)  # where it leaves the drum
-    return Behind(radius * (wrap.angle - falls / square) / strained, 2.0 * dead / (first + last))
+    strained, first, last = strains(pulley, weight, stiffness, tension, wrap.sine)
+    beta = weight * pulley.radius / stiffness
+    falls = pulley.entry * beta * (1.0 - wrap.cosine - wrap.angle * wrap.sine)
+    wrapped = pulley.radius * (wrap.angle - falls / (strained * strained)) / strained
+    return Behind(wrapped, 2.0 * pulley.dead / (first + last))
 
 
 @formula
@@ -148,23 +153,18 @@ def behind_cable(model: Model, material: Material, pulley: Pulley, tension: floa
 @formula
 def softness(pulley: Pulley, weight: float, stiffness: float, tension: float, wrap: Wrap) -> float:
     """S: how much unstrained length the part behind P gives for a newton more of H, E_A^2 S that at P [m/N]."""
-    radius, entry, dead, rise = pulley
-    strained = 1.0 + tension / stiffness
-    first = math.sqrt(strained * strained - 2.0 * entry * weight * radius / stiffness * wrap.sine)
-    last = math.sqrt(first * first - 2.0 * weight * rise / stiffness)
-    on_pulley = radius * wrap.angle / (strained * strained * strained)
-    return (on_pulley + 2.0 * dead / ((first + last) * first * last)) / stiffness
+    strained, first, last = strains(pulley, weight, stiffness, tension, wrap.sine)
+    on_pulley = pulley.radius * wrap.angle / (strained * strained * strained)
+    return (on_pulley + 2.0 * pulley.dead / ((first + last) * first * last)) / stiffness
 
 
 @formula
 def energy_behind(pulley: Pulley, weight: float, stiffness: float, tension: float, wrap: Wrap, free: float) -> float:
     """Energy [J] of the part behind P, and of lifting the free one (of unstrained length `free`) to P; z from A."""
-    radius, entry, dead, rise = pulley
-    strained = 1.0 + tension / stiffness
+    radius, entry, dead, _rise = pulley
+    strained, entering, drawn = strains(pulley, weight, stiffness, tension, wrap.sine)
+    first, last = entering - 1.0, drawn - 1.0
     height = entry * radius * wrap.sine
-    beta = weight * radius / stiffness
-    first = math.sqrt(strained * strained - 2.0 * entry * beta * wrap.sine) - 1.0
-    last = math.sqrt((1.0 + first) * (1.0 + first) - 2.0 * weight * rise / stiffness) - 1.0
     whole = tension + 0.5 * tension * tension / stiffness - weight * height  # H
     wrapped, run = behind(pulley, weight, stiffness, tension, wrap)
     on_pulley = tension * wrap.angle + entry * weight * radius * (1.0 - wrap.cosine - wrap.angle * wrap.sine) / strained
@@ -201,11 +201,9 @@ def length_behind_by(
     tension = math.sqrt(force.horizontal * force.horizontal + vertical_a * vertical_a)
     sine, cosine = force.horizontal / tension, entry * vertical_a / tension
     wrapped = angle(sine, cosine)
-    strained = 1.0 + tension / stiffness
+    strained, first, last = strains(pulley, weight, stiffness, tension, sine)
     cube = strained * strained * strained
     beta = weight * radius / stiffness
-    first = math.sqrt(strained * strained - 2.0 * entry * beta * sine)
-    last = math.sqrt(first * first - 2.0 * weight * rise / stiffness)
     vertical_by = -(free * change.weight + weight * grown)
     angle_by = -entry * sine / tension * vertical_by
     strained_by = (entry * cosine * vertical_by - (strained - 1.0) * change.stiffness) / stiffness

@@ -15,8 +15,8 @@ from sagline.kernels.algebra.cholesky import factor_positive
 from sagline.kernels.balance.freedom import components_along
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.geometry import cable_geometry
-from sagline.kernels.cable.over_pulleys import chord_at
-from sagline.kernels.cable.pulley import pulley_at, straight_behind
+from sagline.kernels.cable.over_pulleys import chord_at, material_at
+from sagline.kernels.cable.pulley import Wrap, behind_cable, pulley_at, straight_behind
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import CABLE_NO_TENSION, FORWARD_FITTED, FORWARD_NO_LENGTHS, FORWARD_NOT_CONVERGED, STRAIGHT
 from sagline.kernels.forward.newton import solve_step
@@ -158,8 +158,10 @@ def fit_poses(
             answer.results[tables.LENGTH, p, i] = batch.lengths[p, i]
             if answer.results.shape[0] > tables.BARE_ROWS:
                 pulley, chord = pulley_at(problem.cables, i), chord_at(space.rows, i)
-                wrapped = angle(chord.cosine, pulley.entry * chord.sine)
-                answer.results[tables.WRAP, p, i] = wrapped
-                answer.results[tables.WRAPPED, p, i] = pulley.radius * wrapped
-                answer.results[tables.DEAD, p, i] = pulley.dead
+                sine, cosine = chord.cosine, pulley.entry * chord.sine
+                wrap = Wrap(sine, cosine, angle(sine, cosine))
+                wrapped, dead = behind_cable(problem.model, material_at(problem.cables, i), pulley, 0.0, wrap)
+                answer.results[tables.WRAP, p, i] = wrap.angle
+                answer.results[tables.WRAPPED, p, i] = wrapped
+                answer.results[tables.DEAD, p, i] = dead
                 answer.results[tables.SINE, p, i] = chord.sine

@@ -15,7 +15,7 @@ from sagline.kernels.balance.freedom import turns
 from sagline.kernels.balance.setting import Balance, Limits, Platform, need, new_balance, set_pose
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.cables import Cables, material_of, new_cables, pulley_of
-from sagline.kernels.cable.pulley import Wrap, any_behind, behind_cable
+from sagline.kernels.cable.pulley import Wrap, behind_cable, robots_have_machine
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import CABLE_SOLVED, CATENARY, CLOSEST, POSE_NO_CHORD, POSE_SINGULAR, POSE_SOLVED
 from sagline.kernels.inverse.rounds import remember, share_and_hang
@@ -77,7 +77,7 @@ def inverse_poses(
     results, statuses, residuals, needed, pose_statuses = answers
     m = statuses.shape[1]
     n = freedom.shape[0]
-    machine = any_behind(robots)
+    machine = robots_have_machine(robots)
     cables, rest = new_cables(Memory(*room), m, machine)
     balance, rest = new_balance(rest, m, n)
     near, rest = new_nearness(rest, previous, m - n)

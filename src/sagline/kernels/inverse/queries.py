@@ -17,7 +17,7 @@ from sagline.kernels.balance.setting import (
     start_from_minimum_norm,
 )
 from sagline.kernels.cable.cables import new_cables
-from sagline.kernels.cable.pulley import any_behind
+from sagline.kernels.cable.pulley import robots_have_machine
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import CHORD_TENSION, FRAME_END_TENSION, POSE_NO_CHORD
 from sagline.kernels.inverse.frame_end import linearize_ends
@@ -62,7 +62,7 @@ def polygon_of_pose(
     tensions, pulls = carried
     scale, offset, strips, null, corners, labels = polygon
     r, m = null.shape
-    cables, rest = new_cables(Memory(*room), m, any_behind(robots))
+    cables, rest = new_cables(Memory(*room), m, robots_have_machine(robots))
     balance, rest = new_balance(rest, m, freedom.shape[0])
     platform = Platform(freedom, bodies[0], robots[0], pose, wrench)
     model = Model(model_terms[0], model_terms[1], model_terms[2], bodies[0, tables.GRAVITY], None)
@@ -107,7 +107,7 @@ def margins_of_poses(
     freedom, bodies, robots = robot_terms
     count, m = pulls.shape
     n = freedom.shape[0]
-    cables, rest = new_cables(Memory(*room), m, any_behind(robots))
+    cables, rest = new_cables(Memory(*room), m, robots_have_machine(robots))
     balance, rest = new_balance(rest, m, n)
     weights, at = block(rest.numbers, 0, 1, m)
     weight = weights[0]

@@ -20,7 +20,7 @@ from sagline.kernels.balance.setting import (
 from sagline.kernels.balance.wrench import along_freedom
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.cables import Cables, new_cables
-from sagline.kernels.cable.pulley import any_behind
+from sagline.kernels.cable.pulley import robots_have_machine
 from sagline.kernels.cable.pulls import new_curves, pulls_at
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import (
@@ -84,7 +84,7 @@ def decide_poses(
     brackets, reliefs, farkas, blocking = verdicts
     n = freedom.shape[0]
     m = statuses.shape[1]
-    cables, rest = new_cables(Memory(*memory), m, any_behind(robots))
+    cables, rest = new_cables(Memory(*memory), m, robots_have_machine(robots))
     balance, rest = new_balance(rest, m, n)
     rows, at = block(rest.numbers, 0, 2 * n + 3, m)
     vectors, at = block(rest.numbers, at, 3, n)
