@@ -185,6 +185,10 @@ def _robots(given: _Given) -> dict[str, Call]:
         name: ("array", [2.0, 1.0], not rule.needed) for name, rule in RULES.items() if name != "dead_rise"
     }
     wound |= {"dead_rise": ("array", [0.5, -0.25]), "swivel_axis": ("array", [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])}
+    wound |= {
+        "rolling_friction": ("array", [0.5, 0.25]),
+        "guides": ("array", [[[1.0, 1.0, 2.0], [2.0, 1.0, 2.0]], [[1.0, 2.0, 2.0], [2.0, 2.0, 4.0]]], True),
+    }
     winch = sl.Winch(0.05, dead_cable=[3.0, 4.0])
     return {
         "Winch": Call(sl.Winch, _all(**wound)),

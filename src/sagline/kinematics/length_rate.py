@@ -6,10 +6,12 @@ import numpy as np
 
 from sagline.arrays import Array, Flags, Indices, locked
 from sagline.kernels import tables
+from sagline.kinematics.hung import hung
 from sagline.kinematics.instants import Instant, Instants, instants
-from sagline.kinematics.inverse_rows import solve_rows
+from sagline.kinematics.inverse_rows import Found, solve_rows
 from sagline.kinematics.tension_rate import closest_rates, placed
 from sagline.motion.path import Path
+from sagline.robot.behind import with_behind
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.several import first_of, robot_at
 from sagline.statics.tables import pose_rows
@@ -65,17 +67,24 @@ def _lengths(state: Equilibrium, tension: TensionMethod, moment: Instant) -> Arr
     rows, loads = pose_rows(moment.pose), locked(moment.wrench)
     if not isinstance(tension, Closest):
         none = np.full(first_of(state.robot).cable_count, np.nan)
-        lengths: Array = solve_rows(state.robot, tension, options, rows, loads, none).results[tables.LENGTH]
-        return lengths
+        return _off_the_drums(state, moment, solve_rows(state.robot, tension, options, rows, loads, none))
     held = np.where(np.isnan(state.chord_tension), np.nan, shared_tension(state, tension.variable))
-    return np.array(
-        [
-            solve_rows(
-                robot_at(state.robot, i), tension, options, rows[i : i + 1], loads[i : i + 1], held[i].copy()
-            ).results[tables.LENGTH, 0]
-            for i in range(len(rows))
-        ]
-    )
+    found = Found.empty(len(held), held.shape[1], first_of(state.robot).degrees_of_freedom)
+    for i in range(len(rows)):
+        one = slice(i, i + 1)
+        answer = solve_rows(robot_at(state.robot, i), tension, options, rows[one], loads[one], held[i].copy())
+        found.results[:, one], found.cable_status[one] = answer.results, answer.cable_status
+    return _off_the_drums(state, moment, found)
+
+
+def _off_the_drums(state: Equilibrium, moment: Instant, found: Found) -> Array:
+    """Unstrained lengths of answers, with the state's guides and friction."""
+    if state.contact is None:
+        lengths: Array = found.results[tables.LENGTH]
+        return lengths
+    cables, contact = hung(state.robot, state.cables.model, found.results, found.cable_status, state.pose.shape)
+    there = Equilibrium(state.robot, moment.pose, moment.wrench, cables, contact)
+    return with_behind(there, state.contact.winding).unstrained_length
 
 
 def _followed(state: Equilibrium, tension: TensionMethod, near: Instants, kept: Indices) -> Array:
