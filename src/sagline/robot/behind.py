@@ -153,12 +153,12 @@ def _of_robot(state: Equilibrium, robot: Robot, *, guided: bool) -> Behind:
     contact, winches, shape = state.contact, robot.winches, state.cables.shape
     assert contact is not None
     if winches is None or not winches.anything_behind:
-        return Behind(np.zeros(shape), np.zeros(shape), state.cables.frame_end_tension)
+        return Behind(np.zeros(shape), np.zeros(shape), _tension(state))
     if state.cables.model.code == codes.STRAIGHT:  # does not stretch, whatever rubs
         dead = np.broadcast_to(winches.dead_cable, shape)
-        return Behind(winches.pulley_radius * contact.wrap_angle, dead, state.cables.frame_end_tension)
+        return Behind(winches.pulley_radius * contact.wrap_angle, dead, _tension(state))
     found = Behind(*(np.full(shape, np.nan) for _ in Behind._fields))
-    known = np.isfinite(state.cables.frame_end_tension)
+    known = np.isfinite(_tension(state))
     if not known.any():
         return found
     cable = np.broadcast_to(np.arange(shape[-1]), shape)[known]
@@ -173,10 +173,16 @@ def _of_robot(state: Equilibrium, robot: Robot, *, guided: bool) -> Behind:
     return found
 
 
+def _tension(state: Equilibrium) -> Array:
+    """Tensions at P as kernels have them there [N]: only the exact cable's differ along it."""
+    cables = state.cables
+    return cables.frame_end_tension if cables.model.code == codes.CATENARY else state.chord_tension
+
+
 def _leaving(state: Equilibrium, robot: Robot, winches: Winch, known: Flags, cable: Indices) -> _Leaving:
     cables, contact = state.cables, state.contact
     assert contact is not None
-    tension, material = cables.frame_end_tension[known], robot.cables
+    material = robot.cables
     weight = np.zeros(cables.shape[-1])
     if cables.model.code == codes.CATENARY:
         weight = material.linear_density * robot.gravity
@@ -187,7 +193,7 @@ def _leaving(state: Equilibrium, robot: Robot, winches: Winch, known: Flags, cab
     sine = np.sin(wrap)
     sign = np.zeros(wrap.shape) if contact.winding is None else contact.winding[known]
     return _Leaving(
-        tension,
+        _tension(state)[known],
         weight[cable],
         material.axial_stiffness[cable],
         wrap,
