@@ -63,6 +63,21 @@ def test_lengths_with_friction_and_guides_lead_back_to_the_pose(name: str, field
                 assert np.abs(found.pose.position - poses.position[kept]).max() < 1e-11
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("name", ["cogiro", "article-prototype"])
+def test_much_friction_settles_too(name: str, sign: float) -> None:
+    """Five radians at 0.3: four and a half times the tension at the drum, where plain rounds would not settle."""
+    robot = machine(name, pulley_friction=0.3)
+    poses, winding = random_poses(robot, 12, np.random.default_rng(5)), np.full(robot.cable_count, sign)
+    plan = sl.inverse(robot, poses, winding=winding)
+    kept = plan.feasible
+    assert kept.sum() > 4
+    assert sl.confirm(plan).position_error[kept].max() < 1e-11
+    found = sl.forward(robot, plan.unstrained_length[kept], poses[kept], winding=winding)
+    assert found.solved.all()  # there are other poses with the same lengths near by
+    np.testing.assert_allclose(found.state.unstrained_length, plan.unstrained_length[kept], rtol=0.0, atol=5e-12)
+
+
 def test_a_lone_sample_and_a_chain_are_answered_alike() -> None:
     robot = machine("cogiro")
     poses = sl.Pose.from_euler([[0.5, 0.5, 2.0], [0.6, 0.5, 2.0], [0.7, 0.6, 2.1]], 0.0, 0.0, 0.0)

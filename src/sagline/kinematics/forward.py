@@ -60,7 +60,8 @@ def forward(
             deviations to fit each other, and the answer carries the covariance of the pose.
         winding: Which way the drums turned last, for the friction of pulleys and guides: +1 winding in, -1 paying out,
             0 standing, shape (m,) or (N, m). None: nothing rubs. What friction and guides change of the lengths is
-            found in rounds of solving; with load cells, it stays what it is at the measured lengths.
+            found in rounds of solving; with load cells, it stays what it is at the measured lengths. Much friction on
+            soft cables lets the platform rest at more than one pose near by.
         progress: Called every tenth of a second or so: how many samples are solved, of how many.
 
     Returns:

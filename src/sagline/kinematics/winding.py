@@ -17,7 +17,9 @@ from sagline.robot.robot import Robot
 from sagline.robot.several import Robots, robots_at
 
 Winding = ArrayLike | Literal["path"]
-ROUNDS: Final = 100  # each lessens what is missed by about (exp(mu psi) - 1) times the share of the cable behind
+ROUNDS: Final = 100  # some ten of them, unless far more cable is behind than before, or a lot rubs
+MEMORY: Final = 5  # of rounds before, from which the next is mixed
+_RANK: Final = 1e-6
 SETTLED: Final = 1e-13  # of a length
 _OPEN = (codes.FORWARD_NOT_CONVERGED, codes.FORWARD_NO_LENGTHS)
 
@@ -72,7 +74,13 @@ def without_guides(robot: Robot, solver: str, instead: str) -> Robot:
 
 
 def settled(
-    robot: Robots, model: CableModel, found: Found, lengths: Array, loads: Array, winding: Array | None
+    robot: Robots,
+    model: CableModel,
+    found: Found,
+    lengths: Array,
+    loads: Array,
+    winding: Array | None,
+    taken: Array | None = None,
 ) -> Found:
     """Equilibria at lengths that count what is really behind the pulleys.
 
@@ -81,38 +89,54 @@ def settled(
     Args:
         robot: The robot, or one a sample.
         model: Cable model.
-        found: Equilibria as if the lengths were those over a straight guided run without friction.
+        found: Equilibria over a straight guided run without friction, at the lengths less what is taken for the rest.
         lengths: Unstrained lengths (N, m).
         loads: External plus inertial wrenches (1 or N, 6).
         winding: Directions of friction, shape (m,) or (N, m), or None.
+        taken: What they were solved with for what guides and friction add [m], (N, m); None for nothing.
 
     Returns:
         The answers; NOT_CONVERGED where that does not settle, or a cable is too slack to hang between its guides.
     """
-    more = np.zeros(lengths.shape)
+    more = np.zeros(lengths.shape) if taken is None else taken.copy()
+    past: list[tuple[Array, Array]] = []  # what was taken, and what it missed
     still = np.flatnonzero(~np.isin(found.pose_status, _OPEN))
     for _ in range(ROUNDS):
         if not still.size:
             return found
-        robots = robots_at(robot, still)
         some = found.part(still)
         turning = winding if winding is None or winding.ndim == 1 else winding[still]
-        added = _added(robots, model, some, turning)
+        added = _added(robots_at(robot, still), model, some, turning)
         slack = np.isnan(added)
-        added = np.where(slack, more[still], added)
-        given = lengths[still] - added
-        moved = (np.abs(added - more[still]) > SETTLED * lengths[still]).any(axis=1)
-        more[still] = added
-        lost = (moved & ~(given > 0.0).all(axis=1)) | (~moved & slack.any(axis=1))
+        missed = np.where(slack, 0.0, added - more[still])
+        moving = (np.abs(missed) > SETTLED * lengths[still]).any(axis=1)
+        whole = np.zeros(lengths.shape)
+        whole[still] = missed
+        mixed = more[still] + _mixed(more[still], missed, [(x[still], f[still]) for x, f in past[-MEMORY:]])
+        past.append((more.copy(), whole))
+        given = lengths[still] - mixed
+        lost = np.where(moving, ~(given > 0.0).all(axis=1), slack.any(axis=1))
         found.pose_status[still[lost]] = codes.FORWARD_NOT_CONVERGED
-        again = moved & ~lost
+        again = moving & ~lost
         still, starts = still[again], locked(some.poses[again])
         if still.size:
+            more[still] = mixed[again]
             load = loads if len(loads) == 1 else locked(loads[still])
             found.keep(still, solve_rows(robots_at(robot, still), model, locked(given[again]), starts, load))
             still = still[~np.isin(found.pose_status[still], _OPEN)]
     found.pose_status[still] = codes.FORWARD_NOT_CONVERGED
     return found
+
+
+def _mixed(taken: Array, missed: Array, past: list[tuple[Array, Array]]) -> Array:
+    """The next step from what was missed before too, (N, m): by Anderson's mixing."""
+    if not past:
+        return missed
+    changes = np.stack([missed - before for _, before in past], axis=-1)
+    moves = np.stack([taken - before for before, _ in past], axis=-1)
+    shares = np.linalg.pinv(changes, rcond=_RANK) @ missed[..., None]
+    step: Array = missed - ((moves + changes) @ shares)[..., 0]
+    return step
 
 
 def _added(robot: Robots, model: CableModel, found: Found, winding: Array | None) -> Array:
