@@ -100,7 +100,7 @@ def winches(given: Winch | None, frame: Array) -> Winch | None:
         InvalidValueError: If it is no Winch, of another count, or its guides do not lead to the frame anchors.
     """
     winch = optional(given, Winch, "winches")
-    return None if winch is None else winch.per_cable(len(frame)).run_to(frame)
+    return None if winch is None else winch.per_cable(len(frame))._run_to(frame)
 
 
 def inertia(given: ArrayLike | None, pattern: str, normal: Array | None) -> Array:

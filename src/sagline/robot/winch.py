@@ -317,7 +317,7 @@ class Winch:
             changes = {"dead_cable": 0.0, "dead_rise": 0.0, **changes}  # they follow anew
         return replace(self, **changes)
 
-    def run_to(self, frame_anchors: Array) -> Winch:
+    def _run_to(self, frame_anchors: Array) -> Winch:
         """These winches with the dead cable that follows from their guides.
 
         Args:
