@@ -1,8 +1,9 @@
-"""The machine between encoder and cable: drums; one core."""
+"""The machine between encoder and cable: pulleys, dead cable and drums; one core."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 
 import numpy as np
 from rich.console import Console
@@ -10,9 +11,15 @@ from rich.console import Console
 import sagline as sl
 from benchmarks.measure import Row, best_seconds, one_core, show
 from sagline.robot.drum import drums_of
+from tests.kernels.cable.test_pulley import there_and_back
+from tests.kinematics.test_pulleys import formula_error
 from tests.kinematics.winches import wound
+from tests.tension.reference import random_poses
 
 COUNTS = 1_000_000
+POSES = 5_000
+TURNS = 12
+ROBOTS = ("article-suspended", "article-mixed", "cogiro", "ipanema-1")
 
 
 def counts() -> Iterator[Row]:
@@ -33,16 +40,74 @@ def counts() -> Iterator[Row]:
     )
 
 
+def hard_cables() -> Iterator[Row]:
+    """Random cables over pulleys, with dead cable: length from tension, and the tension back."""
+    tension, found, expected, _statuses = there_and_back(38_000, seed=3)
+    worst = (np.abs(found - tension) / expected).max()
+    yield Row("38,000 random cables there and back, of one rounding of the length", "4", f"{worst:.1f} at most")
+
+
+def speed() -> Iterator[Row]:
+    """The same robots with pulleys and dead cable and without, in turn."""
+    for name in ROBOTS:
+        bare = sl.load_robot(name)
+        over = bare.replace(winches=sl.Winch(0.05, dead_cable=4.0))
+        poses = random_poses(bare, POSES, np.random.default_rng(0))
+        poses = poses[sl.inverse(bare, poses).feasible & sl.inverse(over, poses).feasible]
+        ratio, seconds = ratio_of(partial(sl.inverse, motion=poses), over, bare)
+        shown = f"{ratio:.2f} ({1e6 * seconds / len(poses):.2f} us)"
+        yield Row(f"{name}: exact inverse, of that without", "<= 1.3", shown)
+        path = course(bare)
+        plans = {id(one): sl.inverse(one, path) for one in (bare, over)}
+
+        def track(one: sl.Robot, plans: dict[int, sl.Plan] = plans) -> sl.ForwardSolution:
+            plan = plans[id(one)]
+            return sl.forward(one, plan.unstrained_length, start=plan.state.pose[0], wrench=plan.state.wrench)
+
+        ratio, seconds = ratio_of(track, over, bare)
+        shown = f"{ratio:.2f} ({1e6 * seconds / len(path):.2f} us)"
+        yield Row(f"{name}: forward along a path, of that without", "<= 2", shown)
+
+
+def ratio_of(run: Callable[[sl.Robot], object], one: sl.Robot, other: sl.Robot) -> tuple[float, float]:
+    """Least time of one by that of the other, measured in turn, and the first itself [s]."""
+    times: list[list[float]] = [[], []]
+    for _ in range(TURNS):
+        for kept, robot in zip(times, (one, other), strict=True):
+            kept.append(best_seconds(lambda robot=robot: run(robot)))  # type: ignore[misc]
+    return min(times[0]) / min(times[1]), min(times[0])
+
+
+def course(robot: sl.Robot) -> sl.Path:
+    """Through the middle of the test box, at 500 samples a second."""
+    assert robot.test_box is not None
+    low, high = robot.test_box.low, robot.test_box.high
+    return sl.quintic_path([0.7 * low + 0.3 * high, 0.3 * low + 0.7 * high], durations=5.0, rate=500)
+
+
+def formula() -> Iterator[Row]:
+    """The straight cable's exit and wrap, with the exact catenary from there, against the exact contact."""
+    for dead in (0.0, 4.0):
+        worst = 0.0
+        for name in ROBOTS:
+            robot = sl.load_robot(name).replace(winches=sl.Winch(0.05, dead_cable=dead))
+            worst = max(worst, formula_error(robot, random_poses(robot, 500, np.random.default_rng(1))))
+        what = f"{dead:g} m of dead cable" if dead else "no dead cable"
+        yield Row(f"straight exit and catenary from it, {what}", "state it", f"{1e6 * worst:.1f} um off at most")
+
+
 def main() -> None:
     """Measure and print."""
     console = Console()
     rows: list[Row] = []
     one_core()
-    for part in (counts,):
+    for part in PARTS:
         Console(stderr=True).print(f"[dim]{part.__doc__}[/dim]")
         rows.extend(part())
     show("The machine between encoder and cable", rows, console)
 
+
+PARTS = (counts, hard_cables, speed, formula)
 
 if __name__ == "__main__":
     main()

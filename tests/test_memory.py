@@ -63,9 +63,10 @@ def test_paths_and_batches_ask_before_they_take(monkeypatch: pytest.MonkeyPatch)
     tracemalloc.stop()
 
 
+@pytest.mark.parametrize("winches", [None, sl.Winch(0.05, dead_cable=4.0)])
 @pytest.mark.parametrize("cable_count", [7, 8])
-def test_a_pose_needs_no_more_than_is_reckoned(cable_count: int) -> None:
-    robot = sl.load_robot("falcon-7" if cable_count == 7 else "cogiro")
+def test_a_pose_needs_no_more_than_is_reckoned(cable_count: int, winches: sl.Winch | None) -> None:
+    robot = sl.load_robot("falcon-7" if cable_count == 7 else "cogiro").replace(winches=winches)
     assert robot.test_box is not None
     place = np.random.default_rng(5).uniform(robot.test_box.low, robot.test_box.high, (20_000, 3))
     poses = sl.Pose.from_euler(place, 0.0, 0.0, 0.0)
@@ -80,5 +81,5 @@ def test_a_pose_needs_no_more_than_is_reckoned(cable_count: int) -> None:
         found = call()
         peak = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
-        assert peak < 20_000 * (400 + 64 * cable_count)
+        assert peak < 20_000 * (400 + (64 if winches is None else 136) * cable_count)
         del found

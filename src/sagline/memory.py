@@ -11,6 +11,7 @@ from sagline.errors import InvalidValueError
 
 UNASKED: Final = 1 << 26  # bytes: less is not worth asking how much is free
 _POSE_BYTES, _CABLE_BYTES = 400.0, 64.0  # what a pose takes while it is solved, and each of its cables: as measured
+_BEHIND_BYTES = 72.0  # and what is behind each of them
 _GROUPS: Final = (  # limit and use of a container
     ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"),
     ("/sys/fs/cgroup/memory/memory.limit_in_bytes", "/sys/fs/cgroup/memory/memory.usage_in_bytes"),
@@ -34,19 +35,19 @@ def check_memory(item: str, size: float, next_step: str) -> None:
         raise InvalidValueError(f"the memory for {item}", wanted, left, next_step)
 
 
-def check_poses(count: int, cable_count: int) -> None:
+def check_poses(count: int, cable_count: int, behind: bool) -> None:
     """Refuse to solve, forward or inverse, for more poses than there is memory.
 
     Args:
         count: How many poses.
         cable_count: Number of cables m of the robot.
+        behind: Whether anything is behind the cables.
 
     Raises:
         InvalidValueError: If all together need more than is free; the message says how much.
     """
-    check_memory(
-        f"a batch of {count:,} poses", count * (_POSE_BYTES + _CABLE_BYTES * cable_count), "Take them in parts."
-    )
+    cable = _CABLE_BYTES + (_BEHIND_BYTES if behind else 0.0)
+    check_memory(f"a batch of {count:,} poses", count * (_POSE_BYTES + cable * cable_count), "Take them in parts.")
 
 
 def free_memory() -> float:

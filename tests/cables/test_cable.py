@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sagline.article.identify_cable import identify_cable
-from sagline.article.machine import PARAMETERS, Machine, Parameter
+from sagline.article.machine import PARAMETERS, Parameter, machine
 from sagline.cables.cable import Cable
 from sagline.cables.catenary import Catenary
 from sagline.cables.rope import ROPES
@@ -77,7 +77,7 @@ def test_replace_leaves_the_original() -> None:
 
 
 def changed(parameter: Parameter, robot: Robot) -> Robot:
-    return parameter.changed(Machine(robot), parameter.typical).robot
+    return machine(robot, {parameter.name: parameter.typical})
 
 
 PROTOTYPE = load_robot("article-prototype").replace(cables=THICK)

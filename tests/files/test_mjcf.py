@@ -1,17 +1,21 @@
+from itertools import product
+
 import mujoco
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from sagline.arrays import Array
 from sagline.cables.cable import Cable
 from sagline.cables.elastic import Elastic
-from sagline.errors import InvalidValueError
+from sagline.errors import CableGeometryError, InvalidValueError
 from sagline.files.mjcf import dump_mjcf
 from sagline.files.robot_file import load_robot
 from sagline.kinematics.forward import forward
 from sagline.kinematics.inverse import inverse
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
+from sagline.robot.winch import Winch
 
 POSE = Pose.from_euler((1.0, -0.5, 2.0), 0.1, -0.05, 0.08)
 STEPS = 12_000
@@ -147,3 +151,82 @@ def test_what_is_refused(pose: Pose, lengths: list[float] | None, message: str) 
 def test_the_file_says_what_is_not_in_it() -> None:
     text = dump_mjcf(load_robot("article-suspended"), POSE)
     assert "Its sag, its weight and the tension limits are not in this model." in text
+
+
+OVER_PULLEYS = load_robot("article-suspended").replace(
+    winches=Winch(
+        pulley_radius=[0.1, 0.2, 0.3, 0.0, 0.1, 0.2, 0.3, 0.15],
+        swivel_axis=[[0, 0, 1]] * 5 + [[0, 0, -1]] * 3,
+        dead_cable=[3.0, 0.0, 4.0, 2.0, 0.0, 3.0, 0.1, 3.0],
+    )
+)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_over_pulleys_forces_and_stiffness_are_those_of_pulleys_that_swivel(seed: int) -> None:
+    """Forces to rounding; where the platform comes to rest with other lengths, to the square of how far that is."""
+    random = np.random.default_rng(seed)
+    pose = Pose.from_euler(random.uniform((-3.0, -2.0, 0.5), (3.0, 2.0, 4.0)), *random.uniform(-0.15, 0.15, 3))
+    plan = inverse(OVER_PULLEYS, pose, model=Elastic())
+    assert plan.feasible
+    model, data = opened(dump_mjcf(OVER_PULLEYS, pose))
+    pull = model.tendon_stiffness * (data.ten_length - model.tendon_lengthspring[:, 1])
+    np.testing.assert_allclose(pull, plan.chord_tension, rtol=1e-9)
+    np.testing.assert_allclose(model.tendon_stiffness, 44e3 / plan.unstrained_length, rtol=1e-14)
+    np.testing.assert_allclose(data.qacc, 0.0, atol=1e-7)
+    np.testing.assert_array_equal(data.ten_wrapnum == 4, OVER_PULLEYS.winches.pulley_radius > 0.0)  # type: ignore[union-attr]
+    lengths = plan.unstrained_length * (1.0 + 1e-5 * random.normal(size=8))
+    expected = forward(OVER_PULLEYS, lengths, start=pose, model=Elastic())
+    away = float(np.linalg.norm(expected.pose.position - pose.position))
+    assert away > 1e-5
+    data = settled(dump_mjcf(OVER_PULLEYS, pose, lengths))
+    np.testing.assert_allclose(data.qpos[:3], expected.pose.position, atol=1e-4 * away)
+
+
+def test_over_pulleys_lengths_are_off_by_little_nearby_and_by_millimeters_in_the_corners() -> None:
+    """How far they are off for the cylinders not to swivel, of ipanema-2-pulleys, and for exit points that stay."""
+    robot = load_robot("ipanema-2-pulleys")
+    box = robot.test_box
+    assert box is not None
+    middle, half = 0.5 * (box.low + box.high), 0.5 * (box.high - box.low)
+    model, data = opened(dump_mjcf(robot, Pose(middle, np.eye(3))))
+    plan = inverse(robot, Pose(middle, np.eye(3)), model=Elastic())
+    lengths, exits = plan.unstrained_length, plan.exit_point
+    assert plan.wrap_angle is not None
+    for share, most, fixed in ((0.1, 0.013e-3, 0.70e-3), (1.0, 10.0e-3, 77e-3)):
+        worst, left = 0.0, 0.0
+        for corner in product((-1.0, 1.0), repeat=3):
+            pose = Pose(middle + share * half * corner, np.eye(3))
+            data.qpos[:3], data.qpos[3:] = pose.position, (1.0, 0.0, 0.0, 0.0)
+            mujoco.mj_forward(model, data)
+            ends = pose.transform(robot.platform_anchors)
+            taut = tangent_lengths(ends - robot.frame_anchors, 0.25)
+            off = data.ten_length - model.tendon_lengthspring[:, 1] + lengths - taut
+            worst = max(worst, float(np.abs(off).max()))
+            stays = np.linalg.norm(ends - exits, axis=1) + 0.25 * plan.wrap_angle
+            left = max(left, float(np.abs(stays - taut).max()))
+        assert worst == pytest.approx(most, rel=0.01)
+        assert left == pytest.approx(fixed, rel=0.01)
+
+
+def tangent_lengths(reach: Array, radius: float) -> Array:
+    """Cable from where it enters a pulley from below to a point: arc and tangent, by the angles of a right triangle."""
+    across, up = np.hypot(reach[:, 0], reach[:, 1]) - radius, reach[:, 2]
+    distance = np.hypot(across, up)
+    touches = np.arctan2(up, across) + np.arccos(radius / distance)  # of the radius there, from level outward
+    return np.asarray(radius * (np.pi - touches) + np.sqrt(distance**2 - radius**2))
+
+
+def test_a_platform_end_in_a_pulley_is_refused() -> None:
+    robot = load_robot("article-suspended").replace(winches=Winch(pulley_radius=0.2))
+    place = robot.frame_anchors[3] - robot.platform_anchors[3] + np.array([0.1, 0.1, -1.0])
+    with pytest.raises(CableGeometryError, match="cable 2: its platform end is inside its pulley"):
+        dump_mjcf(robot, Pose(place, np.eye(3)), [9.0] * 8)
+    with pytest.raises(InvalidValueError, match=r"cable 2: unstrained length is 4 m; allowed: > 4 m, the dead cable"):
+        dump_mjcf(OVER_PULLEYS, POSE, [9.0, 9.0, 4.0, 9.0, 9.0, 9.0, 9.0, 9.0])
+
+
+def test_the_file_says_what_pulleys_lose() -> None:
+    said = "Its pulleys are cylinders that stand as the platform has turned them at the pose it starts from, and do not"
+    assert said in dump_mjcf(OVER_PULLEYS, POSE)
+    assert "pulleys" not in dump_mjcf(load_robot("article-suspended"), POSE)

@@ -25,7 +25,7 @@ def parts_of(words: object) -> list[Array]:
     """All arrays of nested NamedTuples, memory that is left over not counted."""
     if isinstance(words, np.ndarray):
         return [words]
-    if isinstance(words, Memory):
+    if isinstance(words, Memory | bool):
         return []
     assert isinstance(words, tuple)
     return [part for word in words for part in parts_of(word)]
@@ -35,7 +35,7 @@ def parts_of(words: object) -> list[Array]:
 @pytest.mark.parametrize(("m", "n"), [(2, 1), (4, 2), (6, 6), (8, 6), (24, 6)])
 def test_blocks_do_not_overlap_and_are_all_inside(m: int, n: int, method: int) -> None:
     numbers, counters = memory_for(m)
-    cables, rest = room_for_cables(Memory(numbers, counters), m)
+    cables, rest = room_for_cables(Memory(numbers, counters), m, True)
     balance, rest = room_for_balance(rest, m, n)
     near, rest = room_for_nearness(rest, np.zeros(m), m - n)
     room = room_otherwise(method, rest, m, m - n)
@@ -74,7 +74,7 @@ def test_a_block_and_the_place_that_follows() -> None:
 
 def test_too_little_memory_is_told() -> None:
     with pytest.raises(ValueError, match="total size"):
-        room_for_cables(memory(14 * 8 - 1, 100), 8)
+        room_for_cables(memory(26 * 8 - 1, 100), 8, False)
     with pytest.raises(ValueError, match="total size"):
         room_for_balance(memory(300, 100), 8, 6)
     with pytest.raises(ValueError, match="total size"):

@@ -28,3 +28,17 @@ def test_no_kernel_takes_more_arguments_than_one_can_read() -> None:
     assert {name: count for name, count in counts.items() if count > MOST} == {}
     many = [name for name, count in counts.items() if count > MANY]
     assert len(many) <= SHARE_OF_MANY * len(counts), many
+
+
+PULLEY_COLUMNS = {"PULLEY_RADIUS", "ENTRY", "DEAD_CABLE", "DEAD_RISE"}
+
+
+def test_only_the_geometry_and_the_pulley_know_what_a_pulley_is() -> None:
+    """Everything else takes chords, wraps and lengths behind from them."""
+    folder = Path(kernels.__file__).parent
+    knowing = set()
+    for source in folder.rglob("*.py"):
+        names = {node.attr for node in ast.walk(ast.parse(source.read_text())) if isinstance(node, ast.Attribute)}
+        if names & PULLEY_COLUMNS:
+            knowing.add(source.relative_to(folder).as_posix())
+    assert knowing == {"cable/geometry.py", "cable/pulley.py"}

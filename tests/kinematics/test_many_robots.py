@@ -1,7 +1,10 @@
 """N robots, one a pose, against N single calls: the same answers to the last bit."""
 
+from typing import Any
+
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 import sagline as sl
 from sagline.arrays import Array
@@ -249,3 +252,27 @@ def test_a_plan_of_many_robots_is_not_saved_by_halves(tmp_path: object) -> None:
     with pytest.raises(sl.InvalidValueError, match="sequence of 2 robots"):
         plan.save(file)
     assert not file.exists()
+
+
+def test_robots_with_and_without_pulleys_in_one_batch(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In memory that others have used: what a kernel does not write must not be told."""
+    empty = np.empty
+    plain = sl.load_robot("article-prototype")
+    robots = [plain, plain.replace(winches=sl.Winch(pulley_radius=0.05, dead_cable=2.0)), plain]
+    poses = sl.Pose.from_euler([[0.2, 0.1, 1.4], [0.0, 0.0, 1.5], [0.3, 0.4, 1.2]], 0.0, 0.0, 0.0)
+    lengths = sl.inverse(robots, poses).unstrained_length
+
+    def used(shape: int | tuple[int, ...], dtype: type = float) -> NDArray[Any]:
+        return np.full(shape, np.nan) if dtype is float else empty(shape, dtype)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(np, "empty", used)
+        found = sl.forward(robots, lengths, start=poses)
+    for k, robot in enumerate(robots):
+        alone = sl.forward(robot, lengths[k], start=poses[k])
+        for name in ("unstrained_length", "horizontal_tension"):  # beside pulleys a bare cable rounds differently
+            together, single = getattr(found.state.cables, name)[k], getattr(alone.state.cables, name)
+            np.testing.assert_allclose(together, single, rtol=1e-12)
+    assert found.state.contact is not None
+    np.testing.assert_array_equal(found.state.contact.wrapped_length[[0, 2]], 0.0)
+    np.testing.assert_array_equal(found.state.contact.dead_length[[0, 2]], 0.0)

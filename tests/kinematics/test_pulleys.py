@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 import sagline as sl
 from sagline.arrays import Array
-from tests.tension.reference import needed, presets, random_poses, structure, unbalanced
+from tests.tension.reference import needed, presets, random_poses, ropes, structure, unbalanced
 
 WINCHES = [
     sl.Winch(0.05),
@@ -198,6 +198,20 @@ def test_the_platform_follows_its_data_as_differences_say(winch: sl.Winch) -> No
     assert np.abs(matrix - matrix.T).max() < 1e-12 * np.abs(matrix).max()
 
 
+@pytest.mark.parametrize("winch", WINCHES)
+def test_tensions_where_cables_leave_follow_the_lengths_as_differences_say(winch: sl.Winch) -> None:
+    robot = cogiro(winch, softer=0.05)
+    plan = sl.inverse(robot, POSE)
+    lengths, cable = plan.unstrained_length, np.eye(8)[3]
+
+    def tensions(by: float) -> Array:
+        return sl.forward(robot, lengths + by * cable, start=POSE).state.cables.frame_end_tension
+
+    expected = slopes(tensions, 2e-3)
+    found = sl.stiffness(plan.state).tension_sensitivity[:, 3]
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=3e-7 * np.abs(expected).max())
+
+
 def test_a_radius_that_vanishes_leaves_the_cable_at_its_anchor() -> None:
     bare = sl.inverse(cogiro(sl.Winch()), POSE)
     errors = [
@@ -243,6 +257,30 @@ def test_the_rate_of_winding_is_the_slope_of_the_lengths() -> None:
     step = path.time[1] - path.time[0]
     inner = (8.0 * (lengths[3:-1] - lengths[1:-3]) - (lengths[4:] - lengths[:-4])) / (12.0 * step)
     assert np.abs(rates[2:-2] - inner).max() < 2e-5 * np.abs(rates).max()
+
+
+def formula_error(robot: sl.Robot, poses: sl.Pose) -> float:
+    """By how much the straight cable's exit and wrap, and the exact catenary from there, miss exact lengths [m]."""
+    plan, winches = sl.inverse(robot, poses), robot.winches
+    assert winches is not None
+    reach = -ropes(robot, poses.position[:, None] + robot.platform_anchors @ np.swapaxes(poses.matrix, 1, 2))
+    span, rise = np.hypot(reach[..., 0], reach[..., 1]), reach[..., 2]
+    tension = plan.chord_tension
+    free = sl.Catenary().from_tension(robot.cables, span, rise, np.nan_to_num(tension, nan=1.0), robot.gravity)
+    angle = np.arctan2(span, winches.swivel_axis[:, 2] * rise)
+    behind = winches.pulley_radius * angle + winches.dead_cable
+    lengths = free.unstrained_length + behind / (1.0 + tension / robot.cables.axial_stiffness)
+    return float(np.nanmax(np.abs(lengths - plan.unstrained_length)))
+
+
+def test_the_straight_cable_s_exit_is_off_by_micrometers() -> None:
+    robot = sl.load_robot("cogiro")
+    poses = random_poses(robot, 60, np.random.default_rng(1))
+    bare, dead = (
+        formula_error(robot.replace(winches=sl.Winch(0.05, dead_cable=length)), poses) for length in (0.0, 4.0)
+    )
+    assert 1e-7 < bare < 3e-5
+    assert bare < dead < 3e-4
 
 
 def test_dead_cable_stretches_as_a_spring() -> None:

@@ -104,3 +104,15 @@ def test_samples_without_an_answer_have_no_rates() -> None:
 def test_poses_without_times_have_no_rates(plan: sl.Plan) -> None:
     with pytest.raises(sl.InvalidValueError, match="plan is one of poses without times; allowed: one along a path"):
         sl.winch_rates(sl.inverse(wound(), plan.state.pose[0]))
+
+
+def test_the_lever_differs_from_the_radius_by_what_the_docstring_says() -> None:
+    """Of a drum of one layer whose exit wanders from 40 mm on one side of the pulley to 40 mm on the other."""
+    robot = wound(drum_width=0.08, layers=1, cable_length=12.0, length_zero=10.0)
+    drums = drums_of(robot)
+    turns = np.linspace(0.0, 20.0, 201)[:, None] * np.ones(8)
+    _, travel = drums.turns(drums.lengths(turns))
+    off = travel / (2.0 * np.pi * 0.05) - 1.0
+    helix = np.hypot(2.0 * np.pi * 0.05, 0.004) / (2.0 * np.pi * 0.05) - 1.0
+    assert 5e-5 < helix < 1e-4
+    assert 100.0 * np.abs(off - helix).max() == pytest.approx(0.06, abs=0.005)

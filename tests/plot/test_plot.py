@@ -317,3 +317,24 @@ def test_a_path_of_a_hundred_thousand_stops_has_as_many_arrows_as_can_be_told_ap
     begins = np.array([child.xy for child in ax.get_children() if isinstance(child, Annotation)])
     assert len(begins) == 100
     assert np.ptp(np.diff(np.unwrap(np.arctan2(begins[:, 1], begins[:, 0])))) < 1e-3  # evenly
+
+
+def test_pulleys_are_drawn_as_circles_and_cables_leave_them_at_their_exit_points() -> None:
+    winch = sl.Winch(pulley_radius=0.3, dead_cable=2.0, dead_rise=[2.0] * 4 + [1.0] * 4, drum_radius=0.25)
+    robot, pose = SUSPENDED.replace(winches=winch), sl.Pose([1.0, 0.5, 2.0], np.eye(3))
+    lines = plot.robot(robot, pose).get_lines()
+    drawn = [np.array(line.get_data_3d()).T for line in lines]
+    plan = sl.inverse(robot, pose)
+    for cable, anchor, leaves in zip(drawn[:8], robot.frame_anchors, plan.exit_point, strict=True):
+        np.testing.assert_array_equal(cable[0], anchor)
+        assert np.linalg.norm(cable - leaves, axis=1).min() < 1e-9
+    ends = pose.transform(robot.platform_anchors)
+    np.testing.assert_allclose([cable[-1] for cable in drawn[:8]], ends, atol=1e-9)
+    reach = (ends - robot.frame_anchors) * [1.0, 1.0, 0.0]
+    centers = robot.frame_anchors + 0.3 * reach / np.linalg.norm(reach, axis=1, keepdims=True)
+    for circle, center in zip(drawn[8:16], centers, strict=True):
+        np.testing.assert_allclose(np.linalg.norm(circle - center, axis=1), 0.3, rtol=1e-9)
+    for i, anchor in enumerate(robot.frame_anchors):  # after the circles of eight pulleys and eight drums
+        run, rise = drawn[24 + i], 2.0 if i < 4 else 1.0
+        np.testing.assert_allclose(run, [anchor, anchor - (0.0, 0.0, rise)], atol=1e-15)
+        assert lines[24 + i].get_linestyle() == ("-" if i < 4 else ":")

@@ -122,7 +122,12 @@ def test_the_numbers_are_in_the_json_file(report: ArticleReport) -> None:
     tension, distance = np.mean(poses["table-2"]["horizontal_tension_N"], axis=1), poses["table-2"]["distance_mm"]
     against = statistics.correlation(tension.tolist(), distance)
     assert poses["error-in-space"]["correlation_with_tension"] == pytest.approx(against, rel=1e-9)
-    assert poses["explanations"]["explanations"][1][0]["rms_mm"] == pytest.approx(4.21, abs=0.02)
+    best = poses["explanations"]["explanations"][1][0]
+    assert best["values"] == pytest.approx({"zero of the lengths": -7.26, "pulley radius": 38.3}, abs=0.05)
+    assert best["deviations"] == pytest.approx({"zero of the lengths": 0.55, "pulley radius": 2.68}, abs=0.01)
+    assert (best["rms_mm"], best["left_out_rms_mm"]) == pytest.approx((3.92, 4.53), abs=0.01)
+    assert poses["explanations"]["models"] == 175
+    assert poses["ten-points"]["pulley_imitated_by_zero_and_anchor_height"] == pytest.approx(0.990, abs=1e-3)
     assert len(numbers["errata"]) == 11
 
 
@@ -189,11 +194,16 @@ def test_what_the_texts_say_without_numbers_is_so(report: ArticleReport) -> None
     assert [name for name, case in cases.items() if case["warnings"]] == ["taut only"]
     slopes = numbers["poses"]["one-parameter-off"]["height_slope_mm_per_m"]
     falling = [name for name, slope in slopes.items() if slope < 0.0]
-    assert falling == ["linear density ρ", "drum radius", "pulley radius"]
+    assert falling == ["linear density ρ", "drum radius", "pulley radius", "dead cable"]
     low = numbers["simulation"]["low-tension"]
     good = [max(a, b) <= 6.0 for a, b in zip(low["suspended_mm"], low["mixed_mm"], strict=True)]
     assert good == sorted(good)  # bad below some limit, good from there on
     assert numbers["poses"]["tour"]["feasible_share"] == 1.0
+    assert numbers["poses"]["ten-points"]["pulley_or_anchor_height_in_all_of_them"]
+    explained, measured = numbers["poses"]["explanations"], numbers["poses"]["explanations"]["measured_rms_mm"]
+    assert explained["explanations"][2][0]["at_limit"] == ["pulley radius"]  # the best third parameter runs there
+    assert explained["three_inside_aicc_above_best_two"] > 0.5  # and no other is worth its place
+    assert min(numbers["poses"]["ten-points"]["single_zero_deviation_mm"]) > 4.0 * measured
 
 
 def test_parts_alone(tmp_path: Path) -> None:

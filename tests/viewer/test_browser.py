@@ -241,7 +241,11 @@ def test_on_small_screens_the_panels_are_a_sheet_below_the_robot(browser: Browse
 
 
 @pytest.mark.parametrize(
-    "name", [each if each == "fast" else pytest.param(each, marks=pytest.mark.soak) for each in sl.robot_names()]
+    "name",
+    [
+        each if each in ("fast", "ipanema-2-pulleys") else pytest.param(each, marks=pytest.mark.soak)
+        for each in sl.robot_names()
+    ],
 )
 def test_nothing_overflows_its_panel(browser: Browser, name: str) -> None:
     with opened(browser, sl.load_robot(name)) as (page, _):

@@ -41,3 +41,26 @@ def test_pictures_become_png_and_gif() -> None:
     with Image.open(BytesIO(pictures_as_gif(frames, 0.1))) as film:
         assert getattr(film, "n_frames", 1) == 3
         assert film.info["duration"] == 100
+
+
+def test_glb_holds_pulleys_as_they_have_turned_and_what_is_behind() -> None:
+    winch = sl.Winch(pulley_radius=[0.0] + [0.3] * 7, dead_cable=2.0, dead_rise=[2.0] * 4 + [1.0] * 4, drum_radius=0.2)
+    robot, pose = ROBOT.replace(winches=winch), sl.Pose([1.0, 0.5, 2.0], np.eye(3))
+    snapshot = taken_at(robot, pose, Settings(mass=50.0), None)
+    scene = trimesh.load(BytesIO(scene_as_glb(snapshot, TensionScale.of(robot))), file_type="glb")
+    assert isinstance(scene, trimesh.Scene)
+    behind = {f"dead cable {i}" for i in range(4)} | {f"dead cable {i}, its way not known" for i in range(4, 8)}
+    assert set(scene.geometry) == {
+        "frame",
+        "winches",
+        "platform",
+        *behind,
+        *(f"pulley {i}" for i in range(1, 8)),
+        *(f"cable {i}" for i in range(8)),
+    }
+    for i in range(1, 8):
+        place, geometry = scene.graph[f"pulley {i}"]
+        middle = trimesh.transform_points(scene.geometry[geometry].bounds, place).mean(axis=0)
+        reach = (pose.transform(robot.platform_anchors) - robot.frame_anchors)[i] * [1.0, 1.0, 0.0]
+        x, y, z = robot.frame_anchors[i] + 0.3 * reach / np.linalg.norm(reach)
+        assert middle == pytest.approx([x, z, -y], abs=1e-5)

@@ -58,3 +58,61 @@ def test_dashes_are_every_other_segment() -> None:
     sizes = np.linalg.norm(dashed[:, 1] - dashed[:, 0], axis=1).reshape(8, -1)
     assert np.all(sizes[:, 1::2] == 0.0)
     assert np.array_equal(dashed.reshape(8, -1, 2, 3)[:, ::2], solid.reshape(8, -1, 2, 3)[:, ::2])
+
+
+WOUND = sl.Winch(
+    pulley_radius=[0.1, 0.2, 0.3, 0.0, 0.1, 0.2, 0.3, 0.15],
+    swivel_axis=[[0, 0, 1]] * 6 + [[0, 0, -1]] * 2,
+    dead_cable=[3.0, 3.0, 4.0, 2.0, 0.0, 3.0, 3.0, 3.0],
+    dead_rise=[3.0, 1.0, -2.0, 2.0, 0.0, 3.0, 3.0, -3.0],
+    drum_radius=0.2,
+    drum_width=0.5,
+)
+OVER_PULLEYS = ROBOT.replace(winches=WOUND)
+
+
+def test_cables_run_from_anchor_over_pulley_to_platform() -> None:
+    """Drawn lengths on the pulleys are arcs of their radius, and the cable bends nowhere else."""
+    plan = sl.inverse(OVER_PULLEYS, POSE)
+    assert plan.wrap_angle is not None
+    wraps = lines.wraps(OVER_PULLEYS, POSE, plan.wrap_angle)
+    np.testing.assert_array_equal(wraps[:, 0], ROBOT.frame_anchors)
+    np.testing.assert_allclose(wraps[:, -1], plan.exit_point, atol=1e-15)
+    on_pulley = np.linalg.norm(np.diff(wraps, axis=1), axis=2).sum(axis=1)
+    chord_of_arc = 2.0 * (lines.WRAP_POINTS - 1) * np.sin(plan.wrap_angle / (2.0 * (lines.WRAP_POINTS - 1)))
+    np.testing.assert_allclose(on_pulley, WOUND.pulley_radius * chord_of_arc, atol=1e-12)
+    free = lines.hanging(lines.chords(OVER_PULLEYS, POSE, wraps[:, -1]), plan.state.cables, 1.0)
+    np.testing.assert_allclose(free[:, -1], POSE.transform(ROBOT.platform_anchors), atol=1e-9)
+    strain = 0.5 * (plan.state.cables.frame_end_tension + plan.state.cables.platform_end_tension) / 44e3
+    along = np.linalg.norm(np.diff(free, axis=1), axis=2).sum(axis=1)
+    np.testing.assert_allclose(along, plan.free_length * (1.0 + strain), rtol=1e-5)
+    whole = np.concatenate((wraps[:, :-1], free), axis=1)[WOUND.pulley_radius > 0.0]
+    steps = np.diff(whole, axis=1)
+    steps /= np.linalg.norm(steps, axis=2, keepdims=True)
+    bend = np.arccos(np.clip(np.einsum("ijk,ijk->ij", steps[:, 1:], steps[:, :-1]), -1.0, 1.0))
+    assert bend.max() < 1.01 * plan.wrap_angle.max() / (lines.WRAP_POINTS - 1)
+
+
+def test_straight_cables_touch_where_the_weightless_leave() -> None:
+    plan = sl.inverse(OVER_PULLEYS, POSE, model=sl.Elastic())
+    np.testing.assert_allclose(lines.wraps(OVER_PULLEYS, POSE, None)[:, -1], plan.exit_point, atol=1e-12)
+
+
+def test_dead_cable_is_drawn_as_far_as_it_rises() -> None:
+    runs, upright = lines.dead_runs(OVER_PULLEYS)
+    np.testing.assert_array_equal(runs[:, 0], ROBOT.frame_anchors)
+    np.testing.assert_array_equal(runs[:, 1, :2], ROBOT.frame_anchors[:, :2])
+    np.testing.assert_allclose(runs[:, 0, 2] - runs[:, 1, 2], WOUND.dead_rise, atol=1e-15)
+    assert upright.tolist() == [True, False, False, True, True, True, True, True]
+    assert not np.diff(lines.dead_runs(ROBOT)[0], axis=1).any()
+
+
+def test_drums_touch_the_feet_of_their_runs_from_outside() -> None:
+    axes, feet = lines.drum_axes(OVER_PULLEYS), lines.dead_runs(OVER_PULLEYS)[0][:, 1]
+    np.testing.assert_allclose(np.linalg.norm(axes[:, 1] - axes[:, 0], axis=1), 0.5, rtol=1e-12)
+    assert not (axes[:, 1] - axes[:, 0])[:, 2].any()
+    middle = axes.mean(axis=1)
+    np.testing.assert_allclose(np.linalg.norm(middle - feet, axis=1), 0.2, rtol=1e-12)
+    out = np.linalg.norm(middle[:, :2], axis=1) - np.linalg.norm(feet[:, :2], axis=1)
+    np.testing.assert_allclose(out, 0.2, rtol=1e-3)
+    assert len(lines.drum_axes(ROBOT)) == 0

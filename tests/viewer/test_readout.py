@@ -172,3 +172,23 @@ def test_colors_of_cables_are_those_of_nothing_else() -> None:
 def test_until_the_first_numbers_the_page_says_what_it_waits_for() -> None:
     assert "Getting ready" in readout.waiting()
     assert "compiles" in readout.waiting()
+
+
+def test_robots_with_pulleys_show_wraps_and_all_cable_off_the_drum() -> None:
+    robot = ROBOT.replace(winches=sl.Winch(pulley_radius=[0.0] + [0.2] * 7, dead_cable=4.0, dead_rise=1.0))
+    pose = sl.Pose([1.0, 0.5, 2.0], np.eye(3))
+    html = readout.numbers(taken_at(robot, pose, Settings(mass=50.0), None), SCALE, None)
+    plan = sl.inverse(robot, pose)
+    assert plan.wrap_angle is not None
+    told = cells(html)
+    assert [float(row[3]) for row in told] == pytest.approx(plan.unstrained_length, abs=5.01e-5)
+    assert told[0][6] == "–"
+    assert [float(row[6]) for row in told[1:]] == pytest.approx(np.degrees(plan.wrap_angle[1:]), abs=0.0501)
+    plain_spaces = html.replace("\N{NO-BREAK SPACE}", " ")
+    assert "<b>Pulleys</b> radius 0 m to 0.2 m, dead cable 4 m, drawn upright and only as far as it" in plain_spaces
+    assert "not known" not in readout.numbers(
+        taken_at(robot.replace(winches=sl.Winch(pulley_radius=0.2)), pose, Settings(mass=50.0), None), SCALE, None
+    )
+    plain = readout.numbers(taken_at(ROBOT, pose, Settings(mass=50.0), None), SCALE, None)
+    assert "wrap" not in plain
+    assert "Pulleys" not in plain

@@ -8,6 +8,7 @@ import pytest
 import sagline as sl
 from sagline.viewer.settings import Settings
 from sagline.viewer.snapshot import taken_at
+from sagline.viewer.tension_scale import TensionScale
 
 ROBOT = sl.load_robot("article-suspended")
 HERE = sl.Pose([1.0, 0.5, 2.0], np.eye(3))
@@ -100,3 +101,35 @@ def test_ghosts_are_drawn_only_where_they_are_apart_from_their_cables() -> None:
         away = np.linalg.norm(ghosts - cables, axis=3)
         assert away[drawn].size == 0 or away[drawn].min() > apart
         assert not drawn[:, [0, -1]].any()  # where both end at the same anchor
+
+
+def test_cables_over_pulleys_are_drawn_on_them_whether_they_hold_or_not() -> None:
+    robot = ROBOT.replace(winches=sl.Winch(pulley_radius=0.2, dead_cable=2.0))
+    outside = sl.Pose([7.2, 3.0, 1.5], np.eye(3))
+    for pose, model in ((HERE, sl.Catenary()), (outside, sl.Elastic())):
+        snapshot = taken_at(robot, pose, Settings(mass=50.0), None)
+        assert snapshot.feasible is (pose is HERE)
+        courses = snapshot.courses(1.0)
+        np.testing.assert_array_equal(courses[:, 0], ROBOT.frame_anchors)
+        np.testing.assert_allclose(courses[:, -1], pose.transform(ROBOT.platform_anchors), atol=1e-9)
+        centers = ROBOT.frame_anchors.copy()
+        reach = (pose.transform(ROBOT.platform_anchors) - centers)[:, :2]
+        centers[:, :2] += 0.2 * reach / np.linalg.norm(reach, axis=1, keepdims=True)
+        from_center = np.linalg.norm(courses - centers[:, None], axis=2)
+        assert from_center.min() > 0.2 - 1e-9  # none cuts through its pulley
+        on_it = np.isclose(from_center, 0.2, rtol=1e-9).sum(axis=1)
+        assert (on_it >= 16).all()
+        assert snapshot.cable_colors(TensionScale.of(robot)).shape == snapshot.cable_segments(1.0).shape
+        if pose is HERE:
+            exits = sl.inverse(robot, pose, model=model).exit_point
+            assert np.abs(courses[:, :, None] - exits[:, None, None]).sum(axis=3).min(axis=(1, 2)).max() < 1e-9
+
+
+def test_a_platform_dragged_into_a_pulley_says_so() -> None:
+    robot = ROBOT.replace(winches=sl.Winch(pulley_radius=0.2))
+    corner = ROBOT.frame_anchors[3] - ROBOT.platform_anchors[3]
+    snapshot = taken_at(robot, sl.Pose(corner + np.array([0.1, 0.1, -1.0]), np.eye(3)), Settings(mass=50.0), None)
+    assert not snapshot.feasible
+    assert snapshot.reason.startswith("cable 2: its platform end is inside its pulley or past the near side")
+    assert "0.282842712 m; allowed: > 0.4 m there" in snapshot.reason
+    assert np.isfinite(snapshot.courses(1.0)).all()

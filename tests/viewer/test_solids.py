@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial.transform import Rotation
 
 import sagline as sl
 from sagline.viewer import solids
@@ -56,3 +57,39 @@ def test_frames_that_nobody_gave_are_dashed(name: str) -> None:
 )
 def test_lengths_to_measure_by_are_round(length: float, rounded: float) -> None:
     assert solids.round_below(length) == pytest.approx(rounded, rel=1e-12)
+
+
+def test_a_pulley_stands_where_its_cable_enters_and_as_large_as_it_is() -> None:
+    wheel = mesh(solids.wheel())
+    assert wheel.bounds[0] == pytest.approx([0.03, -0.1, -0.97], abs=0.01)  # entered at the origin, a bit of room
+    assert wheel.bounds[1] == pytest.approx([1.97, 0.1, 0.97], abs=0.01)
+    assert wheel.volume > 0.0
+    across = np.hypot(wheel.vertices[:, 0] - 1.0, wheel.vertices[:, 2])
+    assert across.max() <= 0.97 + 1e-12  # the cable, at 1, lies on it
+
+
+def test_pulleys_turn_to_the_platform() -> None:
+    robot = sl.load_robot("ipanema-2-pulleys")
+    pose = sl.Pose.from_euler([0.5, -0.3, 2.0], 0.1, 0.0, 0.2)
+    turned = Rotation.from_quat(np.roll(solids.turns(robot, pose), -1, axis=1)).apply([1.0, 0.0, 0.0])
+    reach = pose.transform(robot.platform_anchors) - robot.frame_anchors
+    reach[:, 2] = 0.0
+    assert turned == pytest.approx(reach / np.linalg.norm(reach, axis=1, keepdims=True), abs=1e-12)
+
+
+def test_marks_stay_where_no_pulley_is_seen_and_drums_are_drawn_where_they_are() -> None:
+    robot = sl.load_robot("ipanema-2")
+    assert mesh(solids.winches(robot)).body_count == 8
+    assert mesh(solids.winches(robot.replace(winches=sl.Winch(pulley_radius=0.01)))).body_count == 8
+    assert len(solids.winches(robot.replace(winches=sl.Winch(pulley_radius=0.2))).faces) == 0
+    wound = sl.Winch(pulley_radius=0.2, dead_cable=3.0, dead_rise=3.0, drum_radius=0.25, drum_width=0.4)
+    drums = mesh(solids.winches(robot.replace(winches=wound)))
+    assert drums.body_count == 8
+    assert drums.volume == pytest.approx(8 * np.pi * 0.25**2 * 0.4, rel=0.03)  # as good as twenty sides are
+    assert drums.bounds[:, 2] == pytest.approx(robot.frame_anchors[[5, 3], 2] - 3.0 + [-0.25, 0.25], abs=0.005)
+
+
+def test_a_tube_leaves_out_points_that_repeat() -> None:
+    points = np.linspace([0.0, 0.0, 0.0], [0.0, 3.0, 4.0], 9)
+    twice = np.repeat(points, 2, axis=0)
+    assert np.array_equal(solids.tube(twice, 0.1).vertices, solids.tube(points, 0.1).vertices)

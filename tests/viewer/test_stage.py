@@ -9,7 +9,10 @@ import pytest
 import sagline as sl
 from sagline.viewer import solids
 from sagline.viewer.server import Server, started, stop
+from sagline.viewer.settings import Settings
+from sagline.viewer.snapshot import taken_at
 from sagline.viewer.stage import Stage
+from sagline.viewer.tension_scale import TensionScale
 from sagline.viewer.viewer import home_pose
 
 
@@ -49,3 +52,37 @@ def test_every_robot_has_a_floor_and_a_scale(server: Server, name: str) -> None:
     assert node(server, "/axes/length").text == f"{lengths[0]:g} m"
     assert lengths == pytest.approx(lengths[0])
     assert (arms[:, 1] - arms[:, 0]) / lengths[0] == pytest.approx(np.eye(3), abs=1e-6)
+
+
+def test_pulleys_turn_and_exit_points_move_with_the_platform(server: Server) -> None:
+    robot = sl.load_robot("ipanema-2-pulleys")
+    stage = Stage(server.scene, robot, home_pose(robot))
+    wheels = node(server, "/pulleys")
+    assert np.asarray(wheels.batched_scales) == pytest.approx(0.25)
+    assert np.asarray(wheels.batched_positions) == pytest.approx(robot.frame_anchors, abs=1e-6)
+    seen = []
+    for position in ([0.0, 0.0, 2.0], [1.0, 0.5, 2.5]):
+        snapshot = taken_at(robot, sl.Pose(position, np.eye(3)), Settings(mass=robot.mass), None)
+        stage.show(snapshot, TensionScale.of(robot), 1.0, 1.0, ghost=True)
+        assert np.asarray(wheels.batched_wxyzs) == pytest.approx(solids.turns(robot, snapshot.pose), abs=1e-6)
+        points = np.asarray(node(server, "/cables").points).reshape(8, -1, 2, 3)
+        assert points[:, 0, 0] == pytest.approx(robot.frame_anchors, abs=1e-6)
+        exits = sl.inverse(robot, snapshot.pose).exit_point
+        assert np.linalg.norm(points[:, :, 0] - exits[:, None], axis=2).min(axis=1) == pytest.approx(0.0, abs=1e-5)
+        seen.append(exits)
+    assert np.linalg.norm(seen[1] - seen[0], axis=1).min() > 0.005
+
+
+def test_dead_cable_is_dashed_where_its_way_is_not_known(server: Server) -> None:
+    base = sl.load_robot("article-suspended")
+    rise = np.array([2.0, 2.0, 2.0, 2.0, 1.0, 1.0, 0.0, 0.0])
+    winch = sl.Winch(pulley_radius=0.2, dead_cable=2.0, dead_rise=rise, drum_radius=0.2)
+    robot = base.replace(winches=winch)
+    stage = Stage(server.scene, robot, home_pose(robot))
+    for name, runs in (("/dead", 4 * 2.0), ("/dead_assumed", 2 * 0.5 * 1.0)):
+        points = np.asarray(node(server, name).points)
+        assert np.linalg.norm(points[:, 1] - points[:, 0], axis=1).sum() == pytest.approx(runs, rel=1e-5)
+    low, high = stage.extent(home_pose(robot))
+    drums = solids.winches(robot).vertices
+    assert np.all(drums > low)
+    assert np.all(drums <= high)

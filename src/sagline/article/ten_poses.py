@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import reduce
-from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
 from sagline.arrays import Array, locked
+from sagline.article.explanations import ErrorOf, Explanation, explanations, subsets, tangents
 from sagline.article.fits import Line, fit_line
-from sagline.article.machine import PARAMETERS, Machine, Parameter
+from sagline.article.machine import ANCHORS, PARAMETERS, PULLEY, ZERO, Errors, Parameter, machine, rest
 from sagline.article.table2 import Table2, table2
 from sagline.cables.empirical import Empirical
 from sagline.files.robot_file import load_robot
@@ -21,14 +20,13 @@ from sagline.kinematics.plan import Plan
 from sagline.motion.profile import QUINTIC
 from sagline.motion.rest_to_rest import quintic_path
 from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.statics.stiffness import stiffness
 from sagline.tension.minimum_norm import MinimumNorm
 
 HOME = (0.0, 0.0, 1.5)  # m, the prototype's home position
 METHOD = MinimumNorm("horizontal")
 TOUR_SPEED = 0.2  # m/s, ours: the article says "low speed"
-STEP = 0.01  # of a plausible error, for the slopes
-NEWTON_STEPS = 8
-SETTLED = 1e-3  # of a plausible error
 
 
 class Trend(NamedTuple):
@@ -59,38 +57,17 @@ class Tour(NamedTuple):
     stops: Array
 
 
-class Guess(NamedTuple):
-    """Errors of some parameters fitted with slopes at zero.
+class Limits(NamedTuple):
+    """What ten poses cannot tell apart, about the best explanation by two parameters.
 
     Attributes:
-        parameters: The parameters.
-        values: Their errors, each in its unit, shape (k,).
-        rms: Root mean square of measured less predicted position, over all coordinates [m].
+        imitated: Of what a pulley radius does to the positions, the part that a zero of the lengths and an anchor
+            height do together: length of the projection over length of the whole.
+        single_zero: Standard deviation of the zero of each cable if every cable had its own [m], shape (m,).
     """
 
-    parameters: tuple[Parameter, ...]
-    values: Array
-    rms: float
-
-
-class Explanation(NamedTuple):
-    """The errors of some parameters, none beyond what we think plausible, that fit the measured positions best.
-
-    Attributes:
-        parameters: The parameters.
-        values: Their errors, each in its unit, shape (k,).
-        predicted: Actual less desired position with these errors [m], shape (10, 3).
-        rms: Root mean square of measured less predicted position, over all coordinates [m].
-        worst: Largest distance of measured and predicted position [m].
-        at_limit: Whether a value has run into the limit of what is plausible.
-    """
-
-    parameters: tuple[Parameter, ...]
-    values: Array
-    predicted: Array
-    rms: float
-    worst: float
-    at_limit: bool
+    imitated: float
+    single_zero: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,8 +81,8 @@ class TenPoses:
         model_error: Error that the empirical model itself makes at the ten poses [m], shape (10, 3).
         height_line: Line of least squares of the measured vertical error over the height of the pose.
         trends: One parameter off at a time.
-        explanations: The best explanations by one, by two and by three parameters, best first within each.
-        unlimited: The best fit by as many parameters as the last explanations have, whatever the values.
+        explanations: All explanations by one, by two and by three parameters, those that leave least first within each.
+        limits: What the poses cannot tell apart.
         measured_rms: Root mean square of the measured errors, over all coordinates [m].
     """
 
@@ -116,54 +93,48 @@ class TenPoses:
     height_line: Line
     trends: tuple[Trend, ...]
     explanations: tuple[tuple[Explanation, ...], ...]
-    unlimited: Guess
+    limits: Limits
     measured_rms: float
 
+    def best(self, count: int) -> Explanation:
+        """The explanation by so many parameters that leaves least."""
+        return self.explanations[count - 1][0]
 
-def ten_poses(parameters: Sequence[Parameter] = PARAMETERS, most: int = 3, best: int = 4) -> TenPoses:
+    def explanation(self, *names: str) -> Explanation:
+        """The explanation by the parameters of these names."""
+        return next(found for found in self.explanations[len(names) - 1] if found.names == set(names))
+
+
+def ten_poses(most: int = 3) -> TenPoses:
     """Plan the prototype at the ten poses, and look for what explains its measured errors.
 
-    Every combination of up to three parameters is fitted with slopes at zero, within what we think plausible; the best
-    are then fitted with the whole model. Positions are printed in whole millimeters: no fit can be better than 0.3 mm.
+    Every model of up to three of the parameters is fitted with the exact machine, within what we think plausible.
+    Positions are printed in whole millimeters: no fit can be better than 0.3 mm.
 
     Args:
-        parameters: What may be off.
         most: Largest number of parameters in an explanation.
-        best: How many explanations by two or more parameters to keep; by one, all.
 
     Returns:
         The study.
     """
-    table, machine = table2(), Machine(load_robot("article-prototype"))
-    plan = _planned(machine, table.desired)
-    home = _planned(machine, np.array([HOME]))
-    nominal = machine.rest(plan, home)
+    table, robot = table2(), load_robot("article-prototype")
+    plan, home = _planned(robot, table.desired), _planned(robot, np.array([HOME]))
 
-    def error_of(chosen: Sequence[Parameter], values: Array) -> Array:
-        changed = reduce(lambda m, pair: pair[0].changed(m, float(pair[1])), zip(chosen, values, strict=True), machine)
-        return changed.rest(plan, home) - table.desired
+    def error_of(errors: Sequence[Errors]) -> Array:
+        return rest(robot, plan, home, errors) - table.desired
 
-    zero = np.zeros(1)
-    slopes = {p.name: _slope([p], zero, 0, nominal - table.desired, error_of) for p in parameters}
-    trends = [_trend(p, error_of([p], np.array([p.typical])), table) for p in parameters]
-    missing = (table.actual - nominal).ravel()
-    explanations = []
-    for count in range(1, most + 1):
-        guesses = [_guess(chosen, slopes, missing, limited=True) for chosen in combinations(parameters, count)]
-        kept = len(guesses) if count == 1 else best
-        ranked = sorted(guesses, key=lambda guess: guess.rms)[:kept]
-        fitted = [_fitted(guess, error_of, table.error) for guess in ranked]
-        explanations.append(tuple(sorted(fitted, key=lambda found: found.rms)))
-    wild = [_guess(chosen, slopes, missing, limited=False) for chosen in combinations(parameters, most)]
+    nominal, *off = error_of([{}, *({parameter.name: parameter.typical} for parameter in PARAMETERS)])
+    found = sorted(explanations(error_of, table.error, subsets(PARAMETERS, most)), key=lambda one: one.rms)
+    ranked = tuple(tuple(one for one in found if len(one.parameters) == count + 1) for count in range(most))
     return TenPoses(
         table=table,
         plan=plan,
         home=home,
-        model_error=nominal - table.desired,
+        model_error=nominal,
         height_line=fit_line(table.desired[:, 2], table.error[:, 2]),
-        trends=tuple(trends),
-        explanations=tuple(explanations),
-        unlimited=min(wild, key=lambda guess: guess.rms),
+        trends=tuple(_trend(parameter, error, table) for parameter, error in zip(PARAMETERS, off, strict=True)),
+        explanations=ranked,
+        limits=_limits(robot, error_of, plan, ranked[1][0]),
         measured_rms=float(np.sqrt(np.mean(table.error**2))),
     )
 
@@ -184,8 +155,8 @@ def tour(rate: float = 10.0) -> Tour:
     return Tour(plan, locked(np.cumsum(way * QUINTIC.peak_speed / TOUR_SPEED)[:-1]))
 
 
-def _planned(machine: Machine, positions: Array) -> Plan:
-    return inverse(machine.robot, Pose.from_euler(positions, 0.0, 0.0, 0.0), Empirical(), METHOD)
+def _planned(robot: Robot, positions: Array) -> Plan:
+    return inverse(robot, Pose.from_euler(positions, 0.0, 0.0, 0.0), Empirical(), METHOD)
 
 
 def _trend(parameter: Parameter, error: Array, table: Table2) -> Trend:
@@ -194,63 +165,18 @@ def _trend(parameter: Parameter, error: Array, table: Table2) -> Trend:
     return Trend(parameter, error, float(line.slope), float(np.corrcoef(height, error[:, 2])[0, 1]))
 
 
-def _fitted(guess: Guess, error_of: Callable[[Sequence[Parameter], Array], Array], measured: Array) -> Explanation:
-    """Least squares within the plausible errors by Gauss-Newton, from the guess on."""
-    chosen, values = guess.parameters, guess.values
-    low, high = _limits(chosen)
-    predicted = error_of(chosen, values)
-    for _ in range(NEWTON_STEPS):
-        matrix = np.stack([_slope(chosen, values, k, predicted, error_of) for k in range(len(chosen))], axis=1)
-        new = _bounded(matrix, (measured - predicted).ravel() + matrix @ values, low, high)
-        step, values = float(np.abs((new - values) / high).max()), new
-        predicted = error_of(chosen, values)
-        if step < SETTLED:
-            break
-    rest = measured - predicted
-    return Explanation(
-        parameters=chosen,
-        values=values,
-        predicted=predicted,
-        rms=float(np.sqrt(np.mean(rest**2))),
-        worst=float(np.linalg.norm(rest, axis=1).max()),
-        at_limit=bool(np.any((values <= 0.999 * low) & (low < 0.0) | (values >= 0.999 * high))),
+def _limits(robot: Robot, error_of: ErrorOf, plan: Plan, found: Explanation) -> Limits:
+    """What the ten poses cannot tell apart, about an explanation."""
+    at = dict(zip((p.name for p in found.parameters), found.values, strict=True))
+    three = tuple(p for p in PARAMETERS if p.name in (PULLEY, ZERO, ANCHORS))
+    slopes = tangents(error_of, [three], [np.array([at.get(p.name, 0.0) for p in three])])[0].slopes
+    is_pulley = np.array([p.name == PULLEY for p in three])
+    whole, others = slopes[:, is_pulley], slopes[:, ~is_pulley]
+    imitation = others @ np.linalg.lstsq(others, whole)[0]
+    state = inverse(machine(robot, at), plan.state.pose, tension=METHOD).state
+    by_zero = stiffness(state).length_sensitivity[:, :3].reshape(-1, robot.cable_count)
+    scatter = found.rms * np.sqrt(len(by_zero) / (len(by_zero) - robot.cable_count))
+    return Limits(
+        imitated=float(np.linalg.norm(imitation) / np.linalg.norm(whole)),
+        single_zero=scatter * np.sqrt(np.diag(np.linalg.inv(by_zero.T @ by_zero))),
     )
-
-
-def _slope(
-    chosen: Sequence[Parameter],
-    values: Array,
-    k: int,
-    error: Array,
-    error_of: Callable[[Sequence[Parameter], Array], Array],
-) -> Array:
-    """Change of the errors with the k-th value, shape (30,), by a difference away from its limit."""
-    step = -STEP * chosen[k].plausible if values[k] > 0.0 else STEP * chosen[k].plausible
-    moved = values.copy()
-    moved[k] += step
-    slope: Array = (error_of(chosen, moved) - error).ravel() / step
-    return slope
-
-
-def _guess(chosen: tuple[Parameter, ...], slopes: Mapping[str, Array], missing: Array, *, limited: bool) -> Guess:
-    matrix = _matrix(chosen, slopes)
-    values = _bounded(matrix, missing, *_limits(chosen)) if limited else np.asarray(np.linalg.lstsq(matrix, missing)[0])
-    return Guess(chosen, values, float(np.sqrt(np.mean((missing - matrix @ values) ** 2))))
-
-
-def _matrix(chosen: Sequence[Parameter], slopes: Mapping[str, Array]) -> Array:
-    return np.stack([slopes[parameter.name] for parameter in chosen], axis=1)
-
-
-def _limits(chosen: Sequence[Parameter]) -> tuple[Array, Array]:
-    high = np.array([parameter.plausible for parameter in chosen])
-    low = np.array([0.0 if parameter.positive else -parameter.plausible for parameter in chosen])
-    return low, high
-
-
-def _bounded(matrix: Array, right: Array, low: Array, high: Array) -> Array:
-    """Least squares within bounds; each unknown is counted in its upper bound, which makes them comparable."""
-    from scipy.optimize import lsq_linear
-
-    values: Array = high * lsq_linear(matrix * high, right, bounds=(low / high, np.ones_like(high))).x
-    return values

@@ -81,7 +81,7 @@ def _verdicts() -> None:
     from sagline.tension.options import kernel_options
 
     robot = sl.load_robot(ROBOT)
-    found = Found.empty(1, robot.cable_count, robot.degrees_of_freedom)
+    found = Found.empty(1, robot.cable_count, robot.degrees_of_freedom, behind=False)
     found = found._replace(pose_status=np.full(1, POSE_INFEASIBLE, dtype=np.int8))
     options = kernel_options(robot, sl.Catenary(), sl.MinimumNorm())
     decide_rows(robot, options, pose_rows(sl.Pose(PLACE, LEVEL)), np.zeros((1, 6)), found)

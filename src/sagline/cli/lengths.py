@@ -98,15 +98,14 @@ def _plan_of(file: Path, out: Path | None) -> Plan:
 
 def plan_text(plan: Plan) -> str:
     """A whole plan as CSV: time, pose, lengths, tensions and how each sample ended; empty where it has no answer."""
-    pose, cables = plan.state.pose, plan.state.cables
+    pose, lengths, tensions = plan.state.pose, plan.unstrained_length, plan.chord_tension
     columns: dict[str, Array] = {}
     if plan.path is not None:
         columns["time [s]"] = plan.path.time
     columns |= {f"{axis} [m]": pose.position[..., k] for k, axis in enumerate("xyz")}
     columns |= {f"q{axis}": pose.quaternion[..., k] for k, axis in enumerate("xyzw")}
-    count = cables.unstrained_length.shape[-1]
-    columns |= {f"L{k} [m]": cables.unstrained_length[..., k] for k in range(count)}
-    columns |= {f"T{k} [N]": cables.chord_tension[..., k] for k in range(count)}
+    columns |= {f"L{k} [m]": lengths[..., k] for k in range(lengths.shape[-1])}
+    columns |= {f"T{k} [N]": tensions[..., k] for k in range(tensions.shape[-1])}
     numbers = np.column_stack([np.atleast_1d(column) for column in columns.values()]).tolist()
     words = [PoseStatus(int(code)).name for code in np.atleast_1d(plan.status)]
     body = ([*("" if x != x else x for x in row), word] for row, word in zip(numbers, words, strict=True))

@@ -107,7 +107,7 @@ def run_along(
 
 def summary(run: Run) -> Summary:
     """The run in numbers."""
-    plan, cables = run.plan, run.plan.state.cables
+    plan = run.plan
     error = 1e3 * np.linalg.norm(run.confirmation.position_error, axis=-1)
     largest, mean = (
         float(f(error[~np.isnan(error)])) if not np.isnan(error).all() else np.nan for f in (np.max, np.mean)
@@ -115,9 +115,9 @@ def summary(run: Run) -> Summary:
     return Summary(
         largest,
         mean,
-        *_range(cables.chord_tension),
-        *_range(cables.unstrained_length),
-        *_range(1e3 * cables.adjusting_length),
+        *_range(plan.chord_tension),
+        *_range(plan.unstrained_length),
+        *_range(1e3 * plan.state.cables.adjusting_length),
         100.0 * float(np.mean(plan.feasible)),
         1e6 * run.seconds / plan.status.size,
     )

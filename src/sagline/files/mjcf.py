@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from decimal import ROUND_DOWN, Context
 from typing import NamedTuple
 from xml.etree import ElementTree
@@ -16,10 +15,14 @@ from sagline.arguments import instance
 from sagline.arrays import Array, checked
 from sagline.cables.elastic import Elastic
 from sagline.errors import InvalidValueError
+from sagline.files.mjcf_pulleys import NOTE, add_pulleys, free_chords, lead_of, numbers_text
+from sagline.kinematics.forward import dead_only
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.status import PoseStatus
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
+from sagline.robot.several import pulleys_of
+from sagline.robot.wheels import dead_cable
 
 _NOTE = (
     " Written by sagline. Every cable is a straight spring that pulls and never pushes, of the given unstrained length "
@@ -55,6 +58,8 @@ def dump_mjcf(robot: Robot, pose: Pose, unstrained_length: ArrayLike | None = No
     """The text of a MuJoCo model of the robot, with the platform at a pose.
 
     A cable of unstrained length L is a spatial tendon of stiffness EA/L that is slack below L: the model `Elastic`.
+    Where it runs over a pulley it lies on a cylinder, which does not swivel: forces, lengths and stiffness are those of
+    the robot at the pose, and the file says what is lost elsewhere.
     The time step is short enough for the fastest motion that the platform can make on its cables, wherever it is.
     Damping lets it come to rest: that of a cable is proportional to its stiffness; where motions are left that no cable
     resists, the platform's joints are damped as well.
@@ -62,41 +67,46 @@ def dump_mjcf(robot: Robot, pose: Pose, unstrained_length: ArrayLike | None = No
     Args:
         robot: The robot.
         pose: A single pose, where the platform starts.
-        unstrained_length: L [m], >= 1e-6, shape (m,). None takes the lengths with which straight elastic cables hold
-            the platform at rest at this pose.
+        unstrained_length: L, all cable off the drum [m], >= 1e-6, shape (m,). None takes the lengths with which
+            straight elastic cables hold the platform at rest at this pose.
 
     Returns:
         The XML text.
 
     Raises:
-        InvalidValueError: If the pose is a batch, a length is below 1e-6 m, or no tensions within the robot's limits
-            hold the platform there.
+        InvalidValueError: If the pose is a batch, a length is below 1e-6 m or no longer than the dead cable, or no
+            tensions within the robot's limits hold the platform there.
+        CableGeometryError: If a platform end is inside its pulley.
     """
     instance(robot, Robot, "robot")
     if instance(pose, Pose, "pose").shape:
         raise InvalidValueError("pose", f"a batch of {len(pose)}", "a single pose", "Write one model a pose.")
     lengths = _held(robot, pose) if unstrained_length is None else _checked(robot, unstrained_length)
     stiffness = robot.cables.axial_stiffness / lengths
+    lead, over_pulley = lead_of(robot, pose), pulleys_of(robot).radius > 0.0
     dynamics = _dynamics(robot, pose, stiffness)
     root = Element("mujoco", model=robot.name)
-    root.append(Comment(_NOTE))
+    root.append(Comment(_NOTE + NOTE if over_pulley.any() else _NOTE))
     SubElement(root, "compiler", angle="radian", inertiafromgeom="false")
-    option = SubElement(root, "option", gravity=_text((0.0, 0.0, -robot.gravity)))
+    option = SubElement(root, "option", gravity=numbers_text((0.0, 0.0, -robot.gravity)))
     option.set("timestep", f"{_DOWN.create_decimal_from_float(dynamics.step):g}")
     option.set("integrator", "implicitfast")  # which takes damping implicitly: it never limits the step
     radius = _RADIUS * _add_view(root, robot)
     world = SubElement(root, "worldbody")
-    for i, point in enumerate(robot.frame_anchors):
-        SubElement(world, "site", name=f"frame_{i}", pos=_text(point), size=_text((radius,)))
+    for i, point in enumerate(lead.start):
+        SubElement(world, "site", name=f"frame_{i}", pos=numbers_text(point), size=numbers_text((radius,)))
     _add_platform(world, robot, pose, radius, dynamics.drag)
-    tendons = SubElement(root, "tendon")
+    add_pulleys(world, robot, pose, lead)
+    listed = SubElement(root, "tendon")
     for i, length in enumerate(lengths):
-        tendon = SubElement(tendons, "spatial", name=f"cable_{i}", stiffness=_text((stiffness[i],)))
-        tendon.set("springlength", _text((0.0, length)))
-        tendon.set("damping", _text((dynamics.stretch_time * stiffness[i],)))
-        tendon.set("width", _text((0.3 * radius,)))
-        for end in ("frame", "platform"):
-            SubElement(tendon, "site", site=f"{end}_{i}")
+        tendon = SubElement(listed, "spatial", name=f"cable_{i}", stiffness=numbers_text((stiffness[i],)))
+        tendon.set("springlength", numbers_text((0.0, length - lead.missing[i])))
+        tendon.set("damping", numbers_text((dynamics.stretch_time * stiffness[i],)))
+        tendon.set("width", numbers_text((0.3 * radius,)))
+        SubElement(tendon, "site", site=f"frame_{i}")
+        if over_pulley[i]:
+            SubElement(tendon, "geom", geom=f"pulley_{i}", sidesite=f"side_{i}")
+        SubElement(tendon, "site", site=f"platform_{i}")
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode") + "\n"
 
@@ -116,7 +126,7 @@ def _dynamics(robot: Robot, pose: Pose, stiffness: Array) -> _Dynamics:
     mobility = np.swapaxes(moved, 1, 2) @ np.linalg.solve(masses, moved)
     fastest = float(np.sqrt(stiffness @ np.linalg.eigvalsh(mobility)[:, -1]))
     step = min(_LONGEST_STEP, 2.0 * np.pi / (_STEPS * fastest))
-    cables = pose.transform(robot.platform_anchors) - robot.frame_anchors
+    cables = free_chords(robot, pose)
     distance = np.linalg.norm(cables, axis=1)
     directions = cables / np.where(distance > 0.0, distance, 1.0)[:, None]
     stretch = np.einsum("ik,ijk->ij", directions, moved)
@@ -144,6 +154,9 @@ def _checked(robot: Robot, lengths: ArrayLike) -> Array:
         raise InvalidValueError(
             "unstrained_length", f"of shape {array.shape}", f"shape ({robot.cable_count},)", "Give one length a cable."
         )
+    dead = dead_cable(robot)
+    if ((array <= dead) & (dead > 0.0)).any():
+        raise dead_only(array, dead)
     return array
 
 
@@ -151,26 +164,26 @@ def _add_view(root: Element, robot: Robot) -> float:
     """What MuJoCo's camera shall see: the frame. Returns the size of the robot [m]."""
     low, high = robot.frame_anchors.min(axis=0), robot.frame_anchors.max(axis=0)
     size = float(np.linalg.norm(high - low)) + float(np.linalg.norm(np.ptp(robot.platform_anchors, axis=0)))
-    SubElement(root, "statistic", center=_text(0.5 * (low + high)), extent=_text((size,)))
+    SubElement(root, "statistic", center=numbers_text(0.5 * (low + high)), extent=numbers_text((size,)))
     return size
 
 
 def _add_platform(world: Element, robot: Robot, pose: Pose, radius: float, drag: float) -> None:
     x, y, z, w = pose.quaternion
-    body = SubElement(world, "body", name="platform", pos=_text(pose.position), quat=_text((w, x, y, z)))
+    body = SubElement(world, "body", name="platform", pos=numbers_text(pose.position), quat=numbers_text((w, x, y, z)))
     _add_joints(body, robot, pose, drag)
     inertia = _inertia(robot, pose)
     moments = [inertia[i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
-    inertial = SubElement(body, "inertial", pos=_text(robot.center_of_mass), mass=_text((robot.mass,)))
-    inertial.set("fullinertia", _text(moments))
+    inertial = SubElement(body, "inertial", pos=numbers_text(robot.center_of_mass), mass=numbers_text((robot.mass,)))
+    inertial.set("fullinertia", numbers_text(moments))
     low, high = robot.platform_anchors.min(axis=0), robot.platform_anchors.max(axis=0)
     edges = high - low if robot.platform_size is None else robot.platform_size
     half = np.maximum(0.5 * edges, max(0.5 * _THINNEST * float(edges.max()), radius))
-    box = SubElement(body, "geom", type="box", pos=_text(0.5 * (low + high)), size=_text(half))
+    box = SubElement(body, "geom", type="box", pos=numbers_text(0.5 * (low + high)), size=numbers_text(half))
     for key in ("contype", "conaffinity"):
         box.set(key, "0")
     for i, point in enumerate(robot.platform_anchors):
-        SubElement(body, "site", name=f"platform_{i}", pos=_text(point), size=_text((radius,)))
+        SubElement(body, "site", name=f"platform_{i}", pos=numbers_text(point), size=numbers_text((radius,)))
 
 
 def _inertia(robot: Robot, pose: Pose) -> Array:
@@ -194,11 +207,8 @@ def _add_joints(body: Element, robot: Robot, pose: Pose, drag: float) -> None:
         joints = []
         for k, row in enumerate(robot.freedom):
             kind, axis = ("slide", row[:3]) if row[:3].any() else ("hinge", row[3:])
-            joints.append(SubElement(body, "joint", name=f"freedom_{k}", type=kind, axis=_text(axis @ pose.matrix)))
+            joints.append(
+                SubElement(body, "joint", name=f"freedom_{k}", type=kind, axis=numbers_text(axis @ pose.matrix))
+            )
     for joint in joints if drag > 0.0 else ():
-        joint.set("damping", _text((drag,)))
-
-
-def _text(values: Iterable[float]) -> str:
-    """Numbers to their last bit."""
-    return " ".join(repr(float(value)) for value in values)
+        joint.set("damping", numbers_text((drag,)))

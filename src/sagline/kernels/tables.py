@@ -32,3 +32,4 @@ SPAN, RISE, LENGTH, HORIZONTAL, VERTICAL, TENSION = 0, 1, 2, 3, 4, 5
 WRAP, WRAPPED, DEAD = 6, 7, 8  # wrap angle [rad], unstrained length on the pulley and behind it [m]
 SINE = 9  # sin phi of the chord that touches the pulley
 RESULT_ROWS = 10
+BARE_ROWS = WRAP  # where nothing is

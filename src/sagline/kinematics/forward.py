@@ -24,7 +24,8 @@ from sagline.robot.behind import differs, with_behind
 from sagline.robot.pose import Pose
 from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot
-from sagline.robot.several import check_count, first_of, together
+from sagline.robot.several import Robots, anything_behind, check_count, first_of, together
+from sagline.robot.wheels import dead_cable
 from sagline.statics.tables import pose_rows
 from sagline.statics.wrench import external_wrench
 
@@ -68,9 +69,10 @@ def forward(
         ForwardSolution, single or with a leading axis N.
 
     Raises:
-        InvalidValueError: If a length is not positive or single lengths of a sample are NaN (the message names the
-            cable), several robots do not fit together (it names which), an argument is of the wrong kind or shape,
-            the start is outside the motions of the robot's pattern, or so many samples need more memory than is free.
+        InvalidValueError: If a length is not positive, or no longer than the dead cable behind its pulley, or single
+            lengths of a sample are NaN (the message names the cable), several robots do not fit together (it names
+            which), an argument is of the wrong kind or shape, the start is outside the motions of the robot's pattern,
+            or so many samples need more memory than is free.
 
     Source:
         docs/model.md, section 6.
@@ -88,11 +90,11 @@ def forward(
         optional(value, kind, item)
     instance(model, CableModel, "model")
     callback(progress, "progress")
-    lengths = checked_lengths(first_of(robots), unstrained_length)
+    lengths = checked_lengths(robots, unstrained_length)
     shape = lengths.shape[:-1]
     count = shape[0] if shape else None
     check_count(robots, count)
-    check_poses(count or 1, lengths.shape[-1])
+    check_poses(count or 1, lengths.shape[-1], anything_behind(robots))
     load = external_wrench(wrench, count)
     direction = None if winding is None else checked_winding(winding, shape, lengths.shape[-1])
     samples, loads = np.atleast_2d(lengths), np.atleast_2d(load)
@@ -112,11 +114,11 @@ def forward(
     return replace(solution, state=with_behind(solution.state, direction))
 
 
-def checked_lengths(robot: Robot, lengths: ArrayLike) -> Array:
-    """The caller's lengths, shape (m,) or (N, m), positive or whole rows of NaN.
+def checked_lengths(robot: Robots, lengths: ArrayLike) -> Array:
+    """The caller's lengths, shape (m,) or (N, m), positive and beyond the dead cable, or whole rows of NaN.
 
     Args:
-        robot: Gives the number of cables, and its name to messages.
+        robot: Gives the number of cables, their dead cable, and its name to messages; or one a sample.
         lengths: What the caller gave [m].
 
     Returns:
@@ -126,13 +128,14 @@ def checked_lengths(robot: Robot, lengths: ArrayLike) -> Array:
         InvalidValueError: If they are not; the message names the cable and, of many, the sample.
     """
     array = numbers(lengths, "unstrained_length", "m")
-    m = robot.cable_count
+    shared, dead = first_of(robot), dead_cable(robot)
+    m = shared.cable_count
     if array.ndim not in (1, 2) or array.shape[-1] != m:
         raise InvalidValueError(
             "unstrained_length",
             f"of shape {array.shape}",
             f"shape ({m},) or (N, {m})",
-            f"Give one length for each of the {m} cables of {robot.name}.",
+            f"Give one length for each of the {m} cables of {shared.name}.",
         )
     absent = np.isnan(array).all(axis=-1, keepdims=True)
     wrong = ~((array >= SMALLEST) & (array < LARGEST)) & ~absent
@@ -145,7 +148,30 @@ def checked_lengths(robot: Robot, lengths: ArrayLike) -> Array:
             "> 0 m, finite; or NaN for all cables of a sample",
             "Correct the length of this cable.",
         )
+    fitting = dead.shape[:-1] in ((), array.shape[:-1])  # who gives other counts is told so later
+    if fitting and ((array <= dead) & (dead > 0.0)).any():
+        raise dead_only(array, np.broadcast_to(dead, array.shape))
     return locked(array)
+
+
+def dead_only(lengths: Array, dead: Array) -> InvalidValueError:
+    """The error of a length that would not reach from drum to pulley.
+
+    Args:
+        lengths: Unstrained lengths [m], shape (m,) or (N, m).
+        dead: Dead cable [m], of the same shape; no less than one of the lengths.
+
+    Returns:
+        The error, to be raised: it names the cable and, of many, the sample.
+    """
+    index = tuple(int(i) for i in np.argwhere((lengths <= dead) & (dead > 0.0))[0])
+    sample = f"sample {index[0]}, " if lengths.ndim == 2 else ""
+    return InvalidValueError(
+        f"{sample}cable {index[-1]}: unstrained length",
+        f"{lengths[index]:.9g} m",
+        f"> {dead[index]:.9g} m, the dead cable behind its pulley",
+        "Give all cable off the drum, or correct its dead_cable.",
+    )
 
 
 def start_rows(start: Pose, lengths: Array) -> Array:

@@ -95,19 +95,20 @@ class Found(NamedTuple):
         return self.poses, self.results, self.cable_status, self.numbers, self.pose_status
 
     @classmethod
-    def empty(cls, count: int, cables: int) -> Found:
+    def empty(cls, count: int, cables: int, behind: bool | None) -> Found:
         """Room for a batch.
 
         Args:
             count: Number of samples N.
             cables: Number of cables m.
+            behind: Whether anything is behind them.
 
         Returns:
             Arrays to be filled.
         """
         return cls(
             np.empty((count, tables.POSE_COLUMNS)),
-            np.empty((tables.RESULT_ROWS, count, cables)),
+            np.empty((tables.RESULT_ROWS if behind else tables.BARE_ROWS, count, cables)),
             np.empty((count, cables), dtype=np.int8),
             np.empty((count, FORWARD_NUMBERS)),
             np.empty(count, dtype=np.int8),
@@ -183,9 +184,9 @@ def solve_rows(
     allowed = first_of(robot).freedom if freedom is None else freedom
     bodies, cables, behind = body_table(robot), cable_table(robot), anything_behind(robot) or None
     chain, memory = new_chain(m, len(allowed)), memory_for(m)  # the chain goes on from block to block
-    found = Found.empty(count, m)
+    found = Found.empty(count, m, behind)
     for part in blocks(count, max(1, BLOCK // m), progress):
-        block = Found.empty(part.stop - part.start, m)
+        block = Found.empty(part.stop - part.start, m, behind)
         per_sample = (rows_of(bodies, part), rows_of(cables, part), lengths[part], rows_of(starts, part))
         given = (allowed, *per_sample, rows_of(wrenches, part))
         if model.code == codes.STRAIGHT:

@@ -17,6 +17,7 @@ from sagline.kernels.forward.forward import forward_poses
 from sagline.kernels.forward.problem import FORCE_RESIDUAL, FORWARD_NUMBERS, MOMENT_RESIDUAL, STIFFNESS_MIN
 from sagline.kernels.memory import memory_for
 from sagline.kinematics.caller import give, take
+from sagline.kinematics.forward import dead_only
 from sagline.kinematics.forward_rows import new_chain
 from sagline.kinematics.forward_status import STABLE, ForwardStatus
 from sagline.kinematics.start import search
@@ -24,6 +25,7 @@ from sagline.kinematics.winding import without_guides
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.robot.several import anything_behind
+from sagline.robot.wheels import dead_cable
 from sagline.statics.tables import body_table, cable_table, pose_rows
 
 
@@ -74,16 +76,17 @@ class ForwardSolver:
             raise InvalidValueError(
                 "model", "Straight()", "a model with forces", "Use forward() to fit straight cables."
             )
-        m = robot.cable_count
+        m, behind = robot.cable_count, anything_behind(robot)
+        self._dead = None if robot.winches is None else dead_cable(robot)
         self._lengths = np.ones((1, m))
         self._start = np.zeros((1, tables.POSE_COLUMNS))
         self._wrench = np.zeros((1, 6))
         self._pose = np.empty((1, tables.POSE_COLUMNS))
-        self._results = np.empty((tables.RESULT_ROWS, 1, m))
+        self._results = np.empty((tables.RESULT_ROWS if behind else tables.BARE_ROWS, 1, m))
         self._numbers = np.empty((1, FORWARD_NUMBERS))
         self._status: Codes = np.empty(1, dtype=np.int8)
         self._arguments: tuple[Any, ...] = (
-            (self._model.code, *self._model.parameters, anything_behind(robot) or None),
+            (self._model.code, *self._model.parameters, behind or None),
             True,  # a chain goes on from what it remembers of the last equilibrium
             (
                 robot.freedom,
@@ -129,9 +132,12 @@ class ForwardSolver:
             A fresh result whose arrays belong to the caller.
 
         Raises:
-            InvalidValueError: If a length is not positive (the message names its index), or a shape is wrong.
+            InvalidValueError: If a length is not positive, or no longer than its dead cable (the message names the
+                cable), or a shape is wrong.
         """
         lengths = self._checked(unstrained_length)
+        if self._dead is not None and not (lengths > self._dead).all():
+            raise dead_only(lengths, self._dead)
         load = None if wrench is None else exactly(wrench, "wrench", "N or N m", (6,))
         position, quaternion = np.empty(3), np.empty(4)
         status = self.step_into(lengths, position, quaternion, load)

@@ -15,7 +15,7 @@ from sagline.blocks import Progress
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
-from sagline.kernels import codes, tables
+from sagline.kernels import codes
 from sagline.kinematics.hung import hung
 from sagline.kinematics.inverse_rows import decide_rows, solve_rows
 from sagline.kinematics.plan import Plan
@@ -27,8 +27,8 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot
-from sagline.robot.several import first_of, one_a_pose
-from sagline.statics.balance import refuse_missing_chords
+from sagline.robot.several import anything_behind, first_of, one_a_pose
+from sagline.statics.chords import refuse_missing_chords
 from sagline.statics.tables import pose_rows
 from sagline.statics.wrench import external_wrench, inertial_wrench
 from sagline.tension.closest import Closest
@@ -78,7 +78,8 @@ def inverse(
             its cables, several robots do not fit together (the message names which), winding is "path" for poses
             without times, an argument is of the wrong kind or shape, a pose is outside the motions of the robot's
             pattern, or so many poses need more memory than is free.
-        CableGeometryError: If a cable has no length at some pose.
+        CableGeometryError: If a cable has no length at some pose: its ends coincide, or its platform end is inside its
+            pulley.
 
     Source:
         Gia Luan & Truong Thinh 2020, figure 16; made exact in docs/model.md, section 5.
@@ -101,7 +102,7 @@ def inverse(
     options = kernel_options(robots, model, method)
     rows = pose_rows(pose)
     count = len(rows)
-    check_poses(count, shared.cable_count)
+    check_poses(count, shared.cable_count, anything_behind(robots))
     load = external_wrench(wrench, count if pose.shape else None)
     if isinstance(motion, Path):
         load = locked(inertial_wrench(robots, pose, motion.twist, motion.twist_rate) + load)
@@ -109,7 +110,7 @@ def inverse(
     loads = np.atleast_2d(load)
     found = solve_rows(robots, method, options, rows, loads, reference, progress)
     if (found.pose_status == codes.POSE_NO_CHORD).any():
-        refuse_missing_chords(np.hypot(found.results[tables.SPAN], found.results[tables.RISE]), pose)
+        refuse_missing_chords(robots, pose)
     verdicts = decide_rows(robots, options, rows, loads, found, progress)
     whole = locked(np.ascontiguousarray(np.broadcast_to(load, (*pose.shape, 6))))
     direction = None if turning is None else checked_winding(turning, pose.shape, shared.cable_count)

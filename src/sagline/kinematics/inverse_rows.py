@@ -12,13 +12,14 @@ from sagline.kernels import codes, tables
 from sagline.kernels.inverse.poses import Answers, inverse_poses
 from sagline.kernels.inverse.verdicts import ENOUGH, PROVED, decide_poses
 from sagline.kernels.memory import memory_for
-from sagline.robot.several import Robots, first_of
+from sagline.robot.several import Robots, anything_behind, first_of
 from sagline.statics.tables import robot_terms
 from sagline.tension.method import TensionMethod
 from sagline.tension.options import Options, takes_default_kernel
 
 UNDECIDED = (codes.POSE_INFEASIBLE, codes.POSE_NOT_CONVERGED)  # what the rounds of sharing leave open
-BLOCK = 1 << 12  # poses solved at once: less than 0.2 s, after which an interrupt is heard
+BLOCK = 1 << 12  # poses solved at once: a tenth of a second at most, after which an interrupt is heard
+DECIDED = 1 << 10  # and poses decided at once, which take longer
 
 
 class Found(NamedTuple):
@@ -31,19 +32,20 @@ class Found(NamedTuple):
     pose_status: Codes
 
     @classmethod
-    def empty(cls, count: int, cables: int, freedoms: int) -> Found:
+    def empty(cls, count: int, cables: int, freedoms: int, behind: bool) -> Found:
         """Room for a batch.
 
         Args:
             count: Number of poses N.
             cables: Number of cables m.
             freedoms: Number of free motions n.
+            behind: Whether anything is behind the cables.
 
         Returns:
             Arrays to be filled.
         """
         return cls(
-            np.empty((tables.RESULT_ROWS, count, cables)),
+            np.empty((tables.RESULT_ROWS if behind else tables.BARE_ROWS, count, cables)),
             np.empty((count, cables), dtype=np.int8),
             np.empty((count, 2)),
             np.empty((count, freedoms)),
@@ -101,7 +103,8 @@ def solve_rows(
         The answers.
     """
     shared = first_of(robot)
-    found = Found.empty(len(rows), shared.cable_count, shared.degrees_of_freedom)
+    behind = anything_behind(robot)
+    found = Found.empty(len(rows), shared.cable_count, shared.degrees_of_freedom, behind)
     otherwise = None if takes_default_kernel(method) else True
     memory = memory_for(shared.cable_count)
     given = (*options, robot_terms(robot), rows, loads, reference, memory, otherwise, found.answers)
@@ -200,7 +203,7 @@ def decide_rows(
     which = np.flatnonzero(np.isin(found.pose_status, UNDECIDED))
     given = (options.model, options.limits, robot_terms(robot), rows, loads)
     how = (covers_all(options.sharing[0], m - n), memory_for(m), found.answers, verdicts.answers)
-    for part in blocks(which.size, BLOCK):
+    for part in blocks(which.size, DECIDED):
         decide_poses(*given, which[part], *how)
         if progress is not None:
             progress(count - which.size + part.stop, count)

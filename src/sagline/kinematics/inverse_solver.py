@@ -25,6 +25,7 @@ from sagline.kinematics.inverse_rows import UNDECIDED, Found, Verdicts, covers_a
 from sagline.kinematics.status import PoseStatus
 from sagline.kinematics.winding import without_guides
 from sagline.robot.robot import Robot
+from sagline.robot.several import anything_behind
 from sagline.statics.tables import robot_terms
 from sagline.tension.closest import Closest
 from sagline.tension.method import TensionMethod
@@ -97,7 +98,7 @@ class InverseSolver:
         self._quaternion: Any = self._pose[0, 3:].data
         self._load = self._wrench[0].data
         self._reference = np.full(m, np.nan)
-        self._found = Found.empty(1, m, n)
+        self._found = Found.empty(1, m, n, anything_behind(robot))
         self._status = self._found.pose_status.data  # read five times faster than an array of one
         self._loaded = False  # whether the wrench of the last step was more than zero
         self._lengths = self._found.results[tables.LENGTH, 0]

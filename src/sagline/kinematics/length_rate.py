@@ -13,7 +13,7 @@ from sagline.kinematics.tension_rate import closest_rates, placed
 from sagline.motion.path import Path
 from sagline.robot.behind import with_behind
 from sagline.robot.equilibrium import Equilibrium
-from sagline.robot.several import first_of, robot_at
+from sagline.robot.several import anything_behind, first_of, robot_at
 from sagline.statics.tables import pose_rows
 from sagline.tension.closest import Closest
 from sagline.tension.method import TensionMethod, shared_tension
@@ -69,7 +69,9 @@ def _lengths(state: Equilibrium, tension: TensionMethod, moment: Instant) -> Arr
         none = np.full(first_of(state.robot).cable_count, np.nan)
         return _off_the_drums(state, moment, solve_rows(state.robot, tension, options, rows, loads, none))
     held = np.where(np.isnan(state.chord_tension), np.nan, shared_tension(state, tension.variable))
-    found = Found.empty(len(held), held.shape[1], first_of(state.robot).degrees_of_freedom)
+    found = Found.empty(
+        len(held), held.shape[1], first_of(state.robot).degrees_of_freedom, anything_behind(state.robot)
+    )
     for i in range(len(rows)):
         one = slice(i, i + 1)
         answer = solve_rows(robot_at(state.robot, i), tension, options, rows[one], loads[one], held[i].copy())

@@ -15,7 +15,7 @@ from sagline.robot.equilibrium import limited_tension
 from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.robot.several import Robots, anchors_of, first_of, limits_of, robots_at
+from sagline.robot.several import Robots, anchors_of, anything_behind, first_of, limits_of, robots_at
 from sagline.statics.tables import pose_rows
 
 _TILTS = (25.0, 60.0)  # degrees, tried where the level platform leads nowhere
@@ -45,7 +45,7 @@ def search(
         The best answer to each sample.
     """
     count, m = lengths.shape
-    found = Found.empty(count, m)
+    found = Found.empty(count, m, anything_behind(robot))
     for part in blocks(count, max(1, BLOCK // m), progress):
         robots = robots_at(robot, part)
         found.keep(part, _search_block(robots, model, lengths[part], rows_of(wrenches, part)))
@@ -53,7 +53,7 @@ def search(
 
 
 def _search_block(robot: Robots, model: CableModel, lengths: Array, wrenches: Array) -> Found:
-    found = Found.empty(*lengths.shape)
+    found = Found.empty(len(lengths), lengths.shape[1], anything_behind(robot))
     open_samples = np.arange(len(lengths))
     for round_, quaternion in enumerate(start_quaternions(first_of(robot))):
         loads = wrenches if len(wrenches) == 1 else locked(wrenches[open_samples])

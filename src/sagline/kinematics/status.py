@@ -24,7 +24,11 @@ class PoseStatus(Status):
         "a cable would carry less than a thousandth of its own weight; raise tension_min",
     )
     NOT_CONVERGED = codes.POSE_NOT_CONVERGED, "the tensions did not settle; please report this robot and pose"
-    NO_CHORD = codes.POSE_NO_CHORD, "both ends of a cable coincide; move the platform away from the anchor"
+    NO_CHORD = (
+        codes.POSE_NO_CHORD,
+        "both ends of a cable coincide, or its platform end is inside its pulley or hangs from it nearer to the swivel "
+        "axis than the pulley's diameter; move the platform away from the anchor",
+    )
     NOT_COVERED = (
         codes.POSE_NOT_COVERED,
         "there are tensions within the limits, but the chosen way of sharing does not find them; "

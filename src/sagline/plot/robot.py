@@ -16,21 +16,22 @@ from scipy.spatial import ConvexHull
 
 from sagline.arguments import instance, optional
 from sagline.errors import InvalidValueError
-from sagline.kernels.cable import geometry
 from sagline.kinematics.inverse import inverse
 from sagline.numbers import n
 from sagline.plot.sheet import LABEL, TICK, VERMILLION, sheet
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.statics.tables import body_table, cable_table, pose_rows
+from sagline.robot.several import pulleys_of
+from sagline.robot.wheels import on_wheels
+from sagline.viewer import lines
 from sagline.viewer.tension_scale import TensionScale
 
 if TYPE_CHECKING:
     from sagline.arrays import Array
     from sagline.kinematics.plan import Plan
 
-POINTS = 50  # along each cable
-FRAME_COLOR, FLOOR_COLOR, SHADOW_COLOR = "0.6", "0.955", "0.82"
+POINTS = 50  # around each pulley
+FRAME_COLOR, FLOOR_COLOR, SHADOW_COLOR, WHEEL_COLOR = "0.6", "0.955", "0.82", "0.35"
 FLAT = 1e-6  # of the robot's size: a platform that is thinner casts a line
 NEAR = 0.04  # of the robot's size: anchors that are closer share a label
 HALO = [patheffects.withStroke(linewidth=2.0, foreground="white")]
@@ -41,7 +42,9 @@ def robot(robot: Robot, pose: Pose | None = None, ax: Axes3D | None = None) -> A
     """The robot in space at rest: frame, platform, and its cables as exact catenaries that carry it.
 
     Cables have the color of their chord tension, on the scale of the robot's limits as in `sagline view`, and their
-    numbers at the frame; the platform stands over its shadow on the ground, which is at z = 0 or lower.
+    numbers at the frame. Pulleys stand as the platform has turned them, cables lie on them; of dead cable behind them
+    its rise is drawn, dotted where its length does not say that it is upright. The platform stands over its shadow on
+    the ground, which is at z = 0 or lower.
 
     Args:
         robot: The robot.
@@ -60,11 +63,12 @@ def robot(robot: Robot, pose: Pose | None = None, ax: Axes3D | None = None) -> A
     if ax is None:
         ax = sheet(height=4.0, width=5.6).add_subplot(projection="3d")
     ax.computed_zorder = False  # by the middles of things, which puts the ground over what stands on it
-    plan, lines = _cable_lines(robot, where)
+    plan, courses = _cable_lines(robot, where)
     scale = TensionScale.of(robot)
     colors = scale.colors(plan.chord_tension) / 255.0  # gray where there is no tension
-    for line, color in zip(lines, colors, strict=True):
+    for line, color in zip(courses, colors, strict=True):
         ax.plot(*line.T, color=color, linewidth=1.4, linestyle="-" if plan.feasible else (0, (3.0, 2.0)), zorder=2.0)
+    wheels = _draw_wheels(ax, robot, where)
     frame = _frame_box(robot)
     if frame is not None:
         _draw_box(ax, frame, FRAME_COLOR, 0.7)
@@ -73,7 +77,7 @@ def robot(robot: Robot, pose: Pose | None = None, ax: Axes3D | None = None) -> A
     size = high - low if robot.platform_size is None else robot.platform_size
     platform = where.position + _corners(0.5 * (low + high), size) @ where.matrix.T
     _draw_box(ax, platform, VERMILLION, 1.3)
-    points = np.concatenate((lines.reshape(-1, 3), platform, *([] if frame is None else [frame])))
+    points = np.concatenate((courses.reshape(-1, 3), wheels, platform, *([] if frame is None else [frame])))
     _draw_ground(ax, points, platform)
     _number(ax, robot.frame_anchors, points)
     _dress(ax, points, robot.name if plan.feasible else f"{robot.name}: no tensions within the limits carry it here")
@@ -92,19 +96,40 @@ def _pose_of(robot: Robot, pose: Pose | None) -> Pose:
 
 
 def _cable_lines(robot: Robot, pose: Pose) -> tuple[Plan, Array]:
-    """What carries the platform, and points of the cables in the world [m], shape (m, POINTS, 3)."""
+    """What carries the platform, and points of the cables in the world [m], shape (m, points, 3)."""
     plan = inverse(robot, pose)
-    tables = np.empty((1, geometry.GEOMETRY_ROWS, robot.cable_count))
-    geometry.cable_geometries(cable_table(robot), body_table(robot), pose_rows(pose), np.empty((3, 3)), tables)
-    table = tables[0]
-    if plan.feasible:
-        along, up = np.moveaxis(plan.state.cables.points(POINTS), -1, 0)
-    else:
-        share = np.linspace(0.0, 1.0, POINTS)
-        along, up = (np.outer(table[row], share) for row in (geometry.SPAN, geometry.RISE))
-    azimuth = table[[geometry.AZIMUTH_X, geometry.AZIMUTH_Y]]
-    offsets = np.stack((azimuth[0, :, None] * along, azimuth[1, :, None] * along, up), axis=-1)
-    return plan, robot.frame_anchors[:, None] + offsets
+    contact = plan.state.contact if plan.feasible else None
+    wraps = lines.wraps(robot, pose, None if contact is None else contact.wrap_angle)
+    ends = lines.chords(robot, pose, wraps[:, -1])
+    free = lines.hanging(ends, plan.state.cables, 1.0) if plan.feasible else lines.straight(ends)
+    return plan, np.concatenate((wraps, free), axis=1)
+
+
+def _draw_wheels(ax: Axes3D, robot: Robot, pose: Pose) -> Array:
+    """The pulleys, the runs behind them and the drums that are known; returns their points (n, 3)."""
+    turn = np.linspace(0.0, 2.0 * np.pi, POINTS)[:, None]
+    wheels = np.swapaxes(on_wheels(robot, pose, turn), 0, 1)[pulleys_of(robot).radius > 0.0]
+    runs, upright = lines.dead_runs(robot)
+    drums = [_circle(ends, radius) for ends, radius in zip(lines.drum_axes(robot), _drum_radii(robot), strict=False)]
+    for circle in (*wheels, *drums):
+        ax.plot(*circle.T, color=WHEEL_COLOR, linewidth=0.9, zorder=1.9)
+    for run, known in zip(runs, upright, strict=True):
+        if run[0, 2] != run[1, 2]:
+            ax.plot(*run.T, color=WHEEL_COLOR, linewidth=0.7, linestyle="-" if known else ":", zorder=1.8)
+    return np.concatenate((wheels.reshape(-1, 3), runs.reshape(-1, 3), *drums))
+
+
+def _drum_radii(robot: Robot) -> Array:
+    known = None if robot.winches is None else robot.winches.drum_radius
+    return np.empty(0) if known is None else known
+
+
+def _circle(ends: Array, radius: float) -> Array:
+    """Both rims of a level drum, from one end of its axis to the other (2, 3), as one line."""
+    axis = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+    turn = np.linspace(0.0, 2.0 * np.pi, POINTS)[:, None]
+    rim = radius * (np.cos(turn) * np.cross(axis, [0.0, 0.0, 1.0]) + np.sin(turn) * [0.0, 0.0, 1.0])
+    return np.concatenate((ends[0] + rim, ends[1] + rim))
 
 
 def _frame_box(robot: Robot) -> Array | None:

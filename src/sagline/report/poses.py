@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from sagline.arrays import Array
 from sagline.article.fits import fit_line
-from sagline.article.machine import DENSITY, MODULUS, Parameter
-from sagline.article.ten_poses import Explanation, TenPoses, Tour, ten_poses, tour
+from sagline.article.ten_poses import TenPoses, Tour, ten_poses, tour
 from sagline.numbers import n
-from sagline.plot.sheet import BLUE, COLORS, TICK, VERMILLION
-from sagline.report.blocks import Chapter, Finding, Panel, Table, Verdict
+from sagline.plot.sheet import BLUE, COLORS, TICK
+from sagline.report.blocks import Chapter, Finding, Table, Verdict
 from sagline.report.drawing import Drawings, axes, legend, thinned
-
-COUNTS = ("one parameter", "two parameters", "three parameters")
-PRINTING = 1e-3 / np.sqrt(12.0)  # m: scatter of positions printed in whole millimeters
+from sagline.report.explanations import explained, untold
 
 
 def poses_chapter() -> Chapter:
@@ -27,7 +23,14 @@ def poses_chapter() -> Chapter:
         "The prototype of Table 1 (anchors ours: frame and platform corners, crossed as the suspended robot), planned "
         "with the article's empirical model and the least norm of T_x, then set on exact cables with something other "
         "than planned.",
-        (_table(study), _tour(way, draw), _space(study, draw), _trends(study, draw), _explanations(study, draw)),
+        (
+            _table(study),
+            _tour(way, draw),
+            _space(study, draw),
+            _trends(study, draw),
+            explained(study, draw),
+            untold(study),
+        ),
     )
 
 
@@ -213,85 +216,3 @@ def _trends(study: TenPoses, draw: Drawings) -> Finding:
             ),
         ),
     )
-
-
-def _explanations(study: TenPoses, draw: Drawings) -> Finding:
-    rows = [
-        (
-            f"{count}: {_values(found)}",
-            n(1e3 * found.rms, ".2f"),
-            n(1e3 * found.worst, ".1f"),
-            "yes" if found.at_limit else "no",
-        )
-        for count, group in zip(COUNTS, study.explanations, strict=True)
-        for found in group
-    ]
-    best = [group[0] for group in study.explanations]
-    guess, alone = study.unlimited, {found.parameters[0].name: found.rms for found in study.explanations[0]}
-    return Finding(
-        key="explanations",
-        title="what would explain the measured errors",
-        statement="Sources named: the model, the measurement, the cable material, latency, transmission and cumulative "
-        "error.",
-        measured=f"Of {n(1e3 * study.measured_rms, '.1f', 'mm')} (root mean square of all coordinates) the best single "
-        f"parameter leaves {n(1e3 * best[0].rms, '.1f', 'mm')}: {_values(best[0])}. Two leave "
-        f"{n(1e3 * best[1].rms, '.1f', 'mm')}: {_values(best[1])}. Three leave {n(1e3 * best[2].rms, '.1f', 'mm')}: "
-        f"{_values(best[2])}. Printing in whole millimeters allows {n(1e3 * PRINTING, '.1f', 'mm')}, so none is the "
-        "whole truth.\n\nIt says: the pattern is geometric, as unmodeled pulleys or a wrong height of the anchors "
-        f"make it, not that of a wrong cable: E alone leaves {n(1e3 * alone[MODULUS], '.1f', 'mm')}, ρ alone "
-        f"{n(1e3 * alone[DENSITY], '.1f', 'mm')}.\n\nIt does not say that these parts were wrong: anchors and "
-        "wiring are ours, ten poses cannot separate parameters with like patterns, and values without limits fit still "
-        f"better ({n(1e3 * guess.rms, '.1f', 'mm')}) with nonsense: " + _list(guess.parameters, guess.values) + ".",
-        verdict=Verdict.OPEN,
-        numbers={
-            "measured_rms_mm": 1e3 * study.measured_rms,
-            "printing_rms_mm": 1e3 * PRINTING,
-            "explanations": [
-                [
-                    {
-                        "rms_mm": 1e3 * e.rms,
-                        "at_limit": e.at_limit,
-                        "values": dict(zip((p.name for p in e.parameters), e.values, strict=True)),
-                    }
-                    for e in group
-                ]
-                for group in study.explanations
-            ],
-            "unlimited_rms_mm": 1e3 * guess.rms,
-            "unlimited_values": dict(zip((p.name for p in guess.parameters), guess.values, strict=True)),
-        },
-        panels=tuple(_fit_panel(study, found, count, draw) for found, count in zip(best, COUNTS, strict=True)),
-        data=(
-            Table(
-                "The best explanations within what we think plausible",
-                ("explanation", "left, rms [mm]", "left, worst pose [mm]", "at a limit"),
-                rows,
-            ),
-        ),
-    )
-
-
-def _fit_panel(study: TenPoses, found: Explanation, count: str, draw: Drawings) -> Panel:
-    figure, ax = axes("$z$ desired [m]", "error [mm]")
-    height = study.table.desired[:, 2]
-    for axis, name, color, marker in ((2, "z", VERMILLION, "o"), (1, "y", BLUE, "s")):
-        ax.plot(height, 1e3 * study.table.error[:, axis], marker, color=color, markersize=4.5, label=f"{name} measured")
-        ax.plot(
-            height,
-            1e3 * found.predicted[:, axis],
-            marker,
-            color=color,
-            markersize=7.0,
-            markerfacecolor="none",
-            label=f"{name} explained",
-        )
-    legend(ax)
-    return draw.panel(figure, f"Best explanation by {count}: {_values(found)}.")
-
-
-def _values(found: Explanation) -> str:
-    return _list(found.parameters, found.values)
-
-
-def _list(parameters: tuple[Parameter, ...], values: Array) -> str:
-    return ", ".join(f"{p.name} {n(value, '+.3g', p.unit)}" for p, value in zip(parameters, values, strict=True))

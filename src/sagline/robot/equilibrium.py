@@ -14,9 +14,8 @@ from sagline.indices import length_of, part_of
 from sagline.robot.contact import Contact
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.robot.several import Index, Robots, anchors_of, first_of, pulleys_of, robots_at
-
-_TINY = 1e-300
+from sagline.robot.several import Index, Robots, anchors_of, first_of, robots_at
+from sagline.robot.wheels import on_wheels
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,18 +72,9 @@ class Equilibrium:
     @property
     def exit_point(self) -> Array:
         """Where the cables leave the frame, world axes [m], shape (m, 3) or (N, m, 3): pulleys, or frame anchors."""
-        anchors = anchors_of(self.robot)
-        shape = (*self.cables.shape, 3)
         if self.contact is None:
-            return locked(np.array(np.broadcast_to(anchors.frame, shape)))
-        ends = self.pose.position[..., None, :] + anchors.platform @ np.swapaxes(self.pose.matrix, -1, -2)
-        level = (ends - anchors.frame)[..., :2]
-        outward = level / np.maximum(np.linalg.norm(level, axis=-1, keepdims=True), _TINY)
-        radius, entry = pulleys_of(self.robot)
-        wrap = self.contact.wrap_angle
-        away = outward * (radius * (1.0 - np.cos(wrap)))[..., None]
-        point: Array = anchors.frame + np.concatenate((away, (radius * entry * np.sin(wrap))[..., None]), axis=-1)
-        return locked(point)
+            return locked(np.array(np.broadcast_to(anchors_of(self.robot).frame, (*self.cables.shape, 3))))
+        return locked(on_wheels(self.robot, self.pose, self.contact.wrap_angle))
 
     @property
     def one_robot(self) -> Robot:

@@ -9,15 +9,12 @@ import numpy as np
 
 from sagline.arguments import instance
 from sagline.arrays import Array, locked, number
-from sagline.errors import CableGeometryError
-from sagline.kernels.balance.setting import SHORTEST_CHORD
 from sagline.kernels.balance.wrench import structure_matrices
 from sagline.kernels.cable import geometry as rows
-from sagline.kernels.cable.geometry import cable_geometries
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.robot.several import Robots, first_of, one_a_pose
-from sagline.statics.tables import body_table, cable_table, pose_rows
+from sagline.statics.chords import chord_geometry, refuse_missing_chords
 
 
 class ArticleBalance(NamedTuple):
@@ -33,34 +30,10 @@ class ArticleBalance(NamedTuple):
 
 
 def _geometry(robot: Robots, pose: Pose) -> Array:
-    """Geometry rows of every pose, shape (N, GEOMETRY_ROWS, m)."""
-    cables, poses = cable_table(robot), pose_rows(pose)
-    out = np.empty((len(poses), rows.GEOMETRY_ROWS, cables.shape[1]))
-    cable_geometries(cables, body_table(robot), poses, np.empty((3, 3)), out)
-    refuse_missing_chords(out[:, rows.CHORD], pose)
-    return out
-
-
-def refuse_missing_chords(chord: Array, pose: Pose) -> None:
-    """Refuse poses at which both ends of a cable coincide: it has no direction there.
-
-    Args:
-        chord: Distances between the ends [m], shape (N, m).
-        pose: One pose or a batch of N, for the message.
-
-    Raises:
-        CableGeometryError: If one is no more than 1e-9 m; the message names pose and cable.
-    """
-    missing = np.argwhere(chord < SHORTEST_CHORD)
-    if not len(missing):
-        return
-    row, cable = (int(k) for k in missing[0])
-    raise CableGeometryError(
-        f"pose{f' {row}' if pose.shape else ''}, cable {cable}: distance between its ends",
-        f"{round(float(chord[row, cable]), 12):g} m",
-        f">= {SHORTEST_CHORD:g} m",
-        "Move the platform away from the anchor, or the anchor away from the path.",
-    )
+    """Geometry rows of every pose, shape (N, GEOMETRY_ROWS, m); refused where a cable has no chord."""
+    geometry = chord_geometry(robot, pose)
+    refuse_missing_chords(robot, pose, geometry)
+    return geometry
 
 
 def structure_matrix(robot: Robot | Sequence[Robot], pose: Pose) -> Array:
@@ -75,7 +48,8 @@ def structure_matrix(robot: Robot | Sequence[Robot], pose: Pose) -> Array:
 
     Raises:
         InvalidValueError: If several robots are not one a pose, or do not fit together.
-        CableGeometryError: If both ends of a cable coincide; the message names pose and cable.
+        CableGeometryError: If both ends of a cable coincide, or one is inside its pulley; the message names pose and
+            cable.
 
     Source:
         docs/model.md, section 1.
@@ -105,7 +79,8 @@ def article_balance(robot: Robot, pose: Pose, k_h: float = 4.845) -> ArticleBala
 
     Raises:
         InvalidValueError: If robot or pose are none, or k_h is no number.
-        CableGeometryError: If both ends of a cable coincide; the message names pose and cable.
+        CableGeometryError: If both ends of a cable coincide, or one is inside its pulley; the message names pose and
+            cable.
 
     Source:
         Gia Luan & Truong Thinh 2020, equations (26), (27), (50), (51).

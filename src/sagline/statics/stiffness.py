@@ -10,7 +10,7 @@ from sagline.arguments import instance
 from sagline.arrays import Array, locked
 from sagline.memory import check_memory
 from sagline.robot.equilibrium import Equilibrium
-from sagline.robot.several import bodies_of, first_of
+from sagline.robot.several import bodies_of, first_of, pulleys_of
 from sagline.statics.slopes import CableSlopes, cable_slopes, on_platform
 
 _SINGULAR = 1e-14  # determinant, at diagonal elements of 1
@@ -156,6 +156,8 @@ def _tension_by_length(state: Equilibrium, slopes: CableSlopes, by_length: Array
     forces = ends @ np.swapaxes(slopes.blocks, -1, -2)
     index = np.arange(forces.shape[-2])
     forces[..., index, index, :] += slopes.by_length
+    if state.contact is not None:
+        return _leaving_by_length(state, slopes, forces, ends)
     at_frame = slopes.force.copy()
     at_frame[..., 2] -= cables.cable_weight
     if not cables.model.weightless:
@@ -163,6 +165,35 @@ def _tension_by_length(state: Equilibrium, slopes: CableSlopes, by_length: Array
     # a cable without force pulls nowhere
     direction = at_frame / np.maximum(np.linalg.norm(at_frame, axis=-1, keepdims=True), _TINY)
     slope: Array = np.einsum("...ik,...ijk->...ij", direction, forces)
+    return slope
+
+
+def _leaving_by_length(state: Equilibrium, slopes: CableSlopes, forces: Array, ends: Array) -> Array:
+    """The same of cables that leave pulleys, from H = T + T^2/(2 EA) - w z, which is one number from end to end.
+
+    Args:
+        state: The state.
+        slopes: Of its cables.
+        forces: Change of the force on each platform end, shape (..., m, m, 3).
+        ends: Motion of each platform end, of the same shape.
+    """
+    cables, contact = state.cables, state.contact
+    assert contact is not None
+    stiffness, density = cables.cable.axial_stiffness, cables.cable.linear_density
+    weight = np.broadcast_to(0.0 if cables.model.weightless else density * cables.gravity, cables.shape)
+    at_end, leaving = cables.platform_end_tension, cables.frame_end_tension
+    by_end = np.einsum("...ik,...ijk->...ij", slopes.force / np.maximum(at_end, _TINY)[..., None], forces)
+    whole = (1.0 + at_end / stiffness)[..., None] * by_end - weight[..., None] * ends[..., 2]
+    radius, entry = pulleys_of(state.robot)
+    turned = forces.copy()
+    index = np.arange(forces.shape[-2])
+    turned[..., index, index, 2] -= weight
+    sine, cosine = np.sin(contact.wrap_angle), np.cos(contact.wrap_angle)
+    level = slopes.force[..., :2] / np.maximum(cables.horizontal_tension, _TINY)[..., None]
+    around = np.concatenate((level * cosine[..., None], (-entry * sine)[..., None]), axis=-1)
+    angle = np.einsum("...ik,...ijk->...ij", around / np.maximum(leaving, _TINY)[..., None], turned)
+    raised = (weight * radius * entry * cosine)[..., None] * angle
+    slope: Array = (whole + raised) / (1.0 + leaving / stiffness)[..., None]
     return slope
 
 

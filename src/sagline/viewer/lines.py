@@ -1,4 +1,4 @@
-"""Cables as lines in the world: where they hang, where their chords are."""
+"""Cables as lines in the world: where they lie on pulleys, where they hang, where their chords are."""
 
 from __future__ import annotations
 
@@ -9,14 +9,77 @@ from sagline.arrays import Array, locked
 from sagline.cables.model import CableState
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
+from sagline.robot.several import pulleys_of
+from sagline.robot.wheels import on_wheels
+from sagline.statics.chords import touching_angle
 
-POINTS = 41  # along a cable: an odd number, so that dashes end as they begin
+POINTS = 41  # along a hanging cable: an odd number, so that dashes end as they begin
+WRAP_POINTS = 16  # along the cable on a pulley
+_UPRIGHT = 1e-6  # of a run's length, that its rise may be less
 
 
-def chords(robot: Robot, pose: Pose) -> Array:
-    """Frame end and platform end of every cable in the world [m], shape (m, 2, 3)."""
+def points_per_cable(robot: Robot) -> int:
+    """How many points a cable is drawn with, from its frame anchor to its platform end."""
+    return POINTS + WRAP_POINTS * bool(pulleys_of(robot).radius.any())
+
+
+def wraps(robot: Robot, pose: Pose, wrap_angle: Array | None) -> Array:
+    """Points of the cables from their frame anchors over their pulleys to where they leave them [m].
+
+    Args:
+        robot: The robot.
+        pose: One pose.
+        wrap_angle: Psi [rad], shape (m,); None for straight cables, which touch where their chords do; where no chord
+            does, as for an end inside the pulley, a cable leaves where it enters.
+
+    Returns:
+        Shape (m, WRAP_POINTS, 3); (m, 1, 3), the frame anchors, where no cable has a pulley.
+    """
+    if not pulleys_of(robot).radius.any():
+        return robot.frame_anchors[:, None]
+    angle = np.nan_to_num(touching_angle(robot, pose)) if wrap_angle is None else wrap_angle
+    return np.swapaxes(on_wheels(robot, pose, np.linspace(0.0, 1.0, WRAP_POINTS)[:, None] * angle), 0, 1)
+
+
+def chords(robot: Robot, pose: Pose, exits: Array | None = None) -> Array:
+    """Both ends of every hanging cable in the world [m], shape (m, 2, 3); it starts at its exit point, or anchor."""
     platform_ends = pose.transform(robot.platform_anchors)
-    return locked(np.stack((robot.frame_anchors, platform_ends), axis=1))
+    return locked(np.stack((robot.frame_anchors if exits is None else exits, platform_ends), axis=1))
+
+
+def dead_runs(robot: Robot) -> tuple[Array, NDArray[np.bool_]]:
+    """The straight guided runs behind the pulleys, upright: of a run only its length and its rise are known.
+
+    Returns:
+        Frame anchors and the points as much lower as the runs rise [m], shape (m, 2, 3); and whether a run is upright,
+        as its length and its rise say, shape (m,).
+    """
+    winches = robot.winches
+    low = robot.frame_anchors.copy()
+    if winches is None:
+        return np.stack((robot.frame_anchors, low), axis=1), np.ones(len(low), dtype=bool)
+    low[:, 2] -= winches.dead_rise
+    upright = winches.dead_cable - np.abs(winches.dead_rise) <= _UPRIGHT * winches.dead_cable
+    return np.stack((robot.frame_anchors, low), axis=1), upright
+
+
+def drum_axes(robot: Robot) -> Array:
+    """Ends of the axes of the drums whose radius is known [m], shape (k, 2, 3).
+
+    A drum touches the foot of its run on the side away from the robot's middle, level; its way around is not known.
+    """
+    winches = robot.winches
+    if winches is None or winches.drum_radius is None:
+        return np.empty((0, 2, 3))
+    feet, middle = dead_runs(robot)[0][:, 1], robot.frame_anchors.mean(axis=0)
+    away = (feet - middle)[:, :2]
+    length = np.linalg.norm(away, axis=1, keepdims=True)
+    away = np.where(length > 0.0, away / np.where(length > 0.0, length, 1.0), [1.0, 0.0])
+    flat = np.zeros((len(feet), 1))
+    centers = feet + winches.drum_radius[:, None] * np.hstack((away, flat))
+    width = winches.drum_radius if winches.drum_width is None else winches.drum_width
+    half = 0.5 * width[:, None] * np.hstack((-away[:, 1:], away[:, :1], flat))
+    return np.stack((centers - half, centers + half), axis=1)
 
 
 def straight(ends: Array) -> Array:

@@ -10,7 +10,9 @@ from sagline.arrays import Array
 from sagline.kinematics.status import PoseStatus
 from sagline.numbers import n
 from sagline.robot.robot import Robot
+from sagline.robot.several import pulleys_of
 from sagline.tension.margin import capacity_margin
+from sagline.viewer.lines import dead_runs
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.tension_scale import TensionScale
 from sagline.viewer.wording import ForceUnit, number
@@ -64,6 +66,7 @@ def numbers(
         _cable_table(snapshot, scale),
         _frequency_line(LATER) if frequencies_later else _listed(frequencies),
         _material_line(snapshot),
+        _pulley_line(snapshot.robot),
     )
     return block("".join(parts))
 
@@ -155,9 +158,9 @@ def _pose_line(snapshot: Snapshot) -> str:
 
 
 def _cable_table(snapshot: Snapshot, scale: TensionScale) -> str:
-    unit = force_unit(snapshot.robot)
+    unit, wrap = force_unit(snapshot.robot), _wrap_column(snapshot)
     heads = ("cable", f"tension<br>[{unit.name}]", f"winch<br>[{unit.name}]", "length<br>[m]", "sag<br>[mm]",
-             f"to limit<br>[{unit.name}]")  # fmt: skip
+             f"to limit<br>[{unit.name}]", *["wrap<br>[°]"] * len(wrap))  # fmt: skip
     head = "".join(f"<th>{text}</th>" for text in heads)
     cables = None if snapshot.plan is None else snapshot.plan.state.cables
     count = snapshot.robot.cable_count
@@ -165,9 +168,10 @@ def _cable_table(snapshot: Snapshot, scale: TensionScale) -> str:
     columns = (
         (snapshot.tension / unit.newtons, unit.form),
         (unknown if cables is None else cables.frame_end_tension / unit.newtons, unit.form),
-        (unknown if cables is None else cables.unstrained_length, ".4f"),
+        (unknown if snapshot.plan is None else snapshot.plan.unstrained_length, ".4f"),
         (unknown if cables is None else 1e3 * cables.sag, ".1f"),
         (snapshot.margin / unit.newtons, unit.form),
+        *wrap,
     )
     colors = scale.colors(snapshot.tension)
     rows = "".join(
@@ -177,6 +181,29 @@ def _cable_table(snapshot: Snapshot, scale: TensionScale) -> str:
         for i in range(count)
     )
     return f"<table><tr>{head}</tr>{rows}</table>"
+
+
+def _wrap_column(snapshot: Snapshot) -> tuple[tuple[Array, str], ...]:
+    """Wrap angles [degree] and how they are written, of a robot with pulleys."""
+    radius = pulleys_of(snapshot.robot).radius
+    if not radius.any():
+        return ()
+    contact = None if snapshot.plan is None else snapshot.plan.state.contact
+    angle = np.full(radius.shape, np.nan) if contact is None else np.degrees(contact.wrap_angle)
+    return ((np.where(radius > 0.0, angle, np.nan), ".1f"),)
+
+
+def _pulley_line(robot: Robot) -> str:
+    """What is behind the frame anchors, and that nobody knows the way of a dead cable that is not upright."""
+    winches = robot.winches
+    if winches is None or not winches.anything_behind:
+        return ""
+    text = f'<div style="margin-top:2px"><b>Pulleys</b> radius {_span(winches.pulley_radius, "m")}'
+    if winches.dead_cable.any():
+        text += f", dead cable {_span(winches.dead_cable, 'm')}"
+    if not dead_runs(robot)[1].all():
+        text += ", drawn upright and only as far as it rises: where it runs is not known"
+    return text + "</div>"
 
 
 def _listed(frequencies: Array | None) -> str:

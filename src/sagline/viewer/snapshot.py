@@ -32,12 +32,14 @@ class Snapshot:
         plan: The plan for this pose; None where a cable has no chord.
         rest: Where the platform would really rest on exact cables of the planned lengths; None where the plan has no
             answer or the model is exact.
+        refusal: Which cable over a pulley has no chord, and why; "" where all have.
     """
 
     robot: Robot
     pose: Pose
     plan: Plan | None
     rest: Pose | None
+    refusal: str = ""
 
     @property
     def feasible(self) -> bool:
@@ -54,7 +56,9 @@ class Snapshot:
         """Why it is not feasible, with the shortfall and the blocking cables; "" where it is."""
         if self.feasible:
             return ""
-        if self.plan is None or self.status is not PoseStatus.INFEASIBLE:
+        if self.plan is None:
+            return self.refusal or self.status.text
+        if self.status is not PoseStatus.INFEASIBLE:
             return self.status.text
         shortfall = float(self.plan.shortfall)
         short = f"short of {shortfall:,.1f} N" if np.isfinite(shortfall) else "no force alone would do"
@@ -91,25 +95,37 @@ class Snapshot:
         """Where the platform would really rest less where it is wanted [m], shape (3,)."""
         return None if self.rest is None else self.rest.position - self.pose.position
 
+    def courses(self, sag_scale: float) -> Array:
+        """Points of the cables from frame anchor over pulley to platform end (m, points_per_cable, 3).
+
+        Hanging, their sag some times as large; straight where the pose is not feasible.
+        """
+        wraps, ends = self._on_pulleys()
+        free = lines.straight(ends)
+        if self.plan is not None and self.feasible:
+            free = lines.hanging(ends, self.plan.state.cables, sag_scale)
+        return free if wraps.shape[1] == 1 else np.concatenate((wraps, free), axis=1)
+
     def cable_segments(self, sag_scale: float) -> Array:
-        """Segments to draw the cables with (m (POINTS - 1), 2, 3): hanging, or dashed chords where not feasible."""
-        ends = lines.chords(self.robot, self.pose)
-        if self.plan is None or not self.plan.feasible:
-            return lines.segments(lines.straight(ends), dashed=True)
-        return lines.segments(lines.hanging(ends, self.plan.state.cables, sag_scale), dashed=False)
+        """Segments to draw the cables with (m (points - 1), 2, 3): hanging, or dashed chords where not feasible."""
+        return lines.segments(self.courses(sag_scale), dashed=not self.feasible)
 
     def ghost_segments(self, sag_scale: float, apart: float) -> Array:
         """Segments of the chords where a cable as drawn hangs farther from its own than that [m]; else of no length."""
-        ends = lines.chords(self.robot, self.pose)
-        points = lines.straight(ends)
-        drawn = points
-        if self.plan is not None and self.feasible:
-            drawn = lines.hanging(ends, self.plan.state.cables, sag_scale)
+        points = lines.straight(self._on_pulleys()[1])
+        drawn = self.courses(sag_scale)[:, -lines.POINTS :]
         return lines.segments(points, dashed=False, shown=np.linalg.norm(drawn - points, axis=2) > apart)
 
+    def _on_pulleys(self) -> tuple[Array, Array]:
+        """The cables on their pulleys, and both ends of the free ones."""
+        contact = self.plan.state.contact if self.plan is not None and self.feasible else None
+        wraps = lines.wraps(self.robot, self.pose, None if contact is None else contact.wrap_angle)
+        return wraps, lines.chords(self.robot, self.pose, wraps[:, -1])
+
     def cable_colors(self, scale: TensionScale) -> Colors:
-        """Colors of both ends of every segment as viser takes them, shape (m (POINTS - 1), 2, 3)."""
-        return np.repeat(scale.linear_colors(self.tension), 2 * (lines.POINTS - 1), axis=0).reshape(-1, 2, 3)
+        """Colors of both ends of every segment as viser takes them, shape (m (points - 1), 2, 3)."""
+        ends = 2 * (lines.points_per_cable(self.robot) - 1)
+        return np.repeat(scale.linear_colors(self.tension), ends, axis=0).reshape(-1, 2, 3)
 
     def drawn_rest(self, error_scale: float) -> Array | None:
         """Where to draw the platform at rest: its position error some times as large."""
@@ -139,7 +155,7 @@ def taken_at(
     reference = previous if remembers(settings.tension) else None
     try:
         plan = inverse(robot, pose, settings.model, settings.tension, wrench, reference)
-    except CableGeometryError:
-        return Snapshot(robot, pose, None, None)
+    except CableGeometryError as error:
+        return Snapshot(robot, pose, None, None, "" if robot.winches is None else str(error).removeprefix("pose, "))
     approximate = confirmed and not isinstance(settings.model, Catenary) and bool(plan.feasible)
     return Snapshot(robot, pose, plan, confirm(plan).pose if approximate else None)

@@ -9,9 +9,14 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
+from trimesh.creation import annulus
 
 from sagline.arrays import Array
+from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
+from sagline.robot.several import pulleys_of
+from sagline.robot.wheels import outward
+from sagline.viewer import lines
 
 Faces = NDArray[np.int64]
 
@@ -20,6 +25,8 @@ _DASH = 0.02  # length of a dash of an assumed frame, of the robot's size
 _WINCH = 0.009  # radius of a winch, of the robot's size
 _THINNEST = 0.08  # thinnest platform, of its largest edge
 _SIDES = 20  # of a winch's drum
+_WHEEL: Final = ((0.8, 0.97), (0.1, 0.26))  # radii of rim and hub, of a pulley's: the cable lies on the rim
+_WHEEL_WIDTH, _SPOKE, _WHEEL_SIDES = 0.2, 0.055, 48
 _FLAT = 0.05  # anchors that differ in height by less than this, of the robot's size, all hang at the top
 _SIGNS: Final = np.array(list(product((-0.5, 0.5), repeat=3)))
 
@@ -88,9 +95,48 @@ def _beams(start: Array, end: Array, thick: float, dash: float) -> list[Solid]:
 
 
 def winches(robot: Robot) -> Solid:
-    """A drum at every frame anchor."""
+    """What stands still at the frame: the drums that are known, and a mark at every anchor without a visible pulley."""
     radius = _WINCH * size_of(robot)
-    return merged([drum(place, radius) for place in np.unique(robot.frame_anchors, axis=0)])
+    marked = robot.frame_anchors[pulleys_of(robot).radius < radius]
+    parts = [drum(place, radius) for place in np.unique(marked, axis=0)]
+    known = None if robot.winches is None else robot.winches.drum_radius
+    if known is not None:
+        parts += [rod(ends, thick) for ends, thick in zip(lines.drum_axes(robot), known, strict=True)]
+    return merged(parts) if parts else Solid(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
+
+
+def wheel() -> Solid:
+    """A pulley of radius 1 as it stands for a cable along x: it is entered at the origin, its middle is at x = 1."""
+    rim, hub = (annulus(*radii, _WHEEL_WIDTH, sections=_WHEEL_SIDES).triangles.reshape(-1, 3) for radii in _WHEEL)
+    spokes = [rod(np.array([inner, outer]), _SPOKE) for inner, outer in _spokes()]
+    corners = [Solid(ring, np.arange(len(ring)).reshape(-1, 3)) for ring in (rim, hub)]
+    lying = merged([*corners, *spokes])
+    x, y, z = lying.vertices.T
+    return Solid(np.stack((1.0 + x, -z, y), axis=1), lying.faces)
+
+
+def _spokes() -> Array:
+    """Inner and outer ends of the spokes of a lying wheel, shape (k, 2, 3)."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 5, endpoint=False)
+    out = np.stack((np.cos(angle), np.sin(angle), np.zeros_like(angle)), axis=1)
+    return np.stack((_WHEEL[1][1] * out, _WHEEL[0][0] * out), axis=1)
+
+
+def turns(robot: Robot, pose: Pose) -> Array:
+    """How the pulleys have turned about the vertical, as quaternions, scalar first, shape (m, 4)."""
+    half = 0.5 * np.arctan2(*outward(robot, pose).T[::-1])
+    zero = np.zeros_like(half)
+    return np.stack((np.cos(half), zero, zero, np.sin(half)), axis=1)
+
+
+def rod(ends: Array, radius: float) -> Solid:
+    """A cylinder from one point to another, shape (2, 3)."""
+    along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+    left = np.cross(along, [1.0, 0.0, 0.0] if abs(along[0]) < 0.9 else [0.0, 1.0, 0.0])
+    left /= np.linalg.norm(left)
+    angle = np.linspace(0.0, 2.0 * np.pi, _SIDES, endpoint=False)[:, None]
+    ring = radius * (np.cos(angle) * left + np.sin(angle) * np.cross(along, left))
+    return _hull(np.concatenate((ends[0] + ring, ends[1] + ring)))
 
 
 def platform(robot: Robot) -> Solid:
@@ -124,7 +170,9 @@ def drum(middle: Array, radius: float) -> Solid:
 
 
 def tube(points: Array, radius: float, sides: int = 6) -> Solid:
-    """A thin tube along a line of points (P, 3), open at its ends."""
+    """A thin tube along a line of points (P, 3), open at its ends; points that repeat the one before are left out."""
+    new = np.concatenate(([True], np.linalg.norm(np.diff(points, axis=0), axis=1) > 0.0))
+    points = points[new] if new.sum() > 1 else points
     forward = np.gradient(points, axis=0)
     forward /= np.linalg.norm(forward, axis=1, keepdims=True)
     helper = np.where(np.abs(forward[:, 2:]) > 0.9, [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])

@@ -12,6 +12,7 @@ from sagline.errors import InvalidValueError
 from sagline.robot.pattern import ROTATING
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
+from sagline.robot.several import pulleys_of
 from sagline.viewer import lines, solids
 from sagline.viewer.readout import headline
 from sagline.viewer.snapshot import Snapshot
@@ -42,6 +43,7 @@ class Stage:
         self._scene.configure_default_lights(cast_shadow=False)  # a small screen has better things to compute
         self._low, self._high = solids.bounds(robot)
         self._size = solids.size_of(robot)
+        self._winches = solids.winches(robot)
         self._build_surroundings(robot)
         body = self._body = solids.platform(robot)
         self._gizmo: Any = (
@@ -50,7 +52,9 @@ class Stage:
         self._platform = self._scene.add_mesh_simple("/platform/body", body.vertices, body.faces, color=PLATFORM)
         self._rest_frame = self._scene.add_frame("/rest", show_axes=False, visible=False)
         self._scene.add_mesh_simple("/rest/body", body.vertices, body.faces, color=REST, opacity=0.55)
-        blank = np.zeros((robot.cable_count * (lines.POINTS - 1), 2, 3))
+        self._over_pulleys = pulleys_of(robot).radius > 0.0
+        self._wheels = self._build_pulleys(robot, home) if self._over_pulleys.any() else None
+        blank = np.zeros((robot.cable_count * (lines.points_per_cable(robot) - 1), 2, 3))
         self._cables = self._scene.add_line_segments(
             "/cables", blank, GHOST, thickness=CABLE_WIDTH, thickness_units="screen"
         )
@@ -71,7 +75,7 @@ class Stage:
 
     def extent(self, pose: Pose) -> tuple[Array, Array]:
         """Lowest and highest corner of what there is to see with the platform at a pose, names and axes too [m]."""
-        corners = np.vstack((self._low, self._high, pose.transform(self._body.vertices)))
+        corners = np.vstack((self._low, self._high, pose.transform(self._body.vertices), self._winches.vertices))
         return corners.min(axis=0) - _BELOW * self._size, corners.max(axis=0) + _ABOVE * self._size
 
     def dragged_pose(self) -> Pose:
@@ -102,6 +106,9 @@ class Stage:
         """Draw a snapshot; the platform itself follows the gizmo."""
         self._cables.points = snapshot.cable_segments(sag_scale).astype(np.float32)
         self._cables.colors = snapshot.cable_colors(scale)
+        if self._wheels is not None:
+            turns = solids.turns(snapshot.robot, snapshot.pose)[self._over_pulleys]
+            self._wheels.batched_wxyzs = turns.astype(np.float32)
         self._platform.color = PLATFORM if snapshot.feasible else INFEASIBLE
         self._notice.visible = not snapshot.feasible
         if not snapshot.feasible:
@@ -125,9 +132,11 @@ class Stage:
                 self._scene.add_line_segments(name, known, color, thickness=TRACE_WIDTH, thickness_units="screen")
 
     def _build_surroundings(self, robot: Robot) -> None:
-        frame, drums = solids.frame(robot), solids.winches(robot)
+        frame = solids.frame(robot)
         self._scene.add_mesh_simple("/frame", frame.vertices, frame.faces, color=STEEL)
-        self._scene.add_mesh_simple("/winches", drums.vertices, drums.faces, color=DRUM)
+        if len(self._winches.faces):
+            self._scene.add_mesh_simple("/winches", self._winches.vertices, self._winches.faces, color=DRUM)
+        self._build_dead_cables(robot)
         width, depth = 1.5 * (self._high - self._low)[:2]
         cell = solids.round_below(self._size / 10.0)
         middle = 0.5 * (self._low + self._high)
@@ -144,6 +153,23 @@ class Stage:
                 position=place + np.array([0.0, 0.0, NEAR * self._size]),
                 anchor="bottom-center",
             )
+
+    def _build_pulleys(self, robot: Robot, pose: Pose) -> viser.BatchedMeshHandle:
+        """The pulleys as large as they are; they turn with the platform."""
+        wheel, which = solids.wheel(), self._over_pulleys
+        return self._scene.add_batched_meshes_simple(
+            "/pulleys", wheel.vertices, wheel.faces, solids.turns(robot, pose)[which], robot.frame_anchors[which],
+            batched_scales=pulleys_of(robot).radius[which], batched_colors=DRUM, flat_shading=True, lod="off",
+        )  # fmt: skip
+
+    def _build_dead_cables(self, robot: Robot) -> None:
+        """The runs behind the pulleys, dashed where only what they rise is known."""
+        runs, upright = lines.dead_runs(robot)
+        for name, which in (("/dead", upright), ("/dead_assumed", ~upright)):
+            shown = runs[which & (runs[:, 0, 2] != runs[:, 1, 2])]
+            if len(shown):
+                pieces = lines.segments(lines.straight(shown), dashed=name != "/dead")
+                self._scene.add_line_segments(name, pieces, STEEL, thickness=GHOST_WIDTH, thickness_units="screen")
 
     def _build_axes(self) -> None:
         """The directions of the world at a corner of the floor; their arms of a round length are the scale."""

@@ -12,6 +12,7 @@ from sagline.kernels.algebra.strips import HIGH, LOW, START
 from sagline.kernels.balance import setting as s
 from sagline.kernels.cable import hanging
 from sagline.kernels.cable.cables import Cables, new_cables
+from sagline.kernels.cable.pulley import Pulley
 from sagline.kernels.cable.terms import Chord, Material, Model
 from sagline.kernels.codes import (
     CATENARY,
@@ -44,6 +45,7 @@ room_for_balance = from_python(s.new_balance)
 frame_end_tension = from_python(hanging.frame_end_tension)
 
 EXACT = Model(CATENARY, 0.0, 0.0, GRAVITY)
+NO_PULLEY = Pulley(0.0, 1.0, 0.0, 0.0)
 NO_BOUND = s.Limits(LIMITS_OF_CHORD, math.nan)
 VARIABLES = [CHORD_TENSION, HORIZONTAL_TENSION, FRAME_END_TENSION]
 
@@ -63,7 +65,7 @@ def setting(
     model: Model = EXACT,
 ) -> Set:
     m = len(case.robot)
-    cables, rest = room_for_cables(memory(10000), m)
+    cables, rest = room_for_cables(memory(10000), m, False)
     balance, _ = room_for_balance(rest, m, len(case.freedom))
     platform = s.Platform(*case)
     status = set_pose(model, limits, variable, np.ones(m) if weight is None else weight, platform, cables, balance)
@@ -131,7 +133,9 @@ def test_limits_of_the_frame_end() -> None:
         chord = Chord(cables.chord[i], cables.sine[i], cables.cosine[i])
         material = Material(cables.density[i], cables.stiffness[i])
         for limit, column in ((cables.low[i], tables.TENSION_MIN), (cables.high[i], tables.TENSION_MAX)):
-            assert frame_end_tension(EXACT, chord, material, limit) == pytest.approx(case.robot[i, column], rel=1e-11)
+            assert frame_end_tension(EXACT, chord, material, NO_PULLEY, limit) == pytest.approx(
+                case.robot[i, column], rel=1e-11
+            )
 
 
 def test_the_bound_of_validity_lifts_the_lower_limit() -> None:

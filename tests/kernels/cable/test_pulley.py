@@ -143,7 +143,7 @@ def there_and_back(count: int, seed: int) -> tuple[Array, Array, Array, Array]:
             vertical = taut * rise / own + pull
         leaving = math.hypot(horizontal, vertical - weight * free)
         rows[t.LENGTH, i] = free + sum(behind_cable(model, material, over, leaving, wrap(angle)))
-    for _ in range(2):  # from where the last pose left it, as the platform's own steps do
+    for _ in range(8):  # from where the last pose left it, as the platform's own steps do
         cable_forces(model, cables, rows, True)
     # one rounding of the length moves the tension by its stiffness along the chord, of the free span in series
     stiff = 1.0 / (chord / cables[:, tables.STIFFNESS] + chord * (half_weight * np.cos(slope) / tension) ** 2 / tension)
@@ -154,11 +154,11 @@ def there_and_back(count: int, seed: int) -> tuple[Array, Array, Array, Array]:
 def test_lengths_of_cables_over_pulleys_lead_back_to_their_tensions() -> None:
     tension, found, expected, statuses = there_and_back(2000, seed=2)
     assert (statuses == CABLE_SOLVED).all()
-    assert (np.abs(found - tension) / expected).max() < 16.0  # 7.7
+    assert (np.abs(found - tension) / expected).max() < 16.0  # 7
 
 
 @pytest.mark.soak
 def test_lengths_of_many_cables_over_pulleys_lead_back_to_their_tensions() -> None:
     tension, found, expected, statuses = there_and_back(38_000, seed=3)
     assert (statuses == CABLE_SOLVED).all()
-    assert (np.abs(found - tension) / expected).max() < 16.0
+    assert (np.abs(found - tension) / expected).max() < 16.0  # 8.9; 99 in 100 are below 4.5

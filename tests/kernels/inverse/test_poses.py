@@ -11,6 +11,7 @@ import pytest
 from sagline.arrays import Array, Codes, locked
 from sagline.kernels import codes, tables
 from sagline.kernels.cable import hanging, models
+from sagline.kernels.cable.pulley import Pulley
 from sagline.kernels.cable.terms import Chord, Material, Model
 from sagline.kernels.codes import (
     CATENARY,
@@ -250,6 +251,7 @@ def in_variable(case: Case, variable: int, tensions: Array) -> Array:
                 model,
                 Chord(length[i], sine[i], cosine[i]),
                 Material(case.robot[i, tables.DENSITY], case.robot[i, tables.STIFFNESS]),
+                Pulley(0.0, 1.0, 0.0, 0.0),
                 tension,
             )
             for i, tension in enumerate(tensions)

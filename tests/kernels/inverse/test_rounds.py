@@ -18,7 +18,7 @@ room_for_balance = from_python(new_balance)
 
 
 def test_cables_take_the_tensions_shared_and_remember_their_pulls() -> None:
-    cables, _ = room_for_cables(memory(), 3)
+    cables, _ = room_for_cables(memory(), 3, False)
     balance, _ = room_for_balance(memory(), 3, 1)
     balance.tension[:], balance.scale[:] = [10.0, 24.0, 6.0], [1.0, 2.0, 0.5]
     cables.tau[:], cables.pull[:] = [10.0, 15.0, 12.0], [1.0, 2.0, 3.0]

@@ -117,7 +117,7 @@ def leave_by_force(model: Model, cables: Array, rows: Array) -> None:
     for i in range(m):
         rows[t.WRAP_SINE, i] = rows[t.HORIZONTAL, i] / (rows[t.LEAVING, i] + TINY)
     for i in range(m):
-        rows[t.WRAP_COSINE, i] = cables[i, tables.ENTRY] * rows[t.VERTICAL, i] / (rows[t.LEAVING, i] + TINY)
+        rows[t.WRAP_COSINE, i] = pulley_at(cables, i).entry * rows[t.VERTICAL, i] / (rows[t.LEAVING, i] + TINY)
     for i in range(m):
         rows[t.WRAP, i] = angle(rows[t.WRAP_SINE, i] + TINY, rows[t.WRAP_COSINE, i])
     for i in range(m):

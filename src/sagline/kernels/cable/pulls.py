@@ -20,7 +20,7 @@ from sagline.kernels.jit import glue, kernel
 from sagline.kernels.memory import Memory, block
 
 SLOPE_STEP = 1e-4  # relative step of the central difference of the pull
-EXITS = 8  # passes over pulleys: the pull is then known to 1e-9 of the weight for X up to 1
+EXITS = 4  # passes over pulleys: for X up to 1 the pull is then known to 1e-9 of the tension
 SHRINKINGS = 30
 TURN_ERROR = 1e-10  # of half the cable's weight: the pull at a turn is better known
 SHRINKS = 0.9  # of the section before: what shrinks less does not shrink

@@ -156,9 +156,10 @@ def fit_poses(
             answer.results[tables.SPAN, p, i] = space.rows[g.SPAN, i]
             answer.results[tables.RISE, p, i] = space.rows[g.RISE, i]
             answer.results[tables.LENGTH, p, i] = batch.lengths[p, i]
-            pulley, chord = pulley_at(problem.cables, i), chord_at(space.rows, i)
-            wrapped = angle(chord.cosine, pulley.entry * chord.sine)
-            answer.results[tables.WRAP, p, i] = wrapped
-            answer.results[tables.WRAPPED, p, i] = pulley.radius * wrapped
-            answer.results[tables.DEAD, p, i] = pulley.dead
-            answer.results[tables.SINE, p, i] = chord.sine
+            if answer.results.shape[0] > tables.BARE_ROWS:
+                pulley, chord = pulley_at(problem.cables, i), chord_at(space.rows, i)
+                wrapped = angle(chord.cosine, pulley.entry * chord.sine)
+                answer.results[tables.WRAP, p, i] = wrapped
+                answer.results[tables.WRAPPED, p, i] = pulley.radius * wrapped
+                answer.results[tables.DEAD, p, i] = pulley.dead
+                answer.results[tables.SINE, p, i] = chord.sine

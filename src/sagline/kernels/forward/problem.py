@@ -211,7 +211,7 @@ def leave_out(found: Found, p: int, status: int, cable_status: int) -> None:
         found.poses[p, k] = math.nan
     for i in range(found.statuses.shape[1]):
         found.statuses[p, i] = cable_status
-        for row in range(tables.RESULT_ROWS):
+        for row in range(found.results.shape[0]):
             found.results[row, p, i] = math.nan
     for k in range(FORWARD_NUMBERS):
         found.numbers[p, k] = math.nan

@@ -1,0 +1,233 @@
+"""Which parameters, off by how much, explain measured positions; and how well, for how many of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import combinations
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from sagline.arrays import Array, Flags
+from sagline.article.machine import Errors, Parameter
+from sagline.errors import InvalidValueError
+
+STEP = 0.01  # of a plausible error, for the slopes
+NEWTON_STEPS = 20
+SETTLED = 1e-5  # m, by which a step moves the platform; the positions are printed in millimeters
+NEAR = 1e-3  # of a plausible error: what is nearer to a limit has run into it
+
+Model: TypeAlias = tuple[Parameter, ...]
+ErrorOf: TypeAlias = Callable[[Sequence[Errors]], Array]  # actual less desired positions [m], (K, N, 3), of K machines
+
+
+class Explanation(NamedTuple):
+    """The errors of some parameters, none beyond what we think plausible, that fit the measured positions best.
+
+    Attributes:
+        parameters: The parameters, k of them.
+        values: Their errors, each in its unit, shape (k,).
+        deviation: Their standard deviations, each in its unit, shape (k,); NaN for one that stands at a limit.
+        at_limit: Whether each has run into the limit of what is plausible, shape (k,).
+        predicted: Actual less desired position with these errors [m], shape (N, 3).
+        rms: Root mean square of measured less predicted position, over all coordinates [m].
+        worst: Largest distance of measured and predicted position [m].
+        aicc: Akaike's information criterion, corrected for few measurements: smaller is better, and 2 more is little.
+        left_out: Root mean square of measured less predicted position, over all coordinates, where each pose is
+            predicted by the fit to the others [m].
+    """
+
+    parameters: Model
+    values: Array
+    deviation: Array
+    at_limit: Flags
+    predicted: Array
+    rms: float
+    worst: float
+    aicc: float
+    left_out: float
+
+    @property
+    def names(self) -> frozenset[str]:
+        """Names of the parameters."""
+        return frozenset(parameter.name for parameter in self.parameters)
+
+
+class Tangent(NamedTuple):
+    """Positions about some errors of a model's parameters, to first order.
+
+    Attributes:
+        error: Actual less desired, shape (3 N,) [m].
+        slopes: Its change with each parameter, shape (3 N, k) [m by the parameter's unit].
+    """
+
+    error: Array
+    slopes: Array
+
+
+def explanations(error_of: ErrorOf, measured: Array, models: Sequence[Model]) -> tuple[Explanation, ...]:
+    """Fit models to measured positions: least squares within what is plausible, by Gauss-Newton, all at once.
+
+    Args:
+        error_of: Where the platform is for errors of parameters.
+        measured: Actual less desired position [m], shape (N, 3).
+        models: Of each, which parameters may be off.
+
+    Returns:
+        An explanation a model.
+
+    Raises:
+        InvalidValueError: If a fit does not settle.
+    """
+    values, slopes = _start(error_of, measured, models)
+    steps = [np.zeros(len(model)) for model in models]
+    moving = list(range(len(models)))
+    for _ in range(NEWTON_STEPS):
+        near = tangents(error_of, [models[i] for i in moving], [values[i] for i in moving])
+        far = []
+        for i, one in zip(moving, near, strict=True):
+            step = best_within(models[i], one.slopes, measured.ravel() - one.error + one.slopes @ values[i]) - values[i]
+            if step @ steps[i] < 0.0:  # it swings about where it should end
+                step *= 0.5
+            values[i], steps[i], slopes[i] = values[i] + step, step, one.slopes
+            if np.abs(one.slopes @ step).max() > SETTLED:
+                far.append(i)
+        moving = far
+        if not moving:
+            break
+    else:
+        names = ", ".join(parameter.name for parameter in models[moving[0]])
+        raise InvalidValueError(
+            f"the fit of {names}",
+            f"still moving after {NEWTON_STEPS} steps",
+            "fits that settle",
+            "Leave this model out.",
+        )
+    found = error_of([_errors(*of) for of in zip(models, values, strict=True)])
+    return tuple(_explanation(*of, measured) for of in zip(models, values, slopes, found, strict=True))
+
+
+def subsets(parameters: Sequence[Parameter], most: int) -> list[Model]:
+    """All models of one parameter, of two, and so on.
+
+    Args:
+        parameters: To choose from.
+        most: Largest number of parameters in a model.
+
+    Returns:
+        The models, those of fewer parameters first.
+    """
+    return [model for count in range(1, most + 1) for model in combinations(parameters, count)]
+
+
+def tangents(error_of: ErrorOf, models: Sequence[Model], values: Sequence[Array]) -> list[Tangent]:
+    """Each model about its values, by differences away from the limits.
+
+    Args:
+        error_of: Where the platform is for errors of parameters.
+        models: The models.
+        values: Errors of the parameters of each.
+
+    Returns:
+        A tangent a model.
+    """
+    points, steps = [], []
+    for model, x in zip(models, values, strict=True):
+        high = limits(model)[1]
+        step = np.where(x > (1.0 - STEP) * high, -STEP, STEP) * high
+        points.append(np.vstack((x, x + np.diag(step))))
+        steps.append(step)
+    rows = [_errors(model, row) for model, some in zip(models, points, strict=True) for row in some]
+    found = error_of(rows).reshape(len(rows), -1)
+    parts = np.split(found, np.cumsum([len(some) for some in points])[:-1])
+    return [Tangent(part[0], ((part[1:] - part[0]) / step[:, None]).T) for part, step in zip(parts, steps, strict=True)]
+
+
+def limits(model: Model) -> tuple[Array, Array]:
+    """The least and the largest plausible errors of a model's parameters, each in its unit, shape (k,)."""
+    high = np.array([parameter.plausible for parameter in model])
+    return np.where([parameter.positive for parameter in model], 0.0, -high), high
+
+
+def best_within(model: Model, slopes: Array, right: Array) -> Array:
+    """Least squares within the limits; each unknown is counted in its upper one, which makes them comparable."""
+    from scipy.optimize import lsq_linear
+
+    low, high = limits(model)
+    values: Array = high * lsq_linear(slopes * high, right, bounds=(low / high, np.ones_like(high)), method="bvls").x
+    return values
+
+
+def information(rms: float, count: int, parameters: int) -> float:
+    """Akaike's information criterion, corrected for few measurements.
+
+    Args:
+        rms: Root mean square of what a model leaves [m].
+        count: Number of measured coordinates n.
+        parameters: Fitted parameters of the model k; the scatter of the measurements is one more.
+
+    Returns:
+        AICc = n ln(rms^2/1 mm^2) + 2 K + 2 K (K + 1)/(n - K - 1) with K = k + 1.
+
+    Source:
+        Hurvich and Tsai 1989, Biometrika 76(2), 297-307.
+    """
+    unknown = parameters + 1
+    return float(
+        2.0 * count * np.log(1e3 * rms) + 2.0 * unknown + 2.0 * unknown * (unknown + 1) / (count - unknown - 1)
+    )
+
+
+def _errors(model: Model, values: Array) -> Errors:
+    return {parameter.name: float(value) for parameter, value in zip(model, values, strict=True)}
+
+
+def _start(error_of: ErrorOf, measured: Array, models: Sequence[Model]) -> tuple[list[Array], list[Array]]:
+    """Values and slopes of every model from slopes at zero, which the models have in common."""
+    alone: list[Model] = [(parameter,) for parameter in dict.fromkeys(p for model in models for p in model)]
+    near = {
+        model[0]: one for model, one in zip(alone, tangents(error_of, alone, [np.zeros(1)] * len(alone)), strict=True)
+    }
+    slopes = [np.hstack([near[parameter].slopes for parameter in model]) for model in models]
+    values = [
+        best_within(model, one, measured.ravel() - near[model[0]].error)
+        for model, one in zip(models, slopes, strict=True)
+    ]
+    return values, slopes
+
+
+def _explanation(model: Model, values: Array, slopes: Array, predicted: Array, measured: Array) -> Explanation:
+    rest = measured - predicted
+    rms = float(np.sqrt(np.mean(rest**2)))
+    low, high = limits(model)
+    at_limit = (values >= (1.0 - NEAR) * high) | (values <= low + NEAR * high)
+    return Explanation(
+        parameters=model,
+        values=values,
+        deviation=_deviation(slopes, ~at_limit, rest),
+        at_limit=at_limit,
+        predicted=predicted,
+        rms=rms,
+        worst=float(np.linalg.norm(rest, axis=1).max()),
+        aicc=information(rms, rest.size, len(model)),
+        left_out=_left_out(model, values, slopes, rest),
+    )
+
+
+def _deviation(slopes: Array, free: Flags, rest: Array) -> Array:
+    """Standard deviations of values, from how much is left; NaN for those that are not free."""
+    normal = slopes[:, free].T @ slopes[:, free]
+    scatter = np.sum(rest**2) / (rest.size - free.sum())
+    deviation = np.full(free.size, np.nan)
+    deviation[free] = np.sqrt(scatter * np.diag(np.linalg.inv(normal)))
+    return deviation
+
+
+def _left_out(model: Model, values: Array, slopes: Array, rest: Array) -> float:
+    """What is left of each pose by the fit to the others, on the tangent at the fit to all [m], root mean square."""
+    right, pose = rest.ravel() + slopes @ values, np.arange(rest.size) // rest.shape[1]
+    left = [
+        right[pose == k] - slopes[pose == k] @ best_within(model, slopes[pose != k], right[pose != k])
+        for k in range(len(rest))
+    ]
+    return float(np.sqrt(np.mean(np.square(left))))

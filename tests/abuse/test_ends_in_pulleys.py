@@ -1,0 +1,168 @@
+"""Platform ends in pulleys or past them, and lengths that end before the pulley: one line, or the right answer."""
+
+import re
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.errors import MOST
+from sagline.statics.balance import article_balance
+from sagline.viewer import readout
+from sagline.viewer.settings import Settings
+from sagline.viewer.snapshot import taken_at
+
+FEW_AND_MANY = [60, pytest.param(4000, marks=pytest.mark.soak)]
+SHOWN = re.compile(
+    r"cable (\d+): its platform end is inside its pulley or past the near side, its distance from the swivel axis is "
+    r"([-+.e\d]+) m; allowed: (?:< ([-+.e\d]+) m or )?> ([-+.e\d]+) m there\. Move the platform away, or correct its "
+    r"pulley_radius, ([-+.e\d]+) m\."
+)
+
+
+def over_pulleys(random: np.random.Generator) -> sl.Robot:
+    """A robot with pulleys of any size, some larger than any of its cables, entered from either side."""
+    robot = sl.load_robot(str(random.choice(["article-suspended", "ipanema-2", "cogiro"])))
+    radius = 10.0 ** random.uniform(-2.0, 1.0, robot.cable_count)
+    radius[random.random(robot.cable_count) < 0.7] = 0.0
+    radius[int(random.integers(robot.cable_count))] = 10.0 ** random.uniform(-2.0, 1.0)
+    axis = np.zeros((robot.cable_count, 3))
+    axis[:, 2] = random.choice([-1.0, 1.0], robot.cable_count)
+    return robot.replace(winches=sl.Winch(pulley_radius=radius, swivel_axis=axis))
+
+
+def near_a_pulley(robot: sl.Robot, random: np.random.Generator) -> sl.Pose:
+    """A pose with a platform end within a few radii of where its cable enters the pulley."""
+    assert robot.winches is not None
+    i = int(random.choice(np.flatnonzero(robot.winches.pulley_radius)))
+    away = robot.winches.pulley_radius[i] * random.uniform(-3.0, 3.0, 3)
+    turn = sl.Pose.from_euler(np.zeros(3), *random.uniform(-0.3, 0.3, 3))
+    return sl.Pose(robot.frame_anchors[i] - turn.matrix @ robot.platform_anchors[i] + away, turn.rotation)
+
+
+def wrong_cables(robot: sl.Robot, pose: sl.Pose) -> list[int]:
+    """Cables whose end no half turn of cable leads to, by rolling a tangent around the pulley."""
+    assert robot.winches is not None
+    reach = pose.transform(robot.platform_anchors) - robot.frame_anchors
+    span, along = np.hypot(reach[:, 0], reach[:, 1]), robot.winches.swivel_axis[:, 2] * reach[:, 2]
+    found = []
+    for i, radius in enumerate(robot.winches.pulley_radius):
+        if not radius:
+            continue
+        angle = np.linspace(0.0, np.pi, 4001)
+        # of the end, seen from each point of the half turn: beside the tangent there, and ahead on it
+        x, z = span[i] - radius * (1.0 - np.cos(angle)), along[i] - radius * np.sin(angle)
+        beside = x * np.cos(angle) - z * np.sin(angle)
+        ahead = x * np.sin(angle) + z * np.cos(angle)
+        passed = (beside[:-1] > 0.0) & (beside[1:] <= 0.0) & (ahead[:-1] > 0.0)
+        if not passed.any():
+            found.append(i)
+    return found
+
+
+@pytest.mark.parametrize("count", FEW_AND_MANY)
+def test_ends_that_no_cable_reaches_are_named(count: int) -> None:
+    random, refused = np.random.default_rng(5), 0
+    for _ in range(count):
+        robot = over_pulleys(random)
+        pose = near_a_pulley(robot, random)
+        wrong = wrong_cables(robot, pose)
+        solver = sl.InverseSolver(robot).step(pose.position, pose.quaternion)
+        if not wrong:
+            assert np.isfinite(sl.structure_matrix(robot, pose)).all()
+            assert solver.status is not sl.PoseStatus.NO_CHORD
+            continue
+        refused += 1
+        assert solver.status is sl.PoseStatus.NO_CHORD
+        assert np.isnan(solver.unstrained_length).all()
+        both = sl.Pose(np.stack((robot_middle(robot), pose.position)), np.stack((pose.matrix, pose.matrix)))
+        for refuse in (sl.inverse, sl.structure_matrix, article_balance):
+            with pytest.raises(sl.CableGeometryError) as error:
+                refuse(robot, pose)
+            said = SHOWN.fullmatch(str(error.value).removeprefix("pose, "))
+            assert said is not None, str(error.value)
+            check(robot, pose, wrong, said)
+            if not wrong_cables(robot, both[0]):
+                with pytest.raises(sl.CableGeometryError, match=rf"^pose 1, cable {said[1]}: its platform end"):
+                    refuse(robot, both)
+        snapshot = taken_at(robot, pose, Settings(mass=robot.mass), None)
+        assert SHOWN.fullmatch(snapshot.reason)
+        assert np.isfinite(snapshot.cable_segments(1.0)).all()
+        assert np.isfinite(snapshot.ghost_segments(1.0, 0.0)).all()
+        assert "No chord" in readout.verdict(snapshot)
+    assert 0.2 * count < refused < 0.95 * count
+
+
+def robot_middle(robot: sl.Robot) -> np.ndarray:
+    assert robot.test_box is not None
+    return 0.5 * (robot.test_box.low + robot.test_box.high)
+
+
+def check(robot: sl.Robot, pose: sl.Pose, wrong: list[int], said: re.Match[str]) -> None:
+    """The numbers of a message are those of the cable that it names, and out of the range that it tells."""
+    assert robot.winches is not None
+    cable, span = int(said[1]), float(said[2])
+    assert cable == wrong[0]
+    assert len(said[0]) < MOST
+    reach = (pose.transform(robot.platform_anchors) - robot.frame_anchors)[cable]
+    assert span == pytest.approx(np.hypot(reach[0], reach[1]), rel=1e-8)
+    assert float(said[5]) == pytest.approx(robot.winches.pulley_radius[cable], rel=1e-5)
+    assert span <= float(said[4]) * (1.0 + 1e-5)
+    assert said[3] is None or span >= float(said[3]) * (1.0 - 1e-5)
+    level = reach[:2] / np.hypot(reach[0], reach[1])
+    for limit, beyond in ((said[4], 1.0), (said[3], -1.0)):
+        if limit is None:
+            continue
+        # what the message allows is taken, what is next to it is not
+        for side, taken in ((1e-4, True), (-1e-4, False)):
+            place = (float(limit) + beyond * side * robot.winches.pulley_radius[cable]) - np.hypot(reach[0], reach[1])
+            there = sl.Pose(pose.position + np.array([*(place * level), 0.0]), pose.rotation)
+            if float(limit) > 1e-3 * robot.winches.pulley_radius[cable]:
+                assert (cable not in wrong_cables(robot, there)) is taken
+
+
+@pytest.mark.parametrize("count", FEW_AND_MANY)
+def test_lengths_within_the_dead_cable_are_named(count: int) -> None:
+    random = np.random.default_rng(6)
+    base = sl.load_robot("article-suspended")
+    planned = sl.inverse(base, sl.Pose([0.5, 0.2, 2.0], np.eye(3))).unstrained_length
+    for _ in range(count):
+        dead = random.choice([0.0, 1.0], 8) * random.uniform(0.5, 9.0, 8)
+        dead[int(random.integers(8))] = 2.0
+        robot = base.replace(winches=sl.Winch(pulley_radius=random.choice([0.0, 0.05]), dead_cable=dead))
+        cable = int(random.choice(np.flatnonzero(dead)))
+        lengths = planned + dead
+        lengths[cable] = dead[cable] * random.choice([1e-3, 0.5, 1.0])
+        words = rf"cable {cable}: unstrained length is {lengths[cable]:.9g} m; allowed: > {dead[cable]:.9g} m, the dead"
+        calls = (sl.forward, sl.equilibria, lambda robot, lengths: sl.ForwardSolver(robot).step(lengths))
+        for refuse in calls:
+            with pytest.raises(sl.InvalidValueError, match=f"^{re.escape(words).replace(chr(92) + ' ', ' ')}") as error:
+                refuse(robot, lengths)
+            assert len(str(error.value)) < MOST
+        with pytest.raises(sl.InvalidValueError, match=r"^sample 1, cable"):
+            sl.forward(robot, [planned + dead, lengths])
+        with pytest.raises(sl.InvalidValueError, match=r"^sample 1, cable"):
+            sl.forward([base, robot], [planned, lengths])
+        with pytest.raises(sl.InvalidValueError, match=f"^cable {cable}: unstrained length"):
+            sl.dump_mjcf(robot, sl.Pose([0.5, 0.2, 2.0], np.eye(3)), lengths)
+
+
+def test_what_the_inverse_plans_next_to_a_pulley_is_taken_back() -> None:
+    """Hardly wrapped cables are shorter off the drum than half a turn and the dead cable; none of them is refused."""
+    random, shorter = np.random.default_rng(7), 0
+    base = sl.load_robot("article-suspended")
+    robot = base.replace(winches=sl.Winch(pulley_radius=0.3, dead_cable=4.0, dead_rise=1.0))
+    middle = base.frame_anchors.mean(axis=0)
+    for _ in range(60):
+        i = int(random.integers(8))
+        inward = np.sign(middle - base.frame_anchors[i]) * random.uniform(0.2, 0.7, 3)
+        inward[2] = random.uniform(0.3, 0.45) if i % 2 == 0 else random.uniform(-0.1, 0.05)
+        pose = sl.Pose(base.frame_anchors[i] - base.platform_anchors[i] + inward, np.eye(3))
+        if wrong_cables(robot, pose):
+            continue
+        plan = sl.inverse(robot, pose)
+        if plan.feasible and (plan.unstrained_length < np.pi * 0.3 + 4.0).any():
+            found = sl.forward(robot, plan.unstrained_length, start=pose)
+            np.testing.assert_allclose(found.pose.position, pose.position, atol=1e-9)
+            shorter += 1
+    assert shorter > 3

@@ -1,0 +1,31 @@
+"""The lengths that a command writes are those that winches control: all cable off the drum."""
+
+import csv
+from io import StringIO
+
+import numpy as np
+
+import sagline as sl
+from sagline.cli.lengths import plan_text
+from sagline.cli.study import Run, summary
+
+ROBOT = sl.load_robot("article-suspended").replace(winches=sl.Winch(pulley_radius=0.1, dead_cable=4.0))
+ENDS = sl.Pose(np.array([[0.0, 0.0, 1.5], [1.0, 0.5, 2.0]]), np.stack([np.eye(3)] * 2))
+
+
+def test_a_plan_of_a_robot_with_pulleys_is_written_with_all_cable_off_the_drum() -> None:
+    plan = sl.inverse(ROBOT, ENDS)
+    rows = list(csv.DictReader(StringIO(plan_text(plan))))
+    written = np.array([[float(row[f"L{k} [m]"]) for k in range(8)] for row in rows])
+    np.testing.assert_allclose(sl.forward(ROBOT, written, start=ENDS).pose.position, ENDS.position, atol=1e-9)
+    tension = np.array([[float(row[f"T{k} [N]"]) for k in range(8)] for row in rows])
+    force = sl.structure_matrix(ROBOT, ENDS)[:, :3] @ tension[..., None]
+    np.testing.assert_allclose(force[:, :2, 0], 0.0, atol=1e-9 * tension.max())  # chords balance level
+
+
+def test_the_summary_counts_all_cable_off_the_drum() -> None:
+    plan = sl.inverse(ROBOT, ENDS)
+    told = summary(Run(sl.confirm(plan), 0.0))
+    straight = np.linalg.norm(ENDS.position[:, None] + ROBOT.platform_anchors - ROBOT.frame_anchors, axis=-1)
+    assert straight.min() + 4.0 < told.unstrained_length_min_m < straight.min() + 4.0 + 0.2 * np.pi
+    assert told.unstrained_length_max_m == plan.unstrained_length.max()

@@ -1,0 +1,99 @@
+"""The numbers of docs/winches.md: what pulleys cost that are left out, and what the straight formula for them does."""
+
+import re
+import runpy
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.arrays import Array
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs" / "winches.md").read_text(encoding="utf-8")
+PROSE = re.sub(r"\s+", " ", PAGE)
+ROBOTS = ("cogiro", "article-prototype", "ipanema-1", "expo2015-lucia")
+PULLEYS = sl.Winch(0.05)
+RISING = sl.Winch(0.05, dead_cable=3.0, dead_rise=3.0)
+
+
+@pytest.fixture(scope="module")
+def example(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any]]:
+    with pytest.MonkeyPatch.context() as there:
+        there.chdir(tmp_path_factory.mktemp("example"))
+        yield runpy.run_path(str(ROOT / "examples" / "pulleys_left_out.py"))
+
+
+def test_the_table_is_what_the_example_finds(example: dict[str, Any]) -> None:
+    rows = [re.split(r" *\| *", line)[1:-1] for line in PAGE.splitlines() if re.match(r"\| (position|`)", line)]
+    head = next(row for row in rows if row[0].startswith("position error"))
+    table = {row[0].strip("`"): row[1:] for row in rows if row[0].strip("`") in ROBOTS}
+    assert head[1:] == list(example["left_out"])
+    assert list(table) == list(example["found"]) == list(ROBOTS)
+    for name, cells in table.items():
+        assert cells == [f"{row.mean():.1f}, {row.max():.0f}" for row in example["found"][name]]
+    assert {row.size for rows in example["found"].values() for row in rows} == {405}
+    assert "at 405 level poses" in PROSE
+    assert Path("pulleys_left_out.png").stat().st_size > 10_000
+
+
+def test_twice_the_radius_costs_about_twice_as_much(example: dict[str, Any]) -> None:
+    for narrow, wide, _dead in example["found"].values():
+        assert wide.mean() == pytest.approx(2.0 * narrow.mean(), rel=0.03)
+
+
+def box(name: str) -> tuple[sl.Robot, sl.Pose, sl.Pose]:
+    """A robot, the poses of the example, and the middle of its box."""
+    robot = sl.load_robot(name)
+    assert robot.test_box is not None
+    low, high = robot.test_box.low, robot.test_box.high
+    grid = np.stack(np.meshgrid(*map(np.linspace, low, high, (9, 9, 5))), axis=-1).reshape(-1, 3)
+    return robot, sl.Pose.from_euler(grid, 0.0, 0.0, 0.0), sl.Pose.from_euler(0.5 * (low + high), 0.0, 0.0, 0.0)
+
+
+def straight_formula(robot: sl.Robot, pose: sl.Pose, tension: Array) -> tuple[Array, Array]:
+    """Wrap angles and lengths where the cables leave as straight ones would, and hang from there.
+
+    The angle is that of the line from the pulley's middle to the platform end, less the one between it and the spoke
+    to where the tangent touches; what is behind is stretched by the tension at the exit.
+    """
+    winches = robot.winches
+    assert winches is not None
+    along = pose.transform(robot.platform_anchors) - robot.frame_anchors
+    radius = winches.pulley_radius
+    across, drop = np.hypot(along[..., 0], along[..., 1]) - radius, -along[..., 2]
+    wrap = 0.5 * np.pi + np.arctan2(drop, across) + np.arcsin(radius / np.hypot(across, drop))
+    span, rise = across + radius * np.cos(wrap), -drop - radius * np.sin(wrap)
+    free = sl.Catenary().from_tension(robot.cables, span, rise, tension)
+    strain = free.frame_end_tension / robot.cables.axial_stiffness
+    return wrap, free.unstrained_length + (radius * wrap + winches.dead_cable) / (1.0 + strain)
+
+
+def off_by(name: str, winch: sl.Winch, *, zeroed: bool = False) -> tuple[float, float]:
+    """Largest error of the platform [um] at lengths by the straight formula, and of the wrap angle [deg]."""
+    robot, poses, home = box(name)
+    real = robot.replace(winches=winch)
+    plan, at_home = sl.inverse(real, poses), sl.inverse(real, home)
+    wrap, lengths = straight_formula(real, poses, plan.chord_tension)
+    if zeroed:
+        lengths = lengths + (at_home.unstrained_length - straight_formula(real, home, at_home.chord_tension)[1])
+    found = sl.forward(real, lengths, start=poses)
+    assert found.solved.all()
+    error = np.linalg.norm(found.pose.position - poses.position, axis=1).max()
+    assert plan.wrap_angle is not None
+    return float(1e6 * error), float(np.degrees(np.abs(wrap - plan.wrap_angle).max()))
+
+
+def test_the_straight_formula_is_as_near_as_the_page_says() -> None:
+    without = [off_by(name, PULLEYS) for name in ROBOTS]
+    assert f"wrong by up to {max(angle for _, angle in without):.1f}°" in PROSE
+    assert f"put the platform {max(error for error, _ in without):.1f} µm off at most" in PROSE
+    rising = {name: off_by(name, RISING)[0] for name in ROBOTS}
+    soft = rising.pop("article-prototype")
+    assert f"it is {1e-3 * soft:.2f} mm on the prototype's soft rope" in PROSE
+    assert f"and {1e-3 * max(rising.values()):.2f} mm elsewhere" in PROSE
+    zeroed = max(off_by(name, RISING, zeroed=True)[0] for name in ROBOTS)
+    assert f"zeros set at home leave {zeroed:.0f} µm of it" in PROSE

@@ -1,0 +1,37 @@
+"""Chords that touch pulleys, against the circle itself."""
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.kernels.cable import geometry
+from sagline.robot.wheels import on_wheels, wheel_centers
+from sagline.statics.chords import chord_geometry, touching_angle
+
+RADIUS = 0.2
+BASE = sl.load_robot("article-suspended")
+
+
+@pytest.mark.parametrize("entry", [1.0, -1.0])
+@pytest.mark.parametrize("seed", range(4))
+def test_chords_touch_their_pulleys(entry: float, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    robot = BASE.replace(winches=sl.Winch(pulley_radius=RADIUS, swivel_axis=(0, 0, entry)))
+    pose = sl.Pose(rng.uniform((-3.0, -3.0, 0.0), (3.0, 3.0, 5.0)), np.eye(3))
+    ends, centers = pose.transform(robot.platform_anchors), wheel_centers(robot, pose)
+    chord = chord_geometry(robot, pose)[0, geometry.CHORD]
+    np.testing.assert_allclose(chord**2 + RADIUS**2, ((ends - centers) ** 2).sum(axis=1), rtol=1e-13)
+    exits = on_wheels(robot, pose, touching_angle(robot, pose))
+    np.testing.assert_allclose(np.linalg.norm(ends - exits, axis=1), chord, rtol=1e-13)
+    np.testing.assert_allclose(np.einsum("ij,ij->i", ends - exits, exits - centers), 0.0, atol=1e-13)
+    # of the two tangents it is the one that goes on as the cable does around the pulley
+    forward = on_wheels(robot, pose, touching_angle(robot, pose) + 1e-3) - exits
+    assert (np.einsum("ij,ij->i", forward, ends - exits) > 0.0).all()
+
+
+def test_without_pulleys_chords_begin_at_the_anchors() -> None:
+    pose = sl.Pose([1.0, -0.5, 2.0], np.eye(3))
+    assert not touching_angle(BASE, pose).any()
+    chord = chord_geometry(BASE, pose)[0, geometry.CHORD]
+    ends = pose.transform(BASE.platform_anchors)
+    np.testing.assert_allclose(chord, np.linalg.norm(ends - BASE.frame_anchors, axis=1), rtol=1e-14)
