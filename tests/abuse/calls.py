@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from enum import Enum
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -185,6 +185,10 @@ def _robots(given: _Given) -> dict[str, Call]:
         name: ("array", [2.0, 1.0], not rule.needed) for name, rule in RULES.items() if name != "dead_rise"
     }
     wound |= {"dead_rise": ("array", [0.5, -0.25]), "swivel_axis": ("array", [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])}
+    wound |= {
+        "rolling_friction": ("array", [0.5, 0.25]),
+        "guides": ("array", [[[1.0, 1.0, 2.0], [2.0, 1.0, 2.0]], [[1.0, 2.0, 2.0], [2.0, 2.0, 4.0]]], True),
+    }
     winch = sl.Winch(0.05, dead_cable=[3.0, 4.0])
     return {
         "Winch": Call(sl.Winch, _all(**wound)),
@@ -231,6 +235,9 @@ def _kinematics(given: _Given) -> dict[str, Call]:
     silent = ("callback", lambda done, of: None, True)
     several = ("array", np.stack((given.length, given.length)))
     measured = sl.MeasuredTension(given.plan.state.cables.frame_end_tension, 1.0, 1e-3)
+    guides = given.robot.frame_anchors[:, None] * np.array([1.25, 1.25, 0.5])
+    guided = given.robot.replace(winches=sl.Winch(0.05, pulley_friction=0.1, guides=guides))
+    winding = ("array", np.array([1.0, -1.0, 0.0, 1.0, -1.0, 1.0, 1.0, -1.0]), True)
     return {
         "inverse": Call(
             sl.inverse,
@@ -245,6 +252,11 @@ def _kinematics(given: _Given) -> dict[str, Call]:
             ),
         ),
         "inverse: a path": Call(sl.inverse, _all(robot=robot, motion=("motion", given.path), wrench=wrench)),
+        "inverse: winding": Call(partial(sl.inverse, guided, given.pose), _all(winding=winding)),
+        "forward: winding": Call(
+            partial(sl.forward, guided, sl.inverse(guided, given.pose).unstrained_length, given.pose),
+            _all(winding=winding),
+        ),
         "forward": Call(
             sl.forward,
             _all(

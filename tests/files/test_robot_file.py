@@ -97,6 +97,8 @@ QUANTITIES: dict[str, tuple[Any, Any]] = {
     "winches.pulley_radius": ([0.05, 0.0, 0.04], ["50 mm", 0, "4 cm"]),
     "winches.swivel_axis": ([[0, 0, 1], [0, 0, -1], [0, 0, 2]], ["up", "down", [0, 0, "1"]]),
     "winches.pulley_friction": (0.05, "0.05"),
+    "winches.rolling_friction": ([0.01, 0.0, 0.02], ["0.01", 0, "2e-2"]),
+    "winches.guides": ([[9.0, 0.0, 0.5], [9.0, 0.0, 3.0]], [["900 cm", 0, "500 mm"], [9, "0 mm", "0.003 km"]]),
     "winches.dead_cable": ([4, 5.5, 3], ["400 cm", "5500 mm", 3]),
     "winches.dead_rise": (-2.5, "-25 dm"),
     "winches.drum_radius": (0.06, "60 mm"),

@@ -9,7 +9,7 @@ import numpy as np
 
 from sagline.arrays import Flags
 from sagline.errors import InvalidValueError
-from sagline.files.plan_layout import JERK, MACHINE, MOTION, PARTS, PROOF, QUANTITIES, TIME, Known, Quantity
+from sagline.files.plan_layout import JERK, MACHINE, MOTION, PARTS, PROOF, QUANTITIES, TIME, WINDING, Known, Quantity
 from sagline.kinematics.status import PoseStatus
 
 if TYPE_CHECKING:
@@ -30,7 +30,8 @@ def present(data: Dataset) -> tuple[Quantity, ...]:
     """
     motion = (TIME, *MOTION) if TIME.name in data.variables else ()
     machine = MACHINE if MACHINE[0].name in data.variables else ()
-    return (*QUANTITIES, *machine, *motion, *(some for some in (*PROOF, JERK) if some.name in data.variables))
+    beside = (some for some in (WINDING, *PROOF, JERK) if some.name in data.variables)
+    return (*QUANTITIES, *machine, *motion, *beside)
 
 
 def check_plan(data: Dataset, cables: int) -> None:

@@ -23,7 +23,7 @@ from sagline.cables.straight import Straight
 from sagline.errors import FileError, InvalidValueError, SaglineWarning
 from sagline.files.dataset import AGAIN, read_dataset
 from sagline.files.plan_checks import check_plan
-from sagline.files.plan_layout import JERK, MACHINE, MOTION, PARTS, PROOF, QUANTITIES, TIME, Quantity
+from sagline.files.plan_layout import JERK, MACHINE, MOTION, PARTS, PROOF, QUANTITIES, TIME, WINDING, Quantity
 from sagline.files.robot_file import dump_robot, parse_robot
 from sagline.files.seal import Seal, seal
 from sagline.files.whole import written_whole
@@ -122,7 +122,8 @@ def _dataset(plan: Plan) -> Dataset:
 
     proof = tuple(quantity for quantity in PROOF if quantity.of(plan) is not None)
     motion = () if plan.path is None else MOTION if plan.path.jerk is None else (*MOTION, JERK)
-    machine = () if plan.state.contact is None else MACHINE
+    contact = plan.state.contact
+    machine = () if contact is None else MACHINE if contact.winding is None else (*MACHINE, WINDING)
     quantities = QUANTITIES + machine + proof + motion
     used = {part for quantity in quantities for part in quantity.parts} & PARTS.keys()
     coordinates: dict[str, Any] = {part: (part, list(PARTS[part])) for part in sorted(used)}
@@ -213,7 +214,9 @@ def _plan(path: FilePath, data: Dataset, robot: Robot) -> Plan:
         **{name: values(FREE.get(name, name) if behind else name) for name in STATE_ARRAYS},
         status=values("cable_status"),
     )
-    contact = Contact(*(values(field.name) for field in fields(Contact))) if behind else None
+    contact = None
+    if behind:
+        contact = Contact(**{field.name: values(field.name) for field in fields(Contact) if field.name in data})
     motion = None
     if TIME.name in data.variables:
         jerk = values(JERK.name) if JERK.name in data.variables else None

@@ -224,6 +224,16 @@ MACHINE = (
     ),
 )
 
+# of one whose friction counts
+WINDING = Quantity(
+    "winding",
+    "state.contact.winding",
+    ("cable",),
+    "1",
+    "direction of friction: 1 winding in, -1 paying out, 0 standing",
+    low=-1.0,
+)
+
 # of a plan that has them: one of a file written before they were kept has none. A proof more is a line here.
 PROOF = (
     Quantity(

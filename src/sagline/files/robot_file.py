@@ -138,6 +138,8 @@ def _winches(winches: Winch) -> dict[str, Any]:
         for key, field in winches.known().items()
         if key == "pulley_radius" or key not in plain or field.tobytes() != plain[key].tobytes()
     }
+    if "guides" in data:  # dead cable follows from them
+        data = {key: value for key, value in data.items() if key not in ("dead_cable", "dead_rise")}
     if "swivel_axis" in data:
         words = {tuple(axis): word for word, axis in SWIVEL_AXES.items()}
         data["swivel_axis"] = [words[tuple(axis)] for axis in data["swivel_axis"]]

@@ -43,6 +43,7 @@ _UNITS: Final = {
     "test_box.high": "m",
     "test_box.tilt": "rad",
     "winches.swivel_axis": "",
+    "winches.guides": "m",
     **{f"winches.{name}": rule.unit for name, rule in RULES.items()},
 }  # every other key of inertia is in kg m^2
 SWIVEL_AXES: Final = {"up": [0.0, 0.0, 1.0], "down": [0.0, 0.0, -1.0]}  # the words for the axes that there are
@@ -106,8 +107,10 @@ class _Winches(_RobotPart):
     pulley_radius: Any = None
     swivel_axis: Any = None
     pulley_friction: Any = None
+    rolling_friction: Any = None
     dead_cable: Any = None
     dead_rise: Any = None
+    guides: Any = None
     drum_radius: Any = None
     drum_width: Any = None
     groove_pitch: Any = None

@@ -9,11 +9,19 @@ import numpy as np
 from sagline.arguments import callback, instance
 from sagline.arrays import Array, Codes, Flags, locked
 from sagline.blocks import Progress, blocks
+from sagline.cables.catenary import Catenary
 from sagline.kinematics.forward import forward
+from sagline.kinematics.forward_rows import solve_rows
+from sagline.kinematics.forward_solution import ForwardSolution
 from sagline.kinematics.forward_status import ForwardStatus
 from sagline.kinematics.plan import Plan
+from sagline.kinematics.winding import settled
+from sagline.robot.behind import differs, kernel_length
+from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
+from sagline.statics.tables import pose_rows
 
+_CATENARY = Catenary()
 BLOCK = 1 << 14  # poses whose cables are kept at once: little memory
 
 
@@ -80,15 +88,27 @@ def confirm(plan: Plan, *, progress: Progress | None = None) -> Confirmation:
     callback(progress, "progress")
     state, lengths = instance(plan, Plan, "plan").state, plan.unstrained_length
     if not state.pose.shape or not len(lengths):  # all at once
-        found = forward(state.robot, lengths, start=state.pose, wrench=state.wrench, progress=progress)
+        found = _forward(state, progress)
         return Confirmation(plan, found.pose, found.status, found.wrench_residual)
     parts = []
     for rows in blocks(len(lengths), BLOCK):
         part, told = state[rows], None if progress is None else _from(rows.start, len(lengths), progress)
-        found = forward(part.robot, part.unstrained_length, part.pose, wrench=part.wrench, progress=told)
+        found = _forward(part, told)
         parts.append((found.pose.position, found.pose.quaternion, found.status, found.wrench_residual))
     position, quaternion, status, residual = (locked(np.concatenate(each)) for each in zip(*parts, strict=True))
     return Confirmation(plan, Pose._adopt(position, quaternion), status, residual)
+
+
+def _forward(state: Equilibrium, progress: Progress | None) -> ForwardSolution:
+    """Where the platform rests on a state's lengths, with its friction; from the planned tensions where it counts."""
+    robot, winding = state.robot, None if state.contact is None else state.contact.winding
+    if not differs(robot, winding):
+        return forward(robot, state.unstrained_length, state.pose, wrench=state.wrench, progress=progress)
+    lengths, planned = (locked(np.atleast_2d(each).view()) for each in (state.unstrained_length, kernel_length(state)))
+    loads = locked(np.atleast_2d(state.wrench).view())
+    found = solve_rows(robot, _CATENARY, planned, pose_rows(state.pose), loads, progress=progress)
+    found = settled(robot, _CATENARY, found, lengths, loads, winding, lengths - planned)
+    return found.solution(robot, _CATENARY, state.wrench, state.pose.shape)
 
 
 def _from(first: int, count: int, progress: Progress) -> Progress:

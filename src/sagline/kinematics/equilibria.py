@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,7 +18,9 @@ from sagline.kinematics.forward_rows import Found
 from sagline.kinematics.forward_solution import ForwardSolution
 from sagline.kinematics.forward_status import STABLE, ForwardStatus
 from sagline.kinematics.start import from_orientations, start_quaternions
+from sagline.kinematics.winding import settled
 from sagline.memory import check_memory
+from sagline.robot.behind import differs, with_behind
 from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.robot import Robot
 from sagline.statics.wrench import external_wrench
@@ -92,10 +94,14 @@ def equilibria(
     load = external_wrench(wrench, None)
     quaternions = _quaternions(robot, starts, seed)
     samples = locked(np.repeat(lengths[None], len(quaternions), axis=0))
-    found = from_orientations(robot, model, samples, locked(load[None].copy()), quaternions)
+    loads = locked(load[None].copy())
+    found = from_orientations(robot, model, samples, loads, quaternions)
+    if differs(robot, None):
+        found = settled(robot, model, found, samples, loads, None)
     chosen, reached = _distinct(found, float(lengths.mean()))
-    shape = (len(chosen),)
-    return Equilibria(found.part(chosen).solution(robot, model, load, shape), locked(reached), len(quaternions))
+    solutions = found.part(chosen).solution(robot, model, load, (len(chosen),))
+    solutions = replace(solutions, state=with_behind(solutions.state, None))
+    return Equilibria(solutions, locked(reached), len(quaternions))
 
 
 def _quaternions(robot: Robot, count: int, seed: int) -> Array:

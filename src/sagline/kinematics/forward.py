@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,7 +18,9 @@ from sagline.kinematics.forward_rows import solve_rows
 from sagline.kinematics.forward_solution import ForwardSolution
 from sagline.kinematics.measured import MeasuredTension, corrected
 from sagline.kinematics.start import search
+from sagline.kinematics.winding import checked_winding, settled
 from sagline.memory import check_poses
+from sagline.robot.behind import differs, with_behind
 from sagline.robot.pose import Pose
 from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot
@@ -37,6 +40,7 @@ def forward(
     wrench: ArrayLike | None = None,
     tension_measured: MeasuredTension | None = None,
     *,
+    winding: ArrayLike | None = None,
     progress: Progress | None = None,
 ) -> ForwardSolution:
     """The pose in which the platform rests on cables of given unstrained lengths.
@@ -55,6 +59,10 @@ def forward(
             gravity: force [N], then moment [N m], shape (6,) or (N, 6). None for none.
         tension_measured: Readings of load cells: then lengths count as measured too, both are corrected within their
             deviations to fit each other, and the answer carries the covariance of the pose.
+        winding: Which way the drums turned last, for the friction of pulleys and guides: +1 winding in, -1 paying out,
+            0 standing, shape (m,) or (N, m). None: nothing rubs. What friction and guides change of the lengths is
+            found in rounds of solving; with load cells, it stays what it is at the measured lengths. Much friction on
+            soft cables lets the platform rest at more than one pose near by.
         progress: Called every tenth of a second or so: how many samples are solved, of how many.
 
     Returns:
@@ -88,6 +96,7 @@ def forward(
     check_count(robots, count)
     check_poses(count or 1, lengths.shape[-1], anything_behind(robots))
     load = external_wrench(wrench, count)
+    direction = None if winding is None else checked_winding(winding, shape, lengths.shape[-1])
     samples, loads = np.atleast_2d(lengths), np.atleast_2d(load)
     if start is None:
         found = search(robots, model, samples, loads, progress)
@@ -96,10 +105,13 @@ def forward(
         chained = bool(shape) and not start.shape
         starts = start_rows(start, lengths)
         found = solve_rows(robots, model, samples, starts, loads, chained=chained, progress=progress)
+    if differs(robots, direction):
+        found = settled(robots, model, found, samples, loads, direction)
     covariance = None
     if tension_measured is not None:
         covariance = corrected(robots, model, found, loads, tension_measured)
-    return found.solution(robots, model, load, shape, covariance)
+    solution = found.solution(robots, model, load, shape, covariance)
+    return replace(solution, state=with_behind(solution.state, direction))
 
 
 def checked_lengths(robot: Robots, lengths: ArrayLike) -> Array:

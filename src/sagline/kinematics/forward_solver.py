@@ -21,6 +21,7 @@ from sagline.kinematics.forward import dead_only
 from sagline.kinematics.forward_rows import new_chain
 from sagline.kinematics.forward_status import STABLE, ForwardStatus
 from sagline.kinematics.start import search
+from sagline.kinematics.winding import without_guides
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.robot.several import anything_behind
@@ -66,10 +67,10 @@ class ForwardSolver:
             start: Where the first step begins; None: it searches, which takes some hundred microseconds.
 
         Raises:
-            InvalidValueError: If the model is Straight, which has no forces, start is a batch, or an argument is of the
-                wrong kind.
+            InvalidValueError: If the model is Straight, which has no forces, start is a batch, the robot's winches have
+                guides, or an argument is of the wrong kind.
         """
-        self._robot = instance(robot, Robot, "robot")
+        self._robot = without_guides(instance(robot, Robot, "robot"), "ForwardSolver", "forward")
         self._model = optional(model, CableModel, "model") or Catenary()
         if self._model.code == codes.STRAIGHT:
             raise InvalidValueError(

@@ -49,7 +49,7 @@ def home(
 
     Raises:
         InvalidValueError: If the robot has no winches, the pose is none or a batch, or no cable hangs there with so
-            little tension; the message names the cable.
+            little tension; the message names the cable. If the winches have guides.
 
     Examples:
         >>> import sagline as sl
@@ -68,6 +68,9 @@ def home(
     if winches is None:
         step = "Give it winches first: robot.replace(winches=Winch(drum_radius=..., ...))."
         raise InvalidValueError("winches", "not given", "those of the robot", step)
+    if winches.guides is not None:
+        step = "Set length_zero to unstrained_length (1 + winding_tension/EA) of inverse(robot, pose) instead."
+        raise InvalidValueError("winches: guides", "given", "None for home", step)
     if instance(pose, Pose, "pose").shape:
         raise InvalidValueError("pose", f"a batch of {len(pose)}", "a single pose", "Take one of them: pose[0].")
     m = robot.cable_count

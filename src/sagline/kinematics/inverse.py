@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import brief, callback, instance, optional
+from sagline.arguments import brief, callback, choice, instance, optional
 from sagline.arrays import Array, locked
 from sagline.blocks import Progress
 from sagline.cables.catenary import Catenary
@@ -17,8 +19,10 @@ from sagline.kernels import codes
 from sagline.kinematics.hung import hung
 from sagline.kinematics.inverse_rows import decide_rows, solve_rows
 from sagline.kinematics.plan import Plan
+from sagline.kinematics.winding import Winding, checked_winding
 from sagline.memory import check_poses
 from sagline.motion.path import Path
+from sagline.robot.behind import with_behind
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.reach import check_reach
@@ -31,6 +35,7 @@ from sagline.tension.closest import Closest
 from sagline.tension.method import TensionMethod, Variable, shared_tension
 from sagline.tension.options import kernel_options
 
+STANDING: Final = 1e-7  # of the fastest cable's rate: slower ones stand, rates are good to 1e-8
 _CATENARY = Catenary()
 _CLOSEST = Closest()
 
@@ -43,6 +48,7 @@ def inverse(
     wrench: ArrayLike | None = None,
     previous: Plan | None = None,
     *,
+    winding: Winding | None = None,
     progress: Progress | None = None,
 ) -> Plan:
     """Tensions that balance the platform within their limits, and the unstrained lengths that produce them.
@@ -57,6 +63,9 @@ def inverse(
         wrench: External wrench on the platform about its center of mass in world axes, without gravity and
             inertia: force [N], then moment [N m], shape (6,) or (N, 6). None for none.
         previous: A plan that this one continues: `Closest` starts from its last feasible tensions.
+        winding: Which way the drums turn, for the friction of pulleys and guides: +1 winding in, -1 paying out, 0
+            standing, shape (m,) or (N, m); or "path", the way the lengths go along the path without friction. It
+            changes lengths behind the pulleys alone. None: nothing rubs.
         progress: Called every few hundredths of a second: how many poses are solved, or known not to be feasible and
             why, of how many.
 
@@ -66,9 +75,9 @@ def inverse(
 
     Raises:
         InvalidValueError: If a robot has fewer cables than degrees of freedom, the method cannot share among
-            its cables, several robots do not fit together (the message names which), an argument is of the
-            wrong kind or shape, a pose is outside the motions of the robot's pattern, or so many poses need more
-            memory than is free.
+            its cables, several robots do not fit together (the message names which), winding is "path" for poses
+            without times, an argument is of the wrong kind or shape, a pose is outside the motions of the robot's
+            pattern, or so many poses need more memory than is free.
         CableGeometryError: If a cable has no length at some pose: its ends coincide, or its platform end is inside its
             pulley.
 
@@ -84,6 +93,7 @@ def inverse(
     """
     _check_kinds(motion, model, tension, previous)
     callback(progress, "progress")
+    turning = _turning(winding, motion)
     method = tension if isinstance(motion, Path) or previous is not None else tension.alone
     pose = motion.pose if isinstance(motion, Path) else motion
     robots = one_a_pose(robot, len(pose) if pose.shape else None)
@@ -102,10 +112,18 @@ def inverse(
     if (found.pose_status == codes.POSE_NO_CHORD).any():
         refuse_missing_chords(robots, pose)
     verdicts = decide_rows(robots, options, rows, loads, found, progress)
-    cables, contact = hung(robots, model, found.results, found.cable_status, pose.shape)
     whole = locked(np.ascontiguousarray(np.broadcast_to(load, (*pose.shape, 6))))
-    return Plan(
-        state=Equilibrium(robots, pose, whole, cables, contact),
+    direction = None if turning is None else checked_winding(turning, pose.shape, shared.cable_count)
+
+    def hanging() -> Equilibrium:
+        cables, contact = hung(robots, model, found.results, found.cable_status, pose.shape)
+        return with_behind(Equilibrium(robots, pose, whole, cables, contact), direction)
+
+    state = hanging()
+    if found.leave_out(verdicts, state.unstrained_length):
+        state = hanging()
+    plan = Plan(
+        state=state,
         path=motion if isinstance(motion, Path) else None,
         tension=tension,
         status=locked(found.pose_status.reshape(pose.shape)),
@@ -118,6 +136,26 @@ def inverse(
         relief=locked(np.ascontiguousarray(_in_world(verdicts.reliefs, shared)[:, :3]).reshape(*pose.shape, 3)),
         at_border=locked(verdicts.at_border.reshape(pose.shape)),
     )
+    return plan if winding is None or turning is not None else _wound_along(plan)
+
+
+def _turning(winding: Winding | None, motion: Path | Pose) -> ArrayLike | None:
+    """The winding as numbers; None for none, or for those of the path."""
+    if not isinstance(winding, str):
+        return winding
+    if choice(winding, "winding", ("path",)) and isinstance(motion, Path):
+        return None
+    step = "Plan along a Path, or give +1, -1 or 0 for each cable."
+    raise InvalidValueError("winding", "'path' for poses without one", "numbers, or None", step)
+
+
+def _wound_along(plan: Plan) -> Plan:
+    """A plan with the friction of the way that its lengths go."""
+    if plan.state.contact is None or plan.length_rate is None:
+        return plan
+    rate = np.nan_to_num(plan.length_rate)
+    still = np.abs(rate) <= STANDING * np.abs(rate).max(initial=0.0)
+    return replace(plan, state=with_behind(plan.state, locked(np.where(still, 0.0, -np.sign(rate)))))
 
 
 def _check_kinds(motion: object, model: object, tension: object, previous: object) -> None:

@@ -52,6 +52,27 @@ class Found(NamedTuple):
             np.empty(count, dtype=np.int8),
         )
 
+    def leave_out(self, verdicts: Verdicts, lengths: Array) -> bool:
+        """Take the answers of solved poses back where a cable is too slack to hang between its guides.
+
+        Args:
+            verdicts: Those of the poses; theirs too.
+            lengths: Unstrained lengths, shape (m,) or (N, m), NaN where one hangs nowhere.
+
+        Returns:
+            Whether there are such poses.
+        """
+        slack = np.isnan(np.atleast_2d(lengths)) & np.isfinite(self.results[tables.LENGTH])
+        lost = (self.pose_status == codes.POSE_SOLVED) & slack.any(axis=-1)
+        if not lost.any():
+            return False
+        self.results[tables.LENGTH :, lost] = np.nan
+        self.pose_status[lost] = codes.POSE_TOO_SLACK
+        for array in (self.residuals, verdicts.brackets):
+            array[lost] = np.nan
+        verdicts.at_border[lost] = False
+        return True
+
     @property
     def answers(self) -> Answers:
         """As the kernel takes it: a plain tuple."""

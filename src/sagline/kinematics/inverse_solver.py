@@ -23,6 +23,7 @@ from sagline.kernels.memory import memory_for
 from sagline.kinematics.caller import ARRAY, FLOAT, WHOLE, give, take
 from sagline.kinematics.inverse_rows import UNDECIDED, Found, Verdicts, covers_all
 from sagline.kinematics.status import PoseStatus
+from sagline.kinematics.winding import without_guides
 from sagline.robot.robot import Robot
 from sagline.robot.several import anything_behind
 from sagline.statics.tables import robot_terms
@@ -81,10 +82,11 @@ class InverseSolver:
             tension: How the load is shared; the default is `Closest`, to the step before.
 
         Raises:
-            InvalidValueError: If the robot has too few cables, the method cannot share among them, or an argument is of
-                the wrong kind.
+            InvalidValueError: If the robot has too few cables, its winches have guides, the method cannot share among
+                them, or an argument is of the wrong kind.
         """
-        m, n = instance(robot, Robot, "robot").cable_count, robot.degrees_of_freedom
+        without_guides(instance(robot, Robot, "robot"), "InverseSolver", "inverse")
+        m, n = robot.cable_count, robot.degrees_of_freedom
         method = optional(tension, TensionMethod, "tension") or Closest()
         self._robot = robot
         self._options = kernel_options(robot, optional(model, CableModel, "model") or Catenary(), method)

@@ -6,12 +6,14 @@ import numpy as np
 
 from sagline.arrays import Array, Flags, Indices, locked
 from sagline.kernels import tables
-from sagline.kinematics.instants import Instants, instants
-from sagline.kinematics.inverse_rows import solve_rows
+from sagline.kinematics.hung import hung
+from sagline.kinematics.instants import Instant, Instants, instants
+from sagline.kinematics.inverse_rows import Found, solve_rows
 from sagline.kinematics.tension_rate import closest_rates, placed
 from sagline.motion.path import Path
+from sagline.robot.behind import with_behind
 from sagline.robot.equilibrium import Equilibrium
-from sagline.robot.several import first_of, robot_at
+from sagline.robot.several import anything_behind, first_of, robot_at
 from sagline.statics.tables import pose_rows
 from sagline.tension.closest import Closest
 from sagline.tension.method import TensionMethod, shared_tension
@@ -56,9 +58,11 @@ def _solved_again(state: Equilibrium, tension: TensionMethod, near: Instants) ->
     options, lengths = kernel_options(state.robot, state.cables.model, tension), state.unstrained_length
     none = np.full(first_of(state.robot).cable_count, np.nan)
     before, after = (
-        solve_rows(state.robot, tension, options, pose_rows(moment.pose), locked(moment.wrench), none).results[
-            tables.LENGTH
-        ]
+        _off_the_drums(
+            state,
+            moment,
+            solve_rows(state.robot, tension, options, pose_rows(moment.pose), locked(moment.wrench), none),
+        )
         for moment in (near.before, near.after)
     )
     sides = (after - before) / (2.0 * near.step)
@@ -70,16 +74,30 @@ def _solved_again(state: Equilibrium, tension: TensionMethod, near: Instants) ->
 def _walked(state: Equilibrium, tension: TensionMethod, near: Instants) -> Array:
     """Rates of `Closest` over pulleys, from two steps on: backward it would leave the limits that hold it."""
     options, lengths = kernel_options(state.robot, state.cables.model, tension), state.unstrained_length
-    held = shared_tension(state, tension.variable)
-    rows = np.stack([pose_rows(moment.pose) for moment in (near.after, near.later)], axis=1)
-    loads = np.stack([moment.wrench for moment in (near.after, near.later)], axis=1)
-    rates = np.full(lengths.shape, np.nan)
-    for i in np.flatnonzero(~np.isnan(lengths[:, 0])):
-        given = (robot_at(state.robot, int(i)), tension, options, locked(rows[i].copy()), locked(loads[i].copy()))
-        after, later = solve_rows(*given, held[i].copy()).results[tables.LENGTH]
-        twice = (4.0 * after - later - 3.0 * lengths[i]) / (2.0 * near.step)
-        rates[i] = np.where(np.isnan(twice), (after - lengths[i]) / near.step, twice)
+    held, moments = shared_tension(state, tension.variable), (near.after, near.later)
+    rows = np.stack([pose_rows(moment.pose) for moment in moments], axis=1)
+    loads = np.stack([moment.wrench for moment in moments], axis=1)
+    freedoms = first_of(state.robot).degrees_of_freedom
+    steps = [Found.empty(len(held), held.shape[1], freedoms, anything_behind(state.robot)) for _ in moments]
+    for i in range(len(held)):
+        given = (robot_at(state.robot, i), tension, options, locked(rows[i].copy()), locked(loads[i].copy()))
+        answer = solve_rows(*given, held[i].copy())
+        for k, step in enumerate(steps):
+            step.results[:, i], step.cable_status[i] = answer.results[:, k], answer.cable_status[k]
+    after, later = (_off_the_drums(state, *pair) for pair in zip(moments, steps, strict=True))
+    twice = (4.0 * after - later - 3.0 * lengths) / (2.0 * near.step)
+    rates: Array = np.where(np.isnan(twice), (after - lengths) / near.step, twice)
     return rates
+
+
+def _off_the_drums(state: Equilibrium, moment: Instant, found: Found) -> Array:
+    """Unstrained lengths of answers, with the state's guides and friction."""
+    if state.contact is None:
+        lengths: Array = found.results[tables.LENGTH]
+        return lengths
+    cables, contact = hung(state.robot, state.cables.model, found.results, found.cable_status, state.pose.shape)
+    there = Equilibrium(state.robot, moment.pose, moment.wrench, cables, contact)
+    return with_behind(there, state.contact.winding).unstrained_length
 
 
 def _followed(state: Equilibrium, tension: TensionMethod, near: Instants, kept: Indices) -> Array:

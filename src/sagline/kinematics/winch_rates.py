@@ -27,7 +27,7 @@ class WinchRates:
         motor_speed: Of the motor's shaft [rad/s]: drum_speed times gear.
         motor_acceleration: Of the motor's shaft [rad/s^2]: from differences of the lengths' rates between samples,
             without the jump where a layer ends.
-        drum_tension: Of the cable where it leaves the drum [N], without friction.
+        drum_tension: Of the cable where it leaves the drum [N], with friction where the plan knows the winding.
         motor_torque: That the motor gives at its shaft [N m]: inertia, less the cable's pull at the drum's lever over
             the gear, plus the drive's friction against the motion; at rest without friction. None where the inertia
             of the winches is not known.

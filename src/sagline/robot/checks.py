@@ -86,21 +86,21 @@ def cables(given: Cable, count: int) -> Cable:
     return given.replace(**fields)
 
 
-def winches(given: Winch | None, count: int) -> Winch | None:
-    """The winches, one a cable, or none.
+def winches(given: Winch | None, frame: Array) -> Winch | None:
+    """The winches, one a cable, or none; dead cable follows from guides.
 
     Args:
         given: Winches of all cables, one for all, or None.
-        count: Number of cables m.
+        frame: Frame anchors [m], shape (m, 3).
 
     Returns:
         Winch with fields of shape (m,), or None.
 
     Raises:
-        InvalidValueError: If it is no Winch, or of another count.
+        InvalidValueError: If it is no Winch, of another count, or its guides do not lead to the frame anchors.
     """
     winch = optional(given, Winch, "winches")
-    return None if winch is None else winch.per_cable(count)
+    return None if winch is None else winch.per_cable(len(frame))._run_to(frame)
 
 
 def inertia(given: ArrayLike | None, pattern: str, normal: Array | None) -> Array:

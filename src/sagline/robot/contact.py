@@ -19,6 +19,7 @@ class Contact:
         chord_tension: T_x/cos phi along the chord that touches the pulley and ends at the platform end [N]: the tension
             that is shared and limited. The free span's own chord starts where the cable really leaves.
         chord_sine: sin phi of that chord.
+        winding: The direction of friction: +1 winding in, -1 paying out, 0 standing; None: nothing rubs.
     """
 
     wrap_angle: Array
@@ -26,6 +27,7 @@ class Contact:
     dead_length: Array
     chord_tension: Array
     chord_sine: Array
+    winding: Array | None = None
 
     def part(self, index: Index) -> Contact:
         """That of a part of a batch.
@@ -36,4 +38,5 @@ class Contact:
         Returns:
             Contact of the poses that the index names.
         """
-        return Contact(*(locked(getattr(self, name)[index, ...]) for name in self.__slots__))
+        known = {name: field for name in self.__slots__ if (field := getattr(self, name)) is not None}
+        return Contact(**{name: locked(field[index, ...]) for name, field in known.items()})

@@ -11,6 +11,7 @@ import numpy as np
 from sagline.arrays import Array, checked, kernel_input, locked
 from sagline.errors import InvalidValueError
 from sagline.kernels.cable import drum
+from sagline.robot.behind import differs, real_behind
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.robot import Robot
 from sagline.robot.winch import Winch
@@ -206,7 +207,7 @@ def _limits(winches: Winch, robot: Robot) -> tuple[Array, Array, Array]:
 
 
 def drum_tension(state: Equilibrium) -> Array:
-    """Tension of the cables where they leave the drum, without friction.
+    """Tension of the cables where they leave the drum, with friction where the state's contact knows the winding.
 
     Along a cable without friction T + T^2/(2 EA) - w z is constant, z the height.
 
@@ -220,6 +221,8 @@ def drum_tension(state: Equilibrium) -> Array:
         docs/model.md, section 10.
     """
     robot, cables = state.one_robot, state.cables
+    if state.contact is not None and differs(robot, state.contact.winding) and state.contact.winding is not None:
+        return locked(real_behind(state).drum_tension)
     height = robot.frame_anchors[:, 2]
     leaving = state.exit_point[..., 2]
     drum_height = height if robot.winches is None else height - robot.winches.dead_rise

@@ -148,7 +148,7 @@ class Robot:
             "frame_anchors": frame,
             "platform_anchors": platform,
             "cables": checks.cables(cables, len(frame)),
-            "winches": checks.winches(winches, len(frame)),
+            "winches": checks.winches(winches, frame),
             "mass": number(mass, "mass", "kg", above=0.0),
             "inertia": checks.inertia(inertia, pattern, normal),
             "center_of_mass": exactly(center_of_mass, "center_of_mass", "m", (3,)),
@@ -203,6 +203,9 @@ class Robot:
         """
         for field in changes:
             choice(field, "field", Robot.__slots__)
+        guides = None if self.winches is None else self.winches.guides
+        if self.winches is not None and guides is not None and "frame_anchors" in changes and "winches" not in changes:
+            changes["winches"] = self.winches.replace(guides=guides)  # dead cable follows anew
         return replace(self, **changes)
 
     def __reduce__(self) -> tuple[Any, tuple[dict[str, Any]]]:

@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sagline.arguments import choice, whole_number
-from sagline.arrays import Array, checked, locked
+from sagline.arrays import SMALLEST, Array, checked, locked
 from sagline.errors import InvalidValueError
 from sagline.memory import check_memory
 from sagline.robot.unit import unit
 
 UPRIGHT: Final = 1e-9  # how far from vertical a swivel axis may be, as the sine of an angle
+_AGREEING: Final = 1e-9  # of the dead cable: how far a given one may be from that of the guides
 
 
 class Rule(NamedTuple):
@@ -35,11 +36,12 @@ class Rule(NamedTuple):
     needed: bool = False
 
 
-# every field but the swivel axis, in order
+# every field but the swivel axis and the guides, in order
 RULES: Final[Mapping[str, Rule]] = MappingProxyType(
     {
         "pulley_radius": Rule("m", low=0.0, needed=True),
         "pulley_friction": Rule("", low=0.0, needed=True),
+        "rolling_friction": Rule("", low=0.0, needed=True),
         "dead_cable": Rule("m", low=0.0, needed=True),
         "dead_rise": Rule("m", needed=True),
         "drum_radius": Rule("m", above=0.0),
@@ -75,16 +77,27 @@ class Winch:
 
     A field that is None is not known: what needs it says so by name.
 
+    A cable ends at its platform anchor: one that runs over a pulley at the platform and back to the frame, a loop, is
+    not modeled.
+
     Attributes:
         pulley_radius: Radius of the pulley at the frame, to the middle of the cable [m], >= 0; 0 for an eyelet. The
             pulley swivels about a vertical axis through the frame anchor, where the cable enters it.
         swivel_axis: Unit vector along the cable's travel where it enters the pulley, shape (..., 3): up (0, 0, 1), from
             a drum below, or down (0, 0, -1).
-        pulley_friction: Coefficient mu of the cable's friction on the pulley: tensions on its two sides differ by
-            exp(mu psi), psi the wrap angle, the larger one on the side that the cable runs to.
+        pulley_friction: Coefficient mu of the cable's friction on the pulley and at the guides: tensions on the two
+            sides of a bend differ by exp(mu psi), psi its angle, the larger one on the side that the cable runs to.
+            Friction counts where the direction of `winding` is given, as in `inverse` and `forward`.
+        rolling_friction: Share f of the tension that the pulley's bearing takes, >= 0, < 1: behind the pulley it is
+            1 + f times what it would be while winding in, 1 - f times while paying out.
         dead_cable: Length of the straight guided run from drum to pulley [m], >= 0; where it leaves the drum opposite
-            the first pulley.
-        dead_rise: Height of the pulley's entry above the drum [m], within dead_cable; downward negative.
+            the first pulley. Where there are guides a robot fills it in: the sum of the distances.
+        dead_rise: Height of the pulley's entry above the drum [m], within dead_cable; downward negative. Where there
+            are guides a robot fills it in.
+        guides: Eyelets, or pulleys small enough to be points, that a cable passes on its way from the drum to the frame
+            anchor, world axes [m], shape (..., k, 3): the first is where it leaves the drum, the frame anchor is not
+            among them. Between two of them it hangs freely. None: the dead cable is guided all along. Stiffness and
+            sensitivities are those of a straight guided run of the same length.
         drum_radius: Radius of the drum at the bottom of the cable [m]; None where the drum is not known.
         drum_width: Width that the cable may fill, along the drum's axis [m], >= groove_pitch; a layer has drum_width
             over groove_pitch turns, which need not be whole. None: wide enough for one layer.
@@ -118,8 +131,10 @@ class Winch:
     pulley_radius: Array
     swivel_axis: Array
     pulley_friction: Array
+    rolling_friction: Array
     dead_cable: Array
     dead_rise: Array
+    guides: Array | None
     drum_radius: Array | None
     drum_width: Array | None
     groove_pitch: Array | None
@@ -150,8 +165,10 @@ class Winch:
         *,
         swivel_axis: ArrayLike = (0.0, 0.0, 1.0),
         pulley_friction: ArrayLike = 0.0,
+        rolling_friction: ArrayLike = 0.0,
         dead_cable: ArrayLike = 0.0,
         dead_rise: ArrayLike = 0.0,
+        guides: ArrayLike | None = None,
         drum_radius: ArrayLike | None = None,
         drum_width: ArrayLike | None = None,
         groove_pitch: ArrayLike | None = None,
@@ -182,8 +199,10 @@ class Winch:
             pulley_radius: As the attributes, in SI; one number for all cables, or one a cable.
             swivel_axis: Up or down, of any length but zero.
             pulley_friction: See the attributes.
-            dead_cable: See the attributes.
-            dead_rise: See the attributes.
+            rolling_friction: See the attributes.
+            dead_cable: See the attributes; 0 where it is to follow from guides.
+            dead_rise: See the attributes; 0 where it is to follow from guides.
+            guides: Shape (k, 3) for all cables or (m, k, 3), k >= 1.
             drum_radius: See the attributes.
             drum_width: See the attributes.
             groove_pitch: See the attributes.
@@ -210,7 +229,7 @@ class Winch:
 
         Raises:
             InvalidValueError: If a value is out of its range, the dead cable rises by more than its length, a gear is
-                zero, a swivel axis is not vertical, or the shapes do not fit.
+                zero, a swivel axis is not vertical, two guides in a row coincide, or the shapes do not fit.
 
         Examples:
             >>> import sagline as sl
@@ -223,12 +242,18 @@ class Winch:
             name: _checked(given[name], name) for name, rule in RULES.items() if rule.needed or given[name] is not None
         }
         axis = _vertical(swivel_axis)
-        shape = _shape({name: value.shape for name, value in values.items()} | {"swivel_axis": axis.shape[:-1]})
+        points = None if guides is None else _points(guides)
+        shapes = {name: value.shape for name, value in values.items()} | {"swivel_axis": axis.shape[:-1]}
+        shape = _shape(shapes if points is None else shapes | {"guides": points.shape[:-2]})
         for name in RULES:
             value = None if name not in values else locked(np.array(np.broadcast_to(values[name], shape)))
             object.__setattr__(self, name, value)
         object.__setattr__(self, "swivel_axis", locked(np.array(np.broadcast_to(axis, (*shape, 3)))))
+        if points is not None:
+            points = locked(np.array(np.broadcast_to(points, (*shape, *points.shape[-2:]))))
+        object.__setattr__(self, "guides", points)
         _check_rise(self.dead_cable, self.dead_rise)
+        _check_rolling(self.rolling_friction)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -237,7 +262,7 @@ class Winch:
 
     @property
     def anything_behind(self) -> bool:
-        """Whether a cable runs over a pulley, or has dead cable behind it."""
+        """Whether a cable runs over a pulley, or has dead cable behind it; guides count once a robot has them."""
         return bool(self.pulley_radius.any() or self.dead_cable.any())
 
     def per_cable(self, count: int) -> Winch:
@@ -288,7 +313,47 @@ class Winch:
         """
         for field in changes:
             choice(field, "field", self.__slots__)
+        if self.guides is not None and changes.get("guides") is not None:
+            changes = {"dead_cable": 0.0, "dead_rise": 0.0, **changes}  # they follow anew
         return replace(self, **changes)
+
+    def _run_to(self, frame_anchors: Array) -> Winch:
+        """These winches with the dead cable that follows from their guides.
+
+        Args:
+            frame_anchors: Where the guides lead to, world axes [m], shape (m, 3).
+
+        Returns:
+            Winch with fields of shape (m,); this one where there are no guides.
+
+        Raises:
+            InvalidValueError: If the last guide is at the frame anchor, or a dead cable or rise other than 0 is given
+                and is not what follows from the guides to a billionth.
+        """
+        if self.guides is None:
+            return self
+        points = np.concatenate((self.guides, frame_anchors[:, None]), axis=1)
+        spans = np.linalg.norm(np.diff(points, axis=1), axis=-1)
+        length = spans.sum(axis=1)
+        if (same := spans[:, -1] < SMALLEST).any():
+            i = int(np.argmax(same))
+            raise InvalidValueError(
+                f"winches: guides[{i}, {self.guides.shape[1] - 1}]",
+                "at the frame anchor",
+                "points before it",
+                "List the guides from the drum on, without the frame anchor.",
+            )
+        rise = np.clip(frame_anchors[:, 2] - self.guides[:, 0, 2], -length, length)  # within it, whatever is rounded
+        for name, given, follows in (("dead_cable", self.dead_cable, length), ("dead_rise", self.dead_rise, rise)):
+            if (wrong := (given != 0.0) & (np.abs(given - follows) > _AGREEING * length)).any():
+                i = int(np.argmax(wrong))
+                raise InvalidValueError(
+                    f"winches: {name}[{i}]",
+                    f"{given[i]:.9g} m",
+                    f"{follows[i]:.9g} m, as the guides have it, or 0",
+                    "Leave it out where guides are given.",
+                )
+        return replace(self, dead_cable=length, dead_rise=rise)
 
     def known(self) -> dict[str, Array]:
         """The fields that are known, by their names, in order.
@@ -324,6 +389,26 @@ def _checked(value: ArrayLike, name: str) -> Array:
     return array
 
 
+def _points(given: ArrayLike) -> Array:
+    """The guides of all cables (k, 3), or of each (m, k, 3)."""
+    points = checked(given, "winches: guides", "m")
+    if points.ndim not in (2, 3) or points.shape[-1] != 3 or 0 in points.shape:
+        allowed = "shape (k, 3) or (m, k, 3), k >= 1"
+        step = "Give the points from the drum on, or None."
+        raise InvalidValueError("winches: guides", f"of shape {points.shape}", allowed, step)
+    same = np.linalg.norm(np.diff(points, axis=-2), axis=-1) < SMALLEST
+    if same.any():
+        index = tuple(int(i) for i in np.argwhere(same)[0])
+        index = (*index[:-1], index[-1] + 1)
+        raise InvalidValueError(
+            f"winches: guides[{', '.join(map(str, index))}]",
+            "at the guide before it",
+            "points apart",
+            "Leave one of the two out.",
+        )
+    return points
+
+
 def _shape(shapes: dict[str, tuple[int, ...]]) -> tuple[int, ...]:
     """The one shape of all fields, () or (m,)."""
     longest = max(shapes, key=lambda name: shapes[name])
@@ -356,6 +441,13 @@ def _vertical(given: ArrayLike) -> Array:
             "vertical plane. Give [0, 0, 1] or [0, 0, -1].",
         )
     return np.stack((np.zeros_like(axis[..., 2]), np.zeros_like(axis[..., 2]), np.sign(axis[..., 2])), axis=-1)
+
+
+def _check_rolling(rolling_friction: Array) -> None:
+    if (much := rolling_friction >= 1.0).any():
+        i = int(np.argmax(much))
+        item, shown = f"winches: rolling_friction[{i}]", f"{rolling_friction.flat[i]:g}"
+        raise InvalidValueError(item, shown, ">= 0, < 1", "A bearing takes less than all; correct it.")
 
 
 def _check_rise(dead_cable: Array, dead_rise: Array) -> None:

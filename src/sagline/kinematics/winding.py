@@ -1,0 +1,151 @@
+"""Which way drums turn, and poses from lengths over guides and with friction."""
+
+from __future__ import annotations
+
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sagline.arrays import Array, checked, locked
+from sagline.cables.model import CableModel
+from sagline.errors import InvalidValueError
+from sagline.kernels import codes
+from sagline.kinematics.forward_rows import Found, solve_rows
+from sagline.robot.behind import with_behind
+from sagline.robot.robot import Robot
+from sagline.robot.several import Robots, robots_at
+
+Winding = ArrayLike | Literal["path"]
+ROUNDS: Final = 100  # some ten of them, unless far more cable is behind than before, or a lot rubs
+MEMORY: Final = 5  # of rounds before, from which the next is mixed
+_RANK: Final = 1e-6
+SETTLED: Final = 1e-13  # of a length
+_OPEN = (codes.FORWARD_NOT_CONVERGED, codes.FORWARD_NO_LENGTHS)
+
+
+def checked_winding(winding: ArrayLike, shape: tuple[int, ...], cables: int) -> Array:
+    """Directions of winding, one a cable.
+
+    Args:
+        winding: What the caller gave: +1, -1 and 0.
+        shape: () for a single pose, (N,) for N.
+        cables: Number of cables m.
+
+    Returns:
+        Array of shape (m,) or (N, m).
+
+    Raises:
+        InvalidValueError: If they are not.
+    """
+    array = checked(winding, "winding", "")
+    shapes = [(cables,)] + [(*shape, cables)] * bool(shape)
+    if array.shape not in shapes:
+        step = "Give one for each cable, or None for no friction."
+        raise InvalidValueError("winding", f"of shape {array.shape}", f"shape {' or '.join(map(str, shapes))}", step)
+    wrong = ~np.isin(array, (-1.0, 0.0, 1.0))
+    if wrong.any():
+        index = tuple(int(i) for i in np.argwhere(wrong)[0])
+        allowed = "1 winding in, -1 paying out, or 0 standing"
+        raise InvalidValueError(
+            f"winding[{', '.join(map(str, index))}]", f"{array[index]:g}", allowed, "Give the sign of the motion."
+        )
+    return array
+
+
+def without_guides(robot: Robot, solver: str, instead: str) -> Robot:
+    """The robot, refused where its cables hang between guides.
+
+    Args:
+        robot: The robot.
+        solver: What does not take them, for the message.
+        instead: What does.
+
+    Returns:
+        The same robot.
+
+    Raises:
+        InvalidValueError: If its winches have guides.
+    """
+    if robot.winches is None or robot.winches.guides is None:
+        return robot
+    step = f"Use {instead}(), or robot.replace(winches=robot.winches.replace(guides=None)) for a straight guided run."
+    raise InvalidValueError("winches: guides", "given", f"None for {solver}", step)
+
+
+def settled(
+    robot: Robots,
+    model: CableModel,
+    found: Found,
+    lengths: Array,
+    loads: Array,
+    winding: Array | None,
+    taken: Array | None = None,
+) -> Found:
+    """Equilibria at lengths that count what is really behind the pulleys.
+
+    Kernels get the lengths less what guides and friction add at the tensions of the round before, until that stays.
+
+    Args:
+        robot: The robot, or one a sample.
+        model: Cable model.
+        found: Equilibria over a straight guided run without friction, at the lengths less what is taken for the rest.
+        lengths: Unstrained lengths (N, m).
+        loads: External plus inertial wrenches (1 or N, 6).
+        winding: Directions of friction, shape (m,) or (N, m), or None.
+        taken: What they were solved with for what guides and friction add [m], (N, m); None for nothing.
+
+    Returns:
+        The answers; NOT_CONVERGED where that does not settle, or a cable is too slack to hang between its guides.
+    """
+    more = np.zeros(lengths.shape) if taken is None else taken.copy()
+    past: list[tuple[Array, Array]] = []  # what was taken, and what it missed
+    still = np.flatnonzero(~np.isin(found.pose_status, _OPEN))
+    for _ in range(ROUNDS):
+        if not still.size:
+            return found
+        some = found.part(still)
+        turning = winding if winding is None or winding.ndim == 1 else winding[still]
+        added = _added(robots_at(robot, still), model, some, turning)
+        slack = np.isnan(added)
+        missed = np.where(slack, 0.0, added - more[still])
+        moving = (np.abs(missed) > SETTLED * lengths[still]).any(axis=1)
+        whole = np.zeros(lengths.shape)
+        whole[still] = missed
+        mixed = more[still] + _mixed(more[still], missed, [(x[still], f[still]) for x, f in past[-MEMORY:]])
+        past.append((more.copy(), whole))
+        given = lengths[still] - mixed
+        lost = np.where(moving, ~(given > 0.0).all(axis=1), slack.any(axis=1))
+        found.pose_status[still[lost]] = codes.FORWARD_NOT_CONVERGED
+        again = moving & ~lost
+        still, starts = still[again], locked(some.poses[again])
+        if still.size:
+            more[still] = mixed[again]
+            load = loads if len(loads) == 1 else locked(loads[still])
+            found.keep(still, solve_rows(robots_at(robot, still), model, locked(given[again]), starts, load))
+            still = still[~np.isin(found.pose_status[still], _OPEN)]
+    found.pose_status[still] = codes.FORWARD_NOT_CONVERGED
+    return found
+
+
+def _mixed(taken: Array, missed: Array, past: list[tuple[Array, Array]]) -> Array:
+    """The next step from what was missed before too, (N, m): by Anderson's mixing."""
+    if not past:
+        return missed
+    changes = np.stack([missed - before for _, before in past], axis=-1)
+    moves = np.stack([taken - before for before, _ in past], axis=-1)
+    shares = np.linalg.pinv(changes, rcond=_RANK) @ missed[..., None]
+    step: Array = missed - ((moves + changes) @ shares)[..., 0]
+    return step
+
+
+def _added(robot: Robots, model: CableModel, found: Found, winding: Array | None) -> Array:
+    """What guides and friction add to the lengths behind the pulleys [m], (N, m); NaN where a cable is too slack."""
+    shape = (len(found.poses),)
+    plain = found.solution(robot, model, np.zeros(6), shape).state
+    real = with_behind(plain, winding)
+    assert plain.contact is not None
+    assert real.contact is not None
+    return (real.contact.wrapped_length - plain.contact.wrapped_length) + (
+        real.contact.dead_length - plain.contact.dead_length
+    )

@@ -1,0 +1,318 @@
+"""What really is behind the points where cables leave their pulleys: friction, and spans that hang between guides.
+
+Kernels take it as a straight, guided run without friction. That is left as it is, in the energy and the stiffness too:
+here is the difference of unstrained length between what is there and that run; docs/model.md, section 10.
+
+Friction: over a bend of the angle psi tensions differ by exp(mu psi), and the pulley's bearing takes the share f; both
+are larger toward the drum while winding in. What the weight on the pulley changes is kept to first order: as if nothing
+rubbed. Between guides a cable hangs as a catenary: its far end's tension follows, so that T + T^2/(2 EA) - w z is the
+same number along all of it where nothing rubs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from sagline.arrays import LARGEST, Array, Flags, Indices, locked
+from sagline.cables.cable import Cable
+from sagline.cables.catenary import Catenary
+from sagline.cables.elastic import Elastic
+from sagline.cables.model import CableModel, CableState
+from sagline.kernels import codes
+from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.robot import Robot
+from sagline.robot.winch import Winch
+
+PASSES: Final = 40  # of bends that follow from tensions, and tensions from bends; each gains a digit or more
+STEPS: Final = 60  # of Newton's method for one span
+_SETTLED: Final = 1e-15  # change of a length, of that length
+_MOVED: Final = 1e-14  # change of a tension, of that tension
+_BALANCED: Final = 1e-12  # what tensions may miss, relatively
+_STEP: Final = 1e-6  # of the tension, for its slope
+_TINY: Final = 1e-300
+
+
+class Behind(NamedTuple):
+    """The part behind the points where cables leave their pulleys, arrays of shape (N, m).
+
+    Attributes:
+        wrapped: Unstrained length on the pulleys [m].
+        dead: Unstrained length between pulleys and drums [m]; NaN where the cable is too slack to hang there.
+        drum_tension: Where the cables leave the drums [N].
+    """
+
+    wrapped: Array
+    dead: Array
+    drum_tension: Array
+
+
+class _Leaving(NamedTuple):
+    """Cables where they leave their pulleys, arrays of shape (K,) for those that are looked at.
+
+    Attributes:
+        tension: T_A at P [N].
+        weight: w [N/m]; 0 where the model has no weight there.
+        stiffness: EA [N].
+        wrap: Psi [rad].
+        sine: sin psi.
+        tangent: Unit tangent there, toward the platform, shape (K, 3).
+        radius: R [m].
+        entry: +1 where a cable comes from below, -1 from above.
+        friction: mu, with the sign of the winding.
+        rolling: 1 + f while winding in, 1 - f while paying out, else 1.
+    """
+
+    tension: Array
+    weight: Array
+    stiffness: Array
+    wrap: Array
+    sine: Array
+    tangent: Array
+    radius: Array
+    entry: Array
+    friction: Array
+    rolling: Array
+
+    def entering(self, bend: Array) -> Array:
+        """Tension behind the pulley [N], after a further bend of its frame anchor [rad]."""
+        rubbed = self.tension * np.exp(self.friction * (self.wrap + bend)) * self.rolling
+        drop = 2.0 * self.weight * self.radius * self.entry * self.sine / self.stiffness
+        return _after(rubbed, drop, self.stiffness)
+
+
+def differs(robot: Robot | tuple[Robot, ...], winding: Array | None) -> bool:
+    """Whether there is a difference to a straight guided run without friction.
+
+    Args:
+        robot: The robot, or one a pose.
+        winding: +1, -1 and 0, or None.
+    """
+    winches = [one.winches for one in ((robot,) if isinstance(robot, Robot) else robot) if one.winches is not None]
+    rubs = winding is not None and bool(winding.any())
+    return any(
+        each.guides is not None or (rubs and bool(each.pulley_friction.any() or each.rolling_friction.any()))
+        for each in winches
+    )
+
+
+def with_behind(state: Equilibrium, winding: Array | None) -> Equilibrium:
+    """An equilibrium of the kernels with what really is behind its pulleys.
+
+    Args:
+        state: Robot, pose and cables as kernels have them.
+        winding: +1 winding in, -1 paying out, 0 standing, shape (m,) or (N, m); None: nothing rubs.
+
+    Returns:
+        The equilibrium with other wrapped and dead lengths, NaN where a cable is too slack to hang between guides; the
+        same one where nothing is behind its frame anchors.
+    """
+    if state.contact is None or (winding is None and not differs(state.robot, None)):
+        return state
+    kept = None if winding is None else locked(np.array(np.broadcast_to(winding, state.cables.shape)))
+    contact = replace(state.contact, winding=kept)
+    if differs(state.robot, kept):
+        real = real_behind(replace(state, contact=contact))
+        contact = replace(contact, wrapped_length=locked(real.wrapped), dead_length=locked(real.dead))
+    return replace(state, contact=contact)
+
+
+def kernel_length(state: Equilibrium) -> Array:
+    """Unstrained lengths with which kernels find an equilibrium: those behind a straight guided run [m]."""
+    contact = state.contact
+    if contact is None or not differs(state.robot, contact.winding) or state.cables.model.code == codes.STRAIGHT:
+        return state.unstrained_length
+    plain = replace(state, contact=replace(contact, winding=None))
+    modeled = _each(plain, guided=True)
+    return locked(state.free_length + (modeled.wrapped + modeled.dead))
+
+
+def real_behind(state: Equilibrium) -> Behind:
+    """The part behind the pulleys, with its guides, and friction where the state's contact knows the winding.
+
+    Args:
+        state: An equilibrium with something behind its frame anchors.
+
+    Returns:
+        Behind, of the shape of the state's cables.
+    """
+    return _each(state, guided=False)
+
+
+def _each(state: Equilibrium, *, guided: bool) -> Behind:
+    """The part behind; of several robots one by one. guided: as if it were a straight guided run."""
+    if isinstance(state.robot, Robot):
+        return _of_robot(state, state.robot, guided=guided)
+    parts = [_of_robot(state[i], one, guided=guided) for i, one in enumerate(state.robot)]
+    return Behind(*(np.stack(each) for each in zip(*parts, strict=True)))
+
+
+def _of_robot(state: Equilibrium, robot: Robot, *, guided: bool) -> Behind:
+    contact, winches, shape = state.contact, robot.winches, state.cables.shape
+    assert contact is not None
+    if winches is None or not winches.anything_behind:
+        return Behind(np.zeros(shape), np.zeros(shape), _tension(state))
+    if state.cables.model.code == codes.STRAIGHT:  # does not stretch, whatever rubs
+        dead = np.broadcast_to(winches.dead_cable, shape)
+        return Behind(winches.pulley_radius * contact.wrap_angle, dead, _tension(state))
+    found = Behind(*(np.full(shape, np.nan) for _ in Behind._fields))
+    known = np.isfinite(_tension(state))
+    if not known.any():
+        return found
+    cable = np.broadcast_to(np.arange(shape[-1]), shape)[known]
+    leaving = _leaving(state, robot, winches, known, cable)
+    if guided or winches.guides is None:
+        part = _straight_run(leaving, winches.dead_cable[cable], winches.dead_rise[cable])
+    else:
+        points = np.concatenate((winches.guides, robot.frame_anchors[:, None]), axis=1)[:, ::-1]
+        part = _hanging(leaving, points[cable], winches, robot, state.cables.model, cable)
+    for whole, some in zip(found, (_wrapped(leaving), *part), strict=True):
+        whole[known] = some
+    return found
+
+
+def _tension(state: Equilibrium) -> Array:
+    """Tensions at P as kernels have them there [N]: only the exact cable's differ along it."""
+    cables = state.cables
+    return cables.frame_end_tension if cables.model.code == codes.CATENARY else state.chord_tension
+
+
+def _leaving(state: Equilibrium, robot: Robot, winches: Winch, known: Flags, cable: Indices) -> _Leaving:
+    cables, contact = state.cables, state.contact
+    assert contact is not None
+    material = robot.cables
+    weight = np.zeros(cables.shape[-1])
+    if cables.model.code == codes.CATENARY:
+        weight = material.linear_density * robot.gravity
+    ends = state.pose.position[..., None, :] + robot.platform_anchors @ np.swapaxes(state.pose.matrix, -1, -2)
+    level = (ends - robot.frame_anchors)[..., :2][known]
+    outward = level / np.maximum(np.linalg.norm(level, axis=-1, keepdims=True), _TINY)
+    wrap, entry = contact.wrap_angle[known], winches.swivel_axis[cable, 2]
+    sine = np.sin(wrap)
+    sign = np.zeros(wrap.shape) if contact.winding is None else contact.winding[known]
+    return _Leaving(
+        _tension(state)[known],
+        weight[cable],
+        material.axial_stiffness[cable],
+        wrap,
+        sine,
+        np.concatenate((sine[:, None] * outward, (entry * np.cos(wrap))[:, None]), axis=-1),
+        winches.pulley_radius[cable],
+        entry,
+        sign * winches.pulley_friction[cable],
+        1.0 + sign * winches.rolling_friction[cable],
+    )
+
+
+def _after(tension: Array, drop: Array, stiffness: Array) -> Array:
+    """Tension [N] where (1 + e)^2 is smaller by a drop: T + T^2/(2 EA) - w z is constant."""
+    strain = tension / stiffness
+    gained = strain * (2.0 + strain) - drop  # (1 + strain)^2 - 1
+    with np.errstate(invalid="ignore"):
+        return np.asarray(stiffness * gained / (1.0 + np.sqrt(1.0 + gained)))
+
+
+def _wrapped(at: _Leaving) -> Array:
+    """Unstrained length on the pulleys [m]."""
+    strain = at.tension / at.stiffness
+    strained = 1.0 + strain
+    beta = at.weight * at.radius / at.stiffness
+    falls = at.entry * beta * (1.0 - np.cos(at.wrap) - at.wrap * at.sine)
+    rubs = at.friction != 0.0
+    friction = np.where(rubs, at.friction, 1.0)
+    # ln((1 + e exp(mu psi))/E)/mu, and what it is without friction, psi e/E
+    stretched = np.log1p(strain / strained * np.expm1(friction * at.wrap)) / friction
+    stretched = np.where(rubs, stretched, at.wrap * strain / strained)
+    return np.asarray(at.radius * (at.wrap - stretched - falls / strained**3))
+
+
+def _straight_run(at: _Leaving, length: Array, rise: Array) -> tuple[Array, Array]:
+    """Unstrained length of straight guided runs [m], and the tension at the drum [N]."""
+    first = at.entering(np.zeros(1))
+    last = _after(first, 2.0 * at.weight * rise / at.stiffness, at.stiffness)
+    return 2.0 * length / (2.0 + (first + last) / at.stiffness), last
+
+
+def _hanging(
+    at: _Leaving, points: Array, winches: Winch, robot: Robot, model: CableModel, cable: Indices
+) -> tuple[Array, Array]:
+    """Unstrained length between pulley and drum [m], and the tension at the drum [N]; points (K, k + 1, 3) from A on.
+
+    Tensions need the bends, which follow from the spans that they carry: both are improved in turn.
+    """
+    hanging = Catenary() if model.code == codes.CATENARY else Elastic()
+    material = Cable(robot.cables.linear_density[cable], robot.cables.axial_stiffness[cable])
+    axis, eyelet = winches.swivel_axis[cable], at.radius == 0.0
+    # an eyelet at the frame anchor is one bend, from the span behind it to the cable; a pulley begins along its axis
+    onward = np.where(eyelet[:, None], at.tangent, axis)
+    at = at._replace(wrap=np.where(eyelet, 0.0, at.wrap))
+    steps = points[:, :-1] - points[:, 1:]
+    along = steps / np.linalg.norm(steps, axis=-1, keepdims=True)
+    bends = [_angle(along[:, j], along[:, j - 1] if j else onward) for j in range(steps.shape[1])]
+    length = np.full(at.tension.shape, np.nan)
+    tension = length
+    for _ in range(PASSES):
+        last, length, leaving = length, np.zeros(length.shape), onward
+        tension = at.entering(bends[0])
+        for j, step in enumerate(np.moveaxis(steps, 1, 0)):
+            if j:
+                tension = tension * np.exp(at.friction * bends[j])
+            span = _span(hanging, material, step, tension, robot.gravity)
+            length, tension = length + span.unstrained_length, span.frame_end_tension
+            arriving, departing = _tangents(span, step)
+            bends[j], leaving = _angle(arriving, leaving), departing
+        settled = np.isnan(length) | (np.abs(length - last) <= _SETTLED * length)
+        if settled.all() or not at.friction.any():
+            break
+    return length, tension
+
+
+def _span(model: CableModel, cable: Cable, step: Array, tension: Array, gravity: float) -> CableState:
+    """Cables that hang over steps (K, 3) with a given tension at their upper, "platform", ends; NaN where none does.
+
+    That tension grows with the one along the chord, down to a least tension: below it the cable would run out.
+    """
+    level, rise = np.hypot(step[:, 0], step[:, 1]), step[:, 2]
+    weight = 0.0 if model.weightless else cable.linear_density * gravity
+    least = 1e-9 * cable.axial_stiffness
+
+    def missed(chord: Array) -> tuple[Array, CableState]:
+        state = model.from_tension(cable, level, rise, np.clip(chord, least, LARGEST / 2.0), gravity)
+        return state.platform_end_tension - tension, state
+
+    chord = np.nan_to_num(tension - 0.5 * weight * rise, nan=0.0)
+    for _ in range(STEPS):
+        chord = np.maximum(chord, least)
+        wrong, _ = missed(chord)
+        slope = (missed(chord * (1.0 + _STEP))[0] - wrong) / (_STEP * chord)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            move = np.where(slope > _STEP, wrong / slope, 0.0)
+        chord = chord - np.nan_to_num(move, nan=0.0)
+        if not (np.abs(move) > _MOVED * chord).any():
+            break
+    wrong, state = missed(chord)
+    lost = ~(np.abs(wrong) <= _BALANCED * tension) | ~(chord > least)
+    gone: dict[str, Any] = {
+        name: locked(np.where(lost, np.nan, getattr(state, name)))
+        for name in ("unstrained_length", "horizontal_tension", "vertical_force", "chord_tension")
+    }
+    return replace(state, **gone)
+
+
+def _tangents(span: CableState, step: Array) -> tuple[Array, Array]:
+    """Unit tangents of hanging cables at the ends of a step, at its start first, both toward the platform."""
+    level = np.hypot(step[:, 0], step[:, 1])[:, None]
+    outward = step[:, :2] / np.maximum(level, _TINY)
+
+    def tangent(vertical: Array) -> Array:
+        force = np.concatenate((span.horizontal_tension[:, None] * outward, vertical[:, None]), axis=-1)
+        return np.asarray(force / np.maximum(np.linalg.norm(force, axis=-1, keepdims=True), _TINY))
+
+    return tangent(span.vertical_force), tangent(span.vertical_force - span.cable_weight)
+
+
+def _angle(one: Array, other: Array) -> Array:
+    """Angles between unit vectors (K, 3)."""
+    return np.asarray(2.0 * np.arctan2(np.linalg.norm(one - other, axis=-1), np.linalg.norm(one + other, axis=-1)))
