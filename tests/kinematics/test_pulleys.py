@@ -336,3 +336,17 @@ def test_the_border_of_feasibility_is_where_the_tangents_put_it(direction: int) 
     )
     assert inside.feasible
     assert not outside.feasible
+
+
+def test_a_weightless_cable_without_tension_leaves_along_its_chord() -> None:
+    robot = cogiro(WINCHES[0]).replace(tension_min=0.0, tension_max=800.0)
+    plan = sl.inverse(robot, POSE, sl.Elastic(), tension=sl.LowestSum(), wrench=[0.0, 900.0, 0.0, 0.0, 0.0, 0.0])
+    slack = plan.chord_tension == 0.0
+    assert plan.feasible
+    assert slack.any()
+    assert plan.wrap_angle is not None
+    reach = -ropes(robot, POSE.transform(robot.platform_anchors))
+    wraps = np.arctan2(np.hypot(reach[:, 0], reach[:, 1]), reach[:, 2])
+    np.testing.assert_allclose(plan.wrap_angle, wraps, rtol=1e-12)
+    chords = np.linalg.norm(reach, axis=1)
+    np.testing.assert_allclose(plan.unstrained_length[slack], (chords + 0.05 * wraps)[slack], rtol=1e-12)

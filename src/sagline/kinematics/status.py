@@ -21,7 +21,7 @@ class PoseStatus(Status):
     )
     TOO_SLACK = (
         codes.POSE_TOO_SLACK,
-        "a cable would carry less than a thousandth of its own weight; raise tension_min",
+        "a cable would carry less than a thousandth of its weight, or not hang between its guides; raise tension_min",
     )
     NOT_CONVERGED = codes.POSE_NOT_CONVERGED, "the tensions did not settle; please report this robot and pose"
     NO_CHORD = (

@@ -36,7 +36,7 @@ def leave_pulleys(model: Model, cables: Cables, fresh: bool) -> None:
     The forces are those of the last length and pull (fresh: of first order) at the present chord tensions. Cables of
     the shallow models leave along their chord.
     """
-    exact = 1.0 if model.code == CATENARY else 0.0
+    exact = model.code == CATENARY
     for i in range(cables.tau.size):
         chord, pulley = chord_of(cables, i), pulley_of(cables, i)
         half_density = 0.5 * cables.density[i] * model.gravity
@@ -44,9 +44,10 @@ def leave_pulleys(model: Model, cables: Cables, fresh: bool) -> None:
         hanging = -half_density * chord.length
         if not fresh:
             hanging = cables.pull[i] - 2.0 * half_density * cables.ratio[i] * cables.free_chord[i]
-        vertical_a = cables.tau[i] * chord.sine + exact * hanging
+        vertical_a = cables.tau[i] * chord.sine + hanging
         inverse = 1.0 / math.sqrt(horizontal * horizontal + vertical_a * vertical_a)
-        sine, cosine = horizontal * inverse, pulley.entry * vertical_a * inverse
+        sine = horizontal * inverse if exact else chord.cosine
+        cosine = pulley.entry * (vertical_a * inverse if exact else chord.sine)
         span, rise = free_span(pulley, chord, cosine), free_rise(pulley, chord, sine)
         length = math.sqrt(span * span + rise * rise)
         inverse = 1.0 / length
