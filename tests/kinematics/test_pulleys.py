@@ -260,19 +260,15 @@ def test_the_rate_of_winding_is_the_slope_of_the_lengths() -> None:
 
 
 def test_the_rate_where_a_cable_is_held_at_its_limit_is_that_without_a_pulley() -> None:
-    robot = sl.load_robot("cogiro").replace(tension_min=100.0)
+    robot = sl.load_robot("cogiro").replace(tension_min=150.0)
     points = [(0.0, 0.0, 1.5), (3.0, 1.0, 2.5), (-3.0, 2.0, 3.0), (4.0, -2.0, 1.2)]
     path = sl.quintic_path(points, durations=[3.0] * 3, rate=20)
     bare, tiny = (sl.inverse(one, path) for one in (robot, robot.replace(winches=sl.Winch(1e-9))))
-    held = np.isclose(bare.chord_tension, 100.0, rtol=1e-9).any(axis=1)
-    assert held.sum() > 10
+    assert np.isclose(bare.chord_tension, 150.0, rtol=1e-9).any(axis=1).sum() >= 5
     expected, found = bare.length_rate, tiny.length_rate
     assert expected is not None
     assert found is not None
-    off = np.abs(found - expected).max(axis=1) / np.abs(expected).max()
-    # where a cable comes to its limit or leaves it, the rate has two sides
-    assert np.median(off[held]) < 1e-6
-    assert (off > 1e-5).sum() <= 4
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-5 * np.abs(expected).max())
 
 
 def formula_error(robot: sl.Robot, poses: sl.Pose) -> float:
