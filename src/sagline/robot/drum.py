@@ -18,7 +18,10 @@ from sagline.robot.winch import Winch
 
 MOST_LAYERS: Final = 1000
 ROUNDING: Final = 1e-6  # turns by which a drum may be more than full, or emptier than empty
-_ZERO_STEP: Final = "Give it in the robot file, or find it with home(robot, pose, frame_end_tension) and save that robot; then plan again."
+_ZERO_STEP: Final = (
+    "Give it in the robot file, or find it with home(robot, pose, frame_end_tension) and save the robot it returns; "
+    "then plan again."
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
