@@ -100,7 +100,20 @@ def test_what_is_too_much_for_the_winches_is_told() -> None:
         (["encoder", "nothere.nc"], "nothere.nc"),
         (["encoder", "run.nc", "--out", "run.nc"], "is the run itself"),
         (["encoder", "run.nc", "--winding", "loose"], "'loose' is not one of 'constant', 'remembered'"),
-        (["forward", "my_robot.yaml", "lengths.csv", "--counts"], "unknown column 'L0'"),
+        (
+            ["forward", "my_robot.yaml", "lengths.csv", "--counts"],
+            "line 1: unknown column 'L0': these are lengths: leave out --counts",
+        ),
+        (["forward", "my_robot.yaml", "far.csv"], "line 1: unknown column 'C0': these are counts: add --counts"),
+        (["forward", "my_robot.yaml", "timed.csv"], "line 1: unknown column 'C7': these are counts: add --counts"),
+        (
+            ["encoder", "unhomed.nc"],
+            "winches: length_zero is not given; allowed: one value, or one a cable. Give it in",
+        ),
+        (
+            ["encoder", "unhomed.nc"],
+            "with home(robot, pose, frame_end_tension) and save the robot it returns; then plan",
+        ),
         (
             ["forward", "my_robot.yaml", "far.csv", "--counts"],
             "sample 1, cable 3: count is 9000000000; allowed: -2415336 to 1516823. The drum is full",
@@ -112,6 +125,8 @@ def test_what_is_wrong_ends_with_2_and_writes_nothing(folder: Path, words: list[
     sl.inverse(sl.load_robot("cogiro"), PATH).save("bare.nc")
     Path("lengths.csv").write_text(",".join(f"L{k}" for k in range(8)) + "\n" + ",".join("9" * 8) + "\n")
     header = ",".join(f"C{k}" for k in range(8))
+    Path("timed.csv").write_text("time [s],C7,L0\n1,2,3\n")
+    sl.inverse(wound(length_zero=None), PATH).save("unhomed.nc")
     Path("far.csv").write_text(f"{header}\n{','.join(['100000'] * 8)}\n0,0,0,9e9,0,0,0,0\n")
     before = sorted(folder.iterdir())
     result = sagline(*words)

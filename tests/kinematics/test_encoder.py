@@ -137,6 +137,19 @@ def test_crept_cables_are_longer(robot: sl.Robot, plan: sl.Plan) -> None:
     np.testing.assert_allclose(back, plan.unstrained_length, rtol=0.0, atol=4e-6)
 
 
+def test_over_pulleys_cables_creep_with_the_tension_that_is_shared() -> None:
+    """Over wide pulleys the free cable has another chord, and a slightly other tension along it."""
+    robot = wound(pulley_radius=0.3, counts_per_turn=1e9)
+    plan = sl.inverse(robot, sl.quintic_path([(0, 0, 1.5), (3, 1, 2.5)], durations=3.0, rate=20.0))
+    creep = sl.Creep(3e4, 2.0)
+    assert plan.path is not None
+    off = 1.0 + creep.strain(plan.path.time, plan.state.cables.chord_tension)
+    crept = sl.lengths_from_counts(robot, sl.encoder_counts(plan, creep=creep))
+    longer = 1.0 + creep.strain(plan.path.time, plan.chord_tension)
+    np.testing.assert_allclose(crept * longer, plan.unstrained_length, rtol=0.0, atol=1e-9)
+    assert np.abs(crept * off - plan.unstrained_length).max() > 1e-8
+
+
 def test_memory_both_ways(robot: sl.Robot, plan: sl.Plan) -> None:
     counts = sl.encoder_counts(plan, "remembered")
     assert np.abs(counts - sl.encoder_counts(plan)).max() > 10.0
@@ -254,7 +267,7 @@ def test_no_cable_hangs_with_less_tension_than_its_own_weight_gives(robot: sl.Ro
 
 
 def test_memory_needs_tensions_and_constant_winding_none(robot: sl.Robot) -> None:
-    with pytest.raises(sl.InvalidValueError, match="drum_tension is not given"):
+    with pytest.raises(sl.InvalidValueError, match=r"drum_tension is not given; .*winch_rates\(plan\).drum_tension"):
         sl.lengths_from_counts(robot, np.full(8, 1e5), "remembered")
     with pytest.raises(sl.InvalidValueError, match="drum_tension is given"):
         sl.lengths_from_counts(robot, np.full(8, 1e5), drum_tension=np.ones(8))

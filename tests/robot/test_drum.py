@@ -39,6 +39,31 @@ def test_over_a_pulley_the_tension_goes_with_the_height_of_the_exit(axis: float)
     )
 
 
+@pytest.mark.parametrize("model", [sl.Straight(), sl.Elastic(), sl.Parabolic(), sl.Empirical(0.5, 0.5)], ids=repr)
+@pytest.mark.parametrize("radius", [0.0, 0.2])
+def test_behind_a_shallow_cable_is_its_chord_tension(model: sl.CableModel, radius: float) -> None:
+    robot = wound("article-prototype", pulley_radius=radius, dead_cable=3.5, dead_rise=3.0)
+    state = sl.inverse(robot, sl.Pose.from_euler([0.3, 0.2, 1.5], 0, 0, 0), model).state
+    assert state.contact is not None
+    if isinstance(model, sl.Straight):
+        np.testing.assert_array_equal(state.contact.dead_length, 3.5)
+        strain = state.chord_tension / robot.cables.axial_stiffness
+    else:
+        strain = 3.5 / state.contact.dead_length - 1.0  # the length behind says what tension it has
+    np.testing.assert_allclose(drum_tension(state), strain * robot.cables.axial_stiffness, rtol=1e-9)
+
+
+def test_a_cable_pressed_to_less_than_nothing_has_no_tension() -> None:
+    """At a drum 3 m below, a rope of EA = 14 kN that weighs 3 kN/m would be shorter than nothing."""
+    robot = wound("article-prototype")
+    state = sl.inverse(robot, sl.Pose.from_euler([0.3, 0.2, 1.5], 0, 0, 0)).state
+    heavy = robot.replace(
+        cables=robot.cables.replace(linear_density=300.0),
+        winches=wound("article-prototype", dead_cable=3.5, dead_rise=3.0).winches,
+    )
+    assert np.isnan(drum_tension(sl.Equilibrium(heavy, state.pose, state.wrench, state.cables))).all()
+
+
 def test_where_layers_begin() -> None:
     drums = drums_of(wound())
     assert drums.starts.shape == (8, 5)

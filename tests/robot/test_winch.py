@@ -153,6 +153,33 @@ def test_a_run_rises_by_no_more_than_its_length() -> None:
         Winch(dead_cable=3.0, dead_rise=[3.0, -3.1])
 
 
+def test_a_cable_is_no_shorter_than_its_run() -> None:
+    assert Winch(dead_cable=[2.0, 3.0], cable_length=3.0).dead_cable.tolist() == [2.0, 3.0]
+    with pytest.raises(InvalidValueError, match=r"cable_length\[1\] is 2.9 m; allowed: >= 3 m, its dead_cable"):
+        Winch(dead_cable=[2.0, 3.0], cable_length=2.9)
+
+
+@pytest.mark.parametrize("name", RULES)
+def test_the_field_with_too_few_values_for_a_robot_is_named(name: str) -> None:
+    beside: dict[str, Any] = BESIDE.get(name, {})
+    other: dict[str, Any] = {"inertia" if name == "pulley_radius" else "pulley_radius": 0.05}
+    with pytest.raises(InvalidValueError, match=f"^winches: {name} is 7 values; allowed: one value, or 8, one a cable"):
+        COGIRO.replace(winches=Winch(**beside, **other, **{name: [2, 3, 2, 3, 2, 3, 2]}))
+    with pytest.raises(InvalidValueError, match=f"^winches: .*{name}.* is 7 values; allowed: one value, or 8"):
+        COGIRO.replace(winches=Winch(**beside, **other, **{name: [2] * 7}))  # one of those that are not as usual
+
+
+def test_a_block_of_seven_winches_is_named_in_one_line() -> None:
+    seven: dict[str, Any] = {name: [2, 3, 2, 3, 2, 3, 2] for name in RULES if name not in ("dead_rise", "dead_cable")}
+    with pytest.raises(
+        InvalidValueError, match=r"^winches: pulley_radius, swivel_axis, pulley_friction, \.\.\. is 7"
+    ) as found:
+        COGIRO.replace(winches=Winch(**seven, swivel_axis=[[0, 0, 1]] * 6 + [[0, 0, -1]]))
+    assert len(str(found.value)) < 300
+    with pytest.raises(InvalidValueError, match=r"^winches is 7 values"):
+        COGIRO.replace(winches=Winch([0.0] * 7))  # seven times what it is anyway
+
+
 def test_axes_of_any_length_become_vertical_unit_vectors() -> None:
     axes = Winch(swivel_axis=np.array([[0, 0, 7], [0, 0, -1e-3], [1e-12, 0, 1]])).swivel_axis
     np.testing.assert_array_equal(axes, [[0, 0, 1], [0, 0, -1], [0, 0, 1]])
@@ -169,7 +196,8 @@ def test_one_winch_is_spread_over_the_cables() -> None:
     assert spread.per_cable(3) is spread
     assert_same(Winch([0.05], drum_radius=0.06, swivel_axis=[0, 0, -1]).per_cable(3), spread)
     for count in (2, 4):
-        with pytest.raises(InvalidValueError, match=f"^winches is 3 values; allowed: one value, or {count}"):
+        told = f"^winches: pulley_radius, swivel_axis, drum_radius is 3 values; allowed: one value, or {count}"
+        with pytest.raises(InvalidValueError, match=told):
             spread.per_cable(count)
     for wrong in (0, -1, 2.5, True, 10**14):
         with pytest.raises(InvalidValueError, match=r"count is|winches is"):
@@ -214,7 +242,9 @@ def test_a_robot_takes_as_many_winches_as_cables() -> None:
     assert robot.winches is not None
     assert robot.winches.pulley_radius.tolist() == [0.05] * 8
     assert robot.replace(winches=None).winches is None
-    with pytest.raises(InvalidValueError, match=r"^winches is 7 values; allowed: one value, or 8, one a cable"):
+    with pytest.raises(
+        InvalidValueError, match=r"^winches: pulley_radius is 7 values; allowed: one value, or 8, one a"
+    ):
         COGIRO.replace(winches=Winch([0.05] * 7))
     with pytest.raises(InvalidValueError, match=r"^winches is 0\.05; allowed: a Winch"):
         COGIRO.replace(winches=0.05)

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from sagline.arrays import Array, locked
 from sagline.files.table import TABLE_LIMIT, Table, line_error
 from sagline.files.text import read_text
+
+# of each kind of column the other one, and what to do where a file has that
+_OTHERS: Final = {"L": ("C", "these are counts: add --counts"), "C": ("L", "these are lengths: leave out --counts")}
 
 
 class Lengths(NamedTuple):
@@ -81,13 +84,19 @@ def load_counts(file: os.PathLike[str] | str, cable_count: int) -> Counts:
 def _read(file: os.PathLike[str] | str, letter: str, unit: str, cable_count: int) -> tuple[Table, list[str]]:
     """A table with a column for each cable, and their names."""
     path = Path(file)
-    names = [f"{letter}{k}" for k in range(cable_count)]
-    table = Table.read(path, read_text(path, TABLE_LIMIT), {"time": "s", **dict.fromkeys(names, unit)})
+    names = _columns(letter, cable_count)
+    other, hint = _OTHERS[letter]
+    units, strangers = {"time": "s", **dict.fromkeys(names, unit)}, dict.fromkeys(_columns(other, cable_count), hint)
+    table = Table.read(path, read_text(path, TABLE_LIMIT), units, strangers)
     if missing := [name for name in names if name not in table.columns]:
         raise line_error(path, table.header, f"missing column {', '.join(missing)}; the robot has {cable_count} cables")
     if not table.lines:
         raise line_error(path, table.header, "no rows below the columns' names; allowed: at least one")
     return table, names
+
+
+def _columns(letter: str, cable_count: int) -> list[str]:
+    return [f"{letter}{k}" for k in range(cable_count)]
 
 
 def _samples(table: Table, names: list[str]) -> tuple[Array | None, Array]:

@@ -10,6 +10,7 @@ from array import array
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path as FilePath
+from types import MappingProxyType
 from typing import Final, cast
 
 import numpy as np
@@ -21,6 +22,7 @@ from sagline.files.quantity import LARGEST, REACH, in_si, plain_number
 
 TABLE_LIMIT: Final = 64.0  # MB, about half a million rows
 _TOO_LONG: Final = 100.0  # times the size of what it belongs to: no length in m, but perhaps one in mm
+_NONE: Final[Mapping[str, str]] = MappingProxyType({})
 _COLUMN = re.compile(r"\s*(\w+)\s*(?:\[(.*)\])?\s*")  # name, or name [unit]
 _PLAIN_ROW = re.compile(r"[-+.0-9eE \t,]*")  # of these letters float reads plain numbers only, and much faster
 _DECIMAL_COMMA = re.compile(r"\s*[-+]?[0-9]+,[0-9]+\s*")
@@ -45,13 +47,14 @@ class Table:
     plain: frozenset[str]
 
     @classmethod
-    def read(cls, path: FilePath, text: str, units: Mapping[str, str]) -> Table:
+    def read(cls, path: FilePath, text: str, units: Mapping[str, str], strangers: Mapping[str, str] = _NONE) -> Table:
         """Read a CSV text whose first row names its columns, `name` or `name [unit]`.
 
         Args:
             path: The file, for messages.
             text: What is in it.
             units: The columns it may have, and the SI unit of each.
+            strangers: Columns of another kind of table, and what to do with one of these.
 
         Returns:
             The table, all its numbers finite.
@@ -67,7 +70,7 @@ class Table:
                 if not "".join(row).strip():  # a blank line, or the bare commas of a spreadsheet
                     continue
                 if not found:
-                    found, header = _factors(path, reader.line_num, row, units), reader.line_num
+                    found, header = _factors(path, reader.line_num, row, units, strangers), reader.line_num
                 else:
                     numbers.extend(_numbers(path, reader.line_num, row, tuple(found)))
                     lines.append(reader.line_num)
@@ -121,7 +124,9 @@ class Table:
             self.refuse(far, name, self.columns[name], "m", allowed)
 
 
-def _factors(path: FilePath, line: int, header: list[str], units: Mapping[str, str]) -> dict[str, float | None]:
+def _factors(
+    path: FilePath, line: int, header: list[str], units: Mapping[str, str], strangers: Mapping[str, str]
+) -> dict[str, float | None]:
     """Column names, and what to multiply their numbers by to have them in SI; None where no unit is given."""
     if len(header) == 1 and (other := next((mark for mark in ";\t" if mark in header[0]), None)):
         shown = {";": "semicolons", "\t": "tabs"}[other]
@@ -130,6 +135,8 @@ def _factors(path: FilePath, line: int, header: list[str], units: Mapping[str, s
     for cell in header:
         found = _COLUMN.fullmatch(cell)
         name, unit = (found[1], found[2]) if found else (cell, None)
+        if name in strangers:
+            raise line_error(path, line, f"unknown column {name!r}: {strangers[name]}")
         if name not in units:
             near = nearest(name, units)
             hint = f" (did you mean {near}?)" if near else " (a number, no name)" if plain_number(cell) else ""

@@ -32,7 +32,8 @@ def encoder_counts(
             was never off the drum since the first sample, at winding_tension.
         temperature: By how much the cables are warmer than where the lengths of the winches hold [K], a number or one
             a cable.
-        creep: How cables become longer along the plan's path, from nothing at its first sample; None for not at all.
+        creep: How cables become longer along the plan's path, from nothing at its first sample, under the plan's
+            `chord_tension`; None for not at all.
 
     Returns:
         Whole counts, shape (m,) or (N, m), as floats; NaN where the plan has no answer.
@@ -98,7 +99,8 @@ def lengths_from_counts(
         temperature: By how much the cables are warmer than where the lengths of the winches hold [K].
 
     Returns:
-        L [m], of the shape of counts. Where cables creep, multiply by 1 + `Creep.strain`.
+        L [m], of the shape of counts. Where cables creep, multiply by 1 + `Creep.strain` of the
+            plan's times and `chord_tension`.
 
     Raises:
         InvalidValueError: If the robot's winches or cables lack what is needed (the message names it), counts run off a
@@ -115,7 +117,8 @@ def lengths_from_counts(
     if (winding == "remembered") != (drum_tension is not None):
         given = "not given" if drum_tension is None else "given"
         allowed = 'given with winding="remembered", and only then'
-        raise InvalidValueError("drum_tension", given, allowed, "Give both or neither.")
+        step = "Give those of the plan, winch_rates(plan).drum_tension, or what was measured; or leave both out."
+        raise InvalidValueError("drum_tension", given, allowed, step)
     if drum_tension is None:
         length = path / (1.0 + drums.rest_strain)
     else:
@@ -152,7 +155,7 @@ def _crept(plan: Plan, creep: Creep) -> Array:
     if plan.path is None:
         step = "Plan along a Path, or leave creep out."
         raise InvalidValueError("creep", "given for a plan without a path", "times to creep in", step)
-    return creep.strain(plan.path.time, plan.state.cables.chord_tension)
+    return creep.strain(plan.path.time, plan.chord_tension)
 
 
 def _rows(robot: Robot, value: ArrayLike, item: str, unit: str) -> Array:

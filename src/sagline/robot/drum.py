@@ -11,6 +11,7 @@ import numpy as np
 from sagline.arrays import Array, checked, kernel_input, locked
 from sagline.errors import InvalidValueError
 from sagline.kernels.cable import drum
+from sagline.kernels.codes import CATENARY
 from sagline.robot.behind import differs, real_behind
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.robot import Robot
@@ -18,7 +19,10 @@ from sagline.robot.winch import Winch
 
 MOST_LAYERS: Final = 1000
 ROUNDING: Final = 1e-6  # turns by which a drum may be more than full, or emptier than empty
-_ZERO_STEP: Final = "Give it, or find it with home(robot, pose, frame_end_tension)."
+_ZERO_STEP: Final = (
+    "Give it in the robot file, or find it with home(robot, pose, frame_end_tension) and save the robot it returns; "
+    "then plan again."
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -209,13 +213,15 @@ def _limits(winches: Winch, robot: Robot) -> tuple[Array, Array, Array]:
 def drum_tension(state: Equilibrium) -> Array:
     """Tension of the cables where they leave the drum, with friction where the state's contact knows the winding.
 
-    Along a cable without friction T + T^2/(2 EA) - w z is constant, z the height.
+    Along an exact cable without friction T + T^2/(2 EA) - w z is constant, z the height. Cables of the other models
+    weigh nothing behind their pulleys, and have the chord tension there.
 
     Args:
         state: Robot with winches, and its cables.
 
     Returns:
-        Tensions [N], shape (m,) or (N, m); negative where a slack cable hangs down from a drum.
+        Tensions [N], shape (m,) or (N, m); negative where a slack cable hangs down from a drum, NaN where one
+        would be pressed to less than no length.
 
     Source:
         docs/model.md, section 10.
@@ -223,14 +229,17 @@ def drum_tension(state: Equilibrium) -> Array:
     robot, cables = state.one_robot, state.cables
     if state.contact is not None and differs(robot, state.contact.winding) and state.contact.winding is not None:
         return locked(real_behind(state).drum_tension)
+    if cables.model.code != CATENARY:
+        return state.chord_tension
     height = robot.frame_anchors[:, 2]
-    leaving = state.exit_point[..., 2]
     drum_height = height if robot.winches is None else height - robot.winches.dead_rise
+    fall = state.exit_point[..., 2] - drum_height
     stiffness = robot.cables.axial_stiffness
-    weight = 0.0 if cables.model.weightless else robot.cables.linear_density * robot.gravity
     strain = cables.frame_end_tension / stiffness
-    gained = strain * (2.0 + strain) + 2.0 * weight * (drum_height - leaving) / stiffness  # (1 + strain)^2 - 1
-    return locked(stiffness * gained / (1.0 + np.sqrt(np.maximum(1.0 + gained, 0.0))))
+    lost = 2.0 * robot.cables.linear_density * robot.gravity * fall / stiffness
+    gained = strain * (2.0 + strain) - lost  # (1 + strain there)^2 - 1
+    with np.errstate(invalid="ignore"):
+        return locked(stiffness * gained / (1.0 + np.sqrt(1.0 + gained)))
 
 
 def warmth(robot: Robot, temperature: Any) -> Array | float:

@@ -18,6 +18,7 @@ from sagline.robot.unit import unit
 
 UPRIGHT: Final = 1e-9  # how far from vertical a swivel axis may be, as the sine of an angle
 _AGREEING: Final = 1e-9  # of the dead cable: how far a given one may be from that of the guides
+MOST_NAMED: Final = 3  # fields that a message names
 
 
 class Rule(NamedTuple):
@@ -113,7 +114,8 @@ class Winch:
         count_zero: Counts at which length_zero is off the drum.
         length_zero: Length of cable off the drum at count_zero, at the winding tension, with dead_cable for the run
             to the pulley [m]; `home` finds it.
-        cable_length: All there is of the cable, on the drum and off it, at the winding tension [m].
+        cable_length: All there is of the cable, on the drum and off it, at the winding tension [m]; no less
+            than dead_cable.
         winding_tension: Tension at which the cable lies on the drum [N], >= 0.
         inertia: Moment of inertia of motor, gear and drum at the motor's shaft [kg m^2].
         torque_limit: Largest torque of the motor at its shaft [N m].
@@ -228,8 +230,9 @@ class Winch:
             load_cell_gain: See the attributes.
 
         Raises:
-            InvalidValueError: If a value is out of its range, the dead cable rises by more than its length, a gear is
-                zero, a swivel axis is not vertical, two guides in a row coincide, or the shapes do not fit.
+            InvalidValueError: If a value is out of its range, the dead cable rises by more than its length or is longer
+                than all of the cable, a gear is zero, a swivel axis is not vertical, two guides in a row coincide, or
+                the shapes do not fit.
 
         Examples:
             >>> import sagline as sl
@@ -254,6 +257,7 @@ class Winch:
         object.__setattr__(self, "guides", points)
         _check_rise(self.dead_cable, self.dead_rise)
         _check_rolling(self.rolling_friction)
+        _check_whole(self.dead_cable, self.cable_length)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -281,13 +285,27 @@ class Winch:
         check_memory("winches", 8.0 * len(RULES) * count, "Give fewer cables.")
         if self.shape not in ((), (1,), (count,)):
             allowed = f"one value, or {count}, one a cable"
-            raise InvalidValueError("winches", f"{self.shape[0]} values", allowed, "Give every cable its winch.")
+            raise InvalidValueError(self._long(), f"{self.shape[0]} values", allowed, "Give every cable its own.")
         if self.shape == (count,):
             return self
         length = len(self.shape)
         return self.replace(
             **{name: np.broadcast_to(field, (count, *field.shape[length:])) for name, field in self.known().items()}
         )
+
+    def _long(self) -> str:
+        """What has been given as one value a cable, for a message: what differs among them, or else from the default.
+
+        All fields have one shape, and do not know any more which of them had it first.
+        """
+        known, default = self.known(), Winch()
+        differ = [name for name, field in known.items() if (field != field[0]).any()]
+        if not differ:
+            usual = {name: getattr(default, name) for name in known}
+            differ = [name for name, field in known.items() if usual[name] is None or (field != usual[name]).any()]
+        if not differ:
+            return "winches"
+        return f"winches: {', '.join(differ[:MOST_NAMED])}{', ...' if len(differ) > MOST_NAMED else ''}"
 
     def _part(self, index: NDArray[Any]) -> Winch:
         """The winches of some of the cables, of fields of shape (m,)."""
@@ -459,4 +477,18 @@ def _check_rise(dead_cable: Array, dead_rise: Array) -> None:
             f"{dead_rise.flat[i]:g} m",
             f"within +-{dead_cable.flat[i]:g} m, its dead_cable",
             "A straight run rises by no more than its length; correct one of the two.",
+        )
+
+
+def _check_whole(dead_cable: Array, cable_length: Array | None) -> None:
+    if cable_length is None:
+        return
+    short = np.flatnonzero(cable_length < dead_cable)
+    if short.size:
+        i = int(short[0])
+        raise InvalidValueError(
+            f"winches: cable_length[{i}]",
+            f"{cable_length.flat[i]:g} m",
+            f">= {dead_cable.flat[i]:g} m, its dead_cable",
+            "All there is of a cable reaches from the drum to the pulley at least; correct one of the two.",
         )
