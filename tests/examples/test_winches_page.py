@@ -8,9 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import sagline as sl
 from sagline.arrays import Array
+from sagline.cli.main import app
+from tests.docs.test_snippets import blocks
+from tests.examples.test_commands import lines_of
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "winches.md").read_text(encoding="utf-8")
@@ -38,6 +42,30 @@ def test_the_table_is_what_the_example_finds(example: dict[str, Any]) -> None:
     assert {row.size for rows in example["found"].values() for row in rows} == {405}
     assert "at 405 level poses" in PROSE
     assert Path("pulleys_left_out.png").stat().st_size > 10_000
+
+
+def test_the_commands_lead_from_homing_to_poses(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The blocks of the page up to its commands, and then these, in a folder with the files of `sagline examples`."""
+    monkeypatch.chdir(tmp_path)
+    assert CliRunner().invoke(app, ["examples", "--out", "."]).exit_code == 0
+    names: dict[str, Any] = {}
+    lines: list[list[str]] = []
+    for block in blocks(ROOT / "docs" / "winches.md"):
+        if block.mark == "file":
+            Path(block.what).write_text(block.text, encoding="utf-8")
+        elif block.kind == "python" and not lines:
+            exec(block.text, names)
+        elif block.kind == "sh":
+            lines += lines_of(block.text)
+    assert [words[0] for words in lines] == ["track", "encoder", "forward"]
+    for words in lines:
+        result = CliRunner().invoke(app, [*words, "--no-figures"] if words[0] == "track" else words)
+        assert result.exit_code == 0, result.output
+    plan = sl.load_plan("output/my-robot-catenary.nc")
+    counts = np.loadtxt("counts.csv", delimiter=",", skiprows=1)[:, 1:]
+    np.testing.assert_array_equal(counts, sl.encoder_counts(plan))
+    found = np.loadtxt("output/my-robot-poses.csv", delimiter=",", skiprows=1, usecols=(1, 2, 3))
+    np.testing.assert_allclose(found[[0, -1]], plan.state.pose.position[[0, -1]], atol=2e-5)  # at rest
 
 
 def test_twice_the_radius_costs_about_twice_as_much(example: dict[str, Any]) -> None:

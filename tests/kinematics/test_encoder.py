@@ -181,8 +181,8 @@ def test_on_the_prototypes_tour_the_memory_is_worth_twelve_millimeters() -> None
     assert (tension.min(), tension.max()) == pytest.approx((71.0, 768.0), abs=0.5)
     assert plan.state.one_robot.cables.axial_stiffness == pytest.approx(14e3)
     # wound at the mean tension of the home pose, and at that of the whole tour
-    assert 1e3 * memory_matters(plan, tension[0].mean()) == pytest.approx(10.9, abs=0.1)
-    assert 1e3 * memory_matters(plan, tension.mean()) == pytest.approx(13.4, abs=0.1)
+    assert 1e3 * memory_matters(plan, tension[0].mean()) == pytest.approx(10.8, abs=0.1)
+    assert 1e3 * memory_matters(plan, tension.mean()) == pytest.approx(13.6, abs=0.1)
 
 
 def test_poses_without_an_answer_have_no_counts(robot: sl.Robot) -> None:
@@ -261,7 +261,7 @@ def test_counts_that_run_off_the_drum_are_told_with_what_it_takes(robot: sl.Robo
 @pytest.mark.parametrize("tension", [1e-3, 1.0])
 def test_no_cable_hangs_with_less_tension_than_its_own_weight_gives(robot: sl.Robot, tension: float) -> None:
     with pytest.raises(
-        sl.InvalidValueError, match=r"cable 0: frame_end_tension is .* N; allowed: what a cable can have"
+        sl.InvalidValueError, match=r"cable 0: frame_end_tension is .* N; allowed: >= 6.37.* N there, by"
     ):
         sl.home(robot, POSE, tension)
 

@@ -211,7 +211,7 @@ def wrong_guides() -> list[tuple[Any, str]]:
         ([[1.0, 2.0]], r"guides is of shape \(1, 2\)"),
         (np.empty((0, 3)), r"guides is of shape \(0, 3\)"),
         (good[None], r"guides is of shape \(1, 8, 3, 3\)"),
-        (good[:7], r"winches is 7 values; allowed: one value, or 8"),
+        (good[:7], r"winches: guides is 7 values; allowed: one value, or 8"),
         (7.0, r"guides is of shape \(\)"),
         ("drum", "guides is 'drum'; allowed: numbers"),
         ([[0, 0, 0], [0, 0, 0]], r"guides\[1\] is at the guide before it"),

@@ -163,14 +163,17 @@ def test_a_cable_is_no_shorter_than_its_run() -> None:
 def test_the_field_with_too_few_values_for_a_robot_is_named(name: str) -> None:
     beside: dict[str, Any] = BESIDE.get(name, {})
     other: dict[str, Any] = {"inertia" if name == "pulley_radius" else "pulley_radius": 0.05}
+    two, three = (0.2, 0.3) if name == "rolling_friction" else (2, 3)
     with pytest.raises(InvalidValueError, match=f"^winches: {name} is 7 values; allowed: one value, or 8, one a cable"):
-        COGIRO.replace(winches=Winch(**beside, **other, **{name: [2, 3, 2, 3, 2, 3, 2]}))
+        COGIRO.replace(winches=Winch(**beside, **other, **{name: [two, three, two, three, two, three, two]}))
     with pytest.raises(InvalidValueError, match=f"^winches: .*{name}.* is 7 values; allowed: one value, or 8"):
-        COGIRO.replace(winches=Winch(**beside, **other, **{name: [2] * 7}))  # one of those that are not as usual
+        COGIRO.replace(winches=Winch(**beside, **other, **{name: [two] * 7}))  # one of those that are not as usual
 
 
 def test_a_block_of_seven_winches_is_named_in_one_line() -> None:
-    seven: dict[str, Any] = {name: [2, 3, 2, 3, 2, 3, 2] for name in RULES if name not in ("dead_rise", "dead_cable")}
+    seven: dict[str, Any] = {name: [2, 3, 2, 3, 2, 3, 2] for name in RULES}
+    for name in ("dead_rise", "dead_cable", "rolling_friction"):
+        del seven[name]
     with pytest.raises(
         InvalidValueError, match=r"^winches: pulley_radius, swivel_axis, pulley_friction, \.\.\. is 7"
     ) as found:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.arguments import instance
-from sagline.arrays import Array, checked
+from sagline.arrays import Array, Flags, checked
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
@@ -18,10 +19,15 @@ from sagline.robot.checks import per_cable
 from sagline.robot.drum import warmth
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
+from sagline.robot.winch import Winch
+from sagline.statics.chords import refuse_missing_chords
 from sagline.statics.tables import body_table, cable_table, pose_rows
 
 _CATENARY = Catenary()
 MISSED: Final = 1e-9  # of a tension: a cable that misses it by more cannot have it
+LARGEST_STRAIN: Final = 0.5  # no rope holds more; what reads so has another unit
+HALVINGS: Final = 50  # of the interval, as a ratio, in which a cable's least tension lies
+FOUND: Final = 1e-4  # how near it is told, as a ratio
 
 
 def home(
@@ -38,8 +44,9 @@ def home(
     Args:
         robot: A robot with winches.
         pose: Where the platform is held, a single pose.
-        frame_end_tension: What the load cells at the frame ends read there [N], > 0, a number or shape (m,). They need
-            not balance the platform exactly: each cable is taken by itself.
+        frame_end_tension: What the load cells at the frame ends read there [N], a number or shape (m,). Tensions are
+            these less the winches' load_cell_bias, over load_cell_gain. They need not balance the platform exactly:
+            each cable is taken by itself.
         counts: What the encoders read there, a number or shape (m,).
         model: Cable model; the default is exact.
         temperature: By how much the cables are warmer there than where the lengths are to hold [K].
@@ -48,8 +55,10 @@ def home(
         The robot with `count_zero` and `length_zero` of its winches replaced.
 
     Raises:
-        InvalidValueError: If the robot has no winches, the pose is none or a batch, or no cable hangs there with so
-            little tension; the message names the cable. If the winches have guides.
+        InvalidValueError: If the robot has no winches, or they have guides, the pose is none or a batch, a reading is
+            beyond load_cell_range, no cable hangs there with so little tension or holds so much, or more is off a drum
+            than its cable_length; the message names the cable.
+        CableGeometryError: If a cable's ends coincide there, or its platform end is inside its pulley.
 
     Examples:
         >>> import sagline as sl
@@ -73,29 +82,93 @@ def home(
         raise InvalidValueError("winches: guides", "given", "None for home", step)
     if instance(pose, Pose, "pose").shape:
         raise InvalidValueError("pose", f"a batch of {len(pose)}", "a single pose", "Take one of them: pose[0].")
+    refuse_missing_chords(robot, pose)
     m = robot.cable_count
-    tension = per_cable(checked(frame_end_tension, "frame_end_tension", "N", above=0.0), "frame_end_tension", m)
+    reading = per_cable(checked(frame_end_tension, "frame_end_tension", "N"), "frame_end_tension", m)
     zero = per_cable(checked(counts, "counts", ""), "counts", m)
+    tension = _tensions(robot, winches, reading)
     length = _lengths(robot, pose, tension, instance(model, CableModel, "model"))
     strain = winches.winding_tension / robot.cables.axial_stiffness
     at_rest = length * (1.0 + strain) / warmth(robot, temperature)
+    _check_whole(winches, at_rest)
     return robot.replace(winches=winches.replace(count_zero=zero, length_zero=at_rest))
+
+
+def _tensions(robot: Robot, winches: Winch, reading: Array) -> Array:
+    """Tensions that load cells read, each of which a cable can hold."""
+    bias, gain, most = winches.load_cell_bias, winches.load_cell_gain, winches.load_cell_range
+    if most is not None:
+        _refuse(reading > most, reading, [f"<= {cell:g} N, its load_cell_range" for cell in most], "Correct it.")
+    tension = (reading - bias) / gain
+    least = [f"> {b:g} N{', its load_cell_bias' if b else ''}" for b in bias]
+    _refuse(~(tension > 0.0), reading, least, "A cable pulls; correct the reading.")
+    strongest = LARGEST_STRAIN * robot.cables.axial_stiffness
+    holds = [f"<= {r:.6g} N, where it is {LARGEST_STRAIN:.0%} longer" for r in strongest * gain + bias]
+    _refuse(tension > strongest, reading, holds, "Correct the reading, its unit, or axial_stiffness.")
+    return tension
 
 
 def _lengths(robot: Robot, pose: Pose, tension: Array, model: CableModel) -> Array:
     """Unstrained lengths off the drums at a pose, with given tensions at the frame ends."""
+    length, held = _held(robot, pose, tension, model)
+    if not (missed := ~held).any():
+        return length
+    i = int(np.argmax(missed))
+    least = _least(robot, pose, model, i, float(tension[i]))
+    shown, allowed = _read(robot, i, float(tension[i])), "what a cable can have there"
+    if least is not None:
+        allowed = f">= {_read(robot, i, least):.5g} N there, by the cable's own weight"
+    step = "Correct the reading, its unit, or the pose."
+    raise InvalidValueError(f"cable {i}: frame_end_tension", f"{shown:g} N", allowed, step)
+
+
+def _read(robot: Robot, cable: int, tension: float) -> float:
+    """What a load cell reads of a tension."""
+    if robot.winches is None:
+        return tension
+    return float(tension * robot.winches.load_cell_gain[cable] + robot.winches.load_cell_bias[cable])
+
+
+def _held(robot: Robot, pose: Pose, tension: Array, model: CableModel) -> tuple[Array, Flags]:
+    """Unstrained lengths off the drums, and which cables have these tensions with them."""
     m = robot.cable_count
     held, length = np.empty(m), np.empty(m)
     table, body = cable_table(robot)[0], body_table(robot)[0]
     room = np.empty((3, 3)), np.empty((GEOMETRY_ROWS, m))
     lengths_at_frame_ends(model.terms(robot.gravity), table, body, pose_rows(pose)[0], tension, held, length, *room)
-    missed = ~(np.abs(held - tension) <= MISSED * tension) | ~(length > 0.0)
-    if not missed.any():
-        return length
-    i = int(np.argmax(missed))
+    return length, (np.abs(held - tension) <= MISSED * tension) & (length > 0.0)
+
+
+def _least(robot: Robot, pose: Pose, model: CableModel, cable: int, low: float) -> float | None:
+    """The least tension from `low` on that a cable can have at a pose; None where it holds none that it can have."""
+    high = LARGEST_STRAIN * float(robot.cables.axial_stiffness[cable])
+
+    def can(tension: float) -> bool:
+        return bool(_held(robot, pose, np.full(robot.cable_count, tension), model)[1][cable])
+
+    if not can(high):
+        return None
+    for _ in range(HALVINGS):
+        if high <= (1.0 + FOUND) * low:
+            break
+        middle = math.sqrt(low * high)
+        low, high = (low, middle) if can(middle) else (middle, high)
+    return high * (1.0 + FOUND)  # so that the number told will do, with five digits
+
+
+def _check_whole(winches: Winch, length: Array) -> None:
+    if winches.cable_length is None or not (wrong := length > winches.cable_length).any():
+        return
+    i = int(np.argmax(wrong))
     raise InvalidValueError(
-        f"cable {i}: frame_end_tension",
-        f"{tension[i]:g} N",
-        "what a cable can have there, between its own weight and what breaks it",
-        "Correct the reading, its unit, or the pose.",
+        f"cable {i}: length off its drum at the pose",
+        f"{length[i]:.6g} m",
+        f"<= {winches.cable_length[i]:g} m, its cable_length",
+        "Correct cable_length, or the pose.",
     )
+
+
+def _refuse(wrong: Flags, reading: Array, allowed: list[str], step: str) -> None:
+    if wrong.any():
+        i = int(np.argmax(wrong))
+        raise InvalidValueError(f"cable {i}: frame_end_tension", f"{reading[i]:g} N", allowed[i], step)

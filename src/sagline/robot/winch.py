@@ -124,7 +124,7 @@ class Winch:
         position_gain: k_p of the drive's position loop, at the cable [1/s].
         speed_gain: k_v of its speed loop, at the cable [N s/m].
         integral_gain: k_i of its speed loop, at the cable [N/m].
-        load_cell_range: Largest tension that the load cell reads [N].
+        load_cell_range: Largest value that the load cell reads [N].
         load_cell_deviation: Standard deviation of a reading [N], >= 0.
         load_cell_bias: What it reads without load [N].
         load_cell_gain: What it reads of a newton.

@@ -1,0 +1,85 @@
+"""Homing: what load cells read, and what no cable can have."""
+
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from tests.kinematics.winches import wound
+
+POSE = sl.Pose.from_euler([1.0, 1.0, 2.0], 0.0, 0.0, 0.0)
+
+
+def refused(robot: sl.Robot, reading: Any, pose: sl.Pose = POSE, **more: Any) -> str:
+    with pytest.raises(sl.InvalidValueError) as caught:
+        sl.home(robot, pose, reading, **more)
+    text = str(caught.value)
+    assert len(text) < 300
+    return text
+
+
+def test_a_reading_is_less_its_bias_and_over_its_gain() -> None:
+    rng = np.random.default_rng(3)
+    bias, gain = rng.uniform(-30.0, 30.0, 8), rng.uniform(0.8, 1.2, 8)
+    robot = wound(load_cell_bias=bias, load_cell_gain=gain, load_cell_range=2e3)
+    plan = sl.inverse(robot, POSE)
+    zeroed = sl.home(robot, POSE, gain * plan.state.cables.frame_end_tension + bias, 77.0)
+    np.testing.assert_array_equal(sl.encoder_counts(sl.inverse(zeroed, POSE)), np.full(8, 77.0))
+    np.testing.assert_allclose(sl.lengths_from_counts(zeroed, np.full(8, 77.0)), plan.unstrained_length, rtol=1e-12)
+
+
+def test_a_load_cell_reads_no_more_than_its_range() -> None:
+    reading = np.full(8, 500.0)
+    reading[2] = 1000.1
+    robot = wound(load_cell_range=1000.0)
+    assert "cable 2: frame_end_tension is 1000.1 N; allowed: <= 1000 N, its load_cell_range" in refused(robot, reading)
+    reading[2] = 1000.0
+    sl.home(robot, POSE, reading)
+
+
+def test_a_tension_is_positive_after_the_bias() -> None:
+    assert "cable 0: frame_end_tension is -1 N; allowed: > 0 N." in refused(wound(), -1.0)
+    told = refused(wound(load_cell_bias=[0.0, 20.0] * 4), [500.0, 20.0] * 4)
+    assert "cable 1: frame_end_tension is 20 N; allowed: > 20 N, its load_cell_bias" in told
+
+
+def test_nothing_holds_half_of_its_length_again() -> None:
+    robot = wound(load_cell_gain=2.0, load_cell_bias=10.0)
+    most = robot.cables.axial_stiffness[0]  # half of it, times a gain of two
+    told = refused(robot, 1.01 * most + 10.0)
+    assert f"allowed: <= {most + 10.0:.6g} N, where it is 50% longer" in told
+    assert "Correct the reading, its unit, or axial_stiffness" in told
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.1])
+@pytest.mark.parametrize("density", [0.5, 5.0])
+def test_the_least_tension_is_told_and_will_do(radius: float, density: float) -> None:
+    robot = wound(cable_length=40.0, pulley_radius=radius, load_cell_gain=2.0, load_cell_bias=3.0)
+    robot = robot.replace(cables=robot.cables.replace(linear_density=density))
+    told = refused(robot, [4.0] + [1e4] * 7)
+    assert "cable 0: frame_end_tension is 4 N" in told
+    least = float(re.findall(r"allowed: >= (\S+) N there", told)[0])
+    sl.home(robot, POSE, [least] + [1e4] * 7)
+    refused(robot, [0.98 * least] + [1e4] * 7)
+    # the least of all catenaries between the two ends
+    chords = POSE.transform(robot.platform_anchors) - robot.frame_anchors
+    span, rise, all_tensions = np.hypot(*chords.T[:2]), chords[:, 2], np.geomspace(1.0, 1e4, 3000)[:, None]
+    states = sl.Catenary().from_tension(robot.cables, span, rise, all_tensions, robot.gravity)
+    assert (least - 3.0) / 2.0 == pytest.approx(np.nanmin(states.frame_end_tension[:, 0]), rel=0.015)
+
+
+def test_an_end_inside_a_pulley_is_told_as_that() -> None:
+    robot = wound(pulley_radius=0.3)
+    inside = robot.frame_anchors[4] + [0.2, 0.0, 0.0] - robot.platform_anchors[4]
+    with pytest.raises(sl.CableGeometryError, match="cable 4: its platform end is inside its pulley"):
+        sl.home(robot, sl.Pose(inside, np.eye(3)), 500.0)
+    there = robot.frame_anchors[4] - robot.platform_anchors[4]
+    with pytest.raises(sl.CableGeometryError, match="cable 4: distance between its ends is 0 m"):
+        sl.home(wound(), sl.Pose(there, np.eye(3)), 500.0)
+
+
+def test_no_more_is_off_a_drum_than_there_is() -> None:
+    told = refused(wound(cable_length=[28.0] * 7 + [8.0]), 500.0)
+    assert re.search(r"cable 7: length off its drum at the pose is \d+\.\d* m; allowed: <= 8 m, its cable_length", told)
