@@ -34,7 +34,7 @@ def counts() -> Iterator[Row]:
     there = best_seconds(lambda: sl.lengths_from_counts(robot, given)) * 1e9 / COUNTS
     back = best_seconds(lambda: drums.counts(path)) * 1e9 / COUNTS
     yield Row(
-        "counts to lengths to counts, 10^6, four layers",
+        "a million counts to lengths to counts, four layers",
         "to one count; <= 100 ns each",
         f"{off:.0f} counts off at most; {there:.0f} ns there, {back:.0f} ns back",
     )

@@ -260,7 +260,7 @@ def test_ways_to_give_the_inertia(inertia: object, expected: object) -> None:
         ({"cables": {"linear_density": 1, "axial_stiffness": 1, "expansion": "1e-5"}, "mass": ...}, "mass is missing"),
         (
             {"winches": {"pulley_radius": "50 mm", "dead_cable": [1, 2]}},
-            "winches is 2 values; allowed: one value, or 3",
+            "winches: dead_cable is 2 values; allowed: one value, or 3",
         ),
         (
             {"winches": {"pulley_radius": [0.05, 0.05, 0.05], "dead_cable": [1, 2]}},
@@ -276,7 +276,7 @@ def test_ways_to_give_the_inertia(inertia: object, expected: object) -> None:
         ({"winches": {"swivel_axis": "sideways"}}, "swivel_axis is 'sideways'; allowed: up, down, or a vector"),
         ({"winches": {"swivel_axis": [0, 1, 1]}}, "winches: swivel_axis.*allowed: up or down.*not modeled"),
         ({"winches": {"swivel_axis": [0, 0, 0]}}, "winches: swivel_axis is the zero vector"),
-        ({"winches": {"swivel_axis": ["up", "down"]}}, "winches is 2 values"),
+        ({"winches": {"swivel_axis": ["up", "down"]}}, "winches: swivel_axis is 2 values"),
         ({"winches": {"dead_cable": 2, "dead_rise": [1, -3, 1]}}, "winches: dead_rise\\[1\\] is -3 m; allowed: within"),
         ({"winches": 3}, "winches is 3; allowed: keys pulley_radius"),
         ({"winches": []}, "winches is \\[\\]; allowed: keys pulley_radius"),

@@ -166,8 +166,8 @@ def test_the_field_with_too_few_values_for_a_robot_is_named(name: str) -> None:
     two, three = (0.2, 0.3) if name == "rolling_friction" else (2, 3)
     with pytest.raises(InvalidValueError, match=f"^winches: {name} is 7 values; allowed: one value, or 8, one a cable"):
         COGIRO.replace(winches=Winch(**beside, **other, **{name: [two, three, two, three, two, three, two]}))
-    with pytest.raises(InvalidValueError, match=f"^winches: .*{name}.* is 7 values; allowed: one value, or 8"):
-        COGIRO.replace(winches=Winch(**beside, **other, **{name: [two] * 7}))  # one of those that are not as usual
+    with pytest.raises(InvalidValueError, match=r"^winches is 7 values; allowed: one value, or 8"):
+        COGIRO.replace(winches=Winch(**beside, **other, **{name: [two] * 7}))  # nothing tells which it was
 
 
 def test_a_block_of_seven_winches_is_named_in_one_line() -> None:
@@ -199,7 +199,7 @@ def test_one_winch_is_spread_over_the_cables() -> None:
     assert spread.per_cable(3) is spread
     assert_same(Winch([0.05], drum_radius=0.06, swivel_axis=[0, 0, -1]).per_cable(3), spread)
     for count in (2, 4):
-        told = f"^winches: pulley_radius, swivel_axis, drum_radius is 3 values; allowed: one value, or {count}"
+        told = f"^winches is 3 values; allowed: one value, or {count}"
         with pytest.raises(InvalidValueError, match=told):
             spread.per_cable(count)
     for wrong in (0, -1, 2.5, True, 10**14):
@@ -245,9 +245,7 @@ def test_a_robot_takes_as_many_winches_as_cables() -> None:
     assert robot.winches is not None
     assert robot.winches.pulley_radius.tolist() == [0.05] * 8
     assert robot.replace(winches=None).winches is None
-    with pytest.raises(
-        InvalidValueError, match=r"^winches: pulley_radius is 7 values; allowed: one value, or 8, one a"
-    ):
+    with pytest.raises(InvalidValueError, match=r"^winches is 7 values; allowed: one value, or 8, one a"):
         COGIRO.replace(winches=Winch([0.05] * 7))
     with pytest.raises(InvalidValueError, match=r"^winches is 0\.05; allowed: a Winch"):
         COGIRO.replace(winches=0.05)

@@ -294,15 +294,11 @@ class Winch:
         )
 
     def _long(self) -> str:
-        """What has been given as one value a cable, for a message: what differs among them, or else from the default.
+        """What has surely been given as one value a cable, for a message: what differs among them.
 
         All fields have one shape, and do not know any more which of them had it first.
         """
-        known, default = self.known(), Winch()
-        differ = [name for name, field in known.items() if (field != field[0]).any()]
-        if not differ:
-            usual = {name: getattr(default, name) for name in known}
-            differ = [name for name, field in known.items() if usual[name] is None or (field != usual[name]).any()]
+        differ = [name for name, field in self.known().items() if (field != field[0]).any()]
         if not differ:
             return "winches"
         return f"winches: {', '.join(differ[:MOST_NAMED])}{', ...' if len(differ) > MOST_NAMED else ''}"
