@@ -222,6 +222,18 @@ def test_a_radius_that_vanishes_leaves_the_cable_at_its_anchor() -> None:
     np.testing.assert_allclose(errors, errors[0] * np.array([1.0, 1e-3, 1e-6]), rtol=2e-3)
 
 
+def test_what_a_first_pulley_would_do_is_known_without_one() -> None:
+    """By R at R = 0, of a robot without winches, against small pulleys at the same lengths: a one-sided difference."""
+    robot = sl.load_robot("cogiro")
+    plan, cable = sl.inverse(robot, POSE), np.eye(8)[2]
+    still, near, far = (
+        motion(robot.replace(winches=sl.Winch(radius * cable)), plan.unstrained_length) for radius in (0.0, 1e-5, 2e-5)
+    )
+    expected = (4.0 * near - far - 3.0 * still) / 2e-5
+    found = sl.stiffness(plan.state).pulley_radius_sensitivity[:, 2]
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-6 * np.abs(expected).max())
+
+
 def test_turned_and_moved_robots_need_the_same_lengths() -> None:
     robot = cogiro(WINCHES[1])
     turn, shift = Rotation.from_rotvec([0.0, 0.0, 0.7]), np.array([10.0, -5.0, 3.0])

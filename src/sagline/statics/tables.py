@@ -7,7 +7,7 @@ import numpy as np
 from sagline.arrays import Array, locked
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.robot.several import Robots, first_of
+from sagline.robot.several import Robots, first_of, pulleys_of
 
 
 def cable_table(robot: Robots) -> Array:
@@ -77,8 +77,6 @@ def _cable_rows(robot: Robot) -> Array:
 
 def _behind(robot: Robot) -> Array:
     """What stands behind the frame anchors: pulley radius, entry, dead cable and its rise, (m, 4)."""
-    if robot.winches is None:
-        return np.zeros((robot.cable_count, 4))
-    winches = robot.winches
-    entry = winches.swivel_axis[:, 2]
-    return np.stack((winches.pulley_radius, entry, winches.dead_cable, winches.dead_rise), axis=1)
+    none = np.zeros(robot.cable_count)
+    run = (none, none) if robot.winches is None else (robot.winches.dead_cable, robot.winches.dead_rise)
+    return np.stack((*pulleys_of(robot), *run), axis=1)
