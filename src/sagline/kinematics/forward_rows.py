@@ -27,7 +27,7 @@ from sagline.kernels.forward.problem import (
 from sagline.kernels.memory import memory_for
 from sagline.kinematics.forward_solution import ForwardSolution
 from sagline.kinematics.forward_status import STABLE
-from sagline.kinematics.hung import hung
+from sagline.kinematics.hung import hung_cables
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.several import Robots, anything_behind, first_of
@@ -142,7 +142,7 @@ class Found(NamedTuple):
         pose = Pose._adopt(self.poses[:, :3].reshape(*shape, 3), self.poses[:, 3:].reshape(*shape, 4))
         whole = locked(np.ascontiguousarray(np.broadcast_to(load, (*shape, 6))))
         residuals = self.numbers[:, [FORCE_RESIDUAL, MOMENT_RESIDUAL]]
-        cables, contact = hung(robot, model, self.results, self.cable_status, shape)
+        cables, contact = hung_cables(robot, model, self.results, self.cable_status, shape)
         return ForwardSolution(
             state=Equilibrium(robot, pose, whole, cables, contact),
             status=locked(self.pose_status.reshape(shape)),

@@ -11,7 +11,7 @@ from sagline.robot.contact import Contact
 from sagline.robot.several import Robots, anything_behind, cables_of, first_of
 
 
-def hung(
+def hung_cables(
     robot: Robots, model: CableModel, results: Array, status: Codes, shape: tuple[int, ...]
 ) -> tuple[CableState, Contact | None]:
     """The cables of solved poses.

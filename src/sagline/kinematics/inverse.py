@@ -16,7 +16,7 @@ from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
 from sagline.kernels import codes
-from sagline.kinematics.hung import hung
+from sagline.kinematics.hung import hung_cables
 from sagline.kinematics.inverse_rows import decide_rows, solve_rows
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.winding import Winding, checked_winding
@@ -116,7 +116,7 @@ def inverse(
     direction = None if turning is None else checked_winding(turning, pose.shape, shared.cable_count)
 
     def hanging() -> Equilibrium:
-        cables, contact = hung(robots, model, found.results, found.cable_status, pose.shape)
+        cables, contact = hung_cables(robots, model, found.results, found.cable_status, pose.shape)
         return with_behind(Equilibrium(robots, pose, whole, cables, contact), direction)
 
     state = hanging()

@@ -6,7 +6,7 @@ import numpy as np
 
 from sagline.arrays import Array, Flags, Indices, locked
 from sagline.kernels import tables
-from sagline.kinematics.hung import hung
+from sagline.kinematics.hung import hung_cables
 from sagline.kinematics.instants import Instant, Instants, instants
 from sagline.kinematics.inverse_rows import Found, solve_rows
 from sagline.kinematics.tension_rate import closest_rates, placed
@@ -95,7 +95,7 @@ def _off_the_drums(state: Equilibrium, moment: Instant, found: Found) -> Array:
     if state.contact is None:
         lengths: Array = found.results[tables.LENGTH]
         return lengths
-    cables, contact = hung(state.robot, state.cables.model, found.results, found.cable_status, state.pose.shape)
+    cables, contact = hung_cables(state.robot, state.cables.model, found.results, found.cable_status, state.pose.shape)
     there = Equilibrium(state.robot, moment.pose, moment.wrench, cables, contact)
     return with_behind(there, state.contact.winding).unstrained_length
 

@@ -10,7 +10,7 @@ from sagline.cables.model import CableModel
 from sagline.kernels import codes
 from sagline.kernels.forward.problem import ENERGY
 from sagline.kinematics.forward_rows import BLOCK, Found, solve_rows
-from sagline.kinematics.hung import hung as hung_cables
+from sagline.kinematics.hung import hung_cables
 from sagline.robot.equilibrium import limited_tension
 from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.pose import Pose

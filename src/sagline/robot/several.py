@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -188,13 +188,7 @@ def bodies_of(robot: Robots) -> Bodies:
     Returns:
         Bodies, with a leading axis N for several robots.
     """
-    if isinstance(robot, Robot):
-        return Bodies(np.asarray(robot.mass), robot.center_of_mass, robot.inertia)
-    return Bodies(
-        np.array([one.mass for one in robot]),
-        np.stack([one.center_of_mass for one in robot]),
-        np.stack([one.inertia for one in robot]),
-    )
+    return Bodies(*_each(robot, lambda one: (np.asarray(one.mass), one.center_of_mass, one.inertia)))
 
 
 class Anchors(NamedTuple):
@@ -218,13 +212,11 @@ def anchors_of(robot: Robots) -> Anchors:
     Returns:
         Anchors, with a leading axis N for several robots.
     """
-    if isinstance(robot, Robot):
-        return Anchors(robot.frame_anchors, robot.platform_anchors)
-    return Anchors(np.stack([one.frame_anchors for one in robot]), np.stack([one.platform_anchors for one in robot]))
+    return Anchors(*_each(robot, lambda one: (one.frame_anchors, one.platform_anchors)))
 
 
 class Pulleys(NamedTuple):
-    """The pulleys of the cables; of radius 0 where there are none.
+    """The pulleys of the cables; of radius 0, and entered from below, where there are none.
 
     Attributes:
         radius: R [m], shape (m,) or, for several robots, (N, m).
@@ -244,12 +236,13 @@ def pulleys_of(robot: Robots) -> Pulleys:
     Returns:
         Pulleys, with a leading axis N for several robots.
     """
-    if isinstance(robot, Robot):
-        if robot.winches is None:
-            return Pulleys(np.zeros(robot.cable_count), np.ones(robot.cable_count))
-        return Pulleys(robot.winches.pulley_radius, robot.winches.swivel_axis[:, 2])
-    each = [pulleys_of(one) for one in robot]
-    return Pulleys(np.stack([one.radius for one in each]), np.stack([one.entry for one in each]))
+
+    def own(one: Robot) -> tuple[Array, ...]:
+        if one.winches is None:
+            return np.zeros(one.cable_count), np.ones(one.cable_count)
+        return one.winches.pulley_radius, one.winches.swivel_axis[:, 2]
+
+    return Pulleys(*_each(robot, own))
 
 
 class Limits(NamedTuple):
@@ -273,9 +266,14 @@ def limits_of(robot: Robots) -> Limits:
     Returns:
         Limits, with a leading axis N for several robots.
     """
+    return Limits(*_each(robot, lambda one: (one.tension_min, one.tension_max)))
+
+
+def _each(robot: Robots, own: Callable[[Robot], tuple[Array, ...]]) -> tuple[Array, ...]:
+    """Arrays of a robot as they are; those of several robots stacked, with a leading axis N."""
     if isinstance(robot, Robot):
-        return Limits(robot.tension_min, robot.tension_max)
-    return Limits(np.stack([one.tension_min for one in robot]), np.stack([one.tension_max for one in robot]))
+        return own(robot)
+    return tuple(np.stack(arrays) for arrays in zip(*(own(one) for one in robot), strict=True))
 
 
 def _check_alike(first: Robot, other: Robot, index: int) -> None:
