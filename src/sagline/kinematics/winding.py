@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from typing import Final, Literal
 
 import numpy as np
@@ -99,7 +100,7 @@ def settled(
         The answers; NOT_CONVERGED where that does not settle, or a cable is too slack to hang between its guides.
     """
     more = np.zeros(lengths.shape) if taken is None else taken.copy()
-    past: list[tuple[Array, Array]] = []  # what was taken, and what it missed
+    past: deque[tuple[Array, Array]] = deque(maxlen=MEMORY)  # what was taken, and what it missed
     still = np.flatnonzero(~np.isin(found.pose_status, _OPEN))
     for _ in range(ROUNDS):
         if not still.size:
@@ -112,7 +113,7 @@ def settled(
         moving = (np.abs(missed) > SETTLED * lengths[still]).any(axis=1)
         whole = np.zeros(lengths.shape)
         whole[still] = missed
-        mixed = more[still] + _mixed(more[still], missed, [(x[still], f[still]) for x, f in past[-MEMORY:]])
+        mixed = more[still] + _mixed(more[still], missed, [(x[still], f[still]) for x, f in past])
         past.append((more.copy(), whole))
         given = lengths[still] - mixed
         lost = np.where(moving, ~(given > 0.0).all(axis=1), slack.any(axis=1))
