@@ -41,7 +41,7 @@ def compiling(function: Any, types: Any = ()) -> Any:
 def test_an_entry_is_compiled_when_its_machine_code_is_there(
     tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("sagline.kernels.jit.FOLDER", tmp_path)
+    monkeypatch.setattr("sagline.kernels.jit.folder_of", lambda _: tmp_path)
     (tmp_path / "inverse").mkdir()
     for name in ("poses.inverse_poses-35.py311.nbi", "poses.inverse_poses_too-35.py311.1.nbc", "other.nbc"):
         (tmp_path / "inverse" / name).touch()

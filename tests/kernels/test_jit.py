@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import shutil
 from pathlib import Path
 from typing import Any, cast
@@ -13,46 +14,55 @@ from sagline.kernels import jit
 
 
 @pytest.fixture
-def copy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The kernels' sources once more, as if they were the ones in use."""
+def copy(tmp_path: Path) -> Path:
+    """The kernels' sources once more."""
     copy = tmp_path / "kernels"
-    shutil.copytree(Path(jit.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
-    monkeypatch.setattr(jit, "__file__", str(copy / "jit.py"))
+    shutil.copytree(jit.SOURCES, copy, ignore=shutil.ignore_patterns("__pycache__"))
     return copy
 
 
-def test_the_cache_folder_follows_the_sources(copy: Path) -> None:
+def test_the_cache_folder_follows_all_sources_that_are_compiled(copy: Path) -> None:
     """An edited callee in another file must not run stale machine code: its folder has another name."""
-    assert jit.cache_folder() == jit.FOLDER
-    for nested in ("codes.py", "algebra/hyperbolic.py", "sharing/polygon.py"):
-        before = jit.cache_folder()
+    assert jit.cache_folder("inverse.poses", copy) == jit.cache_folder("inverse.poses")
+    for nested in ("codes.py", "jit.py", "algebra/hyperbolic.py", "sharing/polygon.py", "inverse/poses.py"):
+        before = jit.cache_folder("inverse.poses", copy)
         with (copy / nested).open("a") as stream:
             stream.write("# edited\n")
-        assert jit.cache_folder() != before
+        assert jit.cache_folder("inverse.poses", copy) != before
 
 
-def test_the_cache_folder_follows_files_that_come_go_and_move(copy: Path) -> None:
-    names = [jit.cache_folder()]
-    (copy / "algebra" / "new.py").write_text("# new\n")
-    names.append(jit.cache_folder())
-    (copy / "algebra" / "new.py").rename(copy / "sharing" / "new.py")
-    names.append(jit.cache_folder())
-    (copy / "sharing" / "new.py").rename(copy / "sharing" / "other.py")
-    names.append(jit.cache_folder())
-    assert len(set(names)) == 4
-    (copy / "sharing" / "other.py").unlink()
-    assert jit.cache_folder() == names[0]
-    (copy / "algebra" / "notes.txt").write_text("no source\n")
-    assert jit.cache_folder() == names[0]
+def test_the_cache_folder_stays_where_another_kernel_is_edited(copy: Path) -> None:
+    for nested in ("forward/newton.py", "inverse/verdicts.py"):
+        with (copy / nested).open("a") as stream:
+            stream.write("# edited\n")
+    assert jit.cache_folder("inverse.poses", copy) == jit.cache_folder("inverse.poses")
+    assert jit.cache_folder("forward.forward", copy) != jit.cache_folder("forward.forward")
+
+
+def test_nothing_that_a_kernel_imports_is_overlooked() -> None:
+    """By Python's own reading of the sources: every import of a kernel is a `from` at the beginning of a line."""
+    for file in jit.SOURCES.rglob("*.py"):
+        expected = {file}
+        for node in ast.walk(ast.parse(file.read_text())):
+            if isinstance(node, ast.Import):
+                assert not any(alias.name.startswith("sagline") for alias in node.names), file
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(jit.KERNELS):
+                module = (node.module or "").removeprefix(jit.KERNELS).lstrip(".")
+                for name in (module, *(f"{module}.{alias.name}".lstrip(".") for alias in node.names)):
+                    source = jit.SOURCES.joinpath(*name.split(".")).with_suffix(".py")
+                    expected |= {source} if source.is_file() else set()
+            assert not (isinstance(node, ast.ImportFrom) and node.level), file
+        module = ".".join(file.relative_to(jit.SOURCES).with_suffix("").parts)
+        assert expected <= jit.sources_of(module, jit.SOURCES), file
 
 
 def test_the_cache_folder_can_be_chosen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    assert jit.cache_folder().parent == tmp_path
+    assert jit.base_folder().parent == tmp_path
 
 
 def test_other_users_of_numba_keep_their_cache_folder() -> None:
-    assert str(jit.FOLDER) != getattr(numba.config, "CACHE_DIR")  # noqa: B009
+    assert not str(getattr(numba.config, "CACHE_DIR")).startswith(str(jit.FOLDER))  # noqa: B009
 
 
 def test_an_entry_is_compiled_when_its_own_machine_code_is_there(
@@ -60,7 +70,7 @@ def test_an_entry_is_compiled_when_its_own_machine_code_is_there(
 ) -> None:
     from sagline.kernels.cable.batch import batch_end
 
-    monkeypatch.setattr(jit, "FOLDER", tmp_path)
+    monkeypatch.setattr(jit, "folder_of", lambda _: tmp_path)
     (tmp_path / "cable").mkdir()
     (tmp_path / "cable" / "batch.batch_from_length-9.py311.1.nbc").touch()  # another's
     assert not jit.is_compiled(batch_end)

@@ -1,14 +1,16 @@
 """How a kernel is compiled, and where the machine code is kept.
 
-numba does not notice that a function called from another file was edited and would go on
-running stale machine code. The cache folder is therefore named by a hash of all kernel sources.
+numba does not notice that a function called from another file was edited and would go on running stale machine code.
+What a file's kernels become is therefore kept in a folder named by a hash of that file and of all that it imports.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
+import re
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -17,19 +19,67 @@ from platformdirs import user_cache_path
 
 F = TypeVar("F", bound=Callable[..., object])
 
+KERNELS = __name__.rpartition(".")[0]
+SOURCES = Path(__file__).parent
+# `from sagline.kernels.algebra import angle, cholesky`, names in parentheses too
+IMPORT = re.compile(rf"^from {re.escape(KERNELS)}\.?([\w.]*) import (\([^)]*\)|.*)$", re.MULTILINE)
 
-def cache_folder() -> Path:
-    """Folder of the compiled kernels: below NUMBA_CACHE_DIR if set, else below the user's cache folder."""
-    digest = hashlib.sha256()
-    kernels = Path(__file__).parent
-    for source in sorted(kernels.rglob("*.py")):
-        digest.update(source.relative_to(kernels).as_posix().encode() + b"\0" + source.read_bytes())
+
+def base_folder() -> Path:
+    """Folder of all compiled kernels: below NUMBA_CACHE_DIR if set, else below the user's cache folder."""
     chosen = os.environ.get("NUMBA_CACHE_DIR")
-    base = Path(chosen) if chosen else user_cache_path("sagline")
-    return base / f"kernels-{digest.hexdigest()[:16]}"
+    return (Path(chosen) if chosen else user_cache_path("sagline")) / "kernels"
 
 
-FOLDER = cache_folder()
+FOLDER = base_folder()
+
+
+def sources_of(module: str, sources: Path) -> frozenset[Path]:
+    """The files that a kernel's machine code is made of, below the folder of the kernels.
+
+    Args:
+        module: Name of its module, below `sagline.kernels`.
+        sources: That folder.
+    """
+    waiting, found = {module}, set[Path]()
+    while waiting:
+        name = waiting.pop()
+        file = sources.joinpath(*name.split(".")).with_suffix(".py")
+        if file not in found and file.is_file():
+            found.add(file)
+            waiting.update(_imported(file.read_text(encoding="utf-8")))
+    return frozenset(found)
+
+
+@cache
+def _imported(source: str) -> frozenset[str]:
+    """Names of what a file imports of the kernels: modules, and what is in them, which is no file."""
+    names = set()
+    for match in IMPORT.finditer(source):
+        package = match[1]
+        names.add(package)
+        names.update(f"{package}.{name}".lstrip(".") for name in re.findall(r"(\w+)(?: as \w+)?", match[2]))
+    return frozenset(names)
+
+
+def cache_folder(module: str, sources: Path = SOURCES) -> Path:
+    """Folder of the machine code of a module's kernels.
+
+    Args:
+        module: Name of the module, below `sagline.kernels`.
+        sources: Folder of the kernels.
+    """
+    digest = hashlib.sha256()
+    # a kernel from elsewhere, a benchmark's, may call any
+    for source in sorted(sources_of(module, sources) or sources.rglob("*.py")):
+        digest.update(source.relative_to(sources).as_posix().encode() + b"\0" + source.read_bytes())
+    return FOLDER / digest.hexdigest()[:16]
+
+
+@cache
+def folder_of(function_module: str) -> Path:
+    """The same for a function's module, which stays what it is while the program runs."""
+    return cache_folder(function_module.removeprefix(f"{KERNELS}."))
 
 
 def entry(function: F) -> F:
@@ -63,7 +113,7 @@ def _compiled(function: F, **options: Any) -> F:
     """
     # numba reads its cache folder while it decorates: set for that moment only, other users of numba keep theirs.
     before = getattr(config, "CACHE_DIR")  # noqa: B009 - set by numba at run time, unknown to type checkers
-    setattr(config, "CACHE_DIR", str(FOLDER))  # noqa: B010
+    setattr(config, "CACHE_DIR", str(folder_of(function.__module__)))  # noqa: B010
     every: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
     try:
         return cast("F", njit(**{**every, **options})(function))
@@ -86,4 +136,4 @@ def machine_code(compiled: Callable[..., object], arguments: tuple[object, ...])
 def is_compiled(function: Callable[..., object], versions: int = 1) -> bool:
     """Whether the machine code of an entry is on disk, in at least so many versions for different types."""
     name = f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}"
-    return sum(1 for _ in FOLDER.rglob(f"{name}-*.nbc")) >= versions
+    return sum(1 for _ in folder_of(function.__module__).rglob(f"{name}-*.nbc")) >= versions
