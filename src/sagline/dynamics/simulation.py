@@ -1,0 +1,92 @@
+"""A motion of the robot in time, as it was integrated."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+
+from sagline.arrays import Array
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EnergyBalance:
+    """Where the energy of a simulation is [J]; each of shape (N,).
+
+    Attributes:
+        kinetic: Of platform, cables and drums.
+        potential: Of weight and of strain and height of the cables off the drums, frame ends and the origin at zero.
+        supplied: Work done on the robot since the start: winches, given forces, wind.
+        lost: Work done by damping and friction since the start, and strain that slipped on drums.
+        error: kinetic + potential - supplied + lost, less its value at the start: what the integrator invents.
+    """
+
+    kinetic: Array
+    potential: Array
+    supplied: Array
+    lost: Array
+    error: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Occurrence:
+    """Something that happened to the robot while it moved.
+
+    Attributes:
+        time: When [s].
+        kind: "break", "stall", "brake", "drop", "pick up", "saturate", "slack" ...
+        cable: Which cable or winch, or None where it is the platform's.
+        tension_before: Largest tension of that cable, or of all, before it [N].
+        tension_after: Largest tension of any cable after it, to the end or the next [N].
+    """
+
+    time: float
+    kind: str
+    cable: int | None
+    tension_before: float
+    tension_after: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Simulation:
+    """Result of `simulate`: N samples of a motion.
+
+    Attributes:
+        robot: The robot.
+        time: [s], shape (N,).
+        pose: Poses of the platform, a batch of N.
+        twist: Velocity of the center of mass and angular velocity, world axes [m/s, rad/s], shape (N, 6).
+        tensions: At the frame ends [N], shape (N, m).
+        length: Unstrained lengths off the drum [m], shape (N, m).
+        energy: Where the energy is.
+        events: What happened, in order.
+        cable_mass: "none", "lumped" or "modal".
+        step: Of the integrator [s].
+        nodes: Position of every cable at its nodes, world axes [m], shape (N, m, P, 3); None without cable mass.
+    """
+
+    robot: Robot
+    time: Array
+    pose: Pose
+    twist: Array
+    tensions: Array
+    length: Array
+    energy: EnergyBalance
+    events: tuple[Occurrence, ...]
+    cable_mass: str
+    step: float
+    nodes: Array | None = None
+
+    def save(self, file: FilePath | str) -> None:
+        """Write the simulation to a NetCDF file, whole or not at all, with units and the robot inside.
+
+        Args:
+            file: The file, "sim.nc" for instance; one that exists is replaced. `load_simulation` reads it.
+
+        Raises:
+            FileError: If the file cannot be written; what was there before is untouched.
+        """
+        from sagline.files.simulation_file import save_simulation  # the one call outward
+
+        save_simulation(self, file)

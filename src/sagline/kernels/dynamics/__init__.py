@@ -1,0 +1,1 @@
+"""Kernels of cables with mass and of motion in time."""
