@@ -23,6 +23,7 @@ RINGS = {  # package -> title and opening line of its page of reference
     "robot": ("Robots", "Where cables are fixed, what they carry, and where the platform is."),
     "motion": ("Motion", "Paths of the platform."),
     "kinematics": ("Kinematics", "From motion to lengths, from lengths to the pose, and the proof of a plan."),
+    "dynamics": ("Dynamics", "How the robot vibrates and moves."),
     "tension": ("Tension", "How redundant cables share the load."),
     "statics": ("Statics", "Structure matrix, wrenches, stiffness."),
     "article": ("Identification", "Constants of cables and of the empirical model, from measurements."),

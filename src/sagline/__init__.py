@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from sagline.cables.parabolic import Parabolic
     from sagline.cables.status import CableStatus
     from sagline.cables.straight import Straight
+    from sagline.dynamics.simulation import EnergyBalance, Occurrence, Simulation
     from sagline.errors import CableGeometryError, FileError, InvalidValueError, SaglineError, SaglineWarning
     from sagline.files.caspr import load_caspr
     from sagline.files.imported import Imported
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from sagline.files.path_file import load_path
     from sagline.files.plan_file import load_plan, save_plan
     from sagline.files.robot_file import dump_robot, load_robot
+    from sagline.files.simulation_file import load_simulation
     from sagline.files.wirex import load_wirex
     from sagline.kinematics.confirm import Confirmation, confirm
     from sagline.kinematics.encoder import encoder_counts, lengths_from_counts
@@ -93,6 +95,7 @@ __all__ = [
     "Elastic",
     "Empirical",
     "EmpiricalFit",
+    "EnergyBalance",
     "Equilibria",
     "Equilibrium",
     "FileError",
@@ -111,6 +114,7 @@ __all__ = [
     "MeasuredTension",
     "MinimumNorm",
     "Modes",
+    "Occurrence",
     "PNorm",
     "Parabolic",
     "Path",
@@ -125,6 +129,7 @@ __all__ = [
     "SaglineError",
     "SaglineWarning",
     "Side",
+    "Simulation",
     "Stiffness",
     "Straight",
     "TensionMethod",
@@ -153,6 +158,7 @@ __all__ = [
     "load_path",
     "load_plan",
     "load_robot",
+    "load_simulation",
     "load_wirex",
     "modes",
     "path_from_samples",
@@ -188,6 +194,7 @@ _HOMES = {
     "Elastic": "sagline.cables.elastic",
     "Empirical": "sagline.cables.empirical",
     "EmpiricalFit": "sagline.article.identify",
+    "EnergyBalance": "sagline.dynamics.simulation",
     "Equilibria": "sagline.kinematics.equilibria",
     "Equilibrium": "sagline.robot.equilibrium",
     "FileError": "sagline.errors",
@@ -206,6 +213,7 @@ _HOMES = {
     "MeasuredTension": "sagline.kinematics.measured",
     "MinimumNorm": "sagline.tension.minimum_norm",
     "Modes": "sagline.statics.stiffness",
+    "Occurrence": "sagline.dynamics.simulation",
     "PNorm": "sagline.tension.p_norm",
     "Parabolic": "sagline.cables.parabolic",
     "Path": "sagline.motion.path",
@@ -220,6 +228,7 @@ _HOMES = {
     "SaglineError": "sagline.errors",
     "SaglineWarning": "sagline.errors",
     "Side": "sagline.tension.polygon",
+    "Simulation": "sagline.dynamics.simulation",
     "Stiffness": "sagline.statics.stiffness",
     "Straight": "sagline.cables.straight",
     "TensionMethod": "sagline.tension.method",
@@ -247,6 +256,7 @@ _HOMES = {
     "load_path": "sagline.files.path_file",
     "load_plan": "sagline.files.plan_file",
     "load_robot": "sagline.files.robot_file",
+    "load_simulation": "sagline.files.simulation_file",
     "load_wirex": "sagline.files.wirex",
     "modes": "sagline.statics.stiffness",
     "path_from_samples": "sagline.motion.sampled",

@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 
 import sagline as sl
 from sagline.robot.winch import RULES
+from tests.files.simulations import a_simulation
 from tests.kinematics.winches import wound
 
 MAGIC = ("__getitem__",)  # of the methods with two underscores: those that a caller gives something
@@ -72,7 +73,8 @@ def _of_class(name: str, kind: type) -> set[str]:
 # made by sagline
 RESULTS = frozenset(
     {"CableFit", "CableState", "Confirmation", "EmpiricalFit", "Equilibria", "Equilibrium", "ForwardSolution"}
-    | {"Imported", "Modes", "Plan", "Stiffness", "TensionPolygon", "WinchRates"}
+    | {"EnergyBalance", "Imported", "Modes", "Occurrence", "Plan", "Simulation", "Stiffness", "TensionPolygon"}
+    | {"WinchRates"}
 )
 # asked by sagline itself, with numbers of its own
 INTERNAL = frozenset({"TensionMethod.preference", "QuadraticProgram.preference"})
@@ -476,6 +478,8 @@ def _files(given: _Given) -> dict[str, Call]:
     folder, cable = given.folder, ("one", given.cable, True)
     names = {name: str(folder / name) for name in ("run.nc", "robot.yaml", "path.csv", "cable.csv", "robot.wcrfx")}
     given.run.save(names["run.nc"])
+    simulation = a_simulation()
+    simulation.save(folder / "sim.nc")
     Path(names["robot.yaml"]).write_text(sl.dump_robot(given.robot), encoding="utf-8")
     Path(names["path.csv"]).write_text("time,x,y,z\n0,0,0,1\n1,1,0,1\n", encoding="utf-8")
     Path(names["cable.csv"]).write_text("span,rise,length,tension\n10,1,10.1,100\n", encoding="utf-8")
@@ -486,6 +490,8 @@ def _files(given: _Given) -> dict[str, Call]:
         "Plan.save": Call(given.run.save, _all(file=("file", str(folder / "saved.nc")))),
         "save_plan": Call(sl.save_plan, _all(plan=("one", given.run), file=("file", str(folder / "saved.nc")))),
         "load_plan": Call(sl.load_plan, _all(file=("file", names["run.nc"]))),
+        "Simulation.save": Call(simulation.save, _all(file=("file", str(folder / "saved.nc")))),
+        "load_simulation": Call(sl.load_simulation, _all(file=("file", str(folder / "sim.nc")))),
         "load_robot": Call(sl.load_robot, _all(name_or_path=("file", names["robot.yaml"]))),
         "load_path": Call(sl.load_path, _all(file=("file", names["path.csv"]))),
         "load_measurements": Call(sl.load_measurements, _all(file=("file", names["cable.csv"]))),

@@ -1,56 +1,13 @@
 """Plan files with flipped bits, holes, cuts and foreign pieces: an error or the same plan, never other numbers."""
 
-import time
-import warnings
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import sagline as sl
+from tests.abuse.damage import DAMAGES, Damage, unlike_after
 from tests.files.plans import a_plan, assert_same
-
-SLOWEST = 2.0  # s of this process alone: others may share the machine
-LONGEST = 300  # letters of a message, which is one line
-Damage = Callable[[bytearray, np.random.Generator], None]
-
-
-def flip(content: bytearray, rng: np.random.Generator) -> None:
-    bit = int(rng.integers(8 * len(content)))
-    content[bit // 8] ^= 1 << bit % 8
-
-
-def overwrite(content: bytearray, rng: np.random.Generator) -> None:
-    first, size = int(rng.integers(len(content))), int(rng.integers(1, 4096))
-    last = min(len(content), first + size)
-    content[first:last] = rng.bytes(last - first)
-
-
-def blank(content: bytearray, rng: np.random.Generator) -> None:
-    """A sector that a disk has lost."""
-    first = int(rng.integers(len(content) // 512)) * 512
-    content[first : first + 512] = bytes(min(512, len(content) - first))
-
-
-def cut(content: bytearray, rng: np.random.Generator) -> None:
-    del content[int(rng.integers(len(content))) :]
-
-
-def take_out(content: bytearray, rng: np.random.Generator) -> None:
-    first = int(rng.integers(len(content)))
-    del content[first : first + int(rng.integers(1, 64))]
-
-
-def put_in(content: bytearray, rng: np.random.Generator) -> None:
-    first = int(rng.integers(len(content) + 1))
-    content[first:first] = rng.bytes(int(rng.integers(1, 64)))
-
-
-def swap(content: bytearray, rng: np.random.Generator) -> None:
-    """Two numbers that have changed places."""
-    one, other = (8 * int(k) for k in rng.integers(len(content) // 8, size=2))
-    content[one : one + 8], content[other : other + 8] = content[other : other + 8], content[one : one + 8]
 
 
 @pytest.fixture(scope="module")
@@ -66,37 +23,9 @@ def content(plan: sl.Plan, tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 
 @pytest.mark.parametrize("count", [30, pytest.param(2000, marks=pytest.mark.soak)])
-@pytest.mark.parametrize(
-    "damage", [flip, overwrite, blank, cut, take_out, put_in, swap], ids=lambda damage: damage.__name__
-)
+@pytest.mark.parametrize("damage", DAMAGES, ids=lambda damage: damage.__name__)
 def test_damage_does_not_change_a_value_silently(
     plan: sl.Plan, content: bytes, tmp_path: Path, damage: Damage, count: int
 ) -> None:
-    rng = np.random.default_rng(20)
-    file = tmp_path / "run.nc"
-    unlike = []
-    for k in range(count):
-        damaged = bytearray(content)
-        damage(damaged, rng)
-        file.write_bytes(damaged)
-        start = time.process_time()
-        loaded = loaded_or_refused(file)
-        if time.process_time() - start > SLOWEST:
-            unlike.append(f"case {k} took {time.process_time() - start:.1f} s")
-        if loaded is not None:
-            assert damaged == content, f"case {k} went unnoticed"
-            assert_same(plan, loaded)
-    assert unlike == []
-
-
-def loaded_or_refused(file: Path) -> sl.Plan | None:
-    """The plan, or None if there was one clear line instead."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")  # nothing is only hinted at
-        try:
-            return sl.load_plan(file)
-        except sl.SaglineError as error:
-            line = str(error).replace(str(file), file.name)
-            assert line.isprintable(), line
-            assert len(line) < LONGEST, line
-            return None
+    same = partial(assert_same, plan)
+    assert unlike_after(damage, count, content, tmp_path / "run.nc", sl.load_plan, same) == []

@@ -1,4 +1,4 @@
-"""Files in NetCDF into memory, once it is known that they are as they were written."""
+"""Data sets into files in NetCDF, whole or not at all, and back once it is known that they are as they were written."""
 
 from __future__ import annotations
 
@@ -6,13 +6,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from sagline.errors import FileError
+from sagline.files.content import Content
 from sagline.files.kinds import kind_of
-from sagline.files.seal import Seal, seal_of
+from sagline.files.seal import Seal, seal, seal_of
+from sagline.files.whole import written_whole
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
-AGAIN: Final = "Run sagline track again, or take the file from where it came."
 _BEGIN: Final = b"\x89HDF\r\n\x1a\n"  # of every file in NetCDF-4
 _KINDS: Final = {
     **dict.fromkeys((".yaml", ".yml"), "a YAML file"),
@@ -20,13 +21,35 @@ _KINDS: Final = {
     **{f".{kind}": f"a {kind.upper()} file" for kind in ("csv", "json", "png", "svg")},
 }
 INFLATION = 1000  # times the size of a file that its numbers may take in memory: nobody packs them so well
+HEADERS: Final = 1 << 18  # bytes, more than all names and attributes take beside the robot
 
 
-def read_dataset(path: Path) -> tuple[Dataset, Seal]:
+def write_dataset(data: Dataset, file: Path) -> None:
+    """Write a data set, with a digest over all values and attributes at the end, behind what NetCDF reads.
+
+    Args:
+        data: The data set; one of its attributes is the robot.
+        file: The file; a regular file that exists is replaced, anything else is refused.
+
+    Raises:
+        FileError: If the file cannot be written; what was there before is untouched.
+    """
+    with written_whole(file, size=data.nbytes + HEADERS + len(data.attrs["robot"].encode())) as partial:
+        # _FillValue None: numbers are stored as they are, and NaN needs no second meaning
+        encoding = {str(name): {"_FillValue": None} for name in data.variables}
+        try:
+            data.to_netcdf(partial.absolute(), engine="h5netcdf", encoding=encoding)  # xarray takes ~ for the home
+        except RuntimeError as error:  # what h5py makes of a disk that fills up meanwhile
+            raise OSError(str(error)) from error
+        seal(partial)
+
+
+def read_dataset(path: Path, content: Content) -> tuple[Dataset, Seal]:
     """A whole file.
 
     Args:
         path: The file.
+        content: What it should be of, for the messages.
 
     Returns:
         What is in it, and whether it carries a digest: one that is wrong is refused before anything else is read.
@@ -34,11 +57,11 @@ def read_dataset(path: Path) -> tuple[Dataset, Seal]:
     Raises:
         FileError: If it is missing, no file, not readable, damaged, or no NetCDF file.
     """
-    found = _seal(path)
-    return _opened(path), found
+    found = _seal(path, content)
+    return _opened(path, content), found
 
 
-def _seal(path: Path) -> Seal:
+def _seal(path: Path, content: Content) -> Seal:
     """What a file's end says, before anything else in it is believed."""
     try:
         if kind := kind_of(path.stat().st_mode):  # opening a pipe would wait for its writer
@@ -50,11 +73,11 @@ def _seal(path: Path) -> Seal:
         reason = getattr(error, "strerror", None) or error
         raise FileError(path, f"cannot be read ({reason})", "Check its name and its permissions.") from None
     if found is Seal.BROKEN:
-        raise FileError(path, "is not as it was written: it was damaged or edited", AGAIN)
+        raise FileError(path, "is not as it was written: it was damaged or edited", content.again)
     return found
 
 
-def _opened(path: Path) -> Dataset:
+def _opened(path: Path, content: Content) -> Dataset:
     from h5py import File
     from xarray import open_dataset
 
@@ -67,14 +90,14 @@ def _opened(path: Path) -> Dataset:
                 raise ValueError(f"{size} bytes that say to hold {data.nbytes:.2g}")
             return data.load()
     except Exception as error:  # h5py, h5netcdf and xarray have no error of their own for a damaged file: any will do
-        raise FileError(path, *_cause(path)) from error
+        raise FileError(path, *_cause(path, content)) from error
 
 
-def _cause(path: Path) -> tuple[str, str]:
+def _cause(path: Path, content: Content) -> tuple[str, str]:
     """Why a file is none of ours, and what to do; what the libraries say of it is for those who know its format."""
     with path.open("rb") as file:
         begin = file.read(len(_BEGIN))
     if begin == _BEGIN:
-        return "is damaged, or was cut off", AGAIN
+        return "is damaged, or was cut off", content.again
     kind = _KINDS.get(path.suffix.lower(), "empty" if not begin else "another kind of file")
-    return f"is {kind}, no run of sagline track", "Give the .nc file that sagline track wrote."
+    return f"is {kind}, no {content.made}", content.give

@@ -6,7 +6,6 @@ import os
 import warnings
 from collections.abc import Mapping
 from dataclasses import fields
-from importlib.metadata import version
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -21,12 +20,12 @@ from sagline.cables.model import CableModel, CableState
 from sagline.cables.parabolic import Parabolic
 from sagline.cables.straight import Straight
 from sagline.errors import FileError, InvalidValueError, SaglineWarning
-from sagline.files.dataset import AGAIN, read_dataset
+from sagline.files.content import Content
+from sagline.files.dataset import read_dataset, write_dataset
 from sagline.files.plan_checks import check_plan
-from sagline.files.plan_layout import JERK, MACHINE, MOTION, PARTS, PROOF, QUANTITIES, TIME, WINDING, Quantity
+from sagline.files.plan_layout import JERK, MACHINE, MOTION, PROOF, QUANTITIES, TIME, WINDING
 from sagline.files.robot_file import dump_robot, parse_robot
-from sagline.files.seal import Seal, seal
-from sagline.files.whole import written_whole
+from sagline.files.variables import PARTS, Quantity
 from sagline.kinematics.plan import Plan
 from sagline.motion.path import Path
 from sagline.robot.contact import Contact
@@ -40,9 +39,15 @@ from sagline.tension.methods import METHODS
 if TYPE_CHECKING:
     from xarray import Dataset
 
-FORMAT = 2  # raised whenever an older sagline could misread the file; 2: with a digest
+CONTENT = Content(
+    name="plan",
+    made="run of sagline track",
+    give="Give the .nc file that sagline track wrote.",
+    again="Run sagline track again, or take the file from where it came.",
+    key="sagline_format",
+    format=2,  # 2: with a digest
+)
 MODELS = {model.__name__: model for model in (Straight, Elastic, Empirical, Parabolic, Catenary)}
-HEADERS = 1 << 18  # bytes, more than all names and attributes take beside the robot
 FREE = {"unstrained_length": "free_length", "chord_tension": "free_chord_tension"}  # of cables over pulleys
 STATE_ARRAYS = ("span", "rise", "unstrained_length", "horizontal_tension", "vertical_force", "chord_tension")
 
@@ -67,14 +72,7 @@ def save_plan(plan: Plan, file: os.PathLike[str] | str) -> None:
     """
     data = _dataset(instance(plan, Plan, "plan"))
     check_plan(data, plan.state.one_robot.cable_count)
-    with written_whole(file_path(file), size=data.nbytes + HEADERS + len(data.attrs["robot"].encode())) as partial:
-        # _FillValue None: numbers are stored as they are, and NaN needs no second meaning
-        encoding = {str(name): {"_FillValue": None} for name in data.variables}
-        try:
-            data.to_netcdf(partial.absolute(), engine="h5netcdf", encoding=encoding)  # xarray takes ~ for the home
-        except RuntimeError as error:  # what h5py makes of a disk that fills up meanwhile
-            raise OSError(str(error)) from error
-        seal(partial)
+    write_dataset(data, file_path(file))
 
 
 def load_plan(file: os.PathLike[str] | str) -> Plan:
@@ -102,8 +100,12 @@ def load_plan(file: os.PathLike[str] | str) -> Plan:
         cogiro (283, 8)
     """
     path = file_path(file)
-    data, found = read_dataset(path)
-    _check_format(path, data.attrs, found)
+    data, found = read_dataset(path, CONTENT)
+    if CONTENT.format_of(path, data.attrs) > 1:
+        CONTENT.check_sealed(path, found)
+    else:
+        text = f"{path} is from before plans carried a digest: damage to it need not show. Save it again to have one."
+        warnings.warn(text, SaglineWarning, stacklevel=2)
     try:
         return _plan(path, data, parse_robot(str(data.attrs["robot"]), f"{path}, robot"))
     except KeyError as error:
@@ -137,9 +139,7 @@ def _dataset(plan: Plan) -> Dataset:
 
 def _attributes(plan: Plan) -> dict[str, Any]:
     return {
-        "title": f"Cable lengths and tensions of {plan.state.one_robot.name}",
-        "source": f"sagline {version('sagline')}",
-        "sagline_format": FORMAT,
+        **CONTENT.attributes(f"Cable lengths and tensions of {plan.state.one_robot.name}"),
         **_written("model", plan.state.cables.model, MODELS),
         **_written("tension", plan.tension, METHODS),
         "robot": dump_robot(plan.state.one_robot),
@@ -173,28 +173,6 @@ def _plain(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else value
 
 
-def _check_format(path: FilePath, attributes: Mapping[str, Any], found_seal: Seal) -> None:
-    found = attributes.get("sagline_format")
-    if found is None:
-        raise FileError(
-            path, "is no plan of sagline, it names no sagline_format", "Check that this is the file you mean."
-        )
-    if not isinstance(found, int | np.integer) or found < 1:
-        raise FileError(path, f"is of format {found!r}, which never was", "Write it again; it was edited, or damaged.")
-    if found > FORMAT:
-        raise FileError(
-            path,
-            f"is of format {found}, written by {attributes.get('source')}; this is sagline {version('sagline')}, "
-            f"which reads up to {FORMAT}",
-            "Install a newer sagline.",
-        )
-    if found == 1:
-        text = f"{path} is from before plans carried a digest: damage to it need not show. Save it again to have one."
-        warnings.warn(text, SaglineWarning, stacklevel=3)
-    elif found_seal is Seal.MISSING:
-        raise FileError(path, "is not as it was written: its digest is missing", AGAIN)
-
-
 def _plan(path: FilePath, data: Dataset, robot: Robot) -> Plan:
     def values(name: str) -> Any:
         return locked(np.asarray(data[name].values, order="C"))
@@ -205,7 +183,7 @@ def _plan(path: FilePath, data: Dataset, robot: Robot) -> Plan:
     behind = MACHINE[0].name in data.variables
     if behind != anything_behind(robot):
         said, has = ("is", "none of its") if behind else ("is not", "some of its")
-        raise FileError(path, f"{said} of cables over pulleys, but {has} robot's are", AGAIN)
+        raise FileError(path, f"{said} of cables over pulleys, but {has} robot's are", CONTENT.again)
     pose = Pose.from_quaternion(values("position"), values("quaternion"))
     cables = CableState(
         model=_read(path, data, "model", MODELS),

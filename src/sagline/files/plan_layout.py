@@ -2,89 +2,9 @@
 
 from __future__ import annotations
 
-from enum import Enum, IntEnum
-from operator import attrgetter
-from typing import Any, NamedTuple
-
-import numpy as np
-
 from sagline.cables.status import CableStatus
-from sagline.kinematics.plan import Plan
+from sagline.files.variables import Known, Quantity
 from sagline.kinematics.status import PoseStatus
-
-# labels along the dimensions beside pose and cable
-PARTS = {
-    "axis": ("x", "y", "z"),
-    "quaternion_part": ("x", "y", "z", "w"),
-    "wrench_part": ("force x", "force y", "force z", "moment x", "moment y", "moment z"),
-    "twist_part": ("linear x", "linear y", "linear z", "angular x", "angular y", "angular z"),
-    "residual_part": ("force", "moment"),
-    "bracket_part": ("proved", "sufficient"),
-}
-
-
-class Known(Enum):
-    """Where a quantity has values; elsewhere it is NaN."""
-
-    EVERYWHERE = "at every pose"
-    SOLVED = "at the solved poses alone"
-    SOMEWHERE = "at any poses"
-
-
-class Quantity(NamedTuple):
-    """One variable of the file, and what its values may be.
-
-    Attributes:
-        name: Its name in the file.
-        place: Where a plan has it, as a dotted attribute.
-        parts: Its dimensions after pose.
-        unit: Unit as the file states it; "" for a plain number.
-        long_name: What it is, in a reader's words.
-        codes: The status it holds codes of, if any.
-        known: Where it has values.
-        low: Its lowest value.
-        infinite: Whether it may be infinite.
-        flag: Whether it says yes or no.
-    """
-
-    name: str
-    place: str
-    parts: tuple[str, ...]
-    unit: str
-    long_name: str
-    codes: type[IntEnum] | None = None
-    known: Known = Known.EVERYWHERE
-    low: float = -np.inf
-    infinite: bool = False
-    flag: bool = False
-
-    @property
-    def type(self) -> np.dtype[Any]:
-        """The type of its values."""
-        return np.dtype(np.bool_ if self.flag else np.float64 if self.codes is None else np.int8)
-
-    def of(self, plan: Plan) -> Any:
-        """The values of a plan.
-
-        Args:
-            plan: The plan.
-
-        Returns:
-            Array, or None for a proof that the plan does not have.
-        """
-        return attrgetter(self.place)(plan)
-
-    @property
-    def attributes(self) -> dict[str, Any]:
-        """Attributes of the variable; status codes are explained as the CF conventions want it."""
-        found: dict[str, Any] = {"long_name": self.long_name}
-        if self.unit:
-            found["units"] = self.unit
-        if self.codes is not None:
-            found["flag_values"] = np.array([code.value for code in self.codes], dtype=np.int8)
-            found["flag_meanings"] = " ".join(code.name.lower() for code in self.codes)
-        return found
-
 
 QUANTITIES = (
     Quantity(
@@ -148,7 +68,12 @@ QUANTITIES = (
         low=0.0,
     ),
     Quantity(
-        "blocking", "blocking", ("cable",), "", "whether the cable's limits stand against the needed wrench", flag=True
+        "blocking",
+        "blocking",
+        ("cable",),
+        "",
+        "whether the cable's limits stand against the needed wrench",
+        values=bool,
     ),
     Quantity(
         "wrench",
@@ -276,7 +201,7 @@ PROOF = (
         (),
         "",
         "whether the tensions were searched for at the border of feasibility, where the way of sharing had no say",
-        flag=True,
+        values=bool,
     ),
 )
 

@@ -1,0 +1,83 @@
+"""What a file in NetCDF is of: a plan, a simulation, and what to say where it is neither."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from sagline.errors import FileError
+from sagline.files.seal import Seal
+
+
+class Content(NamedTuple):
+    """One kind of content, in a reader's words.
+
+    Attributes:
+        name: What it is called: "plan".
+        made: What a file of it is: "run of sagline track".
+        give: Which file to give: "Give the .nc file that sagline track wrote."
+        again: What to do about a damaged file.
+        key: The attribute that has its format.
+        format: The newest format; raised whenever an older sagline could misread the file.
+    """
+
+    name: str
+    made: str
+    give: str
+    again: str
+    key: str
+    format: int
+
+    def format_of(self, path: Path, attributes: Mapping[str, Any]) -> int:
+        """The format of a file.
+
+        Args:
+            path: The file.
+            attributes: Of its data set.
+
+        Returns:
+            The format, from 1 on.
+
+        Raises:
+            FileError: If it is of something else, or of a format that this sagline does not read.
+        """
+        found = attributes.get(self.key)
+        if found is None:
+            reason = f"is no {self.name} of sagline, it names no {self.key}"
+            raise FileError(path, reason, "Check that this is the file you mean.")
+        if not isinstance(found, int | np.integer) or found < 1:
+            step = "Write it again; it was edited, or damaged."
+            raise FileError(path, f"is of format {found!r}, which never was", step)
+        if found > self.format:
+            raise FileError(
+                path,
+                f"is of format {found}, written by {attributes.get('source')}; this is sagline {version('sagline')}, "
+                f"which reads up to {self.format}",
+                "Install a newer sagline.",
+            )
+        return int(found)
+
+    def check_sealed(self, path: Path, found: Seal) -> None:
+        """Refuse a file without a digest.
+
+        Args:
+            path: The file.
+            found: What its end says.
+
+        Raises:
+            FileError: If it has none.
+        """
+        if found is Seal.MISSING:
+            raise FileError(path, "is not as it was written: its digest is missing", self.again)
+
+    def attributes(self, title: str) -> dict[str, Any]:
+        """What every file of it says of itself.
+
+        Args:
+            title: Of this file.
+        """
+        return {"title": title, "source": f"sagline {version('sagline')}", self.key: self.format}

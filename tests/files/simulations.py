@@ -1,0 +1,53 @@
+"""Simulations to be saved, and whether two are the same; of numbers that no integrator gave."""
+
+from dataclasses import fields
+from operator import attrgetter
+
+import numpy as np
+
+import sagline as sl
+from sagline.dynamics.simulation import EnergyBalance, Occurrence
+from sagline.files.robot_file import dump_robot
+from sagline.files.simulation_layout import NODES, SAMPLES, TIME
+
+ROBOT = sl.load_robot("article-suspended")
+SAMPLE_COUNT, NODE_COUNT = 7, 5
+HAPPENED = (
+    Occurrence(0.1, "break", 3, 123.4, 456.7),
+    Occurrence(1.0 / 3.0, "pick up", None, 200.0, float("nan")),
+    Occurrence(0.5, "slack", 0, 0.0, 1e3),
+)
+
+
+def a_simulation(
+    events: tuple[Occurrence, ...] = HAPPENED, nodes: bool = True, robot: sl.Robot = ROBOT
+) -> sl.Simulation:
+    rng = np.random.default_rng(12)
+    count, cables = SAMPLE_COUNT, robot.cable_count
+    pose = sl.Pose.from_euler(rng.normal(size=(count, 3)), *rng.normal(size=(3, count)))
+    energy = EnergyBalance(*(rng.random(count) for _ in fields(EnergyBalance)))
+    return sl.Simulation(
+        robot=robot,
+        time=np.arange(count) / 3.0,
+        pose=pose,
+        twist=rng.normal(size=(count, 6)),
+        tensions=rng.random((count, cables)),
+        length=rng.random((count, cables)),
+        energy=energy,
+        events=events,
+        cable_mass="lumped" if nodes else "none",
+        step=0.1 / 3.0,
+        nodes=rng.normal(size=(count, cables, NODE_COUNT, 3)) if nodes else None,
+    )
+
+
+def assert_same(simulation: sl.Simulation, other: sl.Simulation) -> None:
+    for quantity in (TIME, *SAMPLES, *(() if simulation.nodes is None else (NODES,))):
+        mine, theirs = (np.asarray(attrgetter(quantity.place)(s)) for s in (simulation, other))
+        assert (mine.dtype, mine.shape) == (theirs.dtype, theirs.shape), quantity.place
+        assert mine.tobytes() == theirs.tobytes(), quantity.place
+        assert not theirs.flags.writeable, quantity.place
+    assert (simulation.nodes is None) == (other.nodes is None)
+    assert repr(simulation.events) == repr(other.events)  # NaN is NaN, a number of Python one of Python
+    assert (simulation.cable_mass, simulation.step) == (other.cable_mass, other.step)
+    assert dump_robot(simulation.robot) == dump_robot(other.robot)
