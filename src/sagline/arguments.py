@@ -38,8 +38,10 @@ HOW_TO_GET: Final = MappingProxyType(
         "Pose": "Make one: Pose.from_euler(position, 0, 0, 0).",
         "PoseBox": "Give PoseBox(low, high, tilt).",
         "Robot": 'Load one by its name or file: load_robot("cogiro").',
+        "Simulation": "Make one: simulate(plan).",
         "TensionMethod": "Give one of the methods, MinimumNorm() for instance.",
         "TensionPolygon": "Make one: tension_polygon(robot, pose).",
+        "Vibration": "Make one: vibration(state, up_to=20.0).",
         "Winch": "Give Winch(pulley_radius, dead_cable=...), or None.",
     }
 )

@@ -17,6 +17,7 @@ import sagline as sl
 from sagline.robot.winch import RULES
 from tests.files.simulations import a_simulation
 from tests.kinematics.winches import wound
+from tests.plot import made
 
 MAGIC = ("__getitem__",)  # of the methods with two underscores: those that a caller gives something
 
@@ -514,10 +515,14 @@ def _figures(given: _Given) -> dict[str, Call]:
     flat, deep = Figure().add_subplot(), Figure().add_subplot(projection="3d")
     assert isinstance(deep, Axes3D)
     ax, plan, path, proof = ("ax", flat, True), ("one", given.run), ("one", given.path), ("one", sl.confirm(given.run))
+    swing = made.vibration(made.state_at(), np.array([1.0, 2.0]), np.array([0.9, 0.1]))
     polygon, points = sl.tension_polygon(given.robot, given.pose), {"norm": given.plan.chord_tension}
 
     def draw_all(confirmation: Any) -> None:
         sl.plot.errors(confirmation)
+
+    def draw_two(vibration: Any, **others: Any) -> None:
+        sl.plot.frequencies([vibration, vibration], **others)
 
     def draw(function: Callable[..., Any]) -> Callable[..., Any]:
         def call(**arguments: Any) -> None:
@@ -540,6 +545,15 @@ def _figures(given: _Given) -> dict[str, Call]:
             sl.plot.robot,
             {"robot": ("one", given.robot), "pose": ("one", given.pose, True), "ax": ("one", deep, True)},
         ),
+        "response": (
+            sl.plot.response,
+            {"vibration": ("one", swing), "force": ("word", "about z"), "motion": ("word", "x", True), "ax": ax},
+        ),
+        "frequencies": (
+            draw_two,
+            {"vibration": ("one", swing), "time": ("array", np.array([0.0, 1.0]), True), "ax": ax},
+        ),
+        "energy": (sl.plot.energy, {"simulation": ("one", made.simulation(20))}),
         "save": (sl.plot.save, {"drawing": ("one", flat), "file": ("file", str(given.folder / "figure.svg"))}),
     }
     return {f"plot.{name}": Call(draw(function), _all(**arguments)) for name, (function, arguments) in table.items()}

@@ -5,10 +5,27 @@ Axes it is `ax.figure` that does. `save` writes either to a file.
 """
 
 from sagline.plot.courses import lengths, overview, tensions
+from sagline.plot.energy import energy
 from sagline.plot.errors import error, errors
+from sagline.plot.frequencies import frequencies
 from sagline.plot.motion import path, velocity
 from sagline.plot.polygon import polygon
+from sagline.plot.response import response
 from sagline.plot.robot import robot
 from sagline.plot.sheet import save
 
-__all__ = ["error", "errors", "lengths", "overview", "path", "polygon", "robot", "save", "tensions", "velocity"]
+__all__ = [
+    "energy",
+    "error",
+    "errors",
+    "frequencies",
+    "lengths",
+    "overview",
+    "path",
+    "polygon",
+    "response",
+    "robot",
+    "save",
+    "tensions",
+    "velocity",
+]

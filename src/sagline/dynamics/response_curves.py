@@ -1,0 +1,96 @@
+"""How strongly the platform answers a force, over frequency: on cables with mass, and on massless ones."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sagline.arguments import choice, instance
+from sagline.arrays import Array, locked
+from sagline.dynamics.stretch import stretch_losses
+from sagline.dynamics.vibration import Vibration
+from sagline.dynamics.vibration_status import VibrationStatus
+from sagline.errors import InvalidValueError
+from sagline.statics.stiffness import modes, stiffness
+
+MOTIONS = ("x", "y", "z", "about x", "about y", "about z")
+UNITS = {(False, False): "m/N", (False, True): "1/N", (True, False): "1/N", (True, True): "rad/(N m)"}
+SAMPLES = 900  # evenly in the logarithm
+NEAR = np.sinh(np.linspace(-8.0, 8.0, 33)) / np.sinh(8.0)  # about a peak: the denser the nearer
+BESIDE = 0.03  # of a peak's frequency: how far these reach
+LEAST = 1e-9  # of a mode's stiffness that is left at an undamped peak
+BELOW = 6.0  # lowest frequency of a mode over that at which the curves begin
+
+
+class ResponseCurves(NamedTuple):
+    """Two answers to the same force.
+
+    Attributes:
+        frequency: [Hz], ascending, shape (F,).
+        with_mass: Amplitude of the motion over that of the force, cables with mass, in `unit`, shape (F,).
+        massless: The same on cables whose mass does not swing, shape (F,).
+        static: The same at rest.
+        unit: Of all of them.
+    """
+
+    frequency: Array
+    with_mass: Array
+    massless: Array
+    static: float
+    unit: str
+
+
+def response_curves(vibration: Vibration, force: str = "x", motion: str | None = None) -> ResponseCurves:
+    """The platform's motion for a force at its center of mass, over frequency, up to where all modes are known.
+
+    Both curves are sums over modes, with the exact answer at rest; air damping, which only swinging cables feel, has
+    no part in the massless one.
+
+    Args:
+        vibration: Of a stable state.
+        force: "x", "y", "z": a force along it; "about x", ...: a moment. World axes.
+        motion: In the same words, the displacement of the center of mass or the rotation; None for that of the force.
+
+    Returns:
+        The curves.
+
+    Raises:
+        InvalidValueError: If the vibration has no modes, or there is no such motion.
+    """
+    state = instance(vibration, Vibration, "vibration").state
+    if vibration.status is not VibrationStatus.SOLVED or not vibration.frequency.size:
+        reason = vibration.status.name if vibration.status is not VibrationStatus.SOLVED else "no mode below up_to"
+        raise InvalidValueError("vibration", reason, "a stable state with modes", "Ask for another state, or higher.")
+    column = MOTIONS.index(choice(force, "force", MOTIONS))
+    row = column if motion is None else MOTIONS.index(choice(motion, "motion", MOTIONS))
+    platform = modes(state)
+    ratios = vibration.damping.modal_damping + stretch_losses(state, platform, vibration.damping.loss_time)
+    frequency = _grid(np.concatenate((vibration.frequency, platform.frequency)), vibration.up_to)
+    static = float(stiffness(state).compliance[row, column])
+
+    def amplitude(natural: Array, shape: Array, loss: Array) -> Array:
+        return np.abs(_summed(frequency, natural, shape[row] * shape[column], loss, static))
+
+    return ResponseCurves(
+        locked(frequency),
+        locked(amplitude(vibration.frequency, vibration.shape, vibration.loss)),
+        locked(amplitude(platform.frequency, platform.shape, ratios)),
+        abs(static),
+        UNITS[row > 2, column > 2],
+    )
+
+
+def _grid(natural: Array, highest: float) -> Array:
+    """Frequencies evenly in the logarithm, and close to each peak."""
+    even = np.geomspace(natural.min() / BELOW, highest, SAMPLES)
+    near = (natural[:, None] * (1.0 + BESIDE * NEAR)).ravel()
+    return np.unique(np.concatenate((even, near[(near > even[0]) & (near < highest)])))
+
+
+def _summed(frequency: Array, natural: Array, product: Array, loss: Array, static: float) -> Array:
+    """Sum over modes; those beyond the highest count as what they are at rest."""
+    square, driven = (2.0 * np.pi * natural) ** 2, 2.0 * np.pi * frequency[:, None]
+    moving = square - driven**2 + 2j * loss * np.sqrt(square) * driven
+    moving = np.where(np.abs(moving) < LEAST * square, LEAST * square, moving)  # undamped, just at the peak
+    return np.asarray(static + (product / moving - product / square).sum(axis=1))

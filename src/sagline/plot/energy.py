@@ -1,0 +1,74 @@
+"""Where the energy of a simulation is, and what the integrator has invented."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sagline.arguments import instance
+from sagline.dynamics.simulation import Simulation
+from sagline.numbers import n
+from sagline.plot.sheet import COLORS, GAP_COLOR, TICK, dressed, legend_outside, sheet
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from sagline.arrays import Array
+
+STYLES = ("-", (0, (4.0, 1.6)), (0, (1.0, 1.2)), (0, (5.0, 1.5, 1.0, 1.5)))
+ROUNDING = 1e-12  # of the energy that there is: an error below it is the arithmetic's
+
+
+def energy(simulation: Simulation) -> Figure:
+    """Kinetic and potential energy, work supplied and energy lost over time, and the error of the balance below.
+
+    The potential energy is drawn less its value at the start.
+
+    Args:
+        simulation: The simulation.
+
+    Returns:
+        A figure of two panels.
+    """
+    balance, time = instance(simulation, Simulation, "simulation").energy, simulation.time
+    figure = sheet(height=4.2)
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.4, 1.0))
+    rise = balance.potential - balance.potential[0]
+    courses = {"kinetic": balance.kinetic, "potential, less its start": rise}
+    courses |= {"supplied": balance.supplied, "lost": balance.lost}
+    for (name, course), color, style in zip(courses.items(), COLORS, STYLES, strict=False):
+        above.plot(time, course, color=color, linestyle=style, linewidth=1.2, label=name)
+    dressed(above, "", "energy [J]")
+    _mark(above, simulation, named=True)
+    legend_outside(above)
+    below.plot(time, balance.error, color="black", linewidth=1.0, label="error of the balance")
+    dressed(below, "time [s]", "error [J]")
+    _mark(below, simulation, named=False)
+    if time.size > 1:
+        below.set_xlim(time[0], time[-1])
+    least = ROUNDING * _largest(*courses.values(), balance.potential)
+    low, high = below.get_ylim()
+    below.set_ylim(min(low, -least), max(high, least))
+    worst = n(_largest(balance.error), ".2g", "J", size=_largest(balance.potential))
+    below.set_title(
+        f"kinetic + potential − supplied + lost, less its start: at most {worst}", fontsize=TICK, loc="left"
+    )
+    return figure
+
+
+def _largest(*courses: Array) -> float:
+    return max(float(np.nanmax(np.abs(course), initial=0.0)) for course in courses)
+
+
+def _mark(ax: Axes, simulation: Simulation, *, named: bool) -> None:
+    """A line at each event, with its name on top."""
+    for event in simulation.events:
+        ax.axvline(event.time, color=GAP_COLOR, linewidth=1.0, zorder=1.0)
+        if named:
+            what = event.kind if event.cable is None else f"{event.kind}, cable {event.cable}"
+            ax.annotate(
+                what, (event.time, 1.0), xycoords=("data", "axes fraction"), xytext=(0.0, 2.0),
+                textcoords="offset points", fontsize=TICK, ha="center", va="bottom", annotation_clip=False,
+            )  # fmt: skip

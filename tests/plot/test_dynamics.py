@@ -1,0 +1,149 @@
+"""Figures of vibrations and simulations hold the numbers they claim to show."""
+
+import numpy as np
+import pytest
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+
+import sagline as sl
+from sagline import plot
+from sagline.dynamics.damping import Damping
+from sagline.dynamics.vibration_status import VibrationStatus
+from tests.plot import made
+
+FREQUENCY = np.array([1.5, 2.2, 2.9, 4.0])
+SHARE = np.array([1.0, 0.25, 0.5, 0.0])
+
+
+def test_the_response_of_a_single_mode_is_that_of_a_swing() -> None:
+    state = made.state_at()
+    found = sl.modes(state)
+    own = made.vibration(state, found.frequency, np.ones(6), Damping(modal_damping=0.02), up_to=20.0)
+    ax = plot.response(own, "y")
+    with_mass, massless = ax.get_lines()[:2]
+    assert (with_mass.get_label(), massless.get_label()) == ("with cable mass", "massless")
+    np.testing.assert_allclose(np.asarray(with_mass.get_ydata()), np.asarray(massless.get_ydata()), rtol=1e-12)
+    frequency = np.asarray(with_mass.get_xdata())
+    # modal damping: C = 2 zeta M (M^-1 K)^(1/2), of all six modes; the inverse of the whole matrix, not a sum
+    mass = np.linalg.inv(found.shape @ found.shape.T)
+    square = mass @ found.shape @ np.diag((2.0 * np.pi * found.frequency) ** 2) @ found.shape.T @ mass
+    damping = mass @ found.shape @ np.diag(0.04 * 2.0 * np.pi * found.frequency) @ found.shape.T @ mass
+    for k in (0, 200, 500, frequency.size - 1):
+        omega = 2.0 * np.pi * frequency[k]
+        answer = np.linalg.inv(square + 1j * omega * damping - omega**2 * mass)
+        assert np.asarray(with_mass.get_ydata())[k] == pytest.approx(abs(answer[1, 1]), rel=1e-6)
+    assert ax.get_ylabel() == "motion along y for a force along y [m/N]"
+    assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")
+    assert ax.get_title(loc="right") == "modal damping 2 %"
+
+
+def test_the_response_below_all_modes_is_the_compliance() -> None:
+    state = made.state_at(2.0, 1.0)
+    ax = plot.response(made.vibration(state, FREQUENCY, SHARE), "x", "about z")
+    static = abs(sl.stiffness(state).compliance[5, 0])
+    assert np.asarray(ax.get_lines()[0].get_ydata())[0] == pytest.approx(static, rel=0.1)
+    assert ax.get_ylabel() == "rotation about z for a force along x [1/N]"
+    marks = [np.asarray(line.get_xdata())[0] for line in ax.get_lines()[2:]]
+    np.testing.assert_array_equal(marks, FREQUENCY)
+
+
+def test_the_loss_in_the_stretch_damps_the_massless_robot_too() -> None:
+    """Of cables that are taut all the elastic energy of the stiffest mode is stretch: half the loss factor."""
+    light = made.ROBOT.replace(cables=made.ROBOT.cables.replace(linear_density=1e-6))
+    state = sl.inverse(light, sl.Pose([1.0, 0.5, 1.5], np.eye(3))).state
+    found = sl.modes(state)
+    eta = 1e-3
+    ax = plot.response(made.vibration(state, found.frequency, np.ones(6), Damping(loss_time=eta)), "z")
+    massless = ax.get_lines()[1]
+    frequency, answer = np.asarray(massless.get_xdata()), np.asarray(massless.get_ydata())
+    # K(EA (1 + i omega eta)) of straight springs: geometric stiffness stays, the rest turns
+    geometric = sl.stiffness(state).matrix - _elastic(state)
+    mass = np.linalg.inv(found.shape @ found.shape.T)
+    k = int(np.argmin(np.abs(frequency - found.frequency[np.argmax(np.abs(found.shape[2]))])))
+    omega = 2.0 * np.pi * frequency[k]
+    exact = np.linalg.inv(geometric + (1.0 + 1j * omega * eta) * _elastic(state) - omega**2 * mass)
+    assert answer[k] == pytest.approx(abs(exact[2, 2]), rel=0.01)
+
+
+def _elastic(state: sl.Equilibrium) -> np.ndarray:
+    robot = state.one_robot
+    lever = state.pose.transform(robot.platform_anchors) - state.pose.transform(robot.center_of_mass)
+    along = state.pose.transform(robot.platform_anchors) - robot.frame_anchors
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    row = np.hstack((along, np.cross(lever, along)))
+    return np.asarray(row.T @ np.diag(robot.cables.axial_stiffness / state.unstrained_length) @ row)
+
+
+def test_a_response_needs_modes_and_a_motion() -> None:
+    state = made.state_at()
+    lost = made.vibration(state, FREQUENCY, SHARE, status=VibrationStatus.UNSTABLE)
+    with pytest.raises(sl.InvalidValueError, match="vibration is UNSTABLE"):
+        plot.response(lost)
+    with pytest.raises(sl.InvalidValueError, match="no mode below up_to"):
+        plot.response(made.vibration(state, FREQUENCY[:0], SHARE[:0]))
+    with pytest.raises(sl.InvalidValueError, match="force is 'w'; allowed: x, y, z, about x"):
+        plot.response(made.vibration(state, FREQUENCY, SHARE), "w")
+
+
+def test_undamped_peaks_are_cut_and_told() -> None:
+    state = made.state_at()
+    ax = plot.response(made.vibration(state, FREQUENCY, SHARE, Damping()))
+    assert ax.get_title(loc="right") == "undamped: peaks have no top"
+    assert ax.get_ylim()[1] <= 300.0 * sl.stiffness(state).compliance[0, 0]
+
+
+def test_frequencies_along_a_path_are_as_wide_as_the_platforms_share() -> None:
+    clock = np.array([0.0, 0.5, 2.0])
+    states = [
+        made.vibration(made.state_at(x), FREQUENCY[: 4 - (k == 1)] + 0.1 * k, (SHARE + 0.1 * k)[: 4 - (k == 1)] / 1.2)
+        for k, x in enumerate((0.0, 0.5, 1.0))
+    ]
+    ax = plot.frequencies(states, clock)
+    (lines,) = (drawn for drawn in ax.collections if isinstance(drawn, LineCollection))
+    segments = np.array(lines.get_segments())
+    assert segments.shape == (6, 2, 2)  # the fourth mode of the second state lies beyond
+    np.testing.assert_allclose(segments[0], [(0.0, 1.5), (0.5, 1.6)], rtol=1e-12)
+    np.testing.assert_allclose(segments[5], [(0.5, 3.0), (2.0, 3.1)], rtol=1e-12)
+    shares = np.array([(SHARE[k] + 0.05 + 0.1 * j) / 1.2 for j in (0, 1) for k in range(3)])
+    np.testing.assert_allclose(np.asarray(lines.get_linewidth()), 0.6 + 3.0 * shares, rtol=1e-12)
+    dashed = np.array([line.get_ydata() for line in ax.get_lines()])
+    np.testing.assert_array_equal(dashed.T, [sl.modes(each.state).frequency for each in states])
+    legend = ax.get_legend()
+    assert legend is not None
+    words = [text.get_text() for text in legend.get_texts()]
+    assert words[0] == "with cable mass, platform share 100 %"
+    assert words[-1] == "massless"
+    assert ax.get_xlabel() == "time [s]"
+    assert plot.frequencies(states).get_xlabel() == "state"
+
+
+def test_frequencies_need_two_states_and_their_times() -> None:
+    one = made.vibration(made.state_at(), FREQUENCY, SHARE)
+    with pytest.raises(sl.InvalidValueError, match="vibrations is 1 of them"):
+        plot.frequencies([one])
+    with pytest.raises(sl.InvalidValueError, match="time"):
+        plot.frequencies([one, one], [1.0, 0.0])
+    with pytest.raises(sl.InvalidValueError, match=r"vibrations\[1\]"):
+        plot.frequencies([one, 3.0])  # type: ignore[list-item]
+
+
+def test_the_energy_of_a_simulation_and_the_error_of_its_balance() -> None:
+    swinging = made.simulation()
+    above, below = plot.energy(swinging).axes
+    balance = swinging.energy
+    drawn = [line.get_ydata() for line in above.get_lines() if line.get_label()[0] != "_"]
+    expected = (balance.kinetic, balance.potential - balance.potential[0], balance.supplied, balance.lost)
+    np.testing.assert_array_equal(drawn, expected)
+    np.testing.assert_array_equal(below.get_lines()[0].get_ydata(), balance.error)
+    assert [text.get_text() for text in above.texts] == ["break, cable 3"]
+    np.testing.assert_array_equal(above.get_lines()[-1].get_xdata(), [1.0, 1.0])
+    worst = np.abs(balance.error).max()
+    assert below.get_title(loc="left").endswith(f"at most {worst:.2g}\u00a0J")
+    assert (above.get_ylabel(), below.get_xlabel()) == ("energy [J]", "time [s]")
+
+
+def test_axes_of_the_caller_are_used() -> None:
+    left, right = Figure().subplots(1, 2)
+    one = made.vibration(made.state_at(), FREQUENCY, SHARE)
+    assert plot.response(one, ax=left) is left
+    assert plot.frequencies([one, one], ax=right) is right
