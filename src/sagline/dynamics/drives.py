@@ -1,0 +1,129 @@
+"""Winches of a simulation: those that keep their set points, those that lag, and those of the robot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Final, Literal, TypeAlias
+
+import numpy as np
+
+from sagline.arguments import brief
+from sagline.arrays import Array, number
+from sagline.errors import InvalidValueError
+from sagline.kernels.dynamics import drives as d
+from sagline.robot.drum import drums_of
+from sagline.robot.robot import Robot
+
+AIR: Final = 1.2  # kg/m^3
+ROUND: Final = 1.2  # drag of a long round cable across the wind, by its diameter
+NEEDED: Final = ("drum_radius", "inertia", "position_gain", "speed_gain", "integral_gain")
+
+
+@dataclass(frozen=True, slots=True)
+class SecondOrder:
+    """Winches whose lengths follow their set points as a damped mass on a spring does.
+
+    On a set point that moves at a steady rate they lag by 2 damping_ratio / (2 pi bandwidth) times that rate.
+
+    Attributes:
+        bandwidth: Natural frequency [Hz], > 0.
+        damping_ratio: Of that oscillation, > 0.
+
+    Raises:
+        InvalidValueError: If a value is not positive.
+    """
+
+    bandwidth: float
+    damping_ratio: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        object.__setattr__(self, "bandwidth", number(self.bandwidth, "bandwidth", "Hz", above=0.0))
+        object.__setattr__(self, "damping_ratio", number(self.damping_ratio, "damping_ratio", "", above=0.0))
+
+
+Winches: TypeAlias = Literal["ideal", "robot"] | SecondOrder
+
+
+def kind_of(winches: Any) -> int:
+    """The kernel's code of a kind of winches.
+
+    Raises:
+        InvalidValueError: If there is no such kind.
+    """
+    if isinstance(winches, SecondOrder):
+        return d.SECOND_ORDER
+    if isinstance(winches, str) and winches in ("ideal", "robot"):
+        return d.IDEAL if winches == "ideal" else d.DRUMS
+    allowed = '"ideal", "robot" or SecondOrder(bandwidth, damping_ratio)'
+    raise InvalidValueError("winches", brief(winches), allowed, "Choose one of them as winches.")
+
+
+def drive_data(robot: Robot, winches: Winches, length: Array, blown: bool) -> Array:
+    """The drives as kernels take them, (DATA_ROWS, m).
+
+    Args:
+        robot: The robot.
+        winches: Which kind.
+        length: Unstrained lengths at the start [m], (m,), at which drums are looked at.
+        blown: Whether wind acts on the cables.
+
+    Returns:
+        Array, zero where a row has no meaning.
+
+    Raises:
+        InvalidValueError: If data are missing; the message names them.
+    """
+    data = np.zeros((d.DATA_ROWS, robot.cable_count))
+    if isinstance(winches, SecondOrder):
+        data[d.BANDWIDTH] = 2.0 * np.pi * winches.bandwidth
+        data[d.RATIO] = winches.damping_ratio
+    if robot.winches is not None:
+        data[d.WINDING_STRAIN] = robot.winches.winding_tension / robot.cables.axial_stiffness
+        data[d.BEHIND_RISE] = robot.winches.dead_rise
+    if blown:
+        if robot.cables.diameter is None:
+            step = "Give it in the robot file or with Cable(..., diameter=...), or leave wind out."
+            raise InvalidValueError("cables: diameter", "not given", "known where there is wind", step)
+        data[d.DRAG] = 0.5 * AIR * ROUND * robot.cables.diameter
+    if kind_of(winches) == d.DRUMS:
+        _fill_drums(data, robot, length)
+    return data
+
+
+def _fill_drums(data: Array, robot: Robot, length: Array) -> None:
+    """Inertia, limits and gains at the cable, on the layer where each drum is at the start."""
+    winch = robot.winches
+    missing = [f"winches: {name}" for name in NEEDED if winch is None or getattr(winch, name) is None]
+    if winch is None or missing:
+        step = "Give them in the robot file, or with robot.replace(winches=Winch(...))."
+        raise InvalidValueError(", ".join(missing), "not given", 'known for winches="robot"', step)
+    ratio = np.abs(winch.gear) / lever_of(robot, length)  # turns of the motor, in rad, for a meter of cable
+    data[d.INERTIA] = winch.inertia * ratio**2  # type: ignore[operator]
+    data[d.FORCE_LIMIT] = np.inf if winch.torque_limit is None else winch.torque_limit * ratio
+    data[d.SPEED_LIMIT] = np.inf if winch.speed_limit is None else winch.speed_limit / ratio
+    data[d.FRICTION] = winch.friction
+    data[d.POSITION_GAIN] = winch.position_gain
+    data[d.SPEED_GAIN] = winch.speed_gain
+    data[d.INTEGRAL_GAIN] = winch.integral_gain
+
+
+def lever_of(robot: Robot, length: Array) -> Array:
+    """By how much a radian of its drum moves each cable [m], (m,).
+
+    Args:
+        robot: With drum_radius.
+        length: Unstrained lengths off the drums [m], (m,).
+
+    Returns:
+        That of the layer at these lengths where the drums are known, else drum_radius and half the cable's diameter.
+    """
+    winch = robot.winches
+    assert winch is not None
+    if winch.groove_pitch is not None and robot.cables.diameter is not None:
+        drums = drums_of(robot)
+        travel: Array = drums.turns(length[None] * (1.0 + drums.rest_strain))[1][0] / (2.0 * np.pi)
+        return travel
+    thick = 0.0 if robot.cables.diameter is None else 0.5 * robot.cables.diameter
+    assert winch.drum_radius is not None
+    return winch.drum_radius + thick

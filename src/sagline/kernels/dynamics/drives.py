@@ -1,0 +1,169 @@
+"""What turns the drums: a winch that keeps its set points, one that lags behind them, or motor, loops and friction.
+
+Lengths s count along the path of winding, outward; docs/model.md, sections 10 and 11.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from sagline.arrays import Array
+from sagline.kernels import tables
+from sagline.kernels.cable import rows as t
+from sagline.kernels.jit import formula
+
+# kinds of winches
+IDEAL, SECOND_ORDER, DRUMS = 0, 1, 2
+
+NO, YES, NEW = 0.0, 1.0, 2.0
+
+# rows of what the drives of m cables do, (DRIVE_ROWS, m)
+RATE = 0  # dL/dt of the unstrained length [m/s]
+WOUND, SPEED = 1, 2  # s let out [m], and its rate [m/s]
+FORCE, INTEGRAL = 3, 4  # of the motor at the cable, outward; that of its loop [N]
+AT_FRAME, WHOLE, AT_DRUM = 5, 6, 7  # tension at the frame end, H, tension at the drum [N]
+STRETCHING = 8  # what damping adds to the tension, as the drum feels it [N]
+FILTERED = 9  # tension at the frame end behind the load cell's filter [N]
+PEAK = 10  # largest tension at the frame end [N]
+HELD, SATURATED, SLACK = 11, 12, 13  # NO, YES, or NEW until it is noted
+STORED = 14  # strain of the cable that goes on or off the drum
+BEFORE, BEFORE_WHOLE, BEFORE_DRUM = 15, 16, 17  # L, H and tension at the drum one step before
+DRIVE_ROWS = 18
+
+# rows of what they are, (DATA_ROWS, m)
+INERTIA = 0  # of motor, gear and drum at the cable [kg]
+FORCE_LIMIT, SPEED_LIMIT = 1, 2  # [N], [m/s]
+FRICTION = 3  # [N]
+POSITION_GAIN, SPEED_GAIN, INTEGRAL_GAIN = 4, 5, 6  # [1/s], [N s/m], [N/m]
+BANDWIDTH, RATIO = 7, 8  # of one that lags: omega [rad/s], damping ratio
+WINDING_STRAIN = 9  # of the cable on the drum
+BEHIND_RISE = 10  # height of the frame end above the drum [m]
+DRAG = 11  # force of the wind on a length, by the square of its speed [N s^2/m^3]
+DATA_ROWS = 12
+
+# what a run adds up, [J]
+SUPPLIED, LOST, ON_DRUMS, GIVEN_POWER, LOST_POWER = 0, 1, 2, 3, 4
+START, START_POTENTIAL, BEGIN = 5, 6, 7  # energy at the start, of which potential [J]; the time of step 0 [s]
+AUDIT_SIZE = 8
+
+BIN = 0.005  # m of cable on the drum that remember one tension
+
+
+class Drives(NamedTuple):
+    """The drives of m cables.
+
+    Attributes:
+        kind: IDEAL, SECOND_ORDER or DRUMS.
+        remembered: Whether the drum remembers at which tension it was wound.
+        data: What they are, (DATA_ROWS, m).
+        now: What they do, (DRIVE_ROWS, m).
+        layers: Strain of the cable on the drums, BIN by BIN, (m, B).
+        audit: What is added up, (AUDIT_SIZE,).
+    """
+
+    kind: int
+    remembered: bool
+    data: Array
+    now: Array
+    layers: Array
+    audit: Array
+
+
+@formula
+def kick_lagging(drives: Drives, rows: Array, targets: Array, time: float, begins: bool) -> None:
+    """Change the rates of winches that lag: explicitly where a step begins, its adjoint where it ends."""
+    for i in range(rows.shape[1]):
+        omega, ratio = drives.data[BANDWIDTH, i], drives.data[RATIO, i]
+        push = omega * omega * (targets[i] - rows[t.LENGTH, i])
+        if begins:
+            drives.now[RATE, i] += time * (push - 2.0 * ratio * omega * drives.now[RATE, i])
+        else:
+            drives.now[RATE, i] = (drives.now[RATE, i] + time * push) / (1.0 + 2.0 * ratio * omega * time)
+        if drives.now[HELD, i] > 0.0:
+            drives.now[RATE, i] = 0.0
+
+
+@formula
+def kick_drums(drives: Drives, time: float) -> None:
+    """Change the speeds of the drums by motor, cable and friction, which holds what it can."""
+    for i in range(drives.now.shape[1]):
+        inertia, before = drives.data[INERTIA, i], drives.now[SPEED, i]
+        if drives.now[HELD, i] > 0.0:
+            drives.audit[LOST] += 0.5 * inertia * before * before
+            drives.now[SPEED, i] = 0.0
+            continue
+        pull = drives.now[AT_DRUM, i] + drives.now[STRETCHING, i] / (1.0 + drives.now[STORED, i])
+        free = before + time * (drives.now[FORCE, i] + pull) / inertia
+        most = time * drives.data[FRICTION, i] / inertia
+        after = free - math.copysign(most, free) if abs(free) > most else 0.0
+        mean = 0.5 * (before + after)
+        drives.audit[SUPPLIED] += drives.now[FORCE, i] * time * mean
+        drives.audit[LOST] += inertia * (free - after) * mean
+        drives.now[SPEED, i] = after
+
+
+@formula
+def take_stored(drives: Drives, cables: Array, time: float) -> None:
+    """Fill the strain of the cable that the drums let out or take in during a step, and remember what they take in."""
+    bins = drives.layers.shape[1]
+    for i in range(cables.shape[0]):
+        strain = drives.data[WINDING_STRAIN, i]
+        if drives.remembered:
+            place, step = drives.now[WOUND, i], time * drives.now[SPEED, i]
+            one = min(max(int(place / BIN), 0), bins - 1)
+            other = min(max(int((place + step) / BIN), 0), bins - 1)
+            if step < 0.0:
+                strain = drives.now[AT_DRUM, i] / cables[i, tables.STIFFNESS]
+                for k in range(other, one + 1):
+                    drives.layers[i, k] = strain
+            else:
+                strain = drives.layers[i, one]
+        drives.now[STORED, i] = strain
+
+
+@formula
+def turn_drums(drives: Drives, cables: Array, rows: Array, gravity: float, time: float) -> None:
+    """Let out or take in cable for a time, and account for what lies on the drums."""
+    take_stored(drives, cables, time)
+    for i in range(cables.shape[0]):
+        step, strain = time * drives.now[SPEED, i], drives.now[STORED, i]
+        rate = drives.now[SPEED, i] / (1.0 + strain)
+        lifted = -cables[i, tables.DENSITY] * gravity * drives.data[BEHIND_RISE, i]
+        drives.now[WOUND, i] += step
+        drives.now[RATE, i] = rate
+        rows[t.LENGTH, i] += time * rate
+        held = 0.5 * cables[i, tables.STIFFNESS] * strain * strain + lifted
+        drives.audit[ON_DRUMS] -= held * time * rate
+
+
+@formula
+def slip(drives: Drives, cables: Array, time: float) -> None:
+    """Account for the strain that changes where cable leaves its drum, after a step; its rate is still the step's."""
+    for i in range(cables.shape[0]):
+        stiffness = cables[i, tables.STIFFNESS]
+        wound = stiffness * drives.now[STORED, i]
+        before, after = drives.now[BEFORE_DRUM, i] - wound, drives.now[AT_DRUM, i] - wound
+        square = 0.5 * (before * before + after * after)
+        drives.audit[LOST] += 0.5 * square / stiffness * drives.now[RATE, i] * time
+
+
+@formula
+def close_loops(drives: Drives, targets: Array, rates: Array, period: float) -> None:
+    """Fill the motors' forces from lengths and speeds; P-PI, its integral not driven further into a limit.
+
+    targets: s to keep (m,), then the tensions that are expected at the drums (m,).
+    """
+    m = drives.now.shape[1]
+    for i in range(m):
+        limit, fastest = drives.data[FORCE_LIMIT, i], drives.data[SPEED_LIMIT, i]
+        wanted = drives.data[POSITION_GAIN, i] * (targets[i] - drives.now[WOUND, i]) + rates[i]
+        speed = min(max(wanted, -fastest), fastest)
+        error = speed - drives.now[SPEED, i]
+        asked = drives.data[SPEED_GAIN, i] * error + drives.now[INTEGRAL, i] - targets[m + i]
+        force = min(max(asked, -limit), limit)
+        if force == asked or (asked > limit and error < 0.0) or (asked < -limit and error > 0.0):
+            drives.now[INTEGRAL, i] += period * drives.data[INTEGRAL_GAIN, i] * error
+        drives.now[FORCE, i] = force
+        full = (force != asked or speed != wanted) and not drives.now[HELD, i] > 0.0
+        drives.now[SATURATED, i] = (NEW if drives.now[SATURATED, i] == NO else YES) if full else NO

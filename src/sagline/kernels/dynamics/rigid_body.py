@@ -1,0 +1,123 @@
+"""A rigid body in free motion and under forces: the parts that integrators are put together from.
+
+The body's own axes are its principal axes, with the origin at the center of mass. A state is a row: position of the
+center of mass, unit quaternion (scalar last) from these axes to the world, so that the first seven are a pose row,
+velocity, and angular momentum in world axes, which no free motion changes.
+docs/model.md, section 11; Dullweber, Leimkuhler & McLachlan, J. Chem. Phys. 107, 1997.
+"""
+
+from __future__ import annotations
+
+import math
+
+from sagline.arrays import Array
+from sagline.kernels.forward.platform import turned
+from sagline.kernels.jit import formula
+
+CENTER, TURN, VELOCITY, MOMENTUM = 0, 3, 7, 10
+STATE_COLUMNS = 13
+MASS, MOMENTS = 0, 1  # the row of inertia: mass [kg], principal moments [kg m^2], infinite where the body cannot turn
+INERTIA_COLUMNS = 4
+
+Triple = tuple[float, float, float]
+Six = tuple[float, float, float, float, float, float]
+
+
+@formula
+def kick(state: Array, inertia: Array, wrench: Array, time: float) -> None:
+    """Change velocity and angular momentum by what a wrench (6,) does in a time [s]."""
+    for k in range(3):
+        state[VELOCITY + k] += time * wrench[k] / inertia[MASS]
+        state[MOMENTUM + k] += time * wrench[3 + k]
+
+
+@formula
+def drift(state: Array, time: float) -> None:
+    """Move the center of mass on at its velocity."""
+    for k in range(3):
+        state[CENTER + k] += time * state[VELOCITY + k]
+
+
+@formula
+def into_body(state: Array, x: float, y: float, z: float) -> Triple:
+    """A vector of the world in the body's axes."""
+    qx, qy, qz, qw = -state[TURN], -state[TURN + 1], -state[TURN + 2], state[TURN + 3]
+    tx, ty, tz = 2.0 * (qy * z - qz * y), 2.0 * (qz * x - qx * z), 2.0 * (qx * y - qy * x)
+    return x + qw * tx + qy * tz - qz * ty, y + qw * ty + qz * tx - qx * tz, z + qw * tz + qx * ty - qy * tx
+
+
+@formula
+def turn_about(a: float, b: float, c: float, w: float, pa: float, pb: float, pc: float, share: float) -> Six:
+    """Turn about the first of three axes in cyclic order by share pa [rad].
+
+    Takes the quaternion along them with its scalar, and the angular momentum along them; returns the quaternion, and
+    the momentum along the two axes that turn away from it.
+    """
+    angle = 0.5 * share * pa
+    sine, cosine = math.sin(angle), math.cos(angle)
+    whole_sine, whole_cosine = 2.0 * sine * cosine, 1.0 - 2.0 * sine * sine
+    return (
+        w * sine + a * cosine,
+        b * cosine + c * sine,
+        c * cosine - b * sine,
+        w * cosine - a * sine,
+        whole_cosine * pb + whole_sine * pc,
+        whole_cosine * pc - whole_sine * pb,
+    )
+
+
+@formula
+def free_turn(state: Array, inertia: Array, time: float) -> None:
+    """Turn the body for a time without any moment: exactly about one principal axis after the other, symmetrically."""
+    x, y, z, w = state[TURN], state[TURN + 1], state[TURN + 2], state[TURN + 3]
+    px, py, pz = into_body(state, state[MOMENTUM], state[MOMENTUM + 1], state[MOMENTUM + 2])
+    by_x, by_y = 0.5 * time / inertia[MOMENTS], 0.5 * time / inertia[MOMENTS + 1]
+    x, y, z, w, py, pz = turn_about(x, y, z, w, px, py, pz, by_x)
+    y, z, x, w, pz, px = turn_about(y, z, x, w, py, pz, px, by_y)
+    z, x, y, w, px, py = turn_about(z, x, y, w, pz, px, py, time / inertia[MOMENTS + 2])
+    y, z, x, w, pz, px = turn_about(y, z, x, w, py, pz, px, by_y)
+    x, y, z, w, py, pz = turn_about(x, y, z, w, px, py, pz, by_x)
+    scale = 1.0 / math.sqrt(x * x + y * y + z * z + w * w)  # rounding alone
+    state[TURN], state[TURN + 1], state[TURN + 2], state[TURN + 3] = x * scale, y * scale, z * scale, w * scale
+
+
+@formula
+def spin(state: Array, inertia: Array) -> Triple:
+    """Angular velocity in world axes [rad/s]."""
+    x, y, z = into_body(state, state[MOMENTUM], state[MOMENTUM + 1], state[MOMENTUM + 2])
+    return turned(state, x / inertia[MOMENTS], y / inertia[MOMENTS + 1], z / inertia[MOMENTS + 2])
+
+
+@formula
+def kinetic_energy(state: Array, inertia: Array) -> float:
+    """Of motion and rotation [J]."""
+    x, y, z = into_body(state, state[MOMENTUM], state[MOMENTUM + 1], state[MOMENTUM + 2])
+    speed2 = 0.0
+    for k in range(3):
+        speed2 += state[VELOCITY + k] * state[VELOCITY + k]
+    turning = x * x / inertia[MOMENTS] + y * y / inertia[MOMENTS + 1] + z * z / inertia[MOMENTS + 2]
+    return 0.5 * (inertia[MASS] * speed2 + turning)
+
+
+@formula
+def power_of(wrench: Array, state: Array, spinning: Triple) -> float:
+    """Power of a wrench (6,) on the body [W]."""
+    power = wrench[3] * spinning[0] + wrench[4] * spinning[1] + wrench[5] * spinning[2]
+    for k in range(3):
+        power += wrench[k] * state[VELOCITY + k]
+    return power
+
+
+@formula
+def rates_of(state: Array, inertia: Array, wrench: Array, rates: Array) -> None:
+    """Fill the time derivative (13,) of a state under a wrench; the quaternion keeps its length."""
+    wx, wy, wz = spin(state, inertia)
+    x, y, z, w = state[TURN], state[TURN + 1], state[TURN + 2], state[TURN + 3]
+    for k in range(3):
+        rates[CENTER + k] = state[VELOCITY + k]
+        rates[VELOCITY + k] = wrench[k] / inertia[MASS]
+        rates[MOMENTUM + k] = wrench[3 + k]
+    rates[TURN] = 0.5 * (wx * w + wy * z - wz * y)
+    rates[TURN + 1] = 0.5 * (wy * w + wz * x - wx * z)
+    rates[TURN + 2] = 0.5 * (wz * w + wx * y - wy * x)
+    rates[TURN + 3] = -0.5 * (wx * x + wy * y + wz * z)
