@@ -10,11 +10,11 @@ from sagline.arguments import instance
 from sagline.arrays import Array, locked
 from sagline.memory import check_memory
 from sagline.robot.equilibrium import Equilibrium
-from sagline.robot.several import bodies_of, first_of, pulleys_of
+from sagline.robot.several import bodies_of, first_of
 from sagline.statics.slopes import CableSlopes, cable_slopes, on_platform
+from sagline.statics.tension_slopes import tension_slopes
 
 _SINGULAR = 1e-14  # determinant, at diagonal elements of 1
-_TINY = 1e-300
 _STIFFNESS_BYTES, _MODES_BYTES = 2500.0, 800.0  # a cable of a state, while it is worked out
 
 
@@ -150,51 +150,9 @@ def _by_platform_anchor(state: Equilibrium, slopes: CableSlopes, compliance: Arr
 
 def _tension_by_length(state: Equilibrium, slopes: CableSlopes, by_length: Array) -> Array:
     """d(tension at the frame end of cable i)/dL_j of the platform in equilibrium, shape (..., m, m)."""
-    cables = state.cables
-    motion = np.swapaxes(by_length, -1, -2)[..., None, :, :]  # of wound cable j, beside the ends of cable i
-    ends = motion[..., :3] + np.cross(motion[..., 3:], slopes.levers[..., :, None, :])
-    forces = ends @ np.swapaxes(slopes.blocks, -1, -2)
-    index = np.arange(forces.shape[-2])
-    forces[..., index, index, :] += slopes.by_length
-    if state.contact is not None:
-        return _leaving_by_length(state, slopes, forces, ends)
-    at_frame = slopes.force.copy()
-    at_frame[..., 2] -= cables.cable_weight
-    if not cables.model.weightless:
-        forces[..., index, index, 2] -= cables.cable.linear_density * cables.gravity
-    # a cable without force pulls nowhere
-    direction = at_frame / np.maximum(np.linalg.norm(at_frame, axis=-1, keepdims=True), _TINY)
-    slope: Array = np.einsum("...ik,...ijk->...ij", direction, forces)
-    return slope
-
-
-def _leaving_by_length(state: Equilibrium, slopes: CableSlopes, forces: Array, ends: Array) -> Array:
-    """The same of cables that leave pulleys, from H = T + T^2/(2 EA) - w z, which is one number from end to end.
-
-    Args:
-        state: The state.
-        slopes: Of its cables.
-        forces: Change of the force on each platform end, shape (..., m, m, 3).
-        ends: Motion of each platform end, of the same shape.
-    """
-    cables, contact = state.cables, state.contact
-    assert contact is not None
-    stiffness, density = cables.cable.axial_stiffness, cables.cable.linear_density
-    weight = np.broadcast_to(0.0 if cables.model.weightless else density * cables.gravity, cables.shape)
-    at_end, leaving = cables.platform_end_tension, cables.frame_end_tension
-    by_end = np.einsum("...ik,...ijk->...ij", slopes.force / np.maximum(at_end, _TINY)[..., None], forces)
-    whole = (1.0 + at_end / stiffness)[..., None] * by_end - weight[..., None] * ends[..., 2]
-    radius, entry = pulleys_of(state.robot)
-    turned = forces.copy()
-    index = np.arange(forces.shape[-2])
-    turned[..., index, index, 2] -= weight
-    sine, cosine = np.sin(contact.wrap_angle), np.cos(contact.wrap_angle)
-    level = slopes.force[..., :2] / np.maximum(cables.horizontal_tension, _TINY)[..., None]
-    around = np.concatenate((level * cosine[..., None], (-entry * sine)[..., None]), axis=-1)
-    angle = np.einsum("...ik,...ijk->...ij", around / np.maximum(leaving, _TINY)[..., None], turned)
-    raised = (weight * radius * entry * cosine)[..., None] * angle
-    slope: Array = (whole + raised) / (1.0 + leaving / stiffness)[..., None]
-    return slope
+    by_motion, own = tension_slopes(state, slopes)
+    found: Array = by_motion @ by_length + own[..., None] * np.eye(own.shape[-1])
+    return found
 
 
 def _null_space(matrix: Array) -> Array:
@@ -228,7 +186,7 @@ def modes(state: Equilibrium) -> Modes:
     _check_state(state, _MODES_BYTES)
     freedom = first_of(state.robot).freedom
     matrix = freedom @ cable_slopes(state).matrix @ freedom.T
-    lower = np.linalg.cholesky(freedom @ _mass_matrix(state) @ freedom.T)
+    lower = np.linalg.cholesky(freedom @ mass_matrix(state) @ freedom.T)
     inverse = np.linalg.inv(lower)
     scaled = inverse @ (0.5 * (matrix + np.swapaxes(matrix, -1, -2))) @ np.swapaxes(inverse, -1, -2)
     absent = np.asarray(np.isnan(scaled).any(axis=(-1, -2), keepdims=True))
@@ -261,8 +219,15 @@ def _inverse(matrix: Array) -> Array:
     return np.where(lost, np.nan, inverse)
 
 
-def _mass_matrix(state: Equilibrium) -> Array:
-    """Mass and inertia about the center of mass in world axes, shape (..., 6, 6)."""
+def mass_matrix(state: Equilibrium) -> Array:
+    """Mass and inertia of the platform about the center of mass, in world axes.
+
+    Args:
+        state: An equilibrium, single or N of them.
+
+    Returns:
+        Matrices that take twists to momenta, shape (..., 6, 6) [kg, kg m^2].
+    """
     rotation = state.pose.matrix
     body = bodies_of(state.robot)
     mass = np.zeros((*state.pose.shape, 6, 6))
