@@ -18,7 +18,10 @@ if TYPE_CHECKING:
     from sagline.cables.parabolic import Parabolic
     from sagline.cables.status import CableStatus
     from sagline.cables.straight import Straight
+    from sagline.dynamics.shaped import shaped
+    from sagline.dynamics.shapers import EI, ZV, ZVD, Shaper
     from sagline.dynamics.simulation import EnergyBalance, Occurrence, Simulation
+    from sagline.dynamics.to_shape import to_shape
     from sagline.errors import CableGeometryError, FileError, InvalidValueError, SaglineError, SaglineWarning
     from sagline.files.caspr import load_caspr
     from sagline.files.imported import Imported
@@ -78,6 +81,9 @@ if TYPE_CHECKING:
 __version__: str
 
 __all__ = [
+    "EI",
+    "ZV",
+    "ZVD",
     "AnalyticCenter",
     "ArticleBalance",
     "Cable",
@@ -128,6 +134,7 @@ __all__ = [
     "Robot",
     "SaglineError",
     "SaglineWarning",
+    "Shaper",
     "Side",
     "Simulation",
     "Stiffness",
@@ -167,9 +174,11 @@ __all__ = [
     "robot_names",
     "save_plan",
     "septic_path",
+    "shaped",
     "stiffness",
     "structure_matrix",
     "tension_polygon",
+    "to_shape",
     "unresisted_motion",
     "winch_rates",
     "without_cables",
@@ -191,6 +200,7 @@ _HOMES = {
     "Closest": "sagline.tension.closest",
     "Confirmation": "sagline.kinematics.confirm",
     "Creep": "sagline.cables.creep",
+    "EI": "sagline.dynamics.shapers",
     "Elastic": "sagline.cables.elastic",
     "Empirical": "sagline.cables.empirical",
     "EmpiricalFit": "sagline.article.identify",
@@ -227,6 +237,7 @@ _HOMES = {
     "Robot": "sagline.robot.robot",
     "SaglineError": "sagline.errors",
     "SaglineWarning": "sagline.errors",
+    "Shaper": "sagline.dynamics.shapers",
     "Side": "sagline.tension.polygon",
     "Simulation": "sagline.dynamics.simulation",
     "Stiffness": "sagline.statics.stiffness",
@@ -235,6 +246,8 @@ _HOMES = {
     "TensionPolygon": "sagline.tension.polygon",
     "Winch": "sagline.robot.winch",
     "WinchRates": "sagline.kinematics.winch_rates",
+    "ZV": "sagline.dynamics.shapers",
+    "ZVD": "sagline.dynamics.shapers",
     "article_balance": "sagline.statics.balance",
     "article_path": "sagline.motion.planar",
     "capacity_margin": "sagline.tension.margin",
@@ -265,9 +278,11 @@ _HOMES = {
     "robot_names": "sagline.robot.catalogue",
     "save_plan": "sagline.files.plan_file",
     "septic_path": "sagline.motion.rest_to_rest",
+    "shaped": "sagline.dynamics.shaped",
     "stiffness": "sagline.statics.stiffness",
     "structure_matrix": "sagline.statics.balance",
     "tension_polygon": "sagline.kinematics.polygon",
+    "to_shape": "sagline.dynamics.to_shape",
     "unresisted_motion": "sagline.tension.singular",
     "winch_rates": "sagline.kinematics.winch_rates",
     "without_cables": "sagline.tension.broken",

@@ -39,6 +39,7 @@ HOW_TO_GET: Final = MappingProxyType(
         "PoseBox": "Give PoseBox(low, high, tilt).",
         "Robot": 'Load one by its name or file: load_robot("cogiro").',
         "Simulation": "Make one: simulate(plan).",
+        "Shaper": "Make one, for a frequency: ZV(2.0), ZVD(2.0) or EI(2.0).",
         "TensionMethod": "Give one of the methods, MinimumNorm() for instance.",
         "TensionPolygon": "Make one: tension_polygon(robot, pose).",
         "Vibration": "Make one: vibration(state, up_to=20.0).",

@@ -90,6 +90,7 @@ def calls(folder: Path) -> dict[str, Call]:
         _cables,
         _robots,
         _motions,
+        _planning,
         _kinematics,
         _winding,
         _solvers,
@@ -229,6 +230,26 @@ def _motions(given: _Given) -> dict[str, Call]:
         "septic_path": Call(sl.septic_path, _all(waypoints=stops, durations=(*durations, True), rate=rate)),
         "quintic_path: limits": Call(sl.quintic_path, _all(waypoints=stops, **limits, rate=rate)),
         "article_path": Call(sl.article_path, _all(rate=rate)),
+    }
+
+
+def _planning(given: _Given) -> dict[str, Call]:
+    path = sl.quintic_path([(0, 0, 1.5), (1, 1, 2)], durations=1.0, rate=16.0)
+    modes, ratio = sl.modes(given.plan.state), ("array", [0.25, 0.125])
+    frequency = ("array", [2.0, 3.5])
+    return {
+        "Shaper": Call(
+            sl.Shaper,
+            _all(time=("array", [0.0, 0.5, 1.5]), amplitude=("array", [0.25, 0.5, 0.25]), frequency=frequency),
+        ),
+        "Shaper.residual": Call(
+            sl.ZV(2.0).residual, _all(frequency=("array", [0.5, 2.0]), damping_ratio=("number", 0.125))
+        ),
+        "ZV": Call(sl.ZV, _all(frequency=frequency, damping_ratio=ratio)),
+        "ZVD": Call(sl.ZVD, _all(frequency=frequency, damping_ratio=ratio)),
+        "EI": Call(sl.EI, _all(frequency=frequency, tolerance=ratio)),
+        "shaped": Call(sl.shaped, _all(path=("one", path), shaper=("one", sl.ZV(2.0)))),
+        "to_shape": Call(sl.to_shape, _all(modes=("one", modes), path=("one", path))),
     }
 
 

@@ -19,7 +19,17 @@ PLACES = (
     *("state.pose.position", "state.pose.quaternion", "state.wrench"),
     *("status", "shortfall", "wrench_residual", "blocking", "farkas", "needed"),
 )
-PATH_PLACES = ("path.time", "path.twist", "path.twist_rate", "path.jerk", "path.pose.position", "path.pose.quaternion")
+PATH_PLACES = (
+    *("path.time", "path.twist", "path.twist_rate", "path.jerk", "path.rests"),
+    *("path.pose.position", "path.pose.quaternion"),
+)
+    "path.time",
+    "path.twist",
+    "path.twist_rate",
+    "path.jerk",
+    "path.rests",
+    *("path.pose.position", "path.pose.quaternion"),
+)
 
 
 def a_plan() -> sl.Plan:

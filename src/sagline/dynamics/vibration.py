@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from sagline.arrays import Array
 from sagline.dynamics.damping import Damping
 from sagline.dynamics.vibration_status import VibrationStatus
+from sagline.motion.path import Path
 from sagline.robot.equilibrium import Equilibrium
 
 
@@ -55,3 +56,19 @@ class Vibration:
     def complete(self) -> bool:
         """Whether none is missing: as many modes as the exact count has."""
         return self.status is VibrationStatus.SOLVED and self.count == self.frequency.size
+
+    def to_shape(self, path: Path) -> Array:
+        """The frequencies that a path excites most, for a shaper: see `sagline.to_shape`.
+
+        Args:
+            path: A path from rest to rest, best one that ends where the modes were taken.
+
+        Returns:
+            Frequencies [Hz], shape (1,) or (2,), the most excited first.
+
+        Raises:
+            InvalidValueError: As `sagline.to_shape`.
+        """
+        from sagline.dynamics.to_shape import to_shape  # it takes a Vibration
+
+        return to_shape(self, path)

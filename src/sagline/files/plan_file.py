@@ -48,6 +48,7 @@ CONTENT = Content(
     format=2,  # 2: with a digest
 )
 MODELS = {model.__name__: model for model in (Straight, Elastic, Empirical, Parabolic, Catenary)}
+RESTS = "rests"  # of a path whose rests are known
 FREE = {"unstrained_length": "free_length", "chord_tension": "free_chord_tension"}  # of cables over pulleys
 STATE_ARRAYS = ("span", "rise", "unstrained_length", "horizontal_tension", "vertical_force", "chord_tension")
 
@@ -134,7 +135,10 @@ def _dataset(plan: Plan) -> Dataset:
     if plan.path is not None:
         coordinates["time"] = variable(TIME)
     labels = Coordinates(coordinates, indexes={})  # whoever reads the file builds what indexes they need
-    return Dataset({quantity.name: variable(quantity) for quantity in quantities}, labels, _attributes(plan))
+    variables: dict[str, Any] = {quantity.name: variable(quantity) for quantity in quantities}
+    if plan.path is not None and plan.path.rests is not None:
+        variables[RESTS] = (("rest",), plan.path.rests, {"units": "s", "long_name": "when the platform stands"})
+    return Dataset(variables, labels, _attributes(plan))
 
 
 def _attributes(plan: Plan) -> dict[str, Any]:
@@ -198,7 +202,8 @@ def _plan(path: FilePath, data: Dataset, robot: Robot) -> Plan:
     motion = None
     if TIME.name in data.variables:
         jerk = values(JERK.name) if JERK.name in data.variables else None
-        motion = Path(values("time"), pose, values("twist"), values("twist_rate"), jerk)
+        rests = values(RESTS) if RESTS in data.variables else None
+        motion = Path(values("time"), pose, values("twist"), values("twist_rate"), jerk, rests)
     return Plan(
         state=Equilibrium(robot, pose, values("wrench"), cables, contact),
         path=motion,

@@ -24,6 +24,8 @@ class Path:
         twist_rate: Acceleration of the platform's origin [m/s^2], then its angular acceleration [rad/s^2],
             in world axes, shape (N, 6).
         jerk: d(twist_rate)/dt [m/s^3, rad/s^3], shape (N, 6); None where it is not known, as of sampled poses.
+        rests: When the platform stands between one move and the next [s], first and last time included, shape (R,);
+            they need not be times of samples. None where they are not known, as of sampled poses.
     """
 
     time: Array
@@ -31,9 +33,16 @@ class Path:
     twist: Array
     twist_rate: Array
     jerk: Array | None
+    rests: Array | None
 
     def __init__(
-        self, time: ArrayLike, pose: Pose, twist: ArrayLike, twist_rate: ArrayLike, jerk: ArrayLike | None = None
+        self,
+        time: ArrayLike,
+        pose: Pose,
+        twist: ArrayLike,
+        twist_rate: ArrayLike,
+        jerk: ArrayLike | None = None,
+        rests: ArrayLike | None = None,
     ) -> None:
         """Check the fields against each other.
 
@@ -43,6 +52,7 @@ class Path:
             twist: Velocity [m/s] and angular velocity [rad/s], shape (N, 6).
             twist_rate: Their rates [m/s^2, rad/s^2], shape (N, 6).
             jerk: Their second rates [m/s^3, rad/s^3], shape (N, 6), or None.
+            rests: Times between moves [s], from the first sample's to the last's, strictly increasing; or None.
 
         Raises:
             InvalidValueError: If the times do not increase, a number is not finite, or the lengths differ.
@@ -54,6 +64,7 @@ class Path:
         object.__setattr__(self, "time", clock)
         object.__setattr__(self, "pose", pose)
         object.__setattr__(self, "jerk", None)
+        object.__setattr__(self, "rests", None if rests is None else _checked_rests(rests, clock))
         rates = [("twist", twist, "m/s or rad/s"), ("twist_rate", twist_rate, "m/s^2 or rad/s^2")]
         for name, value, unit in [*rates, *([] if jerk is None else [("jerk", jerk, "m/s^3 or rad/s^3")])]:
             array = checked(value, name, unit, shape=(None, 6))
@@ -70,16 +81,17 @@ class Path:
         """Time from the first sample to the last [s]."""
         return float(self.time[-1] - self.time[0])
 
-    def __reduce__(self) -> tuple[type[Path], tuple[Array, Pose, Array, Array, Array | None]]:
+    def __reduce__(self) -> tuple[type[Path], tuple[Array, Pose, Array, Array, Array | None, Array | None]]:
         """Pickle through the constructor, so that a loaded path is checked and locked too."""
-        return Path, (self.time, self.pose, self.twist, self.twist_rate, self.jerk)
+        return Path, (self.time, self.pose, self.twist, self.twist_rate, self.jerk, self.rests)
 
 
-def checked_time(time: ArrayLike) -> Array:
+def checked_time(time: ArrayLike, item: str = "time") -> Array:
     """A locked copy of the sample times [s], strictly increasing, shape (N,) with N >= 1.
 
     Args:
         time: What a caller gave.
+        item: The name a message uses.
 
     Returns:
         The times, float64, write-locked.
@@ -87,18 +99,24 @@ def checked_time(time: ArrayLike) -> Array:
     Raises:
         InvalidValueError: If they are no such times; it names the first sample that is wrong.
     """
-    clock = checked(time, "time", "s", shape=(None,))
+    clock = checked(time, item, "s", shape=(None,))
     if clock.ndim != 1 or clock.size == 0:
-        raise InvalidValueError(
-            "time", f"of shape {clock.shape}", "shape (N,), N >= 1", "Give one time for each sample."
-        )
+        raise InvalidValueError(item, f"of shape {clock.shape}", "shape (N,), N >= 1", "Give one time for each sample.")
     late = np.flatnonzero(np.diff(clock) <= 0.0)
     if late.size:
         k = int(late[0]) + 1
         raise InvalidValueError(
-            f"time[{k}]", f"{clock[k]} s", f"> {clock[k - 1]} s (the sample before)", "Sort the samples by time."
+            f"{item}[{k}]", f"{clock[k]} s", f"> {clock[k - 1]} s (the one before)", "Sort them by time."
         )
     return clock
+
+
+def _checked_rests(rests: ArrayLike, clock: Array) -> Array:
+    times = checked_time(rests, "rests")
+    if times.size < min(2, clock.size) or times[0] != clock[0] or times[-1] != clock[-1]:
+        allowed = f"times from {clock[0]} s to {clock[-1]} s, the first and the last sample's"
+        raise InvalidValueError("rests", f"from {times[0]} s to {times[-1]} s", allowed, "Give all rests, or None.")
+    return times
 
 
 def _length_error(item: str, value: str, samples: int) -> InvalidValueError:

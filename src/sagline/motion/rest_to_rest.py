@@ -140,7 +140,7 @@ def _rest_to_rest(
         )
     times = segments.durations_within(*limits) if durations is None else _checked_durations(durations, len(segments))
     ends = np.cumsum(times)
-    grid = _time_grid(float(ends[-1]), rate)
+    grid = time_grid(float(ends[-1]), rate)
     _check_sampled(grid, ends, times, segments.moves)
     return segments.sampled(grid, ends, times)
 
@@ -187,8 +187,19 @@ def _check_sampled(grid: Array, ends: Array, times: Array, moves: Flags) -> None
         )
 
 
-def _time_grid(total: float, rate: float) -> Array:
-    """Times k/rate from 0 to the total time, and the total itself as the last [s]."""
+def time_grid(total: float, rate: float) -> Array:
+    """Times k/rate from 0 to the total time, and the total itself as the last [s].
+
+    Args:
+        total: The total time [s].
+        rate: Samples per second [1/s], > 0.
+
+    Returns:
+        The times, shape (N,).
+
+    Raises:
+        InvalidValueError: If the rate is not positive, or makes too many samples.
+    """
     rate = number(rate, "rate", "1/s", above=0.0)
     steps = total * rate
     if steps > MOST_SAMPLES:

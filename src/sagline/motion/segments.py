@@ -136,7 +136,8 @@ class Segments:
             for order, by_share in enumerate(self.profile.rates(s)):
                 rate = by_share / T ** (order + 1)
                 rates[order, block, :3], rates[order, block, 3:] = rate * move, rate * turn
-        return Path(time, Pose.from_quaternion(position, quaternion), *locked(rates))
+        rests, pose = np.append(0.0, ends), Pose.from_quaternion(position, quaternion)
+        return Path(time, pose, *locked(rates), rests)
 
     def _least_time(
         self, extent: Array, verb: str, name: str, unit: str, speed: float | None, acceleration: float | None

@@ -1,0 +1,241 @@
+"""Input shapers: a few impulses that, convolved with a motion, leave a frequency at rest."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import reduce
+from operator import mul
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sagline.arguments import instance
+from sagline.arrays import Array, broadcast_shape, checked, locked, number
+from sagline.errors import InvalidValueError
+from sagline.motion.path import checked_time
+
+MOST_IMPULSES: Final = 10_000  # three for each of eight frequencies are 6,561
+_SAME: Final = 1e-12  # of a shaper's duration: impulses so near are one
+_ROUNDING: Final = 1e-9  # of the sum of the amplitudes
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shaper:
+    """Impulses that a motion is convolved with: it is made of shares of itself, each a little later.
+
+    The product of two shapers convolves them: what either leaves at rest, the product leaves at rest.
+
+    Attributes:
+        time: When the impulses come [s], shape (K,), ascending, the first no earlier than 0.
+        amplitude: Share of the motion that starts at each, shape (K,), their sum 1.
+        frequency: What they were made for [Hz], shape (F,); empty where that is not known.
+    """
+
+    time: Array
+    amplitude: Array
+    frequency: Array
+
+    def __init__(self, time: ArrayLike, amplitude: ArrayLike, frequency: ArrayLike = ()) -> None:
+        """Check the impulses.
+
+        Args:
+            time: When they come [s], shape (K,), strictly increasing, >= 0.
+            amplitude: Their shares, shape (K,); they sum to 1.
+            frequency: What they are made for [Hz], > 0, shape (F,).
+
+        Raises:
+            InvalidValueError: If they are no such impulses.
+
+        Examples:
+            >>> import sagline as sl
+            >>> both = sl.ZV(1.8) * sl.ZV(2.9)
+            >>> print(both.time.round(3), both.amplitude)
+            [0.    0.172 0.278 0.45 ] [0.25 0.25 0.25 0.25]
+        """
+        clock = checked(checked_time(time), "time", "s", low=0.0)
+        shares = checked(amplitude, "amplitude", "", shape=(None,))
+        if shares.shape != clock.shape or abs(shares.sum() - 1.0) > _ROUNDING:
+            value = f"{shares.size} that sum to {shares.sum():.9g}"
+            raise InvalidValueError("amplitude", value, f"{clock.size} that sum to 1", "Divide them by their sum.")
+        object.__setattr__(self, "time", clock)
+        object.__setattr__(self, "amplitude", shares)
+        object.__setattr__(self, "frequency", _frequencies(frequency))
+
+    @property
+    def duration(self) -> float:
+        """How much later a shaped motion ends [s]."""
+        return float(self.time[-1])
+
+    def __mul__(self, other: Shaper) -> Shaper:
+        """Both, one after the other, in any order.
+
+        Args:
+            other: A shaper.
+
+        Returns:
+            Shaper with an impulse for each pair of impulses; those at one time are one.
+
+        Raises:
+            InvalidValueError: If the other is none, or there were more than 10,000 impulses.
+        """
+        theirs = instance(other, Shaper, "the other factor")
+        if (count := self.time.size * theirs.time.size) > MOST_IMPULSES:
+            step = "Shape fewer frequencies."
+            raise InvalidValueError("a product of shapers", f"of {count} impulses", f"<= {MOST_IMPULSES}", step)
+        times = np.add.outer(self.time, theirs.time).ravel()
+        order = np.argsort(times, kind="stable")
+        times, shares = times[order], np.multiply.outer(self.amplitude, theirs.amplitude).ravel()[order]
+        first = np.append(True, np.diff(times) > _SAME * times[-1])
+        merged = np.add.reduceat(shares, np.flatnonzero(first))
+        return Shaper(times[first], merged, np.concatenate((self.frequency, theirs.frequency)))
+
+    def residual(self, frequency: ArrayLike, damping_ratio: float = 0.0) -> Array:
+        """Share of the vibration that is left when a motion ends, of what the unshaped motion leaves.
+
+        Args:
+            frequency: Of the vibration, undamped [Hz], >= 0, of any shape.
+            damping_ratio: Of the vibration, >= 0, < 1.
+
+        Returns:
+            |sum A_j exp((zeta w + i w_d) t_j)| exp(-zeta w t_K), w = 2 pi frequency, w_d = w sqrt(1 - zeta^2), of the
+            shape of the frequency: 1 without a shaper.
+
+        Raises:
+            InvalidValueError: If an argument is out of its range.
+
+        Source:
+            Singhose, Command shaping for flexible systems: a review of the first 50 years, 2009.
+        """
+        turning = 2.0 * np.pi * checked(frequency, "frequency", "Hz", low=0.0)[..., None]
+        ratio = _damping_ratio(damping_ratio)
+        before = self.time - self.time[-1]
+        damped = np.exp(ratio * turning * before) * np.exp(1j * turning * np.sqrt(1.0 - ratio**2) * before)
+        left: Array = locked(np.asarray(np.abs(damped @ self.amplitude)))
+        return left
+
+
+def ZV(frequency: ArrayLike, damping_ratio: ArrayLike = 0.0) -> Shaper:  # noqa: N802
+    """Zero vibration: two impulses half a period apart leave nothing at the frequency.
+
+    Args:
+        frequency: Natural frequency [Hz], > 0; of several, shape (F,), the product of their shapers.
+        damping_ratio: Of the vibration, >= 0, < 1, one for all or one a frequency.
+
+    Returns:
+        Shaper that makes a motion half a period longer.
+
+    Raises:
+        InvalidValueError: If a frequency is not positive, or a damping ratio out of its range.
+
+    Source:
+        Singhose, Command shaping for flexible systems: a review of the first 50 years, 2009.
+
+    Examples:
+        >>> import sagline as sl
+        >>> shaper = sl.ZV(2.0)
+        >>> print(shaper.time, shaper.amplitude, shaper.residual(2.2).round(3))
+        [0.   0.25] [0.5 0.5] 0.156
+    """
+    return _several(frequency, damping_ratio, "damping_ratio", _zero_vibration)
+
+
+def ZVD(frequency: ArrayLike, damping_ratio: ArrayLike = 0.0) -> Shaper:  # noqa: N802
+    """Zero vibration and derivative: as `ZV`, and little is left where the frequency is a little off.
+
+    Args:
+        frequency: Natural frequency [Hz], > 0; of several, shape (F,), the product of their shapers.
+        damping_ratio: Of the vibration, >= 0, < 1, one for all or one a frequency.
+
+    Returns:
+        Shaper of three impulses that makes a motion a period longer.
+
+    Raises:
+        InvalidValueError: If a frequency is not positive, or a damping ratio out of its range.
+
+    Source:
+        Singhose, Command shaping for flexible systems: a review of the first 50 years, 2009.
+
+    Examples:
+        >>> import sagline as sl
+        >>> shaper = sl.ZVD(2.0)
+        >>> print(shaper.time, shaper.amplitude, shaper.residual(2.2).round(3))
+        [0.   0.25 0.5 ] [0.25 0.5  0.25] 0.024
+    """
+    return _several(frequency, damping_ratio, "damping_ratio", _zero_vibration_and_derivative)
+
+
+def EI(frequency: ArrayLike, tolerance: ArrayLike = 0.05) -> Shaper:  # noqa: N802
+    """Extra insensitive: leaves the tolerance at the frequency itself, nothing a little above and below.
+
+    Args:
+        frequency: Natural frequency [Hz], > 0, of a vibration that is hardly damped; of several, shape (F,), the
+            product of their shapers.
+        tolerance: Share of the vibration that may be left, >= 0, < 1, one for all or one a frequency.
+
+    Returns:
+        Shaper of three impulses that makes a motion a period longer.
+
+    Raises:
+        InvalidValueError: If a frequency is not positive, or a tolerance out of its range.
+
+    Source:
+        Singhose, Command shaping for flexible systems: a review of the first 50 years, 2009.
+
+    Examples:
+        >>> import sagline as sl
+        >>> shaper = sl.EI(2.0, tolerance=0.05)
+        >>> print(shaper.amplitude, shaper.residual([1.8, 2.0, 2.2]).round(3))
+        [0.2625 0.475  0.2625] [0.024 0.05  0.024]
+    """
+    return _several(frequency, tolerance, "tolerance", _extra_insensitive)
+
+
+def _several(frequency: ArrayLike, option: ArrayLike, name: str, make: Callable[[float, float], Shaper]) -> Shaper:
+    """The product of the shapers of each frequency, each with its option, a number from 0 to below 1."""
+    frequencies, options = checked(frequency, "frequency", "Hz", above=0.0), checked(option, name, "", low=0.0)
+    if (options >= 1.0).any():
+        raise InvalidValueError(name, f"{options.max():g}", ">= 0, < 1", "Give a share, 0.05 for 5 %.")
+    shape = broadcast_shape(f"frequency and {name}", frequencies.shape, options.shape, (1,))
+    if len(shape) > 1 or shape == (0,):
+        step = "Give what is to be left at rest."
+        raise InvalidValueError("frequency", f"of shape {frequencies.shape}", "one number, or shape (F,), F >= 1", step)
+    each = zip(np.broadcast_to(frequencies, shape), np.broadcast_to(options, shape), strict=True)
+    return reduce(mul, (make(float(f), float(o)) for f, o in each))
+
+
+def _zero_vibration(frequency: float, damping_ratio: float) -> Shaper:
+    half, decay = _half_period(frequency, damping_ratio)
+    return Shaper([0.0, half], np.array([1.0, decay]) / (1.0 + decay), [frequency])
+
+
+def _zero_vibration_and_derivative(frequency: float, damping_ratio: float) -> Shaper:
+    half, decay = _half_period(frequency, damping_ratio)
+    shares = np.array([1.0, 2.0 * decay, decay**2]) / (1.0 + decay) ** 2
+    return Shaper([0.0, half, 2.0 * half], shares, [frequency])
+
+
+def _half_period(frequency: float, damping_ratio: float) -> tuple[float, float]:
+    """Half a period of the damped vibration [s], and what is left of it after that."""
+    root = np.sqrt(1.0 - damping_ratio**2)
+    return 0.5 / (frequency * root), float(np.exp(-np.pi * damping_ratio / root))
+
+
+def _extra_insensitive(frequency: float, tolerance: float) -> Shaper:
+    outer, inner = 0.25 * (1.0 + tolerance), 0.5 * (1.0 - tolerance)
+    return Shaper(np.array([0.0, 0.5, 1.0]) / frequency, [outer, inner, outer], [frequency])
+
+
+def _frequencies(frequency: ArrayLike) -> Array:
+    found = checked(frequency, "frequency", "Hz", above=0.0)
+    if found.ndim != 1:
+        raise InvalidValueError("frequency", f"of shape {found.shape}", "shape (F,)", "Give a list of them.")
+    return found
+
+
+def _damping_ratio(value: float) -> float:
+    ratio = number(value, "damping_ratio", "", low=0.0)
+    if ratio >= 1.0:
+        raise InvalidValueError("damping_ratio", f"{ratio:g}", ">= 0, < 1", "Give the ratio, 0.01 for 1 %.")
+    return ratio

@@ -1,0 +1,84 @@
+"""Which vibrations a motion excites: those that a shaper should leave at rest."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from sagline.arguments import brief, instance
+from sagline.arrays import Array, locked
+from sagline.dynamics.moves import Move, moves_of
+from sagline.dynamics.vibration import Vibration
+from sagline.errors import InvalidValueError
+from sagline.motion.path import Path
+from sagline.robot.robot import Robot
+from sagline.statics.stiffness import Modes
+from sagline.statics.wrench import inertial_wrench
+
+_NEAR: Final = 3.0  # times: excitations that differ by less both count
+_INSTANTS: Final = 2000  # of a move, where its inertia is taken
+
+
+def to_shape(modes: Modes | Vibration, path: Path) -> Array:
+    """The frequencies that a path excites most: one, or two where the second is excited a third as much or more.
+
+    A mode is excited by its share of the platform's inertia on the way, at its own frequency, and it is seen by how
+    much it moves the platform: the larger |phi . M d| |phi| |A(w)|/w, phi its shape, d the direction of the way, A the
+    Fourier transform of the acceleration along it. This measure is plausible, not proved: it finds what to shape, not
+    how much is left.
+
+    Args:
+        modes: Of the robot at a single state, best the one where the path ends: `modes(plan.state[-1])`, without the
+            mass of the cables, or `vibration(plan.state[-1])`, with it.
+        path: A path from rest to rest; of several moves, the one that excites a mode most counts.
+
+    Returns:
+        Frequencies [Hz], shape (1,) or (2,), the most excited first.
+
+    Raises:
+        InvalidValueError: If the modes are of several states, no mode has a frequency, or the path is in motion at an
+            end or does not move.
+
+    Source:
+        docs/howto/without-vibration.md.
+
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("article-suspended")
+        >>> path = sl.quintic_path([(0, 0, 1.5), (3, 0, 1.5)], durations=2.0)
+        >>> plan = sl.inverse(robot, path, tension=sl.MinimumNorm())
+        >>> print(sl.to_shape(sl.modes(plan.state[-1]), path).round(2), "Hz")
+        [2.75 1.84] Hz
+    """
+    given: object = modes
+    if not isinstance(given, Modes | Vibration):
+        step = "Make them: modes(plan.state[-1]), or vibration(plan.state[-1])."
+        raise InvalidValueError("modes", brief(given), "a Modes or a Vibration", step)
+    state = modes.state
+    if state.pose.shape:
+        value = f"of {len(state.pose)} states"
+        raise InvalidValueError("modes", value, "of a single state", "Take those of the last: modes(plan.state[-1]).")
+    moves = [move for move in moves_of(instance(path, Path, "path")) if move.curve is not None]
+    known = np.flatnonzero(np.isfinite(modes.frequency) & (modes.frequency > 0.0))
+    if not (moves and known.size):
+        item, value = ("path", "without motion") if not moves else ("modes", "without a frequency")
+        raise InvalidValueError(item, value, "a motion, and modes that it can excite", "Take another path, or state.")
+    frequency, shape = modes.frequency[known], modes.shape[:, known]
+    excited = np.max([_excitation(state.one_robot, move, frequency, shape) for move in moves], axis=0)
+    order = np.argsort(-excited, kind="stable")[:2]
+    return locked(frequency[order[excited[order] * _NEAR >= excited[order[0]]]])
+
+
+def _excitation(robot: Robot, move: Move, frequency: Array, shape: Array) -> Array:
+    """How much a move excites each mode, and the mode moves the platform, shape (K,)."""
+    time = np.linspace(0.0, move.duration, _INSTANTS + 1)
+    assert move.curve is not None
+    motion = move.rates(time)
+    jet = move.curve.at(motion[0])
+    twist, twist_rate, _ = jet.twists(motion)
+    force = inertial_wrench(robot, jet.pose, twist, twist_rate) @ shape  # of each mode over time
+    turning = 2.0 * np.pi * frequency
+    transform = np.trapezoid(force * np.exp(-1j * np.outer(time, turning)), time, axis=0)
+    seen: Array = np.abs(transform) * np.linalg.norm(shape, axis=0) / turning
+    return seen
