@@ -23,13 +23,6 @@ PATH_PLACES = (
     *("path.time", "path.twist", "path.twist_rate", "path.jerk", "path.rests"),
     *("path.pose.position", "path.pose.quaternion"),
 )
-    "path.time",
-    "path.twist",
-    "path.twist_rate",
-    "path.jerk",
-    "path.rests",
-    *("path.pose.position", "path.pose.quaternion"),
-)
 
 
 def a_plan() -> sl.Plan:
