@@ -18,10 +18,15 @@ if TYPE_CHECKING:
     from sagline.cables.parabolic import Parabolic
     from sagline.cables.status import CableStatus
     from sagline.cables.straight import Straight
+    from sagline.dynamics.cable_dynamics import dynamic_stiffness
+    from sagline.dynamics.damping import Damping
     from sagline.dynamics.shaped import shaped
     from sagline.dynamics.shapers import EI, ZV, ZVD, Shaper
     from sagline.dynamics.simulation import EnergyBalance, Occurrence, Simulation
     from sagline.dynamics.to_shape import to_shape
+    from sagline.dynamics.vibrating import vibration
+    from sagline.dynamics.vibration import Vibration
+    from sagline.dynamics.vibration_status import VibrationStatus
     from sagline.errors import CableGeometryError, FileError, InvalidValueError, SaglineError, SaglineWarning
     from sagline.files.caspr import load_caspr
     from sagline.files.imported import Imported
@@ -98,6 +103,7 @@ __all__ = [
     "Closest",
     "Confirmation",
     "Creep",
+    "Damping",
     "Elastic",
     "Empirical",
     "EmpiricalFit",
@@ -141,6 +147,8 @@ __all__ = [
     "Straight",
     "TensionMethod",
     "TensionPolygon",
+    "Vibration",
+    "VibrationStatus",
     "Winch",
     "WinchRates",
     "__version__",
@@ -150,6 +158,7 @@ __all__ = [
     "confirm",
     "dump_mjcf",
     "dump_robot",
+    "dynamic_stiffness",
     "encoder_counts",
     "equilibria",
     "forward",
@@ -180,6 +189,7 @@ __all__ = [
     "tension_polygon",
     "to_shape",
     "unresisted_motion",
+    "vibration",
     "winch_rates",
     "without_cables",
 ]
@@ -201,6 +211,7 @@ _HOMES = {
     "Confirmation": "sagline.kinematics.confirm",
     "Creep": "sagline.cables.creep",
     "EI": "sagline.dynamics.shapers",
+    "Damping": "sagline.dynamics.damping",
     "Elastic": "sagline.cables.elastic",
     "Empirical": "sagline.cables.empirical",
     "EmpiricalFit": "sagline.article.identify",
@@ -244,6 +255,8 @@ _HOMES = {
     "Straight": "sagline.cables.straight",
     "TensionMethod": "sagline.tension.method",
     "TensionPolygon": "sagline.tension.polygon",
+    "Vibration": "sagline.dynamics.vibration",
+    "VibrationStatus": "sagline.dynamics.vibration_status",
     "Winch": "sagline.robot.winch",
     "WinchRates": "sagline.kinematics.winch_rates",
     "ZV": "sagline.dynamics.shapers",
@@ -254,6 +267,7 @@ _HOMES = {
     "confirm": "sagline.kinematics.confirm",
     "dump_mjcf": "sagline.files.mjcf",
     "dump_robot": "sagline.files.robot_file",
+    "dynamic_stiffness": "sagline.dynamics.cable_dynamics",
     "encoder_counts": "sagline.kinematics.encoder",
     "equilibria": "sagline.kinematics.equilibria",
     "forward": "sagline.kinematics.forward",
@@ -284,6 +298,7 @@ _HOMES = {
     "tension_polygon": "sagline.kinematics.polygon",
     "to_shape": "sagline.dynamics.to_shape",
     "unresisted_motion": "sagline.tension.singular",
+    "vibration": "sagline.dynamics.vibrating",
     "winch_rates": "sagline.kinematics.winch_rates",
     "without_cables": "sagline.tension.broken",
 }

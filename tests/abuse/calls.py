@@ -75,7 +75,7 @@ def _of_class(name: str, kind: type) -> set[str]:
 RESULTS = frozenset(
     {"CableFit", "CableState", "Confirmation", "EmpiricalFit", "Equilibria", "Equilibrium", "ForwardSolution"}
     | {"EnergyBalance", "Imported", "Modes", "Occurrence", "Plan", "Simulation", "Stiffness", "TensionPolygon"}
-    | {"WinchRates"}
+    | {"Vibration", "WinchRates"}
 )
 # asked by sagline itself, with numbers of its own
 INTERNAL = frozenset({"TensionMethod.preference", "QuadraticProgram.preference"})
@@ -96,6 +96,7 @@ def calls(folder: Path) -> dict[str, Call]:
         _solvers,
         _tensions,
         _statics,
+        _vibrations,
         _articles,
         _files,
         _figures,
@@ -454,6 +455,18 @@ def _statics(given: _Given) -> dict[str, Call]:
         "article_balance": Call(sl.article_balance, _all(robot=one, pose=pose, k_h=("number", 4.75))),
         "unresisted_motion": Call(sl.unresisted_motion, _all(robot=one, pose=pose)),
         "inertial_wrench": Call(sl.inertial_wrench, _all(robot=robot, pose=("one", given.poses), **rates)),
+    }
+
+
+def _vibrations(given: _Given) -> dict[str, Call]:
+    state, damping = ("one", given.plan.state), ("one", sl.Damping(1e-3), True)
+    ratios = {"loss_time": ("number", 0.25), "air_damping": ("number", 0.5), "modal_damping": ("number", 0.125)}
+    return {
+        "Damping": Call(sl.Damping, _all(**ratios)),
+        "vibration": Call(sl.vibration, _all(state=state, up_to=("number", 4.75), damping=damping)),
+        "dynamic_stiffness": Call(
+            sl.dynamic_stiffness, _all(state=state, frequency=("array", [0.5, 2.0]), damping=damping)
+        ),
     }
 
 

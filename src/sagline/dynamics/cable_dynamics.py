@@ -1,0 +1,167 @@
+"""The stiffness of cables against vibrations of their platform ends, exactly."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sagline.arguments import instance, optional
+from sagline.arrays import Array, checked, locked
+from sagline.dynamics.damping import Damping
+from sagline.errors import InvalidValueError
+from sagline.kernels.dynamics import collocation
+from sagline.kernels.dynamics.collocation import dynamic_stiffnesses
+from sagline.memory import check_memory
+from sagline.robot.equilibrium import Equilibrium
+from sagline.statics.slopes import cable_slopes
+from sagline.statics.strings import Strings, strings_of
+
+EXACT = 0.45 * np.pi  # phase of a transverse wave in an element [rad]
+Complex = NDArray[np.complex128]
+_BYTES = 400.0  # a cable and frequency
+
+
+def dynamic_stiffness(state: Equilibrium, frequency: ArrayLike, damping: Damping | None = None) -> Complex:
+    """Force on the platform end of every cable by its displacement, while it vibrates about an equilibrium.
+
+    Exact about the elastic catenary, in its plane and out of it, from taut string to deep sag; the frame end is held,
+    or on what gives way behind it. At frequency zero it is that of `stiffness`.
+
+    Args:
+        state: An equilibrium, a single one.
+        frequency: [Hz], >= 0, shape (F,) or a single one.
+        damping: What takes energy out of the vibration; None: nothing. Its modal_damping is a loss factor twice as
+            large of all stiffness, which damps every mode by that ratio at its own frequency.
+
+    Returns:
+        Complex array of shape (F, m, 3, 3), or (m, 3, 3) [N/m], world axes; NaN for cables that hang folded or slack,
+        which have no linear vibration.
+
+    Raises:
+        InvalidValueError: If the state is no single Equilibrium, of an exact or an elastic cable; if a frequency is
+            negative, or so high that a cable would hold more than a hundred thousand waves.
+
+    Examples:
+        >>> import numpy as np
+        >>> import sagline as sl
+        >>> pose = sl.Pose((1.0, 0.5, 1.5), np.eye(3))
+        >>> plan = sl.inverse(sl.load_robot("cogiro"), pose)
+        >>> still, moving = sl.dynamic_stiffness(plan.state, [0.0, 4.0])[:, 0]
+        >>> print(still[0, 0].real.round(), moving[0, 0].real.round(), "N/m")
+        36202.0 47220.0 N/m
+
+    Source:
+        docs/model.md, section 11.
+    """
+    one_state(state)
+    given = checked(frequency, "frequency", "Hz", low=0.0)
+    if given.ndim > 1:
+        raise InvalidValueError("frequency", f"of shape {given.shape}", "one frequency or a list", "Flatten it.")
+    optional(damping, Damping, "damping")
+    cables = state.cables.shape[-1]
+    check_memory(f"{given.size:,} frequencies", _BYTES * given.size * cables, "Take them in parts.")
+    found = moving_stiffness(strings_of(state), given.reshape(-1), damping)
+    found += _loss(damping) * cable_slopes(state).blocks
+    return locked(found if given.ndim else found[0])
+
+
+def one_state(state: Equilibrium) -> Equilibrium:
+    """A single equilibrium, as it is.
+
+    Args:
+        state: What was given.
+
+    Returns:
+        The state.
+
+    Raises:
+        InvalidValueError: If it is none, or a batch.
+    """
+    if instance(state, Equilibrium, "state").pose.shape:
+        step = "Take the poses one by one, state[i]; frequency_map takes many."
+        raise InvalidValueError("state", f"a batch of {len(state)}", "a single equilibrium", step)
+    return state
+
+
+def moving_stiffness(strings: Strings, frequency: Array, damping: Damping | None) -> Complex:
+    """What is added to the stiffness at rest of the cables of one state.
+
+    Args:
+        strings: Of one state, with a leading axis 1.
+        frequency: [Hz], shape (F,).
+        damping: What takes energy out, or None.
+
+    Returns:
+        Shape (F, m, 3, 3) [N/m], world axes; NaN for cables that are not taut.
+
+    Raises:
+        InvalidValueError: If a frequency is too high.
+    """
+    waves = _waves(frequency, damping)
+    kind = np.float64 if damping is None else np.complex128
+    m = strings.table.shape[1]
+    found = np.full((1, frequency.size, m, collocation.FOUND), np.nan, dtype=kind)
+    taut = np.flatnonzero(strings.taut[0])
+    part = np.empty((1, frequency.size, taut.size, collocation.FOUND), dtype=kind)
+    counts = np.empty((*part.shape[:-1], 2), dtype=np.int64)
+    room = np.empty(collocation.ROOM, dtype=kind)
+    real = waves if damping is not None else np.ascontiguousarray(waves.real)
+    dynamic_stiffnesses(np.ascontiguousarray(strings.table[:, taut]), real, EXACT, room, part, counts)
+    check_counts(counts, frequency)
+    found[:, :, taut] = part
+    return in_world(found[0], strings.axes[0])
+
+
+def check_counts(counts: NDArray[np.int64], frequency: Array) -> None:
+    """Refuse a frequency for which a cable has too many elements.
+
+    Args:
+        counts: As kernels fill them, shape (1, F, m, 2).
+        frequency: [Hz], shape (F,).
+
+    Raises:
+        InvalidValueError: If there is one.
+    """
+    high = np.flatnonzero((counts == collocation.TOO_MANY).any(axis=(0, 2, 3)))
+    if high.size:
+        value = f"{frequency[high[0]]:g} Hz, which would cut a cable into more than {collocation.MOST_ELEMENTS:,} waves"
+        raise InvalidValueError("frequency", value, "a lower one", "Give one nearer to the robot's own.")
+
+
+def in_world(found: NDArray[np.float64] | Complex, axes: Array) -> Complex:
+    """Stiffness in the planes of cables, and normal to them, in the world.
+
+    Args:
+        found: XX, XZ, ZZ, YY, shape (F, m, FOUND).
+        axes: Of the cables, shape (m, 3, 3).
+
+    Returns:
+        Shape (F, m, 3, 3).
+    """
+    xx, xz, zz, yy = np.moveaxis(found, -1, 0)[..., None, None]
+    level, normal, up = np.moveaxis(axes, 1, 0)
+    across = level[:, :, None] * up[:, None, :]
+    return np.asarray(
+        xx * (level[:, :, None] * level[:, None, :])
+        + xz * (across + np.swapaxes(across, -1, -2))
+        + zz * (up[:, :, None] * up[:, None, :])
+        + yy * (normal[:, :, None] * normal[:, None, :]),
+        dtype=np.complex128,
+    )
+
+
+def _waves(frequency: Array, damping: Damping | None) -> Complex:
+    """Frequencies as kernels take them, shape (1, F, WAVE_COLUMNS)."""
+    omega = 2.0 * np.pi * frequency
+    waves = np.zeros((1, frequency.size, collocation.WAVE_COLUMNS), dtype=np.complex128)
+    waves[0, :, collocation.OMEGA], waves[0, :, collocation.SQUARE] = omega, omega**2
+    waves[0, :, collocation.DRAG] = 0.0 if damping is None else 1j * omega * damping.air_damping
+    waves[0, :, collocation.ACROSS] = 1.0 / _loss(damping)
+    stretch = 1.0 if damping is None else 1.0 + 1j * omega * damping.loss_time
+    waves[0, :, collocation.ALONG] = waves[0, :, collocation.ACROSS] / stretch
+    return waves
+
+
+def _loss(damping: Damping | None) -> complex:
+    """What the modal damping makes of all stiffness."""
+    return 1.0 if damping is None else 1.0 + 2j * damping.modal_damping

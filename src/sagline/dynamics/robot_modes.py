@@ -1,0 +1,109 @@
+"""Modes of one state of a robot whose cables have mass, as many as the exact count has."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from sagline.arrays import Array
+from sagline.dynamics.component_modes import Components, stretch
+from sagline.dynamics.count import modes_below
+from sagline.dynamics.damping import Damping
+from sagline.dynamics.reduced import Setting, reduced
+from sagline.errors import InvalidValueError, SaglineError
+
+MOST_MODES: Final = 2_000
+BORDER: Final = 1e-6  # of a frequency, within which the count says on which side of it a mode is
+
+
+class Found(NamedTuple):
+    """Modes of one state below a frequency.
+
+    Attributes:
+        frequency: [Hz], shape (K,).
+        platform: Motion of the platform, shape (6, K).
+        amplitudes: Of the cables' components beside their motion at rest, shape (K_c, K).
+        ends: Displacements of the platform ends, shape (m, 3, K).
+        components: Of the cables.
+        number: How many, by the exact count.
+    """
+
+    frequency: Array
+    platform: Array
+    amplitudes: Array
+    ends: Array
+    components: Components
+    number: int
+
+
+def modes_of(setting: Setting, row: int, up_to: float) -> Found:
+    """Modes of one state below a frequency, as many as the exact count has.
+
+    Args:
+        setting: Of N states.
+        row: Which of them; a stable one.
+        up_to: The frequency [Hz].
+
+    Returns:
+        The modes.
+
+    Raises:
+        InvalidValueError: If there are too many.
+        SaglineError: If modes and count disagree.
+    """
+    count = modes_below(setting, row, up_to)
+    if count > MOST_MODES:
+        value = f"{up_to:g} Hz, below which the robot has {count:,} modes"
+        raise InvalidValueError("up_to", value, f"a frequency with up to {MOST_MODES:,} modes below it", "Lower it.")
+    problem = reduced(setting, row, up_to)
+    square, vectors = np.linalg.eigh(problem.matrix)
+    frequency = np.sqrt(np.maximum(square, 0.0)) / (2.0 * np.pi)
+    border = np.searchsorted(frequency, (up_to * (1.0 - BORDER), up_to * (1.0 + BORDER)))
+    if not border[0] <= count <= border[1]:
+        text = f"vibration up to {up_to:g} Hz: {border[0]} modes were found where the exact count has {count}"
+        raise SaglineError(f"{text}. Ask for another up_to, and report the robot and its pose.")
+    n = problem.platform.shape[1]
+    platform = problem.platform @ vectors[:n, :count]
+    amplitudes = vectors[n:, :count] - problem.driven @ vectors[:n, :count]
+    return Found(frequency[:count], platform, amplitudes, setting.ends[row] @ platform, problem.components, count)
+
+
+def cable_shares(setting: Setting, row: int, found: Found) -> Array:
+    """Share of each mode's kinetic energy that is each cable's.
+
+    Args:
+        setting: Of N states.
+        row: Which of them.
+        found: Its modes.
+
+    Returns:
+        Shape (m, K).
+    """
+    parts, ends, own = found.components, found.ends, found.amplitudes
+    shares = np.einsum("mak,mab,mbk->mk", ends, parts.still, ends, optimize=True)
+    driven = np.einsum("ca,cak->ck", parts.participation, ends[parts.cable])
+    np.add.at(shares, parts.cable, own * (own + 2.0 * driven))
+    return np.asarray(shares)
+
+
+def loss(density: Array, found: Found, shares: Array, damping: Damping) -> Array:
+    """Damping ratio of each mode, to first order: power lost over that of a critically damped one.
+
+    Args:
+        density: Of the cables [kg/m], shape (m,).
+        found: The modes.
+        shares: Their `cable_shares`.
+        damping: What takes energy out of them.
+
+    Returns:
+        Shape (K,); NaN for a mode without frequency where something is lost.
+    """
+    omega = 2.0 * np.pi * found.frequency
+    lost = np.zeros(omega.size)
+    if damping.air_damping > 0.0:
+        lost += damping.air_damping * (shares / density[:, None]).sum(axis=0)
+    if damping.loss_time > 0.0:
+        lost += damping.loss_time * stretch(found.components, found.ends, found.amplitudes).sum(axis=0)
+    ratio = np.where(lost > 0.0, lost / (2.0 * np.where(omega > 0.0, omega, np.nan)), 0.0)
+    return np.asarray(damping.modal_damping + ratio)

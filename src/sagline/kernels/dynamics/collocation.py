@@ -1,0 +1,318 @@
+"""The dynamic stiffness of one cable, exactly, and how many of its natural frequencies lie below one.
+
+u' = C f, f' = -mu u about rest, by collocation at eight Gauss points of elements, joined from the frame end on;
+docs/model.md, section 11. Out of the cable's plane it is one equation, in it two; both go through the same code, with
+real numbers or, where something takes energy, with complex ones.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from sagline.arrays import Array, Indices
+from sagline.kernels.dynamics.string import (
+    BEHIND_X,
+    BEHIND_Y,
+    BEHIND_Z,
+    String,
+    element,
+    string_at,
+    vertical_at,
+)
+from sagline.kernels.jit import entry, formula, kernel
+
+Numbers = Any  # an array of float64 or complex128
+STAGES = 8
+# columns of a wave: angular frequency; its square; i omega c; factors of C across and along the cable
+OMEGA, SQUARE, DRAG, ACROSS, ALONG = 0, 1, 2, 3, 4
+WAVE_COLUMNS = 5
+ROOM = (5 * STAGES, 20)  # of the numbers to work in
+NUDGES = 5  # of a frequency at which a pivot is singular, each by one rounding
+# columns of what is found of a cable: in its plane, and normal to it
+XX, XZ, ZZ, YY = 0, 1, 2, 3
+FOUND = 4
+MOST_ELEMENTS = 100_000
+SINGULAR, TOO_MANY = -1, -2  # in place of a count
+ROUNDING = 2.0**-52
+
+
+def _gauss() -> tuple[Array, Array, Array]:
+    """Nodes on [0, 1], weights and integrals from 0 to the nodes of Gauss collocation."""
+    nodes, weights = np.polynomial.legendre.leggauss(STAGES)
+    basis = [np.polynomial.legendre.Legendre.basis(k) for k in range(STAGES)]
+    values = np.array([one(nodes) for one in basis])
+    integrals = np.array([one.integ(lbnd=-1.0)(nodes) for one in basis])
+    scale = np.arange(STAGES) + 0.5
+    lagrange = values * weights * scale[:, None]  # of Legendre's polynomials, one node a column
+    return 0.5 * (nodes + 1.0), 0.5 * weights, np.ascontiguousarray(0.5 * (integrals.T @ lagrange))
+
+
+NODES, WEIGHTS, INTEGRALS = _gauss()
+
+
+class Wave(NamedTuple):
+    """What the two equations know of a frequency: mu, and the factors of C across and along the cable."""
+
+    mu: Any
+    across: Any
+    along: Any
+
+
+@formula
+def fill_flexibility(string: String, wave: Wave, start: float, size: float, normal: bool, c: Numbers) -> None:
+    """Fill C at the stages of an element, (STAGES, 3): xx, xz, zz; normal to the plane the first only."""
+    for k in range(STAGES):
+        vertical = vertical_at(string, start + NODES[k] * size)
+        square = string.horizontal * string.horizontal + vertical * vertical
+        turn = wave.across * (1.0 / math.sqrt(square) + 1.0 / string.stiffness)
+        if normal:
+            c[k, 0] = turn
+        else:
+            less = (wave.along / string.stiffness - turn) / square
+            c[k, 0] = turn + less * string.horizontal * string.horizontal
+            c[k, 1] = less * string.horizontal * vertical
+            c[k, 2] = turn + less * vertical * vertical
+
+
+@formula
+def sum_of(c: Numbers, size: float, d: int, phi: Numbers) -> None:
+    """Fill the integral of C over an element, (d, d)."""
+    for a in range(d):
+        for b in range(d):
+            total = 0.0 * c[0, 0]
+            for k in range(STAGES):
+                total += WEIGHTS[k] * c[k, a + b]
+            phi[a, b] = size * total
+
+
+@formula
+def fill_stages(c: Numbers, mu: Any, size: float, d: int, system: Numbers) -> None:
+    """Fill the equations of u at the stages, (STAGES d, STAGES d), and right of them their sides for u, f at 0."""
+    scale = size * size * mu
+    n = STAGES * d
+    for i in range(STAGES):
+        for a in range(d):
+            row = system[i * d + a]
+            for j in range(n):
+                row[j] = 0.0
+            for b in range(d):
+                row[n + b] = 1.0 if a == b else 0.0
+                total = 0.0 * mu
+                for k in range(STAGES):
+                    weighted = INTEGRALS[i, k] * c[k, a + b]
+                    total += weighted
+                    weighted *= scale
+                    for j in range(STAGES):
+                        row[j * d + b] += weighted * INTEGRALS[k, j]
+                row[n + d + b] = size * total
+            row[i * d + a] += 1.0
+
+
+@formula
+def eliminate(system: Numbers, n: int, columns: int) -> None:
+    """Solve n equations for the columns that follow them, in their place."""
+    for k in range(n):
+        best = k
+        for i in range(k + 1, n):
+            if abs(system[i, k]) > abs(system[best, k]):
+                best = i
+        if best != k:
+            for j in range(k, columns):
+                system[k, j], system[best, j] = system[best, j], system[k, j]
+        inverse = 1.0 / system[k, k]
+        for i in range(k + 1, n):
+            ratio = system[i, k] * inverse
+            for j in range(k + 1, columns):
+                system[i, j] -= ratio * system[k, j]
+    for r in range(n):
+        i = n - 1 - r
+        for k in range(i + 1, n):
+            ratio = system[i, k]
+            for j in range(n, columns):
+                system[i, j] -= ratio * system[k, j]
+        inverse = 1.0 / system[i, i]
+        for j in range(n, columns):
+            system[i, j] *= inverse
+
+
+@kernel
+def transfer(c: Numbers, mu: Any, size: float, d: int, system: Numbers, phi: Numbers) -> None:
+    """Fill the transfer matrix (2 d, 2 d) of an element: u, f at its end by u, f at its start."""
+    n = STAGES * d
+    fill_stages(c, mu, size, d, system)
+    eliminate(system, n, n + 2 * d)
+    for column in range(2 * d):
+        for a in range(d):
+            phi[a, column] = 1.0 if a == column else 0.0
+            phi[d + a, column] = 1.0 if d + a == column else 0.0
+        for k in range(STAGES):
+            for b in range(d):
+                force = 0.0 * mu + (1.0 if d + b == column else 0.0)
+                for j in range(STAGES):
+                    force -= size * mu * INTEGRALS[k, j] * system[j * d + b, n + column]
+                for a in range(d):
+                    phi[a, column] += size * WEIGHTS[k] * c[k, a + b] * force
+                phi[d + b, column] -= size * mu * WEIGHTS[k] * system[k * d + b, n + column]
+
+
+@formula
+def join(phi: Numbers, d: int, k: Numbers, moved: Numbers) -> None:
+    """Carry k = f u^-1 (d, d) over an element, and fill how its end moves for a unit at its start, moved (d, d)."""
+    for a in range(d):
+        for b in range(d):
+            end, force = phi[a, b], phi[d + a, b]
+            for j in range(d):
+                end += phi[a, d + j] * k[j, b]
+                force += phi[d + a, d + j] * k[j, b]
+            moved[a, b] = end
+            moved[2 + a, b] = force
+    divide(moved, d, k)
+
+
+@formula
+def begin(phi: Numbers, d: int, give: Numbers, k: Numbers, moved: Numbers) -> None:
+    """The same of the first element, whose start moves by give (d, d) for a unit of force; none where it is held."""
+    for a in range(d):
+        for b in range(d):
+            end, force = phi[a, d + b], phi[d + a, d + b]
+            for j in range(d):
+                end += phi[a, j] * give[j, b]
+                force += phi[d + a, j] * give[j, b]
+            moved[a, b] = end
+            moved[2 + a, b] = force
+    divide(moved, d, k)
+
+
+@formula
+def divide(moved: Numbers, d: int, k: Numbers) -> None:
+    """Fill k = force end^-1, the two on top of each other in moved."""
+    if d == 1:
+        k[0, 0] = moved[2, 0] / moved[0, 0]
+    else:
+        determinant = moved[0, 0] * moved[1, 1] - moved[0, 1] * moved[1, 0]
+        for a in range(2):
+            first, second = moved[2 + a, 0], moved[2 + a, 1]
+            k[a, 0] = (first * moved[1, 1] - second * moved[1, 0]) / determinant
+            k[a, 1] = (second * moved[0, 0] - first * moved[0, 1]) / determinant
+
+
+@formula
+def negatives(phi: Numbers, d: int, moved: Numbers) -> int:
+    """Negative eigenvalues of the pivot Phi_uf^-1 moved, a symmetric matrix; -1 where it is singular."""
+    if d == 1:
+        pivot = moved[0, 0].real * phi[0, 1].real
+        return -1 if pivot == 0.0 else int(pivot < 0.0)
+    below = phi[0, 2].real * phi[1, 3].real - phi[0, 3].real * phi[1, 2].real
+    determinant = (moved[0, 0].real * moved[1, 1].real - moved[0, 1].real * moved[1, 0].real) * below
+    first = (phi[1, 3].real * moved[0, 0].real - phi[0, 3].real * moved[1, 0].real) * below
+    if determinant == 0.0:
+        return -1
+    if determinant < 0.0:
+        return 1
+    return 2 if first < 0.0 else 0
+
+
+@formula
+def spring_negatives(phi: Numbers, d: int, give: Numbers) -> int:
+    """The same of the pivot at a start that gives way along one direction: of 1/give + its k00."""
+    if d == 1:
+        return int(1.0 + (give[0, 0] * phi[0, 0] / phi[0, 1]).real < 0.0)
+    determinant = phi[0, 2] * phi[1, 3] - phi[0, 3] * phi[1, 2]
+    total = 1.0 + 0.0 * give[0, 0]
+    for b in range(2):
+        top = (phi[1, 3] * phi[0, b] - phi[0, 3] * phi[1, b]) / determinant
+        low = (phi[0, 2] * phi[1, b] - phi[1, 2] * phi[0, b]) / determinant
+        total += give[0, b] * top + give[1, b] * low
+    return int(total.real < 0.0)
+
+
+@kernel
+def cable_at(
+    string: String, wave: Wave, omega: float, phase: float, d: int, give: Numbers, room: Numbers, found: Numbers
+) -> int:
+    """Fill K(omega) - K(0) of a cable's platform end, (d, d); returns how many held frequencies lie below omega.
+
+    Negative where a pivot is singular, or the elements are too many.
+    """
+    c, system, phi = room[2 * STAGES : 3 * STAGES], room[: 2 * STAGES], room[3 * STAGES : 3 * STAGES + 4]
+    rest, k = room[3 * STAGES + 4 :, :2], room[3 * STAGES + 4 :, 2:4]
+    moved, whole = room[3 * STAGES :, 4:6], room[3 * STAGES :, 6:8]
+    start = 0.0
+    count = 0
+    for number in range(MOST_ELEMENTS + 1):
+        size = element(string, start, omega, phase)
+        last = start + size >= string.length
+        fill_flexibility(string, wave, start, size, d == 1, c)
+        # at rest the end moves by the sum of all C, for a unit of force
+        sum_of(c, size, d, moved)
+        for a in range(d):
+            for b in range(d):
+                whole[a, b] = moved[a, b] + (give[a, b] if number == 0 else whole[a, b])
+        transfer(c, wave.mu, size, d, system, phi)
+        if number == 0:
+            count += spring_negatives(phi, d, give)
+            begin(phi, d, give, k, moved)
+        else:
+            join(phi, d, k, moved)
+            lost = negatives(phi, d, moved)
+            if lost < 0:
+                return SINGULAR
+            count += lost
+        start += size
+        if last:
+            for a in range(d):
+                for b in range(d):
+                    moved[a, b] = whole[a, b]
+                    moved[2 + a, b] = 1.0 if a == b else 0.0
+            divide(moved, d, rest)
+            for a in range(d):
+                for b in range(d):
+                    found[a, b] = k[a, b] - rest[a, b]
+            return count
+    return TOO_MANY
+
+
+@entry
+def dynamic_stiffnesses(
+    strings: Array, waves: Numbers, phase: float, room: Numbers, found: Numbers, counts: Indices
+) -> None:
+    """What N rows of m strings add to their stiffness at rest when they vibrate.
+
+    Args:
+        strings: (N, m, STRING_COLUMNS).
+        waves: (1 or N, F, WAVE_COLUMNS), of the type of room and found.
+        phase: Of a transverse wave in an element [rad], < pi.
+        room: Of shape ROOM.
+        found: Filled: K(omega) - K(0), (N, F, m, FOUND) [N/m]; NaN without horizontal and vertical force.
+        counts: Filled: held frequencies below omega in the plane and normal to it, (N, F, m, 2); negative where a pivot
+            is singular or the cable has too many elements.
+    """
+    give, block = room[4 * STAGES : 4 * STAGES + 2, :2], room[4 * STAGES : 4 * STAGES + 2, 2:4]
+    for p in range(strings.shape[0]):
+        for f in range(waves.shape[1]):
+            row = waves[min(p, waves.shape[0] - 1), f]
+            omega = row[OMEGA].real
+            for i in range(strings.shape[1]):
+                string = string_at(strings[p], i)
+                wave = Wave(string.density * row[SQUARE] - row[DRAG], row[ACROSS], row[ALONG])
+                x, z, y = strings[p, i, BEHIND_X], strings[p, i, BEHIND_Z], strings[p, i, BEHIND_Y]
+                give[0, 0], give[0, 1], give[1, 0], give[1, 1] = x * x, x * z, x * z, z * z
+                for a in range(2):
+                    for b in range(2):
+                        give[a, b] *= wave.along
+                for d in (2, 1):
+                    for _ in range(NUDGES):
+                        count = cable_at(string, wave, omega, phase, d, give, room, block)
+                        if count != SINGULAR:
+                            break
+                        wave = Wave(wave.mu * (1.0 + ROUNDING), wave.across, wave.along)
+                    counts[p, f, i, 2 - d] = count
+                    if d == 2:
+                        found[p, f, i, XX], found[p, f, i, ZZ] = block[0, 0], block[1, 1]
+                        found[p, f, i, XZ] = 0.5 * (block[0, 1] + block[1, 0])
+                        give[0, 0] = y * wave.across
+                    else:
+                        found[p, f, i, YY] = block[0, 0]

@@ -1,0 +1,142 @@
+"""Cables as strings: what their vibrations about an equilibrium need to know of them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sagline.arguments import instance
+from sagline.arrays import Array, Flags, Indices
+from sagline.cables.model import CableModel
+from sagline.errors import InvalidValueError
+from sagline.kernels import codes
+from sagline.kernels.cable.rows import CABLE_ROWS
+from sagline.kernels.dynamics import collocation
+from sagline.kernels.dynamics import string as columns
+from sagline.kernels.dynamics.behind import fill_behind
+from sagline.kernels.dynamics.collocation import dynamic_stiffnesses
+from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.several import anchors_of, cables_of, first_of
+from sagline.statics.tables import cable_table
+
+FOLD = 1e-6  # of its weight: a cable whose least tension is below is folded, and has no linear vibration
+COUNTING = 0.9 * np.pi  # phase of an element [rad] for a count, which is right up to pi
+_TINY = 1e-300
+
+
+class Strings(NamedTuple):
+    """The cables of N states.
+
+    Attributes:
+        table: Columns as in `sagline.kernels.dynamics.string`, shape (N, m, STRING_COLUMNS).
+        axes: Of each cable in the world: level along its plane, normal to the plane, upward, shape (N, m, 3, 3).
+        taut: Which have linear vibrations: neither folded nor slack, shape (N, m).
+    """
+
+    table: Array
+    axes: Array
+    taut: Flags
+
+
+def strings_of(state: Equilibrium) -> Strings:
+    """What the cables of an equilibrium are as strings.
+
+    Args:
+        state: An equilibrium, single or N of them; the table has a leading axis in either case.
+
+    Returns:
+        Strings.
+
+    Raises:
+        InvalidValueError: If the cable model is neither exact nor weightless and elastic.
+    """
+    cables = state.cables
+    _check_model(cables.model)
+    m = cables.shape[-1]
+    material = cables_of(state.robot)
+    weight = 0.0 if cables.model.weightless else material.linear_density * first_of(state.robot).gravity
+    known = (
+        cables.horizontal_tension,
+        cables.vertical_force,
+        cables.unstrained_length,
+        weight,
+        material.axial_stiffness,
+        material.linear_density,
+    )
+    table = np.zeros((*cables.shape, columns.STRING_COLUMNS))
+    for k, field in enumerate(known):
+        table[..., k] = field
+    table = table.reshape(-1, m, columns.STRING_COLUMNS)
+    if state.contact is not None:
+        exact = cables.model.code == codes.CATENARY
+        leaving = (cables.frame_end_tension if exact else state.chord_tension).reshape(-1, m)
+        terms = cables.model.terms(first_of(state.robot).gravity)
+        wraps = np.array(state.contact.wrap_angle).reshape(-1, m)
+        fill_behind(terms, cable_table(state.robot), wraps, np.array(leaving), np.empty((CABLE_ROWS, m)), table)
+    return Strings(table, _axes(state).reshape(-1, m, 3, 3), _taut(table))
+
+
+def count_below(strings: Array, frequency: Array) -> Indices:
+    """How many natural frequencies the cables have with both ends held, by the count of Wittrick and Williams.
+
+    Args:
+        strings: Their table, shape (N, m, STRING_COLUMNS).
+        frequency: Each [Hz], shape (1 or N, F).
+
+    Returns:
+        Those below each frequency, shape (N, F, m).
+    """
+    waves = undamped(frequency)
+    count, m = strings.shape[:2]
+    found = np.empty((count, waves.shape[1], m, collocation.FOUND))
+    counts = np.empty((*found.shape[:-1], 2), dtype=np.int64)
+    dynamic_stiffnesses(strings, waves, COUNTING, np.empty(collocation.ROOM), found, counts)
+    return np.asarray(counts.sum(axis=-1))
+
+
+def undamped(frequency: Array) -> Array:
+    """Frequencies as kernels take them.
+
+    Args:
+        frequency: [Hz], shape (N, F).
+
+    Returns:
+        Array of shape (N, F, WAVE_COLUMNS).
+    """
+    waves = np.zeros((*frequency.shape, collocation.WAVE_COLUMNS))
+    waves[..., collocation.OMEGA] = omega = 2.0 * np.pi * frequency
+    waves[..., collocation.SQUARE] = omega**2
+    waves[..., collocation.ACROSS] = waves[..., collocation.ALONG] = 1.0
+    return waves
+
+
+def _check_model(model: CableModel) -> None:
+    if instance(model, CableModel, "model").code not in (codes.CATENARY, codes.ELASTIC):
+        step = "Solve the pose with Catenary(), the default."
+        raise InvalidValueError("the cable model", type(model).__name__, "Catenary, Elastic", step)
+
+
+def _axes(state: Equilibrium) -> Array:
+    """Axes of each cable, one a row, shape (..., m, 3, 3); those of a vertical cable are the world's."""
+    anchors = anchors_of(state.robot)
+    turned = anchors.platform @ np.swapaxes(state.pose.matrix, -1, -2)
+    level = (state.pose.position[..., None, :] + turned - anchors.frame)[..., :2]
+    length = np.hypot(level[..., 0], level[..., 1])
+    upright = length == 0.0
+    cosine = np.where(upright, 1.0, level[..., 0] / np.maximum(length, _TINY))
+    sine = np.where(upright, 0.0, level[..., 1] / np.maximum(length, _TINY))
+    axes = np.zeros((*cosine.shape, 3, 3))
+    axes[..., 0, 0], axes[..., 0, 1] = cosine, sine
+    axes[..., 1, 0], axes[..., 1, 1] = -sine, cosine
+    axes[..., 2, 2] = 1.0
+    return axes
+
+
+def _taut(table: Array) -> Flags:
+    """Whether the least tension is more than none, (N, m)."""
+    top = table[..., columns.VERTICAL]
+    hanging = table[..., columns.WEIGHT] * table[..., columns.LENGTH]
+    vertical = np.maximum(np.maximum(top - hanging, -top), 0.0)
+    least = np.hypot(table[..., columns.HORIZONTAL], vertical)
+    return np.asarray(least > np.maximum(FOLD * hanging, _TINY))
