@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from sagline.cables.straight import Straight
     from sagline.dynamics.cable_dynamics import dynamic_stiffness
     from sagline.dynamics.damping import Damping
+    from sagline.dynamics.linearized import Linearized, linearized
     from sagline.dynamics.shaped import shaped
     from sagline.dynamics.shapers import EI, ZV, ZVD, Shaper
     from sagline.dynamics.simulation import EnergyBalance, Occurrence, Simulation
@@ -121,6 +122,7 @@ __all__ = [
     "InvalidValueError",
     "InverseSolver",
     "InverseStep",
+    "Linearized",
     "LowestMaximum",
     "LowestSum",
     "MeasuredTension",
@@ -169,6 +171,7 @@ __all__ = [
     "inverse",
     "lengths_from_counts",
     "limit_margin",
+    "linearized",
     "load_caspr",
     "load_measurements",
     "load_path",
@@ -229,6 +232,7 @@ _HOMES = {
     "InvalidValueError": "sagline.errors",
     "InverseSolver": "sagline.kinematics.inverse_solver",
     "InverseStep": "sagline.kinematics.inverse_solver",
+    "Linearized": "sagline.dynamics.linearized",
     "LowestMaximum": "sagline.tension.lowest_maximum",
     "LowestSum": "sagline.tension.lowest_sum",
     "MeasuredTension": "sagline.kinematics.measured",
@@ -278,6 +282,7 @@ _HOMES = {
     "inverse": "sagline.kinematics.inverse",
     "lengths_from_counts": "sagline.kinematics.encoder",
     "limit_margin": "sagline.tension.margin",
+    "linearized": "sagline.dynamics.linearized",
     "load_caspr": "sagline.files.caspr",
     "load_measurements": "sagline.files.measurements",
     "load_path": "sagline.files.path_file",

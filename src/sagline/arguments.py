@@ -31,6 +31,7 @@ HOW_TO_GET: Final = MappingProxyType(
         "CableState": "Take that of a model: Catenary().from_tension(...).",
         "Confirmation": "Make one of a plan: confirm(plan).",
         "Creep": "Give Creep(axial_stiffness, time), or None.",
+        "Damping": "Give Damping(loss_time, air_damping, modal_damping), or None.",
         "Equilibrium": "Take that of a plan or a solution: plan.state.",
         "MeasuredTension": "Give MeasuredTension(frame_end_tension, tension_deviation, length_deviation).",
         "Path": "Make one, with quintic_path(waypoints, speed=1.0) for instance.",

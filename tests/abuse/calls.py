@@ -74,8 +74,8 @@ def _of_class(name: str, kind: type) -> set[str]:
 # made by sagline
 RESULTS = frozenset(
     {"CableFit", "CableState", "Confirmation", "EmpiricalFit", "Equilibria", "Equilibrium", "ForwardSolution"}
-    | {"EnergyBalance", "Imported", "Modes", "Occurrence", "Plan", "Simulation", "Stiffness", "TensionPolygon"}
-    | {"Vibration", "WinchRates"}
+    | {"EnergyBalance", "Imported", "Linearized", "Modes", "Occurrence", "Plan", "Simulation", "Stiffness"}
+    | {"TensionPolygon", "Vibration", "WinchRates"}
 )
 # asked by sagline itself, with numbers of its own
 INTERNAL = frozenset({"TensionMethod.preference", "QuadraticProgram.preference"})
@@ -466,6 +466,10 @@ def _vibrations(given: _Given) -> dict[str, Call]:
         "vibration": Call(sl.vibration, _all(state=state, up_to=("number", 4.75), damping=damping)),
         "dynamic_stiffness": Call(
             sl.dynamic_stiffness, _all(state=state, frequency=("array", [0.5, 2.0]), damping=damping)
+        ),
+        "linearized": Call(
+            sl.linearized,
+            _all(state=state, damping=("one", sl.Damping(modal_damping=0.01), True), inputs=("word", "speeds")),
         ),
     }
 

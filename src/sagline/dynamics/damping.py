@@ -31,8 +31,8 @@ class Damping:
 
     def __post_init__(self) -> None:
         """Check the values."""
-        number(self.loss_time, "loss_time", "s", low=0.0)
-        number(self.air_damping, "air_damping", "N s/m^2", low=0.0)
-        if number(self.modal_damping, "modal_damping", "", low=0.0) >= 1.0:
+        for name, unit in (("loss_time", "s"), ("air_damping", "N s/m^2"), ("modal_damping", "")):
+            object.__setattr__(self, name, number(getattr(self, name), name, unit, low=0.0))
+        if self.modal_damping >= 1.0:
             step = "Give the ratio, 0.01 for 1 %."
             raise InvalidValueError("modal_damping", f"{self.modal_damping:g}", "< 1", step)
