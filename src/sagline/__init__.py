@@ -20,9 +20,12 @@ if TYPE_CHECKING:
     from sagline.cables.straight import Straight
     from sagline.dynamics.cable_dynamics import dynamic_stiffness
     from sagline.dynamics.damping import Damping
+    from sagline.dynamics.drives import SecondOrder
+    from sagline.dynamics.events import Brake, Break, Drop, PickUp, Stall
     from sagline.dynamics.linearized import Linearized, linearized
     from sagline.dynamics.shaped import shaped
     from sagline.dynamics.shapers import EI, ZV, ZVD, Shaper
+    from sagline.dynamics.simulate import simulate
     from sagline.dynamics.simulation import EnergyBalance, Occurrence, Simulation
     from sagline.dynamics.to_shape import to_shape
     from sagline.dynamics.vibrating import vibration
@@ -92,6 +95,8 @@ __all__ = [
     "ZVD",
     "AnalyticCenter",
     "ArticleBalance",
+    "Brake",
+    "Break",
     "Cable",
     "CableFit",
     "CableGeometryError",
@@ -105,6 +110,7 @@ __all__ = [
     "Confirmation",
     "Creep",
     "Damping",
+    "Drop",
     "Elastic",
     "Empirical",
     "EmpiricalFit",
@@ -132,6 +138,7 @@ __all__ = [
     "PNorm",
     "Parabolic",
     "Path",
+    "PickUp",
     "Plan",
     "PolygonWalk",
     "Pose",
@@ -142,9 +149,11 @@ __all__ = [
     "Robot",
     "SaglineError",
     "SaglineWarning",
+    "SecondOrder",
     "Shaper",
     "Side",
     "Simulation",
+    "Stall",
     "Stiffness",
     "Straight",
     "TensionMethod",
@@ -187,6 +196,7 @@ __all__ = [
     "save_plan",
     "septic_path",
     "shaped",
+    "simulate",
     "stiffness",
     "structure_matrix",
     "tension_polygon",
@@ -201,6 +211,8 @@ __all__ = [
 _HOMES = {
     "AnalyticCenter": "sagline.tension.analytic_center",
     "ArticleBalance": "sagline.statics.balance",
+    "Brake": "sagline.dynamics.events",
+    "Break": "sagline.dynamics.events",
     "Cable": "sagline.cables.cable",
     "CableFit": "sagline.article.identify_cable",
     "CableGeometryError": "sagline.errors",
@@ -213,8 +225,9 @@ _HOMES = {
     "Closest": "sagline.tension.closest",
     "Confirmation": "sagline.kinematics.confirm",
     "Creep": "sagline.cables.creep",
-    "EI": "sagline.dynamics.shapers",
     "Damping": "sagline.dynamics.damping",
+    "Drop": "sagline.dynamics.events",
+    "EI": "sagline.dynamics.shapers",
     "Elastic": "sagline.cables.elastic",
     "Empirical": "sagline.cables.empirical",
     "EmpiricalFit": "sagline.article.identify",
@@ -242,6 +255,7 @@ _HOMES = {
     "PNorm": "sagline.tension.p_norm",
     "Parabolic": "sagline.cables.parabolic",
     "Path": "sagline.motion.path",
+    "PickUp": "sagline.dynamics.events",
     "Plan": "sagline.kinematics.plan",
     "PolygonWalk": "sagline.tension.polygon_walk",
     "Pose": "sagline.robot.pose",
@@ -252,9 +266,11 @@ _HOMES = {
     "Robot": "sagline.robot.robot",
     "SaglineError": "sagline.errors",
     "SaglineWarning": "sagline.errors",
+    "SecondOrder": "sagline.dynamics.drives",
     "Shaper": "sagline.dynamics.shapers",
     "Side": "sagline.tension.polygon",
     "Simulation": "sagline.dynamics.simulation",
+    "Stall": "sagline.dynamics.events",
     "Stiffness": "sagline.statics.stiffness",
     "Straight": "sagline.cables.straight",
     "TensionMethod": "sagline.tension.method",
@@ -298,6 +314,7 @@ _HOMES = {
     "save_plan": "sagline.files.plan_file",
     "septic_path": "sagline.motion.rest_to_rest",
     "shaped": "sagline.dynamics.shaped",
+    "simulate": "sagline.dynamics.simulate",
     "stiffness": "sagline.statics.stiffness",
     "structure_matrix": "sagline.statics.balance",
     "tension_polygon": "sagline.kinematics.polygon",

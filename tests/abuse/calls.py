@@ -99,6 +99,7 @@ def calls(folder: Path) -> dict[str, Call]:
         _vibrations,
         _articles,
         _files,
+        _in_time,
         _figures,
     ):
         table |= part(given)
@@ -612,3 +613,35 @@ _CABLES = """<cables default_cable_set="basic"><cable_set id="basic">
 <attachment><link>0</link><location>-3 0 4</location></attachment>
 <attachment><link>1</link><location>-0.2 0 0.1</location></attachment></attachments></cable_ideal>
 </cable_set></cables>"""
+
+
+def _in_time(given: _Given) -> dict[str, Call]:
+    state = given.plan.state
+
+    def moved(**arguments: Any) -> Any:
+        return sl.simulate(**{"start": state, "duration": 0.02, **arguments})
+
+    return {
+        "simulate": Call(
+            moved,
+            _all(
+                start=("one", state),
+                duration=("number", 0.02),
+                step=("number", 5e-4, True),
+                cable_mass=("word", "none"),
+                integrator=("word", "splitting", True),
+                winches=("one", sl.SecondOrder(10.0)),
+                winding=("word", "constant"),
+                unstrained_length=("array", given.length, True),
+                wrench=("array", [0.0, 0.0, -10.0, 0.0, 1.0, 0.0], True),
+                damping=("one", sl.Damping(1e-3), True),
+                record=("number", 0.01, True),
+            ),
+        ),
+        "SecondOrder": Call(sl.SecondOrder, _all(bandwidth=("number", 10.0), damping_ratio=("number", 0.75))),
+        "Break": Call(sl.Break, _all(cable=("whole", 3), time=("number", 0.5))),
+        "Stall": Call(sl.Stall, _all(winch=("whole", 3), time=("number", 0.5))),
+        "Brake": Call(sl.Brake, _all(time=("number", 0.5), winch=("whole", 3, True), duration=("number", 0.25))),
+        "Drop": Call(sl.Drop, _all(mass=("number", 3.0), time=("number", 0.5))),
+        "PickUp": Call(sl.PickUp, _all(mass=("number", 3.0), time=("number", 0.5))),
+    }

@@ -106,7 +106,7 @@ class Plant:
 
     def arguments(
         self, rules: tuple[int, int, int, int, int], numbers: tuple[float, float, float, float], courses: Any
-    ) -> tuple[Any, ...]:
+    ) -> Any:
         """What the kernel takes but for records and counts of steps; valid until a cable breaks or the mass changes.
 
         Args:
@@ -126,14 +126,13 @@ class Plant:
         given: tuple[Course, Course, Course] = (lengths, wrenches, winds)
         return terms, rules, numbers, robot, locked(self.data.view()), tuple(c.arrays for c in given), kept
 
-    def without(self, cable: int) -> int:
-        """Take a cable away; returns its place among those that were there."""
+    def without(self, cable: int) -> None:
+        """Take a cable away, by its index among all that were ever there."""
         place = int(np.flatnonzero(self.cables == cable)[0])
         self.cables = np.delete(self.cables, place)
         self._table = np.delete(self._table, place, axis=0)
         self.layers = np.delete(self.layers, place, axis=0)
         self.rows, self.now, self.data = (np.delete(array, place, axis=1) for array in (self.rows, self.now, self.data))
-        return place
 
     def with_mass(self, mass: float, *, at_rest: bool) -> None:
         """Change the mass [kg] and the inertia with it; what is taken up at rest shares the momentum there is."""
@@ -159,7 +158,7 @@ class Plant:
     def poses(self, states: Array) -> Pose:
         """Poses of the platform frame at recorded states (N, 13)."""
         turned = Rotation.from_quat(states[:, body.TURN : body.VELOCITY]) * Rotation.from_matrix(self.axes.T)
-        position = states[:, body.CENTER : body.TURN] - turned.apply(self.robot.center_of_mass)
+        position = states[:, body.CENTER : body.TURN] - turned.as_matrix() @ self.robot.center_of_mass
         return Pose.from_quaternion(position, turned.as_quat())
 
 

@@ -50,6 +50,7 @@ NOTE_SLACK, NOTE_SATURATED = 0.0, 1.0
 KINETIC, POTENTIAL, GIVEN, TAKEN = range(4)
 ENERGY_COLUMNS = 4
 
+MOMENT = 1e-6  # of a step: instants that are nearer are the same
 GROWN = 0.1  # of all energy that moves: an integrator that invents more has left its limit of stability
 ROUNDING = 1e-9  # of the sum of all parts of the energy
 LOOP_PERIOD = 1e-3  # s
@@ -197,22 +198,29 @@ def damp_cables(
 
 
 @glue
-def evaluate(plant: Plant, now: float) -> None:
-    """Fill the force on the platform, -gradient, what is given of it, and the cables' tensions, at a time."""
-    at, drives, rows, state = plant.at, plant.drives, plant.rows, plant.state
-    weight_of = plant.model.gravity if plant.model.code == CATENARY else 0.0
-    at[LENGTH_AT] = follow(plant.lengths, at[LENGTH_AT], now, plant.targets, plant.target_rates)
+def take_set_points(plant: Plant, now: float, shift: float) -> None:
+    """Fill the set points at a time, and the lengths of winches that keep them."""
+    at, drives, rows = plant.at, plant.drives, plant.rows
+    at[LENGTH_AT] = follow(plant.lengths, at[LENGTH_AT], now, shift, plant.targets, plant.target_rates)
     if drives.kind == d.IDEAL:
         for i in range(rows.shape[1]):
             held = drives.now[d.HELD, i] > 0.0
             drives.now[d.RATE, i] = 0.0 if held else plant.target_rates[i]
             if not held:
                 rows[t.LENGTH, i] = plant.targets[i]
+
+
+@glue
+def evaluate(plant: Plant, now: float) -> None:
+    """Fill the force on the platform, -gradient, what is given of it, and the cables' tensions, at a time."""
+    at, drives, rows, state = plant.at, plant.drives, plant.rows, plant.state
+    weight_of = plant.model.gravity if plant.model.code == CATENARY else 0.0
+    take_set_points(plant, now, -MOMENT * plant.step)
     if plant.work & LOADED:
-        at[WRENCH_AT] = follow(plant.wrenches, at[WRENCH_AT], now, plant.given, plant.spare)
+        at[WRENCH_AT] = follow(plant.wrenches, at[WRENCH_AT], now, 0.0, plant.given, plant.spare)
     unbalance(plant.model, plant.cables, plant.body, plant.given, state, plant.rotation, rows, plant.gradient)
     if plant.work & BLOWN:
-        at[WIND_AT] = follow(plant.winds, at[WIND_AT], now, plant.before[:3], plant.spare)
+        at[WIND_AT] = follow(plant.winds, at[WIND_AT], now, 0.0, plant.before[:3], plant.spare)
         for k in range(6):
             plant.gradient[k] += plant.given[k]
         blow(plant.cables, drives.data[d.DRAG], rows, plant.before, plant.given)
@@ -489,11 +497,16 @@ def run(
         for k in range(room.shape[0]):
             room[k] = 0.0
         evaluate(plant, audit[d.BEGIN] + at[STEPS] * step)
+        take_set_points(plant, audit[d.BEGIN] + at[STEPS] * step, MOMENT * step)
         damp(plant)
         note(drives, rows, cables, at, audit[d.BEGIN] + at[STEPS] * step, weight_of, records[4])
         record(plant, records)
+    elif steps == 0:
+        record(plant, records)
     for _ in range(steps):
         time = audit[d.BEGIN] + at[STEPS] * step
+        if at[LENGTH_AT] < courses[0][0].shape[0] - 1 and time + MOMENT * step >= courses[0][0][at[LENGTH_AT] + 1]:
+            take_set_points(plant, time, MOMENT * step)  # rates may jump here
         if kind == d.DRUMS and at[STEPS] % stride == 0:
             close_loops(drives, plant.targets, plant.target_rates, stride * step)
         if integrator == SPLITTING:

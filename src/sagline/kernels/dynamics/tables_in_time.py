@@ -27,24 +27,29 @@ class Course(NamedTuple):
 
 
 @formula
-def follow(course: Course, at: int, now: float, value: Array, rate: Array) -> int:
-    """Fill values and rates (n,) at a time, from a course whose interval at or before it is known; returns that now."""
-    times, last = course.time, course.time.shape[0] - 1
-    while at < last - 1 and now >= times[at + 1]:
+def follow(course: Course, at: int, now: float, shift: float, value: Array, rate: Array) -> int:
+    """Fill values and rates (n,) at a time, from a course whose interval at or before it is known; returns that now.
+
+    shift: a moment by which the interval is looked for earlier or later: at an instant of the course that before it is
+    taken where it is negative, that after it where it is positive.
+    """
+    times, last, moment = course.time, course.time.shape[0] - 1, now + shift
+    while at < last - 1 and moment >= times[at + 1]:
         at += 1
-    if last == 0 or now <= times[0] or now > times[last]:
-        row = last if now > times[last] else 0
+    if last == 0 or moment < times[0] or moment >= times[last]:
+        row = last if moment >= times[last] else 0
         for k in range(value.shape[0]):
             value[k] = course.value[row, k]
-            rate[k] = course.begin[0, k] if last > 0 and now == times[0] else 0.0
+            rate[k] = 0.0
         return at
     whole = times[at + 1] - times[at]
     x = (now - times[at]) / whole
     left = 1.0 - x
     for k in range(value.shape[0]):
         low, high = course.value[at, k], course.value[at + 1, k]
-        begin, end, slope = course.begin[at, k], course.end[at, k], (high - low) / whole
-        bend = left * (begin - slope) - x * (end - slope)
+        slope = (high - low) / whole
+        begin, end = course.begin[at, k] - slope, course.end[at, k] - slope
+        bend = left * begin - x * end
         value[k] = (left * low + x * high) + whole * x * left * bend
-        rate[k] = slope + (left - x) * bend - x * left * ((begin - slope) + (end - slope))
+        rate[k] = slope + (left - x) * bend - x * left * (begin + end)
     return at

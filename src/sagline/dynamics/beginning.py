@@ -1,0 +1,189 @@
+"""What a simulation starts from: a robot in motion or at rest, and what is given to it in time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from sagline.arguments import brief
+from sagline.arrays import Array, checked, number
+from sagline.cables.model import CableModel
+from sagline.dynamics.course import Course, table_in_time
+from sagline.errors import InvalidValueError
+from sagline.kernels import codes
+from sagline.kinematics.plan import Plan
+from sagline.kinematics.status import PoseStatus
+from sagline.kinematics.winding import without_guides
+from sagline.robot.behind import differs
+from sagline.robot.drum import drum_tension
+from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.robot.wheels import dead_cable
+from sagline.statics.wrench import inertial_wrench
+
+ROUNDING = 1e-12  # of the largest force and moment: less is none
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Beginning:
+    """A robot at the first instant, and what is given to it from then on.
+
+    Attributes:
+        robot: The robot.
+        model: Cable model.
+        state: State at the start, a single one.
+        poses: Poses on the way, a batch.
+        twist: Velocity of the platform's origin and angular velocity at the start, world axes, (6,).
+        rate: dL/dt at the start [m/s], (m,): of a plan its own, else none.
+        lengths: Set points of the unstrained lengths [m].
+        tensions: Expected at the drums [N], at the same instants.
+        wrench: Given on the platform.
+        begin: First time [s].
+        end: Last time of what is given [s].
+    """
+
+    robot: Robot
+    model: CableModel
+    state: Equilibrium
+    poses: Pose
+    twist: Array
+    rate: Array
+    lengths: Course
+    tensions: Course
+    wrench: Course
+    begin: float
+    end: float
+
+
+def beginning(start: Any, unstrained_length: Any, wrench: Any, duration: Any) -> Beginning:
+    """What `simulate` is given, checked.
+
+    Args:
+        start: A plan along a path, or a single equilibrium.
+        unstrained_length: Lengths in time, for an equilibrium; None to hold its own.
+        wrench: In time; None for that of the start.
+        duration: How long [s]; None for as long as the plan or the table of lengths is.
+
+    Returns:
+        Beginning.
+
+    Raises:
+        InvalidValueError: If there is something that cannot be simulated; the message names it.
+    """
+    if isinstance(start, Plan):
+        if unstrained_length is not None:
+            step = "Give plan.state[0] to wind other lengths than the plan's."
+            raise InvalidValueError("unstrained_length", "given with a plan", "None", step)
+        found = _from_plan(start)
+    elif isinstance(start, Equilibrium):
+        found = _from_equilibrium(start, unstrained_length)
+    else:
+        step = "Give inverse(robot, path), or the state of a pose: plan.state."
+        raise InvalidValueError("start", brief(start), "a Plan along a path, or an Equilibrium", step)
+    _check_robot(found.robot, found.model)
+    end = found.end
+    if duration is not None:
+        end = found.begin + number(duration, "duration", "s", above=0.0)
+    elif not end > found.begin:
+        raise InvalidValueError(
+            "duration", "not given", "> 0 s for a robot at rest", "Give duration=10.0 for instance."
+        )
+    course = found.wrench
+    if wrench is not None:
+        course = table_in_time(wrench, "wrench", "N or N m", 6, found.begin)
+    check_lengths(found.robot, found.lengths)
+    return replace(found, wrench=course, end=end)
+
+
+def _from_plan(plan: Plan) -> Beginning:
+    """The start of a plan along a path, at the speed that the path has there."""
+    path, rate = plan.path, plan.length_rate
+    if path is None or rate is None:
+        step = "Plan along a Path, or give plan.state and a duration."
+        raise InvalidValueError("start", "a plan of poses without times", "a plan along a path", step)
+    robot = plan.state.one_robot
+    lost = np.flatnonzero(~plan.feasible)
+    if lost.size:
+        k = int(lost[0])
+        why = PoseStatus(plan.status[k]).text
+        step = "Plan a path that is feasible throughout."
+        raise InvalidValueError(f"start: sample {k}, {path.time[k]:g} s", f"without an answer ({why})", "solved", step)
+    if plan.state.contact is not None and differs(robot, plan.state.contact.winding):
+        step = "Plan without winding: a simulation knows no friction of pulleys."
+        raise InvalidValueError("start: winding", "given", "None", step)
+    inertial = inertial_wrench(robot, path.pose, path.twist, path.twist_rate)
+    given = plan.state.wrench - inertial
+    given[np.abs(given) <= ROUNDING * np.abs(inertial).max()] = 0.0
+    some = np.unique(np.linspace(0, len(path) - 1, 16).astype(np.int64))
+    tension = drum_tension(plan.state)
+    return Beginning(
+        robot=robot,
+        model=plan.state.cables.model,
+        state=plan.state[0],
+        poses=path.pose[some],
+        twist=path.twist[0],
+        rate=rate[0],
+        lengths=Course.smooth(path.time, plan.unstrained_length, rate),
+        tensions=Course.straight(path.time, tension),
+        wrench=Course.straight(path.time, given) if given.any() else Course.still(np.zeros(6)),
+        begin=float(path.time[0]),
+        end=float(path.time[-1]),
+    )
+
+
+def _from_equilibrium(state: Equilibrium, table: Any) -> Beginning:
+    """A robot at rest."""
+    if state.pose.shape:
+        item = f"a batch of {len(state)} equilibria"
+        raise InvalidValueError("start", item, "a single equilibrium, or a plan", "Give one of them: state[0].")
+    robot, length = state.one_robot, state.unstrained_length
+    if np.isnan(length).any():
+        step = "Give a pose that is feasible."
+        raise InvalidValueError("start", "a state without lengths", "one with an answer", step)
+    tension, end = Course.still(np.nan_to_num(drum_tension(state))), 0.0
+    lengths = Course.still(length)
+    if table is not None:
+        lengths = table_in_time(table, "unstrained_length", "m", robot.cable_count, 0.0)
+        tension = Course.straight(lengths.time, np.repeat(tension.value, lengths.time.size, axis=0))
+        end = float(lengths.time[-1])
+    return Beginning(
+        robot=robot,
+        model=state.cables.model,
+        state=state,
+        poses=Pose._adopt(state.pose.position[None], state.pose.quaternion[None]),
+        twist=np.zeros(6),
+        rate=np.zeros(robot.cable_count),
+        lengths=lengths,
+        tensions=tension,
+        wrench=Course.still(state.wrench),
+        begin=0.0,
+        end=end,
+    )
+
+
+def _check_robot(robot: Robot, model: CableModel) -> None:
+    without_guides(robot, "simulate", "forward")
+    if model.code not in (codes.CATENARY, codes.ELASTIC):
+        step = "Plan with Catenary() or Elastic(), whose forces have an energy."
+        raise InvalidValueError("start: model", f"{type(model).__name__}()", "Catenary() or Elastic()", step)
+
+
+def check_lengths(robot: Robot, lengths: Course) -> None:
+    """Refuse lengths that are none, or all dead cable.
+
+    Args:
+        robot: The robot.
+        lengths: Set points [m].
+
+    Raises:
+        InvalidValueError: If a length is not longer than its dead cable.
+    """
+    checked(lengths.value, "unstrained_length", "m")
+    least, dead = lengths.value.min(axis=0), dead_cable(robot)
+    if (short := least <= dead).any():
+        i = int(np.argmax(short))
+        allowed, step = f"> {dead[i]:g} m" + (", its dead cable" if dead[i] else ""), "Correct the table of lengths."
+        raise InvalidValueError(f"unstrained_length: cable {i}", f"{least[i]:g} m", allowed, step)

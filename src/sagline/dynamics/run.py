@@ -1,0 +1,186 @@
+"""A run through time: from event to event, and what is written down of it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+import numpy as np
+
+from sagline.arrays import Array, locked
+from sagline.dynamics.course import Course
+from sagline.dynamics.events import KINDS, Brake, Break, Drop, Event, PickUp, Stall, cable_of
+from sagline.dynamics.plant import Plant, Records
+from sagline.dynamics.simulation import EnergyBalance, Occurrence, Simulation
+from sagline.errors import InvalidValueError
+from sagline.kernels.dynamics import drives as d
+from sagline.kernels.dynamics import motion as k
+from sagline.kernels.dynamics import rigid_body as body
+
+BLOCK: Final = 20_000  # steps at once: some 100 ms, after which an interrupt is heard
+NAMES: Final = {k.NOTE_SLACK: "slack", k.NOTE_SATURATED: "saturate"}
+RUN: Final[Any] = k.run
+Courses = tuple[Course, Course, Course]
+
+
+class Run:
+    """A simulation on its way."""
+
+    def __init__(
+        self,
+        plant: Plant,
+        rules: tuple[int, int, int, int, int],
+        numbers: tuple[float, float, float, float],
+        courses: Courses,
+        every: int,
+        steps: int,
+    ) -> None:
+        """Look at the start.
+
+        Args:
+            plant: The robot, which the run moves.
+            rules: Of the kernel.
+            numbers: Of the kernel.
+            courses: Of set points, wrenches and the wind.
+            every: After how many steps one is recorded.
+            steps: How many there are.
+        """
+        self.plant, self.every, self.steps = plant, every, steps
+        self._rules, self._numbers, self._courses = rules, numbers, courses
+        m, count = plant.robot.cable_count, steps // every + 1
+        self._all = Records(count, m)
+        self._all.tensions[:] = 0.0
+        self._all.lengths[:] = np.nan
+        self._occurrences: list[Occurrence] = []
+        self._marks: list[int] = []  # of the scheduled events among them
+        self._arguments: Any = plant.arguments(rules, numbers, courses)
+        self._go(0)
+
+    @property
+    def step(self) -> float:
+        """Of the integrator [s]."""
+        return self._numbers[0]
+
+    def _time(self, step: int) -> float:
+        return float(self.plant.audit[d.BEGIN] + step * self.step)
+
+    def _go(self, last: int) -> None:
+        """Go on to a step, recording on the way."""
+        plant, first = self.plant, int(self.plant.counters[k.STEPS])
+        row = first // self.every + 1 if plant.counters[k.READY] else 0
+        records = Records(last // self.every + 1 - row, len(plant.cables))
+        plant.counters[k.RECORDS] = plant.counters[k.NOTES] = 0
+        if last <= first and plant.counters[k.READY]:
+            return
+        for begin in range(first, max(last, first + 1), BLOCK):
+            RUN(*self._arguments, records.arrays, min(last - begin, BLOCK), self.every)
+            if plant.counters[k.FAILED]:
+                raise self._blown_up()
+        rows = slice(row, row + int(plant.counters[k.RECORDS]))
+        kept = slice(0, rows.stop - rows.start)
+        self._all.states[rows], self._all.energies[rows] = records.states[kept], records.energies[kept]
+        self._all.tensions[rows, plant.cables] = records.tensions[kept]
+        self._all.lengths[rows, plant.cables] = records.lengths[kept]
+        self._note(records)
+
+    def _note(self, records: Records) -> None:
+        """Take over what began by itself."""
+        for row in records.notes[: int(self.plant.counters[k.NOTES])]:
+            cable = int(self.plant.cables[int(row[k.NOTE_CABLE])])
+            kind = NAMES[row[k.NOTE_KIND]]
+            before, after = float(row[k.NOTE_BEFORE]), float(row[k.NOTE_AFTER])
+            self._occurrences.append(Occurrence(float(row[k.NOTE_TIME]), kind, cable, before, after))
+
+    def _look(self) -> float:
+        """Energy at the step that is reached, without a record [J]."""
+        plant, here = self.plant, Records(1, len(self.plant.cables))
+        plant.counters[k.RECORDS] = plant.counters[k.NOTES] = 0
+        RUN(*self._arguments, here.arrays, 0, self.every)
+        self._note(here)
+        return float(here.energies[0, k.KINETIC] + here.energies[0, k.POTENTIAL])
+
+    def happen(self, event: Event) -> None:
+        """Go on to an event, and let it happen at the first step that is not earlier.
+
+        Args:
+            event: No earlier than those before.
+        """
+        plant = self.plant
+        self._go(math.ceil((event.time - plant.audit[d.BEGIN]) / self.step - 1e-9))
+        time, before = self._time(int(plant.counters[k.STEPS])), self._look()
+        cable = cable_of(event)
+        places = plant.cables == cable if cable is not None else np.ones(len(plant.cables), dtype=np.bool_)
+        peak = float(plant.now[d.PEAK][places].max())
+        self._close()
+        self._marks.append(len(self._occurrences))
+        self._occurrences.append(Occurrence(time, KINDS[type(event)], cable, peak, 0.0))
+        start = plant.audit[d.START]
+        self._change(event, time)
+        plant.counters[[k.READY, k.LENGTH_AT, k.WRENCH_AT, k.WIND_AT]] = 0
+        plant.now[d.PEAK] = 0.0
+        self._arguments = plant.arguments(self._rules, self._numbers, self._courses)
+        more = self._look() - before
+        if isinstance(event, PickUp):
+            plant.audit[d.SUPPLIED] += more
+        else:
+            plant.audit[d.LOST] -= more
+        plant.audit[d.START] = start
+
+    def _change(self, event: Event, time: float) -> None:
+        plant, (lengths, wrenches, winds) = self.plant, self._courses
+        if isinstance(event, Break):
+            kept = np.tile(plant.cables != event.cable, lengths.value.shape[1] // len(plant.cables))
+            plant.without(event.cable)
+            self._courses = (lengths.part(kept), wrenches, winds)
+        elif isinstance(event, Stall):
+            plant.now[d.HELD, plant.cables == event.winch] = 1.0
+        elif isinstance(event, Brake):
+            columns = np.arange(len(plant.cables))
+            if event.winch is not None:
+                columns = columns[plant.cables == event.winch]
+            self._courses = (lengths.brought_to_rest(time, event.duration, columns), wrenches, winds)
+        elif isinstance(event, Drop):
+            plant.with_mass(plant.inertia[0] - event.mass, at_rest=False)
+        elif isinstance(event, PickUp):
+            plant.with_mass(plant.inertia[0] + event.mass, at_rest=True)
+
+    def _close(self) -> None:
+        """Say of the last event how large tensions became after it."""
+        if self._marks:
+            last = self._marks[-1]
+            event = self._occurrences[last]
+            after = float(self.plant.now[d.PEAK].max())
+            self._occurrences[last] = Occurrence(event.time, event.kind, event.cable, event.tension_before, after)
+
+    def _blown_up(self) -> InvalidValueError:
+        plant = self.plant
+        cable, step = int(plant.cables[int(plant.counters[k.FAILED]) - 1]), self.step
+        time = self._time(int(plant.counters[k.STEPS]))
+        value = f"{step:g} s, at which energy grows by itself: at {time:.6g} s most of it is in cable {cable}"
+        return InvalidValueError("step", value, "one that keeps the energy", f"Give step={0.2 * step:.3g}.")
+
+    def finish(self) -> Simulation:
+        """Go on to the end.
+
+        Returns:
+            The whole run.
+        """
+        self._go(self.steps)
+        self._close()
+        plant, states = self.plant, self._all.states
+        kinetic, potential, supplied, lost = (locked(column.copy()) for column in self._all.energies.T)
+        total: Array = kinetic + potential - supplied + lost
+        twist = np.concatenate((states[:, body.VELOCITY : body.MOMENTUM], states[:, body.MOMENTUM :]), axis=1)
+        time = plant.audit[d.BEGIN] + np.arange(0, self.steps + 1, self.every) * self.step
+        return Simulation(
+            robot=plant.robot,
+            time=locked(time),
+            pose=plant.poses(states),
+            twist=locked(twist),
+            tensions=locked(self._all.tensions),
+            length=locked(self._all.lengths),
+            energy=EnergyBalance(kinetic, potential, supplied, lost, locked(total - total[0])),
+            events=tuple(sorted(self._occurrences, key=lambda event: event.time)),
+            cable_mass="none",
+            step=self.step,
+        )

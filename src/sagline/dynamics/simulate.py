@@ -1,0 +1,223 @@
+"""A robot in time, as its winches move it and as it vibrates."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, Final, Literal, get_args
+
+import numpy as np
+
+from sagline.arguments import choice, optional
+from sagline.arrays import number
+from sagline.dynamics.beginning import Beginning, beginning
+from sagline.dynamics.course import Course, TableInTime, table_in_time
+from sagline.dynamics.damping import Damping
+from sagline.dynamics.drives import Winches, drive_data, kind_of
+from sagline.dynamics.events import Drop, Event, PickUp, checked_events
+from sagline.dynamics.plant import Plant
+from sagline.dynamics.run import Run
+from sagline.dynamics.simulation import Simulation
+from sagline.dynamics.steps import checked_step, frequency_of_drives, highest_frequency
+from sagline.errors import InvalidValueError
+from sagline.kernels.dynamics import drives as d
+from sagline.kernels.dynamics import motion as k
+from sagline.kinematics.plan import Plan
+from sagline.memory import check_memory
+from sagline.robot.equilibrium import Equilibrium
+
+Integrator = Literal["splitting", "runge-kutta"]
+Winding = Literal["constant", "remembered"]
+CableMass = Literal["none"]
+RECORD: Final = 0.01  # s
+MOST_STEPS: Final = 10**8  # some minutes
+
+
+def simulate(
+    start: Plan | Equilibrium,
+    *,
+    duration: float | None = None,
+    step: float | None = None,
+    cable_mass: CableMass = "none",
+    nodes: int = 20,
+    integrator: Integrator | None = None,
+    winches: Winches = "ideal",
+    winding: Winding = "constant",
+    unstrained_length: TableInTime | None = None,
+    events: Event | Iterable[Event] = (),
+    wrench: TableInTime | None = None,
+    wind: TableInTime | None = None,
+    damping: Damping | None = None,
+    record: float | None = None,
+) -> Simulation:
+    """Move a robot in time: the platform is a free body on exact cables, whose lengths its winches change.
+
+    Cables have no inertia ("massless"): they hang at every instant as they do at rest, pull or are slack as their
+    lengths say, over pulleys and with dead cable as the robot has them.
+
+    Between samples a plan's lengths are followed by cubics that have its `length_rate` there; at its samples they are
+    the plan's own. A plan that is sampled more often is followed more closely: give its path at 1 kHz.
+
+    Args:
+        start: A plan along a path, from the pose and at the speed that it begins with; its wrench, without the path's
+            inertia, acts. Or a single equilibrium, at rest.
+        duration: How long [s]; lengths are held after the end of what is given. None: as long as the plan, or the table
+            of lengths.
+        step: Of the integrator [s]; None: 0.2 radians of the highest frequency (massless, cables taut), at most 1 ms.
+        cable_mass: "none".
+        nodes: Of a cable with mass.
+        integrator: "runge-kutta", of order 4, or "splitting", symplectic, of order 2: its energy has no trend in long
+            runs. None: "runge-kutta"; "splitting" for winches="robot", which needs it.
+        winches: "ideal": lengths are what is given. SecondOrder(...): they lag. "robot": the robot's winches, with
+            inertia, limits of torque and speed, friction, and loops of position and speed that are closed every
+            millisecond; from the start on they expect the tensions of the plan.
+        winding: What lies on the drums. "constant": cable wound at the winches' winding_tension. "remembered": cable
+            that is wound in lies at its tension, until it is paid out. Of winches="robot" alone.
+        unstrained_length: Set points in time for an equilibrium: times [s] (K,) and lengths [m] (K, m), straight in
+            between; or one row (m,), which is kept from the start on.
+        events: What happens on the way, at the first step that is not earlier: `Break`, `Stall`, `Brake`, `Drop`,
+            `PickUp`.
+        wrench: On the platform, in place of that of the start: one row (6,) [N, N m], or times and rows (K, 6).
+        wind: Velocity of the air [m/s], (3,), or times and rows (K, 3). Half of its force on a cable, as if it were
+            straight, acts on the platform; needs the cables' diameter. The platform's own is a wrench.
+        damping: What takes energy out of the cables; None: nothing.
+        record: How often the motion is written down [s], in whole steps; None: 0.01.
+
+    Returns:
+        Simulation. Its events name also when a cable began to be slack, and when a winch came to a limit.
+
+    Raises:
+        InvalidValueError: If a plan has samples without an answer (it names the first), the step is above the limit of
+            stability, energy grows by itself (it names time and cable), an event names no cable, the robot lacks data
+            that its winches need, or an argument is of the wrong kind.
+
+    Examples:
+        A platform that is let go 6 mm beside its place:
+
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("cogiro")
+        >>> state = sl.inverse(robot, sl.Pose.from_euler([0, 0, 2], 0, 0, 0)).state
+        >>> push = sl.simulate(state, wrench=([0, 0.2, 0.201], [[0, 0, -500, 0, 0, 0]] * 2 + [[0] * 6]), duration=2.0)
+        >>> print(f"{1e3 * (push.pose.position[:, 2].min() - 2):.1f} mm, {push.energy.error.max():.0e} J")
+        -9.3 mm, 3e-08 J
+
+    Source:
+        docs/model.md, section 11; the splitting of the free turn: Dullweber, Leimkuhler & McLachlan, J. Chem. Phys.
+        107, 1997.
+    """
+    choice(cable_mass, "cable_mass", get_args(CableMass))
+    given = beginning(start, unstrained_length, wrench, duration)
+    kind, losses = kind_of(winches), _checked_damping(damping)
+    code = _code_of(integrator, kind)
+    choice(winding, "winding", get_args(Winding))
+    air = Course.still(np.zeros(3)) if wind is None else table_in_time(wind, "wind", "m/s", 3, given.begin)
+    happening = checked_events(events, given.robot, given.begin, given.end)
+    plant = plant_at(given, winches, wind is not None)
+    if winding == "remembered" and kind == d.DRUMS:
+        plant.remember_winding(float(given.lengths.value.max()))
+    size = _step(given, plant, step, code, kind, losses, happening)
+    work, every, count = _work(losses, given.wrench, wind is not None), _every(record, size), _count(given, size)
+    check_memory("record", 8.0 * (19 + 2 * given.robot.cable_count) * (count / every), "Record less often.")
+    rules = (code, kind, int(winding == "remembered"), work, round(k.LOOP_PERIOD / size) if kind == d.DRUMS else 1)
+    numbers = (size, losses.loss_time, losses.air_damping, 1.0)
+    run = Run(plant, rules, numbers, (set_points(given, plant, kind), given.wrench, air), every, count)
+    for event in happening:
+        run.happen(event)
+    return run.finish()
+
+
+def set_points(given: Beginning, plant: Plant, kind: int) -> Course:
+    """What the drives are to follow: lengths; of drums lengths along the path of winding, and tensions.
+
+    Args:
+        given: The beginning.
+        plant: The robot that is simulated.
+        kind: Of the winches.
+
+    Returns:
+        Course of m numbers, or 2 m.
+    """
+    if kind != d.DRUMS:
+        return given.lengths
+    stretch, course = 1.0 + plant.data[d.WINDING_STRAIN], given.lengths
+    wound = Course(course.time, course.value * stretch, course.begin * stretch, course.end * stretch)
+    return wound.beside(given.tensions)
+
+
+def plant_at(given: Beginning, winches: Winches, blown: bool) -> Plant:
+    """A robot at its beginning, its winches at the speeds that are asked for there.
+
+    Args:
+        given: The beginning.
+        winches: Which kind.
+        blown: Whether wind acts on the cables.
+
+    Returns:
+        Plant.
+    """
+    length = given.state.unstrained_length
+    data = drive_data(given.robot, winches, length, blown)
+    plant = Plant(given.robot, given.model, given.state.pose, given.twist, length, data)
+    plant.audit[d.BEGIN] = given.begin
+    plant.now[d.RATE] = given.rate
+    plant.now[d.SPEED] = given.rate * (1.0 + data[d.WINDING_STRAIN])
+    return plant
+
+
+def _checked_damping(damping: Damping | None) -> Damping:
+    found = optional(damping, Damping, "damping") or Damping()
+    if found.modal_damping > 0.0:
+        step = "Give loss_time or air_damping, which act on cables; a ratio belongs to a mode."
+        raise InvalidValueError("damping: modal_damping", f"{found.modal_damping:g}", "0 in time", step)
+    return found
+
+
+def _code_of(integrator: Any, kind: int) -> int:
+    """The kernel's code of an integrator."""
+    if integrator is not None:
+        choice(integrator, "integrator", get_args(Integrator))
+    if kind == d.DRUMS and integrator == "runge-kutta":
+        step = "Leave integrator out: friction that sticks is nothing for a smooth method."
+        raise InvalidValueError("integrator", '"runge-kutta"', '"splitting" for winches="robot"', step)
+    return k.SPLITTING if kind == d.DRUMS or integrator == "splitting" else k.RUNGE_KUTTA
+
+
+def _step(given: Beginning, plant: Plant, step: Any, code: int, kind: int, losses: Damping, events: Any) -> float:
+    """The step: by the lightest platform that there will be."""
+    robot, lengths = given.robot, given.state.unstrained_length
+    platform = highest_frequency(robot, given.poses, lengths) * _lightness(robot.mass, events)
+    stiffness = robot.cables.axial_stiffness
+    highest = max(platform, frequency_of_drives(kind, plant.data, lengths, stiffness))
+    return checked_step(step, code, highest, losses, kind == d.DRUMS)
+
+
+def _lightness(mass: float, events: tuple[Event, ...]) -> float:
+    """How much faster the platform may swing after loads are dropped."""
+    least = now = mass
+    for event in events:
+        now += event.mass if isinstance(event, PickUp) else -event.mass if isinstance(event, Drop) else 0.0
+        least = min(least, now)
+    return float(np.sqrt(mass / least))
+
+
+def _work(losses: Damping, wrench: Course, blown: bool) -> int:
+    """The kernel's bits of what damps or loads."""
+    damped = losses.loss_time > 0.0 or losses.air_damping > 0.0
+    loaded = blown or bool(wrench.value.any())
+    return k.DAMPED * damped + k.LOADED * loaded + k.BLOWN * blown
+
+
+def _every(record: Any, step: float) -> int:
+    """After how many steps one is recorded."""
+    given = RECORD if record is None else number(record, "record", "s", above=0.0)
+    if record is not None and given < 0.999 * step:
+        raise InvalidValueError("record", f"{given:g} s", f">= {step:g} s, the step", "Give a longer one, or a step.")
+    return max(1, round(min(given / step, MOST_STEPS)))
+
+
+def _count(given: Beginning, step: float) -> int:
+    """How many steps there are."""
+    count = np.ceil((given.end - given.begin) / step - 1e-9)
+    if not count <= MOST_STEPS:
+        longest, advice = f"<= {MOST_STEPS * step:g} s, {MOST_STEPS:.0e} steps", "Simulate a shorter time."
+        raise InvalidValueError("duration", f"{given.end - given.begin:g} s", longest, advice)
+    return int(count)

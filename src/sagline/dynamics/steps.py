@@ -1,0 +1,98 @@
+"""How long a step may be: by the highest frequency that the robot, its cables taut, and its winches have."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from sagline.arrays import Array, number
+from sagline.dynamics.damping import Damping
+from sagline.errors import InvalidValueError
+from sagline.kernels.dynamics import drives as d
+from sagline.kernels.dynamics.motion import RUNGE_KUTTA, SPLITTING
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+
+LIMIT: Final = {SPLITTING: 2.0, RUNGE_KUTTA: 2.0 * math.sqrt(2.0)}  # of step times highest angular frequency
+SHARE: Final = 0.2  # radians of that frequency in a step, unless told otherwise
+LONGEST: Final = 1e-3  # s
+
+
+def highest_frequency(robot: Robot, poses: Pose, lengths: Array) -> float:
+    """Highest angular frequency of the platform on cables that are all taut [rad/s]: sag only makes them softer.
+
+    Args:
+        robot: The robot.
+        poses: A batch.
+        lengths: Unstrained lengths at the first of them [m], (m,).
+
+    Returns:
+        The highest at any of the poses, at tensions that stretch no cable by more than a hundredth.
+    """
+    rotation, freedom = poses.matrix, robot.freedom
+    levers = (robot.platform_anchors - robot.center_of_mass) @ np.swapaxes(rotation, 1, 2)
+    ends = (poses.position + rotation @ robot.center_of_mass)[:, None] + levers
+    chords = ends - robot.frame_anchors
+    distance = np.linalg.norm(chords, axis=-1, keepdims=True)
+    along = chords / np.maximum(distance, 1e-300)
+    rows = np.concatenate((along, np.cross(levers, along)), axis=-1) @ freedom.T
+    free = np.linalg.norm(chords[0], axis=-1)
+    springs = robot.cables.axial_stiffness / np.minimum(lengths, np.maximum(free, 1e-300))
+    stiffness = np.swapaxes(rows, 1, 2) @ (springs[:, None] * rows)
+    mass = np.zeros((len(poses), 6, 6))
+    mass[:, :3, :3] = robot.mass * np.eye(3)
+    mass[:, 3:, 3:] = rotation @ robot.inertia @ np.swapaxes(rotation, 1, 2)
+    squares = np.linalg.eigvals(np.linalg.solve(freedom @ mass @ freedom.T, stiffness)).real
+    return float(np.sqrt(max(squares.max(), 0.0)))
+
+
+def checked_step(step: float | None, integrator: int, highest: float, damping: Damping, stride: bool) -> float:
+    """The step of a run.
+
+    Args:
+        step: What a caller gave [s]; None to let it follow from the highest frequency.
+        integrator: SPLITTING or RUNGE_KUTTA.
+        highest: Highest angular frequency [rad/s].
+        damping: Of the cables.
+        stride: Whether loops are closed every millisecond, of which a step must then be a whole part.
+
+    Returns:
+        The step [s]: unless given, a whole part of a millisecond.
+
+    Raises:
+        InvalidValueError: If it is above the limit of stability, or no whole part where it must be.
+    """
+    ratio = 0.5 * damping.loss_time * highest  # of the highest frequency's damping
+    slower = math.sqrt(1.0 + ratio * ratio) - ratio
+    limit = LIMIT[integrator] * slower / highest if highest > 0.0 else math.inf
+    if step is None:
+        return LONGEST / math.ceil(LONGEST / min(limit * SHARE / LIMIT[integrator], LONGEST) - 1e-9)
+    given = number(step, "step", "s", above=0.0)
+    if given > limit:
+        allowed = (
+            f"<= {limit:.3g} s, the limit of stability at {highest / (2.0 * math.pi):.3g} Hz, massless cables taut"
+        )
+        raise InvalidValueError("step", f"{given:g} s", allowed, "Leave it out, or give a tenth of that.")
+    parts = LONGEST / given
+    if stride and (parts < 0.5 or abs(parts - round(parts)) > 1e-9 * parts):
+        step_to = "Give 1e-3, 5e-4 or the like; drives close their loops every millisecond."
+        raise InvalidValueError("step", f"{given:g} s", "a whole part of 0.001 s", step_to)
+    return LONGEST / round(parts) if stride else given
+
+
+def frequency_of_drives(kind: int, data: Array, lengths: Array, stiffness: Array) -> float:
+    """Highest angular frequency of winches on their cables [rad/s].
+
+    Args:
+        kind: IDEAL, SECOND_ORDER or DRUMS.
+        data: What the drives are, (DATA_ROWS, m).
+        lengths: Unstrained [m], (m,).
+        stiffness: EA [N], (m,).
+    """
+    if kind == d.SECOND_ORDER:
+        return float(data[d.BANDWIDTH].max() * max(1.0, 2.0 * data[d.RATIO].max()))
+    if kind == d.DRUMS:
+        return float(np.sqrt(stiffness / (lengths * data[d.INERTIA])).max())
+    return 0.0
