@@ -91,14 +91,17 @@ def simulate(
             that its winches need, or an argument is of the wrong kind.
 
     Examples:
-        A platform that is let go 6 mm beside its place:
+        A gust that presses the platform down, and the work that it does:
 
+        >>> import numpy as np
         >>> import sagline as sl
         >>> robot = sl.load_robot("cogiro")
         >>> state = sl.inverse(robot, sl.Pose.from_euler([0, 0, 2], 0, 0, 0)).state
-        >>> push = sl.simulate(state, wrench=([0, 0.2, 0.201], [[0, 0, -500, 0, 0, 0]] * 2 + [[0] * 6]), duration=2.0)
-        >>> print(f"{1e3 * (push.pose.position[:, 2].min() - 2):.1f} mm, {push.energy.error.max():.0e} J")
-        -9.3 mm, 3e-08 J
+        >>> gust = ([0.0, 0.2, 0.3, 0.4], np.outer([0, 0, 1, 0], [0, 0, -500, 0, 0, 0]))
+        >>> run = sl.simulate(state, wrench=gust, duration=2.0)
+        >>> lowest = run.pose.position[:, 2].min() - 2.0
+        >>> print(f"{1e3 * lowest:.1f} mm, {run.energy.supplied[-1]:.2f} J")
+        -13.7 mm, 4.79 J
 
     Source:
         docs/model.md, section 11; the splitting of the free turn: Dullweber, Leimkuhler & McLachlan, J. Chem. Phys.
