@@ -16,7 +16,16 @@ from rich.console import Console
 
 from sagline.cli import cold_start
 from sagline.cli.compiling import Stage, first_run_text, heard
-from sagline.cli.entries import ENTRIES, FORWARD, INVERSE, MARGINS, POLYGON, SHARING, VIBRATION
+from sagline.cli.entries import (
+    ENTRIES,
+    FIT,
+    FORWARD,
+    FORWARD_OVER_PULLEYS,
+    INVERSE,
+    MARGINS,
+    SHARING,
+    VIBRATION,
+)
 from sagline.cli.examples import write_examples
 from sagline.cli.line import shown
 from sagline.kernels.forward.forward import forward_poses
@@ -65,6 +74,17 @@ def test_two_cores_share_the_work_and_second_versions_follow_their_first() -> No
     assert here == [SHARING, INVERSE]
     assert sorted(beside) == sorted([VIBRATION, MARGINS])
     assert cold_start.shares([MARGINS]) == ([MARGINS], [])
+    assert cold_start.shares([FORWARD_OVER_PULLEYS, INVERSE]) == (
+        [FORWARD_OVER_PULLEYS],
+        [INVERSE],
+    )  # its first is here
+    here, beside = cold_start.shares(tuple(ENTRIES))
+    assert sorted(here + beside) == sorted(ENTRIES)
+    for first, second in ((INVERSE, SHARING), (FORWARD, FORWARD_OVER_PULLEYS)):
+        (share,) = [each for each in (here, beside) if first in each]
+        assert share.index(first) + 1 == share.index(second)
+    times = [sum(ENTRIES[name].seconds for name in each) for each in (here, beside)]
+    assert times[0] == pytest.approx(times[1], rel=0.2)
 
 
 def test_what_is_compiled_is_named_and_counted() -> None:
@@ -82,15 +102,18 @@ def test_what_is_compiled_is_named_and_counted() -> None:
         pass
     assert stages[-1].words == SHARING
     stages.clear()
-    with heard(stages.append), compiling(forward_poses, ("int64", "bool")):
+    with heard(stages.append), compiling(forward_poses, ("Tuple(int64, float64, float64, none)", "bool")):
         pass
     assert stages[-1].words == FORWARD
+    with heard(stages.append), compiling(forward_poses, ("Tuple(int64, float64, float64, bool)", "bool")):
+        pass
+    assert stages[-1].words == FORWARD_OVER_PULLEYS
     with heard(stages.append), compiling(measure_balance):
         pass
     assert stages[-1].words == "measure balance"
     with compiling(inverse_poses):
         pass
-    assert len(stages) == 4  # nobody listens any more
+    assert len(stages) == 6  # nobody listens any more
 
 
 def test_the_line_says_how_far_it_is() -> None:
@@ -174,7 +197,7 @@ with heard(say):
 
 
 def test_two_processes_compile_what_this_one_then_loads(tmp_path: FilePath) -> None:
-    names = [MARGINS, POLYGON]
+    names = [FIT, VIBRATION]
     code = COMPILE.format(names=names)
     first, second = (process(code, tmp_path).communicate(timeout=600)[0] for _ in range(2))
     assert second == ""  # nothing is compiled twice
@@ -186,7 +209,7 @@ def test_two_processes_compile_what_this_one_then_loads(tmp_path: FilePath) -> N
 
 
 @pytest.mark.soak
-@pytest.mark.parametrize("name", [name for name in ENTRIES if name not in (MARGINS, POLYGON)])
+@pytest.mark.parametrize("name", [name for name in ENTRIES if name not in (FIT, VIBRATION)])
 def test_as_many_kernels_are_compiled_as_the_table_says(name: str, tmp_path: FilePath) -> None:
     said, _ = process(COMPILE.format(names=[name]), tmp_path).communicate(timeout=900)
     ends = {line.split("\t")[0]: line.split("\t")[1:] for line in said.splitlines() if line.endswith("\t1")}

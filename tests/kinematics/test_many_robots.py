@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.arrays import Array, locked
 from sagline.kinematics.forward_rows import solve_rows
 from sagline.kinematics.start import outside_limits
 from sagline.statics.tables import pose_rows
@@ -141,7 +141,7 @@ def test_a_search_that_tilts_again_takes_the_right_robots_along() -> None:
 @pytest.mark.parametrize("limits_of", ["chord", "frame_end"])
 def test_a_search_judges_each_sample_by_the_limits_and_cables_of_its_robot(limits_of: str) -> None:
     plan = feasible_plan(COGIRO, 6, seed=22)
-    lengths, rows, none = plan.unstrained_length, pose_rows(plan.state.pose), np.zeros((1, 6))
+    lengths, rows, none = plan.unstrained_length, pose_rows(plan.state.pose), locked(np.zeros((1, 6)))
     robots = [
         COGIRO.replace(
             cables=sl.Cable(density * COGIRO.cables.linear_density, COGIRO.cables.axial_stiffness),

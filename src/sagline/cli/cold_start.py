@@ -37,14 +37,17 @@ def cores() -> int:
 
 
 def shares(names: Sequence[str]) -> tuple[list[str], list[str]]:
-    """What to compile here, and what beside: about the same time for both. Second versions follow their first here."""
-    here = [name for name in names if ENTRIES[name].version > 1]
-    paths = {ENTRIES[name].path for name in here}
-    here = [name for name in names if ENTRIES[name].path in paths]
+    """What to compile here, and what beside: about the same time for both.
+
+    Versions of an entry stay together; where one is compiled already, here is the file that the next is written into.
+    """
+    groups: dict[str, list[str]] = {}
+    for name in names:
+        groups.setdefault(ENTRIES[name].path, []).append(name)
+    here: list[str] = []
     beside: list[str] = []
-    rest = (name for name in names if name not in here)
-    for name in sorted(rest, key=lambda name: -ENTRIES[name].seconds):
-        (here if _seconds(here) <= _seconds(beside) else beside).append(name)
+    for group in sorted(groups.values(), key=lambda group: (_begins(group), -_seconds(group))):
+        (here if not _begins(group) or _seconds(here) <= _seconds(beside) else beside).extend(group)
     return here, beside
 
 
@@ -176,6 +179,11 @@ def _end_with_parent() -> None:
         # another program in this process: nothing compiles on and writes a file behind what is removed
         os.execv(sys.executable, [sys.executable, "-c", REMOVE, str(FOLDER.parent)])
     os._exit(1)
+
+
+def _begins(group: Sequence[str]) -> bool:
+    """Whether the first version is among those of an entry."""
+    return any(ENTRIES[name].version == 1 for name in group)
 
 
 def _seconds(names: Sequence[str]) -> float:

@@ -75,7 +75,7 @@ def first_run_text(stages: Sequence[Stage]) -> str:
 
 def _stage(path: str, types: Any) -> Stage:
     """The beginning of an entry. The second version of one takes a flag where the first takes None."""
-    version = 2 if any(str(each) == "bool" for each in types) else 1
+    version = 1 if any("none" in str(each) for each in types) else 2
     named = [entry for entry in ENTRIES.values() if KERNELS + entry.path == path]
     for entry in named:
         if entry.version == version or len(named) == 1:

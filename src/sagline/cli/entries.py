@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from sagline.tension.method import TensionMethod
 
 KERNELS = "sagline.kernels."
+ROBOT, OVER_PULLEYS = "article-suspended", "ipanema-2-pulleys"
+PLACE = (0.0, 0.0, 2.0)
+LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 class Entry(NamedTuple):
@@ -75,6 +78,7 @@ def _verdicts() -> None:
     import numpy as np
 
     import sagline as sl
+    from sagline.arrays import locked
     from sagline.kernels.codes import POSE_INFEASIBLE
     from sagline.kinematics.inverse_rows import Found, decide_rows
     from sagline.statics.tables import pose_rows
@@ -84,17 +88,22 @@ def _verdicts() -> None:
     found = Found.empty(1, robot.cable_count, robot.degrees_of_freedom, behind=False)
     found = found._replace(pose_status=np.full(1, POSE_INFEASIBLE, dtype=np.int8))
     options = kernel_options(robot, sl.Catenary(), sl.MinimumNorm())
-    decide_rows(robot, options, pose_rows(sl.Pose(PLACE, LEVEL)), np.zeros((1, 6)), found)
+    decide_rows(robot, options, pose_rows(sl.Pose(PLACE, LEVEL)), locked(np.zeros((1, 6))), found)
 
 
-def _forward(straight: bool = False) -> None:
+def _forward(straight: bool = False, name: str = ROBOT) -> None:
     import numpy as np
 
     import sagline as sl
 
-    robot = sl.load_robot(ROBOT)
+    robot = sl.load_robot(name)
     model = sl.Straight() if straight else sl.Catenary()
     sl.forward(robot, np.full(robot.cable_count, np.nan), sl.Pose(PLACE, LEVEL), model)
+
+
+def _forward_over_pulleys() -> None:
+    _forward()
+    _forward(name=OVER_PULLEYS)
 
 
 def _margins() -> None:
@@ -120,14 +129,21 @@ def _vibration() -> None:
     sl.modes(_unknown_state())
 
 
-def _unknown_state() -> Equilibrium:
+def _vibration_over_pulleys() -> None:
+    import sagline as sl
+
+    _vibration()
+    sl.modes(_unknown_state(OVER_PULLEYS))
+
+
+def _unknown_state(name: str = ROBOT) -> Equilibrium:
     """Cables of which nothing is known: whatever is asked of them is soon answered."""
     import numpy as np
 
     import sagline as sl
     from sagline.arrays import locked
 
-    robot = sl.load_robot(ROBOT)
+    robot = sl.load_robot(name)
     unknown: Any = locked(np.full(robot.cable_count, np.nan))
     status = locked(np.zeros(robot.cable_count, dtype=np.int8))
     geometry, forces = (unknown, unknown, unknown), (unknown, unknown, unknown)
@@ -135,25 +151,26 @@ def _unknown_state() -> Equilibrium:
     return sl.Equilibrium(robot, sl.Pose(PLACE, LEVEL), locked(np.zeros(6)), cables)
 
 
-ROBOT = "article-suspended"
-PLACE = (0.0, 0.0, 2.0)
-LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-
 INVERSE, SHARING, VERDICTS = "inverse kinematics", "further ways of sharing", "verdicts of infeasible poses"
 FORWARD, FIT = "forward kinematics", "fit of straight cables"
 MARGINS, POLYGON, VIBRATION = "margins", "tension polygon", "stiffness and vibration"
+FORWARD_OVER_PULLEYS, VIBRATION_OVER_PULLEYS = f"{FORWARD} over pulleys", f"{VIBRATION} over pulleys"
 
 ENTRIES = {
     entry.words: entry
     for entry in (
-        Entry(INVERSE, "inverse.poses.inverse_poses", 39, 14.0, _inverse),
-        Entry(SHARING, "inverse.poses.inverse_poses", 39, 47.0, _other_sharing, version=2),
-        Entry(VERDICTS, "inverse.verdicts.decide_poses", 56, 24.0, _verdicts),
-        Entry(FORWARD, "forward.forward.forward_poses", 71, 14.0, _forward),
-        Entry(FIT, "forward.fit.fit_poses", 19, 5.0, lambda: _forward(straight=True)),
-        Entry(MARGINS, "inverse.queries.margins_of_poses", 33, 5.0, _margins),
-        Entry(POLYGON, "inverse.queries.polygon_of_pose", 38, 6.0, _polygon),
-        Entry(VIBRATION, "forward.sensitivity.describe_states", 48, 10.0, _vibration),
+        Entry(INVERSE, "inverse.poses.inverse_poses", 39, 18.0, _inverse),
+        Entry(SHARING, "inverse.poses.inverse_poses", 39, 49.0, _other_sharing, version=2),
+        Entry(VERDICTS, "inverse.verdicts.decide_poses", 56, 40.0, _verdicts),
+        Entry(FORWARD, "forward.forward.forward_poses", 82, 14.0, _forward),
+        Entry(FORWARD_OVER_PULLEYS, "forward.forward.forward_poses", 41, 14.0, _forward_over_pulleys, version=2),
+        Entry(FIT, "forward.fit.fit_poses", 30, 5.0, lambda: _forward(straight=True)),
+        Entry(MARGINS, "inverse.queries.margins_of_poses", 33, 9.0, _margins),
+        Entry(POLYGON, "inverse.queries.polygon_of_pose", 38, 5.0, _polygon),
+        Entry(VIBRATION, "forward.sensitivity.describe_states", 57, 6.0, _vibration),
+        Entry(
+            VIBRATION_OVER_PULLEYS, "forward.sensitivity.describe_states", 39, 4.0, _vibration_over_pulleys, version=2
+        ),
     )
 }
 

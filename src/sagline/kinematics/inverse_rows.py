@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, Codes, Flags
+from sagline.arrays import Array, Codes, Flags, locked
 from sagline.blocks import Progress, blocks
 from sagline.kernels import codes, tables
 from sagline.kernels.inverse.poses import Answers, inverse_poses
@@ -200,7 +200,7 @@ def decide_rows(
     m = found.cable_status.shape[1]
     verdicts = Verdicts.empty(count, m, n)
     verdicts.brackets[found.pose_status == codes.POSE_SOLVED] = 0.0
-    which = np.flatnonzero(np.isin(found.pose_status, UNDECIDED))
+    which = locked(np.flatnonzero(np.isin(found.pose_status, UNDECIDED)))
     given = (options.model, options.limits, robot_terms(robot), rows, loads)
     how = (covers_all(options.sharing[0], m - n), memory_for(m), found.answers, verdicts.answers)
     for part in blocks(which.size, DECIDED):

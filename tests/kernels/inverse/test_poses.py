@@ -343,7 +343,7 @@ def decided(case: Case, room: Room) -> Array:
     found = (np.full((1, 2), np.nan), nothing, nothing.copy(), np.zeros((1, m), dtype=np.bool_))
     answers = new_answers(1, m, n)
     heavy = fixed(np.array([[0.0, 0.0, -1e5, 0.0, 0.0, 0.0]]))
-    which = np.zeros(1, dtype=np.int64)
+    which = locked(np.zeros(1, dtype=np.int64))
     given = (TERMS, LIMITS, robot_terms(case), fixed(case.pose[None]), heavy)
     results = (answers.results, answers.statuses, answers.residuals, answers.needed, answers.poses)
     decide_poses(*given, which, True, room, results, found)
@@ -352,7 +352,7 @@ def decided(case: Case, room: Room) -> Array:
 
 def margined(case: Case, room: Room) -> Array:
     found = np.full(1, np.nan)
-    pulls = np.zeros((1, len(case.robot)))
+    pulls = locked(np.zeros((1, len(case.robot))))
     margins_of_poses(
         TERMS, LIMITS, robot_terms(case), fixed(case.pose[None]), fixed(case.wrench[None]), pulls, room, found
     )
@@ -365,6 +365,7 @@ def polygoned(case: Case, room: Room) -> int:
         np.empty(m), np.empty(m), np.empty((3, m)), np.empty((m - n, m)),
         np.empty((2 * m + SPARE_CORNERS, 2)), np.empty(2 * m + SPARE_CORNERS, dtype=np.int64),
     )  # fmt: skip
-    sharing = (MINIMUM_NORM, 0.0, CHORD_TENSION, np.ones(m), np.zeros(m))
-    carried = (np.full(m, np.nan), np.full(m, np.nan))
-    return polygon_of_pose(TERMS, sharing, LIMITS, robot_terms(case), case.pose, case.wrench, carried, room, polygon)
+    sharing = (MINIMUM_NORM, 0.0, CHORD_TENSION, fixed(np.ones(m)), fixed(np.zeros(m)))
+    given = (TERMS, sharing, LIMITS, robot_terms(case), fixed(case.pose), fixed(case.wrench))
+    carried = (fixed(np.full(m, np.nan)), fixed(np.full(m, np.nan)))
+    return polygon_of_pose(*given, carried, room, polygon)
