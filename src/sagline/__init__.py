@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from sagline.dynamics.damping import Damping
     from sagline.dynamics.drives import SecondOrder
     from sagline.dynamics.events import Brake, Break, Drop, PickUp, Stall
+    from sagline.dynamics.fastest import fastest
     from sagline.dynamics.linearized import Linearized, linearized
     from sagline.dynamics.shaped import shaped
     from sagline.dynamics.shapers import EI, ZV, ZVD, Shaper
@@ -172,6 +173,7 @@ __all__ = [
     "dynamic_stiffness",
     "encoder_counts",
     "equilibria",
+    "fastest",
     "forward",
     "home",
     "identify_cable",
@@ -290,6 +292,7 @@ _HOMES = {
     "dynamic_stiffness": "sagline.dynamics.cable_dynamics",
     "encoder_counts": "sagline.kinematics.encoder",
     "equilibria": "sagline.kinematics.equilibria",
+    "fastest": "sagline.dynamics.fastest",
     "forward": "sagline.kinematics.forward",
     "home": "sagline.kinematics.home",
     "identify_cable": "sagline.article.identify_cable",

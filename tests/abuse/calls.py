@@ -251,6 +251,17 @@ def _planning(given: _Given) -> dict[str, Call]:
         "ZVD": Call(sl.ZVD, _all(frequency=frequency, damping_ratio=ratio)),
         "EI": Call(sl.EI, _all(frequency=frequency, tolerance=ratio)),
         "shaped": Call(sl.shaped, _all(path=("one", path), shaper=("one", sl.ZV(2.0)))),
+        "fastest": Call(
+            sl.fastest,
+            _all(
+                robot=("one", given.robot),
+                path=("one", path),
+                margin=("number", 4.5),
+                jerk=("number", 64.0, True),
+                angular_jerk=("number", 32.0, True),
+                progress=("callback", lambda done, of: None, True),
+            ),
+        ),
         "to_shape": Call(sl.to_shape, _all(modes=("one", modes), path=("one", path))),
     }
 

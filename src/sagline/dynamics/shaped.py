@@ -54,7 +54,7 @@ def shaped(path: Path, shaper: Shaper) -> Path:
         >>> print(f"{calm.duration} s, to {calm.pose.position[-1]}")
         2.4 s, to [3.  0.  1.5]
     """
-    step = _sample_time(instance(path, Path, "path"))
+    step = sample_time(instance(path, Path, "path"))
     fastest = instance(shaper, Shaper, "shaper").frequency.max(initial=0.0)
     if fastest > 0.5 / step:
         limit = f"<= {0.5 / step:g} Hz, half the path's sample rate"
@@ -93,8 +93,18 @@ def _held(path: Path, move: Move) -> Pose:
     return path.pose[move.sample]
 
 
-def _sample_time(path: Path) -> float:
-    """The usual time from one sample to the next [s]; a rate that is all but a whole number is that."""
+def sample_time(path: Path) -> float:
+    """The usual time from one sample to the next [s]; a rate that is all but a whole number is that.
+
+    Args:
+        path: The path.
+
+    Returns:
+        The time.
+
+    Raises:
+        InvalidValueError: If the path has one sample only.
+    """
     if len(path) < 2:
         raise InvalidValueError("path", "of one sample", "two or more, from rest to rest", "Give a longer path.")
     rate = 1.0 / float(np.median(np.diff(path.time)))

@@ -137,7 +137,8 @@ class Segments:
                 rate = by_share / T ** (order + 1)
                 rates[order, block, :3], rates[order, block, 3:] = rate * move, rate * turn
         rests, pose = np.append(0.0, ends), Pose.from_quaternion(position, quaternion)
-        return Path(time, pose, *locked(rates), rests)
+        twist, twist_rate, jerk = locked(rates)
+        return Path(time, pose, twist, twist_rate, jerk, rests)
 
     def _least_time(
         self, extent: Array, verb: str, name: str, unit: str, speed: float | None, acceleration: float | None

@@ -1,0 +1,138 @@
+"""What the tension limits leave of acceleration and speed along a curve: a polygon at each of its poses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Final
+
+import numpy as np
+
+from sagline.arrays import Array
+from sagline.dynamics.curves import Jet
+from sagline.kinematics.inverse import inverse
+from sagline.kinematics.plan import Plan
+from sagline.robot.robot import Robot
+from sagline.statics.balance import structure_matrix
+from sagline.statics.wrench import inertial_wrench
+
+_NOTHING: Final = 1e-11  # of what a direction gains by the tension that it gains most by
+_BLOCK: Final = 40_000  # matrices taken apart at once
+_WIDER: Final = 0.5  # N: limits that a pose on their border is solved with
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HalfPlanes:
+    """What holds at K places: rates @ (acceleration, square of the speed) <= bound, row by row.
+
+    Attributes:
+        rates: Shape (K, R, 2).
+        bound: Shape (K, R); infinite where a row says nothing.
+    """
+
+    rates: Array
+    bound: Array
+
+    def joined(self, other: HalfPlanes) -> HalfPlanes:
+        """What holds of both."""
+        return HalfPlanes(np.hstack((self.rates, other.rates)), np.hstack((self.bound, other.bound)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Balances:
+    """The platform's balance at K places of a curve, on cables that pull as they do at tensions near by.
+
+    J tau = needed - u w_u - x w_x, u the acceleration and x the square of the speed along the curve's parameter. What
+    the cables pull beside their chords is that of the tensions last found: it is exact there, and hardly changes.
+
+    Attributes:
+        robot: The robot; its limits are those to keep.
+        jet: The places.
+        wrenches: w_u and w_x: inertial wrenches for u = 1 and for x = 1, shape (2, K, 6).
+        normals: Directions of wrenches that may bound what cables can give, shape (K, R, n).
+        gains: What a unit of each tension gives along them, shape (K, R, m), at most 1.
+        standing: The needed wrench where u = x = 0, in free motions, shape (K, n).
+        low: Lower limits of the chord tensions [N], shape (K, m).
+        high: Upper limits [N], shape (K, m).
+    """
+
+    robot: Robot
+    jet: Jet
+    wrenches: Array
+    normals: Array
+    gains: Array
+    standing: Array
+    low: Array
+    high: Array
+
+    @classmethod
+    def at(cls, robot: Robot, jet: Jet, plan: Plan) -> Balances:
+        """The balance at places where a plan at rest is known."""
+        nothing = np.zeros(plan.chord_tension.shape)
+        freedoms = robot.degrees_of_freedom
+        one = np.zeros((len(nothing), 1, freedoms))
+        new = cls(robot, jet, np.zeros((2, len(nothing), 6)), one, one, nothing[:, :freedoms], nothing, nothing)
+        return new.moved(jet).pulled(plan, np.zeros((len(jet.pose), 2)))
+
+    def moved(self, jet: Jet) -> Balances:
+        """The same balance, with the same pulls, at places near by."""
+        robot, (first, second, _) = self.robot, jet.rates
+        by_rate = inertial_wrench(robot, jet.pose, np.zeros_like(first), first)
+        by_speed = inertial_wrench(robot, jet.pose, first, second)
+        matrix = structure_matrix(robot, jet.pose)
+        normals = np.concatenate(list(_normals(matrix)))
+        gains = normals @ matrix
+        size = np.maximum(np.abs(gains).max(axis=-1, keepdims=True), _NOTHING)
+        gains[np.abs(gains) <= _NOTHING * size] = 0.0  # of the columns in the plane; a limit may be infinite
+        wrenches = np.stack((by_rate, by_speed))
+        return replace(self, jet=jet, wrenches=wrenches, normals=normals / size, gains=gains / size)
+
+    def wrench(self, motion: Array) -> Array:
+        """Inertial wrench of accelerations and squared speeds (K, 2), shape (K, 6)."""
+        total: Array = np.einsum("ck,cki->ki", motion.T, self.wrenches)
+        return total
+
+    def pulled(self, plan: Plan, motion: Array) -> Balances:
+        """The same with the pulls of a plan for motions of shape (K, 2); poses without an answer keep theirs."""
+        assert plan.needed is not None
+        found, freedom = plan.feasible[:, None], self.robot.freedom.T
+        # a limit at the frame end is one of the chord tension that differs from it as it does here
+        chords = self.robot.tension_limits_of == "chord"
+        below = 0.0 if chords else plan.state.cables.frame_end_tension - plan.chord_tension
+        return replace(
+            self,
+            standing=np.where(found, (plan.needed + self.wrench(motion)) @ freedom, self.standing),
+            low=np.where(found, self.robot.tension_min - below, self.low),
+            high=np.where(found, self.robot.tension_max - below, self.high),
+        )
+
+    def near(self, motion: Array) -> Balances:
+        """The same with the pulls that cables have in motions of shape (K, 2), on the border perhaps."""
+        robot = self.robot
+        low = np.maximum(robot.tension_min - _WIDER, 0.0)
+        wider = robot.replace(tension_min=low, tension_max=robot.tension_max + _WIDER)
+        return self.pulled(inverse(wider, self.jet.pose, wrench=self.wrench(motion)), motion)
+
+    def half_planes(self) -> HalfPlanes:
+        """The polygons: along no normal is more needed than the cables give within their limits."""
+        with np.errstate(invalid="ignore"):  # no share of an infinite limit
+            ends = [np.where(self.gains == 0.0, 0.0, self.gains * limit[:, None]) for limit in (self.low, self.high)]
+        most = np.maximum(*ends).sum(axis=-1)
+        along = np.einsum("krn,ckn->krc", self.normals, self.wrenches @ self.robot.freedom.T)
+        return HalfPlanes(-along, most - np.einsum("krn,kn->kr", self.normals, self.standing))
+
+
+def _normals(matrix: Array) -> Iterator[Array]:
+    """Both sides of every plane that n - 1 columns of matrices (K, n, m) span, shape (K, 2 S, n), block by block.
+
+    They hold all facets of the body that the columns make with bounded shares; of columns in a plane of less
+    dimensions any normal is taken, which bounds it too.
+    """
+    n, m = matrix.shape[1:]
+    sets = np.array(list(combinations(range(m), n - 1)), dtype=np.intp).reshape(-1, n - 1)
+    step = max(1, _BLOCK // len(sets))
+    for first in range(0, len(matrix), step):
+        columns = np.swapaxes(matrix[first : first + step], 1, 2)[:, sets]
+        normal = np.linalg.svd(columns, full_matrices=True)[2][..., -1, :]
+        yield np.concatenate((normal, -normal), axis=1)

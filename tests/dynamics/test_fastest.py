@@ -1,0 +1,230 @@
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+import sagline as sl
+from sagline.dynamics.balances import Balances, HalfPlanes
+from sagline.dynamics.moves import moves_of
+from sagline.dynamics.phase_plane import fastest_profile
+from sagline.statics.balance import structure_matrix
+
+ALONG_X = [(0.0, 0.0, 1.5), (3.0, 0.0, 1.5)]
+TURNING = [
+    sl.Pose.from_euler((0.0, 0.0, 1.5), 0.0, 0.0, 0.0),
+    sl.Pose.from_euler((2.0, 1.0, 2.0), 0.1, 0.05, -0.2),
+    sl.Pose.from_euler((2.0, 1.0, 2.0), 0.0, 0.0, 0.0),
+]
+
+
+@pytest.fixture(scope="module")
+def suspended() -> sl.Robot:
+    return sl.load_robot("article-suspended")
+
+
+@pytest.fixture(scope="module")
+def cogiro() -> sl.Robot:
+    return sl.load_robot("cogiro")
+
+
+def within(robot: sl.Robot, margin: float) -> sl.Robot:
+    return robot.replace(tension_min=robot.tension_min + margin, tension_max=robot.tension_max - margin)
+
+
+def hurried(path: sl.Path, factor: float) -> sl.Path:
+    """The same motion in so much of its time."""
+    return sl.Path(path.time * factor, path.pose, path.twist / factor, path.twist_rate / factor**2)
+
+
+def shortest_quintic(robot: sl.Robot, waypoints: list[tuple[float, float, float]], margin: float) -> float:
+    """By bisection, of 500 samples each."""
+    low, high = 0.2, 10.0
+    while high - low > 1e-4:
+        middle = 0.5 * (low + high)
+        path = sl.quintic_path(waypoints, durations=middle, rate=500.0 / middle)
+        if sl.inverse(within(robot, margin), path).feasible.all():
+            high = middle
+        else:
+            low = middle
+    return high
+
+
+def arc(rate: float = 100.0) -> sl.Path:
+    time = np.arange(round(4.0 * rate) + 1) / rate
+    s = time / 4.0
+    angle = (10 * s**3 - 15 * s**4 + 6 * s**5) * 0.5 * np.pi
+    position = np.stack((2.0 * np.cos(angle), 2.0 * np.sin(angle), 2.0 + 0.2 * angle), axis=1)
+    return sl.path_from_samples(time, sl.Pose.from_euler(position, 0.05 * angle, 0.02 * angle, 0.1 * angle))
+
+
+@pytest.mark.parametrize(("margin", "study"), [(0.0, (0.858, 1.118)), (5.0, None)])
+def test_it_is_faster_than_the_shortest_quintic(
+    suspended: sl.Robot, margin: float, study: tuple[float, float] | None
+) -> None:
+    quick = sl.fastest(suspended, sl.quintic_path(ALONG_X, durations=2.0), margin)
+    quintic = shortest_quintic(suspended, ALONG_X, margin)
+    assert quick.duration < 0.78 * quintic
+    if study is not None:
+        assert (quick.duration, quintic) == pytest.approx(study, abs=2e-3)
+
+
+KINDS = ("line", "turning", "arc", "frame end", "pulleys")
+QUICK = [("line", 100.0), ("turning", None), ("arc", 100.0), ("frame end", None), ("pulleys", None)]
+
+
+@pytest.mark.parametrize(
+    ("kind", "jerk"),
+    [
+        pytest.param(kind, jerk, marks=() if (kind, jerk) in QUICK else pytest.mark.soak)
+        for kind in KINDS
+        for jerk in (None, 100.0)
+    ],
+)
+def test_limits_hold_exactly_and_nothing_is_given_away(cogiro: sl.Robot, kind: str, jerk: float | None) -> None:
+    robot = cogiro
+    if kind == "frame end":
+        robot = robot.replace(tension_limits_of="frame_end", tension_max=800.0, tension_min=30.0)
+    if kind == "pulleys":
+        robot = robot.replace(winches=sl.Winch(0.05, dead_cable=4.0))
+    path = {"line": sl.quintic_path([(-1, 0, 1.5), (2, 1, 2)], durations=3.0), "arc": arc()}.get(
+        kind, sl.quintic_path(TURNING, durations=4.0)
+    )
+    quick = sl.fastest(robot, path, margin=8.0, jerk=jerk)
+    limited = within(robot, 8.0)
+    assert sl.inverse(limited, quick).feasible.all()
+    assert quick.rests is not None
+    np.testing.assert_allclose(quick.twist[[0, -1]], 0.0, atol=1e-9)
+    for k in (0, -1):
+        np.testing.assert_allclose(quick.pose.position[k], path.pose.position[k], atol=1e-9)
+        np.testing.assert_allclose(quick.pose.matrix[k], path.pose.matrix[k], atol=1e-9)
+    if jerk is None:
+        assert quick.jerk is None
+        assert not sl.inverse(limited, hurried(quick, 0.995)).feasible.all()
+    else:
+        assert quick.jerk is not None
+        sizes = np.linalg.norm(quick.jerk[:, :3], axis=1)
+        assert sizes.max() <= jerk * (1.0 + 1e-9)
+        assert sizes.max() > 0.99 * jerk
+        h = np.diff(quick.time)[0]
+        there = (quick.twist_rate[1:-1] - quick.twist_rate[:-2])[:, :3] / h  # what its samples say
+        assert np.linalg.norm(there, axis=1).max() <= jerk * 1.001
+
+
+def test_it_stays_on_the_curve(cogiro: sl.Robot) -> None:
+    quick = sl.fastest(cogiro, arc())
+    x, y, z = quick.pose.position.T
+    angle = np.arctan2(y, x)
+    np.testing.assert_allclose(np.hypot(x, y), 2.0, atol=1e-9)
+    np.testing.assert_allclose(z, 2.0 + 0.2 * angle, atol=1e-9)
+    h = np.diff(quick.time)[0]
+    np.testing.assert_allclose(
+        quick.twist[1:-2, :3], (quick.pose.position[2:-1] - quick.pose.position[:-3]) / (2 * h), atol=0.06
+    )
+
+
+@pytest.mark.parametrize("jerk", [1.0, 4.0])
+def test_where_only_the_jerk_is_bounded_the_time_is_known(jerk: float) -> None:
+    """A quarter of the time at each of +J, -J, -J, +J leads over J T^3/32."""
+    robot = sl.load_robot("ipanema-1")
+    low, high = sl.Pose.from_euler((0, 0, 1.5), 0, 0, 0), sl.Pose.from_euler((0.3, 0.4, 1.5), 0, 0, 0)
+    quick = sl.fastest(robot, sl.quintic_path([low, high], durations=2.0), jerk=jerk)
+    assert quick.duration == pytest.approx(np.cbrt(32.0 * 0.5 / jerk), rel=1e-6)
+    turned = sl.Pose.from_euler((0, 0, 1.5), 0, 0, 0.05)
+    quick = sl.fastest(robot, sl.quintic_path([low, turned], durations=2.0), angular_jerk=jerk)
+    assert quick.duration == pytest.approx(np.cbrt(32.0 * 0.05 / jerk), rel=1e-6)
+
+
+def test_much_jerk_comes_near_the_fastest_of_all(suspended: sl.Robot) -> None:
+    path = sl.quintic_path(ALONG_X, durations=2.0)
+    least = sl.fastest(suspended, path).duration
+    times = [sl.fastest(suspended, path, jerk=jerk).duration for jerk in (300.0, 1000.0)]
+    assert times == sorted(times, reverse=True)
+    assert least < times[-1] < 1.025 * least
+
+
+@pytest.mark.parametrize("jerk", [None, 50.0])
+def test_winches_keep_their_speed(cogiro: sl.Robot, jerk: float | None) -> None:
+    winch = sl.Winch(drum_radius=0.06, groove_pitch=0.006, gear=10.0, speed_limit=300.0)
+    robot = cogiro.replace(winches=winch, cables=cogiro.cables.replace(diameter=0.004))
+    path = sl.quintic_path([(-1, 0, 1.5), (2, 1, 2)], durations=3.0)
+    quick = sl.fastest(robot, path, jerk=jerk)
+    speed = np.abs(sl.winch_rates(sl.inverse(within(robot, 5.0), quick)).motor_speed)
+    assert quick.duration > 1.1 * sl.fastest(cogiro, path, jerk=jerk).duration
+    if jerk is None:  # but for what cables stretch where the acceleration jumps
+        assert np.median(np.sort(speed.max(axis=1))[-50:]) == pytest.approx(300.0, rel=0.05)
+    else:
+        assert 270.0 < speed.max() <= 300.0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_half_planes_are_what_linear_programs_find(cogiro: sl.Robot, seed: int) -> None:
+    """The largest of any direction in (u, x), over tensions as variables, is that over the half planes."""
+    rng = np.random.default_rng(seed)
+    robot = cogiro.replace(center_of_mass=(0.05, 0.02, -0.1), tension_max=900.0)
+    if seed == 3:
+        robot = robot.replace(tension_max=np.inf)
+    move = moves_of(arc())[0]
+    assert move.curve is not None
+    jet = move.curve.at(rng.uniform(0.0, 1.0, 3))
+    balances = Balances.at(robot, jet, sl.inverse(robot, jet.pose))
+    planes = balances.half_planes()
+    matrix = structure_matrix(robot, jet.pose)
+    for k in range(3):
+        said = np.isfinite(planes.bound[k])
+        for _ in range(8):
+            c = rng.normal(size=2) * (0.1, 1.0)
+            box = [(-50.0, 50.0), (-50.0, 50.0)]
+            two = linprog(-c, planes.rates[k][said], planes.bound[k][said], bounds=box)
+            equal = np.hstack((balances.wrenches[:, k].T, matrix[k]))
+            limits = [*box, *zip(balances.low[k], balances.high[k], strict=True)]
+            whole = linprog(np.append(-c, np.zeros(8)), A_eq=equal, b_eq=balances.standing[k], bounds=limits)
+            assert two.fun == pytest.approx(whole.fun, rel=1e-7, abs=1e-7)
+
+
+def test_profiles_of_constant_bounds_are_known() -> None:
+    place, a, b, v = np.linspace(0.0, 1.0, 101), 2.0, 4.0, 0.8
+
+    def planes(*rows: tuple[float, float, float]) -> HalfPlanes:
+        every = np.repeat(np.array(rows)[None], len(place), axis=0)
+        return HalfPlanes(every[..., :2], every[..., 2])
+
+    bang = fastest_profile(place, planes((1.0, 0.0, a), (-1.0, 0.0, a)))
+    assert bang is not None
+    assert bang.duration == pytest.approx(2.0 / np.sqrt(a), rel=1e-12)
+    held = fastest_profile(place, planes((1.0, 0.0, a), (-1.0, 0.0, b), (0.0, 1.0, v**2)))
+    assert held is not None
+    expected = 1.0 / v + 0.5 * v * (1.0 / a + 1.0 / b)  # two ramps and a way at the full speed
+    assert held.duration == pytest.approx(expected, rel=2e-3)  # the ramps end between places
+    assert fastest_profile(place, planes((-1.0, 0.0, -1.0))) is None  # it can only speed up
+    time = np.linspace(0.0, bang.duration, 9)
+    np.testing.assert_allclose(bang.at(time)[0, :5], 0.5 * a * time[:5] ** 2, rtol=1e-12)
+
+
+def test_dwells_are_kept_and_progress_is_told(suspended: sl.Robot) -> None:
+    stops = [(0, 0, 1.5), (1, 0, 1.5), (1, 0, 1.5), (1, 1, 1.5)]
+    told: list[tuple[int, int]] = []
+    path = sl.quintic_path(stops, durations=(2.0, 0.7, 2.0))
+    quick = sl.fastest(suspended, path, jerk=100.0, progress=lambda done, of: told.append((done, of)))
+    assert quick.rests is not None
+    assert np.diff(quick.rests)[1] == pytest.approx(0.7)
+    assert told == [(1, 3), (2, 3), (3, 3)]
+    middle = (quick.time > quick.rests[1]) & (quick.time < quick.rests[2])
+    assert not quick.twist[middle].any()
+
+
+def test_what_cannot_be_done_is_refused(suspended: sl.Robot) -> None:
+    path = sl.quintic_path(ALONG_X, durations=2.0)
+    for name, value in (("margin", -1.0), ("jerk", 0.0), ("jerk", np.nan), ("angular_jerk", -2.0)):
+        bad: dict[str, Any] = {name: value}
+        with pytest.raises(sl.InvalidValueError, match=name):
+            sl.fastest(suspended, path, **bad)
+    with pytest.raises(sl.InvalidValueError, match="half the range of cable 0"):
+        sl.fastest(suspended, path, margin=1e4)
+    with pytest.raises(sl.InvalidValueError, match="move from 0 s to 2 s at rest is infeasible at"):
+        sl.fastest(suspended, path, margin=100.0)
+    time = np.linspace(0.0, 1.0, 11)
+    position = np.stack((time, 0.0 * time, 0.0 * time + 1.5), axis=1)
+    moving = sl.path_from_samples(time, sl.Pose.from_euler(position, 0.0, 0.0, 0.0))
+    with pytest.raises(sl.InvalidValueError, match="at its begin is in motion"):
+        sl.fastest(suspended, moving)
