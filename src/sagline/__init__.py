@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from sagline.dynamics.shapers import EI, ZV, ZVD, Shaper
     from sagline.dynamics.simulate import simulate
     from sagline.dynamics.simulation import EnergyBalance, Occurrence, Simulation
+    from sagline.dynamics.simulator import Reading, Simulator
     from sagline.dynamics.to_shape import to_shape
     from sagline.dynamics.vibrating import vibration
     from sagline.dynamics.vibration import Vibration
@@ -147,6 +148,7 @@ __all__ = [
     "PoseStatus",
     "Puncture",
     "QuadraticProgram",
+    "Reading",
     "Robot",
     "SaglineError",
     "SaglineWarning",
@@ -154,6 +156,7 @@ __all__ = [
     "Shaper",
     "Side",
     "Simulation",
+    "Simulator",
     "Stall",
     "Stiffness",
     "Straight",
@@ -265,6 +268,7 @@ _HOMES = {
     "PoseStatus": "sagline.kinematics.status",
     "Puncture": "sagline.tension.puncture",
     "QuadraticProgram": "sagline.tension.quadratic_program",
+    "Reading": "sagline.dynamics.simulator",
     "Robot": "sagline.robot.robot",
     "SaglineError": "sagline.errors",
     "SaglineWarning": "sagline.errors",
@@ -272,6 +276,7 @@ _HOMES = {
     "Shaper": "sagline.dynamics.shapers",
     "Side": "sagline.tension.polygon",
     "Simulation": "sagline.dynamics.simulation",
+    "Simulator": "sagline.dynamics.simulator",
     "Stall": "sagline.dynamics.events",
     "Stiffness": "sagline.statics.stiffness",
     "Straight": "sagline.cables.straight",

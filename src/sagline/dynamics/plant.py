@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from sagline.arrays import Array, Indices, locked
 from sagline.cables.model import CableModel
 from sagline.dynamics.course import Course
+from sagline.errors import InvalidValueError
 from sagline.kernels import tables
 from sagline.kernels.cable.rows import CABLE_ROWS
 from sagline.kernels.cable.rows import LENGTH as LENGTH_ROW
@@ -182,3 +183,18 @@ def principal_axes(robot: Robot, pose: Pose) -> tuple[Array, Array]:
     if np.linalg.det(axes) < 0.0:
         axes[:, 0] *= -1.0
     return np.array([np.inf, np.inf, normal @ robot.inertia @ normal]), axes
+
+
+def grown(step: float, time: float, cable: int) -> InvalidValueError:
+    """What is said of a run whose energy has grown by itself.
+
+    Args:
+        step: Of the integrator [s].
+        time: When it was seen [s].
+        cable: Which has the largest tension.
+
+    Returns:
+        The error, to be raised.
+    """
+    value = f"{step:g} s, at which energy grows by itself: at {time:.6g} s most of it is in cable {cable}"
+    return InvalidValueError("step", value, "one that keeps the energy", f"Give step={0.2 * step:.3g}.")

@@ -10,7 +10,7 @@ import numpy as np
 from sagline.arrays import Array, locked
 from sagline.dynamics.course import Course
 from sagline.dynamics.events import KINDS, Brake, Break, Drop, Event, PickUp, Stall, cable_of
-from sagline.dynamics.plant import Plant, Records
+from sagline.dynamics.plant import Plant, Records, grown
 from sagline.dynamics.simulation import EnergyBalance, Occurrence, Simulation
 from sagline.errors import InvalidValueError
 from sagline.kernels.dynamics import drives as d
@@ -154,10 +154,8 @@ class Run:
 
     def _blown_up(self) -> InvalidValueError:
         plant = self.plant
-        cable, step = int(plant.cables[int(plant.counters[k.FAILED]) - 1]), self.step
-        time = self._time(int(plant.counters[k.STEPS]))
-        value = f"{step:g} s, at which energy grows by itself: at {time:.6g} s most of it is in cable {cable}"
-        return InvalidValueError("step", value, "one that keeps the energy", f"Give step={0.2 * step:.3g}.")
+        cable = int(plant.cables[int(plant.counters[k.FAILED]) - 1])
+        return grown(self.step, self._time(int(plant.counters[k.STEPS])), cable)
 
     def finish(self) -> Simulation:
         """Go on to the end.

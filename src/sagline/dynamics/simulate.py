@@ -109,16 +109,16 @@ def simulate(
     """
     choice(cable_mass, "cable_mass", get_args(CableMass))
     given = beginning(start, unstrained_length, wrench, duration)
-    kind, losses = kind_of(winches), _checked_damping(damping)
-    code = _code_of(integrator, kind)
+    kind, losses = kind_of(winches), checked_damping(damping)
+    code = code_of(integrator, kind)
     choice(winding, "winding", get_args(Winding))
     air = Course.still(np.zeros(3)) if wind is None else table_in_time(wind, "wind", "m/s", 3, given.begin)
     happening = checked_events(events, given.robot, given.begin, given.end)
     plant = plant_at(given, winches, wind is not None)
     if winding == "remembered" and kind == d.DRUMS:
         plant.remember_winding(float(given.lengths.value.max()))
-    size = _step(given, plant, step, code, kind, losses, happening)
-    work, every, count = _work(losses, given.wrench, wind is not None), _every(record, size), _count(given, size)
+    size = step_of(given, plant, step, code, kind, losses, happening)
+    work, every, count = work_of(losses, given.wrench, wind is not None), _every(record, size), _count(given, size)
     check_memory("record", 8.0 * (19 + 2 * given.robot.cable_count) * (count / every), "Record less often.")
     rules = (code, kind, int(winding == "remembered"), work, round(k.LOOP_PERIOD / size) if kind == d.DRUMS else 1)
     numbers = (size, losses.loss_time, losses.air_damping, 1.0)
@@ -166,7 +166,15 @@ def plant_at(given: Beginning, winches: Winches, blown: bool) -> Plant:
     return plant
 
 
-def _checked_damping(damping: Damping | None) -> Damping:
+def checked_damping(damping: Damping | None) -> Damping:
+    """Damping that a motion in time knows; none for None.
+
+    Args:
+        damping: What a caller gave.
+
+    Raises:
+        InvalidValueError: If it is none, or damps modes.
+    """
     found = optional(damping, Damping, "damping") or Damping()
     if found.modal_damping > 0.0:
         step = "Give loss_time or air_damping, which act on cables; a ratio belongs to a mode."
@@ -174,8 +182,16 @@ def _checked_damping(damping: Damping | None) -> Damping:
     return found
 
 
-def _code_of(integrator: Any, kind: int) -> int:
-    """The kernel's code of an integrator."""
+def code_of(integrator: Any, kind: int) -> int:
+    """The kernel's code of an integrator.
+
+    Args:
+        integrator: What a caller gave; None to choose by the kind of winches.
+        kind: Of the winches.
+
+    Raises:
+        InvalidValueError: If there is no such integrator, or it is not for these winches.
+    """
     if integrator is not None:
         choice(integrator, "integrator", get_args(Integrator))
     if kind == d.DRUMS and integrator == "runge-kutta":
@@ -184,8 +200,18 @@ def _code_of(integrator: Any, kind: int) -> int:
     return k.SPLITTING if kind == d.DRUMS or integrator == "splitting" else k.RUNGE_KUTTA
 
 
-def _step(given: Beginning, plant: Plant, step: Any, code: int, kind: int, losses: Damping, events: Any) -> float:
-    """The step: by the lightest platform that there will be."""
+def step_of(given: Beginning, plant: Plant, step: Any, code: int, kind: int, losses: Damping, events: Any) -> float:
+    """The step, by the lightest platform that there will be.
+
+    Args:
+        given: The beginning.
+        plant: The robot that is simulated.
+        step: What a caller gave [s], or None.
+        code: Of the integrator.
+        kind: Of the winches.
+        losses: What damps.
+        events: What will happen.
+    """
     robot, lengths = given.robot, given.state.unstrained_length
     platform = highest_frequency(robot, given.poses, lengths) * _lightness(robot.mass, events)
     stiffness = robot.cables.axial_stiffness
@@ -202,8 +228,14 @@ def _lightness(mass: float, events: tuple[Event, ...]) -> float:
     return float(np.sqrt(mass / least))
 
 
-def _work(losses: Damping, wrench: Course, blown: bool) -> int:
-    """The kernel's bits of what damps or loads."""
+def work_of(losses: Damping, wrench: Course, blown: bool) -> int:
+    """The kernel's bits of what damps or loads.
+
+    Args:
+        losses: What damps.
+        wrench: In time.
+        blown: Whether there is wind.
+    """
     damped = losses.loss_time > 0.0 or losses.air_damping > 0.0
     loaded = blown or bool(wrench.value.any())
     return k.DAMPED * damped + k.LOADED * loaded + k.BLOWN * blown

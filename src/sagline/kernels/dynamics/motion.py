@@ -40,8 +40,8 @@ from sagline.kernels.memory import block
 SPLITTING, RUNGE_KUTTA = 0, 1
 
 # counters that go in and out
-STEPS, LENGTH_AT, WRENCH_AT, WIND_AT, NOTES, RECORDS, READY, FAILED = range(8)
-COUNTERS = 8
+STEPS, LENGTH_AT, WRENCH_AT, WIND_AT, NOTES, RECORDS, READY, FAILED, RENEWED = range(9)
+COUNTERS = 9
 # columns of the notes: what began when, with which cable; largest tensions before and after
 NOTE_TIME, NOTE_KIND, NOTE_CABLE, NOTE_BEFORE, NOTE_AFTER = range(5)
 NOTE_COLUMNS = 5
@@ -448,7 +448,7 @@ def run(
         records: Filled: states with the angular velocity in the momentum's place, tensions at the frame ends, lengths,
             energies, notes.
         steps: How many steps to take. With 0 the start alone is looked at.
-        every: After how many steps one is recorded, the start first.
+        every: After how many steps one is recorded, the start first; 0 for the last one.
     """
     integrator, kind, remembered, work, stride = rules
     step, loss_time, air, filtering = numbers
@@ -499,13 +499,18 @@ def run(
         evaluate(plant, audit[d.BEGIN] + at[STEPS] * step)
         take_set_points(plant, audit[d.BEGIN] + at[STEPS] * step, MOMENT * step)
         damp(plant)
+        if at[STEPS] == 0:
+            for i in range(m):
+                now[d.FILTERED, i] = now[d.AT_FRAME, i]
         note(drives, rows, cables, at, audit[d.BEGIN] + at[STEPS] * step, weight_of, records[4])
         record(plant, records)
     elif steps == 0:
         record(plant, records)
     for _ in range(steps):
         time = audit[d.BEGIN] + at[STEPS] * step
-        if at[LENGTH_AT] < courses[0][0].shape[0] - 1 and time + MOMENT * step >= courses[0][0][at[LENGTH_AT] + 1]:
+        ends = at[LENGTH_AT] < courses[0][0].shape[0] - 1 and time + MOMENT * step >= courses[0][0][at[LENGTH_AT] + 1]
+        if ends or at[RENEWED] > 0:
+            at[RENEWED] = 0
             take_set_points(plant, time, MOMENT * step)  # rates may jump here
         if kind == d.DRUMS and at[STEPS] % stride == 0:
             close_loops(drives, plant.targets, plant.target_rates, stride * step)
@@ -517,7 +522,9 @@ def run(
         for i in range(m):
             now[d.FILTERED, i] += filtering * (now[d.AT_FRAME, i] - now[d.FILTERED, i])
         note(drives, rows, cables, at, audit[d.BEGIN] + at[STEPS] * step, weight_of, records[4])
-        if at[STEPS] % every == 0:
+        if every > 0 and at[STEPS] % every == 0:
             record(plant, records)
             if at[FAILED] > 0:
                 break
+    if every == 0 and steps > 0:
+        record(plant, records)

@@ -12,7 +12,7 @@ import math
 
 from sagline.arrays import Array
 from sagline.kernels.forward.platform import turned
-from sagline.kernels.jit import formula
+from sagline.kernels.jit import entry, formula
 
 CENTER, TURN, VELOCITY, MOMENTUM = 0, 3, 7, 10
 STATE_COLUMNS = 13
@@ -121,3 +121,28 @@ def rates_of(state: Array, inertia: Array, wrench: Array, rates: Array) -> None:
     rates[TURN + 1] = 0.5 * (wy * w + wz * x - wx * z)
     rates[TURN + 2] = 0.5 * (wz * w + wx * y - wy * x)
     rates[TURN + 3] = -0.5 * (wx * x + wy * y + wz * z)
+
+
+@entry
+def platform_of(state: Array, inertia: Array, center: Array, turn: Array, out: Array) -> None:
+    """Fill what the platform's own frame does: position of its origin, quaternion, velocity and angular velocity (13,).
+
+    Args:
+        state: As above.
+        inertia: As above.
+        center: Center of mass, from the frame's origin, in principal axes (3,).
+        turn: Quaternion from the frame's axes to the principal ones (4,).
+        out: Filled; the velocity is that of the center of mass.
+    """
+    lever = turned(state, center[0], center[1], center[2])
+    wx, wy, wz = spin(state, inertia)
+    for k in range(3):
+        out[k] = state[CENTER + k] - lever[k]
+        out[VELOCITY + k] = state[VELOCITY + k]
+    x, y, z, w = state[TURN], state[TURN + 1], state[TURN + 2], state[TURN + 3]
+    a, b, c, s = turn[0], turn[1], turn[2], turn[3]
+    out[TURN] = w * a + x * s + y * c - z * b
+    out[TURN + 1] = w * b - x * c + y * s + z * a
+    out[TURN + 2] = w * c + x * b - y * a + z * s
+    out[TURN + 3] = w * s - x * a - y * b - z * c
+    out[MOMENTUM], out[MOMENTUM + 1], out[MOMENTUM + 2] = wx, wy, wz

@@ -1,0 +1,296 @@
+"""A robot that a controller drives: one period after the other, nothing allocated."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
+
+from sagline.arguments import choice, instance, integer, whole_number
+from sagline.arrays import LARGEST, Array, checked, locked, number
+from sagline.dynamics.beginning import Beginning, beginning
+from sagline.dynamics.course import Course
+from sagline.dynamics.damping import Damping
+from sagline.dynamics.drives import Winches, kind_of
+from sagline.dynamics.plant import Plant, Records
+from sagline.dynamics.sensors import Encoders, LoadCells
+from sagline.dynamics.simulate import (
+    Integrator,
+    Winding,
+    checked_damping,
+    code_of,
+    plant_at,
+    step_of,
+    work_of,
+)
+from sagline.errors import InvalidValueError
+from sagline.kernels.cable.rows import LENGTH
+from sagline.kernels.dynamics import drives as d
+from sagline.kernels.dynamics import motion as k
+from sagline.kernels.dynamics import rigid_body as body
+from sagline.kernels.jit import machine_code
+from sagline.kinematics.caller import take
+from sagline.kinematics.inverse import inverse
+from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+
+NEAR: Final = 1e-6  # of a step: so far may a period be from whole steps
+MOST_STEPS: Final = 10**7  # in one period
+MOST_SEED: Final = 2**128
+
+
+class Reading(NamedTuple):
+    """What sensors read, and what is true; the arrays are the simulator's, and the next step fills them anew.
+
+    Attributes:
+        counts: Of the encoders, whole numbers as floats, shape (m,); None where data are missing that counts need.
+        load_cell: [N], shape (m,).
+        position: Of the platform's origin [m], shape (3,).
+        quaternion: Rotation platform -> world, scalar last, shape (4,).
+        twist: Velocity of the center of mass and angular velocity, world axes [m/s, rad/s], shape (6,).
+        tension: At the frame ends [N], shape (m,).
+        length: Unstrained lengths off the drums [m], shape (m,).
+        force: Of the motors, at the cable, outward [N], shape (m,); 0 without the robot's winches.
+    """
+
+    counts: Array | None
+    load_cell: Array
+    position: Array
+    quaternion: Array
+    twist: Array
+    tension: Array
+    length: Array
+    force: Array
+
+
+class Simulator:
+    """The machine behind a controller: winches, cables without mass, platform and sensors.
+
+    It goes where `simulate` goes, to the last bit, where it is given the same. It is not to be shared between threads.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        start: Pose | Equilibrium,
+        *,
+        winches: Winches = "robot",
+        winding: Winding = "constant",
+        integrator: Integrator | None = None,
+        step: float | None = None,
+        damping: Damping | None = None,
+        load_cell_filter: float = 0.0,
+        seed: int = 0,
+    ) -> None:
+        """Place a robot at rest.
+
+        Args:
+            robot: The machine that there is, which may be another than the one that is planned for.
+            start: A pose, at which the robot rests with the tensions of `inverse`; or a single equilibrium: where the
+                platform is, with the lengths that are off the drums there and the wrench that acts.
+            winches: As of `simulate`.
+            winding: As of `simulate`.
+            integrator: As of `simulate`.
+            step: As of `simulate`.
+            damping: As of `simulate`.
+            load_cell_filter: Time constant of the load cells' first-order filter [s], >= 0.
+            seed: Of their noise.
+
+        Raises:
+            InvalidValueError: If the robot lacks data that its winches need, the step is above the limit of stability,
+                or an argument is of the wrong kind.
+
+        Examples:
+            >>> import sagline as sl
+            >>> robot = sl.load_robot("cogiro")
+            >>> state = sl.inverse(robot, sl.Pose.from_euler([0, 0, 2], 0, 0, 0)).state
+            >>> machine = sl.Simulator(robot, state, winches="ideal")
+            >>> for _ in range(100):
+            ...     reading = machine.step(state.unstrained_length - 0.01 * machine.time, 0.01)
+            >>> print(f"{machine.time:.1f} s, {reading.position[2]:.3f} m")
+            1.0 s, 2.034 m
+        """
+        given: Beginning = beginning(_at_rest(instance(robot, Robot, "robot"), start), None, None, 1.0)
+        kind, losses = kind_of(winches), checked_damping(damping)
+        code = code_of(integrator, kind)
+        choice(winding, "winding", ("constant", "remembered"))
+        self._plant: Plant = plant_at(given, winches, False)
+        if winding == "remembered" and kind == d.DRUMS:
+            self._plant.remember_winding(2.0 * float(given.lengths.value.max()))
+        self._step = step_of(given, self._plant, step, code, kind, losses, ())
+        self._kind, plant, m = kind, self._plant, given.robot.cable_count
+        self._set_up_course(given, m)
+        lag = number(load_cell_filter, "load_cell_filter", "s", low=0.0)
+        stride = round(k.LOOP_PERIOD / self._step) if kind == d.DRUMS else 1
+        rules = (code, kind, int(winding == "remembered"), work_of(losses, given.wrench, False) | k.LOADED, stride)
+        numbers = (self._step, losses.loss_time, losses.air_damping, self._step / (lag + self._step))
+        courses = (self._course, self._load, Course.still(np.zeros(3)))
+        self._records = Records(0, m).arrays
+        self._arguments = plant.arguments(rules, numbers, courses)
+        self._run: Any = machine_code(k.run, (*self._arguments, self._records, 0, 0))
+        self._cells = LoadCells(given.robot, whole_number(seed, "seed", 0, MOST_SEED))
+        self._encoders = Encoders(given.robot) if Encoders.are_on(given.robot) else None
+        self._path, self._platform = np.empty((1, m)), np.empty(body.STATE_COLUMNS)
+        turn = Rotation.from_matrix(plant.axes).inv().as_quat()
+        self._frame = (locked(given.robot.center_of_mass @ plant.axes), locked(turn.copy()))
+        self._reading = self._new_reading()
+        self._run(*self._arguments, self._records, 0, 0)
+        self._read()
+
+    def _set_up_course(self, given: Beginning, m: int) -> None:
+        """The lengths between the last set points and the next; of drums with the tensions that are expected."""
+        wide = 2 * m if self._kind == d.DRUMS else m
+        self._stretch = 1.0 + self._plant.data[d.WINDING_STRAIN] if self._kind == d.DRUMS else np.ones(m)
+        self._lengths = np.repeat(given.lengths.value, 2, axis=0)
+        self._slope = np.zeros(m)
+        self._course = Course(np.array([-1.0, 0.0]), np.zeros((2, wide)), np.zeros((1, wide)), np.zeros((1, wide)))
+        self._course.value[:, :m] = self._lengths * self._stretch
+        if self._kind == d.DRUMS:
+            self._course.value[:, m:] = given.tensions.value
+        self._load = Course(np.zeros(1), given.wrench.value.copy(), np.empty((0, 6)), np.empty((0, 6)))
+        self._given, self._wrench = self._lengths[1].data, self._load.value[0].data
+        self._expected = self._course.value[1, m:].data
+
+    @property
+    def time(self) -> float:
+        """Since the start [s]."""
+        return int(self._plant.counters[k.STEPS]) * self._step
+
+    @property
+    def reading(self) -> Reading:
+        """What was read last."""
+        return self._reading
+
+    def step(
+        self,
+        unstrained_length: ArrayLike,
+        dt: float,
+        *,
+        tension: ArrayLike | None = None,
+        wrench: ArrayLike | None = None,
+    ) -> Reading:
+        """Go on for a period, in which the set points go straight to those that are given.
+
+        Args:
+            unstrained_length: Set points at the end of the period [m], shape (m,).
+            dt: The period [s], > 0, of whole steps.
+            tension: Expected at the drums at its end [N], shape (m,), which the motors hold; None: as before. Of
+                winches="robot" alone.
+            wrench: On the platform, throughout the period [N, N m], shape (6,); None: as before.
+
+        Returns:
+            What is read at the end of the period; its arrays are filled anew by the next step.
+
+        Raises:
+            InvalidValueError: If the period is not of whole steps, energy grows by itself, or an argument is no such
+                array.
+        """
+        count = self._count(dt)
+        course, lengths, slope, m = self._course, self._lengths, self._slope, self._slope.size
+        time, value, begin = course.time, course.value, course.begin
+        lengths[0], value[0] = lengths[1], value[1]
+        take(self._given, unstrained_length, "unstrained_length", "m")
+        if not (lengths[1].min() > 0.0 and lengths[1].max() < LARGEST):  # NaN is neither
+            checked(lengths[1], "unstrained_length", "m", above=0.0)
+        time[0], time[1] = self.time, (int(self._plant.counters[k.STEPS]) + count) * self._step
+        np.subtract(lengths[1], lengths[0], out=slope)
+        np.divide(slope, time[1] - time[0], out=slope)
+        np.multiply(slope, self._stretch, out=begin[0, :m])
+        np.multiply(lengths[1], self._stretch, out=value[1, :m])
+        if self._kind == d.DRUMS:
+            if tension is not None:
+                take(self._expected, tension, "tension", "N")
+            np.subtract(value[1, m:], value[0, m:], out=begin[0, m:])
+            np.divide(begin[0, m:], time[1] - time[0], out=begin[0, m:])
+        course.end[0] = begin[0]
+        if wrench is not None:
+            take(self._wrench, wrench, "wrench", "N or N m")
+        counters = self._plant.counters
+        counters[k.LENGTH_AT], counters[k.RENEWED] = 0, 1
+        self._run(*self._arguments, self._records, count, 0)
+        if counters[k.FAILED]:
+            raise self._blown_up()
+        self._read()
+        return self._reading
+
+    def _count(self, dt: float) -> int:
+        """How many steps a period has."""
+        try:
+            parts = dt / self._step
+            count = round(parts)
+            if 1 <= count <= MOST_STEPS and abs(parts - count) <= NEAR:
+                return count
+        except (TypeError, ValueError, OverflowError, ArithmeticError):
+            pass
+        period = number(dt, "dt", "s", above=0.0)
+        allowed = f"a whole multiple of {self._step:g} s, the step, up to {MOST_STEPS:.0e}"
+        raise InvalidValueError("dt", f"{period:g} s", allowed, "Choose another, or give Simulator a step.")
+
+    def hold(self, *winches: int) -> None:
+        """Lock drums at once, as brakes do; they stay so until `release`.
+
+        Args:
+            winches: Which, from 0; none for all.
+
+        Raises:
+            InvalidValueError: If there is no such winch.
+        """
+        self._plant.now[d.HELD, self._chosen(winches)] = 1.0
+
+    def release(self, *winches: int) -> None:
+        """Let drums go that were locked.
+
+        Args:
+            winches: Which, from 0; none for all.
+
+        Raises:
+            InvalidValueError: If there is no such winch.
+        """
+        self._plant.now[d.HELD, self._chosen(winches)] = 0.0
+
+    def _chosen(self, winches: tuple[Any, ...]) -> Any:
+        m = self._slope.size
+        for winch in winches:
+            if (found := integer(winch)) is None or not 0 <= found < m:
+                raise InvalidValueError("winches", f"{winch!r:.40}", f"0 to {m - 1}", "They count from 0.")
+        return [integer(winch) for winch in winches] if winches else slice(None)
+
+    def _new_reading(self) -> Reading:
+        plant = self._plant
+        counts = None if self._encoders is None else self._encoders.counts
+        own = (self._platform[:3], self._platform[3:7], self._platform[7:])
+        return Reading(counts, self._cells.reading, *own, plant.now[d.AT_FRAME], plant.rows[LENGTH], plant.now[d.FORCE])
+
+    def _read(self) -> None:
+        """Fill the reading."""
+        plant = self._plant
+        body.platform_of(plant.state, plant.inertia, *self._frame, self._platform)
+        self._cells.read(plant.now[d.FILTERED])
+        if self._encoders is not None:
+            if self._kind == d.DRUMS:
+                self._path[0] = plant.now[d.WOUND]
+            else:
+                np.multiply(plant.rows[LENGTH], 1.0 + plant.data[d.WINDING_STRAIN], out=self._path[0])
+            self._encoders.read(self._path)
+
+    def _blown_up(self) -> InvalidValueError:
+        cable = int(self._plant.counters[k.FAILED]) - 1
+        value = (
+            f"{self._step:g} s, at which energy grows by itself: by {self.time:.6g} s most of it is in cable {cable}"
+        )
+        return InvalidValueError("step", value, "one that keeps the energy", f"Give step={0.2 * self._step:.3g}.")
+
+
+def _at_rest(robot: Robot, start: Any) -> Equilibrium:
+    """Where a robot is at the start."""
+    if isinstance(start, Pose):
+        return inverse(robot, start).state
+    state = instance(start, Equilibrium, "start")
+    if state.cables.shape[-1:] != (robot.cable_count,):
+        allowed = f"{robot.cable_count}, as {robot.name} has"
+        raise InvalidValueError("start", f"of {state.cables.shape[-1]} cables", allowed, "Give one of this robot.")
+    return replace(state, robot=robot)
