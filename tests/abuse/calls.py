@@ -629,6 +629,11 @@ _CABLES = """<cables default_cable_set="basic"><cable_set id="basic">
 def _in_time(given: _Given) -> dict[str, Call]:
     state = given.plan.state
 
+    drive = {"inertia": 0.035, "position_gain": 20.0, "speed_gain": 4e3, "integral_gain": 8e4}
+    driven = given.robot.replace(winches=sl.Winch(drum_radius=0.05, **drive))
+    driven_state = sl.inverse(driven, given.pose).state
+    machine = sl.Simulator(driven, driven_state)
+
     def moved(**arguments: Any) -> Any:
         return sl.simulate(**{"start": state, "duration": 0.02, **arguments})
 
@@ -649,6 +654,31 @@ def _in_time(given: _Given) -> dict[str, Call]:
                 record=("number", 0.01, True),
             ),
         ),
+        "Simulator": Call(
+            lambda **a: (sl.Simulator(**a), None)[1],
+            _all(
+                robot=("one", given.robot),
+                start=("one", state),
+                winches=("one", sl.SecondOrder(10.0)),
+                winding=("word", "constant"),
+                integrator=("word", "splitting", True),
+                step=("number", 5e-4, True),
+                damping=("one", sl.Damping(1e-3), True),
+                load_cell_filter=("number", 0.25),
+                seed=("seed", 3),
+            ),
+        ),
+        "Simulator.step": Call(
+            lambda **a: sl.Simulator(driven, driven_state).step(**a),
+            _all(
+                unstrained_length=("sample", given.length),
+                dt=("number", 0.25),
+                tension=("sample", np.full(8, 50.0), True),
+                wrench=("sample", [0.0, 0.0, -10.0, 0.0, 1.0, 0.0], True),
+            ),
+        ),
+        "Simulator.hold": Call(lambda winch: machine.hold(winch), _all(winch=("cable", 3))),
+        "Simulator.release": Call(lambda winch: machine.release(winch), _all(winch=("cable", 3))),
         "SecondOrder": Call(sl.SecondOrder, _all(bandwidth=("number", 10.0), damping_ratio=("number", 0.75))),
         "Break": Call(sl.Break, _all(cable=("whole", 3), time=("number", 0.5))),
         "Stall": Call(sl.Stall, _all(winch=("whole", 3), time=("number", 0.5))),

@@ -11,6 +11,7 @@ from sagline.arguments import brief
 from sagline.arrays import Array, number
 from sagline.errors import InvalidValueError
 from sagline.kernels.dynamics import drives as d
+from sagline.kernels.dynamics.motion import LOOP_PERIOD
 from sagline.robot.drum import drums_of
 from sagline.robot.robot import Robot
 
@@ -106,6 +107,12 @@ def _fill_drums(data: Array, robot: Robot, length: Array) -> None:
     data[d.POSITION_GAIN] = winch.position_gain
     data[d.SPEED_GAIN] = winch.speed_gain
     data[d.INTEGRAL_GAIN] = winch.integral_gain
+    most = 2.0 * data[d.INERTIA] / LOOP_PERIOD  # a larger correction in a period turns the error over, and more
+    if (wild := data[d.SPEED_GAIN] >= most).any():
+        i = int(np.argmax(wild))
+        allowed = f"< {most[i]:.4g} N s/m for {data[d.INERTIA, i]:.4g} kg at the cable, closed every millisecond"
+        step = "Give a smaller gain, or more inertia."
+        raise InvalidValueError(f"winches: speed_gain[{i}]", f"{data[d.SPEED_GAIN, i]:g} N s/m", allowed, step)
 
 
 def lever_of(robot: Robot, length: Array) -> Array:

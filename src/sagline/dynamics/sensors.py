@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from sagline.arrays import Array
-from sagline.kernels.cable.drum import turns_of_lengths
-from sagline.robot.drum import Drums, drums_of
+from sagline.arrays import Array, locked
+from sagline.kernels.dynamics.period import read_cells, read_encoders
+from sagline.kernels.jit import machine_code
+from sagline.robot.drum import drums_of
 from sagline.robot.robot import Robot
 
 COUNTED = ("drum_radius", "groove_pitch", "counts_per_turn", "length_zero")  # what an encoder's counts need
@@ -19,14 +22,21 @@ class Encoders:
         counts: Whole counts, as floats, (m,).
     """
 
-    def __init__(self, robot: Robot) -> None:
-        """Look at the drums of a robot that has all that counts need."""
-        self._drums: Drums = drums_of(robot)
-        self._winches = self._drums.winches
-        zero, self._rate = self._drums._zero()
-        self._offset: Array = self._winches.count_zero + zero * self._rate
-        self._turns, self._travel = np.empty((1, robot.cable_count)), np.empty((1, robot.cable_count))
-        self.counts = self._turns[0]
+    def __init__(self, robot: Robot, wound: Array, stretch: Array) -> None:
+        """Look at the drums of a robot that has all that counts need.
+
+        Args:
+            robot: The robot.
+            wound: Where its lengths off the drums will be [m], (m,).
+            stretch: From these to those along the path of winding, (m,).
+        """
+        drums, m = drums_of(robot), robot.cable_count
+        zero, rate = drums.zero_and_rate()
+        self.counts = np.empty(m)
+        offset = drums.winches.count_zero + zero * rate
+        given = ((drums.table, drums.starts), wound, locked(stretch), locked(offset), locked(rate * 1.0))
+        self._arguments: tuple[Any, ...] = (*given, np.empty((3, 1, m)), self.counts)
+        self._read: Any = machine_code(read_encoders, self._arguments)
 
     @staticmethod
     def are_on(robot: Robot) -> bool:
@@ -35,12 +45,9 @@ class Encoders:
         known = winch is not None and all(getattr(winch, name) is not None for name in COUNTED)
         return known and robot.cables.diameter is not None
 
-    def read(self, path: Array) -> None:
-        """Fill the counts at lengths off the drums along the path of winding [m], (1, m)."""
-        turns_of_lengths(self._drums.table, self._drums.starts, path, self._turns, self._travel)
-        np.multiply(self.counts, self._rate, out=self.counts)
-        np.subtract(self._offset, self.counts, out=self.counts)
-        np.rint(self.counts, out=self.counts)
+    def read(self) -> None:
+        """Fill the counts."""
+        self._read(*self._arguments)
 
 
 class LoadCells:
@@ -51,24 +58,26 @@ class LoadCells:
         generator: Of the noise.
     """
 
-    def __init__(self, robot: Robot, seed: int) -> None:
-        """Make the load cells of a robot; without winches they read what is there."""
-        m, winch = robot.cable_count, robot.winches
-        none, one = np.zeros(m), np.ones(m)
-        self._gain = one if winch is None else winch.load_cell_gain
-        self._bias = none if winch is None else winch.load_cell_bias
-        self._deviation = none if winch is None else winch.load_cell_deviation
-        most = None if winch is None else winch.load_cell_range
-        self._range = np.full(m, np.inf) if most is None else most
-        self.generator = np.random.default_rng(seed)
-        self.reading = np.empty(m)
-        self._noise = np.empty(m)
+    def __init__(self, robot: Robot, seed: int, tension: Array) -> None:
+        """Make the load cells of a robot; without winches they read what is there.
 
-    def read(self, tension: Array) -> None:
-        """Fill the readings at tensions behind the filter [N], (m,): gain, bias and noise, within the range."""
+        Args:
+            robot: The robot.
+            seed: Of the noise.
+            tension: Where the tensions behind the filter will be [N], (m,).
+        """
+        m, winch = robot.cable_count, robot.winches
+        cells = np.array([np.ones(m), np.zeros(m), np.zeros(m), np.full(m, np.inf)])
+        if winch is not None:
+            cells[:3] = winch.load_cell_gain, winch.load_cell_bias, winch.load_cell_deviation
+            if winch.load_cell_range is not None:
+                cells[3] = winch.load_cell_range
+        self.generator, self.reading = np.random.default_rng(seed), np.empty(m)
+        self._noise = np.empty(m)
+        self._arguments: tuple[Any, ...] = (tension, locked(cells), self._noise, self.reading)
+        self._read: Any = machine_code(read_cells, self._arguments)
+
+    def read(self) -> None:
+        """Fill the readings."""
         self.generator.standard_normal(out=self._noise)
-        np.multiply(self._noise, self._deviation, out=self._noise)
-        np.multiply(tension, self._gain, out=self.reading)
-        np.add(self.reading, self._bias, out=self.reading)
-        np.add(self.reading, self._noise, out=self.reading)
-        np.minimum(self.reading, self._range, out=self.reading)
+        self._read(*self._arguments)

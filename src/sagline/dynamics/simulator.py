@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from sagline.arguments import choice, instance, integer, whole_number
-from sagline.arrays import LARGEST, Array, checked, locked, number
+from sagline.arguments import brief, choice, instance, integer, whole_number
+from sagline.arrays import Array, checked, locked, number
 from sagline.dynamics.beginning import Beginning, beginning
 from sagline.dynamics.course import Course
 from sagline.dynamics.damping import Damping
 from sagline.dynamics.drives import Winches, kind_of
-from sagline.dynamics.plant import Plant, Records
+from sagline.dynamics.plant import Plant, Records, grown
 from sagline.dynamics.sensors import Encoders, LoadCells
 from sagline.dynamics.simulate import (
     Integrator,
@@ -31,6 +31,7 @@ from sagline.kernels.cable.rows import LENGTH
 from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics import motion as k
 from sagline.kernels.dynamics import rigid_body as body
+from sagline.kernels.dynamics.period import begin_period
 from sagline.kernels.jit import machine_code
 from sagline.kinematics.caller import take
 from sagline.kinematics.inverse import inverse
@@ -132,33 +133,44 @@ class Simulator:
         self._records = Records(0, m).arrays
         self._arguments = plant.arguments(rules, numbers, courses)
         self._run: Any = machine_code(k.run, (*self._arguments, self._records, 0, 0))
-        self._cells = LoadCells(given.robot, whole_number(seed, "seed", 0, MOST_SEED))
-        self._encoders = Encoders(given.robot) if Encoders.are_on(given.robot) else None
-        self._path, self._platform = np.empty((1, m)), np.empty(body.STATE_COLUMNS)
+        self._cells = LoadCells(given.robot, whole_number(seed, "seed", 0, MOST_SEED), plant.now[d.FILTERED])
+        stretch = 1.0 + plant.data[d.WINDING_STRAIN]
+        places = (plant.now[d.WOUND], np.ones(m)) if kind == d.DRUMS else (plant.rows[LENGTH], stretch)
+        self._encoders = Encoders(given.robot, *places) if Encoders.are_on(given.robot) else None
         turn = Rotation.from_matrix(plant.axes).inv().as_quat()
-        self._frame = (locked(given.robot.center_of_mass @ plant.axes), locked(turn.copy()))
+        frame = (locked(given.robot.center_of_mass @ plant.axes), locked(turn.copy()))
+        self._platform = np.empty(body.STATE_COLUMNS)
+        self._seen: tuple[Any, ...] = (plant.state, locked(plant.inertia.view()), *frame, self._platform)
+        self._look: Any = machine_code(body.platform_of, self._seen)
         self._reading = self._new_reading()
         self._run(*self._arguments, self._records, 0, 0)
         self._read()
 
     def _set_up_course(self, given: Beginning, m: int) -> None:
         """The lengths between the last set points and the next; of drums with the tensions that are expected."""
-        wide = 2 * m if self._kind == d.DRUMS else m
-        self._stretch = 1.0 + self._plant.data[d.WINDING_STRAIN] if self._kind == d.DRUMS else np.ones(m)
-        self._lengths = np.repeat(given.lengths.value, 2, axis=0)
-        self._slope = np.zeros(m)
+        drums = self._kind == d.DRUMS
+        stretch = 1.0 + self._plant.data[d.WINDING_STRAIN] if drums else np.ones(m)
+        lengths = np.repeat(given.lengths.value, 2, axis=0)
+        wide = 2 * m if drums else m
         self._course = Course(np.array([-1.0, 0.0]), np.zeros((2, wide)), np.zeros((1, wide)), np.zeros((1, wide)))
-        self._course.value[:, :m] = self._lengths * self._stretch
-        if self._kind == d.DRUMS:
+        self._course.value[:, :m] = lengths * stretch
+        self._given = lengths[1].copy()
+        if drums:
             self._course.value[:, m:] = given.tensions.value
+            self._given = np.concatenate((lengths[1], given.tensions.value[0]))
         self._load = Course(np.zeros(1), given.wrench.value.copy(), np.empty((0, 6)), np.empty((0, 6)))
-        self._given, self._wrench = self._lengths[1].data, self._load.value[0].data
-        self._expected = self._course.value[1, m:].data
+        course, counters = self._course, self._plant.counters
+        writable = (course.time, course.value, course.begin, course.end)
+        self._next: tuple[Any, ...] = (locked(self._given.view()), locked(stretch), lengths, writable, counters)
+        self._begin: Any = machine_code(begin_period, (*self._next, 1.0))
+        self._asked, self._expected = self._given[:m].data, self._given[m:].data
+        self._wrench = self._load.value[0].data
+        self._counters = counters.data
 
     @property
     def time(self) -> float:
         """Since the start [s]."""
-        return int(self._plant.counters[k.STEPS]) * self._step
+        return self._counters[k.STEPS] * self._step
 
     @property
     def reading(self) -> Reading:
@@ -190,32 +202,26 @@ class Simulator:
                 array.
         """
         count = self._count(dt)
-        course, lengths, slope, m = self._course, self._lengths, self._slope, self._slope.size
-        time, value, begin = course.time, course.value, course.begin
-        lengths[0], value[0] = lengths[1], value[1]
-        take(self._given, unstrained_length, "unstrained_length", "m")
-        if not (lengths[1].min() > 0.0 and lengths[1].max() < LARGEST):  # NaN is neither
-            checked(lengths[1], "unstrained_length", "m", above=0.0)
-        time[0], time[1] = self.time, (int(self._plant.counters[k.STEPS]) + count) * self._step
-        np.subtract(lengths[1], lengths[0], out=slope)
-        np.divide(slope, time[1] - time[0], out=slope)
-        np.multiply(slope, self._stretch, out=begin[0, :m])
-        np.multiply(lengths[1], self._stretch, out=value[1, :m])
-        if self._kind == d.DRUMS:
-            if tension is not None:
-                take(self._expected, tension, "tension", "N")
-            np.subtract(value[1, m:], value[0, m:], out=begin[0, m:])
-            np.divide(begin[0, m:], time[1] - time[0], out=begin[0, m:])
-        course.end[0] = begin[0]
+        take(self._asked, unstrained_length, "unstrained_length", "m")
+        if tension is not None:
+            self._take_tension(tension)
         if wrench is not None:
             take(self._wrench, wrench, "wrench", "N or N m")
-        counters = self._plant.counters
-        counters[k.LENGTH_AT], counters[k.RENEWED] = 0, 1
+            checked(self._load.value[0], "wrench", "N or N m")
+        if not self._begin(*self._next, (self._counters[k.STEPS] + count) * self._step):
+            checked(self._given[: len(self._asked)], "unstrained_length", "m", above=0.0)
         self._run(*self._arguments, self._records, count, 0)
-        if counters[k.FAILED]:
-            raise self._blown_up()
+        if self._counters[k.FAILED]:
+            raise grown(self._step, self.time, self._counters[k.FAILED] - 1)
         self._read()
         return self._reading
+
+    def _take_tension(self, tension: ArrayLike) -> None:
+        if self._kind != d.DRUMS:
+            step = "Leave it out: these winches have no motors."
+            raise InvalidValueError("tension", "given", 'None but for winches="robot"', step)
+        take(self._expected, tension, "tension", "N")
+        checked(self._given[len(self._asked) :], "tension", "N")
 
     def _count(self, dt: float) -> int:
         """How many steps a period has."""
@@ -253,10 +259,10 @@ class Simulator:
         self._plant.now[d.HELD, self._chosen(winches)] = 0.0
 
     def _chosen(self, winches: tuple[Any, ...]) -> Any:
-        m = self._slope.size
+        m = len(self._asked)
         for winch in winches:
             if (found := integer(winch)) is None or not 0 <= found < m:
-                raise InvalidValueError("winches", f"{winch!r:.40}", f"0 to {m - 1}", "They count from 0.")
+                raise InvalidValueError("winches", brief(winch), f"0 to {m - 1}", "They count from 0.")
         return [integer(winch) for winch in winches] if winches else slice(None)
 
     def _new_reading(self) -> Reading:
@@ -267,22 +273,10 @@ class Simulator:
 
     def _read(self) -> None:
         """Fill the reading."""
-        plant = self._plant
-        body.platform_of(plant.state, plant.inertia, *self._frame, self._platform)
-        self._cells.read(plant.now[d.FILTERED])
+        self._look(*self._seen)
+        self._cells.read()
         if self._encoders is not None:
-            if self._kind == d.DRUMS:
-                self._path[0] = plant.now[d.WOUND]
-            else:
-                np.multiply(plant.rows[LENGTH], 1.0 + plant.data[d.WINDING_STRAIN], out=self._path[0])
-            self._encoders.read(self._path)
-
-    def _blown_up(self) -> InvalidValueError:
-        cable = int(self._plant.counters[k.FAILED]) - 1
-        value = (
-            f"{self._step:g} s, at which energy grows by itself: by {self.time:.6g} s most of it is in cable {cable}"
-        )
-        return InvalidValueError("step", value, "one that keeps the energy", f"Give step={0.2 * self._step:.3g}.")
+            self._encoders.read()
 
 
 def _at_rest(robot: Robot, start: Any) -> Equilibrium:

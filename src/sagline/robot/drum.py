@@ -79,7 +79,7 @@ class Drums:
             InvalidValueError: If a field is missing that counts need, or a drum cannot hold what is left or has not so
                 much cable.
         """
-        zero, rate = self._zero()
+        zero, rate = self.zero_and_rate()
         turns, _ = self.turns(length)
         found: Array = self.winches.count_zero + (zero - turns) * rate
         return found
@@ -90,7 +90,7 @@ class Drums:
         Raises:
             InvalidValueError: If a field is missing, or counts run off a drum.
         """
-        zero, rate = self._zero()
+        zero, rate = self.zero_and_rate()
         turns = zero - (counts - self.winches.count_zero) / rate
         if (wrong := self._off(turns)) is not None:
             sample, i = wrong
@@ -99,8 +99,15 @@ class Drums:
             raise self._refusal(_at("count", sample, i, len(counts)), f"{counts[wrong]:.12g}", allowed, turns, wrong)
         return self.lengths(turns)
 
-    def _zero(self) -> tuple[Array, Array]:
-        """Turns on the drums at the zeros of their counts, and counts for a turn let out, both of shape (m,)."""
+    def zero_and_rate(self) -> tuple[Array, Array]:
+        """Turns on the drums at the zeros of their counts, and counts for a turn let out.
+
+        Returns:
+            Both of shape (m,).
+
+        Raises:
+            InvalidValueError: If a field is missing that counts need, or the zero is off a drum.
+        """
         per_turn, length = _given(self.winches, "counts_per_turn"), _given(self.winches, "length_zero", _ZERO_STEP)
         turns, _ = self._turns(length[None])
         if (wrong := self._off(turns)) is not None:

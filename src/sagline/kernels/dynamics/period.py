@@ -1,0 +1,81 @@
+"""What comes before and after the steps of a controller's period: the next set points, and what sensors read."""
+
+from __future__ import annotations
+
+import math
+
+from sagline.arrays import Array, Indices
+from sagline.kernels.cable.drum import turns_of_lengths
+from sagline.kernels.dynamics.motion import LENGTH_AT, RENEWED
+from sagline.kernels.jit import entry
+
+
+@entry
+def begin_period(
+    given: Array, stretch: Array, lengths: Array, course: tuple[Array, Array, Array, Array], at: Indices, end: float
+) -> bool:
+    """Lead the course of set points on, straight to those that are given; false, and nothing done, if one is no length.
+
+    Args:
+        given: Unstrained lengths (m,), then of drums the tensions that are expected (m,).
+        stretch: From unstrained lengths to those that the course is of, (m,).
+        lengths: Unstrained lengths where the last period ended, and where this one does, (2, m).
+        course: See `tables_in_time.Course`, of two instants.
+        at: Counters of the run.
+        end: Of the period [s].
+    """
+    time, value, begins, ends = course
+    m = lengths.shape[1]
+    for i in range(m):
+        if not 0.0 < given[i] < math.inf:
+            return False
+    time[0], time[1] = time[1], end
+    whole = time[1] - time[0]
+    for i in range(m):
+        lengths[0, i], lengths[1, i] = lengths[1, i], given[i]
+        value[0, i], value[1, i] = value[1, i], given[i] * stretch[i]
+        begins[0, i] = (lengths[1, i] - lengths[0, i]) / whole * stretch[i]
+        ends[0, i] = begins[0, i]
+    for i in range(m, value.shape[1]):
+        value[0, i], value[1, i] = value[1, i], given[i]
+        begins[0, i] = (value[1, i] - value[0, i]) / whole
+        ends[0, i] = begins[0, i]
+    at[LENGTH_AT], at[RENEWED] = 0, 1
+    return True
+
+
+@entry
+def read_cells(tension: Array, cells: Array, noise: Array, reading: Array) -> None:
+    """Fill what load cells read, (m,): gain, bias and noise, within their range.
+
+    Args:
+        tension: Behind the filter [N], (m,).
+        cells: Gain, bias, standard deviation and range, (4, m).
+        noise: Of standard deviation 1, (m,).
+        reading: Filled.
+    """
+    for i in range(tension.shape[0]):
+        reading[i] = min(cells[0, i] * tension[i] + cells[1, i] + cells[2, i] * noise[i], cells[3, i])
+
+
+@entry
+def read_encoders(
+    drums: tuple[Array, Array], wound: Array, stretch: Array, zero: Array, rate: Array, room: Array, counts: Array
+) -> None:
+    """Fill the whole counts of encoders, (m,).
+
+    Args:
+        drums: Table and starts of layers, as `turns_of_lengths` takes them.
+        wound: Lengths off the drums [m], (m,).
+        stretch: From these to those along the path of winding, (m,).
+        zero: Counts at no turns, (m,).
+        rate: Counts for a turn let out, (m,).
+        room: (3, 1, m).
+        counts: Filled.
+    """
+    path, turns, travel = room[0], room[1], room[2]
+    for i in range(wound.shape[0]):
+        path[0, i] = wound[i] * stretch[i]
+    turns_of_lengths(drums[0], drums[1], path, turns, travel)
+    for i in range(wound.shape[0]):
+        counts[i] = round(zero[i] - turns[0, i] * rate[i])
