@@ -225,14 +225,11 @@ class Simulator:
 
     def _count(self, dt: float) -> int:
         """How many steps a period has."""
-        try:
-            parts = dt / self._step
-            count = round(parts)
-            if 1 <= count <= MOST_STEPS and abs(parts - count) <= NEAR:
-                return count
-        except (TypeError, ValueError, OverflowError, ArithmeticError):
-            pass
-        period = number(dt, "dt", "s", above=0.0)
+        period = dt if type(dt) is float and 0.0 < dt < MOST_STEPS else number(dt, "dt", "s", above=0.0)
+        parts = period / self._step
+        count = round(min(parts, 2.0 * MOST_STEPS))
+        if 1 <= count <= MOST_STEPS and abs(parts - count) <= NEAR:
+            return count
         allowed = f"a whole multiple of {self._step:g} s, the step, up to {MOST_STEPS:.0e}"
         raise InvalidValueError("dt", f"{period:g} s", allowed, "Choose another, or give Simulator a step.")
 
