@@ -21,7 +21,7 @@ $(STAMP): pyproject.toml
 	@test -n "$(PYTHON)" || { echo "sagline needs Python 3.11 or newer and found none; install it or name it: make env PYTHON=/path/to/python3" >&2; exit 2; }
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "$(PYTHON) is no Python 3.11 or newer; name another: make env PYTHON=/path/to/python3" >&2; exit 2; }
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[viewer,dev]'
+	$(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check --editable '.[viewer,dev]'
 	@touch $@
 
 run: env ## the main job: the article's test, its table, runs and figures in OUT (default: output)
@@ -31,15 +31,15 @@ article: env ## the article's figures, tables and errata redone, as one page in 
 	$(BIN)/sagline article --out $(OUT)
 
 test: env check ## all checks, then the whole test suite
-	$(BIN)/python -m pytest --numprocesses auto --dist loadfile
+	$(BIN)/python -m pytest --numprocesses auto --dist worksteal
 
 coverage: env ## the test suite again, and which lines it runs
-	$(BIN)/python -m pytest --cov --numprocesses auto --dist loadfile
+	$(BIN)/python -m pytest --cov --numprocesses auto --dist worksteal
 
 check: env ## style, types and the direction of imports
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy src $(wildcard tests examples benchmarks)
+	$(BIN)/mypy --num-workers 2 src $(wildcard tests examples benchmarks)
 	$(BIN)/lint-imports
 
 format: env ## put the source in shape
