@@ -271,7 +271,7 @@ def test_a_lost_interrupt_ends_the_command_all_the_same(capsys: pytest.CaptureFi
 def test_a_cold_start_says_what_it_compiles(monkeypatch: pytest.MonkeyPatch) -> None:
     def compile_all(names: list[str], tell: object) -> None:
         assert list(names) == ["inverse kinematics", "forward kinematics"]
-        with event.trigger_event("numba:compile", data={"dispatcher": inverse_poses, "args": ()}):
+        with event.trigger_event("numba:compile", data={"dispatcher": inverse_poses, "args": ("int64", "none")}):
             pass
 
     sagline("track", "article-suspended", "inside.yaml", "--no-figures")  # whatever it needs is compiled then

@@ -5,6 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import sagline as sl
+from sagline.arrays import locked
 from sagline.kinematics.forward_rows import solve_rows
 from sagline.kinematics.start import hung, middle, outside_limits, start_quaternions
 from sagline.statics.tables import pose_rows
@@ -58,7 +59,7 @@ def test_cables_are_counted_outside_the_limits_of_the_tension_that_is_limited(
     low = np.where(np.arange(8) < 3, between / 0.99, 0.0)
     high = np.where(np.arange(8) > 5, between / 1.01, np.inf)
     robot = COGIRO.replace(tension_limits_of=limits_of, tension_min=low, tension_max=high)
-    found = solve_rows(robot, model, plan.unstrained_length[None], pose_rows(pose), np.zeros((1, 6)))
+    found = solve_rows(robot, model, plan.unstrained_length[None], pose_rows(pose), locked(np.zeros((1, 6))))
     # a chord tension is below, one at a winch above what lies between them; without weight both are one
     expected = 2 if limits_of == "frame_end" and not isinstance(model, sl.Elastic) else 3
     assert outside_limits(robot, model, found).tolist() == [expected]
