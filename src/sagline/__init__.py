@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from sagline.dynamics.events import Brake, Break, Drop, PickUp, Stall
     from sagline.dynamics.fastest import fastest
     from sagline.dynamics.linearized import Linearized, linearized
+    from sagline.dynamics.response import FrequencyResponse, frequency_response
     from sagline.dynamics.shaped import shaped
     from sagline.dynamics.shapers import EI, ZV, ZVD, Shaper
     from sagline.dynamics.simulate import simulate
@@ -124,6 +125,7 @@ __all__ = [
     "ForwardSolver",
     "ForwardStatus",
     "ForwardStep",
+    "FrequencyResponse",
     "Gap",
     "Imported",
     "ImprovedClosedForm",
@@ -178,6 +180,7 @@ __all__ = [
     "equilibria",
     "fastest",
     "forward",
+    "frequency_response",
     "home",
     "identify_cable",
     "identify_empirical",
@@ -244,6 +247,7 @@ _HOMES = {
     "ForwardSolver": "sagline.kinematics.forward_solver",
     "ForwardStatus": "sagline.kinematics.forward_status",
     "ForwardStep": "sagline.kinematics.forward_solver",
+    "FrequencyResponse": "sagline.dynamics.response",
     "Gap": "sagline.kinematics.plan",
     "Imported": "sagline.files.imported",
     "ImprovedClosedForm": "sagline.tension.improved_closed_form",
@@ -299,6 +303,7 @@ _HOMES = {
     "equilibria": "sagline.kinematics.equilibria",
     "fastest": "sagline.dynamics.fastest",
     "forward": "sagline.kinematics.forward",
+    "frequency_response": "sagline.dynamics.response",
     "home": "sagline.kinematics.home",
     "identify_cable": "sagline.article.identify_cable",
     "identify_empirical": "sagline.article.identify",

@@ -75,7 +75,7 @@ def _of_class(name: str, kind: type) -> set[str]:
 RESULTS = frozenset(
     {"CableFit", "CableState", "Confirmation", "EmpiricalFit", "Equilibria", "Equilibrium", "ForwardSolution"}
     | {"EnergyBalance", "Imported", "Linearized", "Modes", "Occurrence", "Plan", "Simulation", "Stiffness"}
-    | {"TensionPolygon", "Vibration", "WinchRates"}
+    | {"FrequencyResponse", "TensionPolygon", "Vibration", "WinchRates"}
 )
 # asked by sagline itself, with numbers of its own
 INTERNAL = frozenset({"TensionMethod.preference", "QuadraticProgram.preference"})
@@ -482,6 +482,8 @@ def _vibrations(given: _Given) -> dict[str, Call]:
         "linearized": Call(
             sl.linearized,
             _all(state=state, damping=("one", sl.Damping(modal_damping=0.01), True), inputs=("word", "speeds")),
+        "frequency_response": Call(
+            sl.frequency_response, _all(state=state, frequency=("array", [0.5, 2.0]), damping=damping)
         ),
     }
 

@@ -9,6 +9,7 @@ from sagline.arguments import instance, optional
 from sagline.arrays import Array, checked, locked
 from sagline.dynamics.damping import Damping
 from sagline.errors import InvalidValueError
+from sagline.kernels import codes
 from sagline.kernels.dynamics import collocation
 from sagline.kernels.dynamics.collocation import dynamic_stiffnesses
 from sagline.memory import check_memory
@@ -61,7 +62,7 @@ def dynamic_stiffness(state: Equilibrium, frequency: ArrayLike, damping: Damping
     cables = state.cables.shape[-1]
     check_memory(f"{given.size:,} frequencies", _BYTES * given.size * cables, "Take them in parts.")
     found = moving_stiffness(strings_of(state), given.reshape(-1), damping)
-    found += _loss(damping) * cable_slopes(state).blocks
+    found += cable_slopes(state).blocks
     return locked(found if given.ndim else found[0])
 
 
@@ -80,7 +81,23 @@ def one_state(state: Equilibrium) -> Equilibrium:
     if instance(state, Equilibrium, "state").pose.shape:
         step = "Take the poses one by one, state[i]; frequency_map takes many."
         raise InvalidValueError("state", f"a batch of {len(state)}", "a single equilibrium", step)
+    check_model(state)
     return state
+
+
+def check_model(state: Equilibrium) -> None:
+    """Refuse what has no vibrations of its own: shallow models' forces have no energy, straight cables no stretch.
+
+    Args:
+        state: An equilibrium.
+
+    Raises:
+        InvalidValueError: If its cables are neither exact nor elastic.
+    """
+    model = state.cables.model
+    if model.code not in (codes.CATENARY, codes.ELASTIC):
+        step = "Solve the pose with Catenary(), the default."
+        raise InvalidValueError("the state's cable model", type(model).__name__, "Catenary, Elastic", step)
 
 
 def moving_stiffness(strings: Strings, frequency: Array, damping: Damping | None) -> Complex:
@@ -97,7 +114,7 @@ def moving_stiffness(strings: Strings, frequency: Array, damping: Damping | None
     Raises:
         InvalidValueError: If a frequency is too high.
     """
-    waves = _waves(frequency, damping)
+    waves = waves_of(frequency, damping)
     kind = np.float64 if damping is None else np.complex128
     m = strings.table.shape[1]
     found = np.full((1, frequency.size, m, collocation.FOUND), np.nan, dtype=kind)
@@ -150,8 +167,16 @@ def in_world(found: NDArray[np.float64] | Complex, axes: Array) -> Complex:
     )
 
 
-def _waves(frequency: Array, damping: Damping | None) -> Complex:
-    """Frequencies as kernels take them, shape (1, F, WAVE_COLUMNS)."""
+def waves_of(frequency: Array, damping: Damping | None) -> Complex:
+    """Frequencies as kernels take them, with what takes energy out.
+
+    Args:
+        frequency: [Hz], shape (F,).
+        damping: What does, or None.
+
+    Returns:
+        Shape (1, F, WAVE_COLUMNS).
+    """
     omega = 2.0 * np.pi * frequency
     waves = np.zeros((1, frequency.size, collocation.WAVE_COLUMNS), dtype=np.complex128)
     waves[0, :, collocation.OMEGA], waves[0, :, collocation.SQUARE] = omega, omega**2

@@ -61,6 +61,11 @@ class Mesh(NamedTuple):
     omega: float
     points: Array
 
+    @property
+    def density(self) -> Array:
+        """Of the cables [kg/m], shape (t,)."""
+        return np.asarray(self.table[:, columns.DENSITY])
+
 
 class Motions(NamedTuple):
     """Motions of the taut cables in one plane; each times the roots of the nodes' masses.
@@ -216,8 +221,26 @@ def stretch(components: Components, ends: Array, amplitudes: Array) -> Array:
     Returns:
         Of the taut cables, shape (t, K) [1/s^2].
     """
-    mesh = components.mesh
-    matrices = np.empty((mesh.taut.size, 2 * mesh.points.shape[1], 2 * mesh.points.shape[1]))
-    stretch_matrices(mesh.table, mesh.omega, lobatto(), mesh.points, matrices)
     plane, _ = field(components, ends, amplitudes)
-    return np.asarray(np.einsum("tik,tik->tk", plane, matrices @ plane))
+    return np.asarray(np.einsum("tik,tik->tk", plane, _stretch_matrices(components.mesh) @ plane))
+
+
+def stretch_of_motions(components: Components) -> Array:
+    """Stiffness of stretch between displacements of the platform end at rest and the motions in the plane.
+
+    Args:
+        components: Of the cables.
+
+    Returns:
+        Symmetric, shape (t, 2 + k, 2 + k).
+    """
+    motions = components.plane
+    basis = np.concatenate((motions.rest, motions.shape), axis=2)
+    return np.asarray(np.swapaxes(basis, -1, -2) @ _stretch_matrices(components.mesh) @ basis)
+
+
+def _stretch_matrices(mesh: Mesh) -> Array:
+    n = mesh.points.shape[1]
+    matrices = np.empty((mesh.taut.size, 2 * n, 2 * n))
+    stretch_matrices(mesh.table, mesh.omega, lobatto(), mesh.points, matrices)
+    return matrices

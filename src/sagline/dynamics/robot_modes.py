@@ -53,9 +53,7 @@ def modes_of(setting: Setting, row: int, up_to: float) -> Found:
         SaglineError: If modes and count disagree.
     """
     count = modes_below(setting, row, up_to)
-    if count > MOST_MODES:
-        value = f"{up_to:g} Hz, below which the robot has {count:,} modes"
-        raise InvalidValueError("up_to", value, f"a frequency with up to {MOST_MODES:,} modes below it", "Lower it.")
+    check_number(count, up_to, "up_to")
     problem = reduced(setting, row, up_to)
     square, vectors = np.linalg.eigh(problem.matrix)
     frequency = np.sqrt(np.maximum(square, 0.0)) / (2.0 * np.pi)
@@ -67,6 +65,22 @@ def modes_of(setting: Setting, row: int, up_to: float) -> Found:
     platform = problem.platform @ vectors[:n, :count]
     amplitudes = vectors[n:, :count] - problem.driven @ vectors[:n, :count]
     return Found(frequency[:count], platform, amplitudes, setting.ends[row] @ platform, problem.components, count)
+
+
+def check_number(count: int, frequency: float, item: str) -> None:
+    """Refuse more modes than somebody wants to wait for.
+
+    Args:
+        count: How many lie below a frequency.
+        frequency: The frequency [Hz].
+        item: What a message calls it.
+
+    Raises:
+        InvalidValueError: If there are too many.
+    """
+    if count > MOST_MODES:
+        value = f"{frequency:g} Hz, below which the robot has {count:,} modes"
+        raise InvalidValueError(item, value, f"a frequency with up to {MOST_MODES:,} modes below it", "Lower it.")
 
 
 def cable_shares(setting: Setting, row: int, found: Found) -> Array:

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from sagline.arguments import instance
-from sagline.arrays import Array, locked
+from sagline.arrays import Array, Flags, locked
 from sagline.memory import check_memory
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.several import bodies_of, first_of
 from sagline.statics.slopes import CableSlopes, cable_slopes, on_platform
+from sagline.statics.strings import strings_below, strings_of
 from sagline.statics.tension_slopes import tension_slopes
 
 _SINGULAR = 1e-14  # determinant, at diagonal elements of 1
@@ -78,6 +79,17 @@ class Modes:
     state: Equilibrium
     frequency: Array
     shape: Array
+
+    @property
+    def above_strings(self) -> Flags:
+        """Which modes lie above the lowest frequency at which any cable rings as a string, its ends held.
+
+        Above it the platform's modes are no approximation to those of the robot, whose cables take part in them: see
+        `vibration`. False for a motion that is not held, shape (..., n).
+        """
+        frequency = np.nan_to_num(self.frequency.reshape(-1, self.frequency.shape[-1]))
+        below = strings_below(strings_of(self.state), frequency)
+        return locked(np.asarray((below > 0).any(axis=-1)).reshape(self.frequency.shape))
 
 
 def stiffness(state: Equilibrium) -> Stiffness:

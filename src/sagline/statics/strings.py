@@ -6,10 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arguments import instance
 from sagline.arrays import Array, Flags, Indices
-from sagline.cables.model import CableModel
-from sagline.errors import InvalidValueError
 from sagline.kernels import codes
 from sagline.kernels.cable.rows import CABLE_ROWS
 from sagline.kernels.dynamics import collocation
@@ -21,7 +18,7 @@ from sagline.robot.several import anchors_of, cables_of, first_of
 from sagline.statics.tables import cable_table
 
 FOLD = 1e-6  # of its weight: a cable whose least tension is below is folded, and has no linear vibration
-COUNTING = 0.9 * np.pi  # phase of an element [rad] for a count, which is right up to pi
+COUNTING = 0.75 * np.pi  # phase of an element [rad] for a count, below pi: errs by 1e-13 of a frequency
 _TINY = 1e-300
 
 
@@ -48,11 +45,8 @@ def strings_of(state: Equilibrium) -> Strings:
     Returns:
         Strings.
 
-    Raises:
-        InvalidValueError: If the cable model is neither exact nor weightless and elastic.
     """
     cables = state.cables
-    _check_model(cables.model)
     m = cables.shape[-1]
     material = cables_of(state.robot)
     weight = 0.0 if cables.model.weightless else material.linear_density * first_of(state.robot).gravity
@@ -77,22 +71,25 @@ def strings_of(state: Equilibrium) -> Strings:
     return Strings(table, _axes(state).reshape(-1, m, 3, 3), _taut(table))
 
 
-def count_below(strings: Array, frequency: Array) -> Indices:
+def strings_below(strings: Strings, frequency: Array) -> Indices:
     """How many natural frequencies the cables have with both ends held, by the count of Wittrick and Williams.
 
     Args:
-        strings: Their table, shape (N, m, STRING_COLUMNS).
-        frequency: Each [Hz], shape (1 or N, F).
+        strings: Of N states.
+        frequency: Those below which are counted [Hz], shape (N, F).
 
     Returns:
-        Those below each frequency, shape (N, F, m).
+        Below each frequency, shape (N, F, m); none of cables that are not taut.
     """
-    waves = undamped(frequency)
-    count, m = strings.shape[:2]
-    found = np.empty((count, waves.shape[1], m, collocation.FOUND))
-    counts = np.empty((*found.shape[:-1], 2), dtype=np.int64)
-    dynamic_stiffnesses(strings, waves, COUNTING, np.empty(collocation.ROOM), found, counts)
-    return np.asarray(counts.sum(axis=-1))
+    below = np.zeros((*frequency.shape, strings.taut.shape[1]), dtype=np.int64)
+    waves, room = undamped(frequency), np.empty(collocation.ROOM)
+    for row, taut in enumerate(strings.taut):
+        table = np.ascontiguousarray(strings.table[row : row + 1, taut])
+        found = np.empty((1, waves.shape[1], table.shape[1], collocation.FOUND))
+        counts = np.empty((*found.shape[:-1], 2), dtype=np.int64)
+        dynamic_stiffnesses(table, waves[row : row + 1], COUNTING, room, found, counts)
+        below[row][:, taut] = counts[0].sum(axis=-1)
+    return below
 
 
 def undamped(frequency: Array) -> Array:
@@ -109,12 +106,6 @@ def undamped(frequency: Array) -> Array:
     waves[..., collocation.SQUARE] = omega**2
     waves[..., collocation.ACROSS] = waves[..., collocation.ALONG] = 1.0
     return waves
-
-
-def _check_model(model: CableModel) -> None:
-    if instance(model, CableModel, "model").code not in (codes.CATENARY, codes.ELASTIC):
-        step = "Solve the pose with Catenary(), the default."
-        raise InvalidValueError("the cable model", type(model).__name__, "Catenary, Elastic", step)
 
 
 def _axes(state: Equilibrium) -> Array:

@@ -19,6 +19,7 @@ from sagline.kernels.dynamics.string import (
     BEHIND_Z,
     String,
     element,
+    shortest_wave,
     string_at,
     vertical_at,
 )
@@ -30,13 +31,15 @@ STAGES = 8
 OMEGA, SQUARE, DRAG, ACROSS, ALONG = 0, 1, 2, 3, 4
 WAVE_COLUMNS = 5
 ROOM = (5 * STAGES, 20)  # of the numbers to work in
-NUDGES = 5  # of a frequency at which a pivot is singular, each by one rounding
+MESHES = 8  # tried in turn where a joint of elements is about at a node of the cable up to there
+SHORTER = 0.06  # by which share of the longest elements each has shorter ones
+ROUNDING = 2.0**-52  # by which mu grows with them, should the frequency be a held one to the last bit
+CLEAR = 1e-4  # of its terms: a pivot that is less is taken for singular, and digits would be lost
 # columns of what is found of a cable: in its plane, and normal to it
 XX, XZ, ZZ, YY = 0, 1, 2, 3
 FOUND = 4
-MOST_ELEMENTS = 100_000
+MOST_ELEMENTS = 10_000
 SINGULAR, TOO_MANY = -1, -2  # in place of a count
-ROUNDING = 2.0**-52
 
 
 def _gauss() -> tuple[Array, Array, Array]:
@@ -159,8 +162,8 @@ def transfer(c: Numbers, mu: Any, size: float, d: int, system: Numbers, phi: Num
 
 
 @formula
-def join(phi: Numbers, d: int, k: Numbers, moved: Numbers) -> None:
-    """Carry k = f u^-1 (d, d) over an element, and fill how its end moves for a unit at its start, moved (d, d)."""
+def move(phi: Numbers, d: int, k: Numbers, moved: Numbers) -> None:
+    """Fill displacement and force at an element's end for a unit at its start, where f = k u: (d, d) each in moved."""
     for a in range(d):
         for b in range(d):
             end, force = phi[a, b], phi[d + a, b]
@@ -169,18 +172,17 @@ def join(phi: Numbers, d: int, k: Numbers, moved: Numbers) -> None:
                 force += phi[d + a, d + j] * k[j, b]
             moved[a, b] = end
             moved[2 + a, b] = force
-    divide(moved, d, k)
 
 
 @formula
-def begin(phi: Numbers, d: int, give: Numbers, k: Numbers, moved: Numbers) -> None:
-    """The same of the first element, whose start moves by give (d, d) for a unit of force; none where it is held."""
+def begin(phi: Numbers, d: int, give: Numbers, lost: Any, k: Numbers, moved: Numbers) -> None:
+    """The same of the first element, whose start moves by give (d, d) lost for a unit of force; give 0: it is held."""
     for a in range(d):
         for b in range(d):
             end, force = phi[a, d + b], phi[d + a, d + b]
             for j in range(d):
-                end += phi[a, j] * give[j, b]
-                force += phi[d + a, j] * give[j, b]
+                end += phi[a, j] * lost * give[j, b]
+                force += phi[d + a, j] * lost * give[j, b]
             moved[a, b] = end
             moved[2 + a, b] = force
     divide(moved, d, k)
@@ -200,16 +202,21 @@ def divide(moved: Numbers, d: int, k: Numbers) -> None:
 
 
 @formula
-def negatives(phi: Numbers, d: int, moved: Numbers) -> int:
-    """Negative eigenvalues of the pivot Phi_uf^-1 moved, a symmetric matrix; -1 where it is singular."""
+def negatives(phi: Numbers, d: int, k: Numbers, clear: float, moved: Numbers) -> int:
+    """Negative eigenvalues of the pivot Phi_uf^-1 moved, a symmetric matrix; SINGULAR where it is not clear of that.
+
+    k is that up to the element.
+    """
     if d == 1:
+        clear *= abs(phi[0, 0]) + abs(phi[0, 1] * k[0, 0])
         pivot = moved[0, 0].real * phi[0, 1].real
-        return -1 if pivot == 0.0 else int(pivot < 0.0)
+        return SINGULAR if not abs(moved[0, 0]) > clear else int(pivot < 0.0)
     below = phi[0, 2].real * phi[1, 3].real - phi[0, 3].real * phi[1, 2].real
-    determinant = (moved[0, 0].real * moved[1, 1].real - moved[0, 1].real * moved[1, 0].real) * below
+    one, other = moved[0, 0] * moved[1, 1], moved[0, 1] * moved[1, 0]
+    if not abs(one - other) > clear * (abs(one) + abs(other)):
+        return SINGULAR
+    determinant = (one - other).real * below
     first = (phi[1, 3].real * moved[0, 0].real - phi[0, 3].real * moved[1, 0].real) * below
-    if determinant == 0.0:
-        return -1
     if determinant < 0.0:
         return 1
     return 2 if first < 0.0 else 0
@@ -235,32 +242,37 @@ def cable_at(
 ) -> int:
     """Fill K(omega) - K(0) of a cable's platform end, (d, d); returns how many held frequencies lie below omega.
 
-    Negative where a pivot is singular, or the elements are too many.
+    SINGULAR where a joint of elements is about at a node, TOO_MANY where the elements are too many.
     """
     c, system, phi = room[2 * STAGES : 3 * STAGES], room[: 2 * STAGES], room[3 * STAGES : 3 * STAGES + 4]
     rest, k = room[3 * STAGES + 4 :, :2], room[3 * STAGES + 4 :, 2:4]
     moved, whole = room[3 * STAGES :, 4:6], room[3 * STAGES :, 6:8]
     start = 0.0
     count = 0
+    if shortest_wave(string, omega) * MOST_ELEMENTS < string.length:
+        return TOO_MANY
+    lost = wave.across if d == 1 else wave.along
     for number in range(MOST_ELEMENTS + 1):
         size = element(string, start, omega, phase)
         last = start + size >= string.length
-        fill_flexibility(string, wave, start, size, d == 1, c)
         # at rest the end moves by the sum of all C, for a unit of force
+        fill_flexibility(string, Wave(wave.mu, 1.0, 1.0), start, size, d == 1, c)
         sum_of(c, size, d, moved)
         for a in range(d):
             for b in range(d):
                 whole[a, b] = moved[a, b] + (give[a, b] if number == 0 else whole[a, b])
+        fill_flexibility(string, wave, start, size, d == 1, c)
         transfer(c, wave.mu, size, d, system, phi)
         if number == 0:
             count += spring_negatives(phi, d, give)
-            begin(phi, d, give, k, moved)
+            begin(phi, d, give, lost, k, moved)
         else:
-            join(phi, d, k, moved)
-            lost = negatives(phi, d, moved)
-            if lost < 0:
+            move(phi, d, k, moved)
+            below = negatives(phi, d, k, 0.0 if last else CLEAR, moved)
+            if below == SINGULAR:
                 return SINGULAR
-            count += lost
+            divide(moved, d, k)
+            count += below
         start += size
         if last:
             for a in range(d):
@@ -287,8 +299,8 @@ def dynamic_stiffnesses(
         phase: Of a transverse wave in an element [rad], < pi.
         room: Of shape ROOM.
         found: Filled: K(omega) - K(0), (N, F, m, FOUND) [N/m]; NaN without horizontal and vertical force.
-        counts: Filled: held frequencies below omega in the plane and normal to it, (N, F, m, 2); negative where a pivot
-            is singular or the cable has too many elements.
+        counts: Filled: held frequencies below omega in the plane and normal to it, (N, F, m, 2); negative where
+            the cable has too many elements.
     """
     give, block = room[4 * STAGES : 4 * STAGES + 2, :2], room[4 * STAGES : 4 * STAGES + 2, 2:4]
     for p in range(strings.shape[0]):
@@ -300,19 +312,18 @@ def dynamic_stiffnesses(
                 wave = Wave(string.density * row[SQUARE] - row[DRAG], row[ACROSS], row[ALONG])
                 x, z, y = strings[p, i, BEHIND_X], strings[p, i, BEHIND_Z], strings[p, i, BEHIND_Y]
                 give[0, 0], give[0, 1], give[1, 0], give[1, 1] = x * x, x * z, x * z, z * z
-                for a in range(2):
-                    for b in range(2):
-                        give[a, b] *= wave.along
                 for d in (2, 1):
-                    for _ in range(NUDGES):
-                        count = cable_at(string, wave, omega, phase, d, give, room, block)
+                    count = SINGULAR
+                    for mesh in range(MESHES):
+                        other = Wave(wave.mu * (1.0 + ROUNDING * mesh), wave.across, wave.along)
+                        shorter = phase * (1.0 - SHORTER * mesh)
+                        count = cable_at(string, other, omega, shorter, d, give, room, block)
                         if count != SINGULAR:
                             break
-                        wave = Wave(wave.mu * (1.0 + ROUNDING), wave.across, wave.along)
                     counts[p, f, i, 2 - d] = count
                     if d == 2:
                         found[p, f, i, XX], found[p, f, i, ZZ] = block[0, 0], block[1, 1]
                         found[p, f, i, XZ] = 0.5 * (block[0, 1] + block[1, 0])
-                        give[0, 0] = y * wave.across
+                        give[0, 0] = y
                     else:
                         found[p, f, i, YY] = block[0, 0]

@@ -76,6 +76,14 @@ def slowness(string: String, force: float) -> float:
 
 
 @formula
+def shortest_wave(string: String, omega: float) -> float:
+    """Half the length of a transverse wave where the force is largest [m]: it is shorter elsewhere."""
+    low, high = abs(vertical_at(string, 0.0)), abs(string.vertical)
+    force = math.hypot(string.horizontal, max(low, high))
+    return math.pi / (omega * slowness(string, force) + TINY)
+
+
+@formula
 def longest(string: String, start: float, end: float, omega: float, phase: float) -> float:
     """Longest element [m] that an interval allows: C smooth, and at most so much phase of a transverse wave [rad]."""
     force = least_force(string, start, end)
