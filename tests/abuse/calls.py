@@ -482,6 +482,7 @@ def _vibrations(given: _Given) -> dict[str, Call]:
         "linearized": Call(
             sl.linearized,
             _all(state=state, damping=("one", sl.Damping(modal_damping=0.01), True), inputs=("word", "speeds")),
+        ),
         "frequency_response": Call(
             sl.frequency_response, _all(state=state, frequency=("array", [0.5, 2.0]), damping=damping)
         ),
