@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from sagline.dynamics.drives import SecondOrder
     from sagline.dynamics.events import Brake, Break, Drop, PickUp, Stall
     from sagline.dynamics.fastest import fastest
+    from sagline.dynamics.frequency_slopes import FrequencySlopes, frequency_slopes
     from sagline.dynamics.linearized import Linearized, linearized
     from sagline.dynamics.response import FrequencyResponse, frequency_response
     from sagline.dynamics.shaped import shaped
@@ -126,6 +127,7 @@ __all__ = [
     "ForwardStatus",
     "ForwardStep",
     "FrequencyResponse",
+    "FrequencySlopes",
     "Gap",
     "Imported",
     "ImprovedClosedForm",
@@ -181,6 +183,7 @@ __all__ = [
     "fastest",
     "forward",
     "frequency_response",
+    "frequency_slopes",
     "home",
     "identify_cable",
     "identify_empirical",
@@ -248,6 +251,7 @@ _HOMES = {
     "ForwardStatus": "sagline.kinematics.forward_status",
     "ForwardStep": "sagline.kinematics.forward_solver",
     "FrequencyResponse": "sagline.dynamics.response",
+    "FrequencySlopes": "sagline.dynamics.frequency_slopes",
     "Gap": "sagline.kinematics.plan",
     "Imported": "sagline.files.imported",
     "ImprovedClosedForm": "sagline.tension.improved_closed_form",
@@ -304,6 +308,7 @@ _HOMES = {
     "fastest": "sagline.dynamics.fastest",
     "forward": "sagline.kinematics.forward",
     "frequency_response": "sagline.dynamics.response",
+    "frequency_slopes": "sagline.dynamics.frequency_slopes",
     "home": "sagline.kinematics.home",
     "identify_cable": "sagline.article.identify_cable",
     "identify_empirical": "sagline.article.identify",

@@ -74,6 +74,7 @@ def _of_class(name: str, kind: type) -> set[str]:
 # made by sagline
 RESULTS = frozenset(
     {"CableFit", "CableState", "Confirmation", "EmpiricalFit", "Equilibria", "Equilibrium", "ForwardSolution"}
+    | {"FrequencySlopes"}
     | {"EnergyBalance", "Imported", "Linearized", "Modes", "Occurrence", "Plan", "Simulation", "Stiffness"}
     | {"FrequencyResponse", "TensionPolygon", "Vibration", "WinchRates"}
 )
@@ -479,6 +480,7 @@ def _vibrations(given: _Given) -> dict[str, Call]:
         "dynamic_stiffness": Call(
             sl.dynamic_stiffness, _all(state=state, frequency=("array", [0.5, 2.0]), damping=damping)
         ),
+        "frequency_slopes": Call(sl.frequency_slopes, _all(state=state, together=("number", 0.25))),
         "linearized": Call(
             sl.linearized,
             _all(state=state, damping=("one", sl.Damping(modal_damping=0.01), True), inputs=("word", "speeds")),

@@ -198,13 +198,13 @@ def cable_shapes(components: Components, ends: Array, amplitudes: Array, count: 
     values = np.empty((mesh.taut.size, count, n))
     interpolate(mesh.table, mesh.omega, lobatto(), mesh.points, values)
     plane, normal = field(components, ends, amplitudes)
-    inside = plane.reshape(-1, n, 2, k)
+    inside = plane.reshape(mesh.taut.size, n, 2, k)  # there may be no mode
     behind = mesh.table[:, [columns.BEHIND_X, columns.BEHIND_Z]]
     slide = np.hypot(*behind.T)  # a frame end that gives way has one motion in the plane
     direction = behind / np.maximum(slide, _TINY)[:, None]
     inside[:, 0] = direction[:, :, None] * inside[:, 0, :1]
     own = np.stack((inside[:, :, 0], normal, inside[:, :, 1]), axis=-2)
-    moved = (values @ own.reshape(-1, n, 3 * k)).reshape(-1, count, 3, k)
+    moved = (values @ own.reshape(mesh.taut.size, n, 3 * k)).reshape(mesh.taut.size, count, 3, k)
     shapes = np.zeros((k, ends.shape[0], count, 3))
     shapes[:, mesh.taut] = np.einsum("tij,tpik->ktpj", mesh.axes, moved, optimize=True)
     return shapes
