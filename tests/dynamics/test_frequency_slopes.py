@@ -59,7 +59,8 @@ def differences(state: sl.Equilibrium, frequencies: Frequencies, cable: int) -> 
         return robot.replace(cables=sl.Cable(density * (1.0 + heavier * one), stiffness * (1.0 + stiffer * one)))
 
     yield "length", slope(lambda h: at(longer=h * one), 1e-4)
-    yield "density", slope(lambda h: at(cables(heavier=h)), 8e-2) / density[cable]
+    much = 8e-2 if robot is COGIRO else 5e-3  # its modes are far from each other
+    yield "density", slope(lambda h: at(cables(heavier=h)), much) / density[cable]
     yield "stiffness", slope(lambda h: at(cables(stiffer=h)), 3e-2) / stiffness[cable]
     heavier = slope(lambda h: at(robot.replace(mass=robot.mass * (1.0 + h), inertia=robot.inertia)), 1e-2)
     yield "mass", heavier / robot.mass
@@ -143,7 +144,8 @@ def test_frequencies_that_are_one_part_by_their_eigenvalues(heavy: bool) -> None
 
     def frequencies(change: Array) -> Array:
         moved = vibrating(sl.forward(robot, state.unstrained_length + change, state.pose).state)
-        return (moved.frequency if isinstance(moved, sl.Vibration) else sl.modes(moved).frequency)[pair]
+        whole = moved.frequency if isinstance(moved, sl.Vibration) else sl.modes(moved).frequency
+        return np.asarray(whole[pair])
 
     slopes, step = sl.frequency_slopes(vibrating(state)), 1e-6
     pairs = np.flatnonzero(np.bincount(slopes.group) == 2)
@@ -153,7 +155,8 @@ def test_frequencies_that_are_one_part_by_their_eigenvalues(heavy: bool) -> None
         change = np.array([1.0, 0.0, 0.0, 0.0])
         apart = (frequencies(step * change) - frequencies(-step * change)[::-1]) / (2.0 * step)
         np.testing.assert_allclose(slopes.length_sensitivity[pair, 0], apart, rtol=2e-6)
-        np.testing.assert_allclose(*slopes.mass_sensitivity[pair], rtol=1e-7)  # no mass parts them
+        one, other = slopes.mass_sensitivity[pair].tolist()
+        assert one == pytest.approx(other, rel=1e-7)  # no mass parts them
 
 
 def test_no_mode_below_the_frequency_has_no_rows() -> None:
