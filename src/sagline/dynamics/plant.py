@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -35,6 +35,7 @@ class Records:
         lengths: Unstrained [m], (N, m).
         energies: Kinetic, potential, supplied, lost [J], (N, 4).
         notes: See `sagline.kernels.dynamics.motion`, (NOTES, NOTE_COLUMNS).
+        points: Of cables with mass [m], (N, m, points, 3); None of cables without.
     """
 
     def __init__(self, count: int, cables: int) -> None:
@@ -44,9 +45,10 @@ class Records:
         self.lengths = np.empty((count, cables))
         self.energies = np.empty((count, k.ENERGY_COLUMNS))
         self.notes = np.zeros((NOTES, k.NOTE_COLUMNS))
+        self.points: Array | None = None
 
     @property
-    def arrays(self) -> tuple[Array, Array, Array, Array, Array]:
+    def arrays(self) -> tuple[Array, ...]:
         """As the kernel takes them."""
         return self.states, self.tensions, self.lengths, self.energies, self.notes
 
@@ -69,7 +71,12 @@ class Plant:
         audit: What is added up, (AUDIT_SIZE,).
         counters: Of the kernel, (COUNTERS,).
         layers: Strain of the cable on the drums, (m, B).
+        kernel: What moves it: called with `arguments`, arrays of records, steps to take, and steps a record.
+        cable_mass: As `simulate` takes it.
     """
+
+    kernel: ClassVar[Any] = staticmethod(k.run)
+    cable_mass: ClassVar[str] = "none"
 
     def __init__(self, robot: Robot, model: CableModel, pose: Pose, twist: Array, length: Array, data: Array) -> None:
         """Place a robot at a pose.
@@ -126,6 +133,18 @@ class Plant:
         terms = (self.model.code, *self.model.parameters, self.robot.gravity, self._behind)
         given: tuple[Course, Course, Course] = (lengths, wrenches, winds)
         return terms, rules, numbers, robot, locked(self.data.view()), tuple(c.arrays for c in given), kept
+
+    def records(self, count: int) -> Records:
+        """Room for records of so many steps."""
+        return Records(count, len(self.cables))
+
+    def seen(self, states: Array) -> Array:
+        """Recorded states of what the kernel moves, (N, 13), as those of the platform."""
+        return states
+
+    def failure(self, time: float, step: float) -> InvalidValueError:
+        """Why the kernel stopped: at a time [s], with steps of so many seconds."""
+        return grown(step, time, int(self.cables[int(self.counters[k.FAILED]) - 1]))
 
     def without(self, cable: int) -> None:
         """Take a cable away, by its index among all that were ever there."""

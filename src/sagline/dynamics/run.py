@@ -10,16 +10,14 @@ import numpy as np
 from sagline.arrays import Array, locked
 from sagline.dynamics.course import Course
 from sagline.dynamics.events import KINDS, Brake, Break, Drop, Event, PickUp, Stall, cable_of
-from sagline.dynamics.plant import Plant, Records, grown
+from sagline.dynamics.plant import Plant, Records
 from sagline.dynamics.simulation import EnergyBalance, Occurrence, Simulation
-from sagline.errors import InvalidValueError
 from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics import motion as k
 from sagline.kernels.dynamics import rigid_body as body
 
 BLOCK: Final = 20_000  # steps at once: some 100 ms, after which an interrupt is heard
 NAMES: Final = {k.NOTE_SLACK: "slack", k.NOTE_SATURATED: "saturate"}
-RUN: Final[Any] = k.run
 Courses = tuple[Course, Course, Course]
 
 
@@ -47,8 +45,7 @@ class Run:
         """
         self.plant, self.every, self.steps = plant, every, steps
         self._rules, self._numbers, self._courses = rules, numbers, courses
-        m, count = plant.robot.cable_count, steps // every + 1
-        self._all = Records(count, m)
+        self._all = plant.records(steps // every + 1)
         self._all.tensions[:] = 0.0
         self._all.lengths[:] = np.nan
         self._occurrences: list[Occurrence] = []
@@ -68,17 +65,19 @@ class Run:
         """Go on to a step, recording on the way."""
         plant, first = self.plant, int(self.plant.counters[k.STEPS])
         row = first // self.every + 1 if plant.counters[k.READY] else 0
-        records = Records(last // self.every + 1 - row, len(plant.cables))
+        records = plant.records(last // self.every + 1 - row)
         plant.counters[k.RECORDS] = plant.counters[k.NOTES] = 0
         if last <= first and plant.counters[k.READY]:
             return
         for begin in range(first, max(last, first + 1), BLOCK):
-            RUN(*self._arguments, records.arrays, min(last - begin, BLOCK), self.every)
+            plant.kernel(*self._arguments, records.arrays, min(last - begin, BLOCK), self.every)
             if plant.counters[k.FAILED]:
-                raise self._blown_up()
+                raise plant.failure(self._time(int(plant.counters[k.STEPS])), self.step)
         rows = slice(row, row + int(plant.counters[k.RECORDS]))
         kept = slice(0, rows.stop - rows.start)
-        self._all.states[rows], self._all.energies[rows] = records.states[kept], records.energies[kept]
+        self._all.states[rows], self._all.energies[rows] = plant.seen(records.states[kept]), records.energies[kept]
+        if self._all.points is not None and records.points is not None:
+            self._all.points[rows, plant.cables] = records.points[kept]
         self._all.tensions[rows, plant.cables] = records.tensions[kept]
         self._all.lengths[rows, plant.cables] = records.lengths[kept]
         self._note(records)
@@ -93,9 +92,9 @@ class Run:
 
     def _look(self) -> float:
         """Energy at the step that is reached, without a record [J]."""
-        plant, here = self.plant, Records(1, len(self.plant.cables))
+        plant, here = self.plant, self.plant.records(1)
         plant.counters[k.RECORDS] = plant.counters[k.NOTES] = 0
-        RUN(*self._arguments, here.arrays, 0, self.every)
+        plant.kernel(*self._arguments, here.arrays, 0, self.every)
         self._note(here)
         return float(here.energies[0, k.KINETIC] + here.energies[0, k.POTENTIAL])
 
@@ -152,11 +151,6 @@ class Run:
             after = float(self.plant.now[d.PEAK].max())
             self._occurrences[last] = Occurrence(event.time, event.kind, event.cable, event.tension_before, after)
 
-    def _blown_up(self) -> InvalidValueError:
-        plant = self.plant
-        cable = int(plant.cables[int(plant.counters[k.FAILED]) - 1])
-        return grown(self.step, self._time(int(plant.counters[k.STEPS])), cable)
-
     def finish(self) -> Simulation:
         """Go on to the end.
 
@@ -179,6 +173,7 @@ class Run:
             length=locked(self._all.lengths),
             energy=EnergyBalance(kinetic, potential, supplied, lost, locked(total - total[0])),
             events=tuple(sorted(self._occurrences, key=lambda event: event.time)),
-            cable_mass="none",
+            cable_mass=plant.cable_mass,
             step=self.step,
+            nodes=None if self._all.points is None else locked(self._all.points),
         )

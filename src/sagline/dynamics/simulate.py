@@ -10,6 +10,7 @@ import numpy as np
 from sagline.arguments import choice, optional
 from sagline.arrays import number
 from sagline.dynamics.beginning import Beginning, beginning
+from sagline.dynamics.chains import ChainPlant, checked_nodes, wave_frequency
 from sagline.dynamics.course import Course, TableInTime, table_in_time
 from sagline.dynamics.damping import Damping
 from sagline.dynamics.drives import Winches, drive_data, kind_of
@@ -27,7 +28,7 @@ from sagline.robot.equilibrium import Equilibrium
 
 Integrator = Literal["splitting", "runge-kutta"]
 Winding = Literal["constant", "remembered"]
-CableMass = Literal["none"]
+CableMass = Literal["none", "lumped"]
 RECORD: Final = 0.01  # s
 MOST_STEPS: Final = 10**8  # some minutes
 
@@ -63,8 +64,11 @@ def simulate(
         duration: How long [s]; lengths are held after the end of what is given. None: as long as the plan, or the table
             of lengths.
         step: Of the integrator [s]; None: 0.2 radians of the highest frequency (massless, cables taut), at most 1 ms.
-        cable_mass: "none".
-        nodes: Of a cable with mass.
+        cable_mass: "none": cables hang at every instant as they do at rest. "lumped": each is a chain of nodes with
+            its mass, at fixed material points, which swings, and transmits its waves; new nodes are born at the frame
+            and merged there as cable is let out and wound in. A chain keeps the exit from its pulley of the start.
+        nodes: Elements a cable is divided into where it has mass, at the start, 4 to 500. At rest the pose differs from
+            the exact one by the order of nodes^-2.
         integrator: "runge-kutta", of order 4, or "splitting", symplectic, of order 2: its energy has no trend in long
             runs. None: "runge-kutta"; "splitting" for winches="robot", which needs it.
         winches: "ideal": lengths are what is given. SecondOrder(...): they lag. "robot": the robot's winches, with
@@ -109,17 +113,20 @@ def simulate(
     """
     choice(cable_mass, "cable_mass", get_args(CableMass))
     given = beginning(start, unstrained_length, wrench, duration)
+    elements = checked_nodes(nodes, given) if cable_mass == "lumped" else 0
     kind, losses = kind_of(winches), checked_damping(damping)
-    code = code_of(integrator, kind)
+    code = code_of(integrator, kind, elements)
     choice(winding, "winding", get_args(Winding))
     air = Course.still(np.zeros(3)) if wind is None else table_in_time(wind, "wind", "m/s", 3, given.begin)
     happening = checked_events(events, given.robot, given.begin, given.end)
-    plant = plant_at(given, winches, wind is not None)
+    plant = plant_at(given, winches, wind is not None, elements, losses)
     if winding == "remembered" and kind == d.DRUMS:
         plant.remember_winding(float(given.lengths.value.max()))
-    size = step_of(given, plant, step, code, kind, losses, happening)
+    waves = wave_frequency(given, elements) if elements else 0.0
+    size = step_of(given, plant, step, code, kind, losses, happening, waves)
     work, every, count = work_of(losses, given.wrench, wind is not None), _every(record, size), _count(given, size)
-    check_memory("record", 8.0 * (19 + 2 * given.robot.cable_count) * (count / every), "Record less often.")
+    numbers_each = 19 + given.robot.cable_count * (2 + (3 * elements + 3 if elements else 0))
+    check_memory("record", 8.0 * numbers_each * (count / every), "Record less often.")
     rules = (code, kind, int(winding == "remembered"), work, round(k.LOOP_PERIOD / size) if kind == d.DRUMS else 1)
     numbers = (size, losses.loss_time, losses.air_damping, 1.0)
     run = Run(plant, rules, numbers, (set_points(given, plant, kind), given.wrench, air), every, count)
@@ -146,20 +153,27 @@ def set_points(given: Beginning, plant: Plant, kind: int) -> Course:
     return wound.beside(given.tensions)
 
 
-def plant_at(given: Beginning, winches: Winches, blown: bool) -> Plant:
+def plant_at(
+    given: Beginning, winches: Winches, blown: bool, elements: int = 0, losses: Damping | None = None
+) -> Plant:
     """A robot at its beginning, its winches at the speeds that are asked for there.
 
     Args:
         given: The beginning.
         winches: Which kind.
         blown: Whether wind acts on the cables.
+        elements: Of each cable where it has mass; 0 where it has none.
+        losses: Of the cables, where they have mass.
 
     Returns:
         Plant.
     """
     length = given.state.unstrained_length
     data = drive_data(given.robot, winches, length, blown)
-    plant = Plant(given.robot, given.model, given.state.pose, given.twist, length, data)
+    if elements:
+        plant: Plant = ChainPlant(given, data, elements, losses or Damping())
+    else:
+        plant = Plant(given.robot, given.model, given.state.pose, given.twist, length, data)
     plant.audit[d.BEGIN] = given.begin
     plant.now[d.RATE] = given.rate
     plant.now[d.SPEED] = given.rate * (1.0 + data[d.WINDING_STRAIN])
@@ -182,12 +196,13 @@ def checked_damping(damping: Damping | None) -> Damping:
     return found
 
 
-def code_of(integrator: Any, kind: int) -> int:
+def code_of(integrator: Any, kind: int, elements: int = 0) -> int:
     """The kernel's code of an integrator.
 
     Args:
         integrator: What a caller gave; None to choose by the kind of winches.
         kind: Of the winches.
+        elements: Of each cable where it has mass; 0 where it has none.
 
     Raises:
         InvalidValueError: If there is no such integrator, or it is not for these winches.
@@ -197,10 +212,22 @@ def code_of(integrator: Any, kind: int) -> int:
     if kind == d.DRUMS and integrator == "runge-kutta":
         step = "Leave integrator out: friction that sticks is nothing for a smooth method."
         raise InvalidValueError("integrator", '"runge-kutta"', '"splitting" for winches="robot"', step)
-    return k.SPLITTING if kind == d.DRUMS or integrator == "splitting" else k.RUNGE_KUTTA
+    if elements and integrator == "runge-kutta":
+        step = "Leave integrator out: long runs of stiff chains need one that keeps their energy."
+        raise InvalidValueError("integrator", '"runge-kutta"', '"splitting" for cables with mass', step)
+    return k.SPLITTING if kind == d.DRUMS or elements or integrator == "splitting" else k.RUNGE_KUTTA
 
 
-def step_of(given: Beginning, plant: Plant, step: Any, code: int, kind: int, losses: Damping, events: Any) -> float:
+def step_of(
+    given: Beginning,
+    plant: Plant,
+    step: Any,
+    code: int,
+    kind: int,
+    losses: Damping,
+    events: Any,
+    waves: float = 0.0,
+) -> float:
     """The step, by the lightest platform that there will be.
 
     Args:
@@ -211,12 +238,13 @@ def step_of(given: Beginning, plant: Plant, step: Any, code: int, kind: int, los
         kind: Of the winches.
         losses: What damps.
         events: What will happen.
+        waves: Highest angular frequency of cables with mass [rad/s]; 0 without.
     """
     robot, lengths = given.robot, given.state.unstrained_length
     platform = highest_frequency(robot, given.poses, lengths) * _lightness(robot.mass, events)
     stiffness = robot.cables.axial_stiffness
     highest = max(platform, frequency_of_drives(kind, plant.data, lengths, stiffness))
-    return checked_step(step, code, highest, losses, kind == d.DRUMS)
+    return checked_step(step, code, highest, losses, kind == d.DRUMS, waves)
 
 
 def _lightness(mass: float, events: tuple[Event, ...]) -> float:

@@ -17,6 +17,7 @@ from sagline.robot.robot import Robot
 
 LIMIT: Final = {SPLITTING: 2.0, RUNGE_KUTTA: 2.0 * math.sqrt(2.0)}  # of step times highest angular frequency
 SHARE: Final = 0.2  # radians of that frequency in a step, unless told otherwise
+WAVE_SHARE: Final = 0.465  # of the limit of cables with mass, 0.4 l sqrt(rho/EA): what breaks shakes the shortest waves
 LONGEST: Final = 1e-3  # s
 
 
@@ -48,7 +49,9 @@ def highest_frequency(robot: Robot, poses: Pose, lengths: Array) -> float:
     return float(np.sqrt(max(squares.max(), 0.0)))
 
 
-def checked_step(step: float | None, integrator: int, highest: float, damping: Damping, stride: bool) -> float:
+def checked_step(
+    step: float | None, integrator: int, highest: float, damping: Damping, stride: bool, waves: float = 0.0
+) -> float:
     """The step of a run.
 
     Args:
@@ -57,6 +60,7 @@ def checked_step(step: float | None, integrator: int, highest: float, damping: D
         highest: Highest angular frequency [rad/s].
         damping: Of the cables.
         stride: Whether loops are closed every millisecond, of which a step must then be a whole part.
+        waves: Highest angular frequency of cables with mass [rad/s]; 0 without.
 
     Returns:
         The step [s]: unless given, a whole part of a millisecond.
@@ -64,22 +68,29 @@ def checked_step(step: float | None, integrator: int, highest: float, damping: D
     Raises:
         InvalidValueError: If it is above the limit of stability, or no whole part where it must be.
     """
-    ratio = 0.5 * damping.loss_time * highest  # of the highest frequency's damping
-    slower = math.sqrt(1.0 + ratio * ratio) - ratio
-    limit = LIMIT[integrator] * slower / highest if highest > 0.0 else math.inf
+    limit = _limit(integrator, max(highest, waves), damping)
     if step is None:
-        return LONGEST / math.ceil(LONGEST / min(limit * SHARE / LIMIT[integrator], LONGEST) - 1e-9)
+        usual = min(SHARE / LIMIT[integrator] * _limit(integrator, highest, damping), LONGEST)
+        usual = min(usual, WAVE_SHARE * limit) if waves > 0.0 else usual
+        return LONGEST / math.ceil(LONGEST / usual - 1e-9)
     given = number(step, "step", "s", above=0.0)
     if given > limit:
-        allowed = (
-            f"<= {limit:.3g} s, the limit of stability at {highest / (2.0 * math.pi):.3g} Hz, massless cables taut"
-        )
+        what = "cables with mass" if waves > highest else "massless cables taut"
+        at = f"{max(highest, waves) / (2.0 * math.pi):.3g} Hz, {what}"
+        allowed = f"<= {limit:.3g} s, the limit of stability at {at}"
         raise InvalidValueError("step", f"{given:g} s", allowed, "Leave it out, or give a tenth of that.")
     parts = LONGEST / given
     if stride and (parts < 0.5 or abs(parts - round(parts)) > 1e-9 * parts):
         step_to = "Give 1e-3, 5e-4 or the like; drives close their loops every millisecond."
         raise InvalidValueError("step", f"{given:g} s", "a whole part of 0.001 s", step_to)
     return LONGEST / round(parts) if stride else given
+
+
+def _limit(integrator: int, highest: float, damping: Damping) -> float:
+    """Longest step that is stable at an angular frequency [s]."""
+    ratio = 0.5 * damping.loss_time * highest  # of that frequency's damping
+    slower = math.sqrt(1.0 + ratio * ratio) - ratio
+    return LIMIT[integrator] * slower / highest if highest > 0.0 else math.inf
 
 
 def frequency_of_drives(kind: int, data: Array, lengths: Array, stiffness: Array) -> float:

@@ -1,0 +1,289 @@
+"""A cable with mass as a chain: nodes at fixed material points, elements that pull and do not push.
+
+docs/model.md, section 11. Node 0 is the platform's end, the last one the frame's, so that nodes are born and merged at
+the end of the arrays. All elements have the same unstrained length but the one at the frame, which has what is left.
+Each gives half its mass to both of its nodes; what lies on the platform's end belongs to the platform.
+"""
+
+from __future__ import annotations
+
+import math
+
+from sagline.arrays import Array
+from sagline.kernels.jit import formula, kernel
+
+# columns of the chain table, a row for each cable
+EXIT_X, EXIT_Y, EXIT_Z = 0, 1, 2  # where the chain leaves the frame, world axes [m]
+ELEMENT = 3  # unstrained length of an element [m]
+DENSITY, STIFFNESS = 4, 5  # [kg/m], [N]
+LOSS_TIME = 6  # [s]
+AIR_RATE = 7  # force of the air on a length, by its velocity and its mass [1/s]
+BEHIND, RUN = 8, 9  # what lies on pulley and dead cable: unstrained, and its way from drum to exit [m]
+WIND = 10  # force of the wind on a length, by the square of its speed [N s^2/m^3]
+SMOOTH = 11  # share of a step's mean tension in that by which a slack cable is known
+GRAVITY = 12  # [m/s^2]
+REST, RATE = 13, 14  # unstrained length of the element at the frame [m], and the rate at which cable is let out [m/s]
+CHAIN_COLUMNS = 15
+
+LEAST, MOST = 0.4, 1.6  # of an element: the one at the frame is merged with its neighbor, or gives birth to a node
+TINY = 1e-300
+
+
+@formula
+def pull(place: Array, speed: Array, count: int, row: Array, pulls: Array) -> float:
+    """Fill the force of every element divided by its length [N/m]; returns the power that they lose [W].
+
+    Args:
+        place: Of the nodes [m], (3, nodes): node 0 is the platform's, node count + 1 the frame's.
+        speed: Of the nodes [m/s]; used where the elements lose energy.
+        count: Number of free nodes.
+        row: Of the chain table.
+        pulls: To be filled, (elements,).
+    """
+    element, stiffness = row[ELEMENT], row[STIFFNESS]
+    inverse = 1.0 / element
+    for j in range(count):
+        x = place[0, j + 1] - place[0, j]
+        y = place[1, j + 1] - place[1, j]
+        z = place[2, j + 1] - place[2, j]
+        distance = math.sqrt(x * x + y * y + z * z)
+        pulls[j] = max(stiffness * (distance * inverse - 1.0), 0.0) / (distance + TINY)
+    distance = distance_of(place, count)
+    pulls[count] = max(stiffness * strain_at_exit(row, distance), 0.0) / (distance + TINY)
+    if row[LOSS_TIME] == 0.0:
+        return 0.0
+    return lose(place, speed, count, row, pulls)
+
+
+@formula
+def strain_at_exit(row: Array, distance: float) -> float:
+    """Strain of the element at the frame, which has that of the cable behind it: that slides."""
+    return (distance + row[RUN]) / (row[REST] + row[BEHIND]) - 1.0
+
+
+@formula
+def distance_of(place: Array, j: int) -> float:
+    """Length of the element between node j and the next towards the frame [m]."""
+    x = place[0, j + 1] - place[0, j]
+    y = place[1, j + 1] - place[1, j]
+    z = place[2, j + 1] - place[2, j]
+    return math.sqrt(x * x + y * y + z * z)
+
+
+@kernel
+def lose(place: Array, speed: Array, count: int, row: Array, pulls: Array) -> float:
+    """Add what resists the stretching of every taut element, which never pushes; returns the power lost [W]."""
+    viscous = row[STIFFNESS] * row[LOSS_TIME]
+    power = 0.0
+    for j in range(count + 1):
+        length = row[REST] + row[BEHIND] if j == count else row[ELEMENT]
+        x = place[0, j + 1] - place[0, j]
+        y = place[1, j + 1] - place[1, j]
+        z = place[2, j + 1] - place[2, j]
+        square = x * x + y * y + z * z + TINY
+        along = (
+            x * (speed[0, j + 1] - speed[0, j])
+            + y * (speed[1, j + 1] - speed[1, j])
+            + z * (speed[2, j + 1] - speed[2, j])
+        )
+        # d(strain)/dt; at the frame the node's speed is that of what enters, which holds the change of rest already
+        slope = along / (math.sqrt(square) * length)
+        before = pulls[j]
+        after = max(before + viscous * slope / math.sqrt(square), 0.0) if before > 0.0 else 0.0
+        power += (after - before) * math.sqrt(square) * slope * length
+        pulls[j] = after
+    return power
+
+
+@formula
+def enter(place: Array, speed: Array, count: int, row: Array) -> None:
+    """Fill the velocity of the frame's node: that of the cable which enters there, L' (1 + strain) along it."""
+    for c in range(3):
+        speed[c, count + 1] = row[RATE] * (place[c, count] - place[c, count + 1]) / row[REST]
+
+
+@formula
+def kick(place: Array, speed: Array, count: int, row: Array, pulls: Array, h: float) -> None:
+    """Change the nodes' velocities by what pulls at them during h [s], and by the momentum that enters."""
+    share = h / (row[DENSITY] * row[ELEMENT])
+    last = h / (0.5 * row[DENSITY] * (row[ELEMENT] + row[REST]))
+    for c in range(3):
+        fall = row[GRAVITY] * h if c == 2 else 0.0
+        for j in range(1, count):
+            there = pulls[j] * (place[c, j + 1] - place[c, j])
+            back = pulls[j - 1] * (place[c, j] - place[c, j - 1])
+            speed[c, j] += share * (there - back) - fall
+        there = pulls[count] * (place[c, count + 1] - place[c, count])
+        back = pulls[count - 1] * (place[c, count] - place[c, count - 1])
+        entering = 0.5 * row[DENSITY] * row[RATE] * speed[c, count + 1]
+        speed[c, count] += last * (there - back + entering) - fall
+
+
+@formula
+def drift(place: Array, speed: Array, count: int, row: Array, before: float, h: float) -> None:
+    """Move the nodes for h [s]; the one next to the frame keeps its momentum while its mass changes.
+
+    Args:
+        place: Of the nodes [m].
+        speed: Of the nodes [m/s].
+        count: Number of free nodes.
+        row: Of the chain table.
+        before: Unstrained length of the element at the frame before [m]; the row knows it as it is afterwards.
+        h: Time [s].
+    """
+    old, new = row[ELEMENT] + before, row[ELEMENT] + row[REST]
+    middle = 0.5 * (old + new)
+    for c in range(3):
+        for j in range(1, count):
+            place[c, j] += h * speed[c, j]
+        momentum = speed[c, count] * old
+        place[c, count] += h * momentum / middle
+        speed[c, count] = momentum / new
+
+
+@kernel
+def brake(speed: Array, count: int, row: Array, h: float) -> float:
+    """Slow the nodes down by the air for h [s]; returns the energy lost [J]."""
+    if row[AIR_RATE] == 0.0:
+        return 0.0
+    factor = math.exp(-row[AIR_RATE] * h)
+    before = kinetic(speed, count, row)
+    for c in range(3):
+        for j in range(1, count + 1):
+            speed[c, j] *= factor
+    return (1.0 - factor * factor) * before
+
+
+@kernel
+def kinetic(speed: Array, count: int, row: Array) -> float:
+    """Kinetic energy of the free nodes [J]."""
+    inner = 0.0
+    last = 0.0
+    for c in range(3):
+        for j in range(1, count):
+            inner += speed[c, j] * speed[c, j]
+        last += speed[c, count] * speed[c, count]
+    return 0.5 * row[DENSITY] * (row[ELEMENT] * inner + 0.5 * (row[ELEMENT] + row[REST]) * last)
+
+
+@kernel
+def kinetic_at_exit(speed: Array, count: int, row: Array) -> float:
+    """Kinetic energy of the half element that enters at the frame [J]."""
+    square = speed[0, count + 1] ** 2 + speed[1, count + 1] ** 2 + speed[2, count + 1] ** 2
+    return 0.25 * row[DENSITY] * row[REST] * square
+
+
+@kernel
+def potential(place: Array, count: int, row: Array) -> tuple[float, float]:
+    """Strain energy [J], and that of the height of the free nodes above the exit [J]."""
+    element, stiffness = row[ELEMENT], row[STIFFNESS]
+    stretch = 0.0
+    height = 0.0
+    for j in range(count):
+        more = max(distance_of(place, j) - element, 0.0)
+        stretch += more * more
+    for j in range(1, count):
+        height += place[2, j] - row[EXIT_Z]
+    last = row[REST] + row[BEHIND]
+    more = max(strain_at_exit(row, distance_of(place, count)), 0.0) * last
+    strain = 0.5 * stiffness * (stretch / element + more * more / last)
+    above = element * height + 0.5 * (element + row[REST]) * (place[2, count] - row[EXIT_Z])
+    return strain, row[DENSITY] * row[GRAVITY] * above
+
+
+@kernel
+def whole_force(place: Array, speed: Array, count: int, row: Array, pulls: Array) -> float:
+    """What the winch loses by letting out a length [N]: H = T + T^2/(2 EA) - w z, less what enters moves.
+
+    The energies of `kinetic` and `potential` change by -H times the rate.
+    """
+    distance = distance_of(place, count)
+    strain = max(strain_at_exit(row, distance), 0.0)
+    elastic = row[STIFFNESS] * strain
+    viscous = pulls[count] * distance - elastic
+    density = row[DENSITY]
+    square = 0.0
+    with_entering = 0.0
+    for c in range(3):
+        square += speed[c, count] * speed[c, count]
+        with_entering += speed[c, count] * (place[c, count] - place[c, count + 1])
+    with_entering *= row[RATE] / row[REST]
+    height = place[2, count] - row[EXIT_Z]
+    moving = 0.5 * density * (with_entering - 0.5 * square + row[GRAVITY] * height)
+    return elastic * (1.0 + 0.5 * strain) + viscous * distance / row[REST] - moving
+
+
+@kernel
+def tension_at_exit(place: Array, count: int, row: Array, pulls: Array) -> float:
+    """Tension where the chain leaves the frame [N]: of its element there and half of that one's weight."""
+    x = pulls[count] * (place[0, count + 1] - place[0, count])
+    y = pulls[count] * (place[1, count + 1] - place[1, count])
+    z = pulls[count] * (place[2, count + 1] - place[2, count]) + 0.5 * row[DENSITY] * row[GRAVITY] * row[REST]
+    return math.sqrt(x * x + y * y + z * z)
+
+
+@formula
+def mean_tension(pulls: Array, count: int, row: Array) -> float:
+    """Mean tension of the elements [N], by which a slack cable is known: waves alone leave it."""
+    total = 0.0
+    for j in range(count + 1):
+        total += pulls[j]
+    return total * row[ELEMENT] / (count + 1)
+
+
+@kernel
+def give_birth(place: Array, speed: Array, count: int, row: Array) -> None:
+    """Put a node on the element at the frame, one element from its end; count is then one more, rest less.
+
+    Tension, mass and momentum stay, the frame's half element included; without cable behind the exit place and speed
+    are linear along the element, and the center of mass stays too.
+    """
+    rest, rate = row[REST], row[RATE]
+    distance, left = distance_of(place, count), rest - row[ELEMENT]
+    share = 1.0 - row[ELEMENT] * (1.0 + strain_at_exit(row, distance)) / (distance + TINY)
+    share = min(max(share, 0.0), 1.0)
+    for c in range(3):
+        exit_place, exit_speed = place[c, count + 1], speed[c, count + 1]
+        born = exit_place + share * (place[c, count] - exit_place)
+        entering = rate * (born - exit_place) / left
+        place[c, count + 2], speed[c, count + 2] = exit_place, entering
+        place[c, count + 1] = born
+        speed[c, count + 1] = (left * (speed[c, count] - entering) + rest * exit_speed) / rest
+
+
+@kernel
+def merge(place: Array, speed: Array, count: int, row: Array) -> None:
+    """Join the element at the frame with its neighbor: the node between them goes; count is then one less, rest more.
+
+    Its momentum goes to the next, less what the frame's half element takes with it at the velocity of what enters.
+    """
+    element, rest, rate = row[ELEMENT], row[REST], row[RATE]
+    whole = element + rest
+    for c in range(3):
+        exit_place = place[c, count + 1]
+        entering = rate * (place[c, count - 1] - exit_place) / whole
+        # in halves of the density
+        momentum = rest * speed[c, count + 1] + whole * speed[c, count] + 2.0 * element * speed[c, count - 1]
+        speed[c, count - 1] = (momentum - whole * entering) / (element + whole)
+        place[c, count], speed[c, count] = exit_place, entering
+
+
+@kernel
+def blow(place: Array, speed: Array, count: int, row: Array, wind: Array, h: float) -> float:
+    """Change the nodes' velocities by a wind of h [s] across the cable; returns its work [J]."""
+    work = 0.0
+    for j in range(1, count + 1):
+        x = place[0, j + 1] - place[0, j - 1]
+        y = place[1, j + 1] - place[1, j - 1]
+        z = place[2, j + 1] - place[2, j - 1]
+        along = (wind[0] * x + wind[1] * y + wind[2] * z) / (x * x + y * y + z * z + TINY)
+        nx, ny, nz = wind[0] - along * x, wind[1] - along * y, wind[2] - along * z
+        length = row[ELEMENT] if j < count else 0.5 * (row[ELEMENT] + row[REST])
+        push = h * row[WIND] * math.sqrt(nx * nx + ny * ny + nz * nz)
+        share = push / row[DENSITY]
+        for_work = nx * (speed[0, j] + 0.5 * share * nx) + ny * (speed[1, j] + 0.5 * share * ny)
+        work += push * length * (for_work + nz * (speed[2, j] + 0.5 * share * nz))
+        speed[0, j] += share * nx
+        speed[1, j] += share * ny
+        speed[2, j] += share * nz
+    return work
