@@ -47,6 +47,12 @@ def test_how_fast(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
     assert "1.0 s: fails after 0.09 s by 226 N" in capsys.readouterr().out
 
 
+def test_few_cables(run: Run) -> None:
+    left = run("few_cables")["left"]
+    assert left["as it is"] == pytest.approx(0.289, abs=0.002)  # m
+    assert left["shaped"] == pytest.approx(0.012, abs=0.001)
+
+
 def test_control_loop(run: Run) -> None:
     names = run("control_loop")
     assert names["difference"] < 1e-12
