@@ -1,4 +1,4 @@
-"""A load on three ropes: where it hangs, how it swings, and lengths that bring it elsewhere and to rest."""
+"""A load on three ropes: how it swings, and lengths that leave it at rest."""
 
 import numpy as np
 
@@ -24,8 +24,9 @@ print(f"it swings at {swing.round(2)} Hz, massless cables")
 
 # a path whose x says how much of the change of lengths is done
 share = sl.quintic_path([(0, 0, 0), (1, 0, 0)], durations=0.8, rate=1000.0)
+ways = {"as it is": share, "shaped": sl.shaped(share, sl.ZV(swing))}
 left = {}
-for name, path in (("as it is", share), ("shaped", sl.shaped(share, sl.ZV(swing)))):
+for name, path in ways.items():
     lengths = first + path.pose.position[:, :1] * (last - first)
     run = sl.simulate(
         start.state,
@@ -33,6 +34,6 @@ for name, path in (("as it is", share), ("shaped", sl.shaped(share, sl.ZV(swing)
         duration=path.duration + 4.0,
     )
     after = run.time >= path.duration
-    away = np.linalg.norm(run.pose.position[after] - goal.pose.position, axis=1)
-    left[name] = away.max()
-    print(f"{name}: {path.duration:.2f} s, then {1e3 * away.max():.0f} mm to and fro")
+    away = run.pose.position[after] - goal.pose.position
+    left[name] = np.linalg.norm(away, axis=1).max()
+    print(f"{name}: {path.duration:.2f} s, then {1e3 * left[name]:.0f} mm off")

@@ -1,0 +1,93 @@
+"""What vibration each way of moving leaves, by simulation: for a test, the benchmark, and the page with the table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import sagline as sl
+
+WAYPOINTS = [(0.0, 0.0, 1.5), (3.0, 0.0, 1.5)]
+SECONDS, RATE = 2.0, 1000.0
+AFTER = 3.0  # s of vibration that are looked at
+HEAVY = 1.2
+
+
+class Scene(NamedTuple):
+    """A robot, a motion of it, and the frequencies that this excites most, massless."""
+
+    robot: sl.Robot
+    path: sl.Path
+    frequency: np.ndarray
+
+
+class Way(NamedTuple):
+    """A way of moving: its path, and whether the lengths are those of a platform at rest everywhere."""
+
+    path: Callable[[Scene], sl.Path]
+    static: bool
+
+
+@cache
+def scene() -> Scene:
+    robot = sl.load_robot("article-suspended")
+    path = sl.quintic_path(WAYPOINTS, durations=SECONDS, rate=RATE)
+    modes = sl.modes(sl.inverse(robot, path.pose[-1], tension=sl.MinimumNorm()).state)
+    return Scene(robot, path, sl.to_shape(modes, path))
+
+
+def _septic(_: Scene) -> sl.Path:
+    return sl.septic_path(WAYPOINTS, durations=SECONDS, rate=RATE)
+
+
+WAYS = {
+    "static lengths": Way(lambda s: s.path, True),
+    "static lengths, septic": Way(_septic, True),
+    "static lengths, ZV": Way(lambda s: sl.shaped(s.path, sl.ZV(s.frequency[0])), True),
+    "static lengths, ZVD": Way(lambda s: sl.shaped(s.path, sl.ZVD(s.frequency[0])), True),
+    "static lengths, EI": Way(lambda s: sl.shaped(s.path, sl.EI(s.frequency[0])), True),
+    "static lengths, ZV of both": Way(lambda s: sl.shaped(s.path, sl.ZV(s.frequency)), True),
+    "plan": Way(lambda s: s.path, False),
+    "plan, septic": Way(_septic, False),
+    "plan, ZVD": Way(lambda s: sl.shaped(s.path, sl.ZVD(s.frequency[0])), False),
+    "plan, ZV of both": Way(lambda s: sl.shaped(s.path, sl.ZV(s.frequency)), False),
+    "plan, fastest": Way(lambda s: sl.fastest(s.robot, s.path, jerk=100.0), False),
+    "plan, fastest, ZV of both": Way(
+        lambda s: sl.shaped(sl.fastest(s.robot, s.path, jerk=100.0), sl.ZV(s.frequency)), False
+    ),
+}
+
+
+@cache
+def planned(name: str) -> tuple[sl.Path, np.ndarray]:
+    """Path and lengths of a way of moving."""
+    way, given = WAYS[name], scene()
+    path = way.path(given)
+    plan = sl.inverse(given.robot, path.pose if way.static else path, tension=sl.MinimumNorm())
+    assert plan.feasible.all()
+    return path, plan.unstrained_length
+
+
+def residual(name: str, mass: float = 1.0, **options: Any) -> float:
+    """Largest distance from where the platform comes to rest, after the end of the motion [mm].
+
+    Args:
+        name: One of `WAYS`.
+        mass: Of the platform that moves, and its inertia, of those that were planned for; it starts from its own
+            equilibrium.
+        **options: Of `simulate`.
+    """
+    path, lengths = planned(name)
+    robot = scene().robot
+    moved = robot.replace(mass=mass * robot.mass, inertia=mass * robot.inertia)
+    start = sl.forward(moved, lengths[0], start=path.pose[0]).state
+    table = (path.time, lengths)
+    run = sl.simulate(start, unstrained_length=table, duration=path.duration + AFTER, record=0.002, **options)
+    after = run.pose.position[run.time >= path.duration]
+    goal = sl.forward(moved, lengths[-1], start=path.pose[-1]).pose.position
+    if options:  # cables with mass hang a little otherwise: about the middle of what is left
+        goal = 0.5 * (after.min(axis=0) + after.max(axis=0))
+    return float(1e3 * np.linalg.norm(after - goal, axis=1).max())

@@ -1,0 +1,47 @@
+"""What vibration each way of moving leaves: the table of docs/howto/without-vibration.md, by simulation."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.dynamics.residuals import HEAVY, WAYS, planned, residual, scene
+
+PAGE = Path(__file__).parents[2] / "docs" / "howto" / "without-vibration.md"
+
+
+def rows() -> dict[str, list[str]]:
+    """The page's table: its numbers as they stand there."""
+    found = re.findall(
+        r"^\| ((?:static|plan)[^|]*) \|((?: [0-9.]+ \|)+)$", PAGE.read_text(encoding="utf-8"), re.MULTILINE
+    )
+    return {name: cells.replace("|", " ").split() for name, cells in found}
+
+
+def test_the_page_has_every_way() -> None:
+    assert list(rows()) == list(WAYS)
+
+
+@pytest.mark.parametrize("name", WAYS)
+def test_the_page_tells_what_is_left(name: str) -> None:
+    seconds, left, heavier = rows()[name]
+    assert f"{planned(name)[0].duration:.2f}" == seconds
+    assert f"{residual(name):.2f}" == left
+    assert f"{residual(name, HEAVY):.2f}" == heavier
+
+
+def test_the_numbers_of_other_programs_are_met() -> None:
+    """Tagged reference: an independent Runge-Kutta integration of the same robot in numpy, exact catenaries, 2 ms."""
+    assert scene().frequency == pytest.approx([2.74601, 1.84399], abs=2e-5)
+    found = {name: residual(name) for name in list(WAYS)[:7]}
+    assert found["static lengths"] == pytest.approx(5.9538, abs=2e-3)
+    assert found["static lengths, ZV"] == pytest.approx(2.1310, abs=1e-3)
+    assert found["static lengths, ZVD"] == pytest.approx(1.0429, abs=1e-3)
+    assert found["static lengths, EI"] == pytest.approx(0.9206, abs=1e-3)
+    assert found["static lengths, ZV of both"] == pytest.approx(0.4100, abs=1e-3)
+    assert found["plan"] < 1e-3
+    assert residual("static lengths", HEAVY) == pytest.approx(10.425, abs=5e-3)
+    assert residual("plan", HEAVY) == pytest.approx(1.4160, abs=2e-3)
+    assert residual("plan, ZVD", HEAVY) == pytest.approx(0.1754, abs=1e-3)
