@@ -13,7 +13,7 @@ import numpy as np
 from rich.console import Console
 
 import sagline as sl
-from benchmarks import machine
+from benchmarks import dynamics, machine
 from benchmarks.formula import algebraic, as_printed
 from benchmarks.measure import (
     Row,
@@ -173,7 +173,14 @@ def main() -> None:
     console = Console()
     rows: list[Row] = [*two_threads()]
     one_core()
-    for part in (accuracy_of_cables, speed_of_cables, inverse_kinematics, whole_processes, *machine.PARTS):
+    for part in (
+        accuracy_of_cables,
+        speed_of_cables,
+        inverse_kinematics,
+        whole_processes,
+        *machine.PARTS,
+        *dynamics.PARTS,
+    ):
         Console(stderr=True).print(f"[dim]{part.__doc__}[/dim]")
         rows.extend(part())
     show("From a path to lengths", rows, console)

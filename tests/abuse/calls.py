@@ -263,6 +263,7 @@ def _planning(given: _Given) -> dict[str, Call]:
                 progress=("callback", lambda done, of: None, True),
             ),
         ),
+        "Vibration.to_shape": Call(sl.vibration(given.plan.state, up_to=6.0).to_shape, _all(path=("one", path))),
         "to_shape": Call(sl.to_shape, _all(modes=("one", modes), path=("one", path))),
     }
 

@@ -17,11 +17,12 @@ HEAVY = 1.2
 
 
 class Scene(NamedTuple):
-    """A robot, a motion of it, and the frequencies that this excites most, massless."""
+    """A robot, a motion of it, and the frequencies that this excites most: massless, and with cable mass."""
 
     robot: sl.Robot
     path: sl.Path
     frequency: np.ndarray
+    heavy_cables: np.ndarray
 
 
 class Way(NamedTuple):
@@ -35,8 +36,8 @@ class Way(NamedTuple):
 def scene() -> Scene:
     robot = sl.load_robot("article-suspended")
     path = sl.quintic_path(WAYPOINTS, durations=SECONDS, rate=RATE)
-    modes = sl.modes(sl.inverse(robot, path.pose[-1], tension=sl.MinimumNorm()).state)
-    return Scene(robot, path, sl.to_shape(modes, path))
+    goal = sl.inverse(robot, path.pose[-1], tension=sl.MinimumNorm()).state
+    return Scene(robot, path, sl.to_shape(sl.modes(goal), path), sl.vibration(goal, up_to=6.0).to_shape(path))
 
 
 def _septic(_: Scene) -> sl.Path:
@@ -54,6 +55,8 @@ WAYS = {
     "plan, septic": Way(_septic, False),
     "plan, ZVD": Way(lambda s: sl.shaped(s.path, sl.ZVD(s.frequency[0])), False),
     "plan, ZV of both": Way(lambda s: sl.shaped(s.path, sl.ZV(s.frequency)), False),
+    "plan, ZVD of both": Way(lambda s: sl.shaped(s.path, sl.ZVD(s.frequency)), False),
+    "plan, ZVD of both with cable mass": Way(lambda s: sl.shaped(s.path, sl.ZVD(s.heavy_cables)), False),
     "plan, fastest": Way(lambda s: sl.fastest(s.robot, s.path, jerk=100.0), False),
     "plan, fastest, ZV of both": Way(
         lambda s: sl.shaped(sl.fastest(s.robot, s.path, jerk=100.0), sl.ZV(s.frequency)), False
