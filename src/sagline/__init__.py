@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from sagline.dynamics.drives import SecondOrder
     from sagline.dynamics.events import Brake, Break, Drop, PickUp, Stall
     from sagline.dynamics.fastest import fastest
+    from sagline.dynamics.frequency_map import FrequencyMap, frequency_map
     from sagline.dynamics.frequency_slopes import FrequencySlopes, frequency_slopes
     from sagline.dynamics.linearized import Linearized, linearized
     from sagline.dynamics.response import FrequencyResponse, frequency_response
@@ -126,6 +127,7 @@ __all__ = [
     "ForwardSolver",
     "ForwardStatus",
     "ForwardStep",
+    "FrequencyMap",
     "FrequencyResponse",
     "FrequencySlopes",
     "Gap",
@@ -182,6 +184,7 @@ __all__ = [
     "equilibria",
     "fastest",
     "forward",
+    "frequency_map",
     "frequency_response",
     "frequency_slopes",
     "home",
@@ -250,6 +253,7 @@ _HOMES = {
     "ForwardSolver": "sagline.kinematics.forward_solver",
     "ForwardStatus": "sagline.kinematics.forward_status",
     "ForwardStep": "sagline.kinematics.forward_solver",
+    "FrequencyMap": "sagline.dynamics.frequency_map",
     "FrequencyResponse": "sagline.dynamics.response",
     "FrequencySlopes": "sagline.dynamics.frequency_slopes",
     "Gap": "sagline.kinematics.plan",
@@ -307,6 +311,7 @@ _HOMES = {
     "equilibria": "sagline.kinematics.equilibria",
     "fastest": "sagline.dynamics.fastest",
     "forward": "sagline.kinematics.forward",
+    "frequency_map": "sagline.dynamics.frequency_map",
     "frequency_response": "sagline.dynamics.response",
     "frequency_slopes": "sagline.dynamics.frequency_slopes",
     "home": "sagline.kinematics.home",

@@ -76,7 +76,7 @@ RESULTS = frozenset(
     {"CableFit", "CableState", "Confirmation", "EmpiricalFit", "Equilibria", "Equilibrium", "ForwardSolution"}
     | {"FrequencySlopes"}
     | {"EnergyBalance", "Imported", "Linearized", "Modes", "Occurrence", "Plan", "Simulation", "Stiffness"}
-    | {"FrequencyResponse", "TensionPolygon", "Vibration", "WinchRates"}
+    | {"FrequencyMap", "FrequencyResponse", "TensionPolygon", "Vibration", "WinchRates"}
 )
 # asked by sagline itself, with numbers of its own
 INTERNAL = frozenset({"TensionMethod.preference", "QuadraticProgram.preference"})
@@ -485,6 +485,17 @@ def _vibrations(given: _Given) -> dict[str, Call]:
         "linearized": Call(
             sl.linearized,
             _all(state=state, damping=("one", sl.Damping(modal_damping=0.01), True), inputs=("word", "speeds")),
+        ),
+        "frequency_map": Call(
+            sl.frequency_map,
+            _all(
+                robot=("one", given.robot),
+                poses=("one", given.poses),
+                up_to=("number", 4.75),
+                tension=("one", sl.MinimumNorm()),
+                damping=damping,
+                progress=("callback", lambda done, of: None, True),
+            ),
         ),
         "frequency_response": Call(
             sl.frequency_response, _all(state=state, frequency=("array", [0.5, 2.0]), damping=damping)

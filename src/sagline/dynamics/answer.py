@@ -14,8 +14,8 @@ from sagline.dynamics.damping import Damping
 from sagline.dynamics.reduced import Setting
 
 LOWEST: Final = 1.0  # Hz: modes up to there are taken at least
-BEYOND: Final = 1.5  # of the highest frequency: modes up to there are taken
-BLOCK: Final = 256  # frequencies at once
+BEYOND: Final = 1.6  # of the highest frequency: modes up to there are taken
+BLOCK: Final = 128  # frequencies at once
 
 
 class Answer(NamedTuple):
@@ -103,24 +103,19 @@ def _in_world(own: Complex, axes: Array) -> Complex:
 
 def _driven(motions: Motions, square: Complex, loss: complex) -> Complex:
     """What the motions add to the stiffness of the end that drives them, undamped but for all alike, (t, F, d, d)."""
-    drive = np.where(motions.kept[..., None], motions.drive, 0.0)
     with np.errstate(all="ignore"):
         shares = square[..., None] ** 2 / (loss * motions.square[:, None] - square[..., None])
-    return np.asarray(-np.einsum("tka,tfk,tkb->tfab", drive, shares, drive, optimize=True))
+    return np.asarray(-np.einsum("tka,tfk,tkb->tfab", motions.drive, shares, motions.drive, optimize=True))
 
 
 def _driven_with_stretch(
     motions: Motions, square: Complex, loss: complex, lost: Array, scaled: Complex
 ) -> tuple[Complex, Complex]:
     """The same with what is lost in stretch, by motions and end (t, d + k, d + k); and what is lost at rest alone."""
-    kept, d = motions.kept, motions.drive.shape[2]
-    on = np.where(kept, 1.0, 0.0)
-    drive, cross = motions.drive * on[..., None], lost[:, d:, :d] * on[..., None]
-    among = lost[:, d:, d:] * on[:, :, None] * on[:, None]
-    factor = scaled[None, :, None, None]
-    by_end = -square[..., None, None] * drive[:, None] + factor * cross[:, None]
-    own = factor * among[:, None]
-    index = np.arange(kept.shape[1])
+    d, factor = motions.drive.shape[2], scaled[None, :, None, None]
+    by_end = -square[..., None, None] * motions.drive[:, None] + factor * lost[:, None, d:, :d]
+    own = factor * lost[:, None, d:, d:]
+    index = np.arange(motions.square.shape[1])
     own[..., index, index] += loss * motions.square[:, None] - square[..., None]
     moved = np.linalg.solve(own, by_end)
     return -np.swapaxes(by_end, -1, -2) @ moved, factor * lost[:, None, :d, :d]

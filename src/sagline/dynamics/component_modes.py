@@ -1,8 +1,4 @@
-"""Modes of every cable with both ends held, and how its platform end drives them: what a robot's modes are made of.
-
-Modes above the cut are not dropped: what they answer to slow motions is kept in a few motions of each cable, which
-match the first moments of all of them together (Krylov).
-"""
+"""Modes of every cable with both ends held, and how its platform end drives them: what a robot's modes are made of."""
 
 from __future__ import annotations
 
@@ -16,22 +12,19 @@ from sagline.kernels.dynamics import string as columns
 from sagline.kernels.dynamics.spectral import interpolate, node_counts, spectral_matrices, stretch_matrices
 from sagline.statics.strings import Strings
 
-BEYOND = 1.15  # of the frequency asked for: modes below are kept as they are
-LEVELS = 2  # moments, in pairs, of those above
 _TINY = 1e-300
 
 
 class Components(NamedTuple):
-    """Motions of the taut cables of one state with both ends held, K_c together.
+    """Motions of the t taut cables of one state with both ends held, T together: those in the planes come first.
 
     Attributes:
-        square: Of their angular frequencies [1/s^2], shape (K_c,).
-        cable: Whose they are, shape (K_c,).
-        participation: P, by which an acceleration of the platform end drives them, world axes, shape (K_c, 3)
-            [sqrt(kg)].
+        square: Of their angular frequencies [1/s^2], shape (T,).
+        cable: Whose they are, shape (T,).
+        participation: P, by which an acceleration of the platform end drives them, world axes, shape (T, 3) [sqrt(kg)].
         still: M_0, mass of every cable as its platform end moves it at rest, world axes, shape (m, 3, 3) [kg].
-        plane: Of the motions in the cables' planes.
-        normal: Of those normal to them.
+        plane: The motions in the cables' planes, cable by cable.
+        normal: Those normal to them.
         mesh: Where they are known.
     """
 
@@ -68,25 +61,25 @@ class Mesh(NamedTuple):
 
 
 class Motions(NamedTuple):
-    """Motions of the taut cables in one plane; each times the roots of the nodes' masses.
+    """Motions of the taut cables in one plane, k of each.
+
+    Displacements of a cable's u unknowns are times the roots of their masses.
 
     Attributes:
         rest: Of the nodes with the platform end displaced at rest, shape (t, u, d).
-        square: Angular frequencies squared [1/s^2], shape (t, k).
-        kept: Which are among the components, shape (t, k).
+        square: Angular frequencies squared, ascending [1/s^2], shape (t, k).
         shape: Of the nodes, shape (t, u, k).
         drive: By the platform end, shape (t, k, d).
     """
 
     rest: Array
     square: Array
-    kept: Flags
     shape: Array
     drive: Array
 
 
 def component_modes(strings: Strings, row: int, up_to: float) -> Components:
-    """Motions of the cables of one state from which the robot's modes below a frequency are made.
+    """Motions of the cables of one state, right up to a frequency; those above complete what the cables can do.
 
     Args:
         strings: Of N states.
@@ -96,26 +89,25 @@ def component_modes(strings: Strings, row: int, up_to: float) -> Components:
     Returns:
         Components.
     """
-    omega = 2.0 * np.pi * BEYOND * up_to
+    omega = 2.0 * np.pi * up_to
     taut = np.flatnonzero(strings.taut[row])
     table, axes = np.ascontiguousarray(strings.table[row, taut]), strings.axes[row, taut]
     counts = np.empty(taut.size, dtype=np.int64)
     node_counts(table, omega, counts)
-    n = int(counts.max(initial=2))
-    points, carried, mass = np.empty((taut.size, n, 6)), np.empty((taut.size, n, 5)), np.empty((taut.size, 4))
-    plane, normal = np.empty((taut.size, 2 * n, 2 * n)), np.empty((taut.size, n, n))
+    t, n = taut.size, int(counts.max(initial=2))
+    points, carried, mass = np.empty((t, n, 6)), np.empty((t, n, 5)), np.empty((t, 4))
+    plane, normal = np.empty((t, 2 * n, 2 * n)), np.empty((t, n, n))
     spectral_matrices(table, omega, lobatto(), points, plane, normal, carried, mass)
-    free = np.arange(n) < counts[:, None] - 1  # the platform end is held
-    inside = _motions(plane, carried[:, :, :4].reshape(-1, 2 * n, 2), np.repeat(free, 2, axis=1), omega)
-    aside = _motions(normal, carried[:, :, 4:], free, omega)
-    owner, side = np.nonzero(inside.kept)[0], np.nonzero(aside.kept)[0]
-    drive = inside.drive[inside.kept]
-    swings = drive[:, :1] * axes[owner, 0] + drive[:, 1:] * axes[owner, 2]
-    sways = aside.drive[aside.kept] * axes[side, 1]
+    free = (np.arange(n) < counts[:, None] - 1)[..., None]  # the platform end is held
+    first = 0 if table[:, columns.BEHIND_X :].any() else 1  # and so is a frame end that does not give way
+    inside = _motions(plane, carried[:, :, :4].reshape(t, 2 * n, 2), np.repeat(free, 2, axis=1), 2 * first)
+    aside = _motions(normal, carried[:, :, 4:], free, first)
+    swings = inside.drive @ axes[:, ::2]
+    sways = aside.drive @ axes[:, 1:2]
     return Components(
-        np.concatenate((inside.square[inside.kept], aside.square[aside.kept])),
-        taut[np.concatenate((owner, side))],
-        np.concatenate((swings, sways)),
+        np.concatenate((inside.square.reshape(-1), aside.square.reshape(-1))),
+        np.concatenate((np.repeat(taut, inside.square.shape[1]), np.repeat(taut, aside.square.shape[1]))),
+        np.concatenate((swings.reshape(-1, 3), sways.reshape(-1, 3))),
         _still(mass, axes, taut, strings.taut.shape[1]),
         inside,
         aside,
@@ -123,28 +115,13 @@ def component_modes(strings: Strings, row: int, up_to: float) -> Components:
     )
 
 
-def _motions(matrix: Array, rest: Array, free: Flags, omega: float) -> Motions:
-    """Modes below a frequency, and the few motions that stand for those above."""
-    square, shape = np.linalg.eigh(matrix)
-    drive = np.swapaxes(shape, -1, -2) @ (rest * free[..., None])
-    low = square < omega * omega
-    reach = int(low.sum(axis=1).max(initial=0))  # ascending: the modes that are kept come first
-    above = np.where(low[..., None], 0.0, drive) / square[..., None]
-    chain = [above]
-    for _ in range(LEVELS - 1):
-        chain.append(chain[-1] / square[..., None])
-    scaled = [one / np.maximum(np.linalg.norm(one, axis=-2, keepdims=True), _TINY) for one in chain]
-    basis = np.linalg.qr(np.concatenate(scaled, axis=-1))[0]
-    slow, turn = np.linalg.eigh(np.swapaxes(basis, -1, -2) @ (square[..., None] * basis))
-    basis = basis @ turn
-    beyond = np.swapaxes(basis, -1, -2)
-    return Motions(
-        rest,
-        np.concatenate((square[:, :reach], slow), axis=1),
-        np.concatenate((low[:, :reach], np.ones(slow.shape, dtype=np.bool_)), axis=1),
-        np.concatenate((shape[:, :, :reach], shape @ basis), axis=-1),
-        np.concatenate((drive[:, :reach], beyond @ np.where(low[..., None], 0.0, drive)), axis=1),
-    )
+def _motions(matrix: Array, rest: Array, free: Flags, first: int) -> Motions:
+    """Of the unknowns from the first that moves to the last that does in any cable."""
+    last = matrix.shape[1] - (2 if rest.shape[2] == 2 else 1)
+    square, own = np.linalg.eigh(matrix[:, first:last, first:last])
+    shape = np.zeros((*matrix.shape[:2], last - first))
+    shape[:, first:last] = own
+    return Motions(rest, square, shape, np.swapaxes(own, -1, -2) @ (rest * free)[:, first:last])
 
 
 def _still(mass: Array, axes: Array, taut: Indices, count: int) -> Array:
@@ -162,21 +139,20 @@ def field(components: Components, ends: Array, amplitudes: Array) -> tuple[Array
     Args:
         components: Of the cables.
         ends: Displacements of all platform ends in K modes, world axes, shape (m, 3, K).
-        amplitudes: Of the components, shape (K_c, K).
+        amplitudes: Of the components, shape (T, K).
 
     Returns:
         Shapes (t, 2 nodes, K) and (t, nodes, K).
     """
     mesh = components.mesh
     own = mesh.axes @ ends[mesh.taut]
-    inside = int(components.plane.kept.sum())
+    inside = components.plane.square.size
     parts = []
     for motions, end, given in (
         (components.plane, own[:, ::2], amplitudes[:inside]),
         (components.normal, own[:, 1:2], amplitudes[inside:]),
     ):
-        spread = np.zeros((*motions.kept.shape, amplitudes.shape[1]))
-        spread[motions.kept] = given
+        spread = given.reshape(*motions.square.shape, ends.shape[2])
         parts.append(motions.rest @ end + motions.shape @ spread)
     return parts[0], parts[1]
 
@@ -194,20 +170,19 @@ def cable_shapes(components: Components, ends: Array, amplitudes: Array, count: 
         World axes, shape (K, m, count, 3); zero for cables that are not taut.
     """
     mesh = components.mesh
-    n, k = mesh.points.shape[1], ends.shape[2]
-    values = np.empty((mesh.taut.size, count, n))
+    t, n, k = mesh.taut.size, mesh.points.shape[1], ends.shape[2]
+    values = np.empty((t, count, n))
     interpolate(mesh.table, mesh.omega, lobatto(), mesh.points, values)
     plane, normal = field(components, ends, amplitudes)
-    inside = plane.reshape(mesh.taut.size, n, 2, k)  # there may be no mode
+    inside = plane.reshape(t, n, 2, k)
     behind = mesh.table[:, [columns.BEHIND_X, columns.BEHIND_Z]]
     slide = np.hypot(*behind.T)  # a frame end that gives way has one motion in the plane
-    direction = behind / np.maximum(slide, _TINY)[:, None]
-    inside[:, 0] = direction[:, :, None] * inside[:, 0, :1]
-    own = np.stack((inside[:, :, 0], normal, inside[:, :, 1]), axis=-2)
-    moved = (values @ own.reshape(mesh.taut.size, n, 3 * k)).reshape(mesh.taut.size, count, 3, k)
-    shapes = np.zeros((k, ends.shape[0], count, 3))
-    shapes[:, mesh.taut] = np.einsum("tij,tpik->ktpj", mesh.axes, moved, optimize=True)
-    return shapes
+    inside[:, 0] = (behind / np.maximum(slide, _TINY)[:, None])[:, :, None] * inside[:, 0, :1]
+    own = np.concatenate((inside, normal[:, :, None]), axis=2)
+    turned = np.swapaxes(mesh.axes[:, None, [0, 2, 1]], -1, -2) @ own
+    shapes = np.zeros((ends.shape[0], count, 3, k))
+    shapes[mesh.taut] = (values @ turned.reshape(t, n, 3 * k)).reshape(t, count, 3, k)
+    return np.moveaxis(shapes, -1, 0)
 
 
 def stretch(components: Components, ends: Array, amplitudes: Array) -> Array:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.arrays import Array, Flags
 from sagline.dynamics.component_modes import Components, component_modes
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.several import first_of
@@ -14,7 +14,10 @@ from sagline.statics.slopes import cable_slopes
 from sagline.statics.stiffness import mass_matrix
 from sagline.statics.strings import Strings, strings_of
 
+BEYOND = 1.15  # of the frequency asked for: the cables' modes up to there are unknowns
+LEVELS = 3  # pairs of moments of those above that are matched
 UNSTABLE = 1e-10  # of the largest: a stiffness that is less negative is rounding
+_TINY = 1e-300
 
 
 class Setting(NamedTuple):
@@ -39,16 +42,37 @@ class Reduced(NamedTuple):
     """The eigenproblem of one state.
 
     Attributes:
-        matrix: Symmetric, shape (n + K_c, n + K_c): first the platform, then the components of the cables [1/s^2].
+        matrix: Symmetric, shape (n + k, n + k): first the platform, then motions of the cables [1/s^2].
         platform: Its first unknowns to motions of the platform, shape (6, n).
-        driven: The same to what the components are driven by, shape (K_c, n).
+        driven: The same to what the motions are driven by, shape (k, n).
+        kept: Which components of the cables are motions by themselves, the first of the k, shape (T,).
+        beyond: The others by the last of the k, shape (T - those, b).
         components: Of the cables.
     """
 
     matrix: Array
     platform: Array
     driven: Array
+    kept: Flags
+    beyond: Array
     components: Components
+
+    def amplitudes(self, vectors: Array) -> Array:
+        """Amplitudes of the components beside their motion at rest.
+
+        Args:
+            vectors: Of the eigenproblem, shape (n + k, K).
+
+        Returns:
+            Shape (T, K).
+        """
+        n = self.platform.shape[1]
+        own = vectors[n:] - self.driven @ vectors[:n]
+        found = np.empty((self.kept.size, vectors.shape[1]))
+        count = len(own) - self.beyond.shape[1]
+        found[self.kept] = own[:count]
+        found[~self.kept] = self.beyond @ own[count:]
+        return found
 
 
 def setting_of(state: Equilibrium) -> Setting:
@@ -80,8 +104,9 @@ def setting_of(state: Equilibrium) -> Setting:
 def reduced(setting: Setting, row: int, up_to: float) -> Reduced:
     """The eigenproblem of one state for its modes below a frequency.
 
-    With the amplitudes z of the cables' modes counted from the frame, the mass is that of the platform, with what the
-    components leave of the cables' mass at rest, and one for each component.
+    The cables' modes a little above it are its unknowns; what those beyond answer to slow motions of the platform is
+    kept in a few motions of all together, which match the first moments (Krylov). With amplitudes counted from the
+    frame the mass is that of the platform, with what these leave of the cables' mass at rest, and one for each.
 
     Args:
         setting: Of N states.
@@ -91,21 +116,36 @@ def reduced(setting: Setting, row: int, up_to: float) -> Reduced:
     Returns:
         Reduced.
     """
-    components = component_modes(setting.strings, row, up_to)
+    components = component_modes(setting.strings, row, BEYOND * up_to)
     freedom, ends = setting.freedom, setting.ends[row]
-    drives = np.einsum("ka,kab->kb", components.participation, ends[components.cable]) @ freedom.T
+    drives = (components.participation[:, None] @ ends[components.cable])[:, 0] @ freedom.T
+    kept = components.square < (2.0 * np.pi * BEYOND * up_to) ** 2
+    beyond, slow = _slow_motions(components.square[~kept], drives[~kept])
+    square = np.concatenate((components.square[kept], slow))
+    drives = np.concatenate((drives[kept], beyond.T @ drives[~kept]))
     at_rest = freedom @ (setting.mass[row] + _on_platform(components.still, ends)) @ freedom.T
     upper = np.linalg.inv(np.linalg.cholesky(at_rest - drives.T @ drives)).T
     driven = drives @ upper
-    pulled = components.square[:, None] * driven
+    pulled = square[:, None] * driven
     n = len(freedom)
     matrix = np.zeros((n + len(driven), n + len(driven)))
     stiffness = freedom @ setting.stiffness[row] @ freedom.T
     matrix[:n, :n] = upper.T @ stiffness @ upper + driven.T @ pulled
     matrix[n:, :n] = -pulled
     matrix[:n, n:] = -pulled.T
-    np.fill_diagonal(matrix[n:, n:], components.square)
-    return Reduced(matrix, freedom.T @ upper, driven, components)
+    np.fill_diagonal(matrix[n:, n:], square)
+    return Reduced(matrix, freedom.T @ upper, driven, kept, beyond, components)
+
+
+def _slow_motions(square: Array, drives: Array) -> tuple[Array, Array]:
+    """Motions that stand for many: orthonormal columns of amplitudes, and their angular frequencies squared."""
+    chain = [drives / square[:, None]]
+    for _ in range(LEVELS - 1):
+        chain.append(chain[-1] / square[:, None])
+    scaled = np.concatenate([one / np.maximum(np.linalg.norm(one, axis=0), _TINY) for one in chain], axis=1)
+    basis = np.linalg.qr(scaled)[0]
+    slow, turn = np.linalg.eigh(basis.T @ (square[:, None] * basis))
+    return basis @ turn, slow
 
 
 def negative_directions(setting: Setting, row: int) -> Array:

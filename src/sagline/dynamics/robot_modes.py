@@ -23,7 +23,7 @@ class Found(NamedTuple):
     Attributes:
         frequency: [Hz], shape (K,).
         platform: Motion of the platform, shape (6, K).
-        amplitudes: Of the cables' components beside their motion at rest, shape (K_c, K).
+        amplitudes: Of the cables' components beside their motion at rest, shape (T, K).
         ends: Displacements of the platform ends, shape (m, 3, K).
         components: Of the cables.
         number: How many, by the exact count.
@@ -61,9 +61,8 @@ def modes_of(setting: Setting, row: int, up_to: float) -> Found:
     if not border[0] <= count <= border[1]:
         text = f"vibration up to {up_to:g} Hz: {border[0]} modes were found where the exact count has {count}"
         raise SaglineError(f"{text}. Ask for another up_to, and report the robot and its pose.")
-    n = problem.platform.shape[1]
-    platform = problem.platform @ vectors[:n, :count]
-    amplitudes = vectors[n:, :count] - problem.driven @ vectors[:n, :count]
+    platform = problem.platform @ vectors[: problem.platform.shape[1], :count]
+    amplitudes = problem.amplitudes(vectors[:, :count])
     return Found(frequency[:count], platform, amplitudes, setting.ends[row] @ platform, problem.components, count)
 
 
@@ -95,9 +94,11 @@ def cable_shares(setting: Setting, row: int, found: Found) -> Array:
         Shape (m, K).
     """
     parts, ends, own = found.components, found.ends, found.amplitudes
-    shares = np.einsum("mak,mab,mbk->mk", ends, parts.still, ends, optimize=True)
-    driven = np.einsum("ca,cak->ck", parts.participation, ends[parts.cable])
-    np.add.at(shares, parts.cable, own * (own + 2.0 * driven))
+    shares = (ends * (parts.still @ ends)).sum(axis=1)
+    driven = (parts.participation[:, None] @ ends[parts.cable])[:, 0]
+    energy, inside = own * (own + 2.0 * driven), parts.plane.square.size
+    for motions, part in ((parts.plane, energy[:inside]), (parts.normal, energy[inside:])):
+        shares[parts.mesh.taut] += part.reshape(*motions.square.shape, ends.shape[2]).sum(axis=1)
     return np.asarray(shares)
 
 

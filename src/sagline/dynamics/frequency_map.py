@@ -1,0 +1,201 @@
+"""How a robot vibrates over many poses: its lowest frequency and its strongest answer to a force."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from sagline.arguments import callback, instance, optional
+from sagline.arrays import Array, Codes, locked, number
+from sagline.blocks import Progress, blocks
+from sagline.dynamics.cable_dynamics import check_model
+from sagline.dynamics.damping import Damping
+from sagline.dynamics.reduced import Setting, negative_directions, setting_of
+from sagline.dynamics.robot_modes import Found, cable_shares, loss, modes_of
+from sagline.dynamics.vibration_status import VibrationStatus
+from sagline.errors import InvalidValueError, SaglineError
+from sagline.kinematics.inverse import inverse
+from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.statics.stiffness import modes, stiffness
+from sagline.tension.closest import Closest
+from sagline.tension.method import TensionMethod
+
+BLOCK: Final = 16  # poses at once: a twentieth of a second, after which an interrupt is heard
+_CLOSEST: Final = Closest()
+_DAMPING: Final = Damping(modal_damping=0.01)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrequencyMap:
+    """Result of `frequency_map` at N poses.
+
+    Numbers are NaN where the status is neither SOLVED nor FOLDED; frequencies also where no mode lies below up_to.
+
+    Attributes:
+        robot: The robot.
+        pose: The poses, a batch of N.
+        up_to: Frequency below which modes are found [Hz].
+        damping: What takes energy out.
+        status: Codes of `VibrationStatus`, shape (N,).
+        frequency: Lowest, with cable mass [Hz], shape (N,).
+        massless_frequency: Lowest of the platform on cables whose mass does not swing [Hz], shape (N,).
+        platform_share: Of the lowest mode with cable mass, shape (N,).
+        peak: Strongest answer below up_to: displacement of the center of mass for a force on it, in the direction that
+            it answers to most [m/N], shape (N,); infinite without damping.
+        peak_frequency: Where that is [Hz], shape (N,).
+    """
+
+    robot: Robot
+    pose: Pose
+    up_to: float
+    damping: Damping
+    status: Codes
+    frequency: Array
+    massless_frequency: Array
+    platform_share: Array
+    peak: Array
+    peak_frequency: Array
+
+    def save(self, file: FilePath | str) -> None:
+        """Write the map to a NetCDF file, whole or not at all, with units and the robot inside.
+
+        Args:
+            file: The file, "map.nc" for instance; one that exists is replaced.
+
+        Raises:
+            FileError: If the file cannot be written; what was there before is untouched.
+        """
+        from sagline.files.frequency_map_file import save_frequency_map  # the one call outward
+
+        save_frequency_map(self, file)
+
+
+def frequency_map(
+    robot: Robot,
+    poses: Pose,
+    *,
+    up_to: float,
+    tension: TensionMethod = _CLOSEST,
+    damping: Damping | None = None,
+    progress: Progress | None = None,
+) -> FrequencyMap:
+    """Lowest frequency and strongest answer of a robot at many poses, cables with mass.
+
+    Each pose as by `vibration`: all modes below up_to, their number proved by the exact count.
+
+    Args:
+        robot: The robot.
+        poses: A batch of N.
+        up_to: Frequency below which modes are wanted [Hz], > 0.
+        tension: How the load is shared among redundant cables, as in `inverse`.
+        damping: What takes energy out, for the strongest answer; None: a modal damping of 1 %.
+        progress: Called after every few poses: how many are done, of how many.
+
+    Returns:
+        FrequencyMap.
+
+    Raises:
+        InvalidValueError: If an argument is none of its kind, up_to is not positive, or too many modes lie below it.
+        SaglineError: If modes and count disagree; the message names the pose.
+
+    Examples:
+        >>> import numpy as np
+        >>> import sagline as sl
+        >>> poses = sl.Pose.from_euler([[0, 0, 2], [3, 2, 2]], 0, 0, 0)
+        >>> found = sl.frequency_map(sl.load_robot("cogiro"), poses, up_to=5.0)
+        >>> print(found.frequency.round(2), "Hz with cable mass")
+        [3.7  2.25] Hz with cable mass
+        >>> print(found.massless_frequency.round(2), "Hz massless")
+        [3.85 4.19] Hz massless
+
+    Source:
+        docs/model.md, section 11.
+    """
+    instance(robot, Robot, "robot")
+    if not instance(poses, Pose, "poses").shape:
+        raise InvalidValueError("poses", "a single pose", "a batch of them", "For one pose use vibration.")
+    limit = number(up_to, "up_to", "Hz", above=0.0)
+    known = optional(damping, Damping, "damping") or _DAMPING
+    told = callback(progress, "progress")
+    state = inverse(robot, poses, tension=tension).state
+    check_model(state)
+    status = np.full(len(poses), VibrationStatus.NO_LENGTHS, dtype=np.int8)
+    found = np.full((len(_Row._fields), len(poses)), np.nan)
+    for part in blocks(len(poses), BLOCK, told):
+        own = state[part]
+        setting, rest = setting_of(own), stiffness(own).compliance[:, :3, :3]
+        massless = modes(own).frequency[:, 0]
+        for k in range(len(own)):
+            index = part.start + k
+            status[index] = _status(setting, k)
+            if status[index] not in (VibrationStatus.SOLVED, VibrationStatus.FOLDED):
+                continue
+            try:
+                found[:, index] = _row(own, setting, k, limit, known, rest[k])
+            except SaglineError as error:
+                raise _at_pose(index, error) from None
+            found[1, index] = massless[k]
+    return FrequencyMap(robot, poses, limit, known, locked(status), *(locked(row) for row in found))
+
+
+class _Row(NamedTuple):
+    """Numbers of one pose, as in `FrequencyMap`."""
+
+    frequency: float
+    massless_frequency: float
+    platform_share: float
+    peak: float
+    peak_frequency: float
+
+
+def _status(setting: Setting, row: int) -> VibrationStatus:
+    if np.isnan(setting.stiffness[row]).any():
+        return VibrationStatus.NO_LENGTHS
+    if negative_directions(setting, row).shape[1]:
+        return VibrationStatus.UNSTABLE
+    return VibrationStatus.SOLVED if setting.strings.taut[row].all() else VibrationStatus.FOLDED
+
+
+def _row(state: Equilibrium, setting: Setting, row: int, up_to: float, damping: Damping, rest: Array) -> _Row:
+    found = modes_of(setting, row, up_to)
+    if not found.number:
+        return _Row(np.nan, np.nan, np.nan, float(np.linalg.norm(rest, 2)), 0.0)
+    first = found.platform[:, 0]
+    peak, at = _peak(found, _ratios(state, setting, row, found, damping), rest)
+    return _Row(float(found.frequency[0]), np.nan, float(first @ setting.mass[row] @ first), peak, at)
+
+
+def _ratios(state: Equilibrium, setting: Setting, row: int, found: Found, damping: Damping) -> Array:
+    shares = cable_shares(setting, row, found) if damping.air_damping > 0.0 else np.zeros((0, found.number))
+    density = state.one_robot.cables.linear_density[: len(shares)]
+    return loss(density, found, shares, damping)
+
+
+def _peak(found: Found, ratios: Array, rest: Array) -> tuple[float, float]:
+    """Largest displacement for a force [m/N], at rest or at a mode, and its frequency [Hz].
+
+    Modes beyond those found answer as at rest.
+    """
+    natural = 2.0 * np.pi * found.frequency
+    omega = np.concatenate(([0.0], natural))[:, None]
+    if not ratios.all():
+        return np.inf, float(found.frequency[0])
+    terms = 1.0 / (natural**2 - omega**2 + 2j * ratios * natural * omega) - 1.0 / natural**2
+    products = (found.platform[:3, None] * found.platform[None, :3]).reshape(9, -1)
+    answer = rest + (terms @ products.T).reshape(-1, 3, 3)
+    size = np.linalg.norm(answer, axis=(1, 2))
+    likely = np.flatnonzero(size >= size.max() / np.sqrt(3.0))  # its norm in one direction may be the largest
+    norms = np.linalg.norm(answer[likely], 2, axis=(1, 2))
+    best = int(np.argmax(norms))
+    return float(norms[best]), float(omega[likely[best], 0] / (2.0 * np.pi))
+
+
+def _at_pose(index: int, error: SaglineError) -> SaglineError:
+    if isinstance(error, InvalidValueError):
+        return InvalidValueError(f"pose {index}: {error.item}", error.value, error.allowed, error.next_step)
+    return SaglineError(f"pose {index}: {error}")

@@ -1,0 +1,84 @@
+"""Maps of frequencies: every pose as by itself, and what their files say."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+
+import sagline as sl
+from sagline.files.robot_file import parse_robot
+
+ROBOT = sl.load_robot("cogiro")
+POSES = sl.Pose.from_euler(
+    [[0, 0, 2], [3, 2, 2], [-4, 1, 1], [0, 0, 50], *np.random.default_rng(3).uniform([-3, -2, 1], [3, 2, 3], (16, 3))],
+    0, 0, 0,
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def found() -> sl.FrequencyMap:
+    told: list[tuple[int, int]] = []
+    made = sl.frequency_map(ROBOT, POSES, up_to=8.0, progress=lambda done, count: told.append((done, count)))
+    assert told == [(16, 20), (20, 20)]
+    return made
+
+
+def test_every_pose_is_as_by_itself(found: sl.FrequencyMap) -> None:
+    damping = sl.Damping(modal_damping=0.01)
+    for k in (0, 1, 2, 17):
+        state = sl.inverse(ROBOT, POSES[k]).state
+        alone = sl.vibration(state, up_to=8.0)
+        assert found.status[k] == sl.VibrationStatus.SOLVED
+        assert found.frequency[k] == pytest.approx(alone.frequency[0], rel=1e-9)
+        assert found.massless_frequency[k] == pytest.approx(alone.massless_frequency[0], rel=1e-9)
+        assert found.platform_share[k] == pytest.approx(alone.platform_share[0], abs=1e-7)
+        response = sl.frequency_response(state, np.linspace(0.5, 8.0, 4001), damping)
+        norms = np.linalg.norm(response.compliance[:, :3, :3], 2, axis=(1, 2))
+        assert found.peak[k] == pytest.approx(norms.max(), rel=0.03)  # losses of stiffness and of modes differ a little
+        assert found.peak_frequency[k] == pytest.approx(response.frequency[np.argmax(norms)], rel=0.02)
+
+
+def test_a_pose_without_an_answer_is_told(found: sl.FrequencyMap) -> None:
+    assert found.status[3] == sl.VibrationStatus.NO_LENGTHS
+    for name in ("frequency", "massless_frequency", "platform_share", "peak", "peak_frequency"):
+        assert np.flatnonzero(np.isnan(getattr(found, name))).tolist() == [3]
+
+
+def test_where_no_mode_is_low_enough_the_answer_at_rest_is_the_strongest() -> None:
+    few = sl.frequency_map(ROBOT, POSES[:1], up_to=0.5)
+    static = sl.stiffness(sl.inverse(ROBOT, POSES[0]).state).compliance[:3, :3]
+    assert np.isnan(few.frequency[0])
+    assert few.peak[0] == pytest.approx(np.linalg.norm(static, 2))
+    assert few.peak_frequency[0] == 0.0
+
+
+def test_undamped_peaks_have_no_top() -> None:
+    assert np.isinf(sl.frequency_map(ROBOT, POSES[:1], up_to=8.0, damping=sl.Damping()).peak[0])
+
+
+def test_its_file_has_units_and_the_robot(found: sl.FrequencyMap, tmp_path: Path) -> None:
+    found.save(tmp_path / "map.nc")
+    with xarray.open_dataset(tmp_path / "map.nc", engine="h5netcdf") as data:
+        assert data["frequency"].attrs["units"] == "Hz"
+        assert "with cable mass" in data["frequency"].attrs["long_name"]
+        assert "massless" in data["massless_frequency"].attrs["long_name"]
+        assert data["peak"].attrs["units"] == "m/N"
+        assert data["frequency"].values == pytest.approx(found.frequency, nan_ok=True)
+        assert data["position"].values == pytest.approx(POSES.position)
+        assert data["status"].values.tolist() == found.status.tolist()
+        assert data["status"].attrs["flag_meanings"] == "solved unstable no_lengths folded"
+        assert data.attrs["modal_damping"] == 0.01
+        assert parse_robot(str(data.attrs["robot"]), "robot").mass == ROBOT.mass
+
+
+def test_poses_are_a_batch() -> None:
+    with pytest.raises(sl.InvalidValueError, match="a batch"):
+        sl.frequency_map(ROBOT, POSES[0], up_to=8.0)
+
+
+def test_too_many_modes_name_the_pose() -> None:
+    with pytest.raises(sl.InvalidValueError, match="pose 0: up_to"):
+        sl.frequency_map(ROBOT, POSES[:2], up_to=900.0)
