@@ -11,6 +11,7 @@ from sagline.arrays import Array, locked
 from sagline.dynamics.course import Course
 from sagline.dynamics.events import KINDS, Brake, Break, Drop, Event, PickUp, Stall, cable_of
 from sagline.dynamics.plant import Plant, Records
+from sagline.dynamics.plant import NOTES, Plant, Records, grown
 from sagline.dynamics.simulation import EnergyBalance, Occurrence, Simulation
 from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics import motion as k
@@ -73,6 +74,15 @@ class Run:
             plant.kernel(*self._arguments, records.arrays, min(last - begin, BLOCK), self.every)
             if plant.counters[k.FAILED]:
                 raise plant.failure(self._time(int(plant.counters[k.STEPS])), self.step)
+        while True:
+            RUN(*self._arguments, records.arrays, min(last - int(plant.counters[k.STEPS]), BLOCK), self.every)
+            if plant.counters[k.FAILED]:
+                raise self._blown_up()
+            if plant.counters[k.STEPS] == last:
+                break
+            if plant.counters[k.NOTES] == NOTES:
+                self._note(records)
+                plant.counters[k.NOTES] = 0
         rows = slice(row, row + int(plant.counters[k.RECORDS]))
         kept = slice(0, rows.stop - rows.start)
         self._all.states[rows], self._all.energies[rows] = plant.seen(records.states[kept]), records.energies[kept]

@@ -45,7 +45,8 @@ DATA_ROWS = 12
 # what a run adds up, [J]
 SUPPLIED, LOST, ON_DRUMS, GIVEN_POWER, LOST_POWER = 0, 1, 2, 3, 4
 START, START_POTENTIAL, BEGIN = 5, 6, 7  # energy at the start, of which potential [J]; the time of step 0 [s]
-AUDIT_SIZE = 8
+MOVED = 8  # the most that has been in motion
+AUDIT_SIZE = 9
 
 BIN = 0.005  # m of cable on the drum that remember one tension
 

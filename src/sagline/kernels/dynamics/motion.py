@@ -401,7 +401,8 @@ def record(plant: Plant, records: Records) -> None:
         audit[d.START_POTENTIAL] = potential
     invented = kinetic + potential - audit[d.SUPPLIED] + audit[d.LOST] - audit[d.START]
     moved = kinetic + abs(potential - audit[d.START_POTENTIAL]) + abs(audit[d.SUPPLIED]) + abs(audit[d.LOST])
-    if not invented <= GROWN * moved + ROUNDING * size:
+    audit[d.MOVED] = max(audit[d.MOVED], moved)
+    if not invented <= GROWN * audit[d.MOVED] + ROUNDING * size:
         at[FAILED] = 1
         for i in range(rows.shape[1]):
             if drives.now[d.AT_FRAME, i] > drives.now[d.AT_FRAME, at[FAILED] - 1]:
@@ -447,7 +448,7 @@ def run(
         kept: What a run is in the midst of, in and out, and room for numbers.
         records: Filled: states with the angular velocity in the momentum's place, tensions at the frame ends, lengths,
             energies, notes.
-        steps: How many steps to take. With 0 the start alone is looked at.
+        steps: How many steps to take, fewer where there is no room for notes left. With 0 the start alone is looked at.
         every: After how many steps one is recorded, the start first; 0 for the last one.
     """
     integrator, kind, remembered, work, stride = rules
@@ -526,5 +527,7 @@ def run(
             record(plant, records)
             if at[FAILED] > 0:
                 break
+        if every > 0 and at[NOTES] == records[4].shape[0]:
+            break
     if every == 0 and steps > 0:
         record(plant, records)

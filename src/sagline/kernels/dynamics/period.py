@@ -6,7 +6,7 @@ import math
 
 from sagline.arrays import Array, Indices
 from sagline.kernels.cable.drum import turns_of_lengths
-from sagline.kernels.dynamics.motion import LENGTH_AT, RENEWED
+from sagline.kernels.dynamics.motion import LENGTH_AT, NOTES, RENEWED
 from sagline.kernels.jit import entry
 
 
@@ -40,7 +40,7 @@ def begin_period(
         value[0, i], value[1, i] = value[1, i], given[i]
         begins[0, i] = (value[1, i] - value[0, i]) / whole
         ends[0, i] = begins[0, i]
-    at[LENGTH_AT], at[RENEWED] = 0, 1
+    at[LENGTH_AT], at[RENEWED], at[NOTES] = 0, 1, 0
     return True
 
 

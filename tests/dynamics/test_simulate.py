@@ -1,0 +1,143 @@
+"""Motion in time against another integration, MuJoCo, balances of energy, and what was planned."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import mujoco
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.arrays import Array
+from tests.dynamics.let_go import LIFT, beside, integrated, lopsided
+
+Code = Literal["splitting", "runge-kutta"]
+BOTH: tuple[Code, ...] = ("splitting", "runge-kutta")
+SHIFT = np.array([0.004, -0.003, 0.0033])  # m; 6 mm
+
+
+def away_from(expected: Array, run: sl.Simulation) -> float:
+    """Largest distance of positions and of quaternions, m and about half a rad."""
+    same = np.sign(np.sum(expected[:, 3:] * run.pose.quaternion, axis=1))[:, None]
+    place = np.abs(run.pose.position - expected[:, :3]).max()
+    return float(max(place, np.abs(same * run.pose.quaternion - expected[:, 3:]).max()))
+
+
+@pytest.mark.parametrize(("integrator", "order"), [("splitting", 2), ("runge-kutta", 4)])
+def test_it_goes_where_another_integration_goes_with_the_order_of_the_method(integrator: Code, order: int) -> None:
+    robot, step = lopsided("article-suspended"), 0.008 if integrator == "runge-kutta" else 0.004
+    state, lengths = beside(robot, (0.5, 0.3, 1.5), 10.0 * SHIFT)
+    expected = integrated(robot, sl.Catenary(), state.pose, lengths, np.linspace(0.0, 0.64, 21))
+    errors = [
+        away_from(expected, sl.simulate(state, unstrained_length=lengths, duration=0.64, step=h, record=0.032,
+                                        integrator=integrator))
+        for h in (step, 0.5 * step, 0.25 * step)
+    ]  # fmt: skip
+    np.testing.assert_allclose(np.log2(np.divide(errors[:-1], errors[1:])), order, atol=0.15)
+    assert errors[-1] < (1e-4 if order == 2 else 1e-7)
+    assert np.abs(np.diff(expected[:, :3], axis=0)).max() > 1e-3  # it moves
+
+
+@pytest.mark.parametrize("integrator", BOTH)
+def test_elastic_cables_swing_as_tendons_of_mujoco(integrator: Code) -> None:
+    robot, step = sl.load_robot("article-suspended"), 1e-4
+    state, lengths = beside(robot, (0.5, 0.3, 1.5), SHIFT, sl.Elastic())
+    model = mujoco.MjModel.from_xml_string(sl.dump_mjcf(robot, state.pose, lengths))
+    model.opt.integrator, model.opt.timestep = mujoco.mjtIntegrator.mjINT_RK4, 5e-4
+    model.tendon_damping[:] = 0.0
+    model.dof_damping[:] = 0.0
+    data = mujoco.MjData(model)
+    for _ in range(2000):
+        mujoco.mj_step(model, data)
+    if integrator == "splitting":
+        step = 2e-5
+    run = sl.simulate(state, unstrained_length=lengths, duration=1.0, step=step, record=0.5, integrator=integrator)
+    assert np.abs(run.pose.position[-1] - data.qpos[:3]).max() < 1e-9
+    assert np.abs(run.pose.position[-1] - run.pose.position[0]).max() > 1e-3
+
+
+@pytest.mark.parametrize("integrator", BOTH)
+def test_a_robot_at_rest_stays_there(integrator: Code) -> None:
+    state = sl.inverse(
+        lopsided("article-suspended"), sl.Pose.from_euler([0.5, 0.3, 1.5], 0.1, 0, 0), tension=LIFT
+    ).state
+    run = sl.simulate(state, duration=10.0, integrator=integrator)
+    assert np.abs(run.pose.position - state.pose.position).max() < 2e-14
+    assert np.abs(run.twist).max() < 1e-12
+
+
+@pytest.mark.parametrize(("away", "least"), [(0.006, 40.0), (0.03, 10.0)])  # the latter slackens cables again and again
+@pytest.mark.parametrize(("integrator", "most"), [("splitting", 5e-5), ("runge-kutta", 1e-4)])
+def test_energy_has_no_trend_in_a_minute(integrator: Code, most: float, away: float, least: float) -> None:
+    state, lengths = beside(sl.load_robot("cogiro"), (0.0, 0.0, 2.0), np.array([away, 0.0, 0.0]))
+    run = sl.simulate(state, unstrained_length=lengths, duration=60.0, step=1e-3, integrator=integrator)
+    assert least < run.tensions.min() < 1.2 * least
+    assert np.ptp(run.tensions) > 1000.0
+    trend = np.polyfit(run.time / 60.0, run.energy.error / run.energy.kinetic.max(), 1)[0]
+    assert abs(trend) < most
+
+
+def test_the_work_of_moving_winches_is_that_of_h_and_not_of_the_tension() -> None:
+    robot = sl.load_robot("article-suspended")
+    path = sl.septic_path([(0, 0, 1), (0.3, 0.2, 2), (0, 0, 1)], durations=[1.0, 1.0], rate=1000.0)
+    run = sl.simulate(sl.inverse(robot, path, tension=LIFT), record=1e-3)
+    total = run.energy.kinetic + run.energy.potential
+    moved = np.ptp(total)
+    assert moved > 500.0
+    assert np.abs(run.energy.error).max() < 1e-6 * moved
+    wound, tension = np.diff(run.length, axis=0), 0.5 * (run.tensions[1:] + run.tensions[:-1])
+    whole = tension + 0.5 * tension**2 / robot.cables.axial_stiffness
+    by_tension, by_whole = (np.cumsum(-(pull * wound).sum(axis=1)) for pull in (tension, whole))
+    assert np.abs(total[1:] - total[0] - by_tension).max() > 1.0
+    assert np.abs(total[1:] - total[0] - by_whole).max() < 1e-3  # of the trapezoidal rule
+
+
+@pytest.mark.parametrize(
+    ("place", "goal", "static"), [((0, 0, 1.5), (3, 0, 1.5), 5.95), ((-1.5, 0, 1.5), (1.5, 0, 1.5), 2.82)]
+)
+def test_planned_lengths_leave_no_vibration_where_static_ones_do(place: Array, goal: Array, static: float) -> None:
+    robot = sl.load_robot("article-suspended")
+    path = sl.quintic_path([place, goal], durations=2.0, rate=1000.0)
+    run = sl.simulate(sl.inverse(robot, path, tension=LIFT), duration=6.0)
+    rest = sl.inverse(robot, path.pose, tension=LIFT)
+    plain = sl.simulate(rest.state[0], unstrained_length=(path.time, rest.unstrained_length), duration=6.0)
+    shaken, plainly = (
+        1e3 * np.linalg.norm(one.pose.position[one.time >= 2.0] - goal, axis=1).max() for one in (run, plain)
+    )
+    assert shaken < 1e-6
+    assert plainly == pytest.approx(static, abs=0.01)
+    planned = path.pose.position[:: round(0.01 / 0.001)]
+    assert np.abs(run.pose.position[: len(planned)] - planned).max() < 1e-9
+
+
+def test_over_pulleys_and_dead_cable_a_plan_is_followed_and_its_energy_kept() -> None:
+    robot = sl.load_robot("article-suspended").replace(winches=sl.Winch(0.05, dead_cable=3.0, dead_rise=2.5))
+    path = sl.septic_path([(0, 0, 1.5), (1, 0.5, 1.8)], durations=1.5, rate=1000.0)
+    plan = sl.inverse(robot, path, tension=LIFT)
+    run = sl.simulate(plan, duration=2.5)
+    planned = path.pose.position[::10]
+    assert np.abs(run.pose.position[: len(planned)] - planned).max() < 1e-8
+    assert np.abs(run.energy.error).max() < 1e-6 * np.ptp(run.energy.potential)
+    np.testing.assert_allclose(run.tensions[0], plan.state.cables.frame_end_tension[0], rtol=1e-9)
+
+
+FRAMES = {
+    "3T": [[3, 0, 3], [-2, 2, 3], [-2, -2, 3]],
+    "1R2T": [[-3, 0, 3], [3, 0, 3], [0.5, 0, 3]],
+    "2T": [[-3, 0, 3], [3, 0, 3]],
+}
+ENDS = {"3T": np.zeros((3, 3)), "1R2T": [[-0.2, 0, 0.1], [0.2, 0, 0.1], [0.0, 0.0, 0.1]], "2T": np.zeros((2, 3))}
+
+
+@pytest.mark.parametrize("pattern", ["3T", "1R2T", "2T"])
+def test_platforms_of_fewer_motions_keep_to_them(pattern: Literal["3T", "1R2T", "2T"]) -> None:
+    normal, rope = None if pattern == "3T" else (0.0, 1.0, 0.0), sl.Cable(0.05, 5e4)
+    few = {"inertia": np.diag([0.3, 0.2, 0.3]), "motion_pattern": pattern, "plane_normal": normal}
+    robot = sl.Robot("few", FRAMES[pattern], ENDS[pattern], rope, 10.0, **few)  # type: ignore[arg-type]
+    state = sl.inverse(robot, sl.Pose.from_euler([0.3, 0.0, 1.0], 0, 0, 0)).state
+    run = sl.simulate(state, wrench=np.array([3.0, 4.0, -5.0, 1.0, 0.5, 2.0]), duration=1.0)
+    free = robot.freedom
+    assert np.abs(run.twist - run.twist @ free.T @ free).max() < 1e-12
+    assert np.abs(run.twist @ free.T).max(axis=0).min() > 1e-3
+    assert np.abs(run.energy.error).max() < 1e-6
