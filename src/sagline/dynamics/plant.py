@@ -62,6 +62,8 @@ class Plant:
         robot: The robot as it was at the start.
         model: Cable model.
         axes: Principal axes in the platform frame, one a column, (3, 3).
+        turn: Quaternion from principal axes to the platform frame, (4,).
+        turn_back: The reverse, (4,).
         inertia: Mass and principal moments, (4,).
         cables: Indices of the cables that are there, (m,).
         state: As in `sagline.kernels.dynamics.rigid_body`, (13,).
@@ -92,6 +94,8 @@ class Plant:
         m = robot.cable_count
         self.robot, self.model, self.data = robot, model, data
         moments, self.axes = principal_axes(robot, pose)
+        self.turn = Rotation.from_matrix(self.axes).as_quat()
+        self.turn_back = locked(self.turn * [-1.0, -1.0, -1.0, 1.0])
         self.inertia = np.array([robot.mass, *moments])
         self.cables: Indices = np.arange(m)
         self._table = cable_table(robot)[0].copy()
@@ -154,6 +158,11 @@ class Plant:
         self.layers = np.delete(self.layers, place, axis=0)
         self.rows, self.now, self.data = (np.delete(array, place, axis=1) for array in (self.rows, self.now, self.data))
 
+    def hold(self, places: Any) -> None:
+        """Lock winches, by their places among the cables that are there; what moves of them is lost at once."""
+        self.now[d.HELD, places] = 1.0
+        self.now[d.RATE, places] = 0.0
+
     def with_mass(self, mass: float, *, at_rest: bool) -> None:
         """Change the mass [kg] and the inertia with it; what is taken up at rest shares the momentum there is."""
         factor = mass / self.inertia[0]
@@ -168,7 +177,7 @@ class Plant:
         lever = turned @ self.robot.center_of_mass
         state = np.empty(body.STATE_COLUMNS)
         state[body.CENTER : body.TURN] = pose.position + lever
-        state[body.TURN : body.VELOCITY] = (pose.rotation * Rotation.from_matrix(self.axes)).as_quat()
+        state[body.TURN : body.VELOCITY] = (pose.rotation * Rotation.from_quat(self.turn)).as_quat()
         state[body.VELOCITY : body.MOMENTUM] = twist[:3] + np.cross(twist[3:], lever)
         axes = turned @ self.axes
         moments = np.where(np.isinf(self.inertia[1:]), 0.0, self.inertia[1:])
@@ -177,7 +186,7 @@ class Plant:
 
     def poses(self, states: Array) -> Pose:
         """Poses of the platform frame at recorded states (N, 13)."""
-        turned = Rotation.from_quat(states[:, body.TURN : body.VELOCITY]) * Rotation.from_matrix(self.axes.T)
+        turned = Rotation.from_quat(states[:, body.TURN : body.VELOCITY]) * Rotation.from_quat(self.turn_back)
         position = states[:, body.CENTER : body.TURN] - turned.as_matrix() @ self.robot.center_of_mass
         return Pose.from_quaternion(position, turned.as_quat())
 

@@ -142,7 +142,7 @@ class Run:
             plant.without(event.cable)
             self._courses = (lengths.part(kept), wrenches, winds)
         elif isinstance(event, Stall):
-            plant.now[d.HELD, plant.cables == event.winch] = 1.0
+            plant.hold(plant.cables == event.winch)
         elif isinstance(event, Brake):
             columns = np.arange(len(plant.cables))
             if event.winch is not None:

@@ -7,7 +7,6 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
 from sagline.arguments import brief, choice, instance, integer, whole_number
 from sagline.arrays import Array, checked, locked, number
@@ -137,8 +136,7 @@ class Simulator:
         stretch = 1.0 + plant.data[d.WINDING_STRAIN]
         places = (plant.now[d.WOUND], np.ones(m)) if kind == d.DRUMS else (plant.rows[LENGTH], stretch)
         self._encoders = Encoders(given.robot, *places) if Encoders.are_on(given.robot) else None
-        turn = Rotation.from_matrix(plant.axes).inv().as_quat()
-        frame = (locked(given.robot.center_of_mass @ plant.axes), locked(turn.copy()))
+        frame = (locked(given.robot.center_of_mass @ plant.axes), plant.turn_back)
         self._platform = np.empty(body.STATE_COLUMNS)
         self._seen: tuple[Any, ...] = (plant.state, locked(plant.inertia.view()), *frame, self._platform)
         self._look: Any = machine_code(body.platform_of, self._seen)
@@ -242,7 +240,7 @@ class Simulator:
         Raises:
             InvalidValueError: If there is no such winch.
         """
-        self._plant.now[d.HELD, self._chosen(winches)] = 1.0
+        self._plant.hold(self._chosen(winches))
 
     def release(self, *winches: int) -> None:
         """Let drums go that were locked.

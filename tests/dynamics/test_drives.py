@@ -1,0 +1,109 @@
+"""Winches in time: lags, loops, limits, stiction, and the energy of what lies on the drums."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.dynamics.simulate import Winding
+from tests.dynamics.let_go import LIFT
+from tests.dynamics.machines import prototype
+
+
+def lift(robot: sl.Robot, duration: float, height: float = 0.4) -> sl.Plan:
+    path = sl.septic_path([(0, 0, 0.8), (0.2, 0.1, 0.8 + height)], durations=duration, rate=500.0)
+    return sl.inverse(robot, path, tension=LIFT)
+
+
+def test_a_lagging_winch_is_late_by_twice_its_damping_ratio_over_its_frequency() -> None:
+    state = lift(sl.load_robot("article-prototype"), 1.0).state[0]
+    rate, times = np.linspace(-0.02, 0.02, 8), np.array([0.0, 4.0])
+    lengths = state.unstrained_length + np.outer(times, rate)
+    run = sl.simulate(state, unstrained_length=(times, lengths), winches=sl.SecondOrder(3.0, 0.6))
+    late = state.unstrained_length + 3.5 * rate - run.length[350]
+    np.testing.assert_allclose(late, rate * 2.0 * 0.6 / (2.0 * np.pi * 3.0), rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("integrator", ["splitting", "runge-kutta"])
+def test_a_lagging_winch_answers_a_step_as_its_transfer_function_says(
+    integrator: sl.dynamics.simulate.Integrator,
+) -> None:
+    state = lift(sl.load_robot("article-prototype"), 1.0).state[0]
+    target = state.unstrained_length + 1e-3
+    winches = sl.SecondOrder(2.0, 0.4)
+    run = sl.simulate(state, unstrained_length=target, winches=winches, duration=1.0, integrator=integrator)
+    omega, ratio = 4.0 * np.pi, 0.4
+    fast = omega * np.sqrt(1.0 - ratio**2)
+    t = run.time
+    left = np.exp(-ratio * omega * t) * (np.cos(fast * t) + ratio * omega / fast * np.sin(fast * t))
+    np.testing.assert_allclose(target[0] - run.length[:, 0], 1e-3 * left, atol=1e-7)
+
+
+def test_a_slow_plan_is_followed_within_its_limits_and_ends_where_it_should() -> None:
+    plan = lift(prototype(), 6.0)
+    run = sl.simulate(plan, winches="robot", duration=10.0)
+    assert run.events == ()
+    assert np.abs(run.length[-1] - plan.unstrained_length[-1]).max() < 2e-5
+    at_samples = run.length[:601:1]
+    assert np.abs(at_samples - plan.unstrained_length[::5][: len(at_samples)]).max() < 2e-3
+    assert np.abs(run.energy.error).max() < 1e-4 * np.abs(run.energy.supplied).max()
+
+
+def test_a_plan_beyond_the_limits_runs_and_tells_which_winch_saturates_and_when() -> None:
+    plan = lift(prototype(speed_limit=60.0), 1.0)
+    rates = sl.winch_rates(plan)
+    assert rates.too_fast is not None
+    assert plan.path is not None
+    too_fast = np.flatnonzero(rates.too_fast.any(axis=0))
+    assert too_fast.size > 0
+    run = sl.simulate(plan, winches="robot", duration=3.0)
+    told = {event.cable: event.time for event in reversed(run.events) if event.kind == "saturate"}
+    assert set(too_fast) <= set(told)
+    for winch in too_fast.tolist():
+        first = plan.path.time[np.argmax(rates.too_fast[:, winch])]
+        assert told[winch] == pytest.approx(first, abs=0.05)
+
+
+def test_friction_holds_a_drum_that_nothing_but_little_moves() -> None:
+    robot = prototype(position_gain=0.0, speed_gain=0.0, integral_gain=0.0)
+    state = lift(robot, 1.0).state[0]
+    small, large = np.array([0, 0, 20.0, 0, 0, 0]), np.array([0, 0, 300.0, 0, 0, 0])
+    held, moved = (sl.simulate(state, wrench=push, winches="robot", duration=1.0) for push in (small, large))
+    assert np.ptp(held.length) == pytest.approx(np.ptp(state.unstrained_length), abs=0)
+    assert np.abs(np.diff(held.length, axis=0)).max() == 0.0
+    assert np.abs(moved.length[-1] - moved.length[0]).max() > 1e-3
+    assert moved.energy.lost[-1] > 0.0
+
+
+@pytest.mark.parametrize("winding", ["constant", "remembered"])
+def test_what_winches_do_is_where_the_energy_is(winding: Winding) -> None:
+    plan = lift(prototype(winding_tension=100.0), 3.0)
+    coarse, fine = (
+        np.abs(sl.simulate(plan, winches="robot", winding=winding, step=step, duration=4.0).energy.error).max()
+        for step in (1e-3, 2.5e-4)
+    )
+    run = sl.simulate(plan, winches="robot", winding=winding, duration=4.0)
+    assert run.energy.supplied[-1] > 100.0
+    assert coarse < 2e-5 * run.energy.supplied[-1]
+    assert fine < 0.3 * coarse
+
+
+def test_a_drum_that_remembers_gives_back_the_cable_that_it_took() -> None:
+    path = sl.septic_path([(0, 0, 0.8), (0.2, 0.1, 1.3), (0, 0, 0.8)], durations=[4.0, 4.0], rate=500.0)
+    robot = prototype(friction=0.0)
+    plan = sl.inverse(robot, path, tension=LIFT)
+    run = sl.simulate(plan, winches="robot", winding="remembered", duration=10.0)
+    middle = np.abs(run.length[400] - plan.unstrained_length[2000]).max()
+    assert middle > 1e-3  # wound under tension, less unstrained cable lies on the drum than a constant 0 N would have
+    assert np.abs(run.length[-1] - plan.unstrained_length[-1]).max() < 0.05 * middle
+    assert run.energy.lost[-1] >= 0.0
+
+
+def test_gains_that_a_millisecond_cannot_close_are_refused() -> None:
+    with pytest.raises(sl.InvalidValueError, match=r"winches: speed_gain\[0\] is 50000 N s/m; allowed: < 2.* N s/m"):
+        sl.simulate(lift(prototype(speed_gain=5e4), 1.0), winches="robot")
+    with pytest.raises(sl.InvalidValueError, match="integrator is"):
+        sl.simulate(lift(prototype(), 1.0), winches="robot", integrator="runge-kutta")
+    with pytest.raises(sl.InvalidValueError, match=r"step is 0\.0003 s; allowed: a whole part of 0\.001 s"):
+        sl.simulate(lift(prototype(), 1.0), winches="robot", step=3e-4)

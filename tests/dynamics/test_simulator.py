@@ -1,0 +1,120 @@
+"""The machine behind a controller: the same bits as `simulate`, nothing allocated, sensors."""
+
+from __future__ import annotations
+
+import tracemalloc
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from tests.dynamics.machines import prototype
+
+PLACE = sl.Pose.from_euler([0.1, 0.05, 1.0], 0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("winches", ["ideal", "robot", sl.SecondOrder(10.0)])
+@pytest.mark.parametrize("pulleys", [False, True])
+def test_it_goes_where_simulate_goes_to_the_last_bit(winches: sl.SecondOrder, pulleys: bool) -> None:
+    robot = prototype(pulley_radius=0.03, dead_cable=1.0) if pulleys else prototype()
+    state, damping = sl.inverse(robot, PLACE).state, sl.Damping(1e-3, 0.1)
+    machine = sl.Simulator(robot, state, winches=winches, damping=damping)
+    rows, times, generator = [state.unstrained_length], [0.0], np.random.default_rng(1)
+    seen = []
+    for _ in range(40):
+        rows.append(state.unstrained_length + generator.uniform(-0.002, 0.002, 8))
+        reading = machine.step(rows[-1], 0.01)
+        times.append(machine.time)
+        seen.append(np.concatenate((reading.twist, reading.tension, reading.length)))
+    table = (times, np.array(rows))
+    run = sl.simulate(state, unstrained_length=table, winches=winches, damping=damping, record=0.01)
+    expected = np.hstack((run.twist, run.tensions, run.length))[1:]
+    np.testing.assert_array_equal(np.array(seen), expected)
+    assert np.abs(reading.position - run.pose.position[-1]).max() < 1e-15
+    assert np.abs(reading.quaternion - run.pose.quaternion[-1]).max() < 1e-15
+    assert np.ptp(run.pose.position, axis=0).max() > 1e-4
+
+
+def test_steps_allocate_nothing() -> None:
+    robot = prototype()
+    machine = sl.Simulator(robot, PLACE)
+    lengths, wrench = machine.reading.length.copy(), np.zeros(6)
+    for _ in range(3):
+        machine.step(lengths, 0.001, wrench=wrench)
+    tracemalloc.start()
+    before = tracemalloc.get_traced_memory()[0]
+    for _ in range(200):
+        machine.step(lengths, 0.001, wrench=wrench)
+    after = tracemalloc.get_traced_memory()[0]
+    tracemalloc.stop()
+    assert after - before < 2000
+
+
+def test_at_rest_sensors_read_what_there_is() -> None:
+    robot = prototype()
+    state = sl.inverse(robot, PLACE).state
+    machine = sl.Simulator(robot, state, seed=4)
+    readings = np.array([machine.step(state.unstrained_length, 0.001).load_cell.copy() for _ in range(2000)])
+    expected = 1.01 * state.cables.frame_end_tension + 2.0
+    assert np.abs(readings.mean(axis=0) - expected).max() < 4.0 / np.sqrt(2000)
+    np.testing.assert_allclose(readings.std(axis=0), 1.0, atol=0.08)
+    np.testing.assert_array_equal(machine.reading.counts, sl.encoder_counts(sl.inverse(robot, PLACE)))
+    assert np.abs(machine.reading.position - PLACE.position).max() < 1e-14
+
+
+def test_one_seed_has_one_noise_and_another_another() -> None:
+    robot, short = prototype(), prototype(load_cell_range=125.0)
+    length = sl.inverse(robot, PLACE).unstrained_length
+    first, same, other = (sl.Simulator(robot, PLACE, seed=seed).step(length, 0.01).load_cell for seed in (1, 1, 2))
+    np.testing.assert_array_equal(first, same)
+    assert (first != other).all()
+    cut = sl.Simulator(short, PLACE, seed=1).step(length, 0.01).load_cell
+    np.testing.assert_array_equal(cut, np.minimum(first, 125.0))
+    assert 0 < np.count_nonzero(cut == 125.0) < 8
+
+
+def test_a_filter_follows_with_its_time_constant() -> None:
+    robot = prototype(load_cell_deviation=0.0, load_cell_bias=0.0, load_cell_gain=1.0, friction=500.0)
+    machine, plain = (sl.Simulator(robot, PLACE, load_cell_filter=lag) for lag in (0.5, 0.0))
+    length, push = machine.reading.length.copy(), np.array([0, 0, -30.0, 0, 0, 0])
+    filtered = machine.reading.load_cell.copy()
+    for _ in range(700):
+        true = plain.step(length, 0.001, wrench=push).load_cell
+        filtered += 0.001 / (0.5 + 0.001) * (true - filtered)
+        np.testing.assert_allclose(machine.step(length, 0.001, wrench=push).load_cell, filtered, rtol=1e-12)
+
+
+def test_held_drums_stand_until_they_are_released() -> None:
+    robot = prototype()
+    machine = sl.Simulator(robot, PLACE)
+    length = machine.reading.length.copy()
+    machine.hold(2, 5)
+    held = machine.step(length + 0.01, 0.2).length.copy()
+    assert (held[[2, 5]] == length[[2, 5]]).all()
+    assert (np.delete(held - length, [2, 5]) > 5e-3).all()
+    machine.release()
+    assert (machine.step(length + 0.01, 0.5).length[[2, 5]] > length[[2, 5]] + 5e-3).all()
+    with pytest.raises(sl.InvalidValueError, match="winches is 8; allowed: 0 to 7"):
+        machine.hold(8)
+
+
+def test_another_machine_than_the_planned_one_does_not_rest_there() -> None:
+    robot = prototype()
+    state = sl.inverse(robot, PLACE).state
+    machine = sl.Simulator(robot.replace(mass=1.1 * robot.mass), state)
+    for _ in range(300):
+        reading = machine.step(state.unstrained_length, 0.01)
+    assert reading.position[2] < PLACE.position[2] - 1e-3
+
+
+def test_what_a_period_cannot_be_is_refused() -> None:
+    machine = sl.Simulator(prototype(), PLACE)
+    length = machine.reading.length.copy()
+    for dt in (0.0015, 0.0, -1.0):
+        with pytest.raises(sl.InvalidValueError, match="dt is"):
+            machine.step(length, dt)
+    with pytest.raises(sl.InvalidValueError, match=r"unstrained_length\[3\] is nan"):
+        machine.step(np.where(np.arange(8) == 3, np.nan, length), 0.01)
+    assert machine.time == 0.0
+    with pytest.raises(sl.InvalidValueError, match="start is of 8 cables"):
+        sl.Simulator(sl.without_cables(prototype(), 3), sl.inverse(prototype(), PLACE).state)
