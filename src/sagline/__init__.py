@@ -71,6 +71,7 @@ if TYPE_CHECKING:
     from sagline.robot.pose_box import PoseBox
     from sagline.robot.robot import Robot
     from sagline.robot.winch import Winch
+    from sagline.robot.winch_drives import WinchDrive, winch_drive, winch_drive_names
     from sagline.statics.balance import ArticleBalance, article_balance, structure_matrix
     from sagline.statics.stiffness import Modes, Stiffness, modes, stiffness
     from sagline.statics.wrench import inertial_wrench
@@ -171,6 +172,7 @@ __all__ = [
     "Vibration",
     "VibrationStatus",
     "Winch",
+    "WinchDrive",
     "WinchRates",
     "__version__",
     "article_balance",
@@ -217,6 +219,8 @@ __all__ = [
     "to_shape",
     "unresisted_motion",
     "vibration",
+    "winch_drive",
+    "winch_drive_names",
     "winch_rates",
     "without_cables",
 ]
@@ -297,6 +301,7 @@ _HOMES = {
     "Vibration": "sagline.dynamics.vibration",
     "VibrationStatus": "sagline.dynamics.vibration_status",
     "Winch": "sagline.robot.winch",
+    "WinchDrive": "sagline.robot.winch_drives",
     "WinchRates": "sagline.kinematics.winch_rates",
     "ZV": "sagline.dynamics.shapers",
     "ZVD": "sagline.dynamics.shapers",
@@ -344,6 +349,8 @@ _HOMES = {
     "to_shape": "sagline.dynamics.to_shape",
     "unresisted_motion": "sagline.tension.singular",
     "vibration": "sagline.dynamics.vibrating",
+    "winch_drive": "sagline.robot.winch_drives",
+    "winch_drive_names": "sagline.robot.winch_drives",
     "winch_rates": "sagline.kinematics.winch_rates",
     "without_cables": "sagline.tension.broken",
 }

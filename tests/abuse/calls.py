@@ -74,7 +74,7 @@ def _of_class(name: str, kind: type) -> set[str]:
 # made by sagline
 RESULTS = frozenset(
     {"CableFit", "CableState", "Confirmation", "EmpiricalFit", "Equilibria", "Equilibrium", "ForwardSolution"}
-    | {"FrequencySlopes"}
+    | {"FrequencySlopes", "WinchDrive"}
     | {"EnergyBalance", "Imported", "Linearized", "Modes", "Occurrence", "Plan", "Simulation", "Stiffness"}
     | {"FrequencyMap", "FrequencyResponse", "TensionPolygon", "Vibration", "WinchRates"}
 )
@@ -200,6 +200,15 @@ def _robots(given: _Given) -> dict[str, Call]:
     return {
         "Winch": Call(sl.Winch, _all(**wound)),
         "Winch.replace": Call(winch.replace, _all(**{name: wound[name] for name in ("gear", "drum_radius")})),
+        "winch_drive": Call(sl.winch_drive, _all(name=("word", "yaskawa-sgmsh-10aa"))),
+        "WinchDrive.winch": Call(
+            sl.winch_drive("yaskawa-sgmsh-10aa").winch,
+            _all(
+                drum_radius=("number", 0.0625),
+                drum_inertia=("number", 0.125),
+                position_gain=("array", [8.0, 9.0], True),
+            ),
+        ),
         "Winch.per_cable": Call(sl.Winch(0.05).per_cable, _all(count=("whole", 3))),
         "Robot": Call(sl.Robot, _all(**fields)),
         "Robot.replace": Call(robot.replace, _all(**{name: fields[name] for name in ("mass", "tension_min", "name")})),

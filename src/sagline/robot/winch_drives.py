@@ -1,0 +1,188 @@
+"""Drives of winches, motor and gear, from the data sheets of their makers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi
+from types import MappingProxyType
+from typing import Any, Final
+
+from sagline.arguments import brief
+from sagline.arrays import number
+from sagline.errors import InvalidValueError, nearest
+from sagline.robot.winch import Winch
+
+_TURN: Final = 2.0 * pi / 60.0  # rad/s of a turn a minute
+_SHORT: Final = 1e-4  # kg m^2, the sheets' unit
+
+
+@dataclass(frozen=True, slots=True)
+class WinchDrive:
+    """A motor, with its gear where it has one, as its data sheet has it.
+
+    Attributes:
+        name: What `winch_drive` takes.
+        gear: Turns of the motor for a turn of the output.
+        inertia: Of motor and gear at the motor's shaft [kg m^2].
+        rated_torque: That it can give all the time, at the motor's shaft [N m].
+        torque_limit: That it can give for moments, at the motor's shaft [N m].
+        rated_speed: At which it gives its rated torque, of the motor's shaft [rad/s].
+        speed_limit: Largest, of the motor's shaft [rad/s].
+        source: The sheet.
+        assumed: What is not on the sheet, or is left out.
+    """
+
+    name: str
+    gear: float
+    inertia: float
+    rated_torque: float
+    torque_limit: float
+    rated_speed: float
+    speed_limit: float
+    source: str
+    assumed: str
+
+    def winch(self, drum_radius: float, drum_inertia: float = 0.0, **fields: Any) -> Winch:
+        """A winch with this drive.
+
+        Args:
+            drum_radius: Radius of the drum at the bottom of the cable [m].
+            drum_inertia: Moment of inertia of the drum about its own axis [kg m^2], >= 0.
+            **fields: Other fields of `Winch`, position_gain for instance.
+
+        Returns:
+            The winch; its gear, inertia and limits are the drive's, the drum's inertia included.
+
+        Raises:
+            InvalidValueError: If a value is out of its range, or a field is none of `Winch` or one of the drive's.
+
+        Examples:
+            >>> import sagline as sl
+            >>> winch = sl.winch_drive("yaskawa-sgmah-01aj3").winch(drum_radius=0.05, drum_inertia=1e-3)
+            >>> print(f"{float(winch.torque_limit * winch.gear / winch.drum_radius):.0f} N")
+            178 N
+        """
+        own = number(drum_inertia, "drum_inertia", "kg m^2", low=0.0)
+        given = {
+            "gear": self.gear,
+            "inertia": self.inertia + own / self.gear**2,
+            "torque_limit": self.torque_limit,
+            "speed_limit": self.speed_limit,
+        }
+        for field in fields:
+            if field in given or field not in Winch.__slots__:
+                allowed = f"a field of Winch beside {', '.join(given)}"
+                step = "Give Winch(...) by hand where the drive is another."
+                raise InvalidValueError("field", brief(field), allowed, step)
+        radius = number(drum_radius, "drum_radius", "m", above=0.0)
+        return Winch(drum_radius=radius, **given, **fields)
+
+
+_GEARED_SOURCE: Final = (
+    "Yaskawa, Sigma-II series user's manual, 3.1, ratings and specifications of SGMAH (3000 min^-1), servomotors with "
+    "standard backlash gears, page 3-7"
+)
+_GEARED_ASSUMED: Final = (
+    "torques at the output over the gear ratio, so that losses in the gear count as torque that is missing; speed: "
+    "that of the motor, 4000 min^-1; backlash and torsion of the gear left out"
+)
+# model: turns of the motor, rated and peak torque at the output [N m], inertia of motor and gear [1e-4 kg m^2]
+_GEARED: Final = {
+    "a3aj1": (5.0, 0.238, 1.16, 0.044),
+    "a3aj3": (31.0 / 3.0, 0.687, 2.37, 0.033),
+    "a3ajc": (21.0, 1.60, 5.48, 0.023),
+    "a3aj7": (33.0, 2.51, 8.61, 0.021),
+    "a5aj1": (5.0, 0.557, 1.92, 0.050),
+    "a5aj3": (31.0 / 3.0, 1.15, 3.95, 0.040),
+    "a5ajc": (21.0, 2.67, 9.07, 0.036),
+    "a5aj7": (33.0, 4.20, 14.3, 0.032),
+    "01aj1": (5.0, 1.27, 4.32, 0.099),
+    "01aj3": (31.0 / 3.0, 2.63, 8.88, 0.054),
+    "01ajc": (21.0, 5.34, 18.1, 0.071),
+    "01aj7": (33.0, 8.40, 28.4, 0.057),
+    "02aj1": (5.0, 2.55, 8.60, 0.299),
+}
+_DIRECT_SOURCE: Final = (
+    "Yaskawa, Sigma II user's manual, 8.1.4, SGMSH servomotors, ratings and specifications for standard servomotors, "
+    "200 V, page 8-15"
+)
+_DIRECT_ASSUMED: Final = "the motor alone: no gear, no brake"
+# model: rated and peak torque [N m], inertia [1e-4 kg m^2]
+_DIRECT: Final = {
+    "10aa": (3.18, 9.54, 1.74),
+    "15aa": (4.9, 14.7, 2.47),
+    "20aa": (6.36, 19.1, 3.19),
+    "30aa": (9.8, 29.4, 7.00),
+    "40aa": (12.6, 37.8, 9.60),
+    "50aa": (15.8, 47.6, 12.3),
+}
+
+
+def _catalogue() -> dict[str, WinchDrive]:
+    geared = (
+        WinchDrive(
+            f"yaskawa-sgmah-{model}",
+            gear,
+            inertia * _SHORT,
+            rated / gear,
+            peak / gear,
+            3000.0 * _TURN,
+            4000.0 * _TURN,
+            _GEARED_SOURCE,
+            _GEARED_ASSUMED,
+        )
+        for model, (gear, rated, peak, inertia) in _GEARED.items()
+    )
+    direct = (
+        WinchDrive(
+            f"yaskawa-sgmsh-{model}",
+            1.0,
+            inertia * _SHORT,
+            rated,
+            peak,
+            3000.0 * _TURN,
+            5000.0 * _TURN,
+            _DIRECT_SOURCE,
+            _DIRECT_ASSUMED,
+        )
+        for model, (rated, peak, inertia) in _DIRECT.items()
+    )
+    return {drive.name: drive for drive in (*geared, *direct)}
+
+
+_DRIVES: Final = MappingProxyType(_catalogue())
+
+
+def winch_drive_names() -> tuple[str, ...]:
+    """Names of the drives in the catalogue.
+
+    Returns:
+        In alphabetical order.
+
+    Examples:
+        >>> import sagline as sl
+        >>> sl.winch_drive_names()[:2]
+        ('yaskawa-sgmah-01aj1', 'yaskawa-sgmah-01aj3')
+    """
+    return tuple(sorted(_DRIVES))
+
+
+def winch_drive(name: str) -> WinchDrive:
+    """A motor and gear for winches, from the catalogue.
+
+    Args:
+        name: One of `winch_drive_names`.
+
+    Returns:
+        The drive, with its source and what is assumed.
+
+    Raises:
+        InvalidValueError: If there is no such drive; the message suggests one that is near.
+    """
+    given: Any = name  # a caller without types gives anything
+    word = str(given) if isinstance(given, str) else ""
+    if word in _DRIVES:
+        return _DRIVES[word]
+    near = nearest(word, _DRIVES)
+    step = f"Did you mean {near}?" if near else "winch_drive_names() lists them."
+    raise InvalidValueError("name", brief(given), f"one of the {len(_DRIVES)} drives of the catalogue", step)
