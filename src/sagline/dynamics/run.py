@@ -10,8 +10,7 @@ import numpy as np
 from sagline.arrays import Array, locked
 from sagline.dynamics.course import Course
 from sagline.dynamics.events import KINDS, Brake, Break, Drop, Event, PickUp, Stall, cable_of
-from sagline.dynamics.plant import Plant, Records
-from sagline.dynamics.plant import NOTES, Plant, Records, grown
+from sagline.dynamics.plant import NOTES, Plant, Records
 from sagline.dynamics.simulation import EnergyBalance, Occurrence, Simulation
 from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics import motion as k
@@ -70,14 +69,11 @@ class Run:
         plant.counters[k.RECORDS] = plant.counters[k.NOTES] = 0
         if last <= first and plant.counters[k.READY]:
             return
-        for begin in range(first, max(last, first + 1), BLOCK):
-            plant.kernel(*self._arguments, records.arrays, min(last - begin, BLOCK), self.every)
+        while True:
+            steps = min(last - int(plant.counters[k.STEPS]), BLOCK)
+            plant.kernel(*self._arguments, records.arrays, steps, self.every)
             if plant.counters[k.FAILED]:
                 raise plant.failure(self._time(int(plant.counters[k.STEPS])), self.step)
-        while True:
-            RUN(*self._arguments, records.arrays, min(last - int(plant.counters[k.STEPS]), BLOCK), self.every)
-            if plant.counters[k.FAILED]:
-                raise self._blown_up()
             if plant.counters[k.STEPS] == last:
                 break
             if plant.counters[k.NOTES] == NOTES:
