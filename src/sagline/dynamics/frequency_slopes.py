@@ -83,8 +83,10 @@ def frequency_slopes(state: Equilibrium | Vibration, together: float = 1e-6) -> 
         >>> import sagline as sl
         >>> plan = sl.inverse(sl.load_robot("cogiro"), sl.Pose((1.0, 0.5, 1.5), np.eye(3)))
         >>> slopes = sl.frequency_slopes(plan.state)
-        >>> print(slopes.stiffness_sensitivity[0].argmax(), f"{slopes.mass_sensitivity[0]:.4f} Hz/kg")
-        5 -0.0196 Hz/kg
+        >>> print(slopes.stiffness_sensitivity[0].argmax())
+        5
+        >>> print(f"{slopes.mass_sensitivity[0]:.4f} Hz/kg")
+        -0.0196 Hz/kg
 
     Source:
         docs/model.md, section 11.

@@ -48,7 +48,7 @@ class WinchDrive:
         Args:
             drum_radius: Radius of the drum at the bottom of the cable [m].
             drum_inertia: Moment of inertia of the drum about its own axis [kg m^2], >= 0.
-            **fields: Other fields of `Winch`, position_gain for instance.
+            fields: Other fields of `Winch`, position_gain for instance.
 
         Returns:
             The winch; its gear, inertia and limits are the drive's, the drum's inertia included.
@@ -58,8 +58,10 @@ class WinchDrive:
 
         Examples:
             >>> import sagline as sl
-            >>> winch = sl.winch_drive("yaskawa-sgmah-01aj3").winch(drum_radius=0.05, drum_inertia=1e-3)
-            >>> print(f"{float(winch.torque_limit * winch.gear / winch.drum_radius):.0f} N")
+            >>> drive = sl.winch_drive("yaskawa-sgmah-01aj3")
+            >>> winch = drive.winch(drum_radius=0.05, drum_inertia=1e-3)
+            >>> most = winch.torque_limit * winch.gear / winch.drum_radius
+            >>> print(f"{most:.0f} N")
             178 N
         """
         own = number(drum_inertia, "drum_inertia", "kg m^2", low=0.0)
