@@ -268,22 +268,27 @@ def merge(place: Array, speed: Array, count: int, row: Array) -> None:
         place[c, count], speed[c, count] = exit_place, entering
 
 
+@formula
+def blow_at(place: Array, j: int, k: int, drag: float, wind: Array) -> tuple[float, float, float]:
+    """Force of a wind across the line from node j to node k, of drag by the square of its speed [N]."""
+    x, y, z = place[0, k] - place[0, j], place[1, k] - place[1, j], place[2, k] - place[2, j]
+    along = (wind[0] * x + wind[1] * y + wind[2] * z) / (x * x + y * y + z * z + TINY)
+    nx, ny, nz = wind[0] - along * x, wind[1] - along * y, wind[2] - along * z
+    size = drag * math.sqrt(nx * nx + ny * ny + nz * nz)
+    return size * nx, size * ny, size * nz
+
+
 @kernel
 def blow(place: Array, speed: Array, count: int, row: Array, wind: Array, h: float) -> float:
     """Change the nodes' velocities by a wind of h [s] across the cable; returns its work [J]."""
     work = 0.0
     for j in range(1, count + 1):
-        x = place[0, j + 1] - place[0, j - 1]
-        y = place[1, j + 1] - place[1, j - 1]
-        z = place[2, j + 1] - place[2, j - 1]
-        along = (wind[0] * x + wind[1] * y + wind[2] * z) / (x * x + y * y + z * z + TINY)
-        nx, ny, nz = wind[0] - along * x, wind[1] - along * y, wind[2] - along * z
         length = row[ELEMENT] if j < count else 0.5 * (row[ELEMENT] + row[REST])
-        push = h * row[WIND] * math.sqrt(nx * nx + ny * ny + nz * nz)
-        share = push / row[DENSITY]
-        for_work = nx * (speed[0, j] + 0.5 * share * nx) + ny * (speed[1, j] + 0.5 * share * ny)
-        work += push * length * (for_work + nz * (speed[2, j] + 0.5 * share * nz))
-        speed[0, j] += share * nx
-        speed[1, j] += share * ny
-        speed[2, j] += share * nz
+        x, y, z = blow_at(place, j - 1, j + 1, length * row[WIND], wind)
+        share = h / (row[DENSITY] * length)
+        along = x * (speed[0, j] + 0.5 * share * x) + y * (speed[1, j] + 0.5 * share * y)
+        work += h * (along + z * (speed[2, j] + 0.5 * share * z))
+        speed[0, j] += share * x
+        speed[1, j] += share * y
+        speed[2, j] += share * z
     return work

@@ -154,6 +154,10 @@ def pull_platform(run: Swing) -> float:
         py = chains.pulls[i, 0] * (place[1, 1] - place[1, 0]) - air * speed[1, 0]
         pz = chains.pulls[i, 0] * (place[2, 1] - place[2, 0]) - air * speed[2, 0]
         lost += air * (speed[0, 0] ** 2 + speed[1, 0] ** 2 + speed[2, 0] ** 2)
+        if run.wind[0] != 0.0 or run.wind[1] != 0.0 or run.wind[2] != 0.0:
+            bx, by, bz = c.blow_at(place, 0, 1, 0.5 * row[c.ELEMENT] * row[c.WIND], run.wind)
+            px, py, pz = px + bx, py + by, pz + bz
+            lost -= bx * speed[0, 0] + by * speed[1, 0] + bz * speed[2, 0]
         fx, fy, fz = fx + px, fy + py, fz + pz
         mx, my, mz = mx + (y * pz - z * py), my + (z * px - x * pz), mz + (x * py - y * px)
         tension = c.tension_at_exit(place, n, row, chains.pulls[i])
@@ -182,16 +186,19 @@ def feed(run: Swing) -> float:
 
 
 @kernel
-def kick_chains(run: Swing, h: float) -> None:
-    """Change the nodes' velocities by forces, wind and air of a time."""
+def kick_chains(run: Swing, h: float, begins: bool) -> None:
+    """Change the nodes' velocities by forces, wind and air of a time; in reverse order where a step begins."""
     chains, audit = run.chains, run.drives.audit
     blows = run.wind[0] != 0.0 or run.wind[1] != 0.0 or run.wind[2] != 0.0
     for i in range(chains.counts.shape[0]):
-        n, row = chains.counts[i], chains.table[i]
-        c.kick(chains.place[i], chains.speed[i], n, row, chains.pulls[i], h)
-        audit[d.LOST] += c.brake(chains.speed[i], n, row, h)
+        n, row, place, speed = chains.counts[i], chains.table[i], chains.place[i], chains.speed[i]
+        if not begins:
+            c.kick(place, speed, n, row, chains.pulls[i], h)
+        audit[d.LOST] += c.brake(speed, n, row, h)
         if blows:
-            audit[d.SUPPLIED] += c.blow(chains.place[i], chains.speed[i], n, row, run.wind, h)
+            audit[d.SUPPLIED] += c.blow(place, speed, n, row, run.wind, h)
+        if begins:
+            c.kick(place, speed, n, row, chains.pulls[i], h)
 
 
 @glue
@@ -200,7 +207,7 @@ def split_step(run: Swing, now: float) -> None:
     h, half, drives, rows, chains = run.step, 0.5 * run.step, run.drives, run.rows, run.chains
     drives.audit[d.SUPPLIED] += half * feed(run)
     kick(run.state, run.inertia, run.force, half)
-    kick_chains(run, half)
+    kick_chains(run, half, True)
     if drives.kind == d.DRUMS:
         kick_drums(drives, half)
     elif drives.kind == d.SECOND_ORDER:
@@ -229,7 +236,7 @@ def split_step(run: Swing, now: float) -> None:
             wound = rows[t.LENGTH, i] - drives.now[d.BEFORE, i]
             drives.audit[d.SUPPLIED] -= 0.5 * (drives.now[d.BEFORE_WHOLE, i] + drives.now[d.WHOLE, i]) * wound
     kick(run.state, run.inertia, run.force, half)
-    kick_chains(run, half)
+    kick_chains(run, half, False)
     if drives.kind == d.DRUMS:
         kick_drums(drives, half)
     elif drives.kind == d.SECOND_ORDER:

@@ -1,0 +1,301 @@
+"""Robots on cables with mass in time, lumped: against exact modes, other steps, the same robot without cable mass."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.signal import find_peaks
+
+import sagline as sl
+from sagline.arrays import Array
+from sagline.dynamics.chains_at_rest import chains_at_rest
+
+
+@cache
+def hung(name: str, x: float, y: float, z: float) -> sl.Equilibrium:
+    """A preset at rest."""
+    return sl.inverse(sl.load_robot(name), sl.Pose([x, y, z], np.eye(3))).state
+
+
+def cogiro() -> sl.Equilibrium:
+    return hung("cogiro", 0.5, 0.3, 2.0)
+
+
+def over_pulleys() -> sl.Equilibrium:
+    return hung("ipanema-3-pulleys", -0.3, -0.05, 1.1)
+
+
+def winched(state: sl.Equilibrium, cable: int, way: float) -> tuple[list[float], list[Array]]:
+    """Let out some of a cable and wind it in again."""
+    there, back = state.unstrained_length.copy(), state.unstrained_length
+    there[cable] += way
+    return [0.0, 0.2, 0.3, 0.5], [back, there, there, back]
+
+
+@pytest.mark.parametrize("name", ["cogiro", "ipanema-3-pulleys", "expo2015-lucia"])
+def test_chains_reach_the_exact_equilibrium_with_the_square_of_their_nodes(name: str) -> None:
+    """Pose, and tension at the platform ends, against the exact catenary: errors fall four times as nodes double."""
+    box = sl.load_robot(name).test_box
+    assert box is not None
+    state = hung(name, *np.mean([box.low, box.high], axis=0) + 0.1)
+    off = []
+    for nodes in (10, 20, 40):
+        found = chains_at_rest(state, nodes)
+        tension = np.linalg.norm(found.force, axis=1) - state.cables.platform_end_tension
+        off.append([np.linalg.norm(found.pose.position - state.pose.position), np.abs(tension).max()])
+    assert np.divide(off[0], off[1]) == pytest.approx(4.0, abs=0.02)
+    assert np.divide(off[1], off[2]) == pytest.approx(4.0, abs=0.01)
+
+
+@pytest.mark.parametrize("state", [cogiro, over_pulleys])
+def test_a_robot_at_rest_stays_at_rest(state: object) -> None:
+    here = state()  # type: ignore[operator]
+    run = sl.simulate(here, cable_mass="lumped", nodes=10, duration=0.2)
+    assert np.ptp(run.pose.position, axis=0).max() < 1e-13
+    assert np.abs(run.tensions - run.tensions[0]).max() < 1e-6
+    assert run.nodes is not None
+    assert np.ptp(run.nodes, axis=0).max() < 1e-9
+    assert run.nodes[0, :, 0] == pytest.approx(here.exit_point, abs=1e-12)
+    assert run.nodes[0, :, -1] == pytest.approx(run.pose[0].transform(here.one_robot.platform_anchors), abs=1e-12)
+    assert (run.cable_mass, run.events, run.nodes.shape[2]) == ("lumped", (), 11)
+
+
+def test_nodes_lie_on_the_exact_catenary_with_the_square_of_their_number() -> None:
+    """A deep one: of 2 % longer cables, which sag by some 0.8 m."""
+    robot = sl.Robot(
+        "slack",
+        frame_anchors=[[-5, 0, 5], [5, 0, 5]],
+        platform_anchors=np.zeros((2, 3)),
+        cables=sl.Cable(linear_density=1.0, axial_stiffness=1e5),
+        mass=2.0,
+        motion_pattern="2T",
+        plane_normal=[0, 1, 0],
+    )
+    start = sl.forward(robot, [5.5, 5.5], start=sl.Pose([0.0, 0.0, 3.0], np.eye(3))).state
+    off = []
+    for nodes in (10, 20):
+        found = chains_at_rest(start, nodes)
+        exact = start.cables.points(nodes + 1)[1]
+        below = found.place[1, 2, ::-1] - start.exit_point[1, 2]
+        off.append(np.abs(below - exact[:, 1]).max())
+    assert off[0] < 0.02
+    assert off[0] / off[1] == pytest.approx(4.0, abs=0.1)
+
+
+def spectrum_peaks(time: Array, motion: Array, low: float, high: float) -> Array:
+    """Frequencies of the peaks of a record between two frequencies [Hz], those above 5 % of the largest."""
+    windowed = (motion - motion.mean()) * np.hanning(len(motion))
+    size = np.abs(np.fft.rfft(windowed, 16 * len(motion)))
+    frequency = np.fft.rfftfreq(16 * len(motion), time[1] - time[0])
+    band = (frequency > low) & (frequency < high)
+    places, _ = find_peaks(size[band], height=0.05 * size[band].max())
+    peaks: Array = frequency[band][places]
+    return peaks
+
+
+@cache
+def pushed(duration: float, nodes: int) -> sl.Simulation:
+    """expo2015-lucia after a small push, free of damping."""
+    gust = ([0, 0.02, 0.1, 0.2, 0.21], np.outer([0, 1, 1, 1, 0], [0.3, 0.2, -0.3, 0.1, 0.08, 0.05]))
+    return sl.simulate(
+        hung("expo2015-lucia", -0.6, 0.0, 3.5), cable_mass="lumped", nodes=nodes, duration=duration, wrench=gust
+    )
+
+
+def check_peaks(run: sl.Simulation, duration: float) -> None:
+    free = run.time > 0.3
+    peaks = spectrum_peaks(run.time[free], run.pose.position[free, 0], 1.9, 3.2)
+    state = hung("expo2015-lucia", -0.6, 0.0, 3.5)
+    exact = sl.vibration(state, up_to=3.2).frequency
+    assert exact == pytest.approx([2.011, 2.586, 3.028], abs=5e-4)
+    assert peaks == pytest.approx(exact, abs=1.0 / duration)
+    massless = sl.modes(state).frequency[:3]
+    assert np.abs(peaks - massless).max() > 1.5 / duration
+
+
+def test_the_spectrum_shows_the_modes_of_cables_with_mass_and_energy_has_no_trend() -> None:
+    run = pushed(20.0, 10)
+    check_peaks(run, 20.0)
+    moving = run.energy.kinetic.max()
+    assert np.abs(run.energy.error).max() < 1e-5 * moving
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("nodes", [10, 20, 40])
+def test_the_spectrum_of_a_minute_shows_the_modes_of_cables_with_mass(nodes: int) -> None:
+    run = pushed(60.0, nodes)
+    check_peaks(run, 60.0)
+    error = np.abs(run.energy.error) / run.energy.kinetic.max()
+    assert error.max() < 1e-5
+    assert error[-1000:].max() < 2.0 * error[1000:2000].max() + 1e-7
+
+
+def test_light_cables_let_the_platform_move_as_on_massless_ones() -> None:
+    """A tenth of the mass, a tenth of the difference: the platform, what it carries, its weight and its turning."""
+    off = []
+    for density in (1e-3, 1e-4):
+        robot = sl.load_robot("article-prototype")
+        robot = robot.replace(winches=None, cables=sl.Cable(linear_density=density, axial_stiffness=14e3))
+        state = sl.inverse(robot, sl.Pose.from_euler([0.2, 0.3, 1.2], 0.1, 0.05, -0.05)).state
+        gust = ([0, 0.02, 0.1, 0.2, 0.21], np.outer([0, 1, 1, 1, 0], [30, 20, -30, 10, 8, 5]))
+        given = {"wrench": gust, "duration": 0.5, "unstrained_length": winched(state, 1, 0.01)}
+        run = sl.simulate(state, cable_mass="lumped", nodes=4, **given)  # type: ignore[arg-type]
+        massless = sl.simulate(state, **given)  # type: ignore[arg-type]
+        off.append(np.abs(run.pose.position - massless.pose.position).max())
+        turned = (run.pose.rotation * massless.pose.rotation.inv()).magnitude()
+        off.append(turned.max())
+    assert np.ptp(massless.pose.position, axis=0).max() > 5e-3
+    assert off[0] < 1e-4
+    assert off[2] < 0.2 * off[0]
+    assert off[3] < 0.2 * off[1]
+
+
+def moved(step: float | None = None) -> sl.Simulation:
+    """CoGiRo along a path on which its cables get nodes and lose them."""
+    path = sl.quintic_path([(0, 0, 1.5), (2.5, 1.5, 3.0), (0, 0, 1.5)], durations=(2.0, 2.0), rate=500.0)
+    return sl.simulate(sl.inverse(sl.load_robot("cogiro"), path), cable_mass="lumped", nodes=10, step=step)
+
+
+def test_moving_winches_close_the_balance_of_energy() -> None:
+    run = moved()
+    cable = np.abs(run.length - run.length[0]).max(axis=0) / (run.length[0] / 10)
+    assert (cable > 2.0).sum() >= 4  # nodes were born and merged
+    turned_over = np.ptp(run.energy.supplied)
+    assert turned_over > 1000.0
+    assert np.abs(run.energy.error).max() < 1e-8 * turned_over
+    assert np.abs(run.energy.lost).max() < 1e-4 * turned_over  # what births and merges take
+    assert np.abs(moved(0.5 * run.step).energy.error).max() < 0.7 * np.abs(run.energy.error).max()
+
+
+def test_a_broken_cable_gives_the_same_tensions_at_half_the_step() -> None:
+    """0.4 of l sqrt(rho/EA) against 0.2, 20 nodes: the largest tension of any cable after it."""
+    after = []
+    for share in (1.0, 0.5):
+        run = sl.simulate(cogiro(), cable_mass="lumped", duration=0.5, step=share * 5e-5, events=sl.Break(0, 0.0))
+        assert [event.kind for event in run.events] == ["break"]
+        assert np.isnan(run.nodes[-1, 0]).all()  # type: ignore[index]
+        assert run.tensions[-1, 0] == 0.0
+        after.append(run.events[0].tension_after)
+    assert after[0] == pytest.approx(after[1], rel=0.002)
+    assert after[0] == pytest.approx(1081.0, abs=1.0)  # after 424 N
+    assert cogiro().cables.frame_end_tension.max() == pytest.approx(424.0, abs=1.0)
+
+
+def test_a_step_that_shakes_a_broken_robot_apart_is_told_with_time_and_cable() -> None:
+    element = cogiro().free_length.min() / 20
+    longest = 0.85 * element * float(np.sqrt(0.065 / 700e3))
+    with pytest.raises(sl.SaglineError, match=r"energy grows by itself: at 0\.\d+ s most of it is in cable \d"):
+        sl.simulate(cogiro(), cable_mass="lumped", duration=2.0, step=longest, events=sl.Break(0, 0.0))
+
+
+@pytest.mark.parametrize("event", [sl.Drop(20.0, 0.1), sl.PickUp(20.0, 0.1)])
+def test_loads_move_the_platform_as_they_do_without_cable_mass(event: sl.Drop | sl.PickUp) -> None:
+    """So soon that its waves have not come back: it falls or rises, and no energy is invented."""
+    run = sl.simulate(cogiro(), cable_mass="lumped", duration=0.12, events=event)
+    massless = sl.simulate(cogiro(), duration=0.12, events=event)
+    way = massless.pose.position[-1, 2] - 2.0
+    assert abs(way) > 1e-4
+    assert run.pose.position[-1, 2] - run.pose.position[0, 2] == pytest.approx(way, rel=0.05)
+    assert np.abs(run.energy.error).max() < 1e-5
+    assert run.energy.lost[-1] == pytest.approx(massless.energy.lost[-1], rel=1e-5, abs=1e-9)
+    assert run.energy.supplied[-1] == pytest.approx(massless.energy.supplied[-1], rel=1e-5, abs=1e-9)
+
+
+def test_a_load_that_is_picked_up_in_motion_shares_the_momentum_and_one_that_falls_takes_its_own() -> None:
+    """The velocity of the platform's center of mass a step before and after, of a platform that moves and turns."""
+    robot = cogiro().one_robot
+    step, carried = 5e-5, 0.5 * 0.065 * float(cogiro().free_length.sum()) / 20.0
+    given = {"cable_mass": "lumped", "duration": 0.101, "step": step, "record": step}
+    swung = {"unstrained_length": winched(cogiro(), 2, 0.05)}
+    free = sl.simulate(cogiro(), **given, **swung)  # type: ignore[arg-type]
+    for event in (sl.PickUp(30.0, 0.1), sl.Drop(30.0, 0.1)):
+        run = sl.simulate(cogiro(), events=event, **given, **swung)  # type: ignore[arg-type]
+        k = round(0.1 / step)
+        before, after = run.twist[k], run.twist[k + 1]
+        assert run.twist[k] == pytest.approx(free.twist[k], abs=1e-12)
+        assert np.abs(before).min() > 1e-3
+        if isinstance(event, sl.Drop):
+            assert after == pytest.approx(before, abs=2e-3)
+        else:
+            mass = robot.mass + carried
+            assert after[:3] == pytest.approx(before[:3] * mass / (mass + 30.0), rel=0.02, abs=2e-3)
+
+
+def test_a_brake_stops_the_lengths_of_chains() -> None:
+    given = {"duration": 0.3, "unstrained_length": winched(cogiro(), 2, 0.02), "events": sl.Brake(0.1, duration=0.1)}
+    run = sl.simulate(cogiro(), cable_mass="lumped", nodes=10, **given)  # type: ignore[arg-type]
+    massless = sl.simulate(cogiro(), **given)  # type: ignore[arg-type]
+    assert run.length == pytest.approx(massless.length, abs=1e-12)
+    assert np.abs(run.energy.error).max() < 1e-4
+
+
+def test_winches_with_inertia_close_the_balance_of_energy_on_chains() -> None:
+    """Over pulleys and dead cable, with drums that are let go at other tensions than they were wound at."""
+    robot = sl.load_robot("article-prototype")
+    assert robot.winches is not None
+    loops = {"inertia": 0.035, "position_gain": 20.0, "speed_gain": 4e3, "integral_gain": 8e4}
+    robot = robot.replace(winches=robot.winches.replace(**loops))
+    state = sl.inverse(robot, sl.Pose([0.2, 0.3, 1.2], np.eye(3))).state
+    for winches in ("robot", sl.SecondOrder(20.0, 0.7)):
+        run = sl.simulate(
+            state,
+            cable_mass="lumped",
+            nodes=10,
+            winches=winches,
+            unstrained_length=winched(state, 1, 0.02),
+        )
+        moving = np.ptp(run.energy.supplied)
+        assert moving > 1.0
+        assert np.abs(run.energy.error).max() < 1e-3 * moving
+
+
+def test_damping_and_wind_close_the_balance_too() -> None:
+    state = hung("expo2015-lucia", -0.6, 0.0, 3.5)
+    run = sl.simulate(
+        state,
+        cable_mass="lumped",
+        nodes=10,
+        duration=1.0,
+        unstrained_length=winched(state, 1, 0.05),
+        damping=sl.Damping(loss_time=2e-5, air_damping=0.05),
+        wind=([0.0, 0.5, 1.0], np.outer([0, 1, 0], [8.0, 4.0, 0.0])),
+    )
+    assert run.energy.lost[-1] > 0.01
+    assert np.abs(run.energy.error).max() < 1e-3 * run.energy.lost[-1]
+
+
+def test_a_steady_wind_moves_the_platform_as_half_its_force_on_every_cable_does() -> None:
+    """Damped to rest; what wind adds to the weight of inclined cables is a tenth of that."""
+    state = hung("expo2015-lucia", -0.6, 0.0, 3.5)
+    given = {"duration": 2.5, "damping": sl.Damping(loss_time=0.02, air_damping=20.0), "wind": [1.0, 0.0, 0.0]}
+    run = sl.simulate(state, cable_mass="lumped", nodes=4, **given)  # type: ignore[arg-type]
+    massless = sl.simulate(state, **given)  # type: ignore[arg-type]
+    way = massless.pose.position[-1] - massless.pose.position[0]
+    assert run.pose.position[-1] - run.pose.position[0] == pytest.approx(way, abs=0.12 * np.abs(way).max())
+
+
+REFUSED: dict[str, tuple[dict[str, Any], str]] = {
+    "nodes": ({"nodes": 3}, "nodes is 3"),
+    "many": ({"nodes": 1000}, "4 to 500"),
+    "integrator": ({"integrator": "runge-kutta"}, "cables with mass"),
+    "step": ({"step": 1e-3}, "the limit of stability at .* Hz, cables with mass"),
+    "wound in": ({"unstrained_length": ([0, 1], [[9.0] * 8, [1.0] * 8]), "duration": 1.0}, "all but wound in at 0"),
+}
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_what_chains_cannot_do_is_told(what: str) -> None:
+    arguments, told = REFUSED[what]
+    with pytest.raises(sl.SaglineError, match=told) as error:
+        sl.simulate(cogiro(), **{"cable_mass": "lumped", "duration": 0.1, **arguments})
+    assert len(str(error.value)) < 300
+
+
+def test_cables_without_weight_or_mass_are_no_chains() -> None:
+    robot = sl.load_robot("cogiro")
+    pose = sl.Pose([0.5, 0.3, 2.0], np.eye(3))
+    with pytest.raises(sl.SaglineError, match=r"Elastic\(\); allowed: Catenary\(\)"):
+        sl.simulate(sl.inverse(robot, pose, sl.Elastic()).state, cable_mass="lumped", duration=0.1)
