@@ -4,13 +4,21 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from functools import partial
+from typing import Final
 
+import numpy as np
 from rich.console import Console
 
 import sagline as sl
-from benchmarks.measure import Row, one_core, show
+from benchmarks.measure import Row, best_of_calls, best_seconds, one_core, show
+from sagline.dynamics.simulate import Integrator
+from tests.dynamics.let_go import beside
+from tests.dynamics.machines import prototype
 from tests.dynamics.residuals import HEAVY, WAYPOINTS, residual, scene
 from tests.dynamics.test_fastest import shortest_quintic
+
+AWAY: Final = np.array([0.004, -0.003, 0.0033])  # m
 
 
 def residuals() -> Iterator[Row]:
@@ -47,6 +55,44 @@ def shortest() -> Iterator[Row]:
     yield Row("shortest quintic", "1.118 s", f"{shortest_quintic(robot, WAYPOINTS, 0.0):.3f} s")
 
 
+def speed() -> Iterator[Row]:
+    """Motion in time without cable mass, 8 cables, 1 ms."""
+    state, lengths = beside(sl.load_robot("article-suspended"), (0.0, 0.0, 1.5), AWAY)
+    seen: dict[Integrator, str] = {"splitting": ">= 250", "runge-kutta": ">= 100"}
+    for integrator, reach in seen.items():
+        run = partial(sl.simulate, state, unstrained_length=lengths, step=1e-3, record=0.1, integrator=integrator)
+        seconds = best_seconds(lambda run=run: run(duration=20.0))  # type: ignore[misc]
+        yield Row(f"{integrator}, times real time", reach, f"{20.0 / seconds:.0f}")
+    for name, robot, reach in (
+        ("without pulleys", prototype(), ">= 350"),
+        ("with pulleys", prototype(pulley_radius=0.03, dead_cable=1.0), ">= 200"),
+    ):
+        machine = sl.Simulator(robot, sl.Pose.from_euler([0.1, 0.05, 1.0], 0.0, 0.0, 0.0), load_cell_filter=0.005)
+        given = machine.reading.length.copy()
+        for period in (1e-2, 1e-3):
+            call = partial(machine.step, given, period)
+            seconds = best_of_calls(call)
+            what = f"prototype {name}, 1 kHz loops, sensors every {1e3 * period:g} ms, times real time"
+            yield Row(what, reach if period == 1e-2 else "", f"{period / seconds:.0f} ({1e6 * seconds:.1f} us a call)")
+
+
+def energies() -> Iterator[Row]:
+    """Energy of an undamped vibration in 60 s at 1 ms."""
+    limits: dict[Integrator, str] = {"splitting": "5e-05", "runge-kutta": "1e-04"}
+    for name, place, away in (
+        ("article-suspended, 6 mm", (0.0, 0.0, 1.5), 0.006),
+        ("cogiro, 6 mm", (0.0, 0.0, 2.0), 0.006),
+        ("cogiro, 30 mm, cables slacken", (0.0, 0.0, 2.0), 0.03),
+    ):
+        state, lengths = beside(sl.load_robot(name.split(",")[0]), place, np.array([away, 0.0, 0.0]))
+        for integrator, limit in limits.items():
+            run = sl.simulate(state, unstrained_length=lengths, duration=60.0, step=1e-3, integrator=integrator)
+            share = run.energy.error / run.energy.kinetic.max()
+            trend = abs(np.polyfit(run.time / 60.0, share, 1)[0])
+            shown = f"{trend:.0e} (largest {np.abs(share).max():.0e})"
+            yield Row(f"{name}: trend of the energy, {integrator}", limit, shown)
+
+
 def main() -> None:
     """Measure and print."""
     console = Console()
@@ -58,7 +104,7 @@ def main() -> None:
     show("Dynamics", rows, console)
 
 
-PARTS = (residuals, shortest)
+PARTS = (residuals, shortest, speed, energies)
 
 if __name__ == "__main__":
     main()

@@ -59,6 +59,20 @@ def test_control_loop(run: Run) -> None:
     assert np.median(names["times"]) < 1e-3  # s; the loop runs at 1 kHz
 
 
+def test_feedforward(run: Run) -> None:
+    distance = run("feedforward")["distance"]
+    planned, static = distance["planned"], distance["static"]
+    assert max(planned) < 3e-4  # m
+    assert max(static) > 5e-3
+    assert max(static[-2000:]) > 5.0 * max(planned[-2000:])  # what is left once the motion has ended
+
+
+def test_pose_loop(run: Run) -> None:
+    names = run("pose_loop")
+    assert 1e3 * names["without"][-1] == pytest.approx(14.58, abs=0.01)
+    assert max(names["closed"][-100:]) < 2e-4
+
+
 def test_encoders(run: Run) -> None:
     names = run("encoders")
     assert names["found"].solved.all()

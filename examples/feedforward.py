@@ -1,0 +1,36 @@
+"""A controller that knows its robot: planned lengths and tensions every ms."""
+
+import numpy as np
+
+import sagline as sl
+
+robot = sl.load_robot("article-prototype")
+assert robot.winches is not None
+gains = {"position_gain": 20.0, "speed_gain": 4000.0, "integral_gain": 80e3}
+robot = robot.replace(winches=robot.winches.replace(**gains))
+path = sl.septic_path([(0, 0, 1.0), (0.3, 0.2, 1.1)], durations=2.5, rate=1000)
+plan = sl.inverse(robot, path, tension=sl.MinimumNorm())
+# the same poses as if the platform had no inertia
+still = sl.inverse(robot, path.pose, tension=sl.MinimumNorm())
+
+
+def follow(these: sl.Plan) -> list[float]:
+    """Distance from the path, every ms, and for three seconds after it [m]."""
+    machine = sl.Simulator(robot, plan.state[0])
+    lengths = these.unstrained_length
+    tensions = these.state.cables.frame_end_tension
+    away = []
+    for step in range(1, len(path) + 3000):
+        k = min(step, len(path) - 1)
+        seen = machine.step(lengths[k], 0.001, tension=tensions[k])
+        distance = np.linalg.norm(seen.position - path.pose.position[k])
+        away.append(float(distance))
+    return away
+
+
+distance = {"planned": follow(plan), "static": follow(still)}
+for name, away in distance.items():
+    largest, left = 1e3 * max(away[: len(path)]), 1e3 * max(away[-2000:])
+    print(
+        f"{name} lengths: {largest:.2f} mm on the way, {left:.2f} mm after it"
+    )
