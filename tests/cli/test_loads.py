@@ -78,7 +78,7 @@ def test_the_viewer_takes_them_too(monkeypatch: pytest.MonkeyPatch) -> None:
     taken: list[Any] = []
 
     class Viewer:
-        def __init__(self, server: Any, robot: sl.Robot, run: Any, ready: Any, wrench: Any) -> None:
+        def __init__(self, server: Any, robot: sl.Robot, run: Any, ready: Any, wrench: Any, *start: Any) -> None:
             taken.append((robot, wrench))
 
         def serve(self) -> None:

@@ -13,6 +13,7 @@ import pytest
 import sagline as sl
 from sagline.viewer.run import Run
 from sagline.viewer.server import Server, started, stop
+from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.stage import Stage
 from sagline.viewer.viewer import Reading, Viewer
 from tests.viewer.client import Client, clients
@@ -111,7 +112,7 @@ def test_everything_follows_a_drag(page: Shown) -> None:
         plan = sl.inverse(ROBOT, sl.Pose.from_euler([1.0, 0.5, 2.0], 2.0 * half, 0.0, 0.0), tension=sl.MinimumNorm())
         view = page.viewer.view
         assert view is not None
-        assert view.snapshot.plan is not None
+        assert isinstance(view.snapshot, Snapshot)
         assert view.snapshot.tension == pytest.approx(plan.chord_tension, rel=1e-12)
         texts = [m["updates"]["content"] for m in client.heard(0.5) if "content" in m.get("updates", {})]
         assert any("1.000, 0.500, 2.000 m" in text for text in texts)

@@ -16,6 +16,8 @@ ENTRY_OF = {
     Reading.POLYGON: POLYGON,
     Reading.FREQUENCIES: VIBRATION,
     Reading.REST: FORWARD,
+    Reading.MODES: VIBRATION,
+    Reading.SIMULATION: FORWARD,
 }
 ORDER = (MARGINS, POLYGON, VIBRATION, VERDICTS, FORWARD)  # as they are looked at
 PATIENCE = 5.0  # s: how long the end may wait for a compilation

@@ -8,7 +8,7 @@ import numpy as np
 
 from sagline.arguments import choice, instance
 from sagline.arrays import Array, locked
-from sagline.dynamics.stretch import stretch_losses
+from sagline.dynamics.at_rest import stretch_losses
 from sagline.dynamics.vibration import Vibration
 from sagline.dynamics.vibration_status import VibrationStatus
 from sagline.errors import InvalidValueError

@@ -61,6 +61,24 @@ def read_dataset(path: Path, content: Content) -> tuple[Dataset, Seal]:
     return _opened(path, content), found
 
 
+def is_of(path: Path, content: Content) -> bool:
+    """Whether a file says that it is of this content; nothing else of it is looked at.
+
+    Args:
+        path: The file; of one that is none, or cannot be read, `read_dataset` says why.
+        content: What it may be of.
+    """
+    from h5py import File
+
+    try:
+        if kind_of(path.stat().st_mode):
+            return False
+        with File(path) as file:
+            return content.key in file.attrs
+    except (OSError, RuntimeError, ValueError):
+        return False
+
+
 def _seal(path: Path, content: Content) -> Seal:
     """What a file's end says, before anything else in it is believed."""
     try:

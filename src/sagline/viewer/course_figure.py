@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from math import ceil, floor, log10
 
@@ -49,7 +50,7 @@ class CourseFigure:
 
     @classmethod
     def of(cls, title: str, time: Array, values: Array, limits: tuple[Limit, ...] = ()) -> CourseFigure:
-        """Draw the lines of values (N, m) over time (N,) [s]; gaps where they are NaN."""
+        """Draw the lines of values (N, m) over time (N,) [s], which begins at 0; gaps where they are NaN."""
         rows = np.unique(np.linspace(0, len(time) - 1, SAMPLES).astype(np.intp))
         time, values = time[rows], values[rows]
         low, high, drawn = _range(values, limits)
@@ -61,14 +62,14 @@ class CourseFigure:
         return cls(_axes(title, low, high, float(time[-1])) + told + lines + marks, float(time[-1]))
 
     @staticmethod
-    def key(count: int) -> str:
-        """HTML that says which line is which cable."""
+    def key(names: Iterable[object], what: str = "cable") -> str:
+        """HTML that says which line is which."""
         marks = "".join(
             f'<span class="key"><span class="stroke" style="border-color:{COLORS[i % len(COLORS)]};'
-            f'border-top-style:{"solid" if i < len(COLORS) else "dashed"}"></span> {i}</span>'
-            for i in range(count)
+            f'border-top-style:{"solid" if i < len(COLORS) else "dashed"}"></span> {name}</span>'
+            for i, name in enumerate(names)
         )
-        return block(f"cable &nbsp;{marks}")
+        return block(f"{what} &nbsp;{marks}")
 
     def at(self, time: float) -> str:
         """HTML with the cursor at a time [s]."""

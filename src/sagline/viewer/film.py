@@ -6,7 +6,7 @@ import numpy as np
 import viser
 
 from sagline.viewer.export import Picture
-from sagline.viewer.run import Run
+from sagline.viewer.played import Played
 from sagline.viewer.stage import TRACE_POINTS, Stage
 from sagline.viewer.view import View
 
@@ -14,14 +14,14 @@ WIDTH, HEIGHT, FRAMES, FRAME_TIME = 720, 450, 60, 0.08  # px, px, frames, s a fr
 PATIENCE = 20.0  # s to wait for a picture
 
 
-def filmed(client: viser.ClientHandle, run: Run, view: View) -> list[Picture]:
+def filmed(client: viser.ClientHandle, run: Played, view: View) -> list[Picture]:
     """Pictures of a run from its beginning to its end, from where a client's camera is.
 
     The client's own scene hides the server's while the film is made: other clients see and drag what they did.
 
     Args:
         client: Who asked; is told how far it is.
-        run: The run.
+        run: The run, or simulation.
         view: How it is drawn.
 
     Returns:
@@ -32,15 +32,15 @@ def filmed(client: viser.ClientHandle, run: Run, view: View) -> list[Picture]:
         TimeoutError: If it gives none for too long.
     """
     height, width = fitting(client, WIDTH, HEIGHT)
-    stage = Stage(client.scene, run.plan.state.one_robot, run.snapshot(0).pose, draggable=False)
-    note = client.add_notification("Film of the run", "", loading=True, with_close_button=False)
+    stage = Stage(client.scene, run.robot, run.home, draggable=False)
+    note = client.add_notification(f"Film of the {run.name}", "", loading=True, with_close_button=False)
     settings, pictures = view.settings, []
     try:
         stage.show_traces(*run.traces(TRACE_POINTS, settings.error_scale))
         client.get_render(height, width, transport_format="jpeg", timeout=PATIENCE)  # names come a picture late
         for i, moment in enumerate(np.linspace(0.0, run.duration, FRAMES)):
             note.body = f"Picture {i + 1} of {FRAMES}. Others see nothing of it."
-            snapshot = run.snapshot(run.index_at(float(moment)))
+            snapshot = run.sight(float(moment))
             with client.atomic():
                 stage.place(snapshot.pose)
                 stage.show(snapshot, view.scale, settings.sag_scale, settings.error_scale, ghost=view.ghost)

@@ -100,6 +100,14 @@ def hanging(ends: Array, cables: CableState, sag_scale: float) -> Array:
     return np.asarray(ends[:, :1] + np.concatenate((level[:, None] * along[..., None], height[..., None]), axis=-1))
 
 
+def resampled(points: Array, count: int) -> Array:
+    """Values at points (m, P, 3) at so many, at equal steps of the first ones' number, shape (m, count, 3)."""
+    place = np.linspace(0.0, points.shape[1] - 1.0, count)
+    first = np.minimum(place.astype(np.intp), points.shape[1] - 2)
+    rest = (place - first)[:, None]
+    return np.asarray((1.0 - rest) * points[:, first] + rest * points[:, first + 1])
+
+
 def segments(points: Array, *, dashed: bool, shown: NDArray[np.bool_] | None = None) -> Array:
     """Consecutive points (m, P, 3) as segments (m (P - 1), 2, 3).
 

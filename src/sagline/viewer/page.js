@@ -39,4 +39,17 @@
       });
     }
   };
+
+  // A mode that is clicked, in the list or in the figure, is written into the field that says which one moves.
+  document.addEventListener("click", (event) => {
+    const mode = event.target.closest?.("[data-mode]")?.dataset.mode;
+    if (mode === undefined) return;
+    const label = [...document.querySelectorAll("label")].find((each) => each.textContent.trim() === "Mode");
+    const after = (each) => label.compareDocumentPosition(each) & Node.DOCUMENT_POSITION_FOLLOWING;
+    const field = label && [...document.querySelectorAll("input")].find(after);
+    if (!field) return;
+    const set = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set;
+    set.call(field, field.value === mode ? "" : mode); // the client's framework keeps a value of its own
+    field.dispatchEvent(new Event("input", { bubbles: true }));
+  });
 })();

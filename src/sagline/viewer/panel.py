@@ -17,7 +17,6 @@ from sagline.viewer.wording import remembers
 
 LEFT_WIDTH, RIGHT_WIDTH = 310, 380  # px
 _LIGHTEST, _HEAVIEST = 0.1, 4.0  # of the robot's own mass
-_OF_RUN = "A run is what it was planned as; drag the platform to ask what if."
 
 
 class Panel:
@@ -39,7 +38,7 @@ class Panel:
         self._gui.main_panel.set_width(LEFT_WIDTH)
         self._build_what_if(robot)
         self._build_drawing()
-        readings = self._gui.add_panel()
+        readings = self.readings = self._gui.add_panel()
         with readings.add_tab("Readings"):
             self._verdict = self._gui.add_html(readout.waiting())
             self._gui.add_html(readout.legend(scale, robot))
@@ -71,11 +70,13 @@ class Panel:
             error_scale=_slid(self._error_scale),
         )
 
-    def show_what_if(self, shown: bool) -> None:
-        """Show what would change the robot, or in its place that a run is what it is."""
+    def show_what_if(self, still: str) -> None:
+        """Show what would change the robot, or in its place why it cannot be changed."""
+        shown = not still
         for handle in (self._mass, self._density, self._stiffness, self._model, self._method):
             handle.visible = shown
         self._of_run.visible = not shown
+        self._of_run.content = readout.block(f'<div class="quiet">{still}</div>')
         self._forgetting.visible = shown and remembers(self.settings().tension)
 
     def read_out(self, verdict: str, numbers: str, polygon: str) -> None:
@@ -100,7 +101,7 @@ class Panel:
     def _build_what_if(self, robot: Robot) -> None:
         gui = self._gui
         with gui.add_folder("What if"):
-            self._of_run = gui.add_html(readout.block(f'<div class="quiet">{_OF_RUN}</div>'), visible=False)
+            self._of_run = gui.add_html("", visible=False)
             lightest, heaviest, step = mass_range(robot.mass)
             self._mass = self.watched(
                 gui.add_slider(

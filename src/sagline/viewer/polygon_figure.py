@@ -8,7 +8,7 @@ from sagline.arrays import Array
 from sagline.errors import InvalidValueError
 from sagline.kinematics.polygon import tension_polygon
 from sagline.tension.polygon import TensionPolygon
-from sagline.viewer.readout import LATER, block, force_unit
+from sagline.viewer.readout import LATER, block, force_unit, sentence
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.wording import ForceUnit, number
 
@@ -20,12 +20,12 @@ def polygon_figure(snapshot: Snapshot) -> str:
     """HTML: the polygon with the chosen tensions in it; for one redundant cable the interval; else a sentence."""
     redundant = snapshot.robot.cable_count - snapshot.robot.degrees_of_freedom
     if redundant > MOST_REDUNDANT:
-        return _sentence(f"{redundant} redundant cables: their feasible tensions have no picture in a plane.")
+        return sentence(f"{redundant} redundant cables: their feasible tensions have no picture in a plane.")
     if redundant == 0:
-        return _sentence("As many cables as freedoms: the balance leaves nothing to choose.")
+        return sentence("As many cables as freedoms: the balance leaves nothing to choose.")
     polygon = _polygon(snapshot)
     if polygon is None or not len(polygon.vertices):
-        return _sentence("No tensions within the limits balance the platform: there is nothing to choose from.")
+        return sentence("No tensions within the limits balance the platform: there is nothing to choose from.")
     point = polygon.coordinates(snapshot.tension)
     unit = force_unit(snapshot.robot)
     if redundant == 1:
@@ -35,7 +35,7 @@ def polygon_figure(snapshot: Snapshot) -> str:
 
 def polygon_later() -> str:
     """HTML: that the polygon is not there yet."""
-    return _sentence(LATER.capitalize())
+    return sentence(LATER.capitalize())
 
 
 def _polygon(snapshot: Snapshot) -> TensionPolygon | None:
@@ -71,7 +71,7 @@ def _drawing(polygon: TensionPolygon, point: Array, unit: ForceUnit) -> str:
         f'<polygon points="{outline}" class="polygon"/>{sides}{dot}</svg>'
     )
     extent = f"Width {unit.written(high[0] - low[0])}, height {unit.written(high[1] - low[1])}."
-    return block(drawing) + _sentence(f"Dot: the chosen tensions. Sides: the limit that each is. {extent}")
+    return block(drawing) + sentence(f"Dot: the chosen tensions. Sides: the limit that each is. {extent}")
 
 
 def _side(polygon: TensionPolygon, k: int, start: tuple[float, float], end: tuple[float, float]) -> str:
@@ -89,8 +89,4 @@ def _side(polygon: TensionPolygon, k: int, start: tuple[float, float], end: tupl
 
 def _interval(ends: Array, point: float) -> str:
     low, high = float(ends.min()), float(ends.max())
-    return _sentence(f"One redundant cable: λ may be {low:.4g} to {high:.4g} N; chosen: {number(point, '.4g')} N.")
-
-
-def _sentence(text: str) -> str:
-    return f'<div class="sagline quiet">{text}</div>'
+    return sentence(f"One redundant cable: λ may be {low:.4g} to {high:.4g} N; chosen: {number(point, '.4g')} N.")

@@ -9,6 +9,7 @@ import numpy as np
 from sagline.arrays import Array
 from sagline.kinematics.status import PoseStatus
 from sagline.numbers import n
+from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.robot.several import pulleys_of
 from sagline.tension.margin import capacity_margin
@@ -26,6 +27,11 @@ def block(content: str) -> str:
     return f'<div class="sagline">{content}</div>'
 
 
+def sentence(text: str) -> str:
+    """HTML of a remark."""
+    return f'<div class="sagline quiet">{text}</div>'
+
+
 def verdict(snapshot: Snapshot, *, capacity: bool = True) -> str:
     """Feasible or not, in one colored box; where not, why.
 
@@ -34,8 +40,8 @@ def verdict(snapshot: Snapshot, *, capacity: bool = True) -> str:
         capacity: Whether the spare force can be computed already.
     """
     if snapshot.feasible:
-        return _box("good", "Feasible", _summary(snapshot, capacity=capacity))
-    return _box("bad", headline(snapshot), escape(snapshot.reason))
+        return box("good", "Feasible", _summary(snapshot, capacity=capacity))
+    return box("bad", headline(snapshot), escape(snapshot.reason))
 
 
 def headline(snapshot: Snapshot) -> str:
@@ -49,12 +55,12 @@ def headline(snapshot: Snapshot) -> str:
 
 def refused(message: str) -> str:
     """What a setting asked for and cannot have."""
-    return _box("bad", "Not possible", escape(message))
+    return box("bad", "Not possible", escape(message))
 
 
 def waiting(what: str = "The first run on a machine compiles the numerical core; later ones start at once.") -> str:
     """What stands there until the numbers do: at the first run the numerical core is compiled before them."""
-    return _box("quiet", "Getting ready", escape(what))
+    return box("quiet", "Getting ready", escape(what))
 
 
 def numbers(
@@ -62,7 +68,7 @@ def numbers(
 ) -> str:
     """The pose, the numbers of every cable, and the platform's natural frequencies, or that they come later."""
     parts = (
-        _pose_line(snapshot),
+        pose_line(snapshot.pose),
         _cable_table(snapshot, scale),
         _frequency_line(LATER) if frequencies_later else _listed(frequencies),
         _material_line(snapshot),
@@ -76,7 +82,7 @@ def legend(scale: TensionScale, robot: Robot) -> str:
     stops = np.linspace(0.0, 1.0, 12)
     values = scale.low * (scale.high / scale.low) ** stops
     colors = ",".join(
-        f"{_hex(color)} {100 * stop:.0f}%" for stop, color in zip(stops, scale.colors(values), strict=True)
+        f"{css_color(color)} {100 * stop:.0f}%" for stop, color in zip(stops, scale.colors(values), strict=True)
     )
     unit = force_unit(robot)
     marks = "".join(
@@ -97,7 +103,8 @@ def force_unit(robot: Robot) -> ForceUnit:
     return ForceUnit.up_to(TensionScale.of(robot).high)
 
 
-def _box(kind: str, head: str, text: str) -> str:
+def box(kind: str, head: str, text: str) -> str:
+    """A verdict in a box: "good", "bad" or "quiet"."""
     return (
         f'<div class="sagline sagline-verdict {kind}"><h2>{head}</h2>'
         f'<div style="color:var(--sagline-text)">{text}</div></div>'
@@ -151,9 +158,10 @@ def _nearest_limit(snapshot: Snapshot, unit: ForceUnit) -> str:
     return f"{unit.written(margin[nearest])} away (cable {nearest}, {which})"
 
 
-def _pose_line(snapshot: Snapshot) -> str:
-    position = ", ".join(number(value, ".3f") for value in snapshot.pose.position)
-    turned = ", ".join(f"{number(value, '.1f')}°" for value in snapshot.pose.rotation.as_euler("ZYX", degrees=True))
+def pose_line(pose: Pose) -> str:
+    """Where the platform is, in words."""
+    position = ", ".join(number(value, ".3f") for value in pose.position)
+    turned = ", ".join(f"{number(value, '.1f')}°" for value in pose.rotation.as_euler("ZYX", degrees=True))
     return f"<b>Position</b> {position} m<br><b>α, β, γ</b> {turned}"
 
 
@@ -175,7 +183,7 @@ def _cable_table(snapshot: Snapshot, scale: TensionScale) -> str:
     )
     colors = scale.colors(snapshot.tension)
     rows = "".join(
-        f'<tr><td><span class="swatch" style="background:{_hex(colors[i])}"></span> {i}</td>'
+        f'<tr><td><span class="swatch" style="background:{css_color(colors[i])}"></span> {i}</td>'
         + "".join(f"<td>{number(values[i], form)}</td>" for values, form in columns)
         + "</tr>"
         for i in range(count)
@@ -228,5 +236,6 @@ def _span(values: Array, unit: str) -> str:
     return n(low, unit=unit) if low == high else f"{n(low, unit=unit)} to {n(high, unit=unit)}"
 
 
-def _hex(color: Array) -> str:
+def css_color(color: Array) -> str:
+    """A color (3,) of 0 to 255 as CSS has it."""
     return "#{:02x}{:02x}{:02x}".format(*(int(part) for part in color))

@@ -11,7 +11,13 @@ from sagline.blocks import Progress
 from sagline.errors import InvalidValueError
 from sagline.kinematics.confirm import Confirmation, confirm
 from sagline.kinematics.plan import Plan
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.viewer.course_figure import CourseFigure
+from sagline.viewer.readout import block
+from sagline.viewer.run_figures import run_figures
 from sagline.viewer.snapshot import Snapshot
+from sagline.viewer.stage import ACTUAL, WANTED, stroke
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,6 +33,9 @@ class Run:
     plan: Plan
     confirmation: Confirmation
     time: Array
+
+    name = "run"
+    still = "A run is what it was planned as; drag the platform to ask what if."
 
     @classmethod
     def of(cls, plan: Plan, progress: Progress | None = None) -> Run:
@@ -47,6 +56,16 @@ class Run:
         return cls(plan, confirm(plan, progress=progress), time - time[0])
 
     @property
+    def robot(self) -> Robot:
+        """The robot."""
+        return self.plan.state.one_robot
+
+    @property
+    def home(self) -> Pose:
+        """Where it begins."""
+        return self.plan.state.pose[0]
+
+    @property
     def duration(self) -> float:
         """Time of the last sample [s]."""
         return float(self.time[-1])
@@ -60,6 +79,19 @@ class Run:
         plan = _sample(self.plan, index)
         rest = self.confirmation.pose[index] if plan.feasible else None
         return Snapshot(plan.state.one_robot, plan.state.pose, plan, rest)
+
+    def sight(self, time: float) -> Snapshot:
+        """The sample at or before a time [s]."""
+        return self.snapshot(self.index_at(time))
+
+    def figures(self) -> tuple[CourseFigure, ...]:
+        """Tensions and lengths over time."""
+        return run_figures(self.plan, self.time)
+
+    def key(self) -> str:
+        """HTML that says which line is which cable, and which path is which."""
+        paths = block(f"path &nbsp;{stroke(WANTED)} desired {stroke(ACTUAL)} actual")
+        return CourseFigure.key(range(self.plan.unstrained_length.shape[-1])) + paths
 
     def traces(self, most: int, error_scale: float) -> tuple[Array, Array]:
         """Desired and actual positions (n, 3), n <= most, the error drawn some times as large; NaN in gaps."""

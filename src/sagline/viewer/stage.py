@@ -14,6 +14,7 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.robot.several import pulleys_of
 from sagline.viewer import lines, solids
+from sagline.viewer.moment import Moment
 from sagline.viewer.readout import headline
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.tension_scale import TensionScale
@@ -49,7 +50,8 @@ class Stage:
         self._gizmo: Any = (
             self._build_gizmo(robot, body) if draggable else scene.add_frame("/platform", show_axes=False)
         )
-        self._platform = self._scene.add_mesh_simple("/platform/body", body.vertices, body.faces, color=PLATFORM)
+        self._traces: list[Any] = []
+        self._platform: Any = self._scene.add_mesh_simple("/platform/body", body.vertices, body.faces, color=PLATFORM)
         self._rest_frame = self._scene.add_frame("/rest", show_axes=False, visible=False)
         self._scene.add_mesh_simple("/rest/body", body.vertices, body.faces, color=REST, opacity=0.55)
         self._over_pulleys = pulleys_of(robot).radius > 0.0
@@ -101,9 +103,9 @@ class Stage:
         self._gizmo.wxyz = np.roll(pose.quaternion, 1)
 
     def show(
-        self, snapshot: Snapshot, scale: TensionScale, sag_scale: float, error_scale: float, *, ghost: bool
+        self, snapshot: Snapshot | Moment, scale: TensionScale, sag_scale: float, error_scale: float, *, ghost: bool
     ) -> None:
-        """Draw a snapshot; the platform itself follows the gizmo."""
+        """Draw a snapshot, or a moment of a simulation; the platform itself follows the gizmo."""
         self._cables.points = snapshot.cable_segments(sag_scale).astype(np.float32)
         self._cables.colors = snapshot.cable_colors(scale)
         if self._wheels is not None:
@@ -111,7 +113,7 @@ class Stage:
             self._wheels.batched_wxyzs = turns.astype(np.float32)
         self._platform.color = PLATFORM if snapshot.feasible else INFEASIBLE
         self._notice.visible = not snapshot.feasible
-        if not snapshot.feasible:
+        if isinstance(snapshot, Snapshot) and not snapshot.feasible:
             self._notice.text = headline(snapshot)
         self._ghost.visible = ghost
         if ghost:
@@ -123,13 +125,29 @@ class Stage:
             self._rest_frame.position = rest
             self._rest_frame.wxyz = np.roll(snapshot.rest.quaternion, 1)
 
+    def swing(self, rest: Pose, pose: Pose, courses: Array) -> None:
+        """Draw the platform elsewhere than its gizmo, which stays at its rest, and the cables (m, P, 3) with it."""
+        back = rest.rotation.inv()
+        self._platform.position = back.as_matrix() @ (pose.position - rest.position)
+        self._platform.wxyz = np.roll((back * pose.rotation).as_quat(), 1)
+        self._cables.points = lines.segments(courses, dashed=False).astype(np.float32)
+
+    def settle(self) -> None:
+        """Put the platform back to where its gizmo is."""
+        self._platform.position = np.zeros(3)
+        self._platform.wxyz = np.array([1.0, 0.0, 0.0, 0.0])
+
     def show_traces(self, wanted: Array, actual: Array) -> None:
-        """Draw the desired and the actual path (n, 3); gaps where they are NaN."""
+        """Draw the desired and the actual path (n, 3) in place of any before; gaps where they are NaN."""
+        while self._traces:
+            self._traces.pop().remove()
         for name, points, color in (("/wanted", wanted, WANTED), ("/actual", actual, ACTUAL)):
             pairs = np.stack((points[:-1], points[1:]), axis=1)
             known = pairs[np.isfinite(pairs).all(axis=(1, 2))]
             if len(known):
-                self._scene.add_line_segments(name, known, color, thickness=TRACE_WIDTH, thickness_units="screen")
+                self._traces.append(
+                    self._scene.add_line_segments(name, known, color, thickness=TRACE_WIDTH, thickness_units="screen")
+                )
 
     def _build_surroundings(self, robot: Robot) -> None:
         frame = solids.frame(robot)
@@ -193,6 +211,11 @@ class Stage:
             active_axes=(bool(free[0]), bool(free[1]), bool(free[2])),
             disable_rotations=robot.motion_pattern not in ROTATING,
         )  # fmt: skip
+
+
+def stroke(color: tuple[int, int, int]) -> str:
+    """HTML of a short line of a color, for a key."""
+    return f'<span class="stroke" style="border-color:rgb{color}"></span>'
 
 
 def _neighbors(points: Array, near: float) -> list[tuple[Array, list[int]]]:

@@ -13,7 +13,21 @@ from sagline.cli.options import PayloadOption, RobotArgument, WrenchOption
 def view(
     robot: RobotArgument,
     run: Annotated[
-        Path | None, typer.Argument(metavar="RUN.nc", help="A run of this robot, written by sagline track, to play.")
+        Path | None,
+        typer.Argument(
+            metavar="RUN.nc", help="A run of this robot, written by sagline track, or a simulation, to play."
+        ),
+    ] = None,
+    pose: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,Y,Z[,A,B,C]",
+            help="Where the platform is at first: position [m] and angles about z, y, x [degrees].",
+        ),
+    ] = None,
+    mode: Annotated[
+        str | None,
+        typer.Option(metavar="NUMBER", help="Natural mode that moves at first: 1, 2, ...; 'massless 1'."),
     ] = None,
     wrench: WrenchOption = None,
     payload: PayloadOption = None,
@@ -30,10 +44,11 @@ def view(
     For example:
 
         sagline view cogiro
+        sagline view cogiro --pose 0,0,2 --mode 1
         sagline view own_robot.yaml --payload "5 kg" --port 9000
         sagline track article-mixed --model empirical
         sagline view article-mixed output/article-mixed-empirical.nc
     """
     from sagline.cli.view import view as serve
 
-    return serve(robot, run, wrench, payload, host, port, browser=browser)
+    return serve(robot, run, pose, mode, wrench, payload, host, port, browser=browser)

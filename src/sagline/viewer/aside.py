@@ -1,0 +1,81 @@
+"""Work that may take longer than a picture: done beside the page, the latest request alone counts."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from typing import TypeVar
+
+from sagline.errors import SaglineError
+
+T = TypeVar("T")
+
+PATIENCE = 2.0  # s: what takes longer is told how long it has taken
+
+
+class Aside:
+    """One piece of work at a time, in a thread of its own."""
+
+    def __init__(self, soon: Callable[[Callable[[], None]], None]) -> None:
+        """Begin with none; `soon` takes what the serving thread is to do, from any thread."""
+        self._soon = soon
+        self._asked = 0
+        self._began: float | None = None
+        self._next: Callable[[], None] | None = None
+
+    @property
+    def busy(self) -> bool:
+        """Whether something is being worked out."""
+        return self._began is not None
+
+    @property
+    def waited(self) -> float:
+        """For how long it has been [s]; 0 as long as nobody minds."""
+        elapsed = 0.0 if self._began is None else time.monotonic() - self._began
+        return elapsed if elapsed > PATIENCE else 0.0
+
+    def ask(self, task: Callable[[], T], done: Callable[[T], None], failed: Callable[[str], None]) -> None:
+        """Have something worked out in place of what was asked before; from the serving thread.
+
+        Args:
+            task: The work, which touches nothing that anybody else changes.
+            done: Given its result, in the serving thread, unless something else has been asked for meanwhile.
+            failed: Given the message of a `SaglineError` in the same way.
+        """
+        self._asked += 1
+        mine = self._asked
+
+        def end(tell: Callable[[], None]) -> None:
+            self._began = None
+            if mine == self._asked:
+                tell()
+            if self._next is not None:
+                start, self._next = self._next, None
+                start()
+
+        def work() -> None:
+            try:
+                result = task()
+            except SaglineError as error:
+                message = str(error)
+                self._soon(lambda: end(lambda: failed(message)))
+                return
+            except BaseException as error:
+                mistake = error
+
+                def fail() -> None:
+                    raise mistake
+
+                self._soon(fail)
+                return
+            self._soon(lambda: end(lambda: done(result)))
+
+        def start() -> None:
+            self._began = time.monotonic()
+            threading.Thread(target=work, daemon=True).start()
+
+        if self._began is None:
+            start()
+        else:
+            self._next = start

@@ -1,0 +1,91 @@
+"""Modes that move: worked out when the platform rests, then drawn picture by picture."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Hashable
+
+import numpy as np
+
+from sagline.dynamics.vibration import Vibration
+from sagline.robot.equilibrium import Equilibrium
+from sagline.viewer.aside import Aside
+from sagline.viewer.modes_panel import ModesPanel
+from sagline.viewer.stage import Stage
+from sagline.viewer.swing import PERIOD, Swing, mode_of
+
+Vibrate = Callable[[Equilibrium, float], Vibration]
+
+RESTED = 0.25  # s without a change: what is dragged is not worked out on its way
+
+
+class ModeShow:
+    """Follows what is shown; all of it belongs to the thread that serves."""
+
+    def __init__(self, panel: ModesPanel, stage: Stage, aside: Aside, vibrate: Vibrate) -> None:
+        """Begin with nothing.
+
+        Args:
+            panel: Where the modes are listed and chosen.
+            stage: Where they move.
+            aside: What works them out.
+            vibrate: Gives the vibration of a state up to a frequency [Hz].
+        """
+        self._panel, self._stage, self._aside, self._vibrate = panel, stage, aside, vibrate
+        self._key: Hashable = None
+        self._state: Equilibrium | None = None
+        self._due: float | None = None
+        self._vibration: Vibration | None = None
+        self.swing: Swing | None = None
+
+    @property
+    def moving(self) -> bool:
+        """Whether a mode moves."""
+        return self.swing is not None
+
+    @property
+    def waiting(self) -> bool:
+        """Whether something is to come without anybody's doing."""
+        return self._due is not None or self._aside.busy
+
+    def follow(self, state: Equilibrium | None, key: Hashable) -> None:
+        """A state is shown, or what is none; the same key is the same state."""
+        key = (key, self._panel.up_to)
+        if state is None or key != self._key:
+            self._still()
+            self._key, self._state, self._vibration = key, state, None
+            self._due = None if state is None else time.monotonic() + RESTED
+            self._panel.forget()
+        elif self._vibration is not None:
+            self._choose(self._vibration)
+
+    def tick(self) -> None:
+        """Draw the next picture, if something moves; see whether something is due."""
+        now = time.monotonic()
+        if self._due is not None and now >= self._due and self._state is not None:
+            self._due = None
+            state, up_to = self._state, self._panel.up_to
+            self._aside.ask(lambda: self._vibrate(state, up_to), self._found, self._panel.refuse)
+        if self._aside.waited:
+            self._panel.wait(self._aside.waited)
+        if self.swing is not None:
+            phase = 2.0 * np.pi * now / PERIOD
+            self._stage.swing(self.swing.state.pose, self.swing.pose(phase), self.swing.courses(phase))
+
+    def _found(self, vibration: Vibration) -> None:
+        if vibration.state is self._state:
+            self._vibration = vibration
+            self._choose(vibration)
+
+    def _choose(self, vibration: Vibration) -> None:
+        mode = mode_of(vibration, self._panel.chosen)
+        if mode is None:
+            self._still()
+        elif self.swing is None or self.swing.mode != mode or self.swing.state is not vibration.state:
+            self.swing = Swing.of(vibration, mode)
+        self._panel.show(vibration, self.swing)
+
+    def _still(self) -> None:
+        if self.swing is not None:
+            self._stage.swing(self.swing.state.pose, self.swing.state.pose, self.swing.rest)
+            self.swing = None

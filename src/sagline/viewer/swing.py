@@ -1,0 +1,97 @@
+"""A mode as it is drawn: platform and cables out of their rest, exaggerated, and by how much."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from sagline.arrays import Array
+from sagline.dynamics.at_rest import end_motions, following
+from sagline.dynamics.mode_list import WITH_MASS, ListedMode, listed_modes
+from sagline.dynamics.vibration import Vibration
+from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.pose import Pose
+from sagline.statics.stiffness import modes
+from sagline.viewer import lines, solids
+
+DRAWN = 0.035  # of the robot's size: how far what swings farthest is drawn from its rest
+MOST_TURN = 0.3  # rad: farthest that the platform is drawn turned
+ENERGY = 1.0  # J, of the vibration that the drawing is compared with
+PERIOD = 1.6  # s of one swing as it is drawn
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Swing:
+    """A mode that moves.
+
+    Attributes:
+        mode: Which.
+        state: The rest.
+        factor: How many times as large as with an energy of one joule it is drawn.
+        motion: Of the platform as drawn: displacement of the center of mass [m], rotation vector [rad], shape (6,).
+        rest: Points of the cables at rest [m], shape (m, P, 3).
+        moved: Their displacement as drawn, shape (m, P, 3).
+    """
+
+    mode: ListedMode
+    state: Equilibrium
+    factor: float
+    motion: Array
+    rest: Array
+    moved: Array
+
+    @classmethod
+    def of(cls, vibration: Vibration, mode: ListedMode) -> Swing:
+        """The drawing of one of the modes that a vibration lists."""
+        state, k = vibration.state, mode.number - 1
+        if mode.kind == WITH_MASS:
+            shape, cables = vibration.shape[:, k], lines.resampled(vibration.cable_shape[k], lines.POINTS)
+        else:
+            shape = modes(state).shape[:, k]
+            cables = following(state, end_motions(state, shape[:, None])[..., 0], lines.POINTS)
+        wraps, free = _at_rest(state)
+        farthest = max(float(np.linalg.norm(cables, axis=-1).max()), float(np.linalg.norm(shape[:3])))
+        scale = DRAWN * solids.size_of(state.one_robot) / farthest
+        scale = min(scale, MOST_TURN / max(float(np.linalg.norm(shape[3:])), 1e-12))
+        at_one_joule = np.sqrt(2.0 * ENERGY) / (2.0 * np.pi * mode.frequency)  # of unit modal mass
+        moved = scale * np.concatenate((np.zeros_like(wraps), cables), axis=1)
+        return cls(mode, state, scale / at_one_joule, scale * shape, np.concatenate((wraps, free), axis=1), moved)
+
+    def pose(self, phase: float) -> Pose:
+        """Where the platform is at a phase [rad]; at rest at 0."""
+        share, rest, center = np.sin(phase), self.state.pose, self.state.one_robot.center_of_mass
+        rotation = Rotation.from_rotvec(share * self.motion[3:]) * rest.rotation
+        place = rest.transform(center) + share * self.motion[:3] - rotation.as_matrix() @ center
+        return Pose(place, rotation)
+
+    def courses(self, phase: float) -> Array:
+        """Points of the cables at a phase [rad], shape (m, P, 3): their ends are on the platform, however it turns."""
+        courses = self.rest + np.sin(phase) * self.moved
+        gap = self.pose(phase).transform(self.state.one_robot.platform_anchors) - courses[:, -1]
+        share = np.zeros(courses.shape[1])
+        share[-lines.POINTS :] = np.linspace(0.0, 1.0, lines.POINTS)
+        return np.asarray(courses + share[:, None] * gap[:, None])
+
+    @property
+    def told(self) -> str:
+        """How much larger and slower than it is, in words."""
+        slower = PERIOD * self.mode.frequency
+        speed = f"{slower:.3g} times slower" if slower >= 1.0 else f"{1.0 / slower:.3g} times faster"
+        return f"drawn {self.factor:.2g} times as large as with {ENERGY:g} J, {speed}"
+
+
+def mode_of(vibration: Vibration, name: str) -> ListedMode | None:
+    """The mode of this name, "1" or "massless 1"; None where there is none."""
+    wanted = " ".join(name.split())
+    return next((mode for mode in listed_modes(vibration) if mode.name == wanted), None)
+
+
+def _at_rest(state: Equilibrium) -> tuple[Array, Array]:
+    """Points of the cables on their pulleys, and hanging."""
+    robot = state.one_robot
+    wraps = lines.wraps(robot, state.pose, None if state.contact is None else state.contact.wrap_angle)
+    if wraps.shape[1] == 1:
+        return wraps[:, :0], lines.hanging(lines.chords(robot, state.pose), state.cables, 1.0)
+    return wraps, lines.hanging(lines.chords(robot, state.pose, wraps[:, -1]), state.cables, 1.0)

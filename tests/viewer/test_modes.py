@@ -1,0 +1,183 @@
+"""Modes that move in the page, work aside, and a simulation that is played as a run is."""
+
+import re
+import threading
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.dynamics.vibrating import vibration
+from sagline.errors import InvalidValueError
+from sagline.viewer import dynamics, lines, moment_words
+from sagline.viewer.aside import Aside
+from sagline.viewer.playback import Playback
+from sagline.viewer.server import Server, started, stop
+from sagline.viewer.swing import PERIOD
+from sagline.viewer.tension_scale import TensionScale
+from sagline.viewer.viewer import Viewer
+from tests.plot import made
+from tests.viewer.client import Client
+from tests.viewer.test_viewer import ROBOT, Shown, await_that, handle
+
+POSE = sl.Pose([3.0, 2.0, 1.5], np.eye(3))
+
+
+@pytest.fixture(scope="module")
+def page() -> Iterator[Shown]:
+    server: Server = started(port=0)
+    viewer = Viewer(server, ROBOT, pose=POSE, mode="2")
+    thread = threading.Thread(target=viewer.serve)
+    thread.start()
+    await_that(lambda: viewer.view is not None, seconds=300.0)
+    yield Shown(server, viewer, thread)
+    viewer.stop()
+    thread.join(timeout=10.0)
+    stop(server)
+    assert not thread.is_alive()
+
+
+def heard_for(client: Client, seconds: float) -> list[Any]:
+    """What comes in a while; a page that moves is never silent."""
+    start, found = time.monotonic(), []
+    for message in client.heard(0.5):
+        found.append(message)
+        if time.monotonic() - start > seconds:
+            break
+    return found
+
+
+def test_a_mode_moves_at_the_rate_of_the_page_and_stops(page: Shown) -> None:
+    show = page.viewer._modes
+    await_that(lambda: show.moving, seconds=300.0)
+    assert show.swing is not None
+    found = vibration(show.swing.state, up_to=20.0)
+    assert show.swing.mode.frequency == pytest.approx(found.frequency[1], rel=1e-12)
+    with Client(page.port) as client:
+        heard_for(client, 0.5)
+        before = page.viewer.updates
+        heard = heard_for(client, 2.0)
+        drawn = sum(m.get("name") == "/cables" and "points" in m.get("updates", {}) for m in heard)
+        assert drawn / 2.0 >= 30.0  # pictures a second
+        assert page.viewer.updates == before  # nothing is solved for them
+        rest, away, end = lines.segments(show.swing.rest, dashed=False), [], time.monotonic() + PERIOD
+        while time.monotonic() < end:
+            away.append(np.linalg.norm(page.viewer._stage._cables.points - rest, axis=-1).max())
+            time.sleep(0.01)
+        farthest = np.linalg.norm(show.swing.courses(0.5 * np.pi) - show.swing.rest, axis=-1).max()
+        assert max(away) == pytest.approx(farthest, rel=0.1)
+        client.set(handle(page, "Mode")._impl.uuid, "")
+        await_that(lambda: not show.moving)
+        np.testing.assert_allclose(page.viewer._stage._cables.points, rest, atol=1e-5)
+
+
+def test_the_list_says_what_every_frequency_is(page: Shown) -> None:
+    with Client(page.port) as client:
+        client.set(handle(page, "Mode")._impl.uuid, "massless 1")
+        await_that(lambda: page.viewer._modes.moving)
+        await_that(lambda: page.viewer._modes._panel._list.content.count("chosen") == 1)
+        assert "massless</b>" in page.viewer._modes._panel._told.content
+        rows = re.findall(r"<tr data-mode.*?</tr>", page.viewer._modes._panel._list.content)
+        found = vibration(page.viewer._modes.swing.state, up_to=20.0)  # type: ignore[union-attr]
+        assert len(rows) == found.frequency.size + 6
+        assert all(("with cable mass" in row) != ("massless" in re.sub('data-mode="[^"]*"', "", row)) for row in rows)
+        marks = re.findall(r'data-mode="(\d+)"', page.viewer._modes._panel._response.content)
+        assert marks == [str(k + 1) for k in range(found.frequency.size)]
+        client.set(handle(page, "Mode")._impl.uuid, "<b>nothing</b>")
+        await_that(lambda: not page.viewer._modes.moving)
+        assert "There is no mode &lt;b&gt;nothing" in page.viewer._modes._panel._told.content
+        client.set(handle(page, "Mode")._impl.uuid, "1")
+        await_that(lambda: page.viewer._modes.moving)
+
+
+def test_while_the_platform_is_dragged_nothing_swings_and_then_its_new_modes_do(page: Shown) -> None:
+    with Client(page.port) as client:
+        client.set(handle(page, "Mode")._impl.uuid, "1")
+        await_that(lambda: page.viewer._modes.moving)
+        for x in np.linspace(3.0, 0.0, 20):
+            client.drag([x, 0.0, 1.5])
+            time.sleep(0.03)
+        await_that(lambda: page.position[0] == 0.0)
+        await_that(lambda: page.viewer._modes.moving)
+        swing = page.viewer._modes.swing
+        assert swing is not None
+        assert swing.mode.frequency == pytest.approx(1.77012, abs=1e-5)  # as finite elements have it
+        assert swing.state.pose.position[0] == 0.0
+
+
+def test_a_cut_cable_is_simulated_and_played_as_a_run_is(page: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[Any] = []
+
+    def cut(state: sl.Equilibrium, cable: int, cable_mass: str) -> sl.Simulation:
+        asked.append((state.pose.position.tolist(), cable, cable_mass))
+        return made.simulation()
+
+    monkeypatch.setattr(dynamics, "cut", cut)
+    with Client(page.port) as client:
+        client.drag([1.0, 0.0, 2.0])
+        await_that(lambda: page.position[0] == 1.0)
+        client.set(handle(page, "Cable to cut")._impl.uuid, "3")
+        client.set(handle(page, "Cut")._impl.uuid, True)
+        await_that(lambda: page.viewer._played is not None)
+        assert asked == [([1.0, 0.0, 2.0], 3, "none")]
+        await_that(lambda: "break of cable 3 at 1.000 s" in page.viewer._panel._verdict.content)
+        assert "massless cables" in page.viewer._panel._verdict.content
+        assert not page.viewer._modes.moving
+        await_that(lambda: page.viewer._clock.time == 2.0)
+        client.grab()
+        client.drag([0.5, 0.0, 2.0])
+        await_that(lambda: page.position[0] == 0.5)
+        await_that(lambda: page.viewer._modes.moving)
+
+
+def test_a_moment_of_a_simulation_hangs_as_its_lengths_say() -> None:
+    played = Playback(made.simulation())
+    start, end = played.sight(0.0), played.sight(9.0)
+    state = made.state_at()
+    ends = lines.chords(ROBOT, state.pose)
+    np.testing.assert_allclose(start.courses(1.0), lines.hanging(ends, state.cables, 1.0), atol=1e-9)
+    assert end.index == 199
+    assert np.isnan(end.tension[3])
+    np.testing.assert_array_equal(end.courses(1.0)[3], np.broadcast_to(ROBOT.frame_anchors[3], (41, 3)))
+    assert "<td>–</td>" in moment_words.numbers(end, TensionScale.of(ROBOT))
+    assert played.duration == 2.0
+    wanted, actual = played.traces(50, 1.0)
+    assert np.isnan(wanted).all()
+    np.testing.assert_array_equal(actual[[0, -1]], played.simulation.pose.position[[0, -1]])
+
+
+def test_of_work_aside_the_latest_alone_counts() -> None:
+    tasks: list[Callable[[], None]] = []
+    aside, done = Aside(tasks.append), list[int]()
+    gate = threading.Event()
+
+    def slow() -> int:
+        gate.wait(10.0)
+        return 1
+
+    def refuse() -> int:
+        raise InvalidValueError("state", "none", "some", "Try.")
+
+    aside.ask(slow, done.append, print)
+    aside.ask(lambda: 2, done.append, print)
+    aside.ask(lambda: 3, done.append, print)
+    assert aside.busy
+    assert aside.waited == 0.0
+    gate.set()
+    for _ in range(2):
+        await_that(lambda: bool(tasks))
+        tasks.pop()()
+    assert done == [3]
+    assert not aside.busy
+    told: list[str] = []
+    aside.ask(refuse, done.append, told.append)
+    await_that(lambda: bool(tasks))
+    tasks.pop()()
+    assert told == [str(InvalidValueError("state", "none", "some", "Try."))]
+    aside.ask(lambda: 1 // 0, done.append, told.append)
+    await_that(lambda: bool(tasks))
+    with pytest.raises(ZeroDivisionError):  # a mistake is none of the user's
+        tasks.pop()()
