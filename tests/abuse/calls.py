@@ -629,6 +629,10 @@ def _figures(given: _Given) -> dict[str, Call]:
             draw_two,
             {"vibration": ("one", swing), "time": ("array", np.array([0.0, 1.0]), True), "ax": ax},
         ),
+        "film": (
+            sl.plot.film,
+            {"vibration": ("one", swing), "number": ("whole", 1), "file": ("file", str(given.folder / "mode.gif"))},
+        ),
         "energy": (sl.plot.energy, {"simulation": ("one", made.simulation(20))}),
         "save": (sl.plot.save, {"drawing": ("one", flat), "file": ("file", str(given.folder / "figure.svg"))}),
     }

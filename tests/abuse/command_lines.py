@@ -19,6 +19,8 @@ LINES = {
     "identify": ["identify", "cable.csv"],
     "forward": ["forward", "cogiro", "lengths.csv"],
     "tension": ["tension", "cogiro", "--no-figures"],
+    "vibrate": ["vibrate", "cogiro", "--up-to", "4", "--no-figures"],
+    "simulate": ["simulate", "cogiro", "--after", "0.1", "--no-figures"],
     "robots": ["robots"],
     "show": ["show", "cogiro"],
     "examples": ["examples"],

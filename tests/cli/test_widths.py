@@ -41,6 +41,8 @@ COMMANDS = (
     ["forward", "wound.yaml", "counts.csv", "--counts"],
     ["tension", "cogiro", "--no-figures"],
     ["tension", "many.yaml", "--pose", "0,0,2", "--no-figures"],
+    ["vibrate", "cogiro", "--up-to", "6", "--no-figures"],
+    ["simulate", "cogiro", "--break", "3@0.1s", "--after", "0.2", "--no-figures"],
     ["robots"],
     ["show", "cogiro"],
     ["show", "many.yaml"],

@@ -95,7 +95,7 @@ def edited(data: xr.Dataset, name: str, index: Any, value: Any) -> xr.Dataset:
     ("name", "index", "value", "told"),
     [
         ("tensions", (2, 1), -1.0, r"tensions\[2, 1\] is -1; allowed: >= 0 N, finite"),
-        ("length", (2, 1), np.nan, r"length\[2, 1\] is nan; allowed: >= 0 m, finite"),
+        ("length", (2, 1), -1.0, r"length\[2, 1\] is -1; allowed: >= 0 m"),
         ("energy_error", 3, np.inf, r"energy_error\[3\] is inf; allowed: finite"),
         ("twist", (0, 0), np.nan, r"twist\[0, 0\] is nan"),
         ("quaternion", (2, 0), 7.0, "quaternion"),

@@ -171,7 +171,7 @@ def test_of_work_aside_the_latest_alone_counts() -> None:
         await_that(lambda: bool(tasks))
         tasks.pop()()
     assert done == [3]
-    assert not aside.busy
+    await_that(lambda: not aside.busy)
     told: list[str] = []
     aside.ask(refuse, done.append, told.append)
     await_that(lambda: bool(tasks))

@@ -61,7 +61,7 @@ def test_it_says_how_much_larger_than_with_a_joule_it_is_drawn() -> None:
         )
         assert kinetic == pytest.approx(swing.factor**2, rel=1e-9)
         assert f"drawn {swing.factor:.2g} times as large as with 1 J" in swing.told
-        assert f"{1.6 * swing.mode.frequency:.3g} times slower" in swing.told
+        assert f"{2.0 * swing.mode.frequency:.3g} times slower" in swing.told
 
 
 def test_modes_are_asked_for_by_their_names() -> None:

@@ -33,6 +33,34 @@ class Model(StrEnum):
         return models[self]()
 
 
+class Direction(StrEnum):
+    """Along which axis a force acts, or about which a moment."""
+
+    X = "x"
+    Y = "y"
+    Z = "z"
+    ABOUT_X = "about x"
+    ABOUT_Y = "about y"
+    ABOUT_Z = "about z"
+
+
+class CableMass(StrEnum):
+    """How cables have mass in motion."""
+
+    NONE = "none"
+    LUMPED = "lumped"
+    MODAL = "modal"
+
+
+class ShaperKind(StrEnum):
+    """What shapes a path so that it excites no vibration."""
+
+    NONE = "none"
+    ZV = "zv"
+    ZVD = "zvd"
+    EI = "ei"
+
+
 class Variable(StrEnum):
     """Tensions in which the load can be shared."""
 

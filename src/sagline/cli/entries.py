@@ -136,6 +136,31 @@ def _vibration_over_pulleys() -> None:
     sl.modes(_unknown_state(OVER_PULLEYS))
 
 
+def _modes() -> None:
+    import sagline as sl
+
+    sl.vibration(_hung_state(), up_to=3.0)
+
+
+def _simulation() -> None:
+    import sagline as sl
+
+    sl.simulate(_hung_state(), duration=0.01)
+
+
+def _hung_state() -> Equilibrium:
+    """Cables that hang, all at one tension: nearly in balance, and none of what solves for it is needed."""
+    import numpy as np
+
+    import sagline as sl
+    from sagline.arrays import locked
+
+    robot, pose = sl.load_robot(ROBOT), sl.Pose(PLACE, LEVEL)
+    run = pose.transform(robot.platform_anchors) - robot.frame_anchors
+    cables = sl.Catenary().from_tension(robot.cables, np.hypot(*run[:, :2].T), run[:, 2], 150.0, robot.gravity)
+    return sl.Equilibrium(robot, pose, locked(np.zeros(6)), cables)
+
+
 def _unknown_state(name: str = ROBOT) -> Equilibrium:
     """Cables of which nothing is known: whatever is asked of them is soon answered."""
     import numpy as np
@@ -154,6 +179,7 @@ def _unknown_state(name: str = ROBOT) -> Equilibrium:
 INVERSE, SHARING, VERDICTS = "inverse kinematics", "further ways of sharing", "verdicts of infeasible poses"
 FORWARD, FIT = "forward kinematics", "fit of straight cables"
 MARGINS, POLYGON, VIBRATION = "margins", "tension polygon", "stiffness and vibration"
+MODES, SIMULATION = "modes with cable mass", "motion in time"
 FORWARD_OVER_PULLEYS, VIBRATION_OVER_PULLEYS = f"{FORWARD} over pulleys", f"{VIBRATION} over pulleys"
 
 ENTRIES = {
@@ -168,6 +194,8 @@ ENTRIES = {
         Entry(MARGINS, "inverse.queries.margins_of_poses", 33, 9.0, _margins),
         Entry(POLYGON, "inverse.queries.polygon_of_pose", 38, 5.0, _polygon),
         Entry(VIBRATION, "forward.sensitivity.describe_states", 57, 6.0, _vibration),
+        Entry(MODES, "dynamics.spectral.interpolate", 2, 9.0, _modes),
+        Entry(SIMULATION, "dynamics.motion.run", 54, 40.0, _simulation),
         Entry(
             VIBRATION_OVER_PULLEYS, "forward.sensitivity.describe_states", 39, 4.0, _vibration_over_pulleys, version=2
         ),

@@ -14,6 +14,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from sagline.cli.commands.article import article, identify
+from sagline.cli.commands.motion import simulate, vibrate
 from sagline.cli.commands.poses import forward, tension
 from sagline.cli.commands.robots import convert, examples, new, robots, show
 from sagline.cli.commands.track import encoder, lengths, run, track
@@ -35,6 +36,8 @@ Start here:
     sagline track cogiro own_path.yaml   a robot along a path of your own
     sagline forward cogiro lengths.csv   from measured lengths to poses
     sagline tension cogiro               ways of sharing a load compared
+    sagline vibrate cogiro               how it swings, cables and all
+    sagline simulate cogiro --break 3@1s what comes when a cable breaks
     sagline article                      the article redone, as one page
     sagline view cogiro                  drag a platform in the browser
     sagline new my_robot.yaml            a robot of your own, by questions
@@ -135,7 +138,8 @@ def sagline(
 
 
 for command in (
-    track, lengths, encoder, run, article, identify, forward, tension, robots, show, examples, new, convert, view,
+    track, lengths, encoder, run, article, identify, forward, tension, vibrate, simulate, robots, show, examples, new,
+    convert, view,
 ):  # fmt: skip
     text = _help(command.__doc__)
     app.command(cls=Command, help=text, short_help=text.partition("\n\n")[0])(command)

@@ -55,11 +55,11 @@ def tell(runs: Sequence[Run], files: Sequence[Path], folder: Path, *, as_json: b
         show_json({"runs": [_record(run) for run in runs], "files": list(files)})
     else:
         show_table(summary_grid(runs))
-        show(f"In {folder.resolve()}: {_listed(files)}", whole=True)
+        show(f"In {folder.resolve()}: {listed(files)}", whole=True)
     return max((_complaints(run) for run in runs), default=0)
 
 
-def _listed(files: Sequence[Path]) -> str:
+def listed(files: Sequence[Path]) -> str:
     """Names, those of a figure's two forms as one."""
     suffixes: dict[str, list[str]] = {}
     for file in files:

@@ -54,7 +54,7 @@ def track(
     machine = loaded(load_robot(robot), payload)
     way = article_path() if path is None else load_path(path)
     if path is not None:
-        _check_unit(path, way, machine)
+        check_unit(path, way, machine)
     cable = model.build()
     name = run_name(machine, cable)
     drawn = [f"{name}-{figure}" for figure in FIGURES] if figures else []
@@ -72,8 +72,17 @@ def track(
     return tell([run], files, folder, as_json=as_json)
 
 
-def _check_unit(file: Path, way: MotionPath, robot: Robot) -> None:
-    """Refuse a path so far from the robot that it must be in another unit."""
+def check_unit(file: Path, way: MotionPath, robot: Robot) -> None:
+    """Refuse a path so far from the robot that it must be in another unit.
+
+    Args:
+        file: Where the path is from.
+        way: The path.
+        robot: The robot.
+
+    Raises:
+        FileError: If it leads too far away.
+    """
     size = float(np.linalg.norm(np.ptp(robot.frame_anchors, axis=0)))
     away = np.linalg.norm(way.pose.position - robot.frame_anchors.mean(axis=0), axis=1)
     k = int(np.argmax(away))

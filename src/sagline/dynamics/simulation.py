@@ -58,7 +58,7 @@ class Simulation:
         pose: Poses of the platform, a batch of N.
         twist: Velocity of the center of mass and angular velocity, world axes [m/s, rad/s], shape (N, 6).
         tensions: At the frame ends [N], shape (N, m).
-        length: Unstrained lengths off the drum [m], shape (N, m).
+        length: Unstrained lengths off the drum [m], shape (N, m); NaN of a cable that has broken.
         energy: Where the energy is.
         events: What happened, in order.
         cable_mass: "none", "lumped" or "modal".

@@ -7,6 +7,7 @@ Axes it is `ax.figure` that does. `save` writes either to a file.
 from sagline.plot.courses import lengths, overview, tensions
 from sagline.plot.energy import energy
 from sagline.plot.errors import error, errors
+from sagline.plot.film import film
 from sagline.plot.frequencies import frequencies
 from sagline.plot.motion import path, velocity
 from sagline.plot.polygon import polygon
@@ -18,6 +19,7 @@ __all__ = [
     "energy",
     "error",
     "errors",
+    "film",
     "frequencies",
     "lengths",
     "overview",

@@ -19,7 +19,7 @@ from sagline.viewer import lines, solids
 DRAWN = 0.035  # of the robot's size: how far what swings farthest is drawn from its rest
 MOST_TURN = 0.3  # rad: farthest that the platform is drawn turned
 ENERGY = 1.0  # J, of the vibration that the drawing is compared with
-PERIOD = 1.6  # s of one swing as it is drawn
+PERIOD = 2.0  # s of one swing as it is drawn
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,0 +1,210 @@
+"""`sagline vibrate`: natural frequencies of a pose, with cable mass and massless, and what the platform answers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from sagline.cli.csv_text import csv_text
+from sagline.cli.ending import OUTSIDE
+from sagline.cli.entries import INVERSE, MODES, VIBRATION
+from sagline.cli.results import figure_files, listed, write_figures
+from sagline.cli.tables import Grid, show_table, written
+from sagline.cli.terminal import note, show, show_json, working
+from sagline.cli.values import loaded, middle_of, pose_of, quantity, wrench_of
+from sagline.dynamics.damping import Damping
+from sagline.dynamics.mode_list import MASSLESS, WITH_MASS, ListedMode, listed_modes, successors
+from sagline.dynamics.vibrating import vibration
+from sagline.dynamics.vibration_status import VibrationStatus
+from sagline.errors import InvalidValueError
+from sagline.files.names import file_stem
+from sagline.files.robot_file import load_robot
+from sagline.files.whole import check_files, made_folder, write_text
+from sagline.kinematics.inverse import inverse
+from sagline.kinematics.status import PoseStatus
+
+if TYPE_CHECKING:
+    from sagline.dynamics.vibration import Vibration
+    from sagline.robot.equilibrium import Equilibrium
+
+LEAST_SHARE = 0.05  # of the platform in a mode that is shown; the file has them all
+LOWEST = 3  # modes that are shown whatever swings
+FRAME_TIME = 0.08  # s, of a film
+
+
+class Losses(NamedTuple):
+    """Damping as texts of the command line."""
+
+    damping: str
+    loss_time: str
+    air_damping: str
+
+    @property
+    def damping_of(self) -> Damping:
+        """As numbers."""
+        return Damping(
+            quantity(self.loss_time, "--loss-time", "s", low=0.0),
+            quantity(self.air_damping, "--air-damping", "N*s/m^2", low=0.0),
+            quantity(self.damping, "--damping", "", low=0.0),
+        )
+
+
+def vibrate(
+    name: str,
+    pose: str | None,
+    up_to: str,
+    losses: Losses,
+    force: str,
+    film: int | None,
+    wrench: str | None,
+    payload: str | None,
+    folder: Path,
+    *,
+    figures: bool,
+    as_json: bool,
+) -> int:
+    """Work out the modes, tell, write and draw them; returns the exit code.
+
+    Raises:
+        SaglineError: If an input is wrong or the folder cannot be written.
+    """
+    limit, damping = quantity(up_to, "--up-to", "Hz", above=0.0), losses.damping_of
+    load, place = wrench_of(wrench), None if pose is None else pose_of(pose)
+    robot = loaded(load_robot(name), payload)
+    table, drawing = (file_stem(robot.name, what) for what in ("modes", "response"))
+    reel = f"{file_stem(robot.name, f'mode-{film}')}.gif"
+    check_files(folder, [f"{table}.csv", *figure_files([drawing] * figures), *[reel] * (film is not None)])
+    place = middle_of(robot) if place is None else place
+    with working(f"{robot.name}: modes up to {limit:g} Hz", INVERSE, VIBRATION, MODES) as line:
+        plan = inverse(robot, place, wrench=load)
+        if not plan.feasible:
+            note("No modes: ", PoseStatus(int(plan.status)).text, style="bold red")
+            return OUTSIDE
+        found = vibration(plan.state, up_to=limit, damping=damping)
+        if found.status in (VibrationStatus.UNSTABLE, VibrationStatus.NO_LENGTHS):
+            note("No modes: ", found.status.text, style="bold red")
+            return OUTSIDE
+        modes = listed_modes(found)
+        _check_film(film, modes)
+        made_folder(folder)
+        files = [folder / f"{table}.csv"]
+        write_text(files[0], csv_text(_rows(modes)))
+        if figures and found.status is VibrationStatus.SOLVED and found.frequency.size:
+            from sagline import plot
+
+            line.stage("drawing the response")
+            files += write_figures({drawing: plot.response(found, force)}, folder)
+        if film is not None:
+            from sagline import plot
+
+            files.append(folder / reel)
+            plot.film(found, film, files[-1], progress=line.stage(f"filming mode {film}"))
+    if as_json:
+        show_json({**_record(found, modes), "files": files})
+    else:
+        _tell(found, modes, plan.state)
+        show(f"In {folder.resolve()}: {listed(files)}", whole=True)
+    if found.status is VibrationStatus.FOLDED:
+        slack = ", ".join(map(str, found.slack_cables))
+        note(f"Cables {slack}: ", found.status.text, style="bold")
+    return 0
+
+
+def _check_film(film: int | None, modes: list[ListedMode]) -> None:
+    count = sum(mode.kind == WITH_MASS for mode in modes)
+    if film is not None and not 1 <= film <= count:
+        raise InvalidValueError("--film", film, f"1 to {count}, modes with cable mass", "Raise --up-to for more.")
+
+
+def _tell(found: Vibration, modes: list[ListedMode], state: Equilibrium) -> None:
+    """The table, with each massless mode beside the one in which most of its motion is found."""
+    swinging = [mode for mode in modes if mode.kind == WITH_MASS]
+    shares = successors(found)
+    beside: dict[int, list[str]] = {}
+    beyond = []
+    for mode in (each for each in modes if each.kind == MASSLESS):
+        k = mode.number - 1
+        if swinging and mode.frequency < found.up_to:
+            beside.setdefault(int(shares[k].argmax()), []).append(written(mode.frequency, ".3f"))
+        else:
+            beyond.append(mode.frequency)
+    chosen = [
+        mode for k, mode in enumerate(swinging) if k < LOWEST or mode.platform_share >= LEAST_SHARE or k in beside
+    ]
+    rows = [
+        [
+            mode.name,
+            written(mode.frequency, ".3f"),
+            written(100.0 * mode.platform_share, ".0f"),
+            "–" if mode.cable is None else str(mode.cable),
+            written(100.0 * mode.cable_share, ".0f"),
+            written(100.0 * mode.loss, ".3g"),
+            ", ".join(beside.get(mode.number - 1, [])),
+        ]
+        for mode in chosen
+    ]
+    heads = [
+        "mode",
+        "with cable\nmass [Hz]",
+        "platform\n[%]",
+        "cable",
+        "its share\n[%]",
+        "damping\n[%]",
+        "massless\n[Hz]",
+    ]
+    x, y, z = state.pose.position
+    show_table(Grid(heads, rows, f"{state.one_robot.name} at {x:g}, {y:g}, {z:g} m", left=frozenset()))
+    proof = "none is missing, by the exact count" if found.complete else "some may be missing"
+    hidden = len(swinging) - len(chosen)
+    text = f"{len(swinging)} modes with cable mass below {found.up_to:g} Hz: {proof}."
+    if hidden:
+        text += f" Not shown: {hidden} in which cables swing alone (platform below {100.0 * LEAST_SHARE:.0f} %)."
+    show(text)
+    if beyond:
+        higher = ", ".join(written(frequency, ".3f") for frequency in beyond)
+        show(f"Massless modes that are beyond it: {higher} Hz")
+    elif swinging:
+        show("A massless frequency stands beside the mode that has the largest part of its motion.")
+
+
+def _rows(modes: list[ListedMode]) -> list[list[Any]]:
+    header = ["mode", "kind", "frequency [Hz]", "platform_share", "cable", "cable_share", "damping_ratio"]
+    return [
+        header,
+        *(
+            [
+                mode.number,
+                mode.kind,
+                mode.frequency,
+                mode.platform_share,
+                "" if mode.cable is None else mode.cable,
+                mode.cable_share,
+                mode.loss,
+            ]
+            for mode in modes
+        ),
+    ]
+
+
+def _record(found: Vibration, modes: list[ListedMode]) -> dict[str, Any]:
+    return {
+        "robot": found.state.one_robot.name,
+        "position_m": found.state.pose.position.tolist(),
+        "up_to_hz": found.up_to,
+        "status": found.status.name,
+        "complete": found.complete,
+        "modes": [
+            {
+                "mode": mode.number,
+                "kind": mode.kind,
+                "frequency_hz": mode.frequency,
+                "platform_share": mode.platform_share,
+                "cable": mode.cable,
+                "cable_share": mode.cable_share,
+                "damping_ratio": mode.loss if np.isfinite(mode.loss) else None,
+            }
+            for mode in modes
+        ],
+    }

@@ -1,0 +1,120 @@
+"""A mode that moves, as a film: platform and cables, exaggerated, with what it is and by how much."""
+
+from __future__ import annotations
+
+import os
+from io import BytesIO
+from itertools import combinations, product
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from mpl_toolkits.mplot3d.axes3d import Axes3D
+from PIL import Image
+
+from sagline.arguments import file_path, instance, whole_number
+from sagline.dynamics.mode_list import WITH_MASS, listed_modes
+from sagline.dynamics.vibration import Vibration
+from sagline.errors import FileError, InvalidValueError
+from sagline.files.whole import written_whole
+from sagline.plot.sheet import BLUE, GAP_COLOR, LABEL, TICK, VERMILLION, sheet
+from sagline.viewer.swing import PERIOD, Swing
+
+if TYPE_CHECKING:
+    from sagline.arrays import Array
+    from sagline.blocks import Progress
+    from sagline.robot.pose import Pose
+    from sagline.robot.robot import Robot
+
+SECONDS = 10.0  # of the film: so many swings that the last picture leads to the first
+PICTURES = 25  # of one swing
+WIDTH, HEIGHT, DOTS = 6.4, 3.8, 100  # in, in, dots an inch
+COLORS = 48
+CORNERS = np.array(list(product((-0.5, 0.5), repeat=3)))
+EDGES = [(a, b) for a, b in combinations(range(8), 2) if np.count_nonzero(CORNERS[a] != CORNERS[b]) == 1]
+
+
+def film(vibration: Vibration, number: int, file: os.PathLike[str] | str, *, progress: Progress | None = None) -> None:
+    """Film a mode with cable mass for ten seconds, as a GIF that repeats.
+
+    Args:
+        vibration: From `vibration`.
+        number: Of the mode, 1 for the lowest.
+        file: The file, "mode.gif" for instance; one that exists is replaced.
+        progress: Told how many pictures are drawn, of how many.
+
+    Raises:
+        InvalidValueError: If there is no such mode.
+        FileError: If the file cannot be written, or is no .gif.
+    """
+    path = file_path(file)
+    if path.suffix.lower() != ".gif":
+        raise FileError(path, f"the suffix is {path.suffix or 'missing'}", "Name it .gif.")
+    modes = [mode for mode in listed_modes(instance(vibration, Vibration, "vibration")) if mode.kind == WITH_MASS]
+    if not 1 <= whole_number(number, "number", 1) <= len(modes):
+        step = "Raise up_to for more."
+        raise InvalidValueError("number", number, f"1 to {len(modes)}, modes with cable mass", step)
+    pictures = _pictures(Swing.of(vibration, modes[number - 1]), progress)
+    rounds = round(SECONDS / PERIOD)
+    buffer = BytesIO()
+    pictures[0].save(
+        buffer, "GIF", save_all=True, append_images=(pictures * rounds)[1:], duration=round(1e3 * PERIOD / PICTURES),
+        loop=0,
+    )  # fmt: skip
+    with written_whole(path) as partial:
+        partial.write_bytes(buffer.getbuffer())
+
+
+def _pictures(swing: Swing, progress: Progress | None) -> list[Image.Image]:
+    """One swing, picture by picture, all of the same colors."""
+    robot, mode = swing.state.one_robot, swing.mode
+    figure = sheet(HEIGHT, WIDTH)
+    canvas: Any = FigureCanvasAgg(figure)
+    figure.set_layout_engine("none")
+    ax = figure.add_axes((0.0, 0.05, 1.0, 0.9), projection="3d")
+    assert isinstance(ax, Axes3D)
+    for course in swing.rest:
+        ax.plot(*course.T, color=GAP_COLOR, linewidth=0.8)
+    cables = [ax.plot(*course.T, color=BLUE, linewidth=1.3)[0] for course in swing.rest]
+    edges = [ax.plot([0.0], [0.0], [0.0], color=VERMILLION, linewidth=1.6)[0] for _ in EDGES]
+    ax.scatter(*robot.frame_anchors.T, color="black", s=7.0, depthshade=False)
+    for artist in ax.get_children():
+        artist.set_clip_on(False)  # the axes are square, the picture is wider
+    _frame(ax, swing)
+    share = f"platform {100.0 * mode.platform_share:.0f} %, cable {mode.cable} {100.0 * mode.cable_share:.0f} %"
+    ax.set_title(f"{robot.name}, mode {mode.number}: {mode.frequency:.3f} Hz {mode.kind}", fontsize=LABEL, y=0.97)
+    figure.text(0.5, 0.02, f"{share}; {swing.told}", fontsize=TICK, ha="center")
+    drawn = []
+    for k in range(PICTURES):
+        phase = 2.0 * np.pi * k / PICTURES
+        for line, course in zip(cables, swing.courses(phase), strict=True):
+            line.set_data_3d(*course.T)
+        corners = _corners(robot, swing.pose(phase))
+        for line, (a, b) in zip(edges, EDGES, strict=True):
+            line.set_data_3d(*corners[[a, b]].T)
+        figure.set_dpi(DOTS)
+        canvas.draw()
+        drawn.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB"))
+        if progress is not None:
+            progress(k + 1, PICTURES)
+    palette = drawn[0].quantize(COLORS)
+    return [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in drawn]
+
+
+def _frame(ax: Axes3D, swing: Swing) -> None:
+    """What is seen, at one scale along all axes, without numbers."""
+    points = swing.rest.reshape(-1, 3)
+    low, high = points.min(axis=0), points.max(axis=0)
+    size = np.maximum(high - low, 0.15 * np.max(high - low))
+    middle = 0.5 * (low + high)
+    ax.set(**{f"{name}lim": (m - 0.5 * s, m + 0.5 * s) for name, m, s in zip("xyz", middle, size, strict=True)})
+    ax.set_box_aspect(size, zoom=1.5)
+    ax.set_axis_off()
+    ax.view_init(elev=18.0, azim=-62.0)
+
+
+def _corners(robot: Robot, pose: Pose) -> Array:
+    """The eight corners of the platform in the world [m]."""
+    low, high = robot.platform_anchors.min(axis=0), robot.platform_anchors.max(axis=0)
+    size = high - low if robot.platform_size is None else robot.platform_size
+    return np.asarray(pose.transform(0.5 * (low + high) + size * CORNERS))

@@ -1,0 +1,142 @@
+"""`sagline vibrate` and `sagline simulate`: numbers of the library, files, what is said where nothing comes."""
+
+import json
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import sagline as sl
+from sagline.cli.main import app
+from sagline.dynamics.to_shape import to_shape
+
+WAY = "durations: 1\nrate: 100\nwaypoints: [{position: [0, 0, 1.5]}, {position: [1, 0, 1.5]}]\n"
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch) -> FilePath:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "80")
+    (tmp_path / "way.yaml").write_text(WAY)
+    return tmp_path
+
+
+def sagline(*words: str) -> Any:
+    return CliRunner().invoke(app, list(words))
+
+
+def test_the_modes_are_those_of_the_library(folder: FilePath) -> None:
+    result = sagline(
+        "vibrate", "article-suspended", "--pose", "3,2,1.5", "--up-to", "2", "--loss-time", "1e-3", "--json"
+    )
+    assert result.exit_code == 0, result.stderr
+    found = json.loads(result.stdout)
+    state = sl.inverse(sl.load_robot("article-suspended"), sl.Pose([3, 2, 1.5], np.eye(3))).state
+    modes = sl.vibration(state, up_to=2.0, damping=sl.Damping(loss_time=1e-3, modal_damping=0.01))
+    swinging = [mode for mode in found["modes"] if mode["kind"] == "with cable mass"]
+    # the lowest six, as finite elements have them
+    told = [mode["frequency_hz"] for mode in swinging]
+    np.testing.assert_allclose(told[:6], [1.32058, 1.32629, 1.36270, 1.41008, 1.75574, 1.82122], atol=1e-5)
+    np.testing.assert_allclose([mode["platform_share"] for mode in swinging], modes.platform_share, rtol=1e-9)
+    np.testing.assert_allclose([mode["damping_ratio"] for mode in swinging], modes.loss, rtol=1e-9)
+    light = [mode["frequency_hz"] for mode in found["modes"] if mode["kind"] == "massless"]
+    np.testing.assert_allclose(light, sl.modes(state).frequency, rtol=1e-12)
+    assert found["complete"] is True
+    names = sorted(file.name for file in (folder / "output").iterdir())
+    assert names == [f"article-suspended-{each}" for each in ("modes.csv", "response.png", "response.svg")]
+
+
+def test_every_frequency_says_what_it_is_and_hidden_modes_are_counted(folder: FilePath) -> None:
+    result = sagline("vibrate", "cogiro", "--pose", "0,0,2", "--up-to", "12", "--no-figures")
+    assert result.exit_code == 0, result.stderr
+    state = sl.inverse(sl.load_robot("cogiro"), sl.Pose([0, 0, 2], np.eye(3))).state
+    modes = sl.vibration(state, up_to=12.0)
+    text = " ".join(result.stdout.split())
+    assert f"{modes.count} modes with cable mass below 12 Hz: none is missing, by the exact count." in text
+    assert f"Massless modes that are beyond it: {sl.modes(state).frequency[-1]:.3f} Hz" in text
+    rows = [line.split() for line in result.stdout.splitlines() if line.strip()[:1].isdigit() and "mode" not in line]
+    assert [float(row[1]) for row in rows[:3]] == modes.frequency[:3].round(3).tolist()
+    assert f"Not shown: {modes.count - len(rows)} in which cables swing alone" in text
+    beside = [row[-1] for row in rows if len(row) == 7]
+    assert beside == [f"{each:.3f}" for each in sl.modes(state).frequency[:-1]]
+    table = (folder / "output" / "cogiro-modes.csv").read_text().splitlines()
+    assert len(table) == 1 + modes.count + 6
+
+
+def test_a_film_of_ten_seconds(folder: FilePath) -> None:
+    from PIL import Image
+
+    result = sagline("vibrate", "article-suspended", "--up-to", "2.2", "--no-figures", "--film", "1")
+    assert result.exit_code == 0, result.stderr
+    with Image.open(folder / "output" / "article-suspended-mode-1.gif") as film:
+        assert film.n_frames * film.info["duration"] == 10_000  # type: ignore[attr-defined]
+        pictures = []
+        for k in (0, 6, 25):
+            film.seek(k)
+            pictures.append(np.asarray(film.convert("L"), dtype=float))
+    assert np.abs(pictures[0] - pictures[1]).max() > 50.0  # a quarter of a swing later
+    np.testing.assert_array_equal(pictures[0], pictures[2])
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "told"),
+    [
+        (["vibrate", "article-suspended", "--pose", "7.45,0,1.5"], 1, "No modes: "),
+        (["vibrate", "cogiro", "--up-to", "0"], 2, "--up-to"),
+        (["vibrate", "cogiro", "--up-to", "3 kg"], 2, "--up-to"),
+        (["vibrate", "cogiro", "--up-to", "1e5"], 2, "frequency is 100000 Hz"),
+        (["vibrate", "cogiro", "--damping", "2"], 2, "modal_damping"),
+        (["vibrate", "cogiro", "--film", "99999"], 2, "--film"),
+        (["simulate", "cogiro", "--break", "9@1s"], 2, "cable 9"),
+        (["simulate", "cogiro", "--break", "3"], 2, "CABLE@TIME"),
+        (["simulate", "cogiro", "--break", "3@1kg"], 2, "--break"),
+        (["simulate", "cogiro", "--out", "sim.txt"], 2, ".nc"),
+        (["simulate", "cogiro", "--step", "1"], 2, "step"),
+        (["simulate", "cogiro", "way.yaml", "--after", "-1"], 2, "--after"),
+    ],
+)
+def test_bad_input_ends_in_one_line(folder: FilePath, words: list[str], code: int, told: str) -> None:
+    result = sagline(*words)
+    assert result.exit_code == code
+    assert told in result.stderr
+    lines = [line for line in result.stderr.splitlines() if not line.startswith("First run")]
+    assert len(lines) == 1
+    assert not list(folder.glob("**/*.nc"))
+
+
+def test_a_break_is_what_the_library_says_and_its_file_is_read_again(folder: FilePath) -> None:
+    words = ["--break", "3@0.2s", "--after", "1", "--loss-time", "1e-3", "--tension", "minimum-norm"]
+    result = sagline("simulate", "cogiro", *words, "--out", "sim.nc")
+    assert result.exit_code == 0, result.stderr
+    robot = sl.load_robot("cogiro")
+    assert robot.test_box is not None
+    middle = sl.Pose(0.5 * (robot.test_box.low + robot.test_box.high), np.eye(3))
+    state = sl.inverse(robot, middle, tension=sl.MinimumNorm()).state
+    own = sl.simulate(state, duration=1.0, events=sl.Break(cable=3, time=0.2), damping=sl.Damping(loss_time=1e-3))
+    read = sl.load_simulation(folder / "sim.nc")
+    np.testing.assert_array_equal(read.tensions, own.tensions)
+    assert np.isnan(read.length[-1, 3])
+    text = " ".join(result.stdout.split())
+    assert f"largest tension {np.nanmax(own.tensions):,.1f} N" in text
+    (event,) = own.events
+    assert (
+        f"0.200 s: break of cable 3, {event.tension_before:,.1f} N before, then at most {event.tension_after:,.1f} N"
+        in text
+    )
+    assert (folder / "sim-energy.png").exists()
+
+
+def test_a_shaped_path_leaves_less_vibration(folder: FilePath) -> None:
+    robot, way = sl.load_robot("article-suspended"), sl.load_path(folder / "way.yaml")
+    result = sagline("simulate", "article-suspended", "way.yaml", "--shaper", "zvd", "--json", "--no-figures")
+    assert result.exit_code == 0, result.stderr
+    found = json.loads(result.stdout)
+    frequency = to_shape(sl.modes(sl.inverse(robot, way.pose[len(way) - 1]).state), way)
+    plan = sl.inverse(robot, sl.shaped(way, sl.ZVD(frequency)))
+    assert plan.path is not None
+    assert found["duration_s"] == pytest.approx(plan.path.time[-1] + 3.0, abs=0.02)
+    assert found["residual_m"] < 1e-4
+    assert found["energy_error_j"] < 1e-3
+    assert " and ".join(f"{each:.3f}" for each in frequency) + " Hz (massless)" in result.stderr
