@@ -49,7 +49,6 @@ class CableMass(StrEnum):
 
     NONE = "none"
     LUMPED = "lumped"
-    MODAL = "modal"
 
 
 class ShaperKind(StrEnum):
