@@ -15,6 +15,7 @@ from sagline.dynamics.reduced import Setting
 
 LOWEST: Final = 1.0  # Hz: modes up to there are taken at least
 BEYOND: Final = 1.6  # of the highest frequency: modes up to there are taken
+COUPLED: Final = 1.5  # of the same: losses couple modes up to there, those beyond lose each by itself
 BLOCK: Final = 128  # frequencies at once
 
 
@@ -114,8 +115,12 @@ def _driven_with_stretch(
     """The same with what is lost in stretch, by motions and end (t, d + k, d + k); and what is lost at rest alone."""
     d, factor = motions.drive.shape[2], scaled[None, :, None, None]
     by_end = -square[..., None, None] * motions.drive[:, None] + factor * lost[:, None, d:, :d]
-    own = factor * lost[:, None, d:, d:]
-    index = np.arange(motions.square.shape[1])
-    own[..., index, index] += loss * motions.square[:, None] - square[..., None]
-    moved = np.linalg.solve(own, by_end)
+    alone = loss * motions.square[:, None] - square[..., None]
+    near = int((motions.square < COUPLED**2 * np.abs(square).max()).sum(axis=1).max())  # of each, ascending
+    own = factor * lost[:, None, d : d + near, d : d + near]
+    index = np.arange(near)
+    own[..., index, index] += alone[..., :near]
+    stretched = np.einsum("tkk->tk", lost[:, d:, d:])[:, None, near:]
+    far = by_end[..., near:, :] / (alone[..., near:] + factor[..., 0] * stretched)[..., None]
+    moved = np.concatenate((np.linalg.solve(own, by_end[..., :near, :]), far), axis=2)
     return -np.swapaxes(by_end, -1, -2) @ moved, factor * lost[:, None, :d, :d]

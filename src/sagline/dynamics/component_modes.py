@@ -36,6 +36,21 @@ class Components(NamedTuple):
     normal: Motions
     mesh: Mesh
 
+    def planes(self, ends: Array, amplitudes: Array) -> tuple[tuple[Motions, Array, Array], ...]:
+        """The motions in the planes and those normal to them, each with what moves them.
+
+        Args:
+            ends: Displacements of all platform ends in K modes, world axes, shape (m, 3, K).
+            amplitudes: Of the components, shape (T, K).
+
+        Returns:
+            Motions; displacements of the platform ends in their directions, (t, d, K); amplitudes, (t, k, K).
+        """
+        own, inside = self.mesh.axes @ ends[self.mesh.taut], self.plane.square.size
+        swing = amplitudes[:inside].reshape(*self.plane.square.shape, ends.shape[2])
+        sway = amplitudes[inside:].reshape(*self.normal.square.shape, ends.shape[2])
+        return (self.plane, own[:, ::2], swing), (self.normal, own[:, 1:2], sway)
+
 
 class Mesh(NamedTuple):
     """Nodes of the taut cables.
@@ -144,17 +159,10 @@ def field(components: Components, ends: Array, amplitudes: Array) -> tuple[Array
     Returns:
         Shapes (t, 2 nodes, K) and (t, nodes, K).
     """
-    mesh = components.mesh
-    own = mesh.axes @ ends[mesh.taut]
-    inside = components.plane.square.size
-    parts = []
-    for motions, end, given in (
-        (components.plane, own[:, ::2], amplitudes[:inside]),
-        (components.normal, own[:, 1:2], amplitudes[inside:]),
-    ):
-        spread = given.reshape(*motions.square.shape, ends.shape[2])
-        parts.append(motions.rest @ end + motions.shape @ spread)
-    return parts[0], parts[1]
+    plane, normal = (
+        motions.rest @ end + motions.shape @ given for motions, end, given in components.planes(ends, amplitudes)
+    )
+    return plane, normal
 
 
 def cable_shapes(components: Components, ends: Array, amplitudes: Array, count: int) -> Array:
@@ -180,8 +188,10 @@ def cable_shapes(components: Components, ends: Array, amplitudes: Array, count: 
     inside[:, 0] = (behind / np.maximum(slide, _TINY)[:, None])[:, :, None] * inside[:, 0, :1]
     own = np.concatenate((inside, normal[:, :, None]), axis=2)
     turned = np.swapaxes(mesh.axes[:, None, [0, 2, 1]], -1, -2) @ own
-    shapes = np.zeros((ends.shape[0], count, 3, k))
-    shapes[mesh.taut] = (values @ turned.reshape(t, n, 3 * k)).reshape(t, count, 3, k)
+    shapes = (values @ turned.reshape(t, n, 3 * k)).reshape(t, count, 3, k)
+    if t < ends.shape[0]:
+        moved, shapes = shapes, np.zeros((ends.shape[0], count, 3, k))
+        shapes[mesh.taut] = moved
     return np.moveaxis(shapes, -1, 0)
 
 

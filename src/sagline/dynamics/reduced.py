@@ -14,7 +14,7 @@ from sagline.statics.slopes import cable_slopes
 from sagline.statics.stiffness import mass_matrix
 from sagline.statics.strings import Strings, strings_of
 
-BEYOND = 1.15  # of the frequency asked for: the cables' modes up to there are unknowns
+BEYOND = 1.2  # of the frequency asked for: the cables' modes up to there are unknowns
 LEVELS = 3  # pairs of moments of those above that are matched
 UNSTABLE = 1e-10  # of the largest: a stiffness that is less negative is rounding
 _TINY = 1e-300

@@ -94,12 +94,10 @@ def cable_shares(setting: Setting, row: int, found: Found) -> Array:
         Shape (m, K).
     """
     parts, ends, own = found.components, found.ends, found.amplitudes
-    shares = (ends * (parts.still @ ends)).sum(axis=1)
-    driven = (parts.participation[:, None] @ ends[parts.cable])[:, 0]
-    energy, inside = own * (own + 2.0 * driven), parts.plane.square.size
-    for motions, part in ((parts.plane, energy[:inside]), (parts.normal, energy[inside:])):
-        shares[parts.mesh.taut] += part.reshape(*motions.square.shape, ends.shape[2]).sum(axis=1)
-    return np.asarray(shares)
+    shares = np.asarray((ends * (parts.still @ ends)).sum(axis=1))
+    for motions, end, given in parts.planes(ends, own):
+        shares[parts.mesh.taut] += (given * (given + 2.0 * (motions.drive @ end))).sum(axis=1)
+    return shares
 
 
 def loss(density: Array, found: Found, shares: Array, damping: Damping) -> Array:

@@ -23,7 +23,7 @@ from sagline.kernels.dynamics.string import (
     string_at,
     vertical_at,
 )
-from sagline.kernels.jit import entry, formula, kernel
+from sagline.kernels.jit import entry, formula, glue, kernel
 
 Numbers = Any  # an array of float64 or complex128
 STAGES = 8
@@ -64,7 +64,7 @@ class Wave(NamedTuple):
     along: Any
 
 
-@formula
+@glue
 def fill_flexibility(string: String, wave: Wave, start: float, size: float, normal: bool, c: Numbers) -> None:
     """Fill C at the stages of an element, (STAGES, 3): xx, xz, zz; normal to the plane the first only."""
     for k in range(STAGES):
@@ -80,7 +80,7 @@ def fill_flexibility(string: String, wave: Wave, start: float, size: float, norm
             c[k, 2] = turn + less * vertical * vertical
 
 
-@formula
+@glue
 def sum_of(c: Numbers, size: float, d: int, phi: Numbers) -> None:
     """Fill the integral of C over an element, (d, d)."""
     for a in range(d):
@@ -91,7 +91,7 @@ def sum_of(c: Numbers, size: float, d: int, phi: Numbers) -> None:
             phi[a, b] = size * total
 
 
-@formula
+@glue
 def fill_stages(c: Numbers, mu: Any, size: float, d: int, system: Numbers) -> None:
     """Fill the equations of u at the stages, (STAGES d, STAGES d), and right of them their sides for u, f at 0."""
     scale = size * size * mu
@@ -114,7 +114,7 @@ def fill_stages(c: Numbers, mu: Any, size: float, d: int, system: Numbers) -> No
             row[i * d + a] += 1.0
 
 
-@formula
+@glue
 def eliminate(system: Numbers, n: int, columns: int) -> None:
     """Solve n equations for the columns that follow them, in their place."""
     for k in range(n):
@@ -141,7 +141,7 @@ def eliminate(system: Numbers, n: int, columns: int) -> None:
             system[i, j] *= inverse
 
 
-@kernel
+@glue
 def transfer(c: Numbers, mu: Any, size: float, d: int, system: Numbers, phi: Numbers) -> None:
     """Fill the transfer matrix (2 d, 2 d) of an element: u, f at its end by u, f at its start."""
     n = STAGES * d
@@ -161,7 +161,7 @@ def transfer(c: Numbers, mu: Any, size: float, d: int, system: Numbers, phi: Num
                 phi[d + b, column] -= size * mu * WEIGHTS[k] * system[k * d + b, n + column]
 
 
-@formula
+@glue
 def move(phi: Numbers, d: int, k: Numbers, moved: Numbers) -> None:
     """Fill displacement and force at an element's end for a unit at its start, where f = k u: (d, d) each in moved."""
     for a in range(d):
@@ -174,7 +174,7 @@ def move(phi: Numbers, d: int, k: Numbers, moved: Numbers) -> None:
             moved[2 + a, b] = force
 
 
-@formula
+@glue
 def begin(phi: Numbers, d: int, give: Numbers, lost: Any, k: Numbers, moved: Numbers) -> None:
     """The same of the first element, whose start moves by give (d, d) lost for a unit of force; give 0: it is held."""
     for a in range(d):
@@ -201,7 +201,7 @@ def divide(moved: Numbers, d: int, k: Numbers) -> None:
             k[a, 1] = (second * moved[0, 0] - first * moved[0, 1]) / determinant
 
 
-@formula
+@glue
 def negatives(phi: Numbers, d: int, k: Numbers, clear: float, moved: Numbers) -> int:
     """Negative eigenvalues of the pivot Phi_uf^-1 moved, a symmetric matrix; SINGULAR where it is not clear of that.
 
@@ -222,7 +222,7 @@ def negatives(phi: Numbers, d: int, k: Numbers, clear: float, moved: Numbers) ->
     return 2 if first < 0.0 else 0
 
 
-@formula
+@glue
 def spring_negatives(phi: Numbers, d: int, give: Numbers) -> int:
     """The same of the pivot at a start that gives way along one direction: of 1/give + its k00."""
     if d == 1:

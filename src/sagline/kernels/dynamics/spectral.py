@@ -24,8 +24,8 @@ from sagline.kernels.jit import entry, formula, kernel
 
 LARGEST_DEGREE = 48
 LEAST_DEGREE = 6
-HALF_WAVE = 1.7  # degrees that a half wave needs
-ALWAYS = 9.0  # and those beside them
+HALF_WAVE = 1.5  # degrees that a half wave needs
+ALWAYS = 7.0  # and those beside them
 MOST_PHASE = math.pi * (LARGEST_DEGREE - ALWAYS) / HALF_WAVE
 
 Rule = tuple[Array, Array, Array, Array]
