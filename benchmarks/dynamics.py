@@ -11,6 +11,7 @@ import numpy as np
 from rich.console import Console
 
 import sagline as sl
+from benchmarks import vibrations
 from benchmarks.measure import Row, best_of_calls, best_seconds, one_core, show
 from sagline.dynamics.simulate import Integrator
 from tests.dynamics.let_go import beside
@@ -104,7 +105,7 @@ def main() -> None:
     show("Dynamics", rows, console)
 
 
-PARTS = (residuals, shortest, speed, energies)
+PARTS = (residuals, shortest, speed, energies, *vibrations.PARTS)
 
 if __name__ == "__main__":
     main()
