@@ -17,9 +17,12 @@ from sagline.dynamics.simulate import Integrator
 from tests.dynamics.let_go import beside
 from tests.dynamics.machines import prototype
 from tests.dynamics.residuals import HEAVY, WAYPOINTS, residual, scene
+from tests.dynamics.test_chains import cogiro as broken_state
+from tests.dynamics.test_chains import moved, pushed, spectrum_peaks
 from tests.dynamics.test_fastest import shortest_quintic
 
 AWAY: Final = np.array([0.004, -0.003, 0.0033])  # m
+LUMPED_STEP: Final = 5e-5  # s, the default of 20 nodes on CoGiRo
 
 
 def residuals() -> Iterator[Row]:
@@ -94,6 +97,36 @@ def energies() -> Iterator[Row]:
             yield Row(f"{name}: trend of the energy, {integrator}", limit, shown)
 
 
+def lumped() -> Iterator[Row]:
+    """Cables with mass as chains, CoGiRo and expo2015-lucia."""
+    state = broken_state()
+    seconds = 2.0
+    took = best_seconds(lambda: sl.simulate(state, cable_mass="lumped", duration=seconds), 3)
+    yield Row("lumped cables, 20 nodes, CoGiRo, 0.4 of the limit", ">= 8 x real time", f"{seconds / took:.0f} x")
+    largest = []
+    for share in (1.125, 0.5, 0.25):  # 0.45, 0.2 and 0.1 of l sqrt(rho/EA)
+        event = sl.Break(cable=0, time=0.0)
+        run = sl.simulate(state, cable_mass="lumped", duration=1.0, step=share * LUMPED_STEP, events=event)
+        largest.append(run.events[0].tension_after)
+    off = max(abs(one / largest[-1] - 1.0) for one in largest)
+    before = state.cables.frame_end_tension.max()
+    shown = f"{100 * off:.2f} %; {largest[-1]:,.0f} N after {before:.0f} N"
+    yield Row("a broken cable at 0.45, 0.2, 0.1 of the limit", "1 %; 1,074 N after 424 N", shown)
+    run = moved()
+    turned, worst = np.ptp(run.energy.supplied), np.abs(run.energy.error).max()
+    yield Row(f"lumped cables along a path, {turned:,.0f} J of work", "closes", f"{worst:.0e} J")
+    for nodes in (10, 20, 40):
+        run = pushed(60.0, nodes)
+        peaks = spectrum_peaks(run.time[40:], run.pose.position[40:, 0], 1.9, 3.2)
+        shown = ", ".join(f"{peak:.3f}" for peak in peaks)
+        invented = np.abs(run.energy.error).max() / run.energy.kinetic.max()
+        yield Row(
+            f"peaks of 60 s, expo2015-lucia with cable mass, {nodes} nodes",
+            "2.011, 2.586, 3.028 Hz +- 0.017",
+            f"{shown} Hz; energy invented {invented:.0e}",
+        )
+
+
 def main() -> None:
     """Measure and print."""
     console = Console()
@@ -105,7 +138,7 @@ def main() -> None:
     show("Dynamics", rows, console)
 
 
-PARTS = (residuals, shortest, speed, energies, *vibrations.PARTS)
+PARTS = (residuals, shortest, speed, energies, lumped, *vibrations.PARTS)
 
 if __name__ == "__main__":
     main()
