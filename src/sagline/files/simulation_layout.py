@@ -7,7 +7,7 @@ from typing import Final
 from sagline.files.variables import Known, Quantity
 
 TIME: Final = Quantity("time", "time", (), "s", "time")
-# of every sample
+# of every sample; a cable that broke has no length any more, and no nodes
 SAMPLES: Final = (
     Quantity("position", "pose.position", ("axis",), "m", "position of the platform origin in the world"),
     Quantity(
@@ -32,7 +32,12 @@ SAMPLES: Final = (
 )
 # of cables with mass
 NODES: Final = Quantity(
-    "node_position", "nodes", ("cable", "node", "axis"), "m", "position of the cables at their nodes"
+    "node_position",
+    "nodes",
+    ("cable", "node", "axis"),
+    "m",
+    "position of the cables at their nodes",
+    known=Known.SOMEWHERE,
 )
 # one a row of what happened; a place is that of one occurrence
 EVENTS: Final = (
