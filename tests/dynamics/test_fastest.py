@@ -6,6 +6,7 @@ from scipy.optimize import linprog
 
 import sagline as sl
 from sagline.dynamics.balances import Balances, HalfPlanes
+from sagline.dynamics.jerk_bounded import fastest_course
 from sagline.dynamics.moves import moves_of
 from sagline.dynamics.phase_plane import fastest_profile
 from sagline.statics.balance import structure_matrix
@@ -123,7 +124,7 @@ def test_it_stays_on_the_curve(cogiro: sl.Robot) -> None:
     )
 
 
-@pytest.mark.parametrize("jerk", [1.0, 4.0])
+@pytest.mark.parametrize("jerk", [2.0])
 def test_where_only_the_jerk_is_bounded_the_time_is_known(jerk: float) -> None:
     """A quarter of the time at each of +J, -J, -J, +J leads over J T^3/32."""
     robot = sl.load_robot("ipanema-1")
@@ -228,3 +229,72 @@ def test_what_cannot_be_done_is_refused(suspended: sl.Robot) -> None:
     moving = sl.path_from_samples(time, sl.Pose.from_euler(position, 0.0, 0.0, 0.0))
     with pytest.raises(sl.InvalidValueError, match="at its begin is in motion"):
         sl.fastest(suspended, moving)
+
+
+@pytest.mark.parametrize("kind", ["chord", "frame end", "pulleys"])
+def test_the_polygons_border_is_where_the_exact_inverse_ends(cogiro: sl.Robot, kind: str) -> None:
+    """Heavy cables: the largest acceleration, by bisection with `inverse`, is the polygon's after rounds of sag."""
+    robot = cogiro.replace(cables=sl.Cable(0.3, 5e5), tension_min=100.0, tension_max=1500.0)
+    if kind == "frame end":
+        robot = robot.replace(tension_limits_of="frame_end")
+    if kind == "pulleys":
+        robot = robot.replace(winches=sl.Winch(0.05, dead_cable=4.0))
+    move = moves_of(arc())[0]
+    assert move.curve is not None
+    jet = move.curve.at(np.array([0.1, 0.5, 0.8]))
+    balances = Balances.at(robot, jet, sl.inverse(robot, jet.pose))
+    for sign in (1.0, -1.0):
+        low, high = np.zeros(3), np.full(3, 50.0)
+        for _ in range(40):
+            middle = 0.5 * (low + high)
+            wrench = balances.wrench(np.stack((sign * middle, 0.0 * middle), axis=1))
+            held = sl.inverse(robot, jet.pose, wrench=wrench).feasible
+            low, high = np.where(held, middle, low), np.where(held, high, middle)
+        border = np.stack((sign * low, 0.0 * low), axis=1)
+        planes = balances.near(border).half_planes()
+        along = sign * planes.rates[..., 0]
+        found = np.min(np.where(along > 1e-9, planes.bound / np.where(along > 1e-9, along, 1.0), np.inf), axis=1)
+        np.testing.assert_allclose(found, low, rtol=1e-4)
+
+
+def test_bounds_hold_at_both_ends_of_every_step() -> None:
+    rng = np.random.default_rng(5)
+    place = np.linspace(0.0, 1.0, 61)
+    for _ in range(20):
+        normals = rng.normal(size=(9, 2)) + 0.3 * np.sin(rng.uniform(2.0, 9.0, (1, 9, 1)) * place[:, None, None])
+        box = np.broadcast_to([[1.0, 0.0], [-1.0, 0.0]], (len(place), 2, 2))
+        planes = HalfPlanes(
+            np.hstack((normals, box)), np.full((len(place), 11), 1.0) * [*rng.uniform(0.5, 2.0, 9), 5, 5]
+        )
+        profile = fastest_profile(place, planes)
+        assert profile is not None
+        for k in range(len(place) - 1):
+            for end in (k, k + 1):
+                point = np.array([profile.acceleration[k], profile.square[end]])
+                assert (planes.rates[end] @ point <= planes.bound[end] + 1e-9).all()
+
+
+def test_what_must_brake_must_come_fast() -> None:
+    """In the second half it brakes by 1 or more, so it must enter that with a square of 1 or more."""
+    place = np.linspace(0.0, 1.0, 101)
+    for most, possible in ((0.5, False), (1.5, True)):
+        up = np.where(place < 0.5, most, -1.0)
+        rates = np.broadcast_to([[1.0, 0.0], [-1.0, 0.0]], (101, 2, 2))
+        profile = fastest_profile(place, HalfPlanes(rates.copy(), np.stack((up, np.full(101, 8.0)), axis=1)))
+        assert (profile is not None) == possible
+
+
+def test_the_jerk_on_a_curve_ends_within_its_limit(cogiro: sl.Robot) -> None:
+    move = moves_of(arc())[0]
+    assert move.curve is not None
+    robot = cogiro.replace(tension_max=5000.0)
+
+    def free(parameter: np.ndarray) -> HalfPlanes:
+        return HalfPlanes(np.zeros((parameter.size, 0, 2)), np.zeros((parameter.size, 0)))
+
+    course = fastest_course(move.curve, robot, free, (20.0, np.inf), 0.5)
+    assert course is not None
+    motion = course.at(np.linspace(0.0, course.duration, 2001))
+    jerk = np.linalg.norm(move.curve.at(motion[0]).twists(motion)[2, :, :3], axis=1)
+    assert np.sort(jerk)[-20] == pytest.approx(20.0, rel=5e-3)
+    assert jerk.max() < 20.0 * 1.005

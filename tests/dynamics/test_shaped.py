@@ -6,7 +6,9 @@ import pytest
 
 import sagline as sl
 from sagline.arrays import Array
+from sagline.dynamics.curves import Bent
 from sagline.dynamics.hermite import piecewise
+from sagline.dynamics.moves import moves_of
 from tests.motion.differences import angular_velocity, slope
 
 STOPS = [
@@ -181,3 +183,45 @@ def test_piecewise_polynomials_are_exact_up_to_their_degree(known: int, at_end: 
     place = np.linspace(-0.1, 1.1, 50)
     for order in range(4):
         np.testing.assert_allclose(found(place, order), derivatives[order](place), rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize(("make", "close"), [(sl.quintic_path, 1e-12), (sl.septic_path, 1e-10)])
+@pytest.mark.parametrize("durations", [OFF_GRID, ON_GRID])
+def test_between_samples_moves_are_the_polynomials_that_they_were(
+    make: type, close: float, durations: tuple[float, ...]
+) -> None:
+    coarse, fine = (make(STOPS, durations=durations, rate=rate) for rate in (50.0, 1000.0))
+    which = np.minimum(np.searchsorted(there(fine.rests)[1:], fine.time, side="right"), 3)
+    for k, move in enumerate(moves_of(coarse)):
+        part = which == k
+        if move.curve is None:
+            assert not fine.twist[part].any()
+            continue
+        motion = move.rates(fine.time[part] - move.begin)
+        jet = move.curve.at(motion[0])
+        np.testing.assert_allclose(jet.pose.position, fine.pose.position[part], rtol=0.0, atol=close)
+        np.testing.assert_allclose(jet.pose.matrix, fine.pose.matrix[part], rtol=0.0, atol=close)
+        np.testing.assert_allclose(jet.twists(motion)[0], fine.twist[part], rtol=0.0, atol=300.0 * close)
+
+
+def test_the_rates_of_a_bent_curve_are_those_of_its_poses() -> None:
+    """By differences: each rate is the slope of the one before, along the parameter and in time."""
+    s = np.linspace(0.0, 1.0, 201)
+    position = np.stack((np.sin(2 * s), np.cos(3 * s), s**3), axis=1)
+    curve = Bent.through(sl.Pose.from_euler(position, 0.4 * np.sin(2 * s), 0.5 * s**2, 1.5 * s), s)
+    h = 1e-4
+    place = np.linspace(0.2, 0.8, 7)[:, None] + h * np.arange(-1, 2)
+    jets = [curve.at(column) for column in place.T]
+    turned = (jets[2].pose.rotation * jets[0].pose.rotation.inv()).as_rotvec() / (2 * h)
+    np.testing.assert_allclose(jets[1].rates[0, :, 3:], turned, atol=1e-6)
+    for order in range(2):
+        difference = (jets[2].rates[order] - jets[0].rates[order]) / (2 * h)
+        np.testing.assert_allclose(jets[1].rates[order + 1], difference, atol=2e-4)
+
+    def twists(time: np.ndarray) -> np.ndarray:
+        motion = np.stack((0.3 + 0.2 * np.sin(time), 0.2 * np.cos(time), -0.2 * np.sin(time), -0.2 * np.cos(time)))
+        return curve.at(motion[0]).twists(motion)
+
+    time = np.linspace(0.0, 2.0, 9)
+    before, now, after = (twists(time + shift) for shift in (-h, 0.0, h))
+    np.testing.assert_allclose(now[1:], (after - before)[:2] / (2 * h), atol=1e-5)

@@ -19,7 +19,7 @@ from sagline.statics.wrench import inertial_wrench
 
 _NOTHING: Final = 1e-11  # of what a direction gains by the tension that it gains most by
 _BLOCK: Final = 40_000  # matrices taken apart at once
-_WIDER: Final = 0.5  # N: limits that a pose on their border is solved with
+_WIDER: Final = (1.0, 0.03)  # N: limits that a pose on their border is solved with
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,11 +108,17 @@ class Balances:
         )
 
     def near(self, motion: Array) -> Balances:
-        """The same with the pulls that cables have in motions of shape (K, 2), on the border perhaps."""
-        robot = self.robot
-        low = np.maximum(robot.tension_min - _WIDER, 0.0)
-        wider = robot.replace(tension_min=low, tension_max=robot.tension_max + _WIDER)
-        return self.pulled(inverse(wider, self.jet.pose, wrench=self.wrench(motion)), motion)
+        """The same with the pulls that cables have in motions of shape (K, 2), on the border perhaps, or a little off.
+
+        On the border itself tensions are all but fixed, but rounding may leave none: they are those within limits a
+        little wider, the narrowest that have an answer.
+        """
+        found, wrench = self, self.wrench(motion)
+        for by in _WIDER:
+            low, high = np.maximum(self.robot.tension_min - by, 0.0), self.robot.tension_max + by
+            wider = self.robot.replace(tension_min=low, tension_max=high)
+            found = found.pulled(inverse(wider, self.jet.pose, wrench=wrench), motion)
+        return found
 
     def half_planes(self) -> HalfPlanes:
         """The polygons: along no normal is more needed than the cables give within their limits."""

@@ -31,7 +31,6 @@ def piecewise(knots: Array, values: Array, at_end: int) -> Any:
     pieces[:, :-1] = _pieces(left[:, :-1], right[:, :-1])
     last = _pieces(left[:, -1:], right[:at_end, -1:])
     pieces[: len(last), -1:] = last
-    pieces[len(last) :, -1:] = 0.0
     return PPoly((pieces / step ** np.arange(2 * known)[:, None])[::-1], knots, extrapolate=True)
 
 

@@ -129,6 +129,8 @@ def _move(path: Path, begin: float, end: float) -> Move:
         held = np.zeros((len(values), knots.size))
         held[:, int(not standing) :][:, : time.size] = values
         held[0] = progress(knots)
+        if not standing and len(values) > 3:
+            held[3, 0] = progress(0.0, 3)  # it rests, but its jerk need not be zero
         progress = piecewise(knots, held, at_end if over else 3)
     return Move(begin, end, curve, progress, part.start)
 
