@@ -36,6 +36,8 @@ DRAWN = {  # command -> what is shown of it
     "run": "<!-- drawn by: sagline run -->",
     "article": "<!-- drawn by: sagline article figures 6-9 -->",
     "tension": "<!-- drawn by: sagline tension article-mixed --pose 1,0.5,2.5 -->",
+    "vibrate": "<!-- drawn by: sagline vibrate cogiro --pose 0,0,2 --up-to 20 --force z -->",
+    "simulate": "<!-- drawn by: sagline simulate cogiro --break 3@0.5s --loss-time 0.001 -->",
     "view": "![A robot in the viewer](../images/viewer.png)\n\n![A run in the viewer](../images/viewer-run.png)",
 }
 SCENE = """\
@@ -46,14 +48,22 @@ again = sl.confirm(sl.inverse(robot, path, model=sl.Empirical()))
 pose = sl.Pose.from_euler((1.0, 1.0, 2.0), 0.0, 0.0, 0.0)
 shape = sl.tension_polygon(robot, pose)
 chosen = {"Closest": sl.inverse(robot, pose).chord_tension}
+state = sl.inverse(robot, pose).state
+swings = sl.vibration(state, up_to=20.0, damping=sl.Damping(modal_damping=0.01))
+some = sl.inverse(robot, path).state[::20]
+along = [sl.vibration(each, up_to=8.0) for each in some]
+broken = sl.simulate(state, duration=2.0, events=sl.Break(cable=3, time=0.5))
 """
 FIGURES = {  # function of `sl.plot` -> a call that draws
+    "energy": "energy(broken)",
     "error": "error(proof)",
     "errors": "errors(proof, again)",
+    "frequencies": "frequencies(along, path.time[::20])",
     "lengths": "lengths(proof.plan)",
     "overview": "overview(proof.plan)",
     "path": "path(path)",
     "polygon": "polygon(shape, chosen)",
+    "response": "response(swings)",
     "robot": "robot(robot, pose)",
     "tensions": "tensions(proof.plan)",
     "velocity": "velocity(path)",
@@ -120,7 +130,7 @@ def with_figures(text: str) -> str:
     shown = [f"{head}The figures below are drawn of these:\n{fenced(SCENE, 'python')}"]
     for function in functions:
         name = function.strip().rsplit(".", 1)[1]
-        if name not in (*FIGURES, "save"):
+        if name not in (*FIGURES, "film", "save"):
             raise PluginError(f"sl.plot.{name} has no figure in its reference; give it a call that draws one")
         figure = f"`sl.plot.{FIGURES[name]}`:\n\n![sl.plot.{name}](plot-{name}.svg)\n" if name in FIGURES else ""
         shown.append(f"::: {function.strip()}\n\n{figure}")

@@ -40,7 +40,7 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
 def _shown(command: str, page: Page, config: MkDocsConfig, files: Files) -> str:
     if command not in _drawn:
         _drawn[command] = [
-            File.generated(config, f"pictures/{file.name}", content=text) for file, text in draw(command)
+            File.generated(config, f"pictures/{file.name}", content=content) for file, content in draw(command)
         ]
         for file in _drawn[command]:
             files.append(file)
@@ -48,12 +48,16 @@ def _shown(command: str, page: Page, config: MkDocsConfig, files: Files) -> str:
     return "\n\n".join(f"![sagline {command}]({relpath(file.src_uri, here or '.')})" for file in _drawn[command])
 
 
-def draw(command: str) -> list[tuple[Path, str]]:
-    """The figures that a command writes, in the order in which it writes them, as SVG."""
+def draw(command: str) -> list[tuple[Path, str | bytes]]:
+    """The figures that a command writes, in the order in which it writes them, as SVG, and films as GIF."""
     folder = WORK / sha256(command.encode()).hexdigest()[:8]
-    ran("-m", "sagline.cli", *shlex.split(command), "--out", folder.name)
-    written = sorted(folder.glob("*.svg"), key=lambda file: file.stat().st_mtime_ns)
-    figures = [(file.with_stem(f"{folder.name}-{file.stem}"), file.read_text(encoding="utf-8")) for file in written]
+    words = shlex.split(command)
+    out = f"{folder.name}/sim.nc" if words[0] == "simulate" else folder.name  # which names its file, not a folder
+    ran("-m", "sagline.cli", *words, "--out", out)
+    written = sorted([*folder.glob("*.svg"), *folder.glob("*.gif")], key=lambda file: file.stat().st_mtime_ns)
+    figures: list[tuple[Path, str | bytes]] = [
+        (file.with_stem(f"{folder.name}-{file.stem}"), file.read_bytes()) for file in written
+    ]
     for page in folder.glob("*.html"):
         figures.append((page.with_name(f"{folder.name}.svg"), first_drawing(page.read_text(encoding="utf-8"))))
     if not figures:

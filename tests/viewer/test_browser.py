@@ -251,3 +251,51 @@ def test_nothing_overflows_its_panel(browser: Browser, name: str) -> None:
     with opened(browser, sl.load_robot(name)) as (page, _):
         page.get_by_text("Natural frequencies").wait_for()
         assert page.evaluate(OVERFLOWING) == []
+
+
+def test_a_frequency_that_is_clicked_moves(browser: Browser) -> None:
+    with opened(browser, sl.load_robot("article-suspended")) as (page, viewer):
+        page.get_by_role("tab", name="Modes").click()
+        page.locator("tr[data-mode='2']").click()
+        await_that(page, lambda: viewer._modes.moving)
+        page.get_by_text("Hz, with cable mass").wait_for()
+        swing = viewer._modes.swing
+        assert swing is not None
+        found = sl.vibration(swing.state, up_to=20.0)
+        told = page.locator(".sagline b", has_text="Hz, with cable mass").inner_text()
+        assert told == f"{found.frequency[1]:.3f} Hz, with cable mass"
+        page.get_by_text(f"drawn {swing.factor:.2g} times as large as with 1 J").wait_for()
+        before = page.locator("canvas[data-engine]").screenshot()
+        await_that(page, lambda: page.locator("canvas[data-engine]").screenshot() != before)  # without anybody's doing
+        assert page.locator("tr.chosen").count() == 1
+        mark = page.locator("svg.response g[data-mode='1'] rect")
+        mark.click()
+        await_that(page, lambda: viewer._modes.swing is not None and viewer._modes.swing.mode.name == "1")
+        page.locator("tr[data-mode='massless 1']").click()
+        page.get_by_text(f"{found.massless_frequency[0]:.3f} Hz, massless").wait_for()
+        assert page.evaluate(OVERFLOWING) == []
+        page.locator("tr[data-mode='massless 1']").click()  # once more: at rest
+        await_that(page, lambda: not viewer._modes.moving)
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_the_modes_can_be_read(browser: Browser, theme: Literal["light", "dark"]) -> None:
+    with opened(browser, sl.load_robot("cogiro"), theme=theme, width=390 if theme == "dark" else 1000) as (page, _):
+        page.get_by_role("tab", name="Modes").click()
+        page.locator("tr[data-mode='1']").click()
+        page.get_by_text("Hz, with cable mass").wait_for()
+        least_contrast(page)
+        assert page.evaluate(OVERFLOWING) == []
+
+
+def test_a_cable_is_cut_and_the_break_is_played(browser: Browser) -> None:
+    with opened(browser, sl.load_robot("article-suspended")) as (page, viewer):
+        page.get_by_text("Cut a cable").click()
+        page.get_by_role("button", name="Cut", exact=True).click()
+        page.get_by_text("Simulated", exact=True).wait_for()
+        page.get_by_text("break of cable 0 at 0.250 s").wait_for()
+        assert viewer._played is not None
+        await_that(page, lambda: viewer._clock.time == viewer._played.duration)  # type: ignore[union-attr]
+        page.get_by_role("button", name="Play").wait_for()
+        least_contrast(page)
+        assert page.evaluate(OVERFLOWING) == []
