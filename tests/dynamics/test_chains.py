@@ -56,6 +56,7 @@ def test_a_robot_at_rest_stays_at_rest(state: object) -> None:
     run = sl.simulate(here, cable_mass="lumped", nodes=10, duration=0.2)
     assert np.ptp(run.pose.position, axis=0).max() < 1e-13
     assert np.abs(run.tensions - run.tensions[0]).max() < 1e-6
+    assert run.tensions[0] == pytest.approx(here.cables.frame_end_tension, abs=0.06)
     assert run.nodes is not None
     assert np.ptp(run.nodes, axis=0).max() < 1e-9
     assert run.nodes[0, :, 0] == pytest.approx(here.exit_point, abs=1e-12)

@@ -15,6 +15,7 @@ from sagline.dynamics.course import Course, TableInTime, table_in_time
 from sagline.dynamics.damping import Damping
 from sagline.dynamics.drives import Winches, drive_data, kind_of
 from sagline.dynamics.events import Drop, Event, PickUp, checked_events
+from sagline.dynamics.modal import modal_simulation, refuse_with_modes
 from sagline.dynamics.plant import Plant
 from sagline.dynamics.run import Run
 from sagline.dynamics.simulation import Simulation
@@ -28,7 +29,7 @@ from sagline.robot.equilibrium import Equilibrium
 
 Integrator = Literal["splitting", "runge-kutta"]
 Winding = Literal["constant", "remembered"]
-CableMass = Literal["none", "lumped"]
+CableMass = Literal["none", "lumped", "modal"]
 RECORD: Final = 0.01  # s
 MOST_STEPS: Final = 10**8  # some minutes
 
@@ -67,6 +68,8 @@ def simulate(
         cable_mass: "none": cables hang at every instant as they do at rest. "lumped": each is a chain of nodes with
             its mass, at fixed material points, which swings, and transmits its waves; new nodes are born at the frame
             and merged there as cable is let out and wound in. A chain keeps the exit from its pulley of the start.
+            "modal": small motion about an equilibrium, each mode of `vibration` by itself; lengths and wrench may
+            change, and `Damping` may have modal_damping. No pulleys, events, winches or wind.
         nodes: Elements a cable is divided into where it has mass, at the start, 4 to 500. At rest the pose differs from
             the exact one by the order of nodes^-2.
         integrator: "runge-kutta", of order 4, or "splitting", symplectic, of order 2: its energy has no trend in long
@@ -113,6 +116,11 @@ def simulate(
     """
     choice(cable_mass, "cable_mass", get_args(CableMass))
     given = beginning(start, unstrained_length, wrench, duration)
+    if cable_mass == "modal":
+        others = {"events": events, "winches": winches != "ideal", "wind": wind is not None, "integrator": integrator}
+        refuse_with_modes([name for name, asked in others.items() if asked])
+        written = RECORD if record is None else number(record, "record", "s", above=0.0)
+        return modal_simulation(given, optional(damping, Damping, "damping") or Damping(), step, written)
     elements = checked_nodes(nodes, given) if cable_mass == "lumped" else 0
     kind, losses = kind_of(winches), checked_damping(damping)
     code = code_of(integrator, kind, elements)
