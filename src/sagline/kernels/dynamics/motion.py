@@ -197,7 +197,7 @@ def damp_cables(
     return lost
 
 
-@glue
+@kernel
 def take_set_points(plant: Plant, now: float, shift: float) -> None:
     """Fill the set points at a time, and the lengths of winches that keep them."""
     at, drives, rows = plant.at, plant.drives, plant.rows
@@ -210,7 +210,7 @@ def take_set_points(plant: Plant, now: float, shift: float) -> None:
                 rows[t.LENGTH, i] = plant.targets[i]
 
 
-@glue
+@kernel
 def evaluate(plant: Plant, now: float) -> None:
     """Fill the force on the platform, -gradient, what is given of it, and the cables' tensions, at a time."""
     at, drives, rows, state = plant.at, plant.drives, plant.rows, plant.state
@@ -232,7 +232,7 @@ def evaluate(plant: Plant, now: float) -> None:
     pull_of_frame(weight_of, plant.cables, rows, drives.data, drives.now, plant.model.behind)
 
 
-@glue
+@kernel
 def damp(plant: Plant) -> None:
     """Fill what damping does at the present velocities, and the powers that damping takes and given forces bring."""
     if plant.work:
@@ -358,7 +358,7 @@ def runge_kutta_step(plant: Plant, now: float) -> None:
     drives.audit[d.LOST] += h * lost
 
 
-@glue
+@kernel
 def note(drives: Drives, rows: Array, cables: Array, at: Indices, now: float, weight_of: float, notes: Array) -> None:
     """Keep the largest tensions, and note what begins: a cable that no longer pulls, a drive at its limit."""
     largest = 0.0
@@ -384,7 +384,7 @@ def note(drives: Drives, rows: Array, cables: Array, at: Indices, now: float, we
                     at[NOTES] += 1
 
 
-@glue
+@kernel
 def record(plant: Plant, records: Records) -> None:
     """Write down a step, and look whether energy has grown by itself."""
     states, tensions, lengths, energies, _notes = records
