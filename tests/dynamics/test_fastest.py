@@ -298,3 +298,30 @@ def test_the_jerk_on_a_curve_ends_within_its_limit(cogiro: sl.Robot) -> None:
     jerk = np.linalg.norm(move.curve.at(motion[0]).twists(motion)[2, :, :3], axis=1)
     assert np.sort(jerk)[-20] == pytest.approx(20.0, rel=5e-3)
     assert jerk.max() < 20.0 * 1.005
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("name", sl.robot_names())
+@pytest.mark.parametrize("seed", range(3))
+def test_every_preset_moves_within_its_limits(name: str, seed: int) -> None:
+    robot = sl.load_robot(name)
+    if robot.winches is not None and robot.winches.speed_limit is not None:
+        robot = robot.replace(winches=robot.winches.replace(speed_limit=None))  # its drums are not known
+    box, rng = robot.test_box, np.random.default_rng(seed)
+    if box is None:
+        pytest.fail("a preset without a box")
+    middle, half = 0.5 * (box.low + box.high), 0.25 * (box.high - box.low)
+    stops = middle + rng.uniform(-1.0, 1.0, (3, 3)) * half
+    path = sl.quintic_path(stops, durations=3.0, rate=200.0)
+    slow = sl.quintic_path(stops, durations=1000.0, rate=1.0)
+    held = sl.inverse(within(robot, 1.0), slow).feasible.all()
+    for jerk in (None, 50.0):
+        if not held:
+            with pytest.raises(sl.InvalidValueError, match="move from"):
+                sl.fastest(robot, path, margin=1.0, jerk=jerk)
+            continue
+        quick = sl.fastest(robot, path, margin=1.0, jerk=jerk)
+        assert sl.inverse(within(robot, 1.0), quick).feasible.all()
+        if jerk is not None:
+            assert quick.jerk is not None
+            assert np.linalg.norm(quick.jerk[:, :3], axis=1).max() <= jerk * (1.0 + 1e-9)

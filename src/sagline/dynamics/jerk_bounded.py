@@ -144,18 +144,16 @@ def _jerk_rows(rates: Array, state: Array, course: Course, limit: float) -> tupl
     Args:
         rates: R1 to R3 at the knots, shape (3, P + 1, 3).
         state: As `sums` makes it.
-        course: Where the jerk is linearized.
+        course: Whose way and speeds are taken.
         limit: Of its size.
     """
-    _, speed, rate = (values[:, None, None] for values in state @ course.jerk)
+    _, speed, rate = (values[:, None] for values in state @ course.jerk)
     first, second, third = rates
-    by_jerk = 3.0 * second[..., None] * (speed * state[2][:, None] + rate * state[1][:, None])
-    by_jerk = by_jerk + 3.0 * third[..., None] * speed**2 * state[1][:, None]
-    rest = -3.0 * second * (speed * rate)[..., 0] - 2.0 * third * speed[..., 0] ** 3
+    rest = 3.0 * second * speed * rate + third * speed**3  # as it is now: it changes little from round to round
     rows, bounds = [], []
     square = course.duration**2
     for knots in (slice(None, -1), slice(1, None)):  # both ends of each piece
-        whole = by_jerk[knots] + first[knots][..., None] * np.eye(PIECES)[:, None]
+        whole = first[knots][..., None] * np.eye(PIECES)[:, None]
         now = whole @ course.jerk + rest[knots]
         along = _unit(first[knots])
         aside = rest[knots] - np.sum(rest[knots] * along, axis=1, keepdims=True) * along
@@ -177,12 +175,12 @@ def reduced(planes: HalfPlanes) -> HalfPlanes:
     """Half planes that contain the origin, without those that the border shows in none of some directions.
 
     Args:
-        planes: Half planes with positive bounds.
+        planes: Half planes with bounds that are not negative.
 
     Returns:
         HalfPlanes, r of the R of each place.
     """
-    normed = planes.rates / planes.bound[..., None]  # 0 for an infinite bound
+    normed = planes.rates / np.maximum(planes.bound, _NOTHING)[..., None]  # 0 for an infinite bound
     scale = np.maximum(np.abs(normed).max(axis=1, keepdims=True), _NOTHING)
     angle = np.linspace(-0.5 * np.pi, 0.5 * np.pi, _SIDES)
     ray = np.stack((np.sin(angle), np.cos(angle)), axis=1)
