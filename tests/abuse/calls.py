@@ -675,6 +675,7 @@ def _in_time(given: _Given) -> dict[str, Call]:
                 duration=("number", 0.02),
                 step=("number", 5e-4, True),
                 cable_mass=("word", "none"),
+                nodes=("whole", 20),
                 integrator=("word", "splitting", True),
                 winches=("one", sl.SecondOrder(10.0)),
                 winding=("word", "constant"),

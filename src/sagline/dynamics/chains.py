@@ -184,22 +184,30 @@ def _table(given: Beginning, place: Array, nodes: int, losses: Damping, data: Ar
     return table
 
 
-def checked_nodes(nodes: Any, given: Beginning) -> int:
-    """Elements a cable of a robot whose cables can be lumped.
+def checked_nodes(nodes: Any) -> int:
+    """Elements a cable.
 
     Args:
         nodes: What a caller gave.
-        given: The beginning.
 
     Returns:
         The number.
 
     Raises:
-        InvalidValueError: If it is out of range, or the cables have no weight or no mass.
+        InvalidValueError: If it is out of range.
     """
-    count = whole_number(nodes, "nodes", FEWEST)
-    if count > MOST:
-        raise InvalidValueError("nodes", count, f"{FEWEST} to {MOST}", "Give fewer: 20 do for most.")
+    return whole_number(nodes, "nodes", FEWEST, MOST)
+
+
+def check_lumped(given: Beginning) -> None:
+    """Refuse cables that cannot be lumped.
+
+    Args:
+        given: The beginning.
+
+    Raises:
+        InvalidValueError: If the cables have no weight or no mass.
+    """
     if given.model.code != codes.CATENARY:
         name, step = f"{type(given.model).__name__}()", 'Plan with Catenary(), or give cable_mass="none".'
         raise InvalidValueError("start: model", name, 'Catenary() where cable_mass="lumped"', step)
@@ -207,7 +215,6 @@ def checked_nodes(nodes: Any, given: Beginning) -> int:
     if light.size:
         step = 'Give a density, or cable_mass="none".'
         raise InvalidValueError(f"cable {light[0]}: linear_density", "0 kg/m", "> 0 kg/m where it has mass", step)
-    return count
 
 
 def wave_frequency(given: Beginning, nodes: int) -> float:

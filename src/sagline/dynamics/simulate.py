@@ -10,7 +10,7 @@ import numpy as np
 from sagline.arguments import choice, optional
 from sagline.arrays import number
 from sagline.dynamics.beginning import Beginning, beginning
-from sagline.dynamics.chains import ChainPlant, checked_nodes, wave_frequency
+from sagline.dynamics.chains import ChainPlant, check_lumped, checked_nodes, wave_frequency
 from sagline.dynamics.course import Course, TableInTime, table_in_time
 from sagline.dynamics.damping import Damping
 from sagline.dynamics.drives import Winches, drive_data, kind_of
@@ -115,13 +115,16 @@ def simulate(
         107, 1997.
     """
     choice(cable_mass, "cable_mass", get_args(CableMass))
+    elements = checked_nodes(nodes)
     given = beginning(start, unstrained_length, wrench, duration)
     if cable_mass == "modal":
         others = {"events": events, "winches": winches != "ideal", "wind": wind is not None, "integrator": integrator}
         refuse_with_modes([name for name, asked in others.items() if asked])
         written = RECORD if record is None else number(record, "record", "s", above=0.0)
         return modal_simulation(given, optional(damping, Damping, "damping") or Damping(), step, written)
-    elements = checked_nodes(nodes, given) if cable_mass == "lumped" else 0
+    elements = elements if cable_mass == "lumped" else 0
+    if elements:
+        check_lumped(given)
     kind, losses = kind_of(winches), checked_damping(damping)
     code = code_of(integrator, kind, elements)
     choice(winding, "winding", get_args(Winding))
