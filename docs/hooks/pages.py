@@ -41,6 +41,8 @@ DRAWN = {  # command -> what is shown of it
     "view": "![A robot in the viewer](../images/viewer.png)\n\n![A run in the viewer](../images/viewer-run.png)",
 }
 SCENE = """\
+import numpy as np
+
 robot = sl.load_robot("cogiro")
 path = sl.quintic_path([(0, 0, 1.5), (2, 1, 2.5), (-2, 1, 2.5)], speed=1.0)
 proof = sl.confirm(sl.inverse(robot, path, model=sl.Elastic()))
@@ -52,6 +54,9 @@ state = sl.inverse(robot, pose).state
 swings = sl.vibration(state, up_to=20.0, damping=sl.Damping(modal_damping=0.01))
 some = sl.inverse(robot, path).state[::20]
 along = [sl.vibration(each, up_to=8.0) for each in some]
+ways = np.meshgrid(*([-3, -1, 1, 3],) * 2, [1, 2, 3], indexing="ij")
+grid = sl.Pose(np.stack(ways, axis=-1).reshape(-1, 3), np.eye(3))
+found = sl.frequency_map(robot, grid, up_to=8.0)
 broken = sl.simulate(state, duration=2.0, events=sl.Break(cable=3, time=0.5))
 """
 FIGURES = {  # function of `sl.plot` -> a call that draws
@@ -59,6 +64,7 @@ FIGURES = {  # function of `sl.plot` -> a call that draws
     "error": "error(proof)",
     "errors": "errors(proof, again)",
     "frequencies": "frequencies(along, path.time[::20])",
+    "frequency_map": "frequency_map(found)",
     "lengths": "lengths(proof.plan)",
     "overview": "overview(proof.plan)",
     "path": "path(path)",

@@ -33,6 +33,7 @@ HOW_TO_GET: Final = MappingProxyType(
         "Creep": "Give Creep(axial_stiffness, time), or None.",
         "Damping": "Give Damping(loss_time, air_damping, modal_damping), or None.",
         "Equilibrium": "Take that of a plan or a solution: plan.state.",
+        "FrequencyMap": "Make one: frequency_map(robot, poses, up_to=20.0).",
         "MeasuredTension": "Give MeasuredTension(frame_end_tension, tension_deviation, length_deviation).",
         "Path": "Make one, with quintic_path(waypoints, speed=1.0) for instance.",
         "Plan": "Make one: inverse(robot, motion).",

@@ -592,6 +592,7 @@ def _figures(given: _Given) -> dict[str, Call]:
     assert isinstance(deep, Axes3D)
     ax, plan, path, proof = ("ax", flat, True), ("one", given.run), ("one", given.path), ("one", sl.confirm(given.run))
     swing = made.vibration(made.state_at(), np.array([1.0, 2.0]), np.array([0.9, 0.1]))
+    mapped = sl.frequency_map(made.ROBOT, sl.Pose([[0.0, 0.0, 1.5], [1.0, 0.0, 1.5]], np.eye(3)), up_to=3.0)
     polygon, points = sl.tension_polygon(given.robot, given.pose), {"norm": given.plan.chord_tension}
 
     def draw_all(confirmation: Any) -> None:
@@ -629,6 +630,7 @@ def _figures(given: _Given) -> dict[str, Call]:
             draw_two,
             {"vibration": ("one", swing), "time": ("array", np.array([0.0, 1.0]), True), "ax": ax},
         ),
+        "frequency_map": (sl.plot.frequency_map, {"found": ("one", mapped), "quantity": ("word", "peak")}),
         "film": (
             sl.plot.film,
             {"vibration": ("one", swing), "number": ("whole", 1), "file": ("file", str(given.folder / "mode.gif"))},

@@ -140,3 +140,36 @@ def test_a_shaped_path_leaves_less_vibration(folder: FilePath) -> None:
     assert found["residual_m"] < 1e-4
     assert found["energy_error_j"] < 1e-3
     assert " and ".join(f"{each:.3f}" for each in frequency) + " Hz (massless)" in result.stderr
+
+
+def test_a_map_of_the_test_box(folder: FilePath) -> None:
+    result = sagline("vibrate", "article-suspended", "--map", "3x2x1", "--up-to", "3", "--out", "maps", "--json")
+    assert result.exit_code == 0, result.stderr
+    found = json.loads(result.stdout)
+    robot = sl.load_robot("article-suspended")
+    assert robot.test_box is not None
+    assert found["position_m"][0][:2] == robot.test_box.low[:2].tolist()
+    assert found["position_m"][0][2] == pytest.approx(0.5 * (robot.test_box.low[2] + robot.test_box.high[2]))
+    state = sl.inverse(robot, sl.Pose(found["position_m"][3], np.eye(3))).state
+    lowest = sl.vibration(state, up_to=3.0).frequency[0]
+    assert found["frequency_with_cable_mass_hz"][3] == pytest.approx(lowest, rel=1e-6)
+    assert found["frequency_massless_hz"][3] == pytest.approx(sl.modes(state).frequency[0], rel=1e-9)
+    names = {file.name for file in (folder / "maps").iterdir()}
+    kinds = (".nc", "-frequency.png", "-frequency.svg", "-peak.png", "-peak.svg")
+    assert names == {f"article-suspended-vibration-map{kind}" for kind in kinds}
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--map", "3x2"], "NXxNYxNZ"),
+        (["--map", "0x1x1"], "NXxNYxNZ"),
+        (["--map", "9999x9999x9"], "1 to 1,000,000 poses"),
+        (["--map", "2x2x2", "--pose", "0,0,1.5"], "--pose is given with --map"),
+        (["--map", "2x2x2", "--film", "1"], "--film is given with --map"),
+    ],
+)
+def test_maps_that_are_none(words: list[str], told: str) -> None:
+    result = sagline("vibrate", "cogiro", *words)
+    assert result.exit_code == 2
+    assert told in result.stderr

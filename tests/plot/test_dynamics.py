@@ -1,9 +1,12 @@
 """Figures of vibrations and simulations hold the numbers they claim to show."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
-from matplotlib.collections import LineCollection
+from matplotlib.collections import LineCollection, QuadMesh
 from matplotlib.figure import Figure
+from PIL import Image
 
 import sagline as sl
 from sagline import plot
@@ -147,3 +150,38 @@ def test_axes_of_the_caller_are_used() -> None:
     one = made.vibration(made.state_at(), FREQUENCY, SHARE)
     assert plot.response(one, ax=left) is left
     assert plot.frequencies([one, one], ax=right) is right
+
+
+def test_a_map_has_the_value_of_a_pose_where_the_pose_is() -> None:
+    x, y, z = np.meshgrid([-1.0, 0.5, 2.0], [0.0, 1.0], [1.5, 2.0], indexing="ij")
+    order = np.random.default_rng(4).permutation(x.size)
+    poses = sl.Pose(np.stack((x, y, z), axis=-1).reshape(-1, 3)[order], np.eye(3))
+    found = sl.frequency_map(made.ROBOT, poses, up_to=4.0)
+    figure = plot.frequency_map(found, "peak")
+    low, high = figure.axes[:2]
+    for ax, height in ((low, 1.5), (high, 2.0)):
+        assert ax.get_title() == f"$z$ = {height:g} m"
+        (mesh,) = (drawn for drawn in ax.collections if isinstance(drawn, QuadMesh))
+        values = np.asarray(mesh.get_array())
+        for i, column in enumerate((-1.0, 0.5, 2.0)):
+            for j, row in enumerate((0.0, 1.0)):
+                k = int(np.flatnonzero(np.all(found.pose.position == (column, row, height), axis=1))[0])
+                assert values[j, i] == found.peak[k]
+    assert figure.axes[-1].get_ylabel() == "strongest answer with cable mass [m/N]"
+    with pytest.raises(sl.InvalidValueError, match="fill no grid"):
+        plot.frequency_map(sl.frequency_map(made.ROBOT, poses[:5], up_to=4.0))
+    with pytest.raises(sl.InvalidValueError, match="quantity is 'mode'"):
+        plot.frequency_map(found, "mode")
+
+
+def test_a_film_lasts_ten_seconds_and_is_a_gif(tmp_path: Path) -> None:
+    found = sl.vibration(made.state_at(), up_to=2.0)
+    told: list[tuple[int, int]] = []
+    plot.film(found, 1, tmp_path / "mode.gif", progress=lambda done, total: told.append((done, total)))
+    with Image.open(tmp_path / "mode.gif") as film:
+        assert film.n_frames * film.info["duration"] == 10_000  # type: ignore[attr-defined]
+    assert told[-1] == (25, 25)
+    with pytest.raises(sl.InvalidValueError, match=r"number is 99; allowed: 1 to \d"):
+        plot.film(found, 99, tmp_path / "mode.gif")
+    with pytest.raises(sl.FileError, match="suffix"):
+        plot.film(found, 1, tmp_path / "mode.mp4")

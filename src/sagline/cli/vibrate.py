@@ -10,6 +10,7 @@ import numpy as np
 from sagline.cli.csv_text import csv_text
 from sagline.cli.ending import OUTSIDE
 from sagline.cli.entries import INVERSE, MODES, VIBRATION
+from sagline.cli.maps import counts_of, vibrate_all_over
 from sagline.cli.results import figure_files, listed, write_figures
 from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
@@ -54,6 +55,7 @@ class Losses(NamedTuple):
 def vibrate(
     name: str,
     pose: str | None,
+    grid: str | None,
     up_to: str,
     losses: Losses,
     force: str,
@@ -72,7 +74,11 @@ def vibrate(
     """
     limit, damping = quantity(up_to, "--up-to", "Hz", above=0.0), losses.damping_of
     load, place = wrench_of(wrench), None if pose is None else pose_of(pose)
+    counts = None if grid is None else counts_of(grid)
     robot = loaded(load_robot(name), payload)
+    if counts is not None:
+        _check_alone(pose=pose, film=film, wrench=wrench)
+        return vibrate_all_over(robot, counts, limit, damping, folder, figures=figures, as_json=as_json)
     table, drawing = (file_stem(robot.name, what) for what in ("modes", "response"))
     reel = f"{file_stem(robot.name, f'mode-{film}')}.gif"
     check_files(folder, [f"{table}.csv", *figure_files([drawing] * figures), *[reel] * (film is not None)])
@@ -110,6 +116,12 @@ def vibrate(
         slack = ", ".join(map(str, found.slack_cables))
         note(f"Cables {slack}: ", found.status.text, style="bold")
     return 0
+
+
+def _check_alone(**others: object) -> None:
+    for item, value in others.items():
+        if value is not None:
+            raise InvalidValueError(f"--{item}", "given with --map", "one of both", "A map is of the whole test box.")
 
 
 def _check_film(film: int | None, modes: list[ListedMode]) -> None:

@@ -9,6 +9,7 @@ from sagline.plot.energy import energy
 from sagline.plot.errors import error, errors
 from sagline.plot.film import film
 from sagline.plot.frequencies import frequencies
+from sagline.plot.maps import frequency_map
 from sagline.plot.motion import path, velocity
 from sagline.plot.polygon import polygon
 from sagline.plot.response import response
@@ -21,6 +22,7 @@ __all__ = [
     "errors",
     "film",
     "frequencies",
+    "frequency_map",
     "lengths",
     "overview",
     "path",

@@ -27,6 +27,15 @@ def vibrate(
             help="Position [m] and angles about z, y, x [degrees]. Default: the middle of the robot's test box.",
         ),
     ] = None,
+    grid: Annotated[
+        str | None,
+        typer.Option(
+            "--map",
+            metavar="NXxNYxNZ",
+            help="Lowest frequency and strongest answer at so many poses all over the test box, instead of one pose.",
+            show_default=False,
+        ),
+    ] = None,
     up_to: Annotated[str, typer.Option(metavar="HZ", help="Frequency below which all modes are found.")] = "20",
     damping: Annotated[
         str, typer.Option(metavar="RATIO", help="Damping ratio of every mode, 0.01 or '1 %', besides the cables'.")
@@ -56,12 +65,15 @@ def vibrate(
 
         sagline vibrate cogiro --pose 0,0,2 --up-to 20
         sagline vibrate article-suspended --damping "2 %" --force z --film 1
+        sagline vibrate cogiro --map 20x15x8 --out maps
     """
     from sagline.cli.vibrate import Losses
     from sagline.cli.vibrate import vibrate as run
 
     losses = Losses(damping, loss_time, air_damping)
-    return run(robot, pose, up_to, losses, force.value, film, wrench, payload, out, figures=figures, as_json=as_json)
+    return run(
+        robot, pose, grid, up_to, losses, force.value, film, wrench, payload, out, figures=figures, as_json=as_json
+    )
 
 
 def simulate(
