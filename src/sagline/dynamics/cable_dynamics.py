@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from sagline.arguments import instance, optional
 from sagline.arrays import Array, checked, locked
 from sagline.dynamics.damping import Damping
-from sagline.errors import InvalidValueError
+from sagline.errors import InvalidValueError, SaglineError
 from sagline.kernels import codes
 from sagline.kernels.dynamics import collocation
 from sagline.kernels.dynamics.collocation import dynamic_stiffnesses
@@ -130,19 +130,23 @@ def moving_stiffness(strings: Strings, frequency: Array, damping: Damping | None
 
 
 def check_counts(counts: NDArray[np.int64], frequency: Array) -> None:
-    """Refuse a frequency for which a cable has too many elements.
+    """Refuse a frequency for which a cable has too many elements, or none that does.
 
     Args:
         counts: As kernels fill them, shape (1, F, m, 2).
         frequency: [Hz], shape (F,).
 
     Raises:
-        InvalidValueError: If there is one.
+        InvalidValueError: If there are too many.
+        SaglineError: If there is none.
     """
     high = np.flatnonzero((counts == collocation.TOO_MANY).any(axis=(0, 2, 3)))
     if high.size:
         value = f"{frequency[high[0]]:g} Hz, which would cut a cable into more than {collocation.MOST_ELEMENTS:,} waves"
         raise InvalidValueError("frequency", value, "a lower one", "Give one nearer to the robot's own.")
+    if (lost := np.flatnonzero((counts < 0).any(axis=(0, 2, 3)))).size:
+        text = f"at {frequency[lost[0]]:g} Hz a cable has no elements whose joints are clear of its nodes"
+        raise SaglineError(f"{text}. Ask for another frequency, and report the robot and its pose.")
 
 
 def in_world(found: NDArray[np.float64] | Complex, axes: Array) -> Complex:

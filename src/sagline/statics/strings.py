@@ -19,6 +19,7 @@ from sagline.statics.tables import cable_table
 
 FOLD = 1e-6  # of its weight: a cable whose least tension is below is folded, and has no linear vibration
 COUNTING = 0.75 * np.pi  # phase of an element [rad] for a count, below pi: errs by 1e-13 of a frequency
+SLACK = 1e-7  # of EA: one whose least tension is below is as slack; its two stiffnesses are too far apart to compute
 _TINY = 1e-300
 
 
@@ -68,7 +69,7 @@ def strings_of(state: Equilibrium) -> Strings:
         terms = cables.model.terms(first_of(state.robot).gravity)
         wraps = np.array(state.contact.wrap_angle).reshape(-1, m)
         fill_behind(terms, cable_table(state.robot), wraps, np.array(leaving), np.empty((CABLE_ROWS, m)), table)
-    return Strings(table, _axes(state).reshape(-1, m, 3, 3), _taut(table))
+    return Strings(table, _axes(state).reshape(-1, m, 3, 3), taut_of(table))
 
 
 def strings_below(strings: Strings, frequency: Array) -> Indices:
@@ -88,7 +89,7 @@ def strings_below(strings: Strings, frequency: Array) -> Indices:
         found = np.empty((1, waves.shape[1], table.shape[1], collocation.FOUND))
         counts = np.empty((*found.shape[:-1], 2), dtype=np.int64)
         dynamic_stiffnesses(table, waves[row : row + 1], COUNTING, room, found, counts)
-        below[row][:, taut] = counts[0].sum(axis=-1)
+        below[row][:, taut] = np.maximum(counts[0], 0).sum(axis=-1)
     return below
 
 
@@ -124,10 +125,18 @@ def _axes(state: Equilibrium) -> Array:
     return axes
 
 
-def _taut(table: Array) -> Flags:
-    """Whether the least tension is more than none, (N, m)."""
+def taut_of(table: Array) -> Flags:
+    """Whether cables have linear vibrations: neither folded nor slack.
+
+    Args:
+        table: Of strings, shape (N, m, STRING_COLUMNS).
+
+    Returns:
+        Shape (N, m).
+    """
     top = table[..., columns.VERTICAL]
     hanging = table[..., columns.WEIGHT] * table[..., columns.LENGTH]
     vertical = np.maximum(np.maximum(top - hanging, -top), 0.0)
     least = np.hypot(table[..., columns.HORIZONTAL], vertical)
-    return np.asarray(least > np.maximum(FOLD * hanging, _TINY))
+    few = np.maximum(FOLD * hanging, SLACK * table[..., columns.STIFFNESS])
+    return np.asarray(least > np.maximum(few, _TINY))

@@ -19,6 +19,7 @@ from sagline.kernels.dynamics.string import (
     BEHIND_Z,
     String,
     element,
+    ended,
     shortest_wave,
     string_at,
     vertical_at,
@@ -32,9 +33,9 @@ OMEGA, SQUARE, DRAG, ACROSS, ALONG = 0, 1, 2, 3, 4
 WAVE_COLUMNS = 5
 ROOM = (5 * STAGES, 20)  # of the numbers to work in
 MESHES = 8  # tried in turn where a joint of elements is about at a node of the cable up to there
-SHORTER = 0.06  # by which share of the longest elements each has shorter ones
+SHORTER = 0.0618034  # by which share each has shorter elements: no ratio of small numbers, which would meet nodes again
 ROUNDING = 2.0**-52  # by which mu grows with them, should the frequency be a held one to the last bit
-CLEAR = 1e-4  # of its terms: a pivot that is less is taken for singular, and digits would be lost
+CLEAR = 1e-6  # of what a joint moves at rest: one that moves less is at a node, and digits would be lost
 # columns of what is found of a cable: in its plane, and normal to it
 XX, XZ, ZZ, YY = 0, 1, 2, 3
 FOUND = 4
@@ -202,18 +203,17 @@ def divide(moved: Numbers, d: int, k: Numbers) -> None:
 
 
 @glue
-def negatives(phi: Numbers, d: int, k: Numbers, clear: float, moved: Numbers) -> int:
+def negatives(phi: Numbers, d: int, clear: float, moved: Numbers) -> int:
     """Negative eigenvalues of the pivot Phi_uf^-1 moved, a symmetric matrix; SINGULAR where it is not clear of that.
 
-    k is that up to the element.
+    The determinant of moved is one or a little more at rest, and zero where the cable up to there has a node.
     """
     if d == 1:
-        clear *= abs(phi[0, 0]) + abs(phi[0, 1] * k[0, 0])
         pivot = moved[0, 0].real * phi[0, 1].real
         return SINGULAR if not abs(moved[0, 0]) > clear else int(pivot < 0.0)
     below = phi[0, 2].real * phi[1, 3].real - phi[0, 3].real * phi[1, 2].real
     one, other = moved[0, 0] * moved[1, 1], moved[0, 1] * moved[1, 0]
-    if not abs(one - other) > clear * (abs(one) + abs(other)):
+    if not abs(one - other) > clear:
         return SINGULAR
     determinant = (one - other).real * below
     first = (phi[1, 3].real * moved[0, 0].real - phi[0, 3].real * moved[1, 0].real) * below
@@ -254,7 +254,7 @@ def cable_at(
     lost = wave.across if d == 1 else wave.along
     for number in range(MOST_ELEMENTS + 1):
         size = element(string, start, omega, phase)
-        last = start + size >= string.length
+        last = ended(string, start + size)
         # at rest the end moves by the sum of all C, for a unit of force
         fill_flexibility(string, Wave(wave.mu, 1.0, 1.0), start, size, d == 1, c)
         sum_of(c, size, d, moved)
@@ -268,7 +268,7 @@ def cable_at(
             begin(phi, d, give, lost, k, moved)
         else:
             move(phi, d, k, moved)
-            below = negatives(phi, d, k, 0.0 if last else CLEAR, moved)
+            below = negatives(phi, d, 0.0 if last else CLEAR, moved)
             if below == SINGULAR:
                 return SINGULAR
             divide(moved, d, k)

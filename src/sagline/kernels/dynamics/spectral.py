@@ -16,6 +16,7 @@ from sagline.kernels.dynamics.string import (
     BEHIND_Z,
     String,
     element,
+    ended,
     slowness,
     string_at,
     vertical_at,
@@ -76,7 +77,7 @@ def node_counts(strings: Array, omega: float, counts: Indices) -> None:
         for _ in range(100_000):
             part = element_from(string, omega, start, nodes)
             start, nodes = part.start + part.size, nodes + part.degree
-            if start >= string.length:
+            if ended(string, start):
                 break
         counts[i] = nodes + 1
 
@@ -237,7 +238,7 @@ def spectral_matrices(
             add_sums(string, part, lobatto, points[i])
             add_element(string, part, lobatto, plane[i], normal[i])
             start, first = part.start + part.size, first + part.degree
-            if start >= string.length:
+            if ended(string, start):
                 break
         count = first + 1
         set_frame_end(strings, i, count, plane[i])
@@ -278,7 +279,7 @@ def interpolate(strings: Array, omega: float, rule: Rule, points: Array, values:
             s = string.length * k / (count - 1)
             for _ in range(100_000):
                 end = part.start + part.size
-                if s <= end or end >= string.length:
+                if s <= end or ended(string, end):
                     break
                 part = element_from(string, omega, end, part.first + part.degree)
             place = min(max(2.0 * (s - part.start) / part.size - 1.0, -1.0), 1.0)
@@ -319,7 +320,7 @@ def stretch_matrices(strings: Array, omega: float, rule: Rule, points: Array, ma
             part = element_from(string, omega, start, first)
             add_stretch(string, part, lobatto, matrix)
             start, first = part.start + part.size, first + part.degree
-            if start >= string.length:
+            if ended(string, start):
                 break
         set_frame_end(strings, i, first + 1, matrix)
         scale(matrix, points[i], 2 * first + 2, 2)

@@ -91,6 +91,12 @@ def longest(string: String, start: float, end: float, omega: float, phase: float
 
 
 @formula
+def ended(string: String, s: float) -> bool:
+    """Whether a sum of elements' lengths is the cable's, but for rounding."""
+    return s >= string.length * (1.0 - 1e-12)
+
+
+@formula
 def element(string: String, start: float, omega: float, phase: float) -> float:
     """Length of the element that begins at a material point [m]."""
     size = string.length - start
