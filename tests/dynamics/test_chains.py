@@ -300,3 +300,77 @@ def test_cables_without_weight_or_mass_are_no_chains() -> None:
     pose = sl.Pose([0.5, 0.3, 2.0], np.eye(3))
     with pytest.raises(sl.SaglineError, match=r"Elastic\(\); allowed: Catenary\(\)"):
         sl.simulate(sl.inverse(robot, pose, sl.Elastic()).state, cable_mass="lumped", duration=0.1)
+
+
+def tripod(mass: float) -> sl.Equilibrium:
+    """A point mass on three cables."""
+    robot = sl.Robot(
+        "tripod",
+        frame_anchors=[[3, 0, 3], [-2, 2, 3], [-2, -2, 3]],
+        platform_anchors=np.zeros((3, 3)),
+        cables=sl.Cable(linear_density=0.005, axial_stiffness=5e4),
+        mass=mass,
+        motion_pattern="3T",
+    )
+    return sl.inverse(robot, sl.Pose([0.0, 0.0, 1.0], np.eye(3))).state
+
+
+def in_a_plane() -> sl.Equilibrium:
+    """A platform that moves and turns in the plane of x and z."""
+    robot = sl.Robot(
+        "planar",
+        frame_anchors=[[3, 0, 3], [-3, 0, 3], [3, 0, 0], [-3, 0, 0]],
+        platform_anchors=[[0.3, 0, 0.2], [-0.3, 0, 0.2], [0.3, 0, -0.2], [-0.3, 0, -0.2]],
+        cables=sl.Cable(linear_density=0.005, axial_stiffness=5e4),
+        mass=20.0,
+        inertia=np.eye(3),
+        motion_pattern="1R2T",
+        plane_normal=[0, 1, 0],
+        tension_min=50.0,
+        tension_max=5000.0,
+    )
+    return sl.inverse(robot, sl.Pose([0.2, 0.0, 1.4], np.eye(3))).state
+
+
+@pytest.mark.parametrize("pattern", ["3T", "1R2T"])
+def test_platforms_that_turn_not_or_in_a_plane_move_as_on_massless_cables(pattern: str) -> None:
+    """On light cables; and what their guides take stays zero."""
+    state = tripod(50.0) if pattern == "3T" else in_a_plane()
+    given: dict[str, Any] = {"unstrained_length": winched(state, 0, 0.01)}
+    run = sl.simulate(state, cable_mass="lumped", nodes=6, **given)
+    massless = sl.simulate(state, **given)
+    moved = np.ptp(massless.pose.position, axis=0).max()
+    assert moved > 3e-3
+    assert np.abs(run.pose.position - massless.pose.position).max() < 0.03 * moved
+    turned = (run.pose.rotation * massless.pose.rotation.inv()).magnitude().max()
+    assert turned < 0.03 * moved
+    held = run.twist[:, 3:] if pattern == "3T" else run.twist[:, [1, 3, 5]]
+    assert np.abs(held).max() < 1e-12
+    assert np.abs(run.energy.error).max() < 1e-4 * np.ptp(run.energy.supplied)
+
+
+def test_a_cable_that_hangs_deep_is_a_chain_at_rest_too() -> None:
+    """1.5 m too long, it sags far below its chord and pulls with 6 N."""
+    robot = sl.load_robot("cogiro")
+    start = hung("cogiro", 0.0, 0.0, 2.0)
+    longer = start.unstrained_length.copy()
+    longer[0] += 1.5
+    state = sl.forward(robot, longer, start=start.pose).state
+    run = sl.simulate(state, cable_mass="lumped", duration=0.1)
+    assert state.cables.frame_end_tension[0] < 7.0
+    assert run.tensions[0] == pytest.approx(state.cables.frame_end_tension, abs=0.05)
+    assert np.ptp(run.pose.position, axis=0).max() < 1e-12
+
+
+def test_a_plan_that_begins_in_motion_goes_on_at_its_speed() -> None:
+    path = sl.quintic_path([(0, 0, 1.5), (1.5, 1.0, 2.5)], durations=(2.0,), rate=500.0)
+    later = slice(300, None)
+    rest = sl.Path(path.time[later], path.pose[later], path.twist[later], path.twist_rate[later])
+    plan = sl.inverse(sl.load_robot("cogiro"), rest)
+    run = sl.simulate(plan, cable_mass="lumped", nodes=10)
+    assert run.time[0] == pytest.approx(0.6)
+    assert run.twist[0] == pytest.approx(sl.simulate(plan, duration=0.1).twist[0], abs=1e-12)
+    assert np.abs(run.twist[0, :3]).max() > 0.5
+    want = np.stack([np.interp(run.time, rest.time, rest.pose.position[:, k]) for k in range(3)], axis=1)
+    assert np.abs(run.pose.position - want).max() < 1e-3
+    assert np.abs(run.energy.error).max() < 1e-8 * np.ptp(run.energy.supplied)
