@@ -157,6 +157,18 @@ def test_what_cannot_be_simulated_is_refused(given: dict[str, object], message: 
         sl.simulate(still(), **arguments)  # type: ignore[arg-type]
 
 
+def test_what_has_no_energy_is_refused() -> None:
+    robot, pose = sl.load_robot("article-suspended"), sl.Pose.from_euler(PLACE, 0.0, 0.0, 0.0)
+    with pytest.raises(
+        sl.InvalidValueError, match=r"start: model is Parabolic\(\); allowed: Catenary\(\) or Elastic\(\)"
+    ):
+        sl.simulate(sl.inverse(robot, pose, model=sl.Parabolic()).state, duration=1.0)
+    rubbing = robot.replace(winches=sl.Winch(0.05, pulley_friction=0.1))
+    path = sl.septic_path([PLACE, (1.4, 0.3, 1.8)], durations=4.0, rate=20.0)
+    with pytest.raises(sl.InvalidValueError, match="start: winding is given; allowed: None"):
+        sl.simulate(sl.inverse(rubbing, path, winding="path"))
+
+
 def test_energy_that_grows_by_itself_stops_the_run_and_names_time_and_cable(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sagline.dynamics.simulate.checked_step", lambda *_: 0.09)
     state = still()

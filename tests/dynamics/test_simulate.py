@@ -122,6 +122,18 @@ def test_over_pulleys_and_dead_cable_a_plan_is_followed_and_its_energy_kept() ->
     np.testing.assert_allclose(run.tensions[0], plan.state.cables.frame_end_tension[0], rtol=1e-9)
 
 
+def test_the_wrench_that_a_plan_was_made_for_acts_and_another_takes_its_place() -> None:
+    robot = sl.load_robot("article-suspended")
+    path = sl.septic_path([(0, 0, 1.5), (0.6, 0.3, 1.7)], durations=1.0, rate=1000.0)
+    load = np.outer(1.0 + path.time, [3.0, -5.0, -40.0, 1.0, 2.0, 0.5])
+    plan = sl.inverse(robot, path, tension=LIFT, wrench=load)
+    run = sl.simulate(plan)
+    assert np.abs(run.pose.position - path.pose.position[::10]).max() < 1e-9
+    same, other = (sl.simulate(plan, wrench=given) for given in ((path.time, load), np.zeros(6)))
+    np.testing.assert_allclose(same.pose.position, run.pose.position, rtol=0, atol=1e-11)
+    assert np.abs(other.pose.position - run.pose.position).max() > 1e-3
+
+
 FRAMES = {
     "3T": [[3, 0, 3], [-2, 2, 3], [-2, -2, 3]],
     "1R2T": [[-3, 0, 3], [3, 0, 3], [0.5, 0, 3]],
