@@ -2,22 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Final
-
-import numpy as np
-
-from sagline.arguments import brief, instance
-from sagline.arrays import Array, locked
-from sagline.dynamics.moves import Move, moves_of
+from sagline.arguments import brief
+from sagline.arrays import Array
+from sagline.dynamics.excitation import most_excited
 from sagline.dynamics.vibration import Vibration
 from sagline.errors import InvalidValueError
 from sagline.motion.path import Path
-from sagline.robot.robot import Robot
 from sagline.statics.stiffness import Modes
-from sagline.statics.wrench import inertial_wrench
-
-_NEAR: Final = 3.0  # times: excitations that differ by less both count
-_INSTANTS: Final = 2000  # of a move, where its inertia is taken
 
 
 def to_shape(modes: Modes | Vibration, path: Path) -> Array:
@@ -59,26 +50,4 @@ def to_shape(modes: Modes | Vibration, path: Path) -> Array:
     if state.pose.shape:
         value = f"of {len(state.pose)} states"
         raise InvalidValueError("modes", value, "of a single state", "Take those of the last: modes(plan.state[-1]).")
-    moves = [move for move in moves_of(instance(path, Path, "path")) if move.curve is not None]
-    known = np.flatnonzero(np.isfinite(modes.frequency) & (modes.frequency > 0.0))
-    if not (moves and known.size):
-        item, value = ("path", "without motion") if not moves else ("modes", "without a frequency")
-        raise InvalidValueError(item, value, "a motion, and modes that it can excite", "Take another path, or state.")
-    frequency, shape = modes.frequency[known], modes.shape[:, known]
-    excited = np.max([_excitation(state.one_robot, move, frequency, shape) for move in moves], axis=0)
-    order = np.argsort(-excited, kind="stable")[:2]
-    return locked(frequency[order[excited[order] * _NEAR >= excited[order[0]]]])
-
-
-def _excitation(robot: Robot, move: Move, frequency: Array, shape: Array) -> Array:
-    """How much a move excites each mode, and the mode moves the platform, shape (K,)."""
-    time = np.linspace(0.0, move.duration, _INSTANTS + 1)
-    assert move.curve is not None
-    motion = move.rates(time)
-    jet = move.curve.at(motion[0])
-    twist, twist_rate, _ = jet.twists(motion)
-    force = inertial_wrench(robot, jet.pose, twist, twist_rate) @ shape  # of each mode over time
-    turning = 2.0 * np.pi * frequency
-    transform = np.trapezoid(force * np.exp(-1j * np.outer(time, turning)), time, axis=0)
-    seen: Array = np.abs(transform) * np.linalg.norm(shape, axis=0) / turning
-    return seen
+    return most_excited(state, modes.frequency, modes.shape, path)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from sagline.arrays import Array
 from sagline.dynamics.damping import Damping
+from sagline.dynamics.excitation import most_excited
 from sagline.dynamics.vibration_status import VibrationStatus
 from sagline.motion.path import Path
 from sagline.robot.equilibrium import Equilibrium
@@ -69,6 +70,4 @@ class Vibration:
         Raises:
             InvalidValueError: As `sagline.to_shape`.
         """
-        from sagline.dynamics.to_shape import to_shape  # it takes a Vibration
-
-        return to_shape(self, path)
+        return most_excited(self.state, self.frequency, self.shape, path)
