@@ -81,6 +81,25 @@ def test_a_winch_that_stalls_stands_while_the_others_go_on(winches: sl.SecondOrd
     np.testing.assert_allclose(run.length[-1, others], plan.unstrained_length[-1, others], atol=1e-6)
 
 
+# peaks of another simulation of the prototype, with winches, semi-implicit: +13 and +8 N at 0.06 m/s, +63 and +39 at 0.3
+@pytest.mark.parametrize(("speed", "locked", "braked"), [(0.06, 13.0, 8.0), (0.3, 63.0, 39.0)])
+def test_stops_between_two_poses_of_the_prototype_raise_tensions_as_known(
+    speed: float, locked: float, braked: float
+) -> None:
+    ends = np.array([[0.0, 0.0, 1.5], [-0.13, 1.42, 0.68]])
+    duration = 2.1875 * float(np.linalg.norm(ends[1] - ends[0])) / speed  # of which 2.1875 is fastest in the middle
+    path = sl.septic_path(ends, durations=duration, rate=100.0)
+    plan = sl.inverse(sl.load_robot("article-prototype"), path, tension=LIFT)
+    middle = 0.5 * duration
+    before = plan.state.cables.frame_end_tension[np.argmin(np.abs(path.time - middle))]
+    stops: list[list[Event]] = [[sl.Stall(i, middle) for i in range(8)], [sl.Brake(middle, duration=0.2)]]
+    for events, expected in zip(stops, (locked, braked), strict=True):
+        damping = sl.Damping(loss_time=1e-3)
+        run = sl.simulate(plan, events=events, duration=middle + 6.0, damping=damping, record=0.002)
+        peak = (run.tensions[run.time >= middle].max(axis=0) - before).max()
+        assert peak == pytest.approx(expected, abs=1.2)
+
+
 def test_what_happens_twice_happens_in_order() -> None:
     events: list[Event] = [sl.Break(5, 1.5), sl.Drop(5.0, 0.7), sl.Brake(1.0), sl.Break(2, 0.7)]
     run = sl.simulate(still(), events=events, duration=2.0)
