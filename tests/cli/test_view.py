@@ -98,3 +98,23 @@ def test_bad_input_ends_with_a_message(wrong: list[str]) -> None:
     result = CliRunner().invoke(app, ["view", *wrong, "--no-browser"])
     assert result.exit_code == 2
     assert "Error:" in result.stderr
+
+
+def test_a_simulation_is_played_as_a_run_is(tmp_path: FilePath) -> None:
+    state = sl.inverse(sl.load_robot("cogiro"), sl.Pose([0.0, 0.0, 2.0], np.eye(3))).state
+    swing = sl.simulate(state, duration=0.5, events=sl.Break(cable=3, time=0.25))
+    swing.save(tmp_path / "sim.nc")
+    played = _played(sl.load_robot("cogiro"), tmp_path / "sim.nc")
+    assert (played.name, played.duration) == ("simulation", 0.5)
+    np.testing.assert_array_equal(played.home.position, swing.pose.position[0])
+    assert np.isnan(played.sight(0.5).tension[3])
+    result = CliRunner().invoke(app, ["view", "fast", str(tmp_path / "sim.nc"), "--port", "0", "--no-browser"])
+    assert result.exit_code == 2
+    assert "is a simulation of cogiro, not of fast" in " ".join(result.stderr.split())
+
+
+@pytest.mark.parametrize("wrong", [["--mode", "0"], ["--mode", "light 1"], ["--mode", "1", "run.nc"]])
+def test_modes_that_are_none(wrong: list[str]) -> None:
+    result = CliRunner().invoke(app, ["view", "cogiro", *wrong, "--no-browser"])
+    assert result.exit_code == 2
+    assert "--mode" in result.stderr

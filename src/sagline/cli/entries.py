@@ -148,6 +148,12 @@ def _simulation() -> None:
     sl.simulate(_hung_state(), duration=0.01)
 
 
+def _chains() -> None:
+    import sagline as sl
+
+    sl.simulate(_hung_state(), duration=1e-4, cable_mass="lumped", nodes=4)
+
+
 def _hung_state() -> Equilibrium:
     """Cables that hang, all at one tension: nearly in balance, and none of what solves for it is needed."""
     import numpy as np
@@ -179,7 +185,7 @@ def _unknown_state(name: str = ROBOT) -> Equilibrium:
 INVERSE, SHARING, VERDICTS = "inverse kinematics", "further ways of sharing", "verdicts of infeasible poses"
 FORWARD, FIT = "forward kinematics", "fit of straight cables"
 MARGINS, POLYGON, VIBRATION = "margins", "tension polygon", "stiffness and vibration"
-MODES, SIMULATION = "modes with cable mass", "motion in time"
+MODES, SIMULATION, CHAINS = "modes with cable mass", "motion in time", "motion of cables with mass"
 FORWARD_OVER_PULLEYS, VIBRATION_OVER_PULLEYS = f"{FORWARD} over pulleys", f"{VIBRATION} over pulleys"
 
 ENTRIES = {
@@ -195,7 +201,8 @@ ENTRIES = {
         Entry(POLYGON, "inverse.queries.polygon_of_pose", 38, 5.0, _polygon),
         Entry(VIBRATION, "forward.sensitivity.describe_states", 57, 6.0, _vibration),
         Entry(MODES, "dynamics.spectral.interpolate", 2, 9.0, _modes),
-        Entry(SIMULATION, "dynamics.motion.run", 54, 40.0, _simulation),
+        Entry(SIMULATION, "dynamics.motion.run", 60, 16.0, _simulation),
+        Entry(CHAINS, "dynamics.chains.swing", 44, 17.0, _chains),
         Entry(
             VIBRATION_OVER_PULLEYS, "forward.sensitivity.describe_states", 39, 4.0, _vibration_over_pulleys, version=2
         ),

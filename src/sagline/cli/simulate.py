@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from sagline.cli.choices import CableMass, ShaperKind, Tension, Variable
-from sagline.cli.entries import SIMULATION, VIBRATION, needed_for
+from sagline.cli.entries import CHAINS, SIMULATION, VIBRATION, needed_for
 from sagline.cli.results import figure_files, listed, write_figures
 from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
@@ -90,7 +90,8 @@ def simulate(
     way = None if path is None else load_path(path)
     if path is not None and way is not None:
         check_unit(path, way, robot)
-    needed = (*needed_for(asked.tension.build(Variable.CHORD)), VIBRATION, SIMULATION)
+    moving = CHAINS if asked.cable_mass is CableMass.LUMPED else SIMULATION
+    needed = (*needed_for(asked.tension.build(Variable.CHORD)), VIBRATION, moving)
     with working(f"{robot.name}: simulating", *needed) as line:
         start = _start(robot, way, asked, load, line)
         end = after if way is None else _duration(start) + after

@@ -50,7 +50,8 @@ class ModesPanel:
     @property
     def up_to(self) -> float:
         """Highest frequency of the list [Hz]."""
-        return min(max(float(self._up_to.value), 1.0), HIGHEST)
+        value = float(self._up_to.value)
+        return value if 1.0 <= value <= HIGHEST else UP_TO  # NaN neither
 
     def wait(self, seconds: float) -> None:
         """Say for how long the modes have been worked out."""
