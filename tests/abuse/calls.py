@@ -563,7 +563,9 @@ def _files(given: _Given) -> dict[str, Call]:
     Path(names["robot.wcrfx"]).write_text(_WIREX, encoding="utf-8")
     (folder / "swing_bodies.xml").write_text(_BODIES, encoding="utf-8")
     (folder / "swing_cables.xml").write_text(_CABLES, encoding="utf-8")
+    lowest = sl.frequency_map(made.ROBOT, sl.Pose([[0.0, 0.0, 1.5]], np.eye(3)), up_to=3.0)
     return {
+        "FrequencyMap.save": Call(lowest.save, _all(file=("file", str(folder / "saved.nc")))),
         "Plan.save": Call(given.run.save, _all(file=("file", str(folder / "saved.nc")))),
         "save_plan": Call(sl.save_plan, _all(plan=("one", given.run), file=("file", str(folder / "saved.nc")))),
         "load_plan": Call(sl.load_plan, _all(file=("file", names["run.nc"]))),
