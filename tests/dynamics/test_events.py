@@ -81,7 +81,7 @@ def test_a_winch_that_stalls_stands_while_the_others_go_on(winches: sl.SecondOrd
     np.testing.assert_allclose(run.length[-1, others], plan.unstrained_length[-1, others], atol=1e-6)
 
 
-# peaks of another simulation of the prototype, with winches, semi-implicit: +13 and +8 N at 0.06 m/s, +63 and +39 at 0.3
+# peaks of another simulation of the prototype, with its winches: +13 and +8 N at 0.06 m/s, +63 and +39 N at 0.3 m/s
 @pytest.mark.parametrize(("speed", "locked", "braked"), [(0.06, 13.0, 8.0), (0.3, 63.0, 39.0)])
 def test_stops_between_two_poses_of_the_prototype_raise_tensions_as_known(
     speed: float, locked: float, braked: float
