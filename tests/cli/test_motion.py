@@ -88,6 +88,7 @@ def test_a_film_of_ten_seconds(folder: FilePath) -> None:
         (["vibrate", "cogiro", "--up-to", "3 kg"], 2, "--up-to"),
         (["vibrate", "cogiro", "--up-to", "1e5"], 2, "frequency is 100000 Hz"),
         (["vibrate", "cogiro", "--damping", "2"], 2, "modal_damping"),
+        (["vibrate", "cogiro", "--damping", "% 1"], 2, "--damping"),
         (["vibrate", "cogiro", "--film", "99999"], 2, "--film"),
         (["simulate", "cogiro", "--break", "9@1s"], 2, "cable 9"),
         (["simulate", "cogiro", "--break", "3"], 2, "CABLE@TIME"),

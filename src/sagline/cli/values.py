@@ -59,6 +59,20 @@ def quantity(text: str, item: str, unit: str, *, low: float = -np.inf, above: fl
     return float(checked(number, item, unit, shape=(), low=low, above=above))
 
 
+def ratio(text: str, item: str) -> float:
+    """A number without unit, or one of hundred: "0.02" or "2 %".
+
+    Args:
+        text: The text.
+        item: What it is, for the message.
+
+    Raises:
+        InvalidValueError: If it is no such number, or negative.
+    """
+    number, percent = text.strip().removesuffix("%"), text.strip().endswith("%")
+    return quantity(number, item, "", low=0.0) / (100.0 if percent else 1.0)
+
+
 def middle_of(robot: Robot) -> Pose:
     """The middle of the poses that a robot is meant for, level.
 
