@@ -77,6 +77,15 @@ def _elastic(state: sl.Equilibrium) -> np.ndarray:
     return np.asarray(row.T @ np.diag(robot.cables.axial_stiffness / state.unstrained_length) @ row)
 
 
+def test_the_response_with_cable_mass_is_that_of_the_exact_stiffness_of_the_cables() -> None:
+    """To the width of a line: modes beyond the highest stand still, and a ratio damps modes here, all forces there."""
+    state, damping = made.state_at(3.0, 2.0), Damping(modal_damping=0.01)
+    ax = plot.response(sl.vibration(state, up_to=8.0, damping=damping), "x")
+    frequency, answer = (np.asarray(each)[::150] for each in ax.get_lines()[0].get_data())
+    exact = sl.frequency_response(state, frequency, damping).compliance[:, 0, 0]
+    np.testing.assert_allclose(answer, np.abs(exact), rtol=0.02)
+
+
 def test_a_response_needs_modes_and_a_motion() -> None:
     state = made.state_at()
     lost = made.vibration(state, FREQUENCY, SHARE, status=VibrationStatus.UNSTABLE)
