@@ -36,7 +36,7 @@ DRAWN = {  # command -> what is shown of it
     "run": "<!-- drawn by: sagline run -->",
     "article": "<!-- drawn by: sagline article figures 6-9 -->",
     "tension": "<!-- drawn by: sagline tension article-mixed --pose 1,0.5,2.5 -->",
-    "vibrate": "<!-- drawn by: sagline vibrate cogiro --pose 0,0,2 --up-to 20 --force z -->",
+    "vibrate": "<!-- drawn by: sagline vibrate cogiro --pose 0,0,2 --up-to 8 --force z -->",
     "simulate": "<!-- drawn by: sagline simulate cogiro --break 3@0.5s --loss-time 0.001 -->",
     "view": "![A robot in the viewer](../images/viewer.png)\n\n![A run in the viewer](../images/viewer-run.png)",
 }
