@@ -21,6 +21,7 @@ from sagline.dynamics.shaped import shaped
 from sagline.dynamics.shapers import EI, ZV, ZVD
 from sagline.dynamics.simulate import simulate as integrated
 from sagline.dynamics.to_shape import to_shape
+from sagline.dynamics.vibrating import vibration
 from sagline.errors import FileError, InvalidValueError
 from sagline.files.names import file_stem
 from sagline.files.path_file import load_path
@@ -133,10 +134,13 @@ def _start(robot: Robot, way: MotionPath | None, asked: Asked, load: Array | Non
             raise InvalidValueError("robot", "not held in the middle of its test box", "one that is", "Give a path.")
         return plan.state
     if asked.shaper is not ShaperKind.NONE:
-        at_end = inverse(robot, way.pose[len(way) - 1], wrench=load)
-        frequency = to_shape(modes(at_end.state), way)
+        state = inverse(robot, way.pose[len(way) - 1], wrench=load).state
+        light = modes(state)
+        heavy = asked.cable_mass is not CableMass.NONE
+        frequency = to_shape(vibration(state, up_to=float(light.frequency.max())) if heavy else light, way)
         told = " and ".join(f"{value:.3f}" for value in frequency)
-        note("Shaper: ", f"{asked.shaper.value} for {told} Hz (massless), at the end of the path")
+        kind = "with cable mass" if heavy else "massless"
+        note("Shaper: ", f"{asked.shaper.value} for {told} Hz ({kind}), at the end of the path")
         way = shaped(way, SHAPERS[asked.shaper](frequency))
     return inverse(robot, way, tension=method, wrench=load, progress=line.stage(f"{robot.name}: planning"))
 
