@@ -1,13 +1,11 @@
 """A controller that knows its robot: planned lengths and tensions every ms."""
 
 import numpy as np
+from matplotlib.figure import Figure
 
 import sagline as sl
 
 robot = sl.load_robot("article-prototype")
-assert robot.winches is not None
-gains = {"position_gain": 20.0, "speed_gain": 4000.0, "integral_gain": 80e3}
-robot = robot.replace(winches=robot.winches.replace(**gains))
 path = sl.septic_path([(0, 0, 1.0), (0.3, 0.2, 1.1)], durations=2.5, rate=1000)
 plan = sl.inverse(robot, path, tension=sl.MinimumNorm())
 # the same poses as if the platform had no inertia
@@ -34,3 +32,13 @@ for name, away in distance.items():
     print(
         f"{name} lengths: {largest:.2f} mm on the way, {left:.2f} mm after it"
     )
+
+figure = Figure(figsize=(6.0, 3.0), layout="constrained")
+ax = figure.subplots()
+for name, away in distance.items():
+    ax.plot(
+        0.001 * np.arange(1, 1 + len(away)), 1e3 * np.array(away), label=name
+    )
+ax.set(xlabel="time [s]", ylabel="distance from the path [mm]")
+ax.legend(title="lengths")
+figure.savefig("feedforward.png", dpi=150)

@@ -1,6 +1,7 @@
 """A load on three ropes: how it swings, and lengths that leave it at rest."""
 
 import numpy as np
+from matplotlib.figure import Figure
 
 import sagline as sl
 
@@ -25,6 +26,8 @@ print(f"it swings at {swing.round(2)} Hz, massless cables")
 # a path whose x says how much of the change of lengths is done
 share = sl.quintic_path([(0, 0, 0), (1, 0, 0)], durations=0.8, rate=1000.0)
 ways = {"as it is": share, "shaped": sl.shaped(share, sl.ZV(swing))}
+figure = Figure(figsize=(6.0, 3.0), layout="constrained")
+ax = figure.subplots()
 left = {}
 for name, path in ways.items():
     lengths = first + path.pose.position[:, :1] * (last - first)
@@ -36,4 +39,9 @@ for name, path in ways.items():
     after = run.time >= path.duration
     away = run.pose.position[after] - goal.pose.position
     left[name] = np.linalg.norm(away, axis=1).max()
+    whole = np.linalg.norm(run.pose.position - goal.pose.position, axis=1)
+    ax.plot(run.time, 1e3 * whole, label=name)
     print(f"{name}: {path.duration:.2f} s, then {1e3 * left[name]:.0f} mm off")
+ax.set(xlabel="time [s]", ylabel="distance from the goal [mm]")
+ax.legend()
+figure.savefig("few_cables.png", dpi=150)
