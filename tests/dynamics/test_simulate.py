@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 import mujoco
 import numpy as np
@@ -15,6 +15,7 @@ from tests.dynamics.let_go import LIFT, beside, integrated, lopsided
 Code = Literal["splitting", "runge-kutta"]
 BOTH: tuple[Code, ...] = ("splitting", "runge-kutta")
 SHIFT = np.array([0.004, -0.003, 0.0033])  # m; 6 mm
+GUST = ([0.0, 0.003, 0.03], np.outer([0, 1, 1], [3.0, 2.0, -3.0, 1.0, 0.8, 0.5]))
 
 
 def away_from(expected: Array, run: sl.Simulation) -> float:
@@ -153,3 +154,45 @@ def test_platforms_of_fewer_motions_keep_to_them(pattern: Literal["3T", "1R2T", 
     assert np.abs(run.twist - run.twist @ free.T @ free).max() < 1e-12
     assert np.abs(run.twist @ free.T).max(axis=0).min() > 1e-3
     assert np.abs(run.energy.error).max() < 1e-6
+
+
+@pytest.mark.parametrize("cable_mass", ["none", "lumped", "modal"])
+@pytest.mark.parametrize(("duration", "last"), [(0.005, [0.0, 0.005]), (0.0234, [0.01, 0.02, 0.0234])])
+def test_the_end_is_always_recorded(cable_mass: Literal["none", "lumped", "modal"], duration: float, last: Any) -> None:
+    """At the first step that is not earlier; the last sample is that of a run that records every step."""
+    state = sl.inverse(sl.load_robot("expo2015-lucia"), sl.Pose([-0.6, 0.0, 3.5], np.eye(3))).state
+    given: dict[str, Any] = {"wrench": GUST, "cable_mass": cable_mass, "nodes": 6, "step": 1e-4}
+    run = sl.simulate(state, duration=duration, **given)
+    np.testing.assert_allclose(run.time[-len(last) :], last, atol=1e-12)
+    every = sl.simulate(state, duration=duration, record=1e-4, **given)
+    for mine, theirs in ((run.pose.position, every.pose.position), (run.tensions, every.tensions)):
+        assert mine.shape[0] == run.time.size
+        np.testing.assert_allclose(mine[-1], theirs[-1], rtol=1e-9)
+    assert run.energy.supplied[-1] == pytest.approx(every.energy.supplied[-1], rel=1e-9)
+    assert run.energy.supplied[-1] > 0.0
+
+
+@pytest.mark.parametrize("cable_mass", ["none", "lumped", "modal"])
+def test_twists_are_of_the_origin_as_those_of_paths(cable_mass: Literal["none", "lumped", "modal"]) -> None:
+    """Against differences of the poses, of a platform that turns about a center of mass that is elsewhere."""
+    robot = sl.load_robot("expo2015-lucia").replace(center_of_mass=[0.05, -0.1, 0.2])
+    state = sl.inverse(robot, sl.Pose([-0.6, 0.0, 3.5], np.eye(3))).state
+    turning = (np.array([0.0, 0.1, 0.2, 0.3]), np.outer([0, 1, -1, 0], [3.0, 2.0, -3.0, 5.0, 4.0, 3.0]))
+    run = sl.simulate(state, wrench=turning, duration=0.4, record=1e-3, cable_mass=cable_mass, nodes=6)
+    place, turned = run.pose.position, run.pose.rotation
+    moving = (place[2:] - place[:-2]) / (run.time[2:] - run.time[:-2])[:, None]
+    spinning = (turned[2:] * turned[:-2].inv()).as_rotvec() / (run.time[2:] - run.time[:-2])[:, None]
+    size = np.abs(moving).max()
+    assert np.abs(np.cross(run.twist[:, 3:], [0.05, -0.1, 0.2])).max() > 0.2 * size
+    tolerance = 2e-2 if cable_mass == "modal" else 2e-3
+    assert np.abs(run.twist[1:-1, :3] - moving).max() < tolerance * size
+    assert np.abs(run.twist[1:-1, 3:] - spinning).max() < tolerance * np.abs(spinning).max()
+
+
+def test_a_run_has_the_twists_of_its_path() -> None:
+    robot = lopsided("article-suspended")
+    poses = sl.Pose.from_euler([(0, 0, 1.5), (0.1, 0.2, 1.6)], [0.0, 0.1], 0.0, [0.0, 0.1])
+    path = sl.quintic_path(poses, durations=1.0, rate=1000.0)
+    run = sl.simulate(sl.inverse(robot, path, tension=LIFT), record=0.01)
+    assert np.abs(run.twist - path.twist[::10]).max() < 1e-7
+    assert np.abs(np.cross(path.twist[:, 3:], robot.center_of_mass)).max() > 1e-3

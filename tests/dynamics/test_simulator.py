@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tracemalloc
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ PLACE = sl.Pose.from_euler([0.1, 0.05, 1.0], 0.0, 0.0, 0.0)
 @pytest.mark.parametrize("pulleys", [False, True])
 def test_it_goes_where_simulate_goes_to_the_last_bit(winches: sl.SecondOrder, pulleys: bool) -> None:
     robot = prototype(pulley_radius=0.03, dead_cable=1.0) if pulleys else prototype()
+    robot = robot.replace(center_of_mass=[0.02, -0.03, 0.05])
     state, damping = sl.inverse(robot, PLACE).state, sl.Damping(1e-3, 0.1)
     machine = sl.Simulator(robot, state, winches=winches, damping=damping)
     rows, times, generator = [state.unstrained_length], [0.0], np.random.default_rng(1)
@@ -25,13 +27,14 @@ def test_it_goes_where_simulate_goes_to_the_last_bit(winches: sl.SecondOrder, pu
         rows.append(state.unstrained_length + generator.uniform(-0.002, 0.002, 8))
         reading = machine.step(rows[-1], 0.01)
         times.append(machine.time)
-        seen.append(np.concatenate((reading.twist, reading.tension, reading.length)))
+        seen.append(np.concatenate((reading.twist[3:], reading.tension, reading.length)))
     table = (times, np.array(rows))
     run = sl.simulate(state, unstrained_length=table, winches=winches, damping=damping, record=0.01)
-    expected = np.hstack((run.twist, run.tensions, run.length))[1:]
+    expected = np.hstack((run.twist[:, 3:], run.tensions, run.length))[1:]
     np.testing.assert_array_equal(np.array(seen), expected)
     assert np.abs(reading.position - run.pose.position[-1]).max() < 1e-15
     assert np.abs(reading.quaternion - run.pose.quaternion[-1]).max() < 1e-15
+    assert np.abs(reading.twist - run.twist[-1]).max() < 1e-15
     assert np.ptp(run.pose.position, axis=0).max() > 1e-4
 
 
@@ -107,14 +110,67 @@ def test_another_machine_than_the_planned_one_does_not_rest_there() -> None:
     assert reading.position[2] < PLACE.position[2] - 1e-3
 
 
-def test_what_a_period_cannot_be_is_refused() -> None:
+def test_an_ideal_winch_that_is_released_sets_off_from_where_it_stood() -> None:
+    state = sl.inverse(prototype(), PLACE).state
+    machine = sl.Simulator(prototype(), state, winches="ideal")
+    length = state.unstrained_length
+    longer = length + np.where(np.arange(8) == 2, 0.004, 0.0)
+    machine.hold(2)
+    held = machine.step(longer, 0.1)
+    assert held.length[2] == length[2]
+    machine.release()
+    for half in (0.5, 1.0):
+        reading = machine.step(length + half * (longer - length), 0.05)
+        np.testing.assert_allclose(reading.length, length + half * (longer - length), rtol=1e-15)
+
+
+def test_a_reading_does_not_let_the_robot_be_changed() -> None:
     machine = sl.Simulator(prototype(), PLACE)
-    length = machine.reading.length.copy()
-    for dt in (0.0015, 0.0, -1.0):
-        with pytest.raises(sl.InvalidValueError, match="dt is"):
-            machine.step(length, dt)
-    with pytest.raises(sl.InvalidValueError, match=r"unstrained_length\[3\] is nan"):
-        machine.step(np.where(np.arange(8) == 3, np.nan, length), 0.01)
-    assert machine.time == 0.0
+    for array in machine.reading:
+        assert array is not None
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0.0
+
+
+@pytest.mark.parametrize("winches", ["ideal", "robot"])
+def test_what_a_period_cannot_be_is_refused_and_changes_nothing(winches: Any) -> None:
+    """After every refusal it goes on as its twin does, which was not asked."""
+    robot = prototype(dead_cable=1.0)
+    machine, twin = (sl.Simulator(robot, PLACE, winches=winches) for _ in range(2))
+    length, down, tension = machine.reading.length.copy(), np.array([0, 0, -20.0, 0, 0, 0]), np.full(8, 50.0)
+    one, refused = np.arange(8) == 3, 0
+    nan = np.full(8, np.nan)
+    asked: list[tuple[dict[str, Any], str]] = [
+        ({"dt": 0.0015}, "dt is"),
+        ({"dt": 0.0}, "dt is"),
+        ({"dt": -1.0}, "dt is"),
+        ({"unstrained_length": np.where(one, np.nan, length)}, r"unstrained_length\[3\] is nan"),
+        ({"unstrained_length": -length, "wrench": [0, 0, -5000, 0, 0, 0]}, r"unstrained_length\[0\] is -"),
+        ({"unstrained_length": np.where(one, 0.9, length)}, r"cable 3 is 0.9 m; allowed: > 1 m, its dead cable"),
+        ({"unstrained_length": np.full(8, 1e60)}, r"unstrained_length\[0\] is 1e\+60"),
+        ({"wrench": nan[:6]}, r"wrench\[0\] is nan"),
+        ({"wrench": np.zeros(3)}, "wrench"),
+        ({"unstrained_length": np.zeros(3), "wrench": 1e3 * down}, "unstrained_length"),
+    ]
+    if winches == "robot":
+        asked += [
+            ({"tension": nan}, r"tension\[0\] is nan"),
+            ({"tension": 9.0 * tension, "wrench": nan[:6]}, r"wrench\[0\] is nan"),
+            ({"tension": nan, "wrench": 1e3 * down}, r"tension\[0\] is nan"),
+        ]
+    for change, told in asked:
+        with pytest.raises(sl.InvalidValueError, match=told):
+            machine.step(**{"unstrained_length": length, "dt": 0.01, **change})
+        refused += 1
+        given: dict[str, Any] = {"wrench": down * refused} if refused % 3 == 0 else {}
+        if winches == "robot" and refused % 4 == 0:
+            given["tension"] = tension + refused
+        seen, expected = machine.step(length, 0.01, **given), twin.step(length, 0.01, **given)
+        for mine, theirs in zip(seen, expected, strict=True):
+            np.testing.assert_array_equal(mine, theirs)
+    assert machine.time == pytest.approx(0.01 * refused)
+
+
+def test_a_start_is_of_this_robot() -> None:
     with pytest.raises(sl.InvalidValueError, match="start is of 8 cables"):
         sl.Simulator(sl.without_cables(prototype(), 3), sl.inverse(prototype(), PLACE).state)

@@ -185,5 +185,5 @@ def check_lengths(robot: Robot, lengths: Course) -> None:
     least, dead = lengths.value.min(axis=0), dead_cable(robot)
     if (short := least <= dead).any():
         i = int(np.argmax(short))
-        allowed, step = f"> {dead[i]:g} m" + (", its dead cable" if dead[i] else ""), "Correct the table of lengths."
+        allowed, step = f"> {dead[i]:g} m" + (", its dead cable" if dead[i] else ""), "Give longer ones."
         raise InvalidValueError(f"unstrained_length: cable {i}", f"{least[i]:g} m", allowed, step)

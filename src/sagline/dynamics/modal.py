@@ -14,7 +14,7 @@ from sagline.arrays import Array, locked, number
 from sagline.dynamics.beginning import Beginning
 from sagline.dynamics.course import Course
 from sagline.dynamics.damping import Damping
-from sagline.dynamics.simulation import EnergyBalance, Simulation
+from sagline.dynamics.simulation import EnergyBalance, Simulation, twist_of_origin
 from sagline.dynamics.vibrating import vibration
 from sagline.dynamics.vibration import Vibration
 from sagline.dynamics.vibration_status import VibrationStatus
@@ -225,22 +225,23 @@ def modal_simulation(given: Beginning, damping: Damping, step: Any, record: floa
         "duration", 8.0 * count * (5.0 * len(frequency) + 4.0 * cables + 3.0 * cables * points / every), SHORTER
     )
     time: Array = given.begin + size * np.arange(count + 1, dtype=np.float64)
+    kept = np.unique(np.append(np.arange(0, count + 1, every), count))  # the end too
     lengths, wrenches = course_values(given.lengths, time), course_values(given.wrench, time)
     change = np.concatenate((lengths - state.unstrained_length, wrenches - state.wrench), axis=1)
     _check_small(np.abs(change[:, : lengths.shape[1]]).max(axis=0), state)
     swung = swing_modes(frequency, found.loss, change @ answer.drive.T, size)
-    kept = slice(None, None, every)
     amplitude, rate, driven = swung.amplitude[kept], swung.rate[kept], change[kept]
     motion = amplitude @ found.shape.T + driven @ answer.motion.T
     kinetic, potential = 0.5 * (rate**2).sum(axis=1), 0.5 * ((amplitude * frequency) ** 2).sum(axis=1)
     supplied, lost = swung.supplied[kept], swung.lost[kept]
     tension = state.cables.frame_end_tension + amplitude @ answer.pulled.T + driven @ answer.tension.T
-    slopes = np.gradient(driven, every * size, axis=0) if len(driven) > 1 else np.zeros_like(driven)
+    slopes = np.gradient(driven, time[kept], axis=0)
+    moving, pose = rate @ found.shape.T + slopes @ answer.motion.T, _moved(state, motion)
     return Simulation(
         robot=given.robot,
         time=locked(time[kept].copy()),
-        pose=_moved(state, motion),
-        twist=locked(rate @ found.shape.T + slopes @ answer.motion.T),
+        pose=pose,
+        twist=twist_of_origin(given.robot, pose, moving[:, :3], moving[:, 3:]),
         tensions=locked(tension),
         length=locked(lengths[kept].copy()),
         energy=EnergyBalance(*map(locked, (kinetic, potential, supplied, lost, kinetic + potential - supplied + lost))),

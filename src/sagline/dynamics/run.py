@@ -11,7 +11,7 @@ from sagline.arrays import Array, locked
 from sagline.dynamics.course import Course
 from sagline.dynamics.events import KINDS, Brake, Break, Drop, Event, PickUp, Stall, cable_of
 from sagline.dynamics.plant import NOTES, Plant, Records
-from sagline.dynamics.simulation import EnergyBalance, Occurrence, Simulation
+from sagline.dynamics.simulation import EnergyBalance, Occurrence, Simulation, twist_of_origin
 from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics import motion as k
 from sagline.kernels.dynamics import rigid_body as body
@@ -45,7 +45,7 @@ class Run:
         """
         self.plant, self.every, self.steps = plant, every, steps
         self._rules, self._numbers, self._courses = rules, numbers, courses
-        self._all = plant.records(steps // every + 1)
+        self._all = plant.records(-(-steps // every) + 1)  # the last step too
         self._all.tensions[:] = 0.0
         self._all.lengths[:] = np.nan
         self._occurrences: list[Occurrence] = []
@@ -79,6 +79,12 @@ class Run:
             if plant.counters[k.NOTES] == NOTES:
                 self._note(records)
                 plant.counters[k.NOTES] = 0
+        self._keep(records, row)
+        self._note(records)
+
+    def _keep(self, records: Records, row: int) -> None:
+        """Take over what was recorded, from a row of the whole record on."""
+        plant = self.plant
         rows = slice(row, row + int(plant.counters[k.RECORDS]))
         kept = slice(0, rows.stop - rows.start)
         self._all.states[rows], self._all.energies[rows] = plant.seen(records.states[kept]), records.energies[kept]
@@ -86,7 +92,6 @@ class Run:
             self._all.points[rows, plant.cables] = records.points[kept]
         self._all.tensions[rows, plant.cables] = records.tensions[kept]
         self._all.lengths[rows, plant.cables] = records.lengths[kept]
-        self._note(records)
 
     def _note(self, records: Records) -> None:
         """Take over what began by itself."""
@@ -96,13 +101,13 @@ class Run:
             before, after = float(row[k.NOTE_BEFORE]), float(row[k.NOTE_AFTER])
             self._occurrences.append(Occurrence(float(row[k.NOTE_TIME]), kind, cable, before, after))
 
-    def _look(self) -> float:
-        """Energy at the step that is reached, without a record [J]."""
+    def _look(self) -> Records:
+        """The step that is reached, by itself."""
         plant, here = self.plant, self.plant.records(1)
         plant.counters[k.RECORDS] = plant.counters[k.NOTES] = 0
         plant.kernel(*self._arguments, here.arrays, 0, self.every)
         self._note(here)
-        return float(here.energies[0, k.KINETIC] + here.energies[0, k.POTENTIAL])
+        return here
 
     def happen(self, event: Event) -> None:
         """Go on to an event, and let it happen at the first step that is not earlier.
@@ -112,7 +117,7 @@ class Run:
         """
         plant = self.plant
         self._go(math.ceil((event.time - plant.audit[d.BEGIN]) / self.step - 1e-9))
-        time, before = self._time(int(plant.counters[k.STEPS])), self._look()
+        time, before = self._time(int(plant.counters[k.STEPS])), _energy(self._look())
         cable = cable_of(event)
         places = plant.cables == cable if cable is not None else np.ones(len(plant.cables), dtype=np.bool_)
         peak = float(plant.now[d.PEAK][places].max())
@@ -124,7 +129,7 @@ class Run:
         plant.counters[[k.READY, k.LENGTH_AT, k.WRENCH_AT, k.WIND_AT]] = 0
         plant.now[d.PEAK] = 0.0
         self._arguments = plant.arguments(self._rules, self._numbers, self._courses)
-        more = self._look() - before
+        more = _energy(self._look()) - before
         if isinstance(event, PickUp):
             plant.audit[d.SUPPLIED] += more
         else:
@@ -164,17 +169,20 @@ class Run:
             The whole run.
         """
         self._go(self.steps)
+        steps = np.arange(0, self.steps + 1, self.every)
+        if steps[-1] < self.steps:
+            steps = np.append(steps, self.steps)
+            self._keep(self._look(), len(steps) - 1)
         self._close()
         plant, states = self.plant, self._all.states
         kinetic, potential, supplied, lost = (locked(column.copy()) for column in self._all.energies.T)
         total: Array = kinetic + potential - supplied + lost
-        twist = np.concatenate((states[:, body.VELOCITY : body.MOMENTUM], states[:, body.MOMENTUM :]), axis=1)
-        time = plant.audit[d.BEGIN] + np.arange(0, self.steps + 1, self.every) * self.step
+        pose, velocity, spin = plant.poses(states), states[:, body.VELOCITY : body.MOMENTUM], states[:, body.MOMENTUM :]
         return Simulation(
             robot=plant.robot,
-            time=locked(time),
-            pose=plant.poses(states),
-            twist=locked(twist),
+            time=locked(plant.audit[d.BEGIN] + steps * self.step),
+            pose=pose,
+            twist=twist_of_origin(plant.robot, pose, velocity, spin),
             tensions=locked(self._all.tensions),
             length=locked(self._all.lengths),
             energy=EnergyBalance(kinetic, potential, supplied, lost, locked(total - total[0])),
@@ -183,3 +191,8 @@ class Run:
             step=self.step,
             nodes=None if self._all.points is None else locked(self._all.points),
         )
+
+
+def _energy(here: Records) -> float:
+    """Of the first record [J]."""
+    return float(here.energies[0, k.KINETIC] + here.energies[0, k.POTENTIAL])

@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path as FilePath
 
-from sagline.arrays import Array
+import numpy as np
+
+from sagline.arrays import Array, locked
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
@@ -54,9 +56,9 @@ class Simulation:
 
     Attributes:
         robot: The robot.
-        time: [s], shape (N,).
+        time: [s], increasing, shape (N,): every so many steps, and the end.
         pose: Poses of the platform, a batch of N.
-        twist: Velocity of the center of mass and angular velocity, world axes [m/s, rad/s], shape (N, 6).
+        twist: Velocity of the platform's origin and angular velocity, world axes [m/s, rad/s], shape (N, 6).
         tensions: At the frame ends [N], shape (N, m).
         length: Unstrained lengths off the drum [m], shape (N, m); NaN of a cable that has broken.
         energy: Where the energy is.
@@ -90,3 +92,19 @@ class Simulation:
         from sagline.files.simulation_file import save_simulation  # the one call outward
 
         save_simulation(self, file)
+
+
+def twist_of_origin(robot: Robot, pose: Pose, velocity: Array, spin: Array) -> Array:
+    """Twists of the platform frame's origin, as a path has them, from motions of the center of mass.
+
+    Args:
+        robot: The robot.
+        pose: Poses, a batch of N.
+        velocity: Of the center of mass, world axes [m/s], (N, 3).
+        spin: Angular velocity, world axes [rad/s], (N, 3).
+
+    Returns:
+        Shape (N, 6), write-locked.
+    """
+    lever = pose.matrix @ robot.center_of_mass
+    return locked(np.concatenate((velocity - np.cross(spin, lever), spin), axis=1))

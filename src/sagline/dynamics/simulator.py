@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.arguments import brief, choice, instance, integer, whole_number
 from sagline.arrays import Array, checked, locked, number
-from sagline.dynamics.beginning import Beginning, beginning
+from sagline.dynamics.beginning import Beginning, beginning, check_lengths
 from sagline.dynamics.course import Course
 from sagline.dynamics.damping import Damping
 from sagline.dynamics.drives import Winches, kind_of
@@ -37,6 +37,7 @@ from sagline.kinematics.inverse import inverse
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
+from sagline.robot.wheels import dead_cable
 
 NEAR: Final = 1e-6  # of a step: so far may a period be from whole steps
 MOST_STEPS: Final = 10**7  # in one period
@@ -44,14 +45,14 @@ MOST_SEED: Final = 2**128
 
 
 class Reading(NamedTuple):
-    """What sensors read, and what is true; the arrays are the simulator's, and the next step fills them anew.
+    """What sensors read, and what is true; the arrays are read-only, and the simulator's next step fills them anew.
 
     Attributes:
         counts: Of the encoders, whole numbers as floats, shape (m,); None where data are missing that counts need.
         load_cell: [N], shape (m,).
         position: Of the platform's origin [m], shape (3,).
         quaternion: Rotation platform -> world, scalar last, shape (4,).
-        twist: Velocity of the center of mass and angular velocity, world axes [m/s, rad/s], shape (6,).
+        twist: Velocity of that origin and angular velocity, world axes [m/s, rad/s], shape (6,).
         tension: At the frame ends [N], shape (m,).
         length: Unstrained lengths off the drums [m], shape (m,).
         force: Of the motors, at the cable, outward [N], shape (m,); 0 without the robot's winches.
@@ -151,18 +152,21 @@ class Simulator:
         lengths = np.repeat(given.lengths.value, 2, axis=0)
         wide = 2 * m if drums else m
         self._course = Course(np.array([-1.0, 0.0]), np.zeros((2, wide)), np.zeros((1, wide)), np.zeros((1, wide)))
-        self._course.value[:, :m] = lengths * stretch
-        self._given = lengths[1].copy()
+        self._course.value[:, :m], self._lengths = lengths * stretch, lengths[1]
         if drums:
             self._course.value[:, m:] = given.tensions.value
-            self._given = np.concatenate((lengths[1], given.tensions.value[0]))
         self._load = Course(np.zeros(1), given.wrench.value.copy(), np.empty((0, 6)), np.empty((0, 6)))
         course, counters = self._course, self._plant.counters
+        # what is asked for goes here first, and to the run when all of it can be
+        self._given = np.zeros(m), np.zeros(wide - m), np.zeros(6)
+        self._asked, self._expected, self._wrench = (array.data for array in self._given)
         writable = (course.time, course.value, course.begin, course.end)
-        self._next: tuple[Any, ...] = (locked(self._given.view()), locked(stretch), lengths, writable, counters)
-        self._begin: Any = machine_code(begin_period, (*self._next, 1.0))
-        self._asked, self._expected = self._given[:m].data, self._given[m:].data
-        self._wrench = self._load.value[0].data
+        read_only = tuple(locked(array.view()) for array in self._given)
+        least = locked(dead_cable(given.robot) + np.zeros(m))
+        self._next: tuple[Any, ...] = (
+            read_only, least, locked(stretch), lengths, writable, self._load.value[0], counters
+        )  # fmt: skip
+        self._begin: Any = machine_code(begin_period, (*self._next, False, False, 1.0))
         self._counters = counters.data
 
     @property
@@ -205,9 +209,9 @@ class Simulator:
             self._take_tension(tension)
         if wrench is not None:
             take(self._wrench, wrench, "wrench", "N or N m")
-            checked(self._load.value[0], "wrench", "N or N m")
-        if not self._begin(*self._next, (self._counters[k.STEPS] + count) * self._step):
-            checked(self._given[: len(self._asked)], "unstrained_length", "m", above=0.0)
+        end = (self._counters[k.STEPS] + count) * self._step
+        if not self._begin(*self._next, tension is not None, wrench is not None, end):
+            self._refuse(tension is not None)
         self._run(*self._arguments, self._records, count, 0)
         if self._counters[k.FAILED]:
             raise grown(self._step, self.time, self._counters[k.FAILED] - 1)
@@ -219,7 +223,16 @@ class Simulator:
             step = "Leave it out: these winches have no motors."
             raise InvalidValueError("tension", "given", 'None but for winches="robot"', step)
         take(self._expected, tension, "tension", "N")
-        checked(self._given[len(self._asked) :], "tension", "N")
+
+    def _refuse(self, with_tension: bool) -> NoReturn:
+        """Say what of what was asked for cannot be."""
+        lengths, tension, wrench = self._given
+        checked(lengths, "unstrained_length", "m", above=0.0)
+        check_lengths(self._plant.robot, Course.still(lengths))
+        if with_tension:
+            checked(tension, "tension", "N")
+        checked(wrench, "wrench", "N or N m")
+        raise AssertionError("a period that could not begin")
 
     def _count(self, dt: float) -> int:
         """How many steps a period has."""
@@ -243,7 +256,7 @@ class Simulator:
         self._plant.hold(self._chosen(winches))
 
     def release(self, *winches: int) -> None:
-        """Let drums go that were locked.
+        """Let drums go that were locked; ideal winches go straight from where they stood to the next set points.
 
         Args:
             winches: Which, from 0; none for all.
@@ -251,7 +264,12 @@ class Simulator:
         Raises:
             InvalidValueError: If there is no such winch.
         """
-        self._plant.now[d.HELD, self._chosen(winches)] = 0.0
+        plant, chosen = self._plant, np.zeros(len(self._asked), dtype=np.bool_)
+        chosen[self._chosen(winches)] = True
+        freed = chosen & (plant.now[d.HELD] > 0.0)
+        plant.now[d.HELD, freed] = 0.0
+        if self._kind == d.IDEAL:  # which has no way but that between set points
+            self._lengths[freed] = self._course.value[1, : len(freed)][freed] = plant.rows[LENGTH, freed]
 
     def _chosen(self, winches: tuple[Any, ...]) -> Any:
         m = len(self._asked)
@@ -262,9 +280,10 @@ class Simulator:
 
     def _new_reading(self) -> Reading:
         plant = self._plant
-        counts = None if self._encoders is None else self._encoders.counts
+        counts = None if self._encoders is None else locked(self._encoders.counts.view())
         own = (self._platform[:3], self._platform[3:7], self._platform[7:])
-        return Reading(counts, self._cells.reading, *own, plant.now[d.AT_FRAME], plant.rows[LENGTH], plant.now[d.FORCE])
+        true = (*own, plant.now[d.AT_FRAME], plant.rows[LENGTH], plant.now[d.FORCE])
+        return Reading(counts, *(locked(array.view()) for array in (self._cells.reading, *true)))
 
     def _read(self) -> None:
         """Fill the reading."""

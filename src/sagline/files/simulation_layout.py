@@ -13,7 +13,7 @@ SAMPLES: Final = (
     Quantity(
         "quaternion", "pose.quaternion", ("quaternion_part",), "1", "rotation from platform to world, scalar last"
     ),
-    Quantity("twist", "twist", ("twist_part",), "m/s, rad/s", "velocity of the center of mass, angular velocity"),
+    Quantity("twist", "twist", ("twist_part",), "m/s, rad/s", "velocity of the platform origin, angular velocity"),
     Quantity("tensions", "tensions", ("cable",), "N", "tension at the frame end", low=0.0),
     Quantity(
         "length",

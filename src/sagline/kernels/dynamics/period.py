@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
-
-from sagline.arrays import Array, Indices
+from sagline.arrays import LARGEST, Array, Indices
 from sagline.kernels.cable.drum import turns_of_lengths
 from sagline.kernels.dynamics.motion import LENGTH_AT, NOTES, RENEWED
 from sagline.kernels.jit import entry
@@ -12,34 +10,60 @@ from sagline.kernels.jit import entry
 
 @entry
 def begin_period(
-    given: Array, stretch: Array, lengths: Array, course: tuple[Array, Array, Array, Array], at: Indices, end: float
+    given: tuple[Array, Array, Array],
+    least: Array,
+    stretch: Array,
+    lengths: Array,
+    course: tuple[Array, Array, Array, Array],
+    load: Array,
+    at: Indices,
+    with_tension: bool,
+    with_wrench: bool,
+    end: float,
 ) -> bool:
-    """Lead the course of set points on, straight to those that are given; false, and nothing done, if one is no length.
+    """Lead the course of set points on, straight to those that are given; false, and nothing done, if one cannot be.
 
     Args:
-        given: Unstrained lengths (m,), then of drums the tensions that are expected (m,).
+        given: Unstrained lengths (m,); of drums tensions that are expected (m,), else none; wrench (6,).
+        least: What lengths must be longer than, (m,).
         stretch: From unstrained lengths to those that the course is of, (m,).
         lengths: Unstrained lengths where the last period ended, and where this one does, (2, m).
         course: See `tables_in_time.Course`, of two instants.
+        load: Wrench on the platform, (6,).
         at: Counters of the run.
+        with_tension: Whether tensions are given; else they stay.
+        with_wrench: Whether a wrench is given; else it stays.
         end: Of the period [s].
     """
     time, value, begins, ends = course
+    asked, expected, wrench = given
     m = lengths.shape[1]
     for i in range(m):
-        if not 0.0 < given[i] < math.inf:
+        if not least[i] < asked[i] <= LARGEST:
+            return False
+    for i in range(expected.shape[0]):
+        if with_tension and not abs(expected[i]) <= LARGEST:
+            return False
+    for k in range(6):
+        if with_wrench and not abs(wrench[k]) <= LARGEST:
             return False
     time[0], time[1] = time[1], end
     whole = time[1] - time[0]
     for i in range(m):
-        lengths[0, i], lengths[1, i] = lengths[1, i], given[i]
-        value[0, i], value[1, i] = value[1, i], given[i] * stretch[i]
+        lengths[0, i], lengths[1, i] = lengths[1, i], asked[i]
+        value[0, i], value[1, i] = value[1, i], asked[i] * stretch[i]
         begins[0, i] = (lengths[1, i] - lengths[0, i]) / whole * stretch[i]
         ends[0, i] = begins[0, i]
-    for i in range(m, value.shape[1]):
-        value[0, i], value[1, i] = value[1, i], given[i]
-        begins[0, i] = (value[1, i] - value[0, i]) / whole
-        ends[0, i] = begins[0, i]
+    for i in range(expected.shape[0]):
+        column = m + i
+        value[0, column] = value[1, column]
+        if with_tension:
+            value[1, column] = expected[i]
+        begins[0, column] = (value[1, column] - value[0, column]) / whole
+        ends[0, column] = begins[0, column]
+    if with_wrench:
+        for k in range(6):
+            load[k] = wrench[k]
     at[LENGTH_AT], at[RENEWED], at[NOTES] = 0, 1, 0
     return True
 

@@ -132,13 +132,15 @@ def platform_of(state: Array, inertia: Array, center: Array, turn: Array, out: A
         inertia: As above.
         center: Center of mass, from the frame's origin, in principal axes (3,).
         turn: Quaternion from the frame's axes to the principal ones (4,).
-        out: Filled; the velocity is that of the center of mass.
+        out: Filled.
     """
     lever = turned(state, center[0], center[1], center[2])
     wx, wy, wz = spin(state, inertia)
     for k in range(3):
         out[k] = state[CENTER + k] - lever[k]
-        out[VELOCITY + k] = state[VELOCITY + k]
+    out[VELOCITY] = state[VELOCITY] - wy * lever[2] + wz * lever[1]
+    out[VELOCITY + 1] = state[VELOCITY + 1] - wz * lever[0] + wx * lever[2]
+    out[VELOCITY + 2] = state[VELOCITY + 2] - wx * lever[1] + wy * lever[0]
     x, y, z, w = state[TURN], state[TURN + 1], state[TURN + 2], state[TURN + 3]
     a, b, c, s = turn[0], turn[1], turn[2], turn[3]
     out[TURN] = w * a + x * s + y * c - z * b
