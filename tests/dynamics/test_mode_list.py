@@ -76,6 +76,21 @@ def test_the_stretch_of_straight_cables_takes_what_a_complex_stiffness_takes() -
     np.testing.assert_allclose(ratio, 0.5 * 1e-4 * elastic / omega, rtol=2e-3)  # springs in series with 1/N: T/EA
 
 
+@pytest.mark.parametrize("winches", [None, sl.Winch(dead_cable=6.0), sl.Winch(0.1, dead_cable=3.0, dead_rise=2.0)])
+def test_massless_cables_lose_and_lie_as_those_that_weigh_hardly_anything(winches: sl.Winch | None) -> None:
+    """What is behind their exits gives way and loses too; elastic springs soft enough that it takes a fair part."""
+    cables = ROBOT.cables.replace(linear_density=2e-6, axial_stiffness=2e4)
+    light = sl.inverse(ROBOT.replace(cables=cables, winches=winches), STATE.pose, tension=sl.MinimumNorm()).state
+    platform = sl.modes(light)
+    found = vibration(light, up_to=1.1 * platform.frequency[-1], damping=sl.Damping(loss_time=1e-4))
+    which = successors(found).argmax(axis=1)
+    np.testing.assert_allclose(stretch_losses(light, platform, 1e-4), found.loss[which], rtol=1e-5)
+    for k in which:
+        shape = found.cable_shape[k]
+        moved = following(light, end_motions(light, found.shape[:, k, None])[..., 0], shape.shape[1])
+        np.testing.assert_allclose(moved, shape, atol=2e-4 * np.abs(shape).max())
+
+
 def test_below_the_lowest_mode_there_is_none() -> None:
     found = vibration(STATE, up_to=0.5)
     assert (found.frequency.size, found.count, found.complete) == (0, 0, True)

@@ -5,10 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from sagline.arrays import Array
+from sagline.dynamics.flexibility import flexibility
+from sagline.kernels.dynamics import string as columns
 from sagline.robot.equilibrium import Equilibrium
-from sagline.statics.stiffness import Modes, stiffness
+from sagline.statics.slopes import cable_slopes
+from sagline.statics.stiffness import Modes
+from sagline.statics.strings import Strings, strings_of
 
-POINTS = 40  # of Gauss, along a cable: to seven digits for one that sags by a third of its span
 _TINY = np.finfo(float).tiny
 
 
@@ -31,8 +34,8 @@ def end_motions(state: Equilibrium, shape: Array) -> Array:
 def stretch_losses(state: Equilibrium, platform: Modes, loss_time: float) -> Array:
     """Damping ratio that the loss in the cables' stretch gives each massless mode, to first order.
 
-    Half the loss factor omega eta, times the share of the mode's elastic energy that is in the stretch of the hanging
-    cables; the rest is in what they sag.
+    Half the loss factor omega eta, times the share of the mode's elastic energy that is in the stretch of the cables,
+    hanging and behind their exits; the rest is in what they sag and swivel.
 
     Args:
         state: A single state.
@@ -43,17 +46,17 @@ def stretch_losses(state: Equilibrium, platform: Modes, loss_time: float) -> Arr
         Shape (n,).
 
     Source:
-        docs/vibration.md.
+        docs/model.md, section 11.
     """
     omega = 2.0 * np.pi * platform.frequency
     if loss_time == 0.0:
         return np.zeros_like(omega)
-    node, weight = np.polynomial.legendre.leggauss(POINTS)
-    tangent, _, stretch = _along(state, 0.5 * (1.0 + node))
-    share = 0.5 * weight * stretch[:, None]
-    compliance = np.einsum("ms,msi,msj->mij", share, tangent, tangent)
-    force = stiffness(state).cable_stiffness @ end_motions(state, platform.shape)
-    energy = np.einsum("min,mij,mjn->n", force, compliance, force)
+    slopes, strings = cable_slopes(state), strings_of(state)
+    taut = strings.taut[0]
+    behind = _behind(strings)
+    compliance = flexibility(state, slopes.force).stretch + behind[:, :, None] * behind[:, None, :]
+    force = slopes.blocks @ end_motions(state, platform.shape)
+    energy = np.einsum("min,mij,mjn->n", force[taut], compliance[taut], force[taut])
     return np.asarray(0.5 * omega * loss_time * energy / omega**2)
 
 
@@ -63,18 +66,28 @@ def following(state: Equilibrium, ends: Array, count: int) -> Array:
     Args:
         state: A single state.
         ends: Displacement of the platform ends, shape (m, 3).
-        count: Points at equal steps of unstrained length, from frame to platform end.
+        count: Points at equal steps of unstrained length, from where the cable leaves the frame to its platform end.
 
     Returns:
-        Shape (m, count, 3).
+        Shape (m, count, 3); zero at a frame end that does not give way.
     """
     middles = (np.arange(count - 1) + 0.5) / (count - 1)
     tangent, sag, stretch = _along(state, middles)
     outer = tangent[..., :, None] * tangent[..., None, :]
     slope = stretch[:, None, None, None] * outer + sag[..., None, None] * (np.eye(3) - outer)
-    summed = np.concatenate((np.zeros((len(ends), 1, 3, 3)), np.cumsum(slope, axis=1)), axis=1)
+    strings = strings_of(state)
+    behind, normal = _behind(strings), strings.axes[0, :, 1]
+    swivels = strings.table[0, :, columns.BEHIND_Y, None, None] * normal[:, :, None] * normal[:, None, :]
+    exits = behind[:, :, None] * behind[:, None, :] + swivels
+    summed = exits[:, None] + np.concatenate((np.zeros_like(slope[:, :1]), np.cumsum(slope, axis=1) / len(middles)), 1)
     force = np.linalg.solve(summed[:, -1], ends[..., None])
     return np.asarray((summed @ force[:, None])[..., 0])
+
+
+def _behind(strings: Strings) -> Array:
+    """Direction in which what is behind each cable's exit gives way [sqrt(m/N)], world axes, (m, 3)."""
+    table, axes = strings.table[0], strings.axes[0]
+    return np.asarray(table[:, columns.BEHIND_X, None] * axes[:, 0] + table[:, columns.BEHIND_Z, None] * axes[:, 2])
 
 
 def _along(state: Equilibrium, place: Array) -> tuple[Array, Array, Array]:
