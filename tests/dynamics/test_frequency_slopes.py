@@ -8,6 +8,7 @@ import pytest
 
 import sagline as sl
 from sagline.arrays import Array
+from sagline.dynamics.string_swings import Cable, _edges, _longest
 from tests.dynamics.linear_systems import mass_of
 from tests.kinematics.feasible import feasible_plan
 from tests.statics.test_sensitivities import one_pose, planar, point
@@ -194,3 +195,13 @@ def test_what_is_refused() -> None:
             sl.frequency_slopes(given)
     with pytest.raises(sl.InvalidValueError, match="together is -1; allowed: >= 0"):
         sl.frequency_slopes(plan.state[0], together=-1.0)
+
+
+@pytest.mark.parametrize("level", [0.0, 1e-12, 1e-3, 1.0, 50.0])
+def test_elements_are_short_and_their_number_ends_where_a_cable_folds(level: float) -> None:
+    cable = Cable(np.array([level, 0.0, 4.0]), 1.0, 9.0, 1e5, 0.1)
+    edges, omega = _edges(cable, 40.0), 40.0
+    assert (edges[0], edges[-1]) == (0.0, 9.0)
+    assert edges.size < 400
+    long = np.diff(edges) > _longest(cable, omega, edges[:-1], edges[1:])
+    assert np.diff(edges)[long].sum() < 1e-10

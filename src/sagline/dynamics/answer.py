@@ -14,9 +14,21 @@ from sagline.dynamics.damping import Damping
 from sagline.dynamics.reduced import Setting
 
 LOWEST: Final = 1.0  # Hz: modes up to there are taken at least
-BEYOND: Final = 1.6  # of the highest frequency: modes up to there are taken
+TAKEN: Final = 1.6  # of the highest frequency: modes up to there are taken
 COUPLED: Final = 1.5  # of the same: losses couple modes up to there, those beyond lose each by itself
 BLOCK: Final = 128  # frequencies at once
+
+
+class Held(NamedTuple):
+    """The cables of one state with both ends held.
+
+    Attributes:
+        components: Their motions.
+        lost: What the loss in their stretch takes, as of `stretch_of_motions`; None if it takes nothing.
+    """
+
+    components: Components
+    lost: Array | None
 
 
 class Answer(NamedTuple):
@@ -34,20 +46,28 @@ class Answer(NamedTuple):
     cables: Array
     damping: Damping
 
-    def by_modes(self, frequency: Array) -> tuple[Complex, Complex]:
+    def held(self, up_to: float) -> Held:
+        """What the cables do by themselves.
+
+        Args:
+            up_to: Highest frequency that is asked for [Hz].
+        """
+        components = component_modes(self.setting.strings, 0, max(TAKEN * up_to, LOWEST))
+        return Held(components, stretch_of_motions(components) if self.damping.loss_time > 0.0 else None)
+
+    def by_modes(self, frequency: Array, held: Held) -> tuple[Complex, Complex]:
         """The compliance by the modes of the cables, and that on massless cables.
 
         Args:
             frequency: [Hz], shape (F,).
+            held: The cables, for these frequencies.
 
         Returns:
             Two arrays of shape (F, 6, 6).
         """
-        components = component_modes(self.setting.strings, 0, max(BEYOND * float(frequency.max()), LOWEST))
-        lost = stretch_of_motions(components) if self.damping.loss_time > 0.0 else None
         found = np.empty((2, frequency.size, 6, 6), dtype=np.complex128)
         for part in blocks(frequency.size, BLOCK):
-            moving, still = self._moving(components, lost, 2.0 * np.pi * frequency[part])
+            moving, still = self._moving(*held, 2.0 * np.pi * frequency[part])
             found[0, part] = self._compliance(frequency[part], moving)
             found[1, part] = self._compliance(frequency[part], still)
         return found[0], found[1]

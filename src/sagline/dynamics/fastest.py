@@ -13,7 +13,7 @@ from sagline.arrays import Array, locked, number
 from sagline.blocks import Progress
 from sagline.dynamics.balances import Balances, HalfPlanes
 from sagline.dynamics.curves import Curve
-from sagline.dynamics.jerk_bounded import Bounds, Course, fastest_course
+from sagline.dynamics.jerk_bounded import Bounds, JerkProfile, fastest_course
 from sagline.dynamics.moves import Move, moves_of
 from sagline.dynamics.phase_plane import Profile, fastest_profile
 from sagline.dynamics.shaped import sample_time
@@ -44,7 +44,7 @@ class _Timed:
     """A move with its new motion: parameter of the curve over time, a little slower than it was found."""
 
     curve: Curve
-    motion: Profile | Course
+    motion: Profile | JerkProfile
     slower: float = 1.0
 
     @property
@@ -159,7 +159,7 @@ def _quickest(robot: Robot, move: Move, curve: Curve, limits: tuple[float, float
         if abs(least - before) <= _SETTLED * least:
             break
         balances = balances.near(profile.motion)
-    motion: Profile | Course | None = profile
+    motion: Profile | JerkProfile | None = profile
     if np.isfinite(limits).any():
         motion = fastest_course(curve, robot, speeds, limits, least)
         if motion is None:

@@ -11,23 +11,26 @@ import numpy as np
 from sagline.arguments import callback, instance, optional
 from sagline.arrays import Array, Codes, locked, number
 from sagline.blocks import Progress, blocks
+from sagline.dynamics.answer import Answer
 from sagline.dynamics.cable_dynamics import check_model
 from sagline.dynamics.damping import Damping
 from sagline.dynamics.reduced import Setting, negative_directions, setting_of
 from sagline.dynamics.robot_modes import Found, cable_shares, loss, modes_of
+from sagline.dynamics.strongest import coupled, strongest, summed
 from sagline.dynamics.vibration_status import VibrationStatus
 from sagline.errors import InvalidValueError, SaglineError
 from sagline.kinematics.inverse import inverse
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
+from sagline.statics.slopes import cable_slopes
 from sagline.statics.stiffness import modes, stiffness
 from sagline.tension.closest import Closest
 from sagline.tension.method import TensionMethod
 
 BLOCK: Final = 16  # poses at once: a twentieth of a second, after which an interrupt is heard
 _CLOSEST: Final = Closest()
-_DAMPING: Final = Damping(modal_damping=0.01)
+_ONE_PERCENT: Final = Damping(modal_damping=0.01)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,8 +48,9 @@ class FrequencyMap:
         frequency: Lowest, with cable mass [Hz], shape (N,).
         massless_frequency: Lowest of the platform on cables whose mass does not swing [Hz], shape (N,).
         platform_share: Of the lowest mode with cable mass, shape (N,).
-        peak: Strongest answer below up_to: displacement of the center of mass for a force on it, in the direction that
-            it answers to most [m/N], shape (N,); infinite without damping.
+        peak: Strongest answer, at rest or near a mode below up_to: displacement of the center of mass for a force on
+            it, in the direction that it answers to most, as of `frequency_response` [m/N], shape (N,); infinite
+            without damping.
         peak_frequency: Where that is [Hz], shape (N,).
     """
 
@@ -81,7 +85,7 @@ def frequency_map(
     *,
     up_to: float,
     tension: TensionMethod = _CLOSEST,
-    damping: Damping | None = None,
+    damping: Damping | None = _ONE_PERCENT,
     progress: Progress | None = None,
 ) -> FrequencyMap:
     """Lowest frequency and strongest answer of a robot at many poses, cables with mass.
@@ -93,7 +97,8 @@ def frequency_map(
         poses: A batch of N.
         up_to: Frequency below which modes are wanted [Hz], > 0.
         tension: How the load is shared among redundant cables, as in `inverse`.
-        damping: What takes energy out, for the strongest answer; None: a modal damping of 1 %.
+        damping: What takes energy out, for the strongest answer; a modal damping of 1 % unless told otherwise; None:
+            nothing.
         progress: Called after every few poses: how many are done, of how many.
 
     Returns:
@@ -120,7 +125,7 @@ def frequency_map(
     if not instance(poses, Pose, "poses").shape:
         raise InvalidValueError("poses", "a single pose", "a batch of them", "For one pose use vibration.")
     limit = number(up_to, "up_to", "Hz", above=0.0)
-    known = optional(damping, Damping, "damping") or _DAMPING
+    known = optional(damping, Damping, "damping") or Damping()
     told = callback(progress, "progress")
     state = inverse(robot, poses, tension=tension).state
     check_model(state)
@@ -166,7 +171,11 @@ def _row(state: Equilibrium, setting: Setting, row: int, up_to: float, damping: 
     if not found.number:
         return _Row(np.nan, np.nan, np.nan, float(np.linalg.norm(rest, 2)), 0.0)
     first = found.platform[:, 0]
-    peak, at = _peak(found, _ratios(state, setting, row, found, damping), rest)
+    answer = summed(found, rest, damping.modal_damping)
+    if damping.loss_time > 0.0 or damping.air_damping > 0.0:
+        slopes = cable_slopes(state[row])
+        answer = coupled(Answer(setting.at(row), slopes.matrix, slopes.blocks, damping), up_to)
+    peak, at = strongest(answer, found.frequency, _ratios(state, setting, row, found, damping), damping)
     return _Row(float(found.frequency[0]), np.nan, float(first @ setting.mass[row] @ first), peak, at)
 
 
@@ -174,25 +183,6 @@ def _ratios(state: Equilibrium, setting: Setting, row: int, found: Found, dampin
     shares = cable_shares(setting, row, found) if damping.air_damping > 0.0 else np.zeros((0, found.number))
     density = state.one_robot.cables.linear_density[: len(shares)]
     return loss(density, found, shares, damping)
-
-
-def _peak(found: Found, ratios: Array, rest: Array) -> tuple[float, float]:
-    """Largest displacement for a force [m/N], at rest or at a mode, and its frequency [Hz].
-
-    Modes beyond those found answer as at rest.
-    """
-    natural = 2.0 * np.pi * found.frequency
-    omega = np.concatenate(([0.0], natural))[:, None]
-    if not ratios.all():
-        return np.inf, float(found.frequency[0])
-    terms = 1.0 / (natural**2 - omega**2 + 2j * ratios * natural * omega) - 1.0 / natural**2
-    products = (found.platform[:3, None] * found.platform[None, :3]).reshape(9, -1)
-    answer = rest + (terms @ products.T).reshape(-1, 3, 3)
-    size = np.linalg.norm(answer, axis=(1, 2))
-    likely = np.flatnonzero(size >= size.max() / np.sqrt(3.0))  # its norm in one direction may be the largest
-    norms = np.linalg.norm(answer[likely], 2, axis=(1, 2))
-    best = int(np.argmax(norms))
-    return float(norms[best]), float(omega[likely[best], 0] / (2.0 * np.pi))
 
 
 def _at_pose(index: int, error: SaglineError) -> SaglineError:

@@ -25,7 +25,7 @@ _SIDES: Final = 32  # directions in which a polygon's border is looked for
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Course:
+class JerkProfile:
     """Constant jerk of the parameter in equal pieces of the time.
 
     Attributes:
@@ -63,7 +63,7 @@ def sums(pieces: int) -> Array:
 
 def fastest_course(
     curve: Curve, robot: Robot, speeds: Bounds, limits: tuple[float, float], least: float
-) -> Course | None:
+) -> JerkProfile | None:
     """The course from rest to rest in the shortest time that is found within tension limits and bounds on jerk.
 
     Linear in the jerk and in the square of the time, but for where the platform is at each share of the time, the
@@ -77,7 +77,7 @@ def fastest_course(
         least: A time in which no course can be faster [s].
 
     Returns:
-        Course; None where no round finds any.
+        The profile; None where no round finds any.
     """
     from scipy.optimize import linprog  # takes longer to load than all the rest of dynamics
 
@@ -107,13 +107,13 @@ def fastest_course(
         found = linprog(cost, np.vstack(rows), np.concatenate(bounds), ends, [1.0, 0.0, 0.0], between, method="highs")
         if found.x is None:
             return None
-        before, course = course, Course(found.x[:-1], float(np.sqrt(found.x[-1])))
+        before, course = course, JerkProfile(found.x[:-1], float(np.sqrt(found.x[-1])))
         if abs(course.duration - before.duration) <= _DONE * course.duration:
             break
     return course
 
 
-def _first(curve: Curve, limits: tuple[float, float], least: float) -> Course:
+def _first(curve: Curve, limits: tuple[float, float], least: float) -> JerkProfile:
     """The profile of 5th degree, in a time in which it may keep the limits."""
     middle = (np.arange(PIECES) + 0.5) / PIECES
     jerk = 60.0 - 360.0 * middle + 360.0 * middle**2
@@ -122,7 +122,7 @@ def _first(curve: Curve, limits: tuple[float, float], least: float) -> Course:
     rates = curve.at(state[0] @ jerk).rates[0]
     extents = (np.linalg.norm(rates[:, part], axis=1).max() for part in (slice(0, 3), slice(3, 6)))
     times = [np.cbrt(60.0 * extent / limit) for extent, limit in zip(extents, limits, strict=True)]
-    return Course(jerk, float(max(_SLOWER * least, *times)))
+    return JerkProfile(jerk, float(max(_SLOWER * least, *times)))
 
 
 def _within(planes: HalfPlanes, state: Array, speed: Array) -> tuple[Array, Array]:
@@ -136,7 +136,7 @@ def _within(planes: HalfPlanes, state: Array, speed: Array) -> tuple[Array, Arra
     return rows / size[:, None], right / size
 
 
-def _jerk_rows(rates: Array, state: Array, course: Course, limit: float) -> tuple[Array, Array]:
+def _jerk_rows(rates: Array, state: Array, course: JerkProfile, limit: float) -> tuple[Array, Array]:
     """Rows that keep a jerk, R1 s''' + 3 R2 s' s'' + R3 s'^3, within its limit in some directions at all knots.
 
     Along the way and across, and in its own direction, so that the rounds end with its size within the limit.

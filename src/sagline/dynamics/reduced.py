@@ -14,7 +14,7 @@ from sagline.statics.slopes import cable_slopes
 from sagline.statics.stiffness import mass_matrix
 from sagline.statics.strings import Strings, strings_of
 
-BEYOND = 1.2  # of the frequency asked for: the cables' modes up to there are unknowns
+KEPT = 1.2  # of the frequency asked for: the cables' modes up to there are unknowns
 LEVELS = 3  # pairs of moments of those above that are matched
 UNSTABLE = 1e-10  # of the largest: a stiffness that is less negative is rounding
 _TINY = 1e-300
@@ -36,6 +36,12 @@ class Setting(NamedTuple):
     stiffness: Array
     mass: Array
     freedom: Array
+
+    def at(self, row: int) -> Setting:
+        """One of them, with a leading axis 1."""
+        part = slice(row, row + 1)
+        strings = Strings(self.strings.table[part], self.strings.axes[part], self.strings.taut[part])
+        return Setting(strings, self.ends[part], self.stiffness[part], self.mass[part], self.freedom)
 
 
 class Reduced(NamedTuple):
@@ -116,10 +122,10 @@ def reduced(setting: Setting, row: int, up_to: float) -> Reduced:
     Returns:
         Reduced.
     """
-    components = component_modes(setting.strings, row, BEYOND * up_to)
+    components = component_modes(setting.strings, row, KEPT * up_to)
     freedom, ends = setting.freedom, setting.ends[row]
     drives = (components.participation[:, None] @ ends[components.cable])[:, 0] @ freedom.T
-    kept = components.square < (2.0 * np.pi * BEYOND * up_to) ** 2
+    kept = components.square < (2.0 * np.pi * KEPT * up_to) ** 2
     beyond, slow = _slow_motions(components.square[~kept], drives[~kept])
     square = np.concatenate((components.square[kept], slow))
     drives = np.concatenate((drives[kept], beyond.T @ drives[~kept]))

@@ -98,7 +98,7 @@ def frequency_response(state: Equilibrium, frequency: ArrayLike, damping: Dampin
     check_number(modes_below(setting, 0, max(float(given.max()), LOWEST)), float(given.max()), "frequency")
     slopes = cable_slopes(state)
     answer = Answer(setting, slopes.matrix, slopes.blocks, known)
-    compliance, massless = answer.by_modes(given)
+    compliance, massless = answer.by_modes(given, answer.held(float(given.max())))
     some = np.unique(np.linspace(0, given.size - 1, CHECKS).round().astype(np.int64))
     wanted = answer.exactly(given[some])
     off = np.linalg.norm(compliance[some] - wanted, axis=(1, 2)) / np.linalg.norm(wanted, axis=(1, 2))

@@ -8,7 +8,7 @@ import numpy as np
 
 from sagline.arguments import choice, instance
 from sagline.arrays import Array, locked
-from sagline.dynamics.at_rest import stretch_losses
+from sagline.dynamics.response import frequency_response
 from sagline.dynamics.vibration import Vibration
 from sagline.dynamics.vibration_status import VibrationStatus
 from sagline.errors import InvalidValueError
@@ -19,7 +19,6 @@ UNITS = {(False, False): "m/N", (False, True): "1/N", (True, False): "1/N", (Tru
 SAMPLES = 900  # evenly in the logarithm
 NEAR = np.sinh(np.linspace(-8.0, 8.0, 33)) / np.sinh(8.0)  # about a peak: the denser the nearer
 BESIDE = 0.03  # of a peak's frequency: how far these reach
-LEAST = 1e-9  # of a mode's stiffness that is left at an undamped peak
 BELOW = 6.0  # lowest frequency of a mode over that at which the curves begin
 
 
@@ -44,8 +43,7 @@ class ResponseCurves(NamedTuple):
 def response_curves(vibration: Vibration, force: str = "x", motion: str | None = None) -> ResponseCurves:
     """The platform's motion for a force at its center of mass, over frequency, up to where all modes are known.
 
-    Both curves are sums over modes, with the exact answer at rest; air damping, which only swinging cables feel, has
-    no part in the massless one.
+    Both are of `frequency_response`; air damping, which only swinging cables feel, has no part in the massless one.
 
     Args:
         vibration: Of a stable state.
@@ -64,21 +62,11 @@ def response_curves(vibration: Vibration, force: str = "x", motion: str | None =
         raise InvalidValueError("vibration", reason, "a stable state with modes", "Ask for another state, or higher.")
     column = MOTIONS.index(choice(force, "force", MOTIONS))
     row = column if motion is None else MOTIONS.index(choice(motion, "motion", MOTIONS))
-    platform = modes(state)
-    ratios = vibration.damping.modal_damping + stretch_losses(state, platform, vibration.damping.loss_time)
-    frequency = _grid(np.concatenate((vibration.frequency, platform.frequency)), vibration.up_to)
-    static = float(stiffness(state).compliance[row, column])
-
-    def amplitude(natural: Array, shape: Array, loss: Array) -> Array:
-        return np.abs(_summed(frequency, natural, shape[row] * shape[column], loss, static))
-
-    return ResponseCurves(
-        locked(frequency),
-        locked(amplitude(vibration.frequency, vibration.shape, vibration.loss)),
-        locked(amplitude(platform.frequency, platform.shape, ratios)),
-        abs(static),
-        UNITS[row > 2, column > 2],
-    )
+    natural = np.concatenate((vibration.frequency, modes(state).frequency))
+    found = frequency_response(state, _grid(natural, vibration.up_to), vibration.damping)
+    with_mass, massless = (np.abs(one[:, row, column]) for one in (found.compliance, found.massless_compliance))
+    static = abs(float(stiffness(state).compliance[row, column]))
+    return ResponseCurves(found.frequency, locked(with_mass), locked(massless), static, UNITS[row > 2, column > 2])
 
 
 def _grid(natural: Array, highest: float) -> Array:
@@ -86,11 +74,3 @@ def _grid(natural: Array, highest: float) -> Array:
     even = np.geomspace(natural.min() / BELOW, highest, SAMPLES)
     near = (natural[:, None] * (1.0 + BESIDE * NEAR)).ravel()
     return np.unique(np.concatenate((even, near[(near > even[0]) & (near < highest)])))
-
-
-def _summed(frequency: Array, natural: Array, product: Array, loss: Array, static: float) -> Array:
-    """Sum over modes; those beyond the highest count as what they are at rest."""
-    square, driven = (2.0 * np.pi * natural) ** 2, 2.0 * np.pi * frequency[:, None]
-    moving = square - driven**2 + 2j * loss * np.sqrt(square) * driven
-    moving = np.where(np.abs(moving) < LEAST * square, LEAST * square, moving)  # undamped, just at the peak
-    return np.asarray(static + (product / moving - product / square).sum(axis=1))

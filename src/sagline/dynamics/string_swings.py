@@ -13,9 +13,10 @@ import numpy as np
 from sagline.arrays import Array
 from sagline.dynamics.mode_slopes import Rest, Swings, lever_form
 from sagline.kernels.dynamics.collocation import INTEGRALS, NODES, STAGES, WEIGHTS
+from sagline.kernels.dynamics.string import SMOOTH, TINY
 
 PHASE = 0.45 * np.pi  # of a transverse wave in an element [rad]
-SMOOTH = 0.5  # of min N/w: longest element
+HALVINGS = 40  # of a cable: about a fold elements would become ever shorter
 CLOSE = 1e-5  # relative difference of two frequencies, by which the equations' change is taken
 _UP = np.array([0.0, 0.0, 1.0])
 
@@ -163,22 +164,22 @@ def _flexible(force: Array, stiffness: float) -> Array:
 
 def _edges(cable: Cable, omega: float) -> Array:
     """Borders of elements that are short against N/w and against a transverse wave."""
-    edges = [0.0]
-    while edges[-1] < cable.length:
-        start, size = edges[-1], cable.length - edges[-1]
-        while size > (allowed := _longest(cable, omega, start, size)):
-            size = max(allowed, 0.5 * size)
-        edges.append(start + size if start + 1.0001 * size < cable.length else cable.length)
-    return np.array(edges)
+    edges = np.array([0.0, cable.length])
+    for _ in range(HALVINGS):
+        size = np.diff(edges)
+        long = size > _longest(cable, omega, edges[:-1], edges[1:])
+        if not long.any():
+            break
+        edges = np.sort(np.concatenate((edges, edges[:-1][long] + 0.5 * size[long])))
+    return edges
 
 
-def _longest(cable: Cable, omega: float, start: float, size: float) -> float:
-    """Longest element [m] that a part of a cable allows."""
-    low, high = (cable.force[2] - cable.weight * (cable.length - s) for s in (start, start + size))
-    least = float(np.hypot(np.hypot(*cable.force[:2]), max(low, -high, 0.0)))
+def _longest(cable: Cable, omega: float, start: Array, end: Array) -> Array:
+    """Longest elements [m] that parts of a cable allow."""
+    low, high = (cable.force[2] - cable.weight * (cable.length - s) for s in (start, end))
+    least = np.hypot(np.hypot(*cable.force[:2]), np.maximum(np.maximum(low, -high), 0.0)) + TINY
     slowness = np.sqrt(cable.density * (1.0 / least + 1.0 / cable.stiffness))
-    smooth = SMOOTH * least / cable.weight if cable.weight > 0.0 else np.inf
-    return float(min(smooth, PHASE / (omega * slowness)))
+    return np.asarray(np.minimum(SMOOTH * least / (cable.weight + TINY), PHASE / (omega * slowness)))
 
 
 def _forms(
