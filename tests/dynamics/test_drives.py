@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import sagline as sl
+from sagline.arrays import Array
 from sagline.dynamics.simulate import Winding
+from sagline.kernels.dynamics import drives as d
 from tests.dynamics.let_go import LIFT
 from tests.dynamics.machines import prototype
 
@@ -107,3 +109,57 @@ def test_gains_that_a_millisecond_cannot_close_are_refused() -> None:
         sl.simulate(lift(prototype(), 1.0), winches="robot", integrator="runge-kutta")
     with pytest.raises(sl.InvalidValueError, match=r"step is 0\.0003 s; allowed: a whole part of 0\.001 s"):
         sl.simulate(lift(prototype(), 1.0), winches="robot", step=3e-4)
+
+
+def test_a_drum_that_remembers_keeps_length_and_energy_of_what_lies_on_it() -> None:
+    robot = prototype(winding_tension=30.0)
+    state = lift(robot, 1.0).state[0]
+    machine = sl.Simulator(robot, state, winding="remembered")
+    plant = machine._plant
+    stiffness, begins = robot.cables.axial_stiffness, d.BIN * np.arange(plant.layers.shape[1])
+
+    def on_drums() -> tuple[Array, float]:
+        """Unstrained lengths there [m], (m,), and all strain energy [J]; the last bin left out."""
+        there = np.clip(begins + d.BIN - plant.now[d.WOUND][:, None], 0.0, d.BIN)[:, :-1]
+        lengths, strains = there / (1.0 + plant.layers[:, :-1]), plant.layers[:, :-1]
+        return lengths.sum(axis=1), float((0.5 * stiffness[:, None] * strains**2 * lengths).sum())
+
+    (length, energy), off = on_drums(), machine.reading.length.copy()
+    generator = np.random.default_rng(2)
+    for size in np.repeat([5e-4, 3e-3, 0.02], 20):
+        wanted = state.unstrained_length + size * generator.uniform(-1.0, 1.0, 8)
+        machine.step(wanted, 0.05)
+    after, left = on_drums()
+    np.testing.assert_allclose(after + machine.reading.length, length + off, rtol=0, atol=1e-12)
+    assert np.ptp(plant.layers) > 1e-4
+    assert left - energy == pytest.approx(plant.audit[d.ON_DRUMS], abs=1e-9)
+    assert abs(plant.audit[d.ON_DRUMS]) > 1e-3
+
+
+def test_a_brake_holds_the_tensions_that_motors_expect_too() -> None:
+    robot = prototype(integral_gain=0.0, friction=0.0)
+    path = sl.septic_path([(0, 0, 0.5), (0.6, 0.3, 2.2)], durations=16.0, rate=62.5)
+    plan = sl.inverse(robot, path, tension=LIFT)
+    tension, rate = plan.state.cables.frame_end_tension, plan.length_rate
+    assert rate is not None
+    run = sl.simulate(plan, winches="robot", events=sl.Brake(8.0, duration=0.2), duration=16.0)
+    expected = plan.unstrained_length[500] + 0.1 * rate[500]
+    assert np.abs(tension[-1] - tension[500]).max() > 20.0
+    assert np.abs(run.length[-1] - expected).max() < 3e-4  # 1.7 mm where the tensions go on
+
+
+@pytest.mark.parametrize("mass", ["none", "lumped"])
+def test_what_begins_is_noted_however_much_of_it(
+    mass: sl.dynamics.simulate.CableMass, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    state = lift(prototype(), 1.0).state[0]
+    times = 0.1 * np.arange(11)
+    lengths = state.unstrained_length + 0.06 * np.outer(np.arange(11) % 2, np.resize([1.0, -1.0], 8))
+    told = []
+    for room in (1000, 0):
+        monkeypatch.setattr("sagline.dynamics.plant.NOTES", room)
+        monkeypatch.setattr("sagline.dynamics.run.NOTES", room)
+        run = sl.simulate(state, unstrained_length=(times, lengths), winches="robot", cable_mass=mass, nodes=6)
+        told.append([(event.time, event.kind, event.cable) for event in run.events])
+    assert len(told[0]) > 20
+    assert told[0] == told[1]

@@ -34,7 +34,7 @@ class Records:
         tensions: At the frame ends [N], (N, m).
         lengths: Unstrained [m], (N, m).
         energies: Kinetic, potential, supplied, lost [J], (N, 4).
-        notes: See `sagline.kernels.dynamics.motion`, (NOTES, NOTE_COLUMNS).
+        notes: See `sagline.kernels.dynamics.motion`, (NOTES + 2 m, NOTE_COLUMNS): a run pauses with more than NOTES.
         points: Of cables with mass [m], (N, m, points, 3); None of cables without.
     """
 
@@ -44,7 +44,7 @@ class Records:
         self.tensions = np.empty((count, cables))
         self.lengths = np.empty((count, cables))
         self.energies = np.empty((count, k.ENERGY_COLUMNS))
-        self.notes = np.zeros((NOTES, k.NOTE_COLUMNS))
+        self.notes = np.zeros((NOTES + 2 * cables, k.NOTE_COLUMNS))
         self.points: Array | None = None
 
     @property
@@ -113,7 +113,10 @@ class Plant:
         self._room = np.zeros(0)
 
     def remember_winding(self, longest: float) -> None:
-        """Let the drums remember the strain at which cable was wound in, up to a length off the drum [m]."""
+        """Let the drums remember the strain at which cable was wound in, up to a length off the drum [m] and MARGIN.
+
+        What lies farther in lies at the winding tension, and comes to it when it is wound in.
+        """
         self.layers = np.tile(self.data[d.WINDING_STRAIN][:, None], (1, int((longest + MARGIN) / d.BIN) + 1))
 
     def arguments(
@@ -128,7 +131,7 @@ class Plant:
         """
         lengths, wrenches, winds = courses
         wide = lengths.value.shape[1]
-        needed = 7 * 6 + 3 * body.STATE_COLUMNS + 4 * len(self.cables) + 2 * wide + 9
+        needed = 6 * 6 + 3 * body.STATE_COLUMNS + 4 * len(self.cables) + 2 * wide + 9
         if self._room.size != needed:
             self._room = np.zeros(needed)
         platform = locked(np.array([self.inertia[0], self.robot.gravity, 0.0, 0.0, 0.0]))

@@ -76,7 +76,7 @@ class Run:
                 raise plant.failure(self._time(int(plant.counters[k.STEPS])), self.step)
             if plant.counters[k.STEPS] == last:
                 break
-            if plant.counters[k.NOTES] == NOTES:
+            if plant.counters[k.NOTES] > NOTES:
                 self._note(records)
                 plant.counters[k.NOTES] = 0
         self._keep(records, row)
@@ -138,16 +138,16 @@ class Run:
 
     def _change(self, event: Event, time: float) -> None:
         plant, (lengths, wrenches, winds) = self.plant, self._courses
+        wide = lengths.value.shape[1] // len(plant.cables)
         if isinstance(event, Break):
-            kept = np.tile(plant.cables != event.cable, lengths.value.shape[1] // len(plant.cables))
+            kept = np.tile(plant.cables != event.cable, wide)
             plant.without(event.cable)
             self._courses = (lengths.part(kept), wrenches, winds)
         elif isinstance(event, Stall):
             plant.hold(plant.cables == event.winch)
         elif isinstance(event, Brake):
-            columns = np.arange(len(plant.cables))
-            if event.winch is not None:
-                columns = columns[plant.cables == event.winch]
+            chosen = np.ones(len(plant.cables), dtype=np.bool_) if event.winch is None else plant.cables == event.winch
+            columns = np.flatnonzero(np.tile(chosen, wide))  # the tensions that motors expect are held too
             self._courses = (lengths.brought_to_rest(time, event.duration, columns), wrenches, winds)
         elif isinstance(event, Drop):
             plant.with_mass(plant.inertia[0] - event.mass, at_rest=False)

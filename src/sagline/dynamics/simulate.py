@@ -19,7 +19,7 @@ from sagline.dynamics.modal import modal_simulation, refuse_with_modes
 from sagline.dynamics.plant import Plant
 from sagline.dynamics.run import Run
 from sagline.dynamics.simulation import Simulation
-from sagline.dynamics.steps import checked_step, frequency_of_drives, highest_frequency
+from sagline.dynamics.steps import checked_step, highest_frequency, with_drives
 from sagline.errors import InvalidValueError
 from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics import motion as k
@@ -251,10 +251,9 @@ def step_of(
         events: What will happen.
         waves: Highest angular frequency of cables with mass [rad/s]; 0 without.
     """
-    robot, lengths = given.robot, given.state.unstrained_length
+    robot, lengths = given.robot, given.lengths.value
     platform = highest_frequency(robot, given.poses, lengths) * _lightness(robot.mass, events)
-    stiffness = robot.cables.axial_stiffness
-    highest = max(platform, frequency_of_drives(kind, plant.data, lengths, stiffness))
+    highest = with_drives(platform, kind, plant.data, lengths, robot.cables.axial_stiffness)
     return checked_step(step, code, highest, losses, kind == d.DRUMS, waves)
 
 

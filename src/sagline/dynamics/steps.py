@@ -26,8 +26,9 @@ def highest_frequency(robot: Robot, poses: Pose, lengths: Array) -> float:
 
     Args:
         robot: The robot.
-        poses: A batch.
-        lengths: Unstrained lengths at the first of them [m], (m,).
+        poses: A batch along a way, to whose poses the lengths belong; or one, which the robot may leave: cables then
+            have their directions there, each the least of its lengths.
+        lengths: Set points of the unstrained lengths [m], (K, m).
 
     Returns:
         The highest at any of the poses, at tensions that stretch no cable by more than a hundredth.
@@ -39,9 +40,9 @@ def highest_frequency(robot: Robot, poses: Pose, lengths: Array) -> float:
     distance = np.linalg.norm(chords, axis=-1, keepdims=True)
     along = chords / np.maximum(distance, 1e-300)
     rows = np.concatenate((along, np.cross(levers, along)), axis=-1) @ freedom.T
-    free = np.linalg.norm(chords[0], axis=-1)
-    springs = robot.cables.axial_stiffness / np.minimum(lengths, np.maximum(free, 1e-300))
-    stiffness = np.swapaxes(rows, 1, 2) @ (springs[:, None] * rows)
+    taut = np.maximum(distance[..., 0], 1e-300)
+    springs = robot.cables.axial_stiffness / (np.minimum(lengths.min(axis=0), taut) if len(poses) == 1 else taut)
+    stiffness = np.swapaxes(rows, 1, 2) @ (springs[..., None] * rows)
     mass = np.zeros((len(poses), 6, 6))
     mass[:, :3, :3] = robot.mass * np.eye(3)
     mass[:, 3:, 3:] = rotation @ robot.inertia @ np.swapaxes(rotation, 1, 2)
@@ -93,17 +94,19 @@ def _limit(integrator: int, highest: float, damping: Damping) -> float:
     return LIMIT[integrator] * slower / highest if highest > 0.0 else math.inf
 
 
-def frequency_of_drives(kind: int, data: Array, lengths: Array, stiffness: Array) -> float:
-    """Highest angular frequency of winches on their cables [rad/s].
+def with_drives(platform: float, kind: int, data: Array, lengths: Array, stiffness: Array) -> float:
+    """Highest angular frequency of a platform and its winches together [rad/s].
 
     Args:
+        platform: That of the platform where the winches stand [rad/s].
         kind: IDEAL, SECOND_ORDER or DRUMS.
         data: What the drives are, (DATA_ROWS, m).
-        lengths: Unstrained [m], (m,).
+        lengths: Set points of the unstrained lengths [m], (K, m).
         stiffness: EA [N], (m,).
     """
     if kind == d.SECOND_ORDER:
-        return float(data[d.BANDWIDTH].max() * max(1.0, 2.0 * data[d.RATIO].max()))
-    if kind == d.DRUMS:
-        return float(np.sqrt(stiffness / (lengths * data[d.INERTIA])).max())
-    return 0.0
+        return max(platform, float(data[d.BANDWIDTH].max() * max(1.0, 2.0 * data[d.RATIO].max())))
+    if kind == d.DRUMS:  # the springs' largest eigenvalue on both masses is at most the sum of those on each
+        drums = stiffness / (lengths.min(axis=0) * data[d.INERTIA])
+        return math.hypot(platform, math.sqrt(float(drums.max())))
+    return platform

@@ -22,6 +22,7 @@ from sagline.kernels.dynamics.motion import (
     KINETIC,
     LENGTH_AT,
     MOMENT,
+    NOTES,
     POTENTIAL,
     READY,
     RECORDS,
@@ -52,7 +53,7 @@ DONE, LONG, SHORT, GROWN = range(4)
 FEWEST = 2  # free nodes of a chain
 GROWTH = 0.5  # of what could have become motion: more than phases that err can invent
 ROUNDING = 1e-9  # of the weights' energies
-ROOM = 24
+ROOM = 21
 
 Numbers = tuple[float, float, float]  # step [s], gravity [m/s^2], share of a new reading in a load cell's filtered one
 Rules = tuple[int, int, int]  # kind of winches, remembered, loops' stride
@@ -357,12 +358,14 @@ def swing(
             place that the given wrench is about, (3,).
         data: Of the drives, (DATA_ROWS, m).
         courses: Of lengths, of wrenches and of the wind's velocity, as in `motion.run`.
-        kept: As there, with one counter more, and ROOM + 4 m numbers to work in.
+        kept: As there, with one counter more, and ROOM numbers to work in, with
+            two for every number of the course of lengths.
         chain_arrays: `Chains`, in and out.
         stock: Energies of the start that could become motion, (2,), in and out; NaN at first.
         records: Filled as in `motion.run`; and points of the cables (R, m, points, 3) at equal material steps from the
             exit on.
-        steps: How many steps to take. With 0 the state at hand is recorded.
+        steps: How many steps to take, fewer where there is no room left for the notes of another. With 0 the state at
+            hand is recorded.
         every: After how many steps one is recorded, the start first.
     """
     kind, remembered, stride = rules
@@ -417,5 +420,5 @@ def swing(
         note(run.drives, rows, body[0], at, audit[d.BEGIN] + at[STEPS] * step, gravity, records[4])
         if at[STEPS] % every == 0:
             record(run, records, stock)
-        if at[FAILED] > 0:
+        if at[FAILED] > 0 or at[NOTES] + 2 * m > records[4].shape[0]:
             break

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from sagline.arrays import Array
 from sagline.kernels import tables
 from sagline.kernels.cable import rows as t
-from sagline.kernels.jit import formula
+from sagline.kernels.jit import formula, kernel
 
 # kinds of winches
 IDEAL, SECOND_ORDER, DRUMS = 0, 1, 2
@@ -22,14 +22,15 @@ NO, YES, NEW = 0.0, 1.0, 2.0
 RATE = 0  # dL/dt of the unstrained length [m/s]
 WOUND, SPEED = 1, 2  # s let out [m], and its rate [m/s]
 FORCE, INTEGRAL = 3, 4  # of the motor at the cable, outward; that of its loop [N]
-AT_FRAME, WHOLE, AT_DRUM = 5, 6, 7  # tension at the frame end, H, tension at the drum [N]
-STRETCHING = 8  # what damping adds to the tension, as the drum feels it [N]
+AT_FRAME, WHOLE, AT_DRUM = 5, 6, 7  # tension at the frame end, damping with it; H, tension at the drum without [N]
+STRETCHING = 8  # what damping adds to H [N]
 FILTERED = 9  # tension at the frame end behind the load cell's filter [N]
 PEAK = 10  # largest tension at the frame end [N]
 HELD, SATURATED, SLACK = 11, 12, 13  # NO, YES, or NEW until it is noted
 STORED = 14  # strain of the cable that goes on or off the drum
 BEFORE, BEFORE_WHOLE, BEFORE_DRUM = 15, 16, 17  # L, H and tension at the drum one step before
-DRIVE_ROWS = 18
+PULL = 18  # tension at the frame end without what damping adds [N]; of cables without mass
+DRIVE_ROWS = 19
 
 # rows of what they are, (DATA_ROWS, m)
 INERTIA = 0  # of motor, gear and drum at the cable [kg]
@@ -48,7 +49,7 @@ START, START_POTENTIAL, BEGIN = 5, 6, 7  # energy at the start, of which potenti
 MOVED = 8  # the most that has been in motion
 AUDIT_SIZE = 9
 
-BIN = 0.005  # m of cable on the drum that remember one tension
+BIN = 0.005  # m of cable on the drum that lie at one tension
 
 
 class Drives(NamedTuple):
@@ -106,21 +107,77 @@ def kick_drums(drives: Drives, time: float) -> None:
 
 @formula
 def take_stored(drives: Drives, cables: Array, time: float) -> None:
-    """Fill the strain of the cable that the drums let out or take in during a step, and remember what they take in."""
-    bins = drives.layers.shape[1]
+    """Fill the strain of the cable that the drums let out or take in during a step."""
     for i in range(cables.shape[0]):
-        strain = drives.data[WINDING_STRAIN, i]
+        strain, lost = drives.data[WINDING_STRAIN, i], 0.0
         if drives.remembered:
-            place, step = drives.now[WOUND, i], time * drives.now[SPEED, i]
-            one = min(max(int(place / BIN), 0), bins - 1)
-            other = min(max(int((place + step) / BIN), 0), bins - 1)
+            stiffness, step = cables[i, tables.STIFFNESS], time * drives.now[SPEED, i]
             if step < 0.0:
-                strain = drives.now[AT_DRUM, i] / cables[i, tables.STIFFNESS]
-                for k in range(other, one + 1):
-                    drives.layers[i, k] = strain
-            else:
-                strain = drives.layers[i, one]
+                strain = drives.now[AT_DRUM, i] / stiffness
+                lost = wind_in(drives.layers[i], drives.now[WOUND, i], -step, strain, stiffness)
+            elif step > 0.0:
+                strain, lost = pay_out(drives.layers[i], drives.now[WOUND, i], step, stiffness)
         drives.now[STORED, i] = strain
+        drives.audit[ON_DRUMS] -= lost
+        drives.audit[LOST] += lost
+
+
+@kernel
+def wind_in(layer: Array, place: float, step: float, strain: float, stiffness: float) -> float:
+    """Put cable of a strain on a drum; returns the energy [J] that is lost where it is shared with what lies there.
+
+    What lies in a bin has one strain, that with which it is as long as it was, strained and unstrained.
+
+    Args:
+        layer: Strain of the cable on the drum, bin by bin, (B,); what is beyond the last border is the last bin's.
+        place: What is let out before [m].
+        step: How much of it is wound in [m], > 0.
+        strain: Of this.
+        stiffness: EA [N].
+    """
+    lost = 0.0
+    first, last = bin_of(layer, place - step), bin_of(layer, place)
+    for k in range(first, last + 1):
+        begin = max(place - step, k * BIN) if k > first else place - step
+        middle = min(place, (k + 1) * BIN) if k < last else place
+        if k == layer.shape[0] - 1:  # endless, it takes the winding strain
+            lost += 0.5 * stiffness * (strain - layer[k]) ** 2 * (middle - begin) / (1.0 + strain)
+            continue
+        new, old = (middle - begin) / (1.0 + strain), max((k + 1) * BIN - middle, 0.0) / (1.0 + layer[k])
+        if new + old > 0.0:
+            shared = new / (new + old)
+            lost += 0.5 * stiffness * (1.0 - shared) * new * (strain - layer[k]) ** 2
+            layer[k] += shared * (strain - layer[k])
+    return lost
+
+
+@kernel
+def pay_out(layer: Array, place: float, step: float, stiffness: float) -> tuple[float, float]:
+    """Strain of the cable that a drum lets out, as one, and the energy [J] that is lost by this.
+
+    Args:
+        layer: Strain of the cable on the drum, bin by bin, (B,); what is beyond the last border is the last bin's.
+        place: What is let out before [m].
+        step: How much more [m], > 0.
+        stiffness: EA [N].
+    """
+    first, last = bin_of(layer, place), bin_of(layer, place + step)
+    if first == last:
+        return layer[first], 0.0
+    length, strained, squares = 0.0, 0.0, 0.0
+    for k in range(first, last + 1):
+        begin = max(place, k * BIN) if k > first else place
+        end = min(place + step, (k + 1) * BIN) if k < last else place + step
+        part = (end - begin) / (1.0 + layer[k])
+        length, strained, squares = length + part, strained + part * layer[k], squares + part * layer[k] * layer[k]
+    mean = strained / length
+    return mean, 0.5 * stiffness * (squares - mean * strained)
+
+
+@formula
+def bin_of(layer: Array, place: float) -> int:
+    """The bin of a place [m] along the cable."""
+    return min(max(int(place / BIN), 0), layer.shape[0] - 1)
 
 
 @formula

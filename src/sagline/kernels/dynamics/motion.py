@@ -14,6 +14,7 @@ from sagline.kernels import tables
 from sagline.kernels.balance.freedom import components_along, spread
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable import rows as t
+from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import CATENARY
 from sagline.kernels.dynamics import drives as d
@@ -140,11 +141,11 @@ def pull_of_frame(weight_of: float, cables: Array, rows: Array, data: Array, now
             x, z = rows[t.HORIZONTAL, i], rows[t.VERTICAL, i] - weight * rows[t.LENGTH, i]
             tension, height = math.sqrt(x * x + z * z), 0.0
         else:
-            tension = rows[t.LEAVING, i]
-            height = cables[i, tables.PULLEY_RADIUS] * cables[i, tables.ENTRY] * rows[t.WRAP_SINE, i]
+            tension, pulley = rows[t.LEAVING, i], pulley_at(cables, i)
+            height = pulley.radius * pulley.entry * rows[t.WRAP_SINE, i]
         whole = tension + 0.5 * tension * tension / stiffness - weight * height
         fallen = whole - weight * data[d.BEHIND_RISE, i]
-        now[d.AT_FRAME, i] = tension
+        now[d.AT_FRAME, i] = now[d.PULL, i] = tension
         now[d.WHOLE, i] = whole
         now[d.AT_DRUM, i] = 2.0 * fallen / (1.0 + math.sqrt(1.0 + 2.0 * fallen / stiffness))
 
@@ -158,11 +159,13 @@ def damp_cables(
     turning: Array,
     now: Array,
     wrench: Array,
+    behind: bool | None,
 ) -> float:
     """Fill the wrench (6,) of what damps the cables; returns the power that is lost.
 
-    The stretch's share of the chord's rate is that of the compliances, 1 for a taut cable, 0 for a slack one; a cable
-    moves in the air as its chord does.
+    All of a cable stretches alike, what lies behind the free span with it, and what is let out lengthens the span by
+    what it is strained: EA/L times the chord's rate less that. Of this the stretch has the share of its compliance, 1
+    in a taut cable, 0 in a slack one. A cable moves in the air as its chord does.
 
     Args:
         losses: loss_time [s], and air damping [N s/m^2].
@@ -170,8 +173,9 @@ def damp_cables(
         cables: Rows of the cable_table.
         rows: Of the cables, after `unbalance`.
         turning: Velocity of the center of mass, and angular velocity, (6,).
-        now: Of the drives; the tension that damping adds is filled.
+        now: Of the drives; what damping adds to the tensions is filled.
         wrench: Filled.
+        behind: That of the model, by itself.
     """
     lost = 0.0
     for k in range(6):
@@ -188,10 +192,12 @@ def damp_cables(
         share = 0.0
         if tension > 0.0:
             share = 1.0 / (1.0 + stiffness * weight * weight * chord / (12.0 * length * tension * tension * tension))
-        rate = ux * x + uy * y + uz * z - now[d.RATE, i] * chord / length
+        strained = chord / rows[t.LENGTH if behind is None else t.FREE_LENGTH, i]
+        rate = ux * x + uy * y + uz * z - now[d.RATE, i] * strained
         more = max(losses[0] * stiffness / length * share * share * rate, -tension)
         slow = losses[1] * chord / 3.0
-        now[d.STRETCHING, i] = more * chord / length
+        now[d.STRETCHING, i] = more * strained
+        now[d.AT_FRAME, i] = max(now[d.PULL, i] + more, 0.0)
         lost += more * rate + slow * (ux * ux + uy * uy + uz * uz)
         add_at_end(rows, i, -more * x - slow * ux, -more * y - slow * uy, -more * z - slow * uz, wrench)
     return lost
@@ -243,7 +249,7 @@ def damp(plant: Plant) -> None:
             motion[k], motion[3 + k] = plant.state[VELOCITY + k], spinning[k]
         if plant.work & DAMPED:
             drives.audit[d.LOST_POWER] = damp_cables(
-                plant.losses, weight_of, plant.cables, plant.rows, motion, drives.now, plant.damping
+                plant.losses, weight_of, plant.cables, plant.rows, motion, drives.now, plant.damping, plant.model.behind
             )
             keep_free(plant.freedom, plant.damping, motion)
         drives.audit[d.GIVEN_POWER] = power_of(plant.given, plant.state, spinning)
@@ -356,6 +362,7 @@ def runge_kutta_step(plant: Plant, now: float) -> None:
         evaluate(plant, now + ahead)
     drives.audit[d.SUPPLIED] += h * supplied
     drives.audit[d.LOST] += h * lost
+    damp(plant)
 
 
 @kernel
@@ -448,7 +455,8 @@ def run(
         kept: What a run is in the midst of, in and out, and room for numbers.
         records: Filled: states with the angular velocity in the momentum's place, tensions at the frame ends, lengths,
             energies, notes.
-        steps: How many steps to take, fewer where there is no room for notes left. With 0 the start alone is looked at.
+        steps: How many steps to take, fewer where there is no room left for the notes of another. With 0 the start
+            alone is looked at.
         every: After how many steps one is recorded, the start first; 0 for the last one.
     """
     integrator, kind, remembered, work, stride = rules
@@ -456,7 +464,7 @@ def run(
     state, rows, now, layers, audit, at, room = kept
     cables, body, inertia, freedom = robot
     m = rows.shape[1]
-    small, place = block(room, 0, 7, 6)
+    small, place = block(room, 0, 6, 6)
     sides, place = block(room, place, 3, STATE_COLUMNS)
     wide, place = block(room, place, 4, m)
     both, place = block(room, place, 2, courses[0][1].shape[1])
@@ -527,7 +535,7 @@ def run(
             record(plant, records)
             if at[FAILED] > 0:
                 break
-        if every > 0 and at[NOTES] == records[4].shape[0]:
+        if every > 0 and at[NOTES] + 2 * m > records[4].shape[0]:
             break
     if every == 0 and steps > 0:
         record(plant, records)
