@@ -111,17 +111,21 @@ def test_another_machine_than_the_planned_one_does_not_rest_there() -> None:
 
 
 def test_an_ideal_winch_that_is_released_sets_off_from_where_it_stood() -> None:
+    """It goes as one that was asked to stand still instead, and to the set points of that period straight."""
     state = sl.inverse(prototype(), PLACE).state
-    machine = sl.Simulator(prototype(), state, winches="ideal")
+    machine, twin = (sl.Simulator(prototype(), state, winches="ideal") for _ in range(2))
     length = state.unstrained_length
-    longer = length + np.where(np.arange(8) == 2, 0.004, 0.0)
+    longer = length + np.where(np.arange(8) == 2, 0.02, 0.0)
     machine.hold(2)
-    held = machine.step(longer, 0.1)
-    assert held.length[2] == length[2]
+    assert machine.step(longer, 0.1).length[2] == length[2]
+    twin.step(length, 0.1)
     machine.release()
-    for half in (0.5, 1.0):
-        reading = machine.step(length + half * (longer - length), 0.05)
-        np.testing.assert_allclose(reading.length, length + half * (longer - length), rtol=1e-15)
+    for share in (0.5, 1.0):
+        asked = length + share * (longer - length)
+        reading, expected = machine.step(asked, 0.05), twin.step(asked, 0.05)
+        np.testing.assert_allclose(reading.length, asked, rtol=1e-15)
+        for mine, theirs in zip(reading[2:], expected[2:], strict=True):
+            np.testing.assert_allclose(mine, theirs, rtol=1e-9, atol=1e-9)
 
 
 def test_a_reading_does_not_let_the_robot_be_changed() -> None:
