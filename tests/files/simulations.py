@@ -1,12 +1,11 @@
 """Simulations to be saved, and whether two are the same; of numbers that no integrator gave."""
 
-from dataclasses import fields
 from operator import attrgetter
 
 import numpy as np
 
 import sagline as sl
-from sagline.dynamics.simulation import EnergyBalance, Occurrence
+from sagline.dynamics.simulation import Occurrence, energy_balance
 from sagline.files.robot_file import dump_robot
 from sagline.files.simulation_layout import NODES, SAMPLES, TIME
 
@@ -25,19 +24,27 @@ def a_simulation(
     rng = np.random.default_rng(12)
     count, cables = SAMPLE_COUNT, robot.cable_count
     pose = sl.Pose.from_euler(rng.normal(size=(count, 3)), *rng.normal(size=(3, count)))
-    energy = EnergyBalance(*(rng.random(count) for _ in fields(EnergyBalance)))
+    time, length = np.arange(count) / 3.0, rng.random((count, cables))
+    points = rng.normal(size=(count, cables, NODE_COUNT, 3))
+    for event in events:
+        if event.kind == "break":
+            length[time > event.time, event.cable] = points[time > event.time, event.cable] = np.nan
     return sl.Simulation(
         robot=robot,
-        time=np.arange(count) / 3.0,
+        time=time,
         pose=pose,
         twist=rng.normal(size=(count, 6)),
         tensions=rng.random((count, cables)),
-        length=rng.random((count, cables)),
-        energy=energy,
+        length=length,
+        energy=energy_balance(*rng.random((4, count))),
         events=events,
         cable_mass="lumped" if nodes else "none",
         step=0.1 / 3.0,
-        nodes=rng.normal(size=(count, cables, NODE_COUNT, 3)) if nodes else None,
+        nodes=points if nodes else None,
+        integrator="splitting",
+        winches=sl.SecondOrder(10.0, 0.7) if nodes else "robot",
+        winding="constant" if nodes else "remembered",
+        damping=sl.Damping(1e-3, 0.2),
     )
 
 
@@ -49,5 +56,7 @@ def assert_same(simulation: sl.Simulation, other: sl.Simulation) -> None:
         assert not theirs.flags.writeable, quantity.place
     assert (simulation.nodes is None) == (other.nodes is None)
     assert repr(simulation.events) == repr(other.events)  # NaN is NaN, a number of Python one of Python
-    assert (simulation.cable_mass, simulation.step) == (other.cable_mass, other.step)
+    for name in ("cable_mass", "step", "integrator", "winches", "winding", "damping"):
+        mine, theirs = (getattr(one, name) for one in (simulation, other))
+        assert (mine, type(mine)) == (theirs, type(theirs)), name
     assert dump_robot(simulation.robot) == dump_robot(other.robot)

@@ -1,7 +1,7 @@
 import re
 from dataclasses import fields, replace
 from pathlib import Path as FilePath
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -39,7 +39,10 @@ def test_a_simulation_comes_back_to_the_last_bit(
 def test_a_broken_cable_and_a_dropped_load_come_back(tmp_path: FilePath, cable_mass: Any) -> None:
     state = sl.inverse(ROBOT, sl.Pose((0.0, 0.0, 1.5), np.eye(3))).state
     events = (sl.Break(cable=3, time=0.02), sl.Drop(mass=5.0, time=0.04))
-    simulation = sl.simulate(state, duration=0.06, events=events, cable_mass=cable_mass, nodes=6)
+    settings: dict[str, Any] = {"cable_mass": cable_mass, "nodes": 6, "damping": sl.Damping(1e-4)}
+    simulation = sl.simulate(state, duration=0.06, events=events, **settings)
+    assert simulation.integrator == ("splitting" if cable_mass == "lumped" else "runge-kutta")
+    assert (simulation.winches, simulation.winding, simulation.damping) == ("ideal", "constant", sl.Damping(1e-4))
     assert np.isnan(simulation.length[-1, 3])
     assert [event.kind for event in simulation.events][:2] == ["break", "drop"]
     simulation.save(tmp_path / "sim.nc")
@@ -48,7 +51,8 @@ def test_a_broken_cable_and_a_dropped_load_come_back(tmp_path: FilePath, cable_m
 
 def test_nothing_of_a_simulation_is_left_out() -> None:
     places = {quantity.place.split(".")[0] for quantity in (TIME, *SAMPLES, NODES)}
-    assert places | {"robot", "events", "cable_mass", "step"} == {field.name for field in fields(sl.Simulation)}
+    told = {"robot", "events", "cable_mass", "step", "integrator", "winches", "winding", "damping"}
+    assert places | told == {field.name for field in fields(sl.Simulation)}
     kept = {quantity.place for quantity in SAMPLES if quantity.place.startswith("energy.")}
     assert kept == {f"energy.{field.name}" for field in fields(EnergyBalance)}
     assert {quantity.place for quantity in EVENTS} == {field.name for field in fields(Occurrence)}
@@ -66,6 +70,9 @@ def test_what_a_reader_finds(saved: FilePath) -> None:
         assert data["event_kind"].values.tolist() == ["break", "pick up", "slack"]
         assert data["event_cable"].values.tolist() == [3, -1, 0]
         assert (data.attrs["cable_mass"], data.attrs["step"], data.attrs["step_units"]) == ("lumped", 0.1 / 3.0, "s")
+        told = {"integrator": "splitting", "winches": "second-order", "bandwidth": 10.0, "bandwidth_units": "Hz"}
+        losses = {"damping_ratio": 0.7, "loss_time": 1e-3, "air_damping": 0.2, "air_damping_units": "N s/m^2"}
+        assert told.items() | losses.items() <= {**data.attrs, "robot": ""}.items()
         assert "name: article-suspended" in data.attrs["robot"]
         assert data.attrs["source"] == f"sagline {sl.__version__}"
 
@@ -110,10 +117,25 @@ def edited(data: xr.Dataset, name: str, index: Any, value: Any) -> xr.Dataset:
         ("energy_error", 3, np.inf, r"energy_error\[3\] is inf; allowed: finite"),
         ("twist", (0, 0), np.nan, r"twist\[0, 0\] is nan"),
         ("quaternion", (2, 0), 7.0, "quaternion"),
-        ("time", 4, 0.5, r"time\[4\] is 0.5 s; allowed: >= 1 s"),
+        ("time", 4, 0.5, r"time\[4\] is 0.5 s; allowed: > 1 s"),
+        ("time", 4, 1.0, r"time\[4\] is 1 s; allowed: > 1 s"),
+        ("energy_error", slice(3, 5), 5.0, r"energy_error\[3\] is 5 J; allowed: .* J, what the other energies leave"),
+        ("energy_lost", 3, 0.5, r"energy_error\[3\] is .* J; allowed: .* J, what the other energies leave"),
+        ("length", (2, 1), np.nan, r"length\[2, 1\] is nan; allowed: a number: its cable has not broken"),
+        ("length", (2, 3), 1.0, r"length\[2, 3\] is 1; allowed: nan: its cable has broken"),
+        ("node_position", (2, 1, 4, 2), np.nan, r"node_position\[2, 1, 4, 2\] is nan; allowed: a number"),
+        ("node_position", (2, 3, 4, 2), 0.5, r"node_position\[2, 3, 4, 2\] is 0.5; allowed: nan"),
+        ("event_kind", 0, "gremlin", r"event_kind\[0\] is 'gremlin'; allowed: break, stall,"),
+        ("event_kind", 0, "drop", r"event_cable\[0\] is 3; allowed: -1 for 'drop'"),
+        ("event_cable", 0, -1, r"event_cable\[0\] is -1; allowed: 0 to 7 for 'break'"),
+        ("event_cable", 2, 3, r"event_cable\[2\] is 3 at 0.5 s; allowed: a cable that is there: 3 broke at 0.1 s"),
+        ("event_cable", 0, 4, r"length\[1, 3\] is nan; allowed: a number"),
+        ("event_time", 0, 0.5, r"event_time\[1\] is 0.3.* s; allowed: 0.5 to 2 s, in order"),
+        ("event_time", 2, 99.0, r"event_time\[2\] is 99 s; allowed: 0.3.* to 2 s, in order"),
+        ("event_tension_after", 0, -1.0, r"event_tension_after\[0\] is -1; allowed: >= 0 N"),
         ("node_position", (0, 0, 0, 0), np.inf, r"node_position\[0, 0, 0, 0\] is inf; allowed: finite"),
-        ("event_cable", 1, 8, r"event_cable\[1\] is 8; allowed: -1 to 7"),
-        ("event_cable", 0, -2, r"event_cable\[0\] is -2; allowed: -1 to 7"),
+        ("event_cable", 1, 8, r"event_cable\[1\] is 8; allowed: -1 for 'pick up'"),
+        ("event_cable", 0, -2, r"event_cable\[0\] is -2; allowed: 0 to 7 for 'break'"),
         ("event_time", 0, np.nan, r"event_time\[0\] is nan; allowed: finite"),
         ("event_kind", 0, "", r"event_kind\[0\] is .*''.*; allowed: a word that prints"),
         ("event_kind", 0, "\x1b[31m", r"event_kind\[0\] is .*; allowed: a word that prints"),
@@ -130,6 +152,19 @@ def test_values_that_no_simulation_has(saved: FilePath, name: str, index: Any, v
         (lambda data: data.drop_vars("twist"), "has no twist. Write it again"),
         (lambda data: data.drop_vars("event_kind"), "has no event_kind. Write it again"),
         (lambda data: data.assign_attrs(cable_mass="heavy"), "cable_mass is 'heavy'; allowed: none, lumped, modal"),
+        (lambda data: data.assign_attrs(cable_mass="none"), "node_position is given; allowed: given for cables with m"),
+        (lambda data: data.drop_vars("node_position"), "node_position is not given; allowed: given for cables with m"),
+        (
+            lambda data: data.assign_attrs(integrator="euler"),
+            "integrator is 'euler'; allowed: splitting, runge-kutta, ",
+        ),
+        (lambda data: data.assign_attrs(integrator="exact"), "integrator is exact for cable_mass lumped"),
+        (lambda data: data.assign_attrs(winches="magic"), "winches is 'magic'; allowed: ideal, robot, second-order"),
+        (lambda data: data.assign_attrs(winding="none"), "winding is 'none'; allowed: constant, remembered"),
+        (lambda data: data.assign_attrs(bandwidth=0.0), "bandwidth is 0 Hz; allowed: > 0"),
+        (lambda data: data.assign_attrs(modal_damping=1.0), "modal_damping is 1; allowed: < 1"),
+        (lambda data: data.assign_attrs(loss_time="x"), "loss_time is 'x'"),
+        (lambda data: data.isel(time=[0]), "time is of 1 samples; allowed: at least the start and the end"),
         (lambda data: data.assign_attrs(step=0.0), "step is 0 s; allowed: > 0"),
         (lambda data: data.assign_attrs(step="x"), "step is"),
         (lambda data: data.assign_attrs(robot="name: x"), "sim.nc, robot: .* is missing"),
@@ -157,11 +192,14 @@ def assert_refused(file: FilePath, data: xr.Dataset, told: str) -> None:
 
 
 def test_what_could_not_be_read_again_is_not_written(tmp_path: FilePath) -> None:
-    simulation = a_simulation()
+    simulation, none, three = a_simulation(), cast("Any", None), cast("Any", 3)
     for wrong, told in (
         (replace(simulation, length=-simulation.length), r"length\[0, 0\] is -"),
         (replace(simulation, cable_mass="some"), "cable_mass is 'some'"),
         (replace(simulation, events=(Occurrence(0.1, "break", 9, 1.0, 2.0),)), r"event_cable\[0\] is 9"),
+        (replace(simulation, nodes=None), "node_position is not given"),
+        (replace(simulation, damping=none), "damping is None"),
+        (replace(simulation, winches=three), "winches is 3"),
     ):
         with pytest.raises(sl.InvalidValueError, match=told):
             wrong.save(tmp_path / "sim.nc")
@@ -172,3 +210,25 @@ def test_the_robot_inside_is_the_robot(saved: FilePath) -> None:
     loaded = sl.load_simulation(saved).robot
     assert loaded.frame_anchors.tobytes() == ROBOT.frame_anchors.tobytes()
     assert loaded.mass == ROBOT.mass
+
+
+@pytest.mark.parametrize("time", [0.0, 0.0301, 0.0333, 0.035])
+def test_events_at_any_time_leave_a_simulation_that_can_be_saved(tmp_path: FilePath, time: float) -> None:
+    """At the start, between records, at the end, which no record falls on."""
+    state = sl.inverse(ROBOT, sl.Pose((0.0, 0.0, 1.5), np.eye(3))).state
+    simulation = sl.simulate(
+        state, duration=0.035, step=1e-4, events=[sl.Drop(5.0, time), sl.Break(3, time), sl.Break(5, time)]
+    )
+    simulation.save(tmp_path / "sim.nc")
+    assert_same(simulation, sl.load_simulation(tmp_path / "sim.nc"))
+    assert np.isnan(simulation.length[:, 3]).tolist() == (simulation.time > time).tolist()
+
+
+def test_small_motions_come_back(tmp_path: FilePath) -> None:
+    state = sl.inverse(sl.load_robot("expo2015-lucia"), sl.Pose([-0.6, 0.0, 3.5], np.eye(3))).state
+    damping = sl.Damping(modal_damping=0.01)
+    push = ([0.0, 0.1], np.outer([0, 1], [3.0, 2.0, -3.0, 1.0, 0.8, 0.5]))
+    simulation = sl.simulate(state, duration=0.1, wrench=push, cable_mass="modal", damping=damping)
+    assert (simulation.integrator, simulation.damping) == ("exact", damping)
+    simulation.save(tmp_path / "sim.nc")
+    assert_same(simulation, sl.load_simulation(tmp_path / "sim.nc"))

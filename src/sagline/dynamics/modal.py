@@ -14,7 +14,7 @@ from sagline.arrays import Array, locked, number
 from sagline.dynamics.beginning import Beginning
 from sagline.dynamics.course import Course
 from sagline.dynamics.damping import Damping
-from sagline.dynamics.simulation import EnergyBalance, Simulation, twist_of_origin
+from sagline.dynamics.simulation import Simulation, energy_balance, twist_of_origin
 from sagline.dynamics.vibrating import vibration
 from sagline.dynamics.vibration import Vibration
 from sagline.dynamics.vibration_status import VibrationStatus
@@ -244,10 +244,12 @@ def modal_simulation(given: Beginning, damping: Damping, step: Any, record: floa
         twist=twist_of_origin(given.robot, pose, moving[:, :3], moving[:, 3:]),
         tensions=locked(tension),
         length=locked(lengths[kept].copy()),
-        energy=EnergyBalance(*map(locked, (kinetic, potential, supplied, lost, kinetic + potential - supplied + lost))),
+        energy=energy_balance(kinetic, potential, supplied, lost),
         events=(),
         cable_mass="modal",
         step=size,
+        integrator="exact",
+        damping=damping,
         nodes=locked(_shapes(state, found, amplitude)),
     )
 

@@ -7,11 +7,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from sagline.arrays import Array, locked
+from sagline.arrays import locked
 from sagline.dynamics.course import Course
 from sagline.dynamics.events import KINDS, Brake, Break, Drop, Event, PickUp, Stall, cable_of
 from sagline.dynamics.plant import NOTES, Plant, Records
-from sagline.dynamics.simulation import EnergyBalance, Occurrence, Simulation, twist_of_origin
+from sagline.dynamics.simulation import Occurrence, Simulation, energy_balance, twist_of_origin
 from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics import motion as k
 from sagline.kernels.dynamics import rigid_body as body
@@ -81,6 +81,8 @@ class Run:
                 plant.counters[k.NOTES] = 0
         self._keep(records, row)
         self._note(records)
+        if last == self.steps and last % self.every:
+            self._keep(self._look(), last // self.every + 1)
 
     def _keep(self, records: Records, row: int) -> None:
         """Take over what was recorded, from a row of the whole record on."""
@@ -169,14 +171,10 @@ class Run:
             The whole run.
         """
         self._go(self.steps)
-        steps = np.arange(0, self.steps + 1, self.every)
-        if steps[-1] < self.steps:
-            steps = np.append(steps, self.steps)
-            self._keep(self._look(), len(steps) - 1)
         self._close()
         plant, states = self.plant, self._all.states
-        kinetic, potential, supplied, lost = (locked(column.copy()) for column in self._all.energies.T)
-        total: Array = kinetic + potential - supplied + lost
+        kinetic, potential, supplied, lost = (column.copy() for column in self._all.energies.T)
+        steps = np.minimum(self.every * np.arange(len(states)), self.steps)
         pose, velocity, spin = plant.poses(states), states[:, body.VELOCITY : body.MOMENTUM], states[:, body.MOMENTUM :]
         return Simulation(
             robot=plant.robot,
@@ -185,7 +183,7 @@ class Run:
             twist=twist_of_origin(plant.robot, pose, velocity, spin),
             tensions=locked(self._all.tensions),
             length=locked(self._all.lengths),
-            energy=EnergyBalance(kinetic, potential, supplied, lost, locked(total - total[0])),
+            energy=energy_balance(kinetic, potential, supplied, lost),
             events=tuple(sorted(self._occurrences, key=lambda event: event.time)),
             cable_mass=plant.cable_mass,
             step=self.step,

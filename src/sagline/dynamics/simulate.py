@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any, Final, Literal, get_args
 
 import numpy as np
@@ -27,7 +28,7 @@ from sagline.kinematics.plan import Plan
 from sagline.memory import check_memory
 from sagline.robot.equilibrium import Equilibrium
 
-Integrator = Literal["splitting", "runge-kutta"]
+Integrator = Literal["splitting", "runge-kutta"]  # in the order of the kernel's codes
 Winding = Literal["constant", "remembered"]
 CableMass = Literal["none", "lumped", "modal"]
 RECORD: Final = 0.01  # s
@@ -143,7 +144,8 @@ def simulate(
     run = Run(plant, rules, numbers, (set_points(given, plant, kind), given.wrench, air), every, count)
     for event in happening:
         run.happen(event)
-    return run.finish()
+    asked = get_args(Integrator)[code]
+    return replace(run.finish(), integrator=asked, winches=winches, winding=winding, damping=losses)
 
 
 def set_points(given: Beginning, plant: Plant, kind: int) -> Course:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 
 import numpy as np
 
 from sagline.arrays import Array, locked
+from sagline.dynamics.damping import Damping
+from sagline.dynamics.drives import Winches
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
@@ -19,8 +21,11 @@ class EnergyBalance:
     Attributes:
         kinetic: Of platform, cables and drums.
         potential: Of weight and of strain and height of the cables off the drums, frame ends and the origin at zero.
-        supplied: Work done on the robot since the start: winches, given forces, wind.
-        lost: Work done by damping and friction since the start, and strain that slipped on drums.
+        supplied: Work done on the robot since the start: by winches, given forces and wind; and what a load that was
+            picked up brought, less what the collision with it took.
+        lost: Work done by damping and friction since the start, strain that slipped on drums, what chains lost where
+            nodes were born and merged, and what broken cables and dropped loads took with them, which falls where a
+            dropped load had less than no energy.
         error: kinetic + potential - supplied + lost, less its value at the start: what the integrator invents.
     """
 
@@ -37,7 +42,7 @@ class Occurrence:
 
     Attributes:
         time: When [s].
-        kind: "break", "stall", "brake", "drop", "pick up", "saturate", "slack" ...
+        kind: "break", "stall", "brake", "drop" or "pick up", as asked for; "saturate" or "slack" by itself.
         cable: Which cable or winch, or None where it is the platform's.
         tension_before: Largest tension of that cable, or of all, before it [N].
         tension_after: Largest tension of any cable after it, to the end or the next [N].
@@ -65,7 +70,12 @@ class Simulation:
         events: What happened, in order.
         cable_mass: "none", "lumped" or "modal".
         step: Of the integrator [s].
-        nodes: Position of every cable at its nodes, world axes [m], shape (N, m, P, 3); None without cable mass.
+        nodes: Position of every cable at its nodes, world axes [m], shape (N, m, P, 3); None without cable mass, NaN of
+            a cable that has broken.
+        integrator: "runge-kutta" or "splitting"; "exact" of modes.
+        winches: "ideal", "robot" or SecondOrder(...).
+        winding: "constant" or "remembered".
+        damping: What took energy out of the cables.
     """
 
     robot: Robot
@@ -79,6 +89,10 @@ class Simulation:
     cable_mass: str
     step: float
     nodes: Array | None = None
+    integrator: str = "runge-kutta"
+    winches: Winches = "ideal"
+    winding: str = "constant"
+    damping: Damping = field(default_factory=Damping)
 
     def save(self, file: FilePath | str) -> None:
         """Write the simulation to a NetCDF file, whole or not at all, with units and the robot inside.
@@ -92,6 +106,12 @@ class Simulation:
         from sagline.files.simulation_file import save_simulation  # the one call outward
 
         save_simulation(self, file)
+
+
+def energy_balance(kinetic: Array, potential: Array, supplied: Array, lost: Array) -> EnergyBalance:
+    """The balance of four energies [J], each of shape (N,)."""
+    total = kinetic + potential - supplied + lost
+    return EnergyBalance(*map(locked, (kinetic, potential, supplied, lost, total - total[0])))
 
 
 def twist_of_origin(robot: Robot, pose: Pose, velocity: Array, spin: Array) -> Array:

@@ -8,15 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sagline.arguments import choice, file_path, instance
-from sagline.arrays import locked, number
+from sagline.arguments import file_path, instance
+from sagline.arrays import locked
+from sagline.dynamics.damping import Damping
+from sagline.dynamics.drives import SecondOrder, Winches
 from sagline.dynamics.simulation import EnergyBalance, Occurrence, Simulation
 from sagline.errors import FileError, InvalidValueError
 from sagline.files.content import Content
 from sagline.files.dataset import read_dataset, write_dataset
 from sagline.files.robot_file import dump_robot, parse_robot
-from sagline.files.simulation_layout import CABLE_MASS, EVENTS, NO_CABLE, NODES, SAMPLES, TIME
-from sagline.files.variable_checks import STEP, check_labels, check_variable
+from sagline.files.simulation_checks import EVENT_ROWS, ROWS, check_simulation, has_events
+from sagline.files.simulation_layout import EVENTS, LAG, LAGGING, LOSSES, NO_CABLE, NODES, SAMPLES, STEP, TIME
 from sagline.files.variables import PARTS, Quantity
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
@@ -32,7 +34,6 @@ CONTENT = Content(
     key="sagline_simulation_format",
     format=1,
 )
-ROWS, EVENT_ROWS = "time", "event"
 
 
 def save_simulation(simulation: Simulation, file: os.PathLike[str] | str) -> None:
@@ -50,7 +51,7 @@ def save_simulation(simulation: Simulation, file: os.PathLike[str] | str) -> Non
         FileError: If the file cannot be written; what was there before is untouched.
     """
     data = _dataset(instance(simulation, Simulation, "simulation"))
-    _check(data, simulation.robot.cable_count)
+    check_simulation(data, simulation.robot.cable_count)
     write_dataset(data, file_path(file))
 
 
@@ -107,58 +108,47 @@ def _attributes(simulation: Simulation) -> dict[str, Any]:
     return {
         **CONTENT.attributes(f"Motion of {simulation.robot.name} in time"),
         "cable_mass": simulation.cable_mass,
-        "step": float(simulation.step),
-        "step_units": "s",
+        "integrator": simulation.integrator,
+        **_numbers(simulation, STEP),
+        **_of_winches(simulation.winches),
+        "winding": simulation.winding,
+        **_numbers(instance(simulation.damping, Damping, "damping"), LOSSES),
         "robot": dump_robot(simulation.robot),
     }
 
 
-def _check(data: Dataset, cables: int) -> None:
-    """Refuse a data set that is no simulation, whatever its file looked like.
-
-    Raises:
-        KeyError: If a variable is missing.
-        InvalidValueError: If one is not what the layout says; the message names its first wrong value.
-    """
-    choice(data.attrs["cable_mass"], "cable_mass", CABLE_MASS)
-    number(data.attrs["step"], "step", "s", above=0.0)
-    check_labels(data)
-    sizes = {"cable": cables, ROWS: data.variables[TIME.name].size, "node": data.sizes.get("node", 0)}
-    everywhere = np.ones(sizes[ROWS], dtype=bool)
-    nodes = (NODES,) if NODES.name in data.variables else ()
-    for quantity in (TIME, *SAMPLES, *nodes):
-        check_variable(quantity, data.variables[quantity.name], (ROWS,), sizes, everywhere)
-    _check_ascending(data.variables[TIME.name].values)
-    if not _events(data):
-        return
-    sizes[EVENT_ROWS] = data.sizes[EVENT_ROWS]
-    for quantity in EVENTS:
-        check_variable(quantity, data.variables[quantity.name], (EVENT_ROWS,), sizes, np.ones(sizes[EVENT_ROWS], bool))
-    of = data.variables["event_cable"].values
-    for k in np.flatnonzero((of < NO_CABLE) | (of >= cables))[:1].tolist():
-        raise InvalidValueError(f"event_cable[{k}]", of[k], f"{NO_CABLE} to {cables - 1}", STEP)
+def _numbers(source: Any, units: dict[str, str]) -> dict[str, Any]:
+    """Attributes that are numbers, each followed by its unit."""
+    found: dict[str, Any] = {}
+    for name, unit in units.items():
+        found |= {name: float(getattr(source, name)), f"{name}_units": unit}
+    return found
 
 
-def _events(data: Dataset) -> bool:
-    return any(quantity.name in data.variables for quantity in EVENTS)
+def _of_winches(winches: Winches) -> dict[str, Any]:
+    if isinstance(winches, SecondOrder):
+        return {"winches": LAGGING, **_numbers(winches, LAG)}
+    return {"winches": winches}
 
 
-def _check_ascending(time: Any) -> None:
-    for k in np.flatnonzero(np.diff(time) < 0.0)[:1].tolist():
-        raise InvalidValueError(f"time[{k + 1}]", f"{time[k + 1]:g} s", f">= {time[k]:g} s", STEP)
+def _winches(attributes: Any) -> Winches:
+    if attributes["winches"] == LAGGING:
+        return SecondOrder(**{name: float(attributes[name]) for name in LAG})
+    kind: Winches = attributes["winches"]
+    return kind
 
 
 def _simulation(path: FilePath, data: Dataset, robot: Robot) -> Simulation:
     if data.sizes["cable"] != robot.cable_count:
         raise FileError(path, f"has {data.sizes['cable']} cables, its robot {robot.cable_count}", "Write it again.")
-    _check(data, robot.cable_count)
+    check_simulation(data, robot.cable_count)
 
     def values(quantity: Quantity) -> Any:
         return locked(np.asarray(data[quantity.name].values, order="C"))
 
     found = {quantity.place: values(quantity) for quantity in (TIME, *SAMPLES)}
     energy = {place.removeprefix("energy."): found.pop(place) for place in list(found) if place.startswith("energy.")}
-    events = _occurrences(data) if _events(data) else ()
+    events = _occurrences(data) if has_events(data) else ()
     return Simulation(
         robot=robot,
         pose=Pose.from_quaternion(found.pop("pose.position"), found.pop("pose.quaternion")),
@@ -168,6 +158,10 @@ def _simulation(path: FilePath, data: Dataset, robot: Robot) -> Simulation:
         cable_mass=data.attrs["cable_mass"],
         step=float(data.attrs["step"]),
         nodes=values(NODES) if NODES.name in data.variables else None,
+        integrator=data.attrs["integrator"],
+        winches=_winches(data.attrs),
+        winding=data.attrs["winding"],
+        damping=Damping(**{name: float(data.attrs[name]) for name in LOSSES}),
     )
 
 

@@ -44,8 +44,24 @@ EVENTS: Final = (
     Quantity("event_time", "time", (), "s", "when it happened"),
     Quantity("event_kind", "kind", (), "", "what happened", values=str),
     Quantity("event_cable", "cable", (), "", "which cable or winch, counted from 0; -1 for the platform", values=int),
-    Quantity("event_tension_before", "tension_before", (), "N", "largest tension before it", known=Known.SOMEWHERE),
-    Quantity("event_tension_after", "tension_after", (), "N", "largest tension after it", known=Known.SOMEWHERE),
+    Quantity(
+        "event_tension_before", "tension_before", (), "N", "largest tension before it", known=Known.SOMEWHERE, low=0.0
+    ),
+    Quantity(
+        "event_tension_after", "tension_after", (), "N", "largest tension after it", known=Known.SOMEWHERE, low=0.0
+    ),
 )
 NO_CABLE: Final = -1
 CABLE_MASS: Final = ("none", "lumped", "modal")
+INTEGRATORS: Final = ("splitting", "runge-kutta", "exact")
+WINDINGS: Final = ("constant", "remembered")
+LAGGING: Final = "second-order"
+WINCHES: Final = ("ideal", "robot", LAGGING)
+# attributes that are numbers, and their units
+STEP: Final = {"step": "s"}
+LAG: Final = {"bandwidth": "Hz", "damping_ratio": "1"}
+LOSSES: Final = {"loss_time": "s", "air_damping": "N s/m^2", "modal_damping": "1"}
+# what happens to a cable or winch, to the platform, and to either
+OF_CABLES: Final = ("break", "stall", "saturate", "slack")
+OF_PLATFORM: Final = ("drop", "pick up")
+OF_EITHER: Final = ("brake",)
