@@ -14,7 +14,7 @@ from sagline.blocks import Progress, blocks
 from sagline.dynamics.answer import Answer
 from sagline.dynamics.cable_dynamics import check_model
 from sagline.dynamics.damping import Damping
-from sagline.dynamics.reduced import Setting, negative_directions, setting_of
+from sagline.dynamics.reduced import Setting, massless, setting_of
 from sagline.dynamics.robot_modes import Found, cable_shares, loss, modes_of
 from sagline.dynamics.strongest import coupled, strongest, summed
 from sagline.dynamics.vibration_status import VibrationStatus
@@ -24,7 +24,6 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.slopes import cable_slopes
-from sagline.statics.stiffness import modes, stiffness
 from sagline.tension.closest import Closest
 from sagline.tension.method import TensionMethod
 
@@ -133,18 +132,17 @@ def frequency_map(
     found = np.full((len(_Row._fields), len(poses)), np.nan)
     for part in blocks(len(poses), BLOCK, told):
         own = state[part]
-        setting, rest = setting_of(own), stiffness(own).compliance[:, :3, :3]
-        massless = modes(own).frequency[:, 0]
+        setting = setting_of(own)
         for k in range(len(own)):
             index = part.start + k
-            status[index] = _status(setting, k)
+            status[index], lowest = _status(setting, k)
             if status[index] not in (VibrationStatus.SOLVED, VibrationStatus.FOLDED):
                 continue
             try:
-                found[:, index] = _row(own, setting, k, limit, known, rest[k])
+                found[:, index] = _row(own, setting, k, limit, known)
             except SaglineError as error:
                 raise _at_pose(index, error) from None
-            found[1, index] = massless[k]
+            found[1, index] = lowest
     return FrequencyMap(robot, poses, limit, known, locked(status), *(locked(row) for row in found))
 
 
@@ -158,15 +156,20 @@ class _Row(NamedTuple):
     peak_frequency: float
 
 
-def _status(setting: Setting, row: int) -> VibrationStatus:
+def _status(setting: Setting, row: int) -> tuple[VibrationStatus, float]:
+    """And the lowest frequency on massless cables [Hz]."""
     if np.isnan(setting.stiffness[row]).any():
-        return VibrationStatus.NO_LENGTHS
-    if negative_directions(setting, row).shape[1]:
-        return VibrationStatus.UNSTABLE
-    return VibrationStatus.SOLVED if setting.strings.taut[row].all() else VibrationStatus.FOLDED
+        return VibrationStatus.NO_LENGTHS, np.nan
+    frequency, leaving = massless(setting, row)
+    if leaving.shape[1]:
+        return VibrationStatus.UNSTABLE, np.nan
+    taut = setting.strings.taut[row].all()
+    return VibrationStatus.SOLVED if taut else VibrationStatus.FOLDED, float(frequency[0])
 
 
-def _row(state: Equilibrium, setting: Setting, row: int, up_to: float, damping: Damping, rest: Array) -> _Row:
+def _row(state: Equilibrium, setting: Setting, row: int, up_to: float, damping: Damping) -> _Row:
+    freedom = setting.freedom
+    rest = (freedom.T @ np.linalg.inv(freedom @ setting.stiffness[row] @ freedom.T) @ freedom)[:3, :3]
     found = modes_of(setting, row, up_to)
     if not found.number:
         return _Row(np.nan, np.nan, np.nan, float(np.linalg.norm(rest, 2)), 0.0)

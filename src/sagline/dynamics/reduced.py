@@ -14,8 +14,8 @@ from sagline.statics.slopes import cable_slopes
 from sagline.statics.stiffness import mass_matrix
 from sagline.statics.strings import Strings, strings_of
 
-KEPT = 1.2  # of the frequency asked for: the cables' modes up to there are unknowns
-LEVELS = 3  # pairs of moments of those above that are matched
+KEPT = 1.05  # of the frequency asked for: the cables' modes up to there are unknowns
+LEVELS = 4  # pairs of moments of those above that are matched
 UNSTABLE = 1e-10  # of the largest: a stiffness that is less negative is rounding
 _TINY = 1e-300
 
@@ -127,48 +127,49 @@ def reduced(setting: Setting, row: int, up_to: float) -> Reduced:
     drives = (components.participation[:, None] @ ends[components.cable])[:, 0] @ freedom.T
     kept = components.square < (2.0 * np.pi * KEPT * up_to) ** 2
     beyond, slow = _slow_motions(components.square[~kept], drives[~kept])
-    square = np.concatenate((components.square[kept], slow))
+    square, count = components.square[kept], int(kept.sum())
     drives = np.concatenate((drives[kept], beyond.T @ drives[~kept]))
     at_rest = freedom @ (setting.mass[row] + _on_platform(components.still, ends)) @ freedom.T
     upper = np.linalg.inv(np.linalg.cholesky(at_rest - drives.T @ drives)).T
     driven = drives @ upper
-    pulled = square[:, None] * driven
+    pulled = np.concatenate((square[:, None] * driven[:count], slow @ driven[count:]))
     n = len(freedom)
     matrix = np.zeros((n + len(driven), n + len(driven)))
     stiffness = freedom @ setting.stiffness[row] @ freedom.T
     matrix[:n, :n] = upper.T @ stiffness @ upper + driven.T @ pulled
     matrix[n:, :n] = -pulled
     matrix[:n, n:] = -pulled.T
-    np.fill_diagonal(matrix[n:, n:], square)
+    np.fill_diagonal(matrix[n : n + count, n : n + count], square)
+    matrix[n + count :, n + count :] = slow
     return Reduced(matrix, freedom.T @ upper, driven, kept, beyond, components)
 
 
 def _slow_motions(square: Array, drives: Array) -> tuple[Array, Array]:
-    """Motions that stand for many: orthonormal columns of amplitudes, and their angular frequencies squared."""
+    """Motions that stand for many: orthonormal columns of amplitudes, and the stiffness between them."""
     chain = [drives / square[:, None]]
     for _ in range(LEVELS - 1):
         chain.append(chain[-1] / square[:, None])
     scaled = np.concatenate([one / np.maximum(np.linalg.norm(one, axis=0), _TINY) for one in chain], axis=1)
     basis = np.linalg.qr(scaled)[0]
-    slow, turn = np.linalg.eigh(basis.T @ (square[:, None] * basis))
-    return basis @ turn, slow
+    return basis, basis.T @ (square[:, None] * basis)
 
 
-def negative_directions(setting: Setting, row: int) -> Array:
-    """Motions of the platform in which an unstable equilibrium is left.
+def massless(setting: Setting, row: int) -> tuple[Array, Array]:
+    """Vibrations of the platform alone, and how it leaves an unstable equilibrium.
 
     Args:
         setting: Of N states.
         row: Which of them.
 
     Returns:
-        Of unit modal mass of the platform alone, one a column, shape (6, d).
+        Frequencies as those of `modes` [Hz], shape (n,); motions in which the equilibrium is left, of unit modal mass,
+        one a column, shape (6, d).
     """
     freedom = setting.freedom
     upper = np.linalg.inv(np.linalg.cholesky(freedom @ setting.mass[row] @ freedom.T)).T
     squares, vectors = np.linalg.eigh(upper.T @ freedom @ setting.stiffness[row] @ freedom.T @ upper)
-    lost = squares < -UNSTABLE * np.abs(squares).max()
-    return np.asarray(freedom.T @ upper @ vectors[:, lost])
+    frequency = np.sqrt(np.where(squares > 0.0, squares, np.nan)) / (2.0 * np.pi)
+    return frequency, freedom.T @ (upper @ vectors[:, squares < -UNSTABLE * np.abs(squares).max()])
 
 
 def dynamic_matrix(setting: Setting, row: int, moving: Array, omega: float) -> Array:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
 
 import numpy as np
 
@@ -10,31 +12,42 @@ from sagline.arrays import Array
 from sagline.dynamics.component_modes import Components, stretch
 from sagline.dynamics.count import modes_below
 from sagline.dynamics.damping import Damping
-from sagline.dynamics.reduced import Setting, reduced
+from sagline.dynamics.reduced import Reduced, Setting, reduced
 from sagline.errors import InvalidValueError, SaglineError
 
 MOST_MODES: Final = 2_000
 BORDER: Final = 1e-6  # of a frequency, within which the count says on which side of it a mode is
 
 
-class Found(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Found:
     """Modes of one state below a frequency.
 
     Attributes:
         frequency: [Hz], shape (K,).
         platform: Motion of the platform, shape (6, K).
-        amplitudes: Of the cables' components beside their motion at rest, shape (T, K).
         ends: Displacements of the platform ends, shape (m, 3, K).
-        components: Of the cables.
         number: How many, by the exact count.
+        problem: Whose solutions they are.
+        vectors: Solutions of the problem, shape (n + k, K).
     """
 
     frequency: Array
     platform: Array
-    amplitudes: Array
     ends: Array
-    components: Components
     number: int
+    problem: Reduced
+    vectors: Array
+
+    @property
+    def components(self) -> Components:
+        """Of the cables."""
+        return self.problem.components
+
+    @cached_property
+    def amplitudes(self) -> Array:
+        """Of the cables' components beside their motion at rest, shape (T, K)."""
+        return self.problem.amplitudes(self.vectors)
 
 
 def modes_of(setting: Setting, row: int, up_to: float) -> Found:
@@ -61,9 +74,9 @@ def modes_of(setting: Setting, row: int, up_to: float) -> Found:
     if not border[0] <= count <= border[1]:
         text = f"vibration up to {up_to:g} Hz: {border[0]} modes were found where the exact count has {count}"
         raise SaglineError(f"{text}. Ask for another up_to, and report the robot and its pose.")
-    platform = problem.platform @ vectors[: problem.platform.shape[1], :count]
-    amplitudes = problem.amplitudes(vectors[:, :count])
-    return Found(frequency[:count], platform, amplitudes, setting.ends[row] @ platform, problem.components, count)
+    vectors = vectors[:, :count]
+    platform = problem.platform @ vectors[: problem.platform.shape[1]]
+    return Found(frequency[:count], platform, setting.ends[row] @ platform, count, problem, vectors)
 
 
 def check_number(count: int, frequency: float, item: str) -> None:

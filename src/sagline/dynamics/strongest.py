@@ -78,7 +78,8 @@ def strongest(answer: Forced, natural: Array, ratios: Array, damping: Damping) -
     near = natural[likely, None] * (1.0 + ratios[likely, None] * WIDTHS)
     frequency = np.unique(np.concatenate((around[:1], near.ravel())))
     for _ in range(ROUNDS):
-        norms = np.linalg.norm(answer(frequency), 2, axis=(1, 2))
+        found = answer(frequency)
+        norms = np.sqrt(np.linalg.eigvalsh(np.swapaxes(found.conj(), -1, -2) @ found)[:, -1])
         best = int(np.argmax(norms))
         if not 0 < best < norms.size - 1:
             return float(norms[best]), float(frequency[best])

@@ -11,12 +11,11 @@ from sagline.arrays import Array, locked, number
 from sagline.dynamics.cable_dynamics import one_state
 from sagline.dynamics.component_modes import cable_shapes
 from sagline.dynamics.damping import Damping
-from sagline.dynamics.reduced import negative_directions, setting_of
+from sagline.dynamics.reduced import massless, setting_of
 from sagline.dynamics.robot_modes import cable_shares, loss, modes_of
 from sagline.dynamics.vibration import Vibration
 from sagline.dynamics.vibration_status import VibrationStatus
 from sagline.robot.equilibrium import Equilibrium
-from sagline.statics.stiffness import modes
 
 POINTS: Final = 41  # of a cable's shape
 
@@ -64,12 +63,13 @@ def vibration(state: Equilibrium, *, up_to: float, damping: Damping | None = Non
         "state": state,
         "up_to": limit,
         "damping": given,
-        "massless_frequency": modes(state).frequency,
+        "massless_frequency": locked(np.full(len(setting.freedom), np.nan)),
         "slack_cables": slack,
     }
     if np.isnan(setting.stiffness).any():
         return _nothing(known | {"slack_cables": ()}, VibrationStatus.NO_LENGTHS, np.empty((6, 0)))
-    leaving = negative_directions(setting, 0)
+    frequency, leaving = massless(setting, 0)
+    known["massless_frequency"] = locked(frequency)
     if leaving.shape[1]:
         return _nothing(known, VibrationStatus.UNSTABLE, leaving)
     found = modes_of(setting, 0, limit)
