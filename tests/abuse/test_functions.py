@@ -5,6 +5,8 @@ What comes of it is a `SaglineError` of one short line, or the right answer: no 
 
 from __future__ import annotations
 
+import copy
+import pickle
 import resource
 import time
 import warnings
@@ -39,6 +41,20 @@ def test_every_public_callable_is_in_the_table(table: dict[str, Call]) -> None:
 def test_every_call_succeeds_as_it_is(table: dict[str, Call]) -> None:
     for call in table.values():
         call.with_one("", None)
+
+
+def test_answers_stay_locked_when_they_are_pickled_or_copied(table: dict[str, Call]) -> None:
+    looked_at, found = 0, []
+    for name, call in table.items():
+        if not is_dataclass(answer := call.with_one("", None)):
+            continue
+        for again in (pickle.loads(pickle.dumps(answer)), copy.deepcopy(answer)):
+            assert _same(again, answer), name
+            arrays = [array for array in _arrays(again) if array.ndim]
+            looked_at += len(arrays)
+            found += [name for array in arrays if array.flags.writeable]
+    assert sorted(set(found)) == []
+    assert looked_at > 500
 
 
 def test_there_are_a_thousand_cases_and_more(table: dict[str, Call]) -> None:

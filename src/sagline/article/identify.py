@@ -19,6 +19,7 @@ from sagline.cables.model import CableState
 from sagline.errors import InvalidValueError
 from sagline.kernels.cable.batch import batch_end
 from sagline.memory import check_memory
+from sagline.results import Result
 
 CONFIDENCE = 0.95
 POINT_BYTES = 400.0  # what each combination of span, rise and tension takes while it is fitted
@@ -42,7 +43,7 @@ class Estimate(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class EmpiricalFit:
+class EmpiricalFit(Result):
     """An empirical model for one cable and working range, and how good it is there.
 
     Axes of the maps: s spans, r rises, t tensions, as given, ascending. A position error is that of the article's

@@ -15,6 +15,7 @@ from sagline.cables.cable import Cable
 from sagline.cables.catenary import Catenary
 from sagline.errors import InvalidValueError
 from sagline.numbers import n
+from sagline.results import Result
 
 TensionAt = Literal["frame_end", "platform_end", "chord"]
 UNITS = {"linear_density": "kg/m", "axial_stiffness": "N", "length_offset": "m"}
@@ -25,7 +26,7 @@ WEIGHTINGS = 3  # the weights depend on the answer, but little
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CableFit:
+class CableFit(Result):
     """A cable found from measurements.
 
     Attributes:

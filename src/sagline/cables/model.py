@@ -18,6 +18,7 @@ from sagline.indices import length_of, part_of
 from sagline.kernels.cable import batch, shape
 from sagline.kernels.cable.terms import Terms
 from sagline.memory import check_memory
+from sagline.results import Result
 
 _ARRAYS = (
     "span",
@@ -192,7 +193,7 @@ class CableModel:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CableState:
+class CableState(Result):
     """Where a cable's ends are, what it carries and how long it is: results of a cable model.
 
     Every array has shape (...), one entry a cable. Forces act on the cable at its platform end. A batch is indexed

@@ -20,6 +20,7 @@ from sagline.dynamics.strongest import coupled, strongest, summed
 from sagline.dynamics.vibration_status import VibrationStatus
 from sagline.errors import InvalidValueError, SaglineError
 from sagline.kinematics.inverse import inverse
+from sagline.results import Result
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
@@ -33,7 +34,7 @@ _ONE_PERCENT: Final = Damping(modal_damping=0.01)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FrequencyMap:
+class FrequencyMap(Result):
     """Result of `frequency_map` at N poses.
 
     Numbers are NaN where the status is neither SOLVED nor FOLDED; frequencies also where no mode lies below up_to.

@@ -18,12 +18,13 @@ from sagline.dynamics.string_swings import cables_of_state, swings_of
 from sagline.dynamics.vibration import Vibration
 from sagline.dynamics.vibration_status import VibrationStatus
 from sagline.errors import InvalidValueError
+from sagline.results import Result
 from sagline.robot.equilibrium import Equilibrium
 from sagline.statics.stiffness import modes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FrequencySlopes:
+class FrequencySlopes(Result):
     """Result of `frequency_slopes`: derivatives of K frequencies, the platform settling in its new equilibrium.
 
     All else is held: the lengths off the drums, the wrench. Where the lengths are to follow a pose, by a way of

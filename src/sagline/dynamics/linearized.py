@@ -12,6 +12,7 @@ from sagline.arrays import Array, locked
 from sagline.dynamics.damping import Damping
 from sagline.dynamics.flexibility import flexibility
 from sagline.errors import InvalidValueError
+from sagline.results import Result
 from sagline.robot.equilibrium import Equilibrium
 from sagline.statics.slopes import CableSlopes, cable_slopes, on_platform
 from sagline.statics.stiffness import mass_matrix, modes
@@ -30,7 +31,7 @@ _WRENCH_UNITS = ("N",) * 3 + ("N m",) * 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Linearized:
+class Linearized(Result):
     """Result of `linearized`: dx/dt = A x + B u, y = C x + D u, all deviations from a state; massless cables.
 
     Motions are (displacement of the center of mass, rotation vector), wrenches act on the platform about its center of

@@ -18,6 +18,7 @@ from sagline.dynamics.reduced import setting_of
 from sagline.dynamics.robot_modes import check_number
 from sagline.errors import InvalidValueError
 from sagline.memory import check_memory
+from sagline.results import Result
 from sagline.robot.equilibrium import Equilibrium
 from sagline.statics.slopes import cable_slopes
 
@@ -26,7 +27,7 @@ _BYTES: Final = 20_000.0  # a frequency
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FrequencyResponse:
+class FrequencyResponse(Result):
     """Result of `frequency_response` at F frequencies.
 
     Motions are (displacement of the center of mass [m], rotation vector [rad]), wrenches (force [N], moment [N m])

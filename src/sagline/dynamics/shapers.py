@@ -15,6 +15,7 @@ from sagline.arguments import instance
 from sagline.arrays import Array, broadcast_shape, checked, locked, number
 from sagline.errors import InvalidValueError
 from sagline.motion.path import checked_time
+from sagline.results import Result
 
 MOST_IMPULSES: Final = 10_000  # three for each of eight frequencies are 6,561
 _SAME: Final = 1e-12  # of a shaper's duration: impulses so near are one
@@ -22,7 +23,7 @@ _ROUNDING: Final = 1e-9  # of the sum of the amplitudes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Shaper:
+class Shaper(Result):
     """Impulses that a motion is convolved with: it is made of shares of itself, each a little later.
 
     The product of two shapers convolves them: what either leaves at rest, the product leaves at rest.

@@ -10,12 +10,13 @@ import numpy as np
 from sagline.arrays import Array, locked
 from sagline.dynamics.damping import Damping
 from sagline.dynamics.drives import Winches
+from sagline.results import Result
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class EnergyBalance:
+class EnergyBalance(Result):
     """Where the energy of a simulation is [J]; each of shape (N,).
 
     Attributes:
@@ -56,7 +57,7 @@ class Occurrence:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Simulation:
+class Simulation(Result):
     """Result of `simulate`: N samples of a motion.
 
     Attributes:

@@ -9,11 +9,12 @@ from sagline.dynamics.damping import Damping
 from sagline.dynamics.excitation import most_excited
 from sagline.dynamics.vibration_status import VibrationStatus
 from sagline.motion.path import Path
+from sagline.results import Result
 from sagline.robot.equilibrium import Equilibrium
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Vibration:
+class Vibration(Result):
     """Result of `vibration`: all modes below a frequency, of the platform and of the strings that its cables are.
 
     Modes have unit modal mass, so that shapes are in m/sqrt(kg); K is their number.

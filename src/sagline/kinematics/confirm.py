@@ -16,6 +16,7 @@ from sagline.kinematics.forward_solution import ForwardSolution
 from sagline.kinematics.forward_status import ForwardStatus
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.winding import settled
+from sagline.results import Result
 from sagline.robot.behind import differs, kernel_length
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
@@ -26,7 +27,7 @@ BLOCK = 1 << 14  # poses whose cables are kept at once: little memory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Confirmation:
+class Confirmation(Result):
     """A plan, and the exact equilibrium that its lengths lead to.
 
     Attributes:

@@ -20,6 +20,7 @@ from sagline.kinematics.forward_status import STABLE, ForwardStatus
 from sagline.kinematics.start import from_orientations, start_quaternions
 from sagline.kinematics.winding import settled
 from sagline.memory import check_memory
+from sagline.results import Result
 from sagline.robot.behind import differs, with_behind
 from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.robot import Robot
@@ -32,7 +33,7 @@ _CATENARY = Catenary()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Equilibria:
+class Equilibria(Result):
     """Result of `equilibria`: K stable equilibria, the lowest energy first.
 
     Attributes:

@@ -8,12 +8,13 @@ import numpy as np
 
 from sagline.arrays import Array, Codes, Flags, Indices
 from sagline.kinematics.forward_status import STABLE, ForwardStatus
+from sagline.results import Result
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ForwardSolution:
+class ForwardSolution(Result):
     """Result of `forward`: a single sample, or N of them with a leading axis.
 
     Attributes:

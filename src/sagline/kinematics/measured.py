@@ -13,6 +13,7 @@ from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
 from sagline.kernels import codes, tables
 from sagline.kinematics.forward_rows import Found, solve_rows
+from sagline.results import Result
 from sagline.robot.robot import Robot
 from sagline.robot.several import Robots, robot_at
 from sagline.statics.stiffness import stiffness
@@ -23,7 +24,7 @@ _SETTLED = 1e-8  # of the sum of squares: a step that promises less is within 1e
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class MeasuredTension:
+class MeasuredTension(Result):
     """Load cells at the frame ends of the cables, and how far they and the lengths are to be trusted.
 
     Attributes:

@@ -14,6 +14,7 @@ from sagline.cables.status import CableStatus
 from sagline.kinematics.length_rate import length_rate
 from sagline.kinematics.status import PoseStatus
 from sagline.motion.path import Path
+from sagline.results import Result
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.reach import LEVEL, ROUNDING, forbidden_turn, in_words, out_of_plane
 from sagline.robot.several import first_of
@@ -42,7 +43,7 @@ class Gap(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Plan:
+class Plan(Result):
     """Result of `inverse`: a single pose with fields of shape (m,), or N poses with fields of shape (N, m).
 
     Attributes:

@@ -11,11 +11,12 @@ from sagline.arguments import instance
 from sagline.arrays import Array, Flags, locked
 from sagline.errors import InvalidValueError
 from sagline.kinematics.plan import Plan
+from sagline.results import Result
 from sagline.robot.drum import drum_tension, drums_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class WinchRates:
+class WinchRates(Result):
     """Speeds and torques of the winches along a path, arrays of shape (N, m); NaN where the plan has no answer.
 
     Speeds of the drum are positive where cable is let out; what holds at the motor is positive in the direction in

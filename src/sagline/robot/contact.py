@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from sagline.arrays import Array, locked
+from sagline.results import Result
 from sagline.robot.several import Index
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Contact:
+class Contact(Result):
     """Where cables leave their pulleys, and what of them is behind; fields of shape (m,) or (N, m).
 
     Attributes:

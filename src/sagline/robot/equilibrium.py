@@ -11,6 +11,7 @@ from sagline.arrays import Array, locked
 from sagline.cables.model import CableState
 from sagline.errors import InvalidValueError
 from sagline.indices import length_of, part_of
+from sagline.results import Result
 from sagline.robot.contact import Contact
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
@@ -19,7 +20,7 @@ from sagline.robot.wheels import on_wheels
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Equilibrium:
+class Equilibrium(Result):
     """The one type that stiffness, modes, the viewer and the files take.
 
     A batch is indexed like an array: `state[3]` is one of its poses, `state[2:5]` and `state[mask]` are batches;

@@ -9,6 +9,7 @@ import numpy as np
 from sagline.arguments import instance
 from sagline.arrays import Array, Flags, locked
 from sagline.memory import check_memory
+from sagline.results import Result
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.several import bodies_of, first_of
 from sagline.statics.slopes import CableSlopes, cable_slopes, on_platform
@@ -20,7 +21,7 @@ _STIFFNESS_BYTES, _MODES_BYTES = 2500.0, 800.0  # a cable of a state, while it i
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Stiffness:
+class Stiffness(Result):
     """Result of `stiffness`, single or with a leading axis N.
 
     Motions are (displacement of the center of mass [m], rotation vector [rad]), wrenches (force [N], moment [N m])
@@ -66,7 +67,7 @@ class Stiffness:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Modes:
+class Modes(Result):
     """Result of `modes`, single or with a leading axis N; n is the number of free motions.
 
     Attributes:

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from sagline.arrays import Array, checked
 from sagline.errors import InvalidValueError
+from sagline.results import Result
 
 
 class Side(NamedTuple):
@@ -24,7 +25,7 @@ class Side(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TensionPolygon:
+class TensionPolygon(Result):
     """All tensions that balance one pose within their limits: tensions = origin + lambda basis.
 
     With a sagging cable the balance depends on the tensions: this is the polygon of the last linearization, with the
