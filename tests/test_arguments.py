@@ -54,6 +54,21 @@ def test_what_is_of_the_right_kind_is_taken_as_it_is() -> None:
     assert whole_number(np.int8(3), "points", 2) == 3
 
 
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: whole_number(1, "points", 2), "^points is 1; allowed: >= 2. "),
+        (lambda: whole_number(1.5, "points", 2), "^points is 1.5; allowed: a whole number, >= 2. "),
+        (lambda: whole_number(9, "points", 2, 8), "^points is 9; allowed: 2 to 8. "),
+        (lambda: sl.Break(cable=-1, time=0.0), "^cable is -1; allowed: >= 0. "),
+        (lambda: sl.Brake(winch=-1, time=0.0), "^winch is -1; allowed: >= 0. "),
+    ],
+)
+def test_a_range_without_an_end_has_none_in_the_message(call: Any, words: str) -> None:
+    with pytest.raises(InvalidValueError, match=words):
+        call()
+
+
 BATCH = np.arange(12.0).reshape(4, 3)
 TAKEN = [0, -4, slice(1, 3), slice(None, None, -2), [3, 0], np.array([1, 1]), [], BATCH[:, 0] > 2]
 REFUSED = [4, -5, (0, 1), None, ..., 1.0, "0", True, [0, 4], [0.0], [[0]], np.ones(3, bool), {0}]

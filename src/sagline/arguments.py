@@ -219,7 +219,7 @@ def whole_number(value: Any, item: str, low: int, high: int = sys.maxsize) -> in
     number = integer(value)
     if number is not None and low <= number <= high:
         return number
-    allowed = f"{low} to {high}"
+    allowed = f"{low} to {high}" if high < sys.maxsize else f">= {low}"
     if number is None:
         allowed = f"a whole number, {allowed}"
     raise InvalidValueError(item, brief(value), allowed, f"Correct {item}.")

@@ -96,7 +96,7 @@ def test_what_is_too_much_for_the_winches_is_told() -> None:
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["encoder", "bare.nc"], "winches: drum_radius, winches: groove_pitch, cables: diameter is not given"),
+        (["encoder", "bare.nc"], "the robot is without winches: drum_radius, groove_pitch, cables: diameter; "),
         (["encoder", "nothere.nc"], "nothere.nc"),
         (["encoder", "run.nc", "--out", "run.nc"], "is the run itself"),
         (["encoder", "run.nc", "--winding", "loose"], "'loose' is not one of 'constant', 'remembered'"),
@@ -118,7 +118,10 @@ def test_what_is_too_much_for_the_winches_is_told() -> None:
             ["forward", "my_robot.yaml", "far.csv", "--counts"],
             "sample 1, cable 3: count is 9000000000; allowed: -2415336 to 1516823. The drum is full",
         ),
-        (["forward", "cogiro", "far.csv", "--counts"], "winches: drum_radius, winches: groove_pitch, cables: diameter"),
+        (
+            ["forward", "cogiro", "far.csv", "--counts"],
+            "the robot is without winches: drum_radius, groove_pitch, cables: diameter; ",
+        ),
     ],
 )
 def test_what_is_wrong_ends_with_2_and_writes_nothing(folder: Path, words: list[str], told: str) -> None:

@@ -95,6 +95,8 @@ def test_a_film_of_ten_seconds(folder: FilePath) -> None:
         (["simulate", "cogiro", "--break", "3@1kg"], 2, "--break"),
         (["simulate", "cogiro", "--out", "sim.txt"], 2, ".nc"),
         (["simulate", "cogiro", "--step", "1"], 2, "step"),
+        (["simulate", "cogiro", "--shaper", "zvd"], 2, "--shaper is zvd without a path"),
+        (["simulate", "cogiro", "--cable-mass", "modal", "--break", "3@1s"], 2, "events is given"),
         (["simulate", "cogiro", "way.yaml", "--after", "-1"], 2, "--after"),
     ],
 )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -111,6 +113,18 @@ def test_damped_against_finite_elements() -> None:
 def test_frequencies_that_are_none(frequency: object) -> None:
     with pytest.raises(sl.InvalidValueError, match="frequency"):
         sl.dynamic_stiffness(middle("cogiro"), frequency)  # type: ignore[arg-type]
+
+
+def test_a_pose_that_is_not_feasible_has_no_dynamics() -> None:
+    """Refused alike by all that take a single state; `vibration` has a status for it."""
+    state = sl.inverse(sl.load_robot("cogiro"), sl.Pose((0, 0, 40), np.eye(3))).state
+    of: Callable[[sl.Equilibrium], object]
+    for of in (sl.frequency_slopes, lambda state: sl.dynamic_stiffness(state, 1.0)):
+        with pytest.raises(sl.InvalidValueError, match=r"^state is one without lengths; allowed: a state that was"):
+            of(state)
+    for of in (sl.linearized, lambda state: sl.frequency_response(state, [1.0])):
+        with pytest.raises(sl.InvalidValueError, match=r"^state is (one )?without lengths"):
+            of(state)
 
 
 def test_shallow_models_have_no_vibrations_of_their_own() -> None:

@@ -302,6 +302,39 @@ def test_cables_without_weight_or_mass_are_no_chains() -> None:
         sl.simulate(sl.inverse(robot, pose, sl.Elastic()).state, cable_mass="lumped", duration=0.1)
 
 
+def on_a_point(*frame: tuple[float, float, float], lengths: list[float], lever: float = 0.0) -> sl.Equilibrium:
+    """A load on cables that meet in a point of it, so high above its center of mass: nothing keeps it from turning."""
+    robot = sl.Robot(
+        "load",
+        frame_anchors=frame,
+        platform_anchors=[[0.0, 0.0, lever]] * len(frame),
+        cables=sl.Cable(linear_density=1.0, axial_stiffness=1e5),
+        mass=100.0,
+        inertia=np.eye(3),
+    )
+    return sl.forward(robot, lengths).state
+
+
+@pytest.mark.parametrize("lever", [0.0, 1e-6, 0.5])
+def test_a_pendulum_of_chains_hangs_as_far_as_they_stretch_and_stays_there(lever: float) -> None:
+    """Tension rises linearly along a plumb cable, for which the midpoint rule is exact."""
+    state = on_a_point((0, 0, 12.0), lengths=[10.0], lever=lever)
+    gravity = state.one_robot.gravity
+    run = sl.simulate(state, duration=0.2, cable_mass="lumped", nodes=7)
+    stretched = 10.0 * (1.0 + (100.0 + 0.5 * 10.0) * gravity / 1e5)
+    np.testing.assert_allclose(run.pose.position, np.tile([0.0, 0.0, 12.0 - stretched - lever], (21, 1)), atol=1e-12)
+    assert np.ptp(run.tensions) < 1e-6
+
+
+@pytest.mark.parametrize("frame", [[(-4, 0, 7.0), (4, 0, 8.0)], [(-4, 0, 7.0), (4, 0, 8.0), (0, 4, 8.0)]])
+def test_chains_that_meet_in_a_point_reach_the_exact_equilibrium_too(frame: Any) -> None:
+    state = on_a_point(*frame, lengths=[6.0, 8.0, 7.0][: len(frame)])
+    off = [np.linalg.norm(chains_at_rest(state, nodes).pose.position - state.pose.position) for nodes in (10, 20, 40)]
+    assert np.divide(off[:-1], off[1:]) == pytest.approx(4.0, abs=0.05)
+    run = sl.simulate(state, duration=0.1, cable_mass="lumped", nodes=10)
+    assert np.ptp(run.pose.position, axis=0).max() < 1e-12
+
+
 def tripod(mass: float) -> sl.Equilibrium:
     """A point mass on three cables."""
     robot = sl.Robot(

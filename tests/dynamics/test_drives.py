@@ -7,7 +7,7 @@ import pytest
 
 import sagline as sl
 from sagline.arrays import Array
-from sagline.dynamics.simulate import Winding
+from sagline.dynamics.drives import Winding
 from sagline.kernels.dynamics import drives as d
 from tests.dynamics.let_go import LIFT
 from tests.dynamics.machines import prototype
@@ -163,3 +163,22 @@ def test_what_begins_is_noted_however_much_of_it(
         told.append([(event.time, event.kind, event.cable) for event in run.events])
     assert len(told[0]) > 20
     assert told[0] == told[1]
+
+
+@pytest.mark.parametrize("winches", ["ideal", sl.SecondOrder(3.0)])
+def test_nothing_lies_on_drums_that_there_are_not(winches: str | sl.SecondOrder) -> None:
+    state = lift(sl.load_robot("article-prototype"), 1.0).state[0]
+    told = 'winding is "remembered"; allowed: "constant" for winches without drums'
+    with pytest.raises(sl.InvalidValueError, match=told):
+        sl.simulate(state, duration=0.1, winches=winches, winding="remembered")  # type: ignore[arg-type]
+    with pytest.raises(sl.InvalidValueError, match=told):
+        sl.Simulator(state.one_robot, state, winches=winches, winding="remembered")  # type: ignore[arg-type]
+
+
+def test_what_winches_lack_is_told_with_their_name_once() -> None:
+    robot = prototype(position_gain=None, speed_gain=None, integral_gain=None)
+    told = "^the robot is without winches: position_gain, speed_gain, integral_gain; allowed: known for"
+    with pytest.raises(sl.InvalidValueError, match=told):
+        sl.simulate(lift(robot, 1.0).state[0], duration=0.1, winches="robot")
+    with pytest.raises(sl.InvalidValueError, match=r"^winches: integral_gain is not given"):
+        sl.simulate(lift(prototype(integral_gain=None), 1.0).state[0], duration=0.1, winches="robot")

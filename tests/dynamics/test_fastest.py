@@ -158,6 +158,35 @@ def test_winches_keep_their_speed(cogiro: sl.Robot, jerk: float | None) -> None:
         assert 270.0 < speed.max() <= 300.0
 
 
+@pytest.mark.parametrize("jerk", [None, 60.0])
+def test_winches_of_which_only_a_radius_is_known_keep_their_speed_too(jerk: float | None) -> None:
+    """The prototype's own speed limit, 15 rad/s of its drums of 30 mm, and one that holds it back."""
+    robot = sl.load_robot("article-prototype")
+    path = sl.quintic_path([(-0.3, 0, 1.0), (0.4, 0.2, 1.2)], durations=3.0)
+    assert robot.winches is not None
+    assert robot.winches.groove_pitch is None
+    free = sl.fastest(robot.replace(winches=robot.winches.replace(speed_limit=None)), path, jerk=jerk)
+    assert sl.fastest(robot, path, jerk=jerk).duration >= free.duration
+    slow = robot.replace(winches=robot.winches.replace(speed_limit=100.0))
+    quick = sl.fastest(slow, path, jerk=jerk)
+    rate = sl.inverse(within(slow, 5.0), quick).length_rate
+    assert rate is not None
+    fastest = np.abs(rate).max(axis=1) / (100.0 / 20.0 * 0.03)
+    assert quick.duration > 1.1 * free.duration
+    if jerk is None:
+        assert np.median(np.sort(fastest)[-50:]) == pytest.approx(1.0, rel=0.05)
+    else:
+        assert 0.9 < fastest.max() <= 1.0 + 1e-6
+
+
+def test_a_speed_limit_needs_a_radius(cogiro: sl.Robot) -> None:
+    robot = cogiro.replace(winches=sl.Winch(speed_limit=300.0))
+    with pytest.raises(
+        sl.InvalidValueError, match=r"^winches: drum_radius is not given; allowed: known where the speed"
+    ):
+        sl.fastest(robot, sl.quintic_path([(-1, 0, 1.5), (2, 1, 2)], durations=3.0))
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_half_planes_are_what_linear_programs_find(cogiro: sl.Robot, seed: int) -> None:
     """The largest of any direction in (u, x), over tensions as variables, is that over the half planes."""
@@ -305,8 +334,6 @@ def test_the_jerk_on_a_curve_ends_within_its_limit(cogiro: sl.Robot) -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_every_preset_moves_within_its_limits(name: str, seed: int) -> None:
     robot = sl.load_robot(name)
-    if robot.winches is not None and robot.winches.speed_limit is not None:
-        robot = robot.replace(winches=robot.winches.replace(speed_limit=None))  # its drums are not known
     box, rng = robot.test_box, np.random.default_rng(seed)
     if box is None:
         pytest.fail("a preset without a box")

@@ -195,7 +195,7 @@ def test_poses_without_an_answer_have_no_counts(robot: sl.Robot) -> None:
 @pytest.mark.parametrize(
     ("changes", "told"),
     [
-        ({"drum_radius": None, "groove_pitch": None}, "winches: drum_radius, winches: groove_pitch is not given"),
+        ({"drum_radius": None, "groove_pitch": None}, "the robot is without winches: drum_radius, groove_pitch; "),
         ({"drum_width": None}, "winches: drum_width is not given"),
         ({"cable_length": None}, "winches: cable_length is not given"),
         ({"layers": None, "cable_length": None}, "winches: cable_length is not given"),
@@ -229,7 +229,7 @@ def test_what_is_missing_or_does_not_fit_is_named(changes: dict[str, Any], told:
 
 def test_a_robot_without_winches_or_diameter_says_what_it_lacks() -> None:
     robot = sl.load_robot("cogiro")
-    told = "winches: drum_radius, winches: groove_pitch, cables: diameter is not given; .* in the robot file, or with"
+    told = "the robot is without winches: drum_radius, groove_pitch, cables: diameter; .* in the robot file, or with"
     with pytest.raises(sl.InvalidValueError, match=told):
         sl.encoder_counts(sl.inverse(robot, POSE))
     thin = wound().replace(cables=robot.cables)

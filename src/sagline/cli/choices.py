@@ -49,6 +49,7 @@ class CableMass(StrEnum):
 
     NONE = "none"
     LUMPED = "lumped"
+    MODAL = "modal"
 
 
 class ShaperKind(StrEnum):

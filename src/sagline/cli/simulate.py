@@ -88,15 +88,18 @@ def simulate(
         raise FileError(file, "does not end in .nc", "Name a NetCDF file: --out sim.nc.")
     drawing = f"{file.stem}-energy"
     check_files(file.parent, [file.name, *figure_files([drawing] * figures)])
+    if path is None and asked.shaper is not ShaperKind.NONE:
+        advice = "Give a path, or leave --shaper out."
+        raise InvalidValueError("--shaper", f"{asked.shaper.value} without a path", "none without a path", advice)
     way = None if path is None else load_path(path)
     if path is not None and way is not None:
         check_unit(path, way, robot)
-    moving = CHAINS if asked.cable_mass is CableMass.LUMPED else SIMULATION
-    needed = (*needed_for(asked.tension.build(Variable.CHORD)), VIBRATION, moving)
+    moving = {CableMass.NONE: (SIMULATION,), CableMass.LUMPED: (CHAINS,)}.get(asked.cable_mass, ())
+    needed = (*needed_for(asked.tension.build(Variable.CHORD)), VIBRATION, *moving)
     with working(f"{robot.name}: simulating", *needed) as line:
         start = _start(robot, way, asked, load, line)
         end = after if way is None else _duration(start) + after
-        line.stage(f"{robot.name}: {end:g} s in time, {asked.cable_mass.value} cable mass")
+        line.stage(f"{robot.name}: {end:g} s in time, {_cables(asked.cable_mass.value)}")
         kind: Any = asked.cable_mass.value
         simulation = integrated(start, duration=end, step=step, cable_mass=kind, events=events, damping=damping)
         made_folder(file.parent)
@@ -150,6 +153,11 @@ def _duration(start: Plan | Equilibrium) -> float:
     return 0.0 if path is None else float(path.time[-1] - path.time[0])
 
 
+def _cables(cable_mass: str) -> str:
+    """Which cables, in words."""
+    return "massless" if cable_mass == CableMass.NONE else f"with cable mass ({cable_mass})"
+
+
 def _residual(simulation: Simulation) -> float:
     """How far the platform is from its mean at most, in the last second [m]."""
     last = simulation.time >= simulation.time[-1] - LAST
@@ -164,7 +172,7 @@ def _tell(simulation: Simulation) -> None:
     size = float(np.nanmax(np.abs(energy.kinetic) + np.abs(energy.potential)))
     rows = [
         ["simulated", f"{simulation.time[-1] - simulation.time[0]:g} s"],
-        ["cables", "massless" if simulation.cable_mass == "none" else f"with cable mass ({simulation.cable_mass})"],
+        ["cables", _cables(simulation.cable_mass)],
         ["step", n(simulation.step, ".3g", "s")],
         ["largest tension", f"{written(simulation.tensions[row, cable], ',.1f')} N, cable {cable}, "
          f"at {simulation.time[row]:.3f} s"],

@@ -39,8 +39,8 @@ def dynamic_stiffness(state: Equilibrium, frequency: ArrayLike, damping: Damping
         which have no linear vibration.
 
     Raises:
-        InvalidValueError: If the state is no single Equilibrium, of an exact or an elastic cable; if a frequency is
-            negative, or so high that a cable would hold more than a hundred thousand waves.
+        InvalidValueError: If the state is no single Equilibrium with lengths, of exact or elastic cables; if a
+            frequency is negative, or so high that a cable would hold more than a hundred thousand waves.
 
     Examples:
         >>> import numpy as np
@@ -59,6 +59,7 @@ def dynamic_stiffness(state: Equilibrium, frequency: ArrayLike, damping: Damping
     if given.ndim > 1:
         raise InvalidValueError("frequency", f"of shape {given.shape}", "one frequency or a list", "Flatten it.")
     optional(damping, Damping, "damping")
+    check_lengths(state)
     cables = state.cables.shape[-1]
     check_memory(f"{given.size:,} frequencies", _BYTES * given.size * cables, "Take them in parts.")
     found = moving_stiffness(strings_of(state), given.reshape(-1), damping)
@@ -83,6 +84,21 @@ def one_state(state: Equilibrium) -> Equilibrium:
         raise InvalidValueError("state", f"a batch of {len(state)}", "a single equilibrium", step)
     check_model(state)
     return state
+
+
+def check_lengths(state: Equilibrium) -> None:
+    """Refuse a state at which nothing hangs.
+
+    Args:
+        state: A single equilibrium.
+
+    Raises:
+        InvalidValueError: If it has no lengths, as that of a pose that is not feasible.
+    """
+    if np.isnan(state.unstrained_length).any():
+        raise InvalidValueError(
+            "state", "one without lengths", "a state that was solved", "See the status of the plan."
+        )
 
 
 def check_model(state: Equilibrium) -> None:

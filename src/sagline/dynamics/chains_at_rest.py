@@ -14,6 +14,7 @@ from sagline.robot.pose import Pose
 
 STEPS = 60
 NEAR = 1e-8  # of a length, of a force: Newton squares what is left, and one more step leaves rounding
+NEUTRAL = 1e-12  # of the largest stiffness: smaller ones are rounding
 LONGEST_STEP = 0.2  # of a force: a longer one is shortened, which keeps far starts from folding a chain
 
 
@@ -116,8 +117,7 @@ def chains_at_rest(state: Equilibrium, nodes: int) -> ChainsAtRest:
         force = _hung(chains, pose.position + robot.platform_anchors @ pose.matrix.T - exits, force)
         unbalance = np.concatenate((force.sum(axis=0), np.cross(levers, force).sum(axis=0))) - given
         blocks = np.asarray(np.linalg.inv(chains.compliance(force)), dtype=np.float64)
-        slope: Array = freedom @ _platform_stiffness(blocks, levers, force) @ freedom.T
-        motion = freedom.T @ np.linalg.solve(slope, -freedom @ unbalance)
+        motion = _against(unbalance, _platform_stiffness(blocks, levers, force), freedom, _size(levers))
         pose = _moved(pose, center, motion)
         if near:
             break
@@ -165,6 +165,23 @@ def _hung(chains: Divided, chord: Array, force: Array) -> Array:
             return force
         near = bool(share.max() <= NEAR)
     raise _no_rest("start", "an equilibrium with a cable so slack that its chain folds")
+
+
+def _size(levers: Array) -> float:
+    """What makes an angle a length [m]: the longest lever, 1 where all cables meet in the center of mass."""
+    longest = float(np.linalg.norm(levers, axis=1).max())
+    return longest if longest > 0.0 else 1.0
+
+
+def _against(unbalance: Array, stiffness: Array, freedom: Array, size: float) -> Array:
+    """The motion that takes an unbalance away; none in directions in which the platform is neutral.
+
+    So turns a pendulum about its cable: neither a stiffness nor an unbalance is there, but for rounding.
+    """
+    units = np.array([1.0, 1.0, 1.0, size, size, size])
+    slope = freedom @ (stiffness / np.outer(units, units)) @ freedom.T
+    found = np.linalg.lstsq(slope, -freedom @ (unbalance / units), rcond=NEUTRAL)[0]
+    return np.asarray(freedom.T @ found / units)
 
 
 def _platform_stiffness(blocks: Array, levers: Array, force: Array) -> Array:

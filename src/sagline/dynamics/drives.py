@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Final, Literal, TypeAlias
+from typing import Any, Final, Literal, TypeAlias, get_args
 
 import numpy as np
 
-from sagline.arguments import brief
+from sagline.arguments import brief, choice
 from sagline.arrays import Array, number
 from sagline.errors import InvalidValueError
 from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics.motion import LOOP_PERIOD
-from sagline.robot.drum import drums_of
+from sagline.robot.drum import drums_of, not_given
 from sagline.robot.robot import Robot
 
 AIR: Final = 1.2  # kg/m^3
@@ -44,6 +44,7 @@ class SecondOrder:
 
 
 Winches: TypeAlias = Literal["ideal", "robot"] | SecondOrder
+Winding: TypeAlias = Literal["constant", "remembered"]
 
 
 def kind_of(winches: Any) -> int:
@@ -58,6 +59,21 @@ def kind_of(winches: Any) -> int:
         return d.IDEAL if winches == "ideal" else d.DRUMS
     allowed = '"ideal", "robot" or SecondOrder(bandwidth, damping_ratio)'
     raise InvalidValueError("winches", brief(winches), allowed, "Choose one of them as winches.")
+
+
+def check_winding(winding: Any, kind: int) -> None:
+    """Refuse what lies on drums where there are none.
+
+    Args:
+        winding: What a caller gave.
+        kind: Of the winches, from `kind_of`.
+
+    Raises:
+        InvalidValueError: If there is no such winding, or it is remembered by winches that have no drums.
+    """
+    if choice(winding, "winding", get_args(Winding)) == "remembered" and kind != d.DRUMS:
+        step = 'Give winches="robot" too, or leave winding out.'
+        raise InvalidValueError("winding", '"remembered"', '"constant" for winches without drums', step)
 
 
 def drive_data(robot: Robot, winches: Winches, length: Array, blown: bool) -> Array:
@@ -98,7 +114,7 @@ def _fill_drums(data: Array, robot: Robot, length: Array) -> None:
     missing = [f"winches: {name}" for name in NEEDED if winch is None or getattr(winch, name) is None]
     if winch is None or missing:
         step = "Give them in the robot file, or with robot.replace(winches=Winch(...))."
-        raise InvalidValueError(", ".join(missing), "not given", 'known for winches="robot"', step)
+        raise InvalidValueError(*not_given(missing), 'known for winches="robot"', step)
     ratio = np.abs(winch.gear) / lever_of(robot, length)  # turns of the motor, in rad, for a meter of cable
     data[d.INERTIA] = winch.inertia * ratio**2  # type: ignore[operator]
     data[d.FORCE_LIMIT] = np.inf if winch.torque_limit is None else winch.torque_limit * ratio
@@ -116,21 +132,26 @@ def _fill_drums(data: Array, robot: Robot, length: Array) -> None:
 
 
 def lever_of(robot: Robot, length: Array) -> Array:
-    """By how much a radian of its drum moves each cable [m], (m,).
+    """By how much a radian of its drum moves each cable [m].
 
     Args:
-        robot: With drum_radius.
-        length: Unstrained lengths off the drums [m], (m,).
+        robot: With winches.
+        length: Unstrained lengths off the drums [m], (m,) or (N, m).
 
     Returns:
-        That of the layer at these lengths where the drums are known, else drum_radius and half the cable's diameter.
+        That of the layer at these lengths where the drums are known, else drum_radius and half the cable's diameter; of
+        the shape of the lengths.
+
+    Raises:
+        InvalidValueError: If drum_radius is not given.
     """
     winch = robot.winches
-    assert winch is not None
+    if winch is None or winch.drum_radius is None:
+        step = "Give it in the robot file, or with robot.replace(winches=Winch(drum_radius=...))."
+        raise InvalidValueError("winches: drum_radius", "not given", "known where the speed of winches counts", step)
     if winch.groove_pitch is not None and robot.cables.diameter is not None:
         drums = drums_of(robot)
-        travel: Array = drums.turns(length[None] * (1.0 + drums.rest_strain))[1][0] / (2.0 * np.pi)
-        return travel
+        travel: Array = drums.turns(np.atleast_2d(length) * (1.0 + drums.rest_strain))[1] / (2.0 * np.pi)
+        return travel.reshape(length.shape)
     thick = 0.0 if robot.cables.diameter is None else 0.5 * robot.cables.diameter
-    assert winch.drum_radius is not None
-    return winch.drum_radius + thick
+    return np.broadcast_to(winch.drum_radius + thick, length.shape)

@@ -26,7 +26,7 @@ class Break:
 
     def __post_init__(self) -> None:
         """Check the values."""
-        object.__setattr__(self, "cable", whole_number(self.cable, "cable", 0, MOST))
+        object.__setattr__(self, "cable", whole_number(self.cable, "cable", 0))
         object.__setattr__(self, "time", number(self.time, "time", "s"))
 
 
@@ -44,7 +44,7 @@ class Stall:
 
     def __post_init__(self) -> None:
         """Check the values."""
-        object.__setattr__(self, "winch", whole_number(self.winch, "winch", 0, MOST))
+        object.__setattr__(self, "winch", whole_number(self.winch, "winch", 0))
         object.__setattr__(self, "time", number(self.time, "time", "s"))
 
 
@@ -68,7 +68,7 @@ class Brake:
         """Check the values."""
         object.__setattr__(self, "time", number(self.time, "time", "s"))
         if self.winch is not None:
-            object.__setattr__(self, "winch", whole_number(self.winch, "winch", 0, MOST))
+            object.__setattr__(self, "winch", whole_number(self.winch, "winch", 0))
         object.__setattr__(self, "duration", number(self.duration, "duration", "s", above=0.0))
 
 
@@ -110,7 +110,6 @@ class PickUp:
         object.__setattr__(self, "time", number(self.time, "time", "s"))
 
 
-MOST = 9999  # of cables that anything has
 Event: TypeAlias = Break | Stall | Brake | Drop | PickUp
 KINDS = {Break: "break", Stall: "stall", Brake: "brake", Drop: "drop", PickUp: "pick up"}
 

@@ -13,6 +13,7 @@ from sagline.arrays import Array, locked, number
 from sagline.blocks import Progress
 from sagline.dynamics.balances import Balances, HalfPlanes
 from sagline.dynamics.curves import Curve
+from sagline.dynamics.drives import lever_of
 from sagline.dynamics.jerk_bounded import Bounds, JerkProfile, fastest_course
 from sagline.dynamics.moves import Move, moves_of
 from sagline.dynamics.phase_plane import Profile, fastest_profile
@@ -21,10 +22,8 @@ from sagline.errors import InvalidValueError
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
-from sagline.kinematics.winch_rates import winch_rates
 from sagline.motion.path import Path
 from sagline.motion.rest_to_rest import time_grid
-from sagline.robot.drum import drums_of
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.balance import structure_matrix
@@ -36,6 +35,7 @@ _SETTLED: Final = 1e-7  # of the time, that a round changes
 _INSTANTS: Final = 4001  # of a move, at which its limits are checked in the end
 _SLOWER: Final = 1e-6  # of the time, that is given first where a limit is missed; four times as much each time
 _TRIES: Final = 12
+_GENTLE: Final = 8  # of these, in which no more is given than winches may need
 _ROUNDING: Final = 1e-12
 
 
@@ -92,7 +92,7 @@ def fastest(
     Raises:
         InvalidValueError: If the path is in motion at an end or turns around in the middle of a curve, if the robot
             cannot hold a pose of it at rest with this margin (the message says where), if an argument is out of its
-            range, or data of winches with a speed_limit are missing.
+            range, or winches with a speed_limit have no drum_radius.
 
     Source:
         Pham & Pham, A new approach to time-optimal path parameterization based on reachability analysis, 2018;
@@ -126,7 +126,8 @@ def fastest(
         plan = inverse(inner, new)
         slower = 1.0 if plan.feasible.all() else 1.0 + _SLOWER * 4.0**again
         if bounded and _has_speed_limits(robot):
-            slower = max(slower, _exceeding(plan))
+            ratio = _exceeding(plan)  # what stretches falls with the cube of the time, the rest in proportion
+            slower = max(slower, np.cbrt(ratio) if again < _GENTLE else ratio)
         if slower == 1.0:
             return new
         timed = [None if one is None else replace(one, slower=one.slower * slower) for one in timed]
@@ -204,11 +205,7 @@ def _speeds(robot: Robot, curve: Curve, place: Array, rest: Plan) -> Bounds:
     """What the speed limits of winches leave of the squared speed, from how fast the chords change."""
     if not _has_speed_limits(robot):
         return lambda parameter: HalfPlanes(np.zeros((parameter.size, 0, 2)), np.zeros((parameter.size, 0)))
-    drums = drums_of(robot)
-    stretch = 1.0 + drums.rest_strain
-    _, travel = drums.turns(rest.unstrained_length * stretch)
-    assert drums.winches.speed_limit is not None
-    fastest_cable = np.abs(drums.winches.speed_limit / drums.winches.gear) * travel / (2.0 * np.pi) / stretch
+    fastest_cable = _fastest_rates(robot, rest.unstrained_length)
 
     def bounds(parameter: Array) -> HalfPlanes:
         jet = curve.at(parameter)
@@ -222,11 +219,21 @@ def _speeds(robot: Robot, curve: Curve, place: Array, rest: Plan) -> Bounds:
     return bounds
 
 
+def _fastest_rates(robot: Robot, length: Array) -> Array:
+    """The fastest that winches change lengths [m/s], at lengths (N, m)."""
+    winch = robot.winches
+    assert winch is not None
+    assert winch.speed_limit is not None
+    stretch = 1.0 + winch.winding_tension / robot.cables.axial_stiffness
+    rates: Array = np.abs(winch.speed_limit / winch.gear) * lever_of(robot, length) / stretch
+    return rates
+
+
 def _exceeding(plan: Plan) -> float:
     """How much too fast the winches are somewhere: 1 where they are not."""
-    rates = winch_rates(plan)
-    limits = drums_of(plan.state.one_robot).winches.speed_limit
-    ratio = float(np.nanmax(np.abs(rates.motor_speed) / limits))
+    assert plan.length_rate is not None
+    limits = _fastest_rates(plan.state.one_robot, plan.unstrained_length)
+    ratio = float(np.nanmax(np.abs(plan.length_rate) / limits))
     return ratio * (1.0 + _SLOWER) if ratio > 1.0 else 1.0
 
 

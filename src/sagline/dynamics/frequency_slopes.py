@@ -12,6 +12,7 @@ from sagline.arguments import instance
 from sagline.arrays import Array, Flags, Indices, locked, number
 from sagline.cables.catenary import Catenary
 from sagline.cables.elastic import Elastic
+from sagline.dynamics.cable_dynamics import check_lengths
 from sagline.dynamics.flexibility import Flexibility, flexibility
 from sagline.dynamics.mode_slopes import Rest, Slopes, Swings, rest_of, slopes_of
 from sagline.dynamics.string_swings import cables_of_state, swings_of
@@ -122,9 +123,7 @@ def _rest(state: Equilibrium) -> Rest:
     if state.contact is not None:
         value, allowed = "one of cables with something behind them", "cables that hang from their frame anchors"
         raise InvalidValueError("state", value, allowed, "Take the robot without winches: robot.replace(winches=None).")
-    if not np.isfinite(state.unstrained_length).all():
-        step = "See the status of the plan."
-        raise InvalidValueError("state", "one without lengths", "a state that was solved", step)
+    check_lengths(state)
     return rest_of(state)
 
 

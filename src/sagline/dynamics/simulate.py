@@ -14,7 +14,7 @@ from sagline.dynamics.beginning import Beginning, beginning
 from sagline.dynamics.chains import ChainPlant, check_lumped, checked_nodes, wave_frequency
 from sagline.dynamics.course import Course, TableInTime, table_in_time
 from sagline.dynamics.damping import Damping
-from sagline.dynamics.drives import Winches, drive_data, kind_of
+from sagline.dynamics.drives import Winches, Winding, check_winding, drive_data, kind_of
 from sagline.dynamics.events import Drop, Event, PickUp, checked_events
 from sagline.dynamics.modal import modal_simulation, refuse_with_modes
 from sagline.dynamics.plant import Plant
@@ -29,7 +29,6 @@ from sagline.memory import check_memory
 from sagline.robot.equilibrium import Equilibrium
 
 Integrator = Literal["splitting", "runge-kutta"]  # in the order of the kernel's codes
-Winding = Literal["constant", "remembered"]
 CableMass = Literal["none", "lumped", "modal"]
 RECORD: Final = 0.01  # s
 MOST_STEPS: Final = 10**8  # some minutes
@@ -128,7 +127,7 @@ def simulate(
         check_lumped(given)
     kind, losses = kind_of(winches), checked_damping(damping)
     code = code_of(integrator, kind, elements)
-    choice(winding, "winding", get_args(Winding))
+    check_winding(winding, kind)
     air = Course.still(np.zeros(3)) if wind is None else table_in_time(wind, "wind", "m/s", 3, given.begin)
     happening = checked_events(events, given.robot, given.begin, given.end)
     plant = plant_at(given, winches, wind is not None, elements, losses)

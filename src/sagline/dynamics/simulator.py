@@ -8,17 +8,16 @@ from typing import Any, Final, NamedTuple, NoReturn
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import brief, choice, instance, integer, whole_number
+from sagline.arguments import brief, instance, integer, whole_number
 from sagline.arrays import Array, checked, locked, number
 from sagline.dynamics.beginning import Beginning, beginning, check_lengths
 from sagline.dynamics.course import Course
 from sagline.dynamics.damping import Damping
-from sagline.dynamics.drives import Winches, kind_of
+from sagline.dynamics.drives import Winches, Winding, check_winding, kind_of
 from sagline.dynamics.plant import Plant, Records, grown
 from sagline.dynamics.sensors import Encoders, LoadCells
 from sagline.dynamics.simulate import (
     Integrator,
-    Winding,
     checked_damping,
     code_of,
     plant_at,
@@ -118,7 +117,7 @@ class Simulator:
         given: Beginning = beginning(_at_rest(instance(robot, Robot, "robot"), start), None, None, 1.0)
         kind, losses = kind_of(winches), checked_damping(damping)
         code = code_of(integrator, kind)
-        choice(winding, "winding", ("constant", "remembered"))
+        check_winding(winding, kind)
         self._plant: Plant = plant_at(given, winches, False)
         if winding == "remembered" and kind == d.DRUMS:
             self._plant.remember_winding(2.0 * float(given.lengths.value.max()))

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Any, Final
 
 import numpy as np
@@ -170,8 +172,24 @@ def drums_of(robot: Robot) -> Drums:
         missing.append("cables: diameter")
     if winches is None or diameter is None or missing:
         step = "Give them in the robot file, or with robot.replace(winches=Winch(...), cables=Cable(...))."
-        raise InvalidValueError(", ".join(missing), "not given", "known, to say what lies on a drum", step)
+        raise InvalidValueError(*not_given(missing), "known, to say what lies on a drum", step)
     return Drums(winches, *_tables(winches, diameter), *_limits(winches, robot))
+
+
+def not_given(names: Sequence[str]) -> tuple[str, str]:
+    """What a message says of data that are missing.
+
+    Args:
+        names: Of one or more, "winches: drum_radius" for instance, those of one kind in a row.
+
+    Returns:
+        Item and value: of several the kind is named once.
+    """
+    if len(names) == 1:
+        return names[0], "not given"
+    kinds = groupby((name.split(": ", 1) for name in names), key=lambda words: words[0])
+    grouped = (f"{kind}: {', '.join(word for _, word in each)}" for kind, each in kinds)
+    return "the robot", f"without {', '.join(grouped)}"
 
 
 def _tables(winches: Winch, diameter: Array) -> tuple[Array, Array]:
