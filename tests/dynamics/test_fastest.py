@@ -59,15 +59,13 @@ def arc(rate: float = 100.0) -> sl.Path:
     return sl.path_from_samples(time, sl.Pose.from_euler(position, 0.05 * angle, 0.02 * angle, 0.1 * angle))
 
 
-@pytest.mark.parametrize(("margin", "study"), [(0.0, (0.858, 1.118)), (5.0, None)])
-def test_it_is_faster_than_the_shortest_quintic(
-    suspended: sl.Robot, margin: float, study: tuple[float, float] | None
-) -> None:
+@pytest.mark.parametrize(("margin", "known"), [(0.0, (0.858, 1.118)), (5.0, (0.877, 1.142))])
+def test_it_is_faster_than_the_shortest_quintic(suspended: sl.Robot, margin: float, known: tuple[float, float]) -> None:
+    """By as much as a study found without a margin; docs/howto/without-vibration.md tells the numbers."""
     quick = sl.fastest(suspended, sl.quintic_path(ALONG_X, durations=2.0), margin)
     quintic = shortest_quintic(suspended, ALONG_X, margin)
     assert quick.duration < 0.78 * quintic
-    if study is not None:
-        assert (quick.duration, quintic) == pytest.approx(study, abs=2e-3)
+    assert (quick.duration, quintic) == pytest.approx(known, abs=2e-3)
 
 
 KINDS = ("line", "turning", "arc", "frame end", "pulleys")

@@ -31,6 +31,11 @@ def test_the_page_tells_what_is_left(name: str) -> None:
         assert f"{number:.{len(cell.partition('.')[2])}f}" == cell
 
 
+def test_the_page_tells_what_straight_lengths_between_samples_leave() -> None:
+    told = f"that alone leaves {1e3 * residual('plan'):.2f} micrometers at {1000:,} samples a second"
+    assert told in " ".join(PAGE.read_text(encoding="utf-8").split())
+
+
 def test_the_numbers_of_other_programs_are_met() -> None:
     """Tagged reference: an independent Runge-Kutta integration of the same robot in numpy, exact catenaries, 2 ms."""
     assert scene().frequency == pytest.approx([2.74601, 1.84399], abs=2e-5)
