@@ -199,8 +199,8 @@ class Simulator:
             What is read at the end of the period; its arrays are filled anew by the next step.
 
         Raises:
-            InvalidValueError: If the period is not of whole steps, energy grows by itself, or an argument is no such
-                array.
+            InvalidValueError: If the period is not of whole steps, a length is not longer than its dead cable, or an
+                argument is no such array: then nothing has changed. Or if energy grows by itself.
         """
         count = self._count(dt)
         take(self._asked, unstrained_length, "unstrained_length", "m")

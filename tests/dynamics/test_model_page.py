@@ -1,0 +1,42 @@
+"""Numbers that docs/model.md tells of cables with mass in time, each as it stands there."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+import sagline as sl
+from sagline.dynamics.chains_at_rest import chains_at_rest
+from tests.dynamics.test_chains import cogiro, moved
+
+PAGE = Path(__file__).parents[2] / "docs" / "model.md"
+
+
+@cache
+def page() -> str:
+    """In one line."""
+    return " ".join(PAGE.read_text(encoding="utf-8").split())
+
+
+def test_how_far_off_a_chain_of_twenty_elements_rests() -> None:
+    off = chains_at_rest(cogiro(), 20).pose.position - cogiro().pose.position
+    assert f"(CoGiRo, 20 elements: {1e6 * np.linalg.norm(off):.1f} µm)" in page()
+
+
+def test_how_well_the_energy_closes_along_a_path() -> None:
+    energy = moved().energy
+    turned_over, error = np.ptp(energy.supplied), np.abs(energy.error).max()
+    told = f"A path of 4 s on CoGiRo on which winches supply and take back {turned_over:,.0f} J closes to"
+    assert f"{told} ${1e6 * error:.0f} \\cdot 10^{{-6}}$ J" in page()
+
+
+def test_how_well_steps_agree_after_a_break() -> None:
+    """At 0.45, 0.2 and 0.1 of l sqrt(rho/EA), of which the default is 0.4, 5e-5 s."""
+    after = []
+    for share in (1.125, 0.5, 0.25):
+        run = sl.simulate(cogiro(), cable_mass="lumped", duration=0.5, step=share * 5e-5, events=sl.Break(0, 0.0))
+        after.append(run.events[0].tension_after)
+    off = max(abs(one / after[-1] - 1.0) for one in after)
+    assert f"0.45, 0.2 and 0.1 agree to {100 * off:.2f} % in the largest tension" in page()
