@@ -9,6 +9,7 @@ import sagline as sl
 from sagline.arrays import Array
 from sagline.dynamics.drives import Winding
 from sagline.kernels.dynamics import drives as d
+from sagline.kernels.dynamics.winding import BIN
 from tests.dynamics.let_go import LIFT
 from tests.dynamics.machines import prototype
 
@@ -116,11 +117,11 @@ def test_a_drum_that_remembers_keeps_length_and_energy_of_what_lies_on_it() -> N
     state = lift(robot, 1.0).state[0]
     machine = sl.Simulator(robot, state, winding="remembered")
     plant = machine._plant
-    stiffness, begins = robot.cables.axial_stiffness, d.BIN * np.arange(plant.layers.shape[1])
+    stiffness, begins = robot.cables.axial_stiffness, BIN * np.arange(plant.layers.shape[1])
 
     def on_drums() -> tuple[Array, float]:
         """Unstrained lengths there [m], (m,), and all strain energy [J]; the last bin left out."""
-        there = np.clip(begins + d.BIN - plant.now[d.WOUND][:, None], 0.0, d.BIN)[:, :-1]
+        there = np.clip(begins + BIN - plant.now[d.WOUND][:, None], 0.0, BIN)[:, :-1]
         lengths, strains = there / (1.0 + plant.layers[:, :-1]), plant.layers[:, :-1]
         return lengths.sum(axis=1), float((0.5 * stiffness[:, None] * strains**2 * lengths).sum())
 

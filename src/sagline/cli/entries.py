@@ -202,7 +202,7 @@ ENTRIES = {
         Entry(VIBRATION, "forward.sensitivity.describe_states", 57, 6.0, _vibration),
         Entry(MODES, "dynamics.spectral.interpolate", 2, 9.0, _modes),
         Entry(SIMULATION, "dynamics.motion.run", 60, 16.0, _simulation),
-        Entry(CHAINS, "dynamics.chains.swing", 44, 17.0, _chains),
+        Entry(CHAINS, "dynamics.chains.run_chains", 44, 17.0, _chains),
         Entry(
             VIBRATION_OVER_PULLEYS, "forward.sensitivity.describe_states", 39, 4.0, _vibration_over_pulleys, version=2
         ),

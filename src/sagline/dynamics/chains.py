@@ -19,10 +19,11 @@ from sagline.errors import InvalidValueError
 from sagline.kernels import codes, tables
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.dynamics import chain as c
-from sagline.kernels.dynamics import chains as k
+from sagline.kernels.dynamics import chain_records as ends
+from sagline.kernels.dynamics import chain_run, chains
 from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics import rigid_body as body
-from sagline.kernels.dynamics.motion import COUNTERS, FAILED
+from sagline.kernels.dynamics.progress import COUNTERS, FAILED
 
 FEWEST, MOST = 4, 500  # elements a cable
 SHORTEST: Final = 0.86  # of l sqrt(rho/EA): the limit of steps where the element at the frame is 0.4 l
@@ -56,7 +57,7 @@ class ChainPlant(Plant):
         nodes: Elements a cable at the start.
     """
 
-    kernel: ClassVar[Any] = staticmethod(k.swing)
+    kernel: ClassVar[Any] = staticmethod(chains.run_chains)
     cable_mass: ClassVar[str] = "lumped"
 
     def __init__(self, given: Beginning, data: Array, nodes: int, losses: Damping) -> None:
@@ -103,8 +104,8 @@ class ChainPlant(Plant):
     def arguments(self, rules: Any, numbers: Any, courses: Any) -> Any:
         """As those of `Plant`, for the kernel of chains."""
         lengths: Course = courses[0]
-        if self._room.size != k.ROOM + 2 * lengths.value.shape[1]:
-            self._room = np.zeros(k.ROOM + 2 * lengths.value.shape[1])
+        if self._room.size != chain_run.ROOM + 2 * lengths.value.shape[1]:
+            self._room = np.zeros(chain_run.ROOM + 2 * lengths.value.shape[1])
         ends = self._table.copy()
         ends[:, tables.PLATFORM_X : tables.PLATFORM_Z + 1] = self._carrier.levers(self._ends)[self.cables]
         freedom = self.robot.freedom
@@ -158,12 +159,12 @@ class ChainPlant(Plant):
 
     def failure(self, time: float, step: float) -> InvalidValueError:
         """Why the kernel stopped."""
-        cable, how = int(self.cables[int(self.counters[FAILED]) - 1]), self.counters[k.ENDED]
-        if how == k.GROWN:
+        cable, how = int(self.cables[int(self.counters[FAILED]) - 1]), self.counters[ends.ENDED]
+        if how == ends.GROWN:
             return super().failure(time, step)
-        value = f"{'too long' if how == k.LONG else 'all but wound in'} at {time:.6g} s"
+        value = f"{'too long' if how == ends.LONG else 'all but wound in'} at {time:.6g} s"
         element = self._chains[0][int(self.counters[FAILED]) - 1, c.ELEMENT]
-        low, high = (k.FEWEST + 1) * element, self._chains[1].shape[2] * element
+        low, high = (ends.FEWEST + 1) * element, self._chains[1].shape[2] * element
         advice = 'Correct the lengths, give more nodes, or cable_mass="none".'
         return InvalidValueError(f"cable {cable}: length", value, f"{low:.3g} to {high:.3g} m of its chain", advice)
 

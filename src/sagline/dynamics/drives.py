@@ -11,7 +11,6 @@ from sagline.arguments import brief, choice
 from sagline.arrays import Array, number
 from sagline.errors import InvalidValueError
 from sagline.kernels.dynamics import drives as d
-from sagline.kernels.dynamics.motion import LOOP_PERIOD
 from sagline.robot.drum import drums_of, not_given
 from sagline.robot.robot import Robot
 
@@ -123,7 +122,7 @@ def _fill_drums(data: Array, robot: Robot, length: Array) -> None:
     data[d.POSITION_GAIN] = winch.position_gain
     data[d.SPEED_GAIN] = winch.speed_gain
     data[d.INTEGRAL_GAIN] = winch.integral_gain
-    most = 2.0 * data[d.INERTIA] / LOOP_PERIOD  # a larger correction in a period turns the error over, and more
+    most = 2.0 * data[d.INERTIA] / d.LOOP_PERIOD  # a larger correction in a period turns the error over, and more
     if (wild := data[d.SPEED_GAIN] >= most).any():
         i = int(np.argmax(wild))
         allowed = f"< {most[i]:.4g} N s/m for {data[d.INERTIA, i]:.4g} kg at the cable, closed every millisecond"

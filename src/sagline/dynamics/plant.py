@@ -15,8 +15,10 @@ from sagline.kernels import tables
 from sagline.kernels.cable.rows import CABLE_ROWS
 from sagline.kernels.cable.rows import LENGTH as LENGTH_ROW
 from sagline.kernels.dynamics import drives as d
-from sagline.kernels.dynamics import motion as k
+from sagline.kernels.dynamics import motion
+from sagline.kernels.dynamics import progress as k
 from sagline.kernels.dynamics import rigid_body as body
+from sagline.kernels.dynamics.winding import BIN
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.robot.several import anything_behind
@@ -34,7 +36,7 @@ class Records:
         tensions: At the frame ends [N], (N, m).
         lengths: Unstrained [m], (N, m).
         energies: Kinetic, potential, supplied, lost [J], (N, 4).
-        notes: See `sagline.kernels.dynamics.motion`, (NOTES + 2 m, NOTE_COLUMNS): a run pauses with more than NOTES.
+        notes: See `sagline.kernels.dynamics.progress`, (NOTES + 2 m, NOTE_COLUMNS): a run pauses with more than NOTES.
         points: Of cables with mass [m], (N, m, points, 3); None of cables without.
     """
 
@@ -77,7 +79,7 @@ class Plant:
         cable_mass: As `simulate` takes it.
     """
 
-    kernel: ClassVar[Any] = staticmethod(k.run)
+    kernel: ClassVar[Any] = staticmethod(motion.run)
     cable_mass: ClassVar[str] = "none"
 
     def __init__(self, robot: Robot, model: CableModel, pose: Pose, twist: Array, length: Array, data: Array) -> None:
@@ -117,7 +119,7 @@ class Plant:
 
         What lies farther in lies at the winding tension, and comes to it when it is wound in.
         """
-        self.layers = np.tile(self.data[d.WINDING_STRAIN][:, None], (1, int((longest + MARGIN) / d.BIN) + 1))
+        self.layers = np.tile(self.data[d.WINDING_STRAIN][:, None], (1, int((longest + MARGIN) / BIN) + 1))
 
     def arguments(
         self, rules: tuple[int, int, int, int, int], numbers: tuple[float, float, float, float], courses: Any
@@ -125,7 +127,7 @@ class Plant:
         """What the kernel takes but for records and counts of steps; valid until a cable breaks or the mass changes.
 
         Args:
-            rules: See `sagline.kernels.dynamics.motion.Rules`.
+            rules: See `sagline.kernels.dynamics.massless.Rules`.
             numbers: See there.
             courses: Of lengths, of wrenches, of the wind.
         """

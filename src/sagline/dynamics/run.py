@@ -13,7 +13,7 @@ from sagline.dynamics.events import KINDS, Brake, Break, Drop, Event, PickUp, St
 from sagline.dynamics.plant import NOTES, Plant, Records
 from sagline.dynamics.simulation import Occurrence, Simulation, energy_balance, twist_of_origin
 from sagline.kernels.dynamics import drives as d
-from sagline.kernels.dynamics import motion as k
+from sagline.kernels.dynamics import progress as k
 from sagline.kernels.dynamics import rigid_body as body
 
 BLOCK: Final = 20_000  # steps at once: some 100 ms, after which an interrupt is heard

@@ -23,7 +23,7 @@ from sagline.dynamics.simulation import Simulation
 from sagline.dynamics.steps import checked_step, highest_frequency, with_drives
 from sagline.errors import InvalidValueError
 from sagline.kernels.dynamics import drives as d
-from sagline.kernels.dynamics import motion as k
+from sagline.kernels.dynamics import massless as k
 from sagline.kinematics.plan import Plan
 from sagline.memory import check_memory
 from sagline.robot.equilibrium import Equilibrium
@@ -138,7 +138,7 @@ def simulate(
     work, every, count = work_of(losses, given.wrench, wind is not None), _every(record, size), _count(given, size)
     numbers_each = 19 + given.robot.cable_count * (2 + (3 * elements + 3 if elements else 0))
     check_memory("record", 8.0 * numbers_each * (count / every), "Record less often.")
-    rules = (code, kind, int(winding == "remembered"), work, round(k.LOOP_PERIOD / size) if kind == d.DRUMS else 1)
+    rules = (code, kind, int(winding == "remembered"), work, round(d.LOOP_PERIOD / size) if kind == d.DRUMS else 1)
     numbers = (size, losses.loss_time, losses.air_damping, 1.0)
     run = Run(plant, rules, numbers, (set_points(given, plant, kind), given.wrench, air), every, count)
     for event in happening:

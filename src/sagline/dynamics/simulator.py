@@ -27,8 +27,10 @@ from sagline.dynamics.simulate import (
 from sagline.errors import InvalidValueError
 from sagline.kernels.cable.rows import LENGTH
 from sagline.kernels.dynamics import drives as d
-from sagline.kernels.dynamics import motion as k
+from sagline.kernels.dynamics import motion
+from sagline.kernels.dynamics import progress as k
 from sagline.kernels.dynamics import rigid_body as body
+from sagline.kernels.dynamics.massless import LOADED
 from sagline.kernels.dynamics.period import begin_period
 from sagline.kernels.jit import machine_code
 from sagline.kinematics.caller import take
@@ -125,13 +127,13 @@ class Simulator:
         self._kind, plant, m = kind, self._plant, given.robot.cable_count
         self._set_up_course(given, m)
         lag = number(load_cell_filter, "load_cell_filter", "s", low=0.0)
-        stride = round(k.LOOP_PERIOD / self._step) if kind == d.DRUMS else 1
-        rules = (code, kind, int(winding == "remembered"), work_of(losses, given.wrench, False) | k.LOADED, stride)
+        stride = round(d.LOOP_PERIOD / self._step) if kind == d.DRUMS else 1
+        rules = (code, kind, int(winding == "remembered"), work_of(losses, given.wrench, False) | LOADED, stride)
         numbers = (self._step, losses.loss_time, losses.air_damping, self._step / (lag + self._step))
         courses = (self._course, self._load, Course.still(np.zeros(3)))
         self._records = Records(0, m).arrays
         self._arguments = plant.arguments(rules, numbers, courses)
-        self._run: Any = machine_code(k.run, (*self._arguments, self._records, 0, 0))
+        self._run: Any = machine_code(motion.run, (*self._arguments, self._records, 0, 0))
         self._cells = LoadCells(given.robot, whole_number(seed, "seed", 0, MOST_SEED), plant.now[d.FILTERED])
         stretch = 1.0 + plant.data[d.WINDING_STRAIN]
         places = (plant.now[d.WOUND], np.ones(m)) if kind == d.DRUMS else (plant.rows[LENGTH], stretch)

@@ -11,7 +11,7 @@ from sagline.arrays import Array, number
 from sagline.dynamics.damping import Damping
 from sagline.errors import InvalidValueError
 from sagline.kernels.dynamics import drives as d
-from sagline.kernels.dynamics.motion import RUNGE_KUTTA, SPLITTING
+from sagline.kernels.dynamics.massless import RUNGE_KUTTA, SPLITTING
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 

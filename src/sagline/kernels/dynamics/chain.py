@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 from sagline.arrays import Array
+from sagline.kernels.dynamics.wind import across
 from sagline.kernels.jit import formula, kernel
 
 # columns of the chain table, a row for each cable
@@ -273,9 +274,7 @@ def blow_at(place: Array, j: int, k: int, drag: float, wind: Array) -> tuple[flo
     """Force of a wind across the line from node j to node k, of drag by the square of its speed [N]."""
     x, y, z = place[0, k] - place[0, j], place[1, k] - place[1, j], place[2, k] - place[2, j]
     along = (wind[0] * x + wind[1] * y + wind[2] * z) / (x * x + y * y + z * z + TINY)
-    nx, ny, nz = wind[0] - along * x, wind[1] - along * y, wind[2] - along * z
-    size = drag * math.sqrt(nx * nx + ny * ny + nz * nz)
-    return size * nx, size * ny, size * nz
+    return across(wind, along, x, y, z, drag)
 
 
 @kernel

@@ -11,7 +11,8 @@ from typing import NamedTuple
 from sagline.arrays import Array
 from sagline.kernels import tables
 from sagline.kernels.cable import rows as t
-from sagline.kernels.jit import formula, kernel
+from sagline.kernels.dynamics.winding import pay_out, wind_in
+from sagline.kernels.jit import formula, glue
 
 # kinds of winches
 IDEAL, SECOND_ORDER, DRUMS = 0, 1, 2
@@ -49,7 +50,7 @@ START, START_POTENTIAL, BEGIN = 5, 6, 7  # energy at the start, of which potenti
 MOVED = 8  # the most that has been in motion
 AUDIT_SIZE = 9
 
-BIN = 0.005  # m of cable on the drum that lie at one tension
+LOOP_PERIOD = 1e-3  # s
 
 
 class Drives(NamedTuple):
@@ -60,7 +61,7 @@ class Drives(NamedTuple):
         remembered: Whether the drum remembers at which tension it was wound.
         data: What they are, (DATA_ROWS, m).
         now: What they do, (DRIVE_ROWS, m).
-        layers: Strain of the cable on the drums, BIN by BIN, (m, B).
+        layers: Strain of the cable on the drums, bin by bin, (m, B).
         audit: What is added up, (AUDIT_SIZE,).
     """
 
@@ -122,64 +123,6 @@ def take_stored(drives: Drives, cables: Array, time: float) -> None:
         drives.audit[LOST] += lost
 
 
-@kernel
-def wind_in(layer: Array, place: float, step: float, strain: float, stiffness: float) -> float:
-    """Put cable of a strain on a drum; returns the energy [J] that is lost where it is shared with what lies there.
-
-    What lies in a bin has one strain, that with which it is as long as it was, strained and unstrained.
-
-    Args:
-        layer: Strain of the cable on the drum, bin by bin, (B,); what is beyond the last border is the last bin's.
-        place: What is let out before [m].
-        step: How much of it is wound in [m], > 0.
-        strain: Of this.
-        stiffness: EA [N].
-    """
-    lost = 0.0
-    first, last = bin_of(layer, place - step), bin_of(layer, place)
-    for k in range(first, last + 1):
-        begin = max(place - step, k * BIN) if k > first else place - step
-        middle = min(place, (k + 1) * BIN) if k < last else place
-        if k == layer.shape[0] - 1:  # endless, it takes the winding strain
-            lost += 0.5 * stiffness * (strain - layer[k]) ** 2 * (middle - begin) / (1.0 + strain)
-            continue
-        new, old = (middle - begin) / (1.0 + strain), max((k + 1) * BIN - middle, 0.0) / (1.0 + layer[k])
-        if new + old > 0.0:
-            shared = new / (new + old)
-            lost += 0.5 * stiffness * (1.0 - shared) * new * (strain - layer[k]) ** 2
-            layer[k] += shared * (strain - layer[k])
-    return lost
-
-
-@kernel
-def pay_out(layer: Array, place: float, step: float, stiffness: float) -> tuple[float, float]:
-    """Strain of the cable that a drum lets out, as one, and the energy [J] that is lost by this.
-
-    Args:
-        layer: Strain of the cable on the drum, bin by bin, (B,); what is beyond the last border is the last bin's.
-        place: What is let out before [m].
-        step: How much more [m], > 0.
-        stiffness: EA [N].
-    """
-    first, last = bin_of(layer, place), bin_of(layer, place + step)
-    if first == last:
-        return layer[first], 0.0
-    length, strained, squares = 0.0, 0.0, 0.0
-    for k in range(first, last + 1):
-        begin = max(place, k * BIN) if k > first else place
-        end = min(place + step, (k + 1) * BIN) if k < last else place + step
-        part = (end - begin) / (1.0 + layer[k])
-        length, strained, squares = length + part, strained + part * layer[k], squares + part * layer[k] * layer[k]
-    mean = strained / length
-    return mean, 0.5 * stiffness * (squares - mean * strained)
-
-
-@formula
-def bin_of(layer: Array, place: float) -> int:
-    """The bin of a place [m] along the cable."""
-    return min(max(int(place / BIN), 0), layer.shape[0] - 1)
-
-
 @formula
 def turn_drums(drives: Drives, cables: Array, rows: Array, gravity: float, time: float) -> None:
     """Let out or take in cable for a time, and account for what lies on the drums."""
@@ -225,3 +168,67 @@ def close_loops(drives: Drives, targets: Array, rates: Array, period: float) -> 
         drives.now[FORCE, i] = force
         full = (force != asked or speed != wanted) and not drives.now[HELD, i] > 0.0
         drives.now[SATURATED, i] = (NEW if drives.now[SATURATED, i] == NO else YES) if full else NO
+
+
+@formula
+def tension_at_drum(whole: float, lifted: float, stiffness: float) -> float:
+    """Tension at the drum [N] from H there, that at the frame end less the weight of what hangs between them."""
+    fallen = whole - lifted
+    return 2.0 * fallen / (1.0 + math.sqrt(max(1.0 + 2.0 * fallen / stiffness, 0.0)))
+
+
+@glue
+def keep_set_points(drives: Drives, rows: Array, targets: Array, rates: Array) -> None:
+    """Fill lengths and rates of winches that keep their set points."""
+    if drives.kind == IDEAL:
+        for i in range(rows.shape[1]):
+            held = drives.now[HELD, i] > 0.0
+            drives.now[RATE, i] = 0.0 if held else rates[i]
+            if not held:
+                rows[t.LENGTH, i] = targets[i]
+
+
+@glue
+def kick_winches(drives: Drives, rows: Array, targets: Array, time: float, begins: bool) -> None:
+    """Change the winches' speeds by forces of a time; see `kick_lagging`."""
+    if drives.kind == DRUMS:
+        kick_drums(drives, time)
+    elif drives.kind == SECOND_ORDER:
+        kick_lagging(drives, rows, targets, time, begins)
+
+
+@glue
+def remember(drives: Drives, rows: Array) -> None:
+    """Keep what `account` needs to know of a step's begin."""
+    for i in range(rows.shape[1]):
+        drives.now[BEFORE, i] = rows[t.LENGTH, i]
+        drives.now[BEFORE_WHOLE, i] = drives.now[WHOLE, i]
+        drives.now[BEFORE_DRUM, i] = drives.now[AT_DRUM, i]
+
+
+@glue
+def turn_winches(drives: Drives, cables: Array, rows: Array, gravity: float, time: float) -> None:
+    """Let out or take in cable for a time; winches that keep their set points do so where these are taken."""
+    if drives.kind == DRUMS:
+        turn_drums(drives, cables, rows, gravity, time)
+    elif drives.kind == SECOND_ORDER:
+        for i in range(rows.shape[1]):
+            rows[t.LENGTH, i] += time * drives.now[RATE, i]
+
+
+@glue
+def account(drives: Drives, cables: Array, rows: Array, time: float) -> None:
+    """Add to the audit what winches did in a step."""
+    if drives.kind == DRUMS:
+        slip(drives, cables, time)
+    else:
+        for i in range(rows.shape[1]):
+            wound = rows[t.LENGTH, i] - drives.now[BEFORE, i]
+            drives.audit[SUPPLIED] -= 0.5 * (drives.now[BEFORE_WHOLE, i] + drives.now[WHOLE, i]) * wound
+
+
+@glue
+def filter_tensions(drives: Drives, share: float) -> None:
+    """Let the filtered tensions follow, by the share of a new reading."""
+    for i in range(drives.now.shape[1]):
+        drives.now[FILTERED, i] += share * (drives.now[AT_FRAME, i] - drives.now[FILTERED, i])

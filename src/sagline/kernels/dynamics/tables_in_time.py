@@ -5,7 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sagline.arrays import Array
-from sagline.kernels.jit import formula
+from sagline.kernels.jit import formula, glue
+
+MOMENT = 1e-6  # of a step: instants that are nearer are the same
 
 CourseArrays = tuple[Array, Array, Array, Array]  # a Course as it comes from Python
 
@@ -53,3 +55,9 @@ def follow(course: Course, at: int, now: float, shift: float, value: Array, rate
         value[k] = (left * low + x * high) + whole * x * left * bend
         rate[k] = slope + (left - x) * bend - x * left * (begin + end)
     return at
+
+
+@glue
+def ends(course: Course, at: int, moment: float) -> bool:
+    """Whether the interval that is known ends by a moment, and another follows."""
+    return at < course.time.shape[0] - 1 and moment >= course.time[at + 1]

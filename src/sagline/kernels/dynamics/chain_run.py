@@ -1,0 +1,120 @@
+"""A run of a platform on chains: all that its steps work on, and what it is given in time."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from sagline.arrays import Array, Indices
+from sagline.kernels.cable import rows as t
+from sagline.kernels.dynamics import chain as c
+from sagline.kernels.dynamics import drives as d
+from sagline.kernels.dynamics.drives import Drives, keep_set_points
+from sagline.kernels.dynamics.progress import LENGTH_AT, WIND_AT, WRENCH_AT
+from sagline.kernels.dynamics.tables_in_time import Course, CourseArrays, follow
+from sagline.kernels.jit import glue, kernel
+
+ROOM = 21
+
+Numbers = tuple[float, float, float]  # step [s], gravity [m/s^2], share of a new reading in a load cell's filtered one
+Rules = tuple[int, int, int]  # kind of winches, remembered, loops' stride
+Body = tuple[Array, Array, Array, Array]  # cables, inertia, what of a wrench moves the body, where the given one acts
+Courses = tuple[CourseArrays, CourseArrays, CourseArrays]  # of lengths, wrenches, the wind
+Kept = tuple[Array, Array, Array, Array, Array, Indices, Array]  # state, rows, drives' now, layers, audit, counters
+ChainArrays = tuple[Array, Array, Array, Array, Indices]
+Records = tuple[Array, Array, Array, Array, Array, Array]  # states, tensions, lengths, energies, notes, points
+
+
+class Chains(NamedTuple):
+    """The chains of m cables, with room for P nodes each.
+
+    Attributes:
+        table: What they are, (m, CHAIN_COLUMNS).
+        place: Of the nodes [m], (m, 3, P).
+        speed: Of the nodes [m/s], (m, 3, P).
+        pulls: Forces by length of the elements [N/m], (m, P).
+        counts: Free nodes, (m,).
+    """
+
+    table: Array
+    place: Array
+    speed: Array
+    pulls: Array
+    counts: Indices
+
+
+class ChainRun(NamedTuple):
+    """What a run works on; arrays as in `chains.run_chains`."""
+
+    chains: Chains
+    step: float
+    gravity: float
+    cables: Array
+    inertia: Array
+    free: Array
+    handle: Array
+    drives: Drives
+    lengths: Course
+    wrenches: Course
+    winds: Course
+    state: Array
+    rows: Array
+    at: Indices
+    targets: Array
+    target_rates: Array
+    force: Array
+    given: Array
+    wind: Array
+    spare: Array
+
+
+@glue
+def run_of(
+    rules: Rules, numbers: Numbers, body: Body, data: Array, courses: Courses, kept: Kept, chain_arrays: ChainArrays
+) -> ChainRun:
+    """What a run works on, from what `chains.run_chains` is given."""
+    kind, remembered, _stride = rules
+    step, gravity, _filtering = numbers
+    state, rows, now, layers, audit, at, room = kept
+    wide = courses[0][1].shape[1]
+    return ChainRun(
+        Chains(*chain_arrays),
+        step,
+        gravity,
+        body[0],
+        body[1],
+        body[2],
+        body[3],
+        Drives(kind, remembered > 0, data, now, layers, audit),
+        Course(*courses[0]),
+        Course(*courses[1]),
+        Course(*courses[2]),
+        state,
+        rows,
+        at,
+        room[ROOM : ROOM + wide],
+        room[ROOM + wide : ROOM + 2 * wide],
+        room[0:6],
+        room[6:12],
+        room[12:15],
+        room[15:21],
+    )
+
+
+@glue
+def take_lengths(run: ChainRun) -> None:
+    """Fill what is left of every length for the element at the frame, and the rates."""
+    for i in range(run.chains.counts.shape[0]):
+        row = run.chains.table[i]
+        row[c.REST] = run.rows[t.LENGTH, i] - row[c.BEHIND] - run.chains.counts[i] * row[c.ELEMENT]
+        row[c.RATE] = run.drives.now[d.RATE, i]
+
+
+@kernel
+def follow_courses(run: ChainRun, now: float, shift: float) -> None:
+    """Fill what is asked of the winches at a time, and what is given of wrench and wind."""
+    at = run.at
+    at[LENGTH_AT] = follow(run.lengths, at[LENGTH_AT], now, shift, run.targets, run.target_rates)
+    at[WRENCH_AT] = follow(run.wrenches, at[WRENCH_AT], now, 0.0, run.given, run.spare)
+    at[WIND_AT] = follow(run.winds, at[WIND_AT], now, 0.0, run.wind, run.spare)
+    keep_set_points(run.drives, run.rows, run.targets, run.target_rates)
+    take_lengths(run)
