@@ -6,13 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, Indices
+from sagline.arrays import Array, Flags, Indices
 from sagline.dynamics.lobatto import lobatto
 from sagline.kernels.dynamics import string as columns
 from sagline.kernels.dynamics.spectral import interpolate, node_counts, spectral_matrices, stretch_matrices
 from sagline.statics.strings import Strings
 
-HELD = 1e6  # of the square of the highest frequency: that of what does not move
 _TINY = 1e-300
 
 
@@ -114,10 +113,10 @@ def component_modes(strings: Strings, row: int, up_to: float) -> Components:
     points, carried, mass = np.empty((t, n, 6)), np.empty((t, n, 5)), np.empty((t, 4))
     plane, normal = np.empty((t, 2 * n, 2 * n)), np.empty((t, n, n))
     spectral_matrices(table, omega, lobatto(), points, plane, normal, carried, mass)
-    first = 0 if table[:, columns.BEHIND_X :].any() else 1  # a frame end that does not give way is held
-    unknowns = omega, first, counts - 1  # and so is the platform end
-    inside = _motions(plane, carried[:, :, :4].reshape(t, 2 * n, 2), *unknowns)
-    aside = _motions(normal, carried[:, :, 4:], *unknowns)
+    free = (np.arange(n) < counts[:, None] - 1)[..., None]  # the platform end is held
+    first = 0 if table[:, columns.BEHIND_X :].any() else 1  # and so is a frame end that does not give way
+    inside = _motions(plane, carried[:, :, :4].reshape(t, 2 * n, 2), np.repeat(free, 2, axis=1), 2 * first)
+    aside = _motions(normal, carried[:, :, 4:], free, first)
     swings = inside.drive @ axes[:, ::2]
     sways = aside.drive @ axes[:, 1:2]
     return Components(
@@ -131,17 +130,13 @@ def component_modes(strings: Strings, row: int, up_to: float) -> Components:
     )
 
 
-def _motions(matrix: Array, rest: Array, omega: float, first: int, last: Indices) -> Motions:
-    """Of the nodes from the first that moves to before each cable's last; those beyond do not move, at HELD."""
-    t, size = matrix.shape[:2]
-    each = rest.shape[2]  # unknowns of a node, as many as directions
-    count = size - each * (first + 1)
-    square, shape = np.full((t, count), HELD * omega**2), np.zeros((t, size, count))
-    begin = each * first
-    for i, end in enumerate((each * last).tolist()):  # one by one: of a cable's own size, not of the largest
-        own = end - begin
-        square[i, :own], shape[i, begin:end, :own] = np.linalg.eigh(matrix[i, begin:end, begin:end])
-    return Motions(rest, square, shape, np.swapaxes(shape, -1, -2) @ rest)
+def _motions(matrix: Array, rest: Array, free: Flags, first: int) -> Motions:
+    """Of the unknowns from the first that moves to the last that does in any cable."""
+    last = matrix.shape[1] - (2 if rest.shape[2] == 2 else 1)
+    square, own = np.linalg.eigh(matrix[:, first:last, first:last])
+    shape = np.zeros((*matrix.shape[:2], last - first))
+    shape[:, first:last] = own
+    return Motions(rest, square, shape, np.swapaxes(own, -1, -2) @ (rest * free)[:, first:last])
 
 
 def _still(mass: Array, axes: Array, taut: Indices, count: int) -> Array:

@@ -9,7 +9,7 @@ from numpy.polynomial import legendre
 from scipy.special import roots_jacobi
 
 from sagline.arrays import Array, locked
-from sagline.kernels.dynamics.spectral import LARGEST_DEGREE, Lobatto
+from sagline.kernels.dynamics.spectral_elements import LARGEST_DEGREE, Lobatto
 
 
 @cache

@@ -12,8 +12,8 @@ import numpy as np
 
 from sagline.arrays import Array
 from sagline.dynamics.mode_slopes import Rest, Swings, lever_form
-from sagline.kernels.dynamics.collocation import INTEGRALS, NODES, STAGES, WEIGHTS
 from sagline.kernels.dynamics.string import SMOOTH, TINY
+from sagline.kernels.dynamics.transfer import INTEGRALS, NODES, STAGES, WEIGHTS
 
 PHASE = 0.45 * np.pi  # of a transverse wave in an element [rad]
 HALVINGS = 40  # of a cable: about a fold elements would become ever shorter

@@ -18,7 +18,7 @@ Forced: TypeAlias = Callable[[Array], Complex]  # displacement by force (F, 3, 3
 LIKELY: Final = 0.4  # of the strongest answer at a mode: those near whose modes a stronger one is looked for
 ROUNDS: Final = 2  # of looking more closely
 CLOSER: Final = 5  # frequencies between two
-WIDTHS: Final = np.linspace(-3.0, 3.0, 13)  # of half a peak, about a mode: where
+WIDTHS: Final = np.linspace(-3.0, 3.0, 7)  # of half a peak, about a mode: where
 
 
 def summed(found: Found, rest: Array, ratio: float) -> Forced:
