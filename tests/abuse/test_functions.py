@@ -27,6 +27,8 @@ LONGEST = 300  # characters
 MOST_MEMORY = 500_000  # kB
 SHARE = 0.08  # of the cases that are tried each time; all of them in a long run
 SEED = 20260310
+REAL = "fiubU"  # kinds of numbers, and texts
+WITH_PHASES = (sl.dynamic_stiffness, sl.frequency_response)
 
 
 @pytest.fixture(scope="module")
@@ -102,7 +104,7 @@ def _fault(call: Call, argument: str, bad: Bad, right: Any) -> str:
         return f"answered: {result!r:.200}"
     if bad.verdict == SAME and not _same(result, right):
         return f"another answer: {result!r:.200}"
-    return _fault_of_answer(result)
+    return _fault_of_answer(result, REAL + "c" if call.function in WITH_PHASES else REAL)
 
 
 def _fault_of_text(text: str) -> str:
@@ -111,11 +113,11 @@ def _fault_of_text(text: str) -> str:
     return ""
 
 
-def _fault_of_answer(result: Any) -> str:
-    """An answer holds real numbers; it is not finite only where a status or a proof says why."""
+def _fault_of_answer(result: Any, kinds: str) -> str:
+    """An answer holds real numbers, but for phases; it is not finite only where a status or a proof says why."""
     arrays = list(_arrays(result))
-    if any(array.dtype.kind not in "fiubU" for array in arrays):
-        return "an answer of no real numbers"
+    if any(array.dtype.kind not in kinds for array in arrays):
+        return "an answer of no such numbers"
     status = getattr(result, "status", np.zeros(1))
     told = np.any(np.asarray(status) != 0) if not isinstance(result, sl.Equilibria) else True
     if not told and isinstance(result, sl.Pose | sl.Path | sl.Robot | sl.Cable | sl.Winch):
