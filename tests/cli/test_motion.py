@@ -65,6 +65,14 @@ def test_every_frequency_says_what_it_is_and_hidden_modes_are_counted(folder: Fi
     assert len(table) == 1 + modes.count + 6
 
 
+def test_where_no_mode_lies_the_lowest_massless_one_is_told(folder: FilePath) -> None:
+    result = sagline("vibrate", "article-suspended", "--pose", "0,0,1.5", "--up-to", "1", "--no-figures")
+    assert result.exit_code == 0, result.stderr
+    assert result.stdout.startswith("No mode with cable mass lies below 1 Hz, by the exact count; the lowest massless")
+    assert "1.787 Hz. Raise --up-to." in " ".join(result.stdout.split())
+    assert "mode  " not in result.stdout
+
+
 def test_a_film_of_ten_seconds(folder: FilePath) -> None:
     from PIL import Image
 

@@ -79,9 +79,9 @@ def test_what_a_reader_finds(saved: FilePath) -> None:
 
 def test_plans_and_simulations_are_told_apart(tmp_path: FilePath, saved: FilePath) -> None:
     a_plan().save(tmp_path / "run.nc")
-    with pytest.raises(sl.FileError, match=r"run\.nc: is no simulation of sagline, it names no sagline_sim"):
+    with pytest.raises(sl.FileError, match=r"run\.nc: is a plan of sagline, no simulation. Read it with load_plan"):
         sl.load_simulation(tmp_path / "run.nc")
-    with pytest.raises(sl.FileError, match=r"sim\.nc: is no plan of sagline, it names no sagline_format"):
+    with pytest.raises(sl.FileError, match=r"sim\.nc: is a simulation of sagline, no plan. Read it with load_sim"):
         sl.load_plan(saved)
     (tmp_path / "sim.yaml").write_text("a: 1")
     with pytest.raises(sl.FileError, match=r"is a YAML file, no simulation of sagline. Give the .nc file that a sim"):

@@ -11,7 +11,9 @@ from PIL import Image
 import sagline as sl
 from sagline import plot
 from sagline.dynamics.damping import Damping
+from sagline.dynamics.mode_list import ListedMode
 from sagline.dynamics.vibration_status import VibrationStatus
+from sagline.plot.film import shares_told
 from tests.plot import made
 
 FREQUENCY = np.array([1.5, 2.2, 2.9, 4.0])
@@ -102,6 +104,23 @@ def test_the_response_with_cable_mass_is_that_of_the_exact_stiffness_of_the_cabl
     frequency, answer = (np.asarray(each)[::150] for each in ax.get_lines()[0].get_data())
     exact = sl.frequency_response(state, frequency, damping).compliance[:, 0, 0]
     np.testing.assert_allclose(answer, np.abs(exact), rtol=0.02)
+
+
+def test_what_frequency_response_found_is_drawn_where_it_was_asked_for() -> None:
+    state, damping = made.state_at(3.0, 2.0), Damping(modal_damping=0.02, loss_time=1e-4)
+    frequency = np.concatenate(([0.0], np.geomspace(8.0, 0.5, 40)))  # in any order, and at rest
+    found = sl.frequency_response(state, frequency, damping)
+    ax = plot.response(found, "about y", "x")
+    for line, answer in zip(ax.get_lines(), (found.compliance, found.massless_compliance), strict=True):
+        np.testing.assert_array_equal(line.get_xdata(), frequency[:0:-1])
+        np.testing.assert_allclose(np.asarray(line.get_ydata()), np.abs(answer[:0:-1, 0, 4]), rtol=1e-15)
+    assert [line.get_label() for line in ax.get_lines()] == ["with cable mass", "massless"]
+    assert ax.get_ylabel() == "motion along x for a moment about y [1/N]"
+    assert ax.get_title(loc="right") == "modal damping 2 %, loss time 0.0001 s"
+    with pytest.raises(sl.InvalidValueError, match="frequency is 1 of them above 0 Hz; allowed: two at least"):
+        plot.response(sl.frequency_response(state, [0.0, 2.0]))
+    with pytest.raises(sl.InvalidValueError, match="motion is 'w'; allowed: x, y, z, about x"):
+        plot.response(found, "x", "w")
 
 
 def test_a_response_needs_modes_and_a_motion() -> None:
@@ -199,6 +218,14 @@ def test_a_map_has_the_value_of_a_pose_where_the_pose_is() -> None:
         plot.frequency_map(sl.frequency_map(made.ROBOT, poses[:5], up_to=4.0))
     with pytest.raises(sl.InvalidValueError, match="quantity is 'mode'"):
         plot.frequency_map(found, "mode")
+
+
+def test_a_film_says_whose_the_energy_is() -> None:
+    def told(cable: int | None, share: float) -> str:
+        return shares_told(ListedMode(1, "with cable mass", 2.0, 1.0 - share, cable, share, 0.01))
+
+    assert told(3, 0.25) == "kinetic energy: platform 75 %, cable 3 25 %"
+    assert told(3, 0.004) == told(None, 0.004) == "kinetic energy: platform 100 %, each cable less than 1 %"
 
 
 def test_a_film_lasts_ten_seconds_and_is_a_gif(tmp_path: Path) -> None:

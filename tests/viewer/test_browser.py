@@ -264,7 +264,7 @@ def test_a_frequency_that_is_clicked_moves(browser: Browser) -> None:
         found = sl.vibration(swing.state, up_to=20.0)
         told = page.locator(".sagline b", has_text="Hz, with cable mass").inner_text()
         assert told == f"{found.frequency[1]:.3f} Hz, with cable mass"
-        page.get_by_text(f"drawn {swing.factor:.2g} times as large as with 1 J").wait_for()
+        page.get_by_text(f"drawn {swing.factor:.2g} times as large as a vibration of 1 J is").wait_for()
         before = page.locator("canvas[data-engine]").screenshot()
         await_that(page, lambda: page.locator("canvas[data-engine]").screenshot() != before)  # without anybody's doing
         assert page.locator("tr.chosen").count() == 1

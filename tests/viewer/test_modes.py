@@ -88,7 +88,9 @@ def test_the_list_says_what_every_frequency_is(page: Shown) -> None:
         assert marks == [str(k + 1) for k in range(found.frequency.size)]
         client.set(handle(page, "Mode")._impl.uuid, "<b>nothing</b>")
         await_that(lambda: not page.viewer._modes.moving)
-        assert "There is no mode &lt;b&gt;nothing" in page.viewer._modes._panel._told.content
+        told = page.viewer._modes._panel._told.content
+        assert "There is no mode &lt;b&gt;nothing" in told
+        assert f": the list has 1 to {found.frequency.size} and massless 1 to 6." in told
         client.set(handle(page, "Mode")._impl.uuid, "1")
         await_that(lambda: page.viewer._modes.moving)
 

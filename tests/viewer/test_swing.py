@@ -60,7 +60,7 @@ def test_it_says_how_much_larger_than_with_a_joule_it_is_drawn() -> None:
             * (robot.mass * swing.motion[:3] @ swing.motion[:3] + swing.motion[3:] @ inertia @ swing.motion[3:])
         )
         assert kinetic == pytest.approx(swing.factor**2, rel=1e-9)
-        assert f"drawn {swing.factor:.2g} times as large as with 1 J" in swing.told
+        assert f"drawn {swing.factor:.2g} times as large as a vibration of 1 J is" in swing.told
         assert f"{2.0 * swing.mode.frequency:.3g} times slower" in swing.told
 
 

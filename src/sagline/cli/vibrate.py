@@ -145,6 +145,12 @@ def _tell(found: Vibration, modes: list[ListedMode], state: Equilibrium) -> None
     chosen = [
         mode for k, mode in enumerate(swinging) if k < LOWEST or mode.platform_share >= LEAST_SHARE or k in beside
     ]
+    if not swinging:
+        proof = "by the exact count" if found.complete else "as far as is known"
+        lowest = written(min(beyond, default=np.nan), ".3f")
+        below = f"No mode with cable mass lies below {found.up_to:g} Hz, {proof}"
+        show(f"{below}; the lowest massless one is at {lowest} Hz. Raise --up-to.")
+        return
     rows = [
         [
             mode.name,

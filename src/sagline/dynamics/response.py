@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from sagline.arguments import optional
 from sagline.arrays import Array, checked, locked
 from sagline.dynamics.answer import LOWEST, Answer
-from sagline.dynamics.cable_dynamics import Complex, one_state
+from sagline.dynamics.cable_dynamics import Complex, check_lengths, one_state
 from sagline.dynamics.count import modes_below
 from sagline.dynamics.damping import Damping
 from sagline.dynamics.reduced import setting_of
@@ -94,8 +94,7 @@ def frequency_response(state: Equilibrium, frequency: ArrayLike, damping: Dampin
     check_memory(f"{given.size:,} frequencies", _BYTES * given.size, "Take them in parts.")
     known = optional(damping, Damping, "damping") or Damping()
     setting = setting_of(state)
-    if np.isnan(setting.stiffness).any():
-        raise InvalidValueError("state", "without lengths", "an equilibrium", "See the status of the plan.")
+    check_lengths(state)
     check_number(modes_below(setting, 0, max(float(given.max()), LOWEST)), float(given.max()), "frequency")
     slopes = cable_slopes(state)
     answer = Answer(setting, slopes.matrix, slopes.blocks, known)

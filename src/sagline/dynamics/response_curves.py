@@ -8,7 +8,7 @@ import numpy as np
 
 from sagline.arguments import choice, instance
 from sagline.arrays import Array, locked
-from sagline.dynamics.response import frequency_response
+from sagline.dynamics.response import FrequencyResponse, frequency_response
 from sagline.dynamics.vibration import Vibration
 from sagline.dynamics.vibration_status import VibrationStatus
 from sagline.errors import InvalidValueError
@@ -60,13 +60,42 @@ def response_curves(vibration: Vibration, force: str = "x", motion: str | None =
     if vibration.status is not VibrationStatus.SOLVED or not vibration.frequency.size:
         reason = vibration.status.name if vibration.status is not VibrationStatus.SOLVED else "no mode below up_to"
         raise InvalidValueError("vibration", reason, "a stable state with modes", "Ask for another state, or higher.")
-    column = MOTIONS.index(choice(force, "force", MOTIONS))
-    row = column if motion is None else MOTIONS.index(choice(motion, "motion", MOTIONS))
+    _places(force, motion)
     natural = np.concatenate((vibration.frequency, modes(state).frequency))
     found = frequency_response(state, _grid(natural, vibration.up_to), vibration.damping)
-    with_mass, massless = (np.abs(one[:, row, column]) for one in (found.compliance, found.massless_compliance))
-    static = abs(float(stiffness(state).compliance[row, column]))
-    return ResponseCurves(found.frequency, locked(with_mass), locked(massless), static, UNITS[row > 2, column > 2])
+    return drawn_curves(found, force, motion)
+
+
+def drawn_curves(response: FrequencyResponse, force: str = "x", motion: str | None = None) -> ResponseCurves:
+    """One element of what `frequency_response` found, as far as logarithmic axes can show it.
+
+    Args:
+        response: The response.
+        force: As of `response_curves`.
+        motion: As of `response_curves`.
+
+    Returns:
+        The curves, without what is at 0 Hz or has no end.
+
+    Raises:
+        InvalidValueError: If less than two frequencies are left, or there is no such motion.
+    """
+    row, column = _places(force, motion)
+    answers = np.abs([one[:, row, column] for one in (response.compliance, response.massless_compliance)])
+    kept = np.flatnonzero((response.frequency > 0.0) & np.isfinite(answers).all(axis=0))
+    kept = kept[np.argsort(response.frequency[kept], kind="stable")]
+    if len(kept) < 2:
+        step = "Give more, np.geomspace(0.5, 20.0, 500) for instance."
+        raise InvalidValueError("frequency", f"{len(kept)} of them above 0 Hz", "two at least", step)
+    static = abs(float(stiffness(response.state).compliance[row, column]))
+    with_mass, massless = (locked(answer[kept]) for answer in answers)
+    return ResponseCurves(locked(response.frequency[kept]), with_mass, massless, static, UNITS[row > 2, column > 2])
+
+
+def _places(force: str, motion: str | None) -> tuple[int, int]:
+    """Row and column of a motion for a force."""
+    column = MOTIONS.index(choice(force, "force", MOTIONS))
+    return column if motion is None else MOTIONS.index(choice(motion, "motion", MOTIONS)), column
 
 
 def _grid(natural: Array, highest: float) -> Array:

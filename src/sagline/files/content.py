@@ -5,12 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from sagline.errors import FileError
 from sagline.files.seal import Seal
+
+OTHERS: Final = {
+    "sagline_format": ("a plan", "Read it with load_plan, or look at it: sagline view ROBOT FILE."),
+    "sagline_simulation_format": ("a simulation", "Read it with load_simulation, or play it: sagline view ROBOT FILE."),
+    "sagline_frequency_map_format": ("a frequency map", "Open it with xarray.open_dataset."),
+}
 
 
 class Content(NamedTuple):
@@ -47,8 +53,7 @@ class Content(NamedTuple):
         """
         found = attributes.get(self.key)
         if found is None:
-            reason = f"is no {self.name} of sagline, it names no {self.key}"
-            raise FileError(path, reason, "Check that this is the file you mean.")
+            raise FileError(path, *self._instead(attributes))
         if not isinstance(found, int | np.integer) or found < 1:
             step = "Write it again; it was edited, or damaged."
             raise FileError(path, f"is of format {found!r}, which never was", step)
@@ -60,6 +65,13 @@ class Content(NamedTuple):
                 "Install a newer sagline.",
             )
         return int(found)
+
+    def _instead(self, attributes: Mapping[str, Any]) -> tuple[str, str]:
+        """What a file is of instead, and what to do with it."""
+        for key, (what, step) in OTHERS.items():
+            if key in attributes:
+                return f"is {what} of sagline, no {self.name}", step
+        return f"is no {self.name} of sagline, it names no {self.key}", "Check that this is the file you mean."
 
     def check_sealed(self, path: Path, found: Seal) -> None:
         """Refuse a file without a digest.

@@ -13,7 +13,7 @@ from mpl_toolkits.mplot3d.axes3d import Axes3D
 from PIL import Image
 
 from sagline.arguments import file_path, instance, whole_number
-from sagline.dynamics.mode_list import WITH_MASS, listed_modes
+from sagline.dynamics.mode_list import WITH_MASS, ListedMode, listed_modes
 from sagline.dynamics.vibration import Vibration
 from sagline.errors import FileError, InvalidValueError
 from sagline.files.whole import written_whole
@@ -30,6 +30,7 @@ SECONDS = 10.0  # of the film: so many swings that the last picture leads to the
 PICTURES = 25  # of one swing
 WIDTH, HEIGHT, DOTS = 6.4, 3.8, 100  # in, in, dots an inch
 COLORS = 48
+LEAST_SHARE = 0.01  # of a cable in the energy, that is told
 CORNERS = np.array(list(product((-0.5, 0.5), repeat=3)))
 EDGES = [(a, b) for a, b in combinations(range(8), 2) if np.count_nonzero(CORNERS[a] != CORNERS[b]) == 1]
 
@@ -81,9 +82,8 @@ def _pictures(swing: Swing, progress: Progress | None) -> list[Image.Image]:
     for artist in ax.get_children():
         artist.set_clip_on(False)  # the axes are square, the picture is wider
     _frame(ax, swing)
-    share = f"platform {100.0 * mode.platform_share:.0f} %, cable {mode.cable} {100.0 * mode.cable_share:.0f} %"
     ax.set_title(f"{robot.name}, mode {mode.number}: {mode.frequency:.3f} Hz {mode.kind}", fontsize=LABEL, y=0.97)
-    figure.text(0.5, 0.02, f"{share}; {swing.told}", fontsize=TICK, ha="center")
+    figure.text(0.5, 0.02, f"{shares_told(mode)}; {swing.told}", fontsize=TICK, ha="center")
     drawn = []
     for k in range(PICTURES):
         phase = 2.0 * np.pi * k / PICTURES
@@ -99,6 +99,18 @@ def _pictures(swing: Swing, progress: Progress | None) -> list[Image.Image]:
             progress(k + 1, PICTURES)
     palette = drawn[0].quantize(COLORS)
     return [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in drawn]
+
+
+def shares_told(mode: ListedMode) -> str:
+    """Whose the energy of a mode is, in words.
+
+    Args:
+        mode: The mode.
+    """
+    words = f"kinetic energy: platform {100.0 * mode.platform_share:.0f} %"
+    if mode.cable is None or mode.cable_share < LEAST_SHARE:
+        return f"{words}, each cable less than {100.0 * LEAST_SHARE:g} %"
+    return f"{words}, cable {mode.cable} {100.0 * mode.cable_share:.0f} %"
 
 
 def _frame(ax: Axes3D, swing: Swing) -> None:

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from sagline.dynamics.response_curves import response_curves
+from sagline.dynamics.response import FrequencyResponse
+from sagline.dynamics.response_curves import drawn_curves, response_curves
 from sagline.plot.sheet import BLUE, TICK, VERMILLION, axes_or_new, dressed, legend_outside
 
 if TYPE_CHECKING:
@@ -20,13 +21,16 @@ MARK = 0.035  # longest mark of a mode, of the axes' height
 FAINTEST = 0.15  # mark of a mode in which the platform stands still
 
 
-def response(vibration: Vibration, force: str = "x", motion: str | None = None, ax: Axes | None = None) -> Axes:
+def response(
+    vibration: Vibration | FrequencyResponse, force: str = "x", motion: str | None = None, ax: Axes | None = None
+) -> Axes:
     """How far the platform swings for a force of 1 N, over frequency: with cable mass, and massless.
 
     Marks at the foot are the modes with cable mass, the darker the more the platform takes part.
 
     Args:
-        vibration: Of a stable state, from `vibration`; its damping is that of both curves.
+        vibration: Of a stable state, from `vibration`; its damping is that of both curves. Or what `frequency_response`
+            found, which is drawn at its own frequencies and marks no modes.
         force: "x", "y", "z": a force along it; "about x", ...: a moment [N m].
         motion: In the same words, what is drawn; None for the motion of the force.
         ax: Axes to draw on; None for a new figure.
@@ -35,9 +39,13 @@ def response(vibration: Vibration, force: str = "x", motion: str | None = None, 
         The axes, both logarithmic.
 
     Raises:
-        InvalidValueError: If the vibration has no modes, or there is no such motion.
+        InvalidValueError: If the vibration has no modes or the response no frequencies, or there is no such motion.
     """
-    curves = response_curves(vibration, force, motion)
+    if isinstance(vibration, FrequencyResponse):
+        curves, modes = drawn_curves(vibration, force, motion), []
+    else:
+        curves = response_curves(vibration, force, motion)
+        modes = list(zip(vibration.frequency, vibration.platform_share, strict=True))
     ax = axes_or_new(ax)
     ax.loglog(curves.frequency, curves.with_mass, color=BLUE, linewidth=1.2, label="with cable mass", zorder=2.2)
     ax.loglog(
@@ -51,7 +59,7 @@ def response(vibration: Vibration, force: str = "x", motion: str | None = None, 
     ax.xaxis.set_major_formatter("{x:g}")
     ax.xaxis.set_minor_formatter(NullFormatter())
     ax.tick_params(which="minor", length=1.5, width=0.4)
-    for frequency, share in zip(vibration.frequency, vibration.platform_share, strict=True):
+    for frequency, share in modes:
         shade = FAINTEST + (1.0 - FAINTEST) * float(share)
         ax.axvline(frequency, ymax=MARK, color=BLUE, alpha=shade, linewidth=0.9, zorder=1.9)
     ax.set_title(_damping(vibration), fontsize=TICK, loc="right")
@@ -73,7 +81,7 @@ def _cause(force: str) -> str:
     return f"moment {force}" if force.startswith("about") else f"force along {force}"
 
 
-def _damping(vibration: Vibration) -> str:
+def _damping(vibration: Vibration | FrequencyResponse) -> str:
     """What both curves are damped by, in words."""
     damping = vibration.damping
     parts = [

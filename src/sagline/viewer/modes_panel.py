@@ -6,6 +6,7 @@ from collections.abc import Callable
 from html import escape
 from typing import Any
 
+import numpy as np
 import viser
 
 from sagline.dynamics.mode_list import MASSLESS, ListedMode, listed_modes
@@ -71,7 +72,7 @@ class ModesPanel:
         """Show the list, the response, and what moves."""
         force = self._force.value if self._force.value in MOTIONS else MOTIONS[0]
         name = "" if swing is None else swing.mode.name
-        self._told.content = _told(swing, self.chosen)
+        self._told.content = _told(vibration, swing, self.chosen)
         if self._shown == (vibration, force, name):
             return
         self._shown = (vibration, force, name)
@@ -91,12 +92,14 @@ def _unit(force: str) -> str:
     return "N m" if force.startswith("about") else "N"
 
 
-def _told(swing: Swing | None, chosen: str) -> str:
+def _told(vibration: Vibration, swing: Swing | None, chosen: str) -> str:
     if swing is not None:
         mode = swing.mode
         return block(f"<b>{mode.frequency:.3f} Hz, {mode.kind}</b>: {swing.told}")
     if chosen:
-        return sentence(f"There is no mode {escape(chosen)} in the list.")
+        counts = vibration.frequency.size, int(np.isfinite(vibration.massless_frequency).sum())
+        there = [f"{word}1 to {count}" for word, count in zip(("", "massless "), counts, strict=True) if count]
+        return sentence(f"There is no mode {escape(chosen)}: the list has {' and '.join(there) or 'none'}.")
     return sentence("Click a frequency, and it moves.")
 
 

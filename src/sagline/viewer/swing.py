@@ -79,7 +79,7 @@ class Swing:
         """How much larger and slower than it is, in words."""
         slower = PERIOD * self.mode.frequency
         speed = f"{slower:.3g} times slower" if slower >= 1.0 else f"{1.0 / slower:.3g} times faster"
-        return f"drawn {self.factor:.2g} times as large as with {ENERGY:g} J, {speed}"
+        return f"drawn {self.factor:.2g} times as large as a vibration of {ENERGY:g} J is, {speed}"
 
 
 def mode_of(vibration: Vibration, name: str) -> ListedMode | None:
