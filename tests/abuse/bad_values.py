@@ -13,6 +13,7 @@ import pint
 from matplotlib.figure import Figure
 
 import sagline as sl
+from sagline.results import Result
 
 REFUSED, SAME, EITHER = "refused", "the same answer", "refused or answered"
 UNITS: pint.UnitRegistry[Any] = pint.UnitRegistry()
@@ -273,7 +274,8 @@ def _object(valid: Any) -> Iterator[Bad]:
     yield Bad("(1, 1, 2)", (1, 1, 2), REFUSED)
     yield Bad("an array", np.ones((3, 3)), REFUSED)
     for other in strangers():
-        if not isinstance(other, kind) and type(other).__bases__ != kind.__bases__:
+        related = {*type(other).__bases__} & {*kind.__bases__} - {object, Result}  # another model or method
+        if not isinstance(other, kind) and not related:
             yield Bad(f"a {type(other).__name__}", other, REFUSED)
 
 
@@ -281,6 +283,11 @@ def _one(valid: Any) -> Iterator[Bad]:
     """An object where a sequence of them is none."""
     yield from _object(valid)
     yield Bad("one in a list", [valid], REFUSED)
+
+
+def _place(valid: Any) -> Iterator[Bad]:
+    """A state where a pose may be."""
+    yield from (bad for bad in _one(valid) if not isinstance(bad.value, sl.Pose))
 
 
 def _motion(valid: Any) -> Iterator[Bad]:
@@ -342,5 +349,5 @@ KINDS = {
     name.removeprefix("_"): function
     for name, function in globals().items()
     if function in (_array, _number, _whole, _cable, _seed, _index, _word, _words, _text, _file, _callback, _mapping,
-                    _object, _one, _motion, _out, _ax, _points, _sample)
+                    _object, _one, _place, _motion, _out, _ax, _points, _sample)
 }  # fmt: skip

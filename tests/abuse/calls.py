@@ -693,7 +693,7 @@ def _in_time(given: _Given) -> dict[str, Call]:
             lambda **a: (sl.Simulator(**a), None)[1],
             _all(
                 robot=("one", given.robot),
-                start=("one", state),
+                start=("place", state),
                 winches=("one", sl.SecondOrder(10.0)),
                 winding=("word", "constant"),
                 integrator=("word", "splitting", True),
