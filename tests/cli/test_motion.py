@@ -130,13 +130,31 @@ def test_a_break_is_what_the_library_says_and_its_file_is_read_again(folder: Fil
     np.testing.assert_array_equal(read.tensions, own.tensions)
     assert np.isnan(read.length[-1, 3])
     text = " ".join(result.stdout.split())
-    assert f"largest tension {np.nanmax(own.tensions):,.1f} N" in text
     (event,) = own.events
+    assert own.largest_tension is not None
+    assert own.largest_tension.max() == event.tension_after > np.nanmax(own.tensions)  # between samples too
+    np.testing.assert_array_equal(read.largest_tension, own.largest_tension)
+    cable = int(own.largest_tension.argmax())
+    assert f"largest tension {event.tension_after:,.1f} N, cable {cable} " in text
+    assert "above tension_max" not in text
     assert (
         f"0.200 s: break of cable 3, {event.tension_before:,.1f} N before, then at most {event.tension_after:,.1f} N"
         in text
     )
     assert (folder / "sim-energy.png").exists()
+
+
+def test_cables_above_their_limit_are_named(folder: FilePath) -> None:
+    robot = sl.load_robot("cogiro")
+    (folder / "weak.yaml").write_text(sl.dump_robot(robot.replace(tension_max=800.0)))
+    words = ["--break", "3@0.1s", "--after", "0.6", "--no-figures", "--out", "sim.nc"]
+    result = sagline("simulate", "weak.yaml", *words)
+    assert result.exit_code == 0, result.stderr
+    largest = sl.load_simulation(folder / "sim.nc").largest_tension
+    assert largest is not None
+    above = np.flatnonzero(largest > 800.0)
+    assert 0 < above.size < 8
+    assert f"above tension_max cables {', '.join(map(str, above))} " in " ".join(result.stdout.split())
 
 
 def test_a_shaped_path_leaves_less_vibration(folder: FilePath) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import sagline as sl
 from sagline.dynamics.simulation import Occurrence, energy_balance
 from sagline.files.robot_file import dump_robot
-from sagline.files.simulation_layout import NODES, SAMPLES, TIME
+from sagline.files.simulation_layout import LARGEST, NODES, SAMPLES, TIME
 
 ROBOT = sl.load_robot("article-suspended")
 SAMPLE_COUNT, NODE_COUNT = 7, 5
@@ -45,11 +45,14 @@ def a_simulation(
         winches=sl.SecondOrder(10.0, 0.7) if nodes else "robot",
         winding="constant" if nodes else "remembered",
         damping=sl.Damping(1e-3, 0.2),
+        largest_tension=1.0 + rng.random(cables) if nodes else None,
     )
 
 
 def assert_same(simulation: sl.Simulation, other: sl.Simulation) -> None:
-    for quantity in (TIME, *SAMPLES, *(() if simulation.nodes is None else (NODES,))):
+    assert (simulation.largest_tension is None) == (other.largest_tension is None)
+    known = (LARGEST,) if simulation.largest_tension is not None else ()
+    for quantity in (TIME, *SAMPLES, *known, *(() if simulation.nodes is None else (NODES,))):
         mine, theirs = (np.asarray(attrgetter(quantity.place)(s)) for s in (simulation, other))
         assert (mine.dtype, mine.shape) == (theirs.dtype, theirs.shape), quantity.place
         assert mine.tobytes() == theirs.tobytes(), quantity.place

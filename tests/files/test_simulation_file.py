@@ -10,7 +10,7 @@ import xarray as xr
 import sagline as sl
 from sagline.dynamics.simulation import EnergyBalance, Occurrence
 from sagline.files.seal import seal
-from sagline.files.simulation_layout import EVENTS, NODES, SAMPLES, TIME
+from sagline.files.simulation_layout import EVENTS, LARGEST, NODES, SAMPLES, TIME
 from tests.files.plans import a_plan
 from tests.files.simulations import ROBOT, a_simulation, assert_same
 
@@ -50,7 +50,7 @@ def test_a_broken_cable_and_a_dropped_load_come_back(tmp_path: FilePath, cable_m
 
 
 def test_nothing_of_a_simulation_is_left_out() -> None:
-    places = {quantity.place.split(".")[0] for quantity in (TIME, *SAMPLES, NODES)}
+    places = {quantity.place.split(".")[0] for quantity in (TIME, *SAMPLES, LARGEST, NODES)}
     told = {"robot", "events", "cable_mass", "step", "integrator", "winches", "winding", "damping"}
     assert places | told == {field.name for field in fields(sl.Simulation)}
     kept = {quantity.place for quantity in SAMPLES if quantity.place.startswith("energy.")}

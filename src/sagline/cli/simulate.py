@@ -165,17 +165,30 @@ def _residual(simulation: Simulation) -> float:
     return float(np.linalg.norm(place - place.mean(axis=0), axis=1).max())
 
 
+def _largest(simulation: Simulation) -> Array:
+    """The largest tension of each cable at any step, for which cables, anchors and winches are to be designed [N]."""
+    if simulation.largest_tension is not None:
+        return simulation.largest_tension
+    largest: Array = np.nanmax(simulation.tensions, axis=0)
+    return largest
+
+
+def _above(simulation: Simulation) -> list[int]:
+    """Cables whose tension exceeds the robot's limit."""
+    return np.flatnonzero(_largest(simulation) > simulation.robot.tension_max).tolist()
+
+
 def _tell(simulation: Simulation) -> None:
     energy = simulation.energy
-    cable = int(np.nanargmax(np.nanmax(simulation.tensions, axis=0)))
-    row = int(np.nanargmax(simulation.tensions[:, cable]))
+    largest = _largest(simulation)
+    cable, above = int(np.argmax(largest)), _above(simulation)
     size = float(np.nanmax(np.abs(energy.kinetic) + np.abs(energy.potential)))
     rows = [
         ["simulated", f"{simulation.time[-1] - simulation.time[0]:g} s"],
         ["cables", _cables(simulation.cable_mass)],
         ["step", n(simulation.step, ".3g", "s")],
-        ["largest tension", f"{written(simulation.tensions[row, cable], ',.1f')} N, cable {cable}, "
-         f"at {simulation.time[row]:.3f} s"],
+        ["largest tension", f"{written(largest[cable], ',.1f')} N, cable {cable}"],
+        *([["above tension_max", f"cable{'s' * (len(above) > 1)} {', '.join(map(str, above))}"]] if above else []),
         [f"residual, last {LAST:g} s", n(_residual(simulation), ".3g", "m", size=1e3)],
         ["work supplied", n(energy.supplied[-1], ".4g", "J", size=size)],
         ["energy lost", n(energy.lost[-1], ".4g", "J", size=size)],
@@ -195,7 +208,8 @@ def _record(simulation: Simulation) -> dict[str, Any]:
         "cable_mass": simulation.cable_mass,
         "step_s": simulation.step,
         "duration_s": float(simulation.time[-1] - simulation.time[0]),
-        "tension_max_n": float(np.nanmax(simulation.tensions)),
+        "tension_max_n": float(_largest(simulation).max()),
+        "cables_above_tension_max": _above(simulation),
         "residual_m": _residual(simulation),
         "supplied_j": float(energy.supplied[-1]),
         "lost_j": float(energy.lost[-1]),

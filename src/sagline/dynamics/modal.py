@@ -234,7 +234,7 @@ def modal_simulation(given: Beginning, damping: Damping, step: Any, record: floa
     motion = amplitude @ found.shape.T + driven @ answer.motion.T
     kinetic, potential = 0.5 * (rate**2).sum(axis=1), 0.5 * ((amplitude * frequency) ** 2).sum(axis=1)
     supplied, lost = swung.supplied[kept], swung.lost[kept]
-    tension = state.cables.frame_end_tension + amplitude @ answer.pulled.T + driven @ answer.tension.T
+    at_steps = state.cables.frame_end_tension + swung.amplitude @ answer.pulled.T + change @ answer.tension.T
     slopes = np.gradient(driven, time[kept], axis=0)
     moving, pose = rate @ found.shape.T + slopes @ answer.motion.T, _moved(state, motion)
     return Simulation(
@@ -242,7 +242,7 @@ def modal_simulation(given: Beginning, damping: Damping, step: Any, record: floa
         time=locked(time[kept].copy()),
         pose=pose,
         twist=twist_of_origin(given.robot, pose, moving[:, :3], moving[:, 3:]),
-        tensions=locked(tension),
+        tensions=locked(at_steps[kept].copy()),
         length=locked(lengths[kept].copy()),
         energy=energy_balance(kinetic, potential, supplied, lost),
         events=(),
@@ -251,6 +251,7 @@ def modal_simulation(given: Beginning, damping: Damping, step: Any, record: floa
         integrator="exact",
         damping=damping,
         nodes=locked(_shapes(state, found, amplitude)),
+        largest_tension=locked(at_steps.max(axis=0)),
     )
 
 

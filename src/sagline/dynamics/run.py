@@ -49,6 +49,7 @@ class Run:
         self._all.tensions[:] = 0.0
         self._all.lengths[:] = np.nan
         self._occurrences: list[Occurrence] = []
+        self._largest = np.zeros(plant.robot.cable_count)
         self._marks: list[int] = []  # of the scheduled events among them
         self._arguments: Any = plant.arguments(rules, numbers, courses)
         self._go(0)
@@ -157,7 +158,8 @@ class Run:
             plant.with_mass(plant.inertia[0] + event.mass, at_rest=True)
 
     def _close(self) -> None:
-        """Say of the last event how large tensions became after it."""
+        """Say of the last event how large tensions became after it; keep the largest of all."""
+        np.maximum.at(self._largest, self.plant.cables, self.plant.now[d.PEAK])
         if self._marks:
             last = self._marks[-1]
             event = self._occurrences[last]
@@ -188,6 +190,7 @@ class Run:
             cable_mass=plant.cable_mass,
             step=self.step,
             nodes=None if self._all.points is None else locked(self._all.points),
+            largest_tension=locked(self._largest),
         )
 
 

@@ -77,6 +77,8 @@ class Simulation(Result):
         winches: "ideal", "robot" or SecondOrder(...).
         winding: "constant" or "remembered".
         damping: What took energy out of the cables.
+        largest_tension: Of each cable at the frame end at any step, also between samples [N], shape (m,); None where it
+            is not known.
     """
 
     robot: Robot
@@ -94,6 +96,7 @@ class Simulation(Result):
     winches: Winches = "ideal"
     winding: str = "constant"
     damping: Damping = field(default_factory=Damping)
+    largest_tension: Array | None = None
 
     def save(self, file: FilePath | str) -> None:
         """Write the simulation to a NetCDF file, whole or not at all, with units and the robot inside.

@@ -72,7 +72,8 @@ class Reading(NamedTuple):
 class Simulator:
     """The machine behind a controller: winches, cables without mass, platform and sensors.
 
-    It goes where `simulate` goes, to the last bit, where it is given the same. It is not to be shared between threads.
+    It goes where `simulate` goes, to the last bit where it is given the same periods, to rounding where a table says
+    the same at other times. It is not to be shared between threads.
     """
 
     def __init__(

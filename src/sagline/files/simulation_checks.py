@@ -15,6 +15,7 @@ from sagline.files.simulation_layout import (
     INTEGRATORS,
     LAG,
     LAGGING,
+    LARGEST,
     LOSSES,
     NO_CABLE,
     NODES,
@@ -54,6 +55,8 @@ def check_simulation(data: Dataset, cables: int) -> None:
     nodes = (NODES,) if NODES.name in data.variables else ()
     for quantity in (TIME, *SAMPLES, *nodes):
         check_variable(quantity, data.variables[quantity.name], (ROWS,), sizes, everywhere)
+    if LARGEST.name in data.variables:
+        check_variable(LARGEST, data.variables[LARGEST.name], (), sizes, np.array(True))
     time = data.variables[TIME.name].values
     _check_times(time)
     if bool(nodes) != (data.attrs["cable_mass"] != "none"):

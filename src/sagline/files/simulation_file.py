@@ -18,7 +18,7 @@ from sagline.files.content import Content
 from sagline.files.dataset import read_dataset, write_dataset
 from sagline.files.robot_file import dump_robot, parse_robot
 from sagline.files.simulation_checks import EVENT_ROWS, ROWS, check_simulation, has_events
-from sagline.files.simulation_layout import EVENTS, LAG, LAGGING, LOSSES, NO_CABLE, NODES, SAMPLES, STEP, TIME
+from sagline.files.simulation_layout import EVENTS, LAG, LAGGING, LARGEST, LOSSES, NO_CABLE, NODES, SAMPLES, STEP, TIME
 from sagline.files.variables import PARTS, Quantity
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
@@ -88,6 +88,8 @@ def _dataset(simulation: Simulation) -> Dataset:
         quantity.name: ((ROWS, *quantity.parts), quantity.of(simulation), quantity.attributes)
         for quantity in quantities
     }
+    if simulation.largest_tension is not None:
+        variables[LARGEST.name] = (LARGEST.parts, LARGEST.of(simulation), LARGEST.attributes)
     for quantity in EVENTS if simulation.events else ():
         values = [_written(quantity.of(event)) for event in simulation.events]
         variables[quantity.name] = (EVENT_ROWS, np.array(values, dtype=quantity.type), quantity.attributes)
@@ -162,6 +164,7 @@ def _simulation(path: FilePath, data: Dataset, robot: Robot) -> Simulation:
         winches=_winches(data.attrs),
         winding=data.attrs["winding"],
         damping=Damping(**{name: float(data.attrs[name]) for name in LOSSES}),
+        largest_tension=values(LARGEST) if LARGEST.name in data.variables else None,
     )
 
 

@@ -30,6 +30,10 @@ SAMPLES: Final = (
     Quantity("energy_lost", "energy.lost", (), "J", "work of damping and friction since the start"),
     Quantity("energy_error", "energy.error", (), "J", "what the integrator has invented since the start"),
 )
+# of every cable, where it is known
+LARGEST: Final = Quantity(
+    "largest_tension", "largest_tension", ("cable",), "N", "largest tension at the frame end at any step", low=0.0
+)
 # of cables with mass
 NODES: Final = Quantity(
     "node_position",
