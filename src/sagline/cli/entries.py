@@ -142,6 +142,26 @@ def _modes() -> None:
     sl.vibration(_hung_state(), up_to=3.0)
 
 
+def _losses() -> None:
+    import sagline as sl
+
+    sl.vibration(_hung_state(), up_to=3.0, damping=sl.Damping(loss_time=1e-3))
+
+
+def _answers() -> None:
+    import sagline as sl
+
+    _modes()
+    sl.dynamic_stiffness(_hung_state(), 1.0, sl.Damping(modal_damping=0.01))
+
+
+def _periods() -> None:
+    import sagline as sl
+
+    state = _hung_state()
+    sl.Simulator(state.one_robot, state, winches="ideal").step(state.unstrained_length, 0.01)
+
+
 def _simulation() -> None:
     import sagline as sl
 
@@ -186,6 +206,7 @@ INVERSE, SHARING, VERDICTS = "inverse kinematics", "further ways of sharing", "v
 FORWARD, FIT = "forward kinematics", "fit of straight cables"
 MARGINS, POLYGON, VIBRATION = "margins", "tension polygon", "stiffness and vibration"
 MODES, SIMULATION, CHAINS = "modes with cable mass", "motion in time", "motion of cables with mass"
+LOSSES, ANSWERS, PERIODS = "losses in the cables' stretch", "answers with losses", "motion from period to period"
 FORWARD_OVER_PULLEYS, VIBRATION_OVER_PULLEYS = f"{FORWARD} over pulleys", f"{VIBRATION} over pulleys"
 
 ENTRIES = {
@@ -201,6 +222,9 @@ ENTRIES = {
         Entry(POLYGON, "inverse.queries.polygon_of_pose", 38, 5.0, _polygon),
         Entry(VIBRATION, "forward.sensitivity.describe_states", 57, 6.0, _vibration),
         Entry(MODES, "dynamics.spectral.interpolate", 2, 9.0, _modes),
+        Entry(LOSSES, "dynamics.spectral.stretch_matrices", 2, 1.0, _losses),
+        Entry(ANSWERS, "dynamics.collocation.dynamic_stiffnesses", 3, 6.0, _answers, version=2),
+        Entry(PERIODS, "dynamics.period.begin_period", 1, 1.0, _periods),
         Entry(SIMULATION, "dynamics.motion.run", 60, 16.0, _simulation),
         Entry(CHAINS, "dynamics.chains.run_chains", 44, 17.0, _chains),
         Entry(

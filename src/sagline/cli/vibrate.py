@@ -9,7 +9,7 @@ import numpy as np
 
 from sagline.cli.csv_text import csv_text
 from sagline.cli.ending import OUTSIDE
-from sagline.cli.entries import INVERSE, MODES, VIBRATION
+from sagline.cli.entries import ANSWERS, INVERSE, MODES, VIBRATION
 from sagline.cli.maps import counts_of, vibrate_all_over
 from sagline.cli.results import figure_files, listed, write_figures
 from sagline.cli.tables import Grid, show_table, written
@@ -83,7 +83,7 @@ def vibrate(
     reel = f"{file_stem(robot.name, f'mode-{film}')}.gif"
     check_files(folder, [f"{table}.csv", *figure_files([drawing] * figures), *[reel] * (film is not None)])
     place = middle_of(robot) if place is None else place
-    with working(f"{robot.name}: modes up to {limit:g} Hz", INVERSE, VIBRATION, MODES) as line:
+    with working(f"{robot.name}: modes up to {limit:g} Hz", INVERSE, VIBRATION, MODES, *[ANSWERS] * figures) as line:
         plan = inverse(robot, place, wrench=load)
         if not plan.feasible:
             note("No modes: ", PoseStatus(int(plan.status)).text, style="bold red")
