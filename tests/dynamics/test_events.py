@@ -6,6 +6,7 @@ import re
 
 import numpy as np
 import pytest
+from scipy.integrate import cumulative_trapezoid, trapezoid
 
 import sagline as sl
 from sagline.arrays import Array
@@ -26,6 +27,18 @@ def calmed(state: sl.Equilibrium, events: object) -> sl.Simulation:
     return sl.simulate(state, duration=20.0, events=events, damping=damping)  # type: ignore[arg-type]
 
 
+def energy_of(state: sl.Equilibrium, i: int) -> float:
+    """Strain and height of one cable [J], its frame end at zero, by quadrature along it."""
+    cables, robot = state.cables, state.one_robot
+    length, axial = cables.unstrained_length[i], robot.cables.axial_stiffness[i]
+    weight = robot.cables.linear_density[i] * robot.gravity
+    s = np.linspace(0.0, length, 20_001)
+    vertical = cables.vertical_force[i] - weight * (length - s)
+    force = np.hypot(cables.horizontal_tension[i], vertical)
+    height = cumulative_trapezoid(vertical * (1.0 / force + 1.0 / axial), s, initial=0.0)
+    return float(trapezoid(weight * height + force * force / (2.0 * axial), s))
+
+
 def test_after_a_break_the_robot_comes_to_rest_on_the_other_cables() -> None:
     state = still()
     run = calmed(state, sl.Break(cable=3, time=0.5))
@@ -37,6 +50,9 @@ def test_after_a_break_the_robot_comes_to_rest_on_the_other_cables() -> None:
     assert (run.tensions[run.time > 0.5, 3] == 0.0).all()
     assert np.isnan(run.length[run.time > 0.5, 3]).all()
     assert np.abs(run.energy.error).max() < 1e-6 * np.ptp(run.energy.kinetic)
+    assert (np.diff(run.energy.lost) >= 0.0).all()  # the cable that hangs below its anchor takes none of it
+    assert (run.energy.removed[run.time <= 0.5] == 0.0).all()
+    assert run.energy.removed[-1] == pytest.approx(energy_of(state, 3), rel=1e-7)
     told = run.events[0]
     assert (told.time, told.kind, told.cable) == (0.5, "break", 3)
     assert told.tension_before == pytest.approx(state.cables.frame_end_tension[3], rel=1e-9)
@@ -52,6 +68,8 @@ def test_after_a_load_is_dropped_or_picked_up_the_robot_rests_with_its_new_mass(
     np.testing.assert_allclose(run.pose.position[-1], expected.pose.position, atol=1e-6)
     assert np.abs(run.pose.position[-1] - PLACE).max() > 1e-3
     assert np.abs(run.energy.error).max() < 1e-5 * np.ptp(run.energy.kinetic)
+    assert (np.diff(run.energy.lost) >= 0.0).all()
+    assert run.energy.removed[-1] == pytest.approx(-mass * robot.gravity * PLACE[2], rel=1e-12)
     assert [told.kind for told in run.events] == ["drop" if mass < 0.0 else "pick up"]
 
 

@@ -36,7 +36,7 @@ def a_simulation(
         twist=rng.normal(size=(count, 6)),
         tensions=rng.random((count, cables)),
         length=length,
-        energy=energy_balance(*rng.random((4, count))),
+        energy=energy_balance(*rng.random((5, count))),
         events=events,
         cable_mass="lumped" if nodes else "none",
         step=0.1 / 3.0,

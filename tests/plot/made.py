@@ -62,11 +62,12 @@ def simulation(count: int = 200) -> Simulation:
     pose = sl.Pose(position, np.eye(3))
     kinetic, lost = 5.0 * np.cos(2.0 * np.pi * time) ** 2, 2.0 * time
     supplied, potential = 1.5 * time, 700.0 + 5.0 * swing**2
-    error = kinetic + potential - supplied + lost - 705.0
+    removed = np.where(time > 1.0, -3.0, 0.0)
+    error = kinetic + potential - supplied + lost + removed - 705.0
     twist = np.zeros((count, 6))
     tensions = state.cables.frame_end_tension * (1.0 + 0.3 * swing[:, None])
     tensions[time > 1.0, 3] = 0.0
     length = np.tile(state.unstrained_length, (count, 1))
     events = (Occurrence(1.0, "break", 3, 104.5, 240.25),)
-    balance = EnergyBalance(kinetic, potential, supplied, lost, error)
+    balance = EnergyBalance(kinetic, potential, supplied, lost, removed, error)
     return Simulation(ROBOT, time, pose, twist, tensions, length, balance, events, "none", 0.001)

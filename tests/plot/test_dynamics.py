@@ -181,7 +181,13 @@ def test_the_energy_of_a_simulation_and_the_error_of_its_balance() -> None:
     above, below = plot.energy(swinging).axes
     balance = swinging.energy
     drawn = [line.get_ydata() for line in above.get_lines() if not str(line.get_label()).startswith("_")]
-    expected = (balance.kinetic, balance.potential - balance.potential[0], balance.supplied, balance.lost)
+    expected = (
+        balance.kinetic,
+        balance.potential - balance.potential[0],
+        balance.supplied,
+        balance.lost,
+        balance.removed,
+    )
     np.testing.assert_array_equal(drawn, expected)
     np.testing.assert_array_equal(below.get_lines()[0].get_ydata(), balance.error)
     assert [text.get_text() for text in above.texts] == ["break, cable 3"]

@@ -192,6 +192,7 @@ def _tell(simulation: Simulation) -> None:
         [f"residual, last {LAST:g} s", n(_residual(simulation), ".3g", "m", size=1e3)],
         ["work supplied", n(energy.supplied[-1], ".4g", "J", size=size)],
         ["energy lost", n(energy.lost[-1], ".4g", "J", size=size)],
+        *([["left with cables", n(energy.removed[-1], ".4g", "J", size=size)]] if energy.removed.any() else []),
         ["error of the balance", n(np.nanmax(np.abs(energy.error)), ".2g", "J", size=size)],
     ]  # fmt: skip
     show_table(Grid(["", simulation.robot.name], rows, left=frozenset({0, 1})))
@@ -213,6 +214,7 @@ def _record(simulation: Simulation) -> dict[str, Any]:
         "residual_m": _residual(simulation),
         "supplied_j": float(energy.supplied[-1]),
         "lost_j": float(energy.lost[-1]),
+        "removed_j": float(energy.removed[-1]),
         "energy_error_j": float(np.nanmax(np.abs(energy.error))),
         "events": [
             {

@@ -244,7 +244,7 @@ def modal_simulation(given: Beginning, damping: Damping, step: Any, record: floa
         twist=twist_of_origin(given.robot, pose, moving[:, :3], moving[:, 3:]),
         tensions=locked(at_steps[kept].copy()),
         length=locked(lengths[kept].copy()),
-        energy=energy_balance(kinetic, potential, supplied, lost),
+        energy=energy_balance(kinetic, potential, supplied, lost, np.zeros_like(lost)),
         events=(),
         cable_mass="modal",
         step=size,

@@ -48,6 +48,7 @@ class Run:
         self._all = plant.records(-(-steps // every) + 1)  # the last step too
         self._all.tensions[:] = 0.0
         self._all.lengths[:] = np.nan
+        self._removed = np.zeros(len(self._all.energies))  # the kernel counts it as lost
         self._occurrences: list[Occurrence] = []
         self._largest = np.zeros(plant.robot.cable_count)
         self._marks: list[int] = []  # of the scheduled events among them
@@ -132,11 +133,10 @@ class Run:
         plant.counters[[k.READY, k.LENGTH_AT, k.WRENCH_AT, k.WIND_AT]] = 0
         plant.now[d.PEAK] = 0.0
         self._arguments = plant.arguments(self._rules, self._numbers, self._courses)
-        more = _energy(self._look()) - before
-        if isinstance(event, PickUp):
-            plant.audit[d.SUPPLIED] += more
-        else:
-            plant.audit[d.LOST] -= more
+        left = before - _energy(self._look())
+        plant.audit[d.LOST] += left
+        if isinstance(event, Break | Drop | PickUp):
+            self._removed[int(plant.counters[k.STEPS]) // self.every + 1 :] += left
         plant.audit[d.START] = start
 
     def _change(self, event: Event, time: float) -> None:
@@ -185,7 +185,7 @@ class Run:
             twist=twist_of_origin(plant.robot, pose, velocity, spin),
             tensions=locked(self._all.tensions),
             length=locked(self._all.lengths),
-            energy=energy_balance(kinetic, potential, supplied, lost),
+            energy=energy_balance(kinetic, potential, supplied, lost - self._removed, self._removed),
             events=tuple(sorted(self._occurrences, key=lambda event: event.time)),
             cable_mass=plant.cable_mass,
             step=self.step,

@@ -22,18 +22,20 @@ class EnergyBalance(Result):
     Attributes:
         kinetic: Of platform, cables and drums.
         potential: Of weight and of strain and height of the cables off the drums, frame ends and the origin at zero.
-        supplied: Work done on the robot since the start: by winches, given forces and wind; and what a load that was
-            picked up brought, less what the collision with it took.
-        lost: Work done by damping and friction since the start, strain that slipped on drums, what chains lost where
-            nodes were born and merged, and what broken cables and dropped loads took with them, which falls where a
-            dropped load had less than no energy.
-        error: kinetic + potential - supplied + lost, less its value at the start: what the integrator invents.
+        supplied: Work done on the robot since the start: by winches, given forces and wind.
+        lost: Work done by damping and friction since the start, strain that slipped on drums, and what chains lost
+            where nodes were born and merged.
+        removed: Energy that left the robot with cables that broke and loads that were dropped since the start, less
+            what loads brought that were picked up. Heights count in it as in `potential`, so it has either sign.
+        error: kinetic + potential - supplied + lost + removed, less its value at the start: what the integrator
+            invents.
     """
 
     kinetic: Array
     potential: Array
     supplied: Array
     lost: Array
+    removed: Array
     error: Array
 
 
@@ -112,10 +114,10 @@ class Simulation(Result):
         save_simulation(self, file)
 
 
-def energy_balance(kinetic: Array, potential: Array, supplied: Array, lost: Array) -> EnergyBalance:
-    """The balance of four energies [J], each of shape (N,)."""
-    total = kinetic + potential - supplied + lost
-    return EnergyBalance(*map(locked, (kinetic, potential, supplied, lost, total - total[0])))
+def energy_balance(kinetic: Array, potential: Array, supplied: Array, lost: Array, removed: Array) -> EnergyBalance:
+    """The balance of five energies [J], each of shape (N,)."""
+    total = kinetic + potential - supplied + lost + removed
+    return EnergyBalance(*map(locked, (kinetic, potential, supplied, lost, removed, total - total[0])))
 
 
 def twist_of_origin(robot: Robot, pose: Pose, velocity: Array, spin: Array) -> Array:

@@ -138,10 +138,10 @@ def _check_gaps(name: str, values: Array, gone: Any) -> None:
 
 def _check_balance(data: Dataset) -> None:
     """The error is what the other energies leave."""
-    names = ("kinetic_energy", "potential_energy", "energy_supplied", "energy_lost", "energy_error")
-    kinetic, potential, supplied, lost, error = (data.variables[name].values for name in names)
-    total = kinetic + potential - supplied + lost
-    size = max(float(np.abs(part).max()) for part in (kinetic, potential, supplied, lost))
+    names = ("kinetic_energy", "potential_energy", "energy_supplied", "energy_lost", "energy_removed", "energy_error")
+    kinetic, potential, supplied, lost, removed, error = (data.variables[name].values for name in names)
+    total = kinetic + potential - supplied + lost + removed
+    size = max(float(np.abs(part).max()) for part in (kinetic, potential, supplied, lost, removed))
     for k in np.flatnonzero(~(np.abs(total - total[0] - error) <= ROUNDING * size))[:1].tolist():
         allowed = f"{total[k] - total[0]:g} J, what the other energies leave"
         raise InvalidValueError(f"energy_error[{k}]", f"{error[k]:g} J", allowed, STEP)

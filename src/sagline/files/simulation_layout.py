@@ -28,6 +28,7 @@ SAMPLES: Final = (
     Quantity("potential_energy", "energy.potential", (), "J", "energy of weight and strain"),
     Quantity("energy_supplied", "energy.supplied", (), "J", "work done on the robot since the start"),
     Quantity("energy_lost", "energy.lost", (), "J", "work of damping and friction since the start"),
+    Quantity("energy_removed", "energy.removed", (), "J", "energy that left with broken cables and dropped loads"),
     Quantity("energy_error", "energy.error", (), "J", "what the integrator has invented since the start"),
 )
 # of every cable, where it is known

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from sagline.arrays import Array
 
-STYLES = ("-", (0, (4.0, 1.6)), (0, (1.0, 1.2)), (0, (5.0, 1.5, 1.0, 1.5)))
+STYLES = ("-", (0, (4.0, 1.6)), (0, (1.0, 1.2)), (0, (5.0, 1.5, 1.0, 1.5)), (0, (7.0, 2.0)))
 ROUNDING = 1e-12  # of the energy that there is: an error below it is the arithmetic's
 
 
@@ -38,6 +38,8 @@ def energy(simulation: Simulation) -> Figure:
     rise = balance.potential - balance.potential[0]
     courses = {"kinetic": balance.kinetic, "potential, less its start": rise}
     courses |= {"supplied": balance.supplied, "lost": balance.lost}
+    if balance.removed.any():
+        courses["left with cables and loads"] = balance.removed
     for (name, course), color, style in zip(courses.items(), COLORS, STYLES, strict=False):
         above.plot(time, course, color=color, linestyle=style, linewidth=1.2, label=name)
     dressed(above, "", "energy [J]")
@@ -52,9 +54,7 @@ def energy(simulation: Simulation) -> Figure:
     low, high = below.get_ylim()
     below.set_ylim(min(low, -least), max(high, least))
     worst = n(_largest(balance.error), ".2g", "J", size=_largest(balance.potential))
-    below.set_title(
-        f"kinetic + potential − supplied + lost, less its start: at most {worst}", fontsize=TICK, loc="left"
-    )
+    below.set_title(f"the sum, supplied counted negative, less its start: at most {worst}", fontsize=TICK, loc="left")
     return figure
 
 
