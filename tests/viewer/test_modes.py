@@ -52,7 +52,7 @@ def heard_for(client: Client, seconds: float) -> list[Any]:
 
 def test_a_mode_moves_at_the_rate_of_the_page_and_stops(page: Shown) -> None:
     show = page.viewer._modes
-    await_that(lambda: show.moving, seconds=300.0)
+    await_that(lambda: show.moving and not show.waiting, seconds=300.0)  # the response is there too
     assert show.swing is not None
     found = vibration(show.swing.state, up_to=20.0)
     assert show.swing.mode.frequency == pytest.approx(found.frequency[1], rel=1e-12)
@@ -84,6 +84,7 @@ def test_the_list_says_what_every_frequency_is(page: Shown) -> None:
         found = vibration(page.viewer._modes.swing.state, up_to=20.0)  # type: ignore[union-attr]
         assert len(rows) == found.frequency.size + 6
         assert all(("with cable mass" in row) != ("massless" in re.sub('data-mode="[^"]*"', "", row)) for row in rows)
+        await_that(lambda: "data-mode" in page.viewer._modes._panel._response.content)
         marks = re.findall(r'data-mode="(\d+)"', page.viewer._modes._panel._response.content)
         assert marks == [str(k + 1) for k in range(found.frequency.size)]
         client.set(handle(page, "Mode")._impl.uuid, "<b>nothing</b>")

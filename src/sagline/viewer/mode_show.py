@@ -7,7 +7,9 @@ from collections.abc import Callable, Hashable
 
 import numpy as np
 
+from sagline.dynamics.response_curves import ResponseCurves, response_curves
 from sagline.dynamics.vibration import Vibration
+from sagline.dynamics.vibration_status import VibrationStatus
 from sagline.robot.equilibrium import Equilibrium
 from sagline.viewer.aside import Aside
 from sagline.viewer.modes_panel import ModesPanel
@@ -36,6 +38,7 @@ class ModeShow:
         self._state: Equilibrium | None = None
         self._due: float | None = None
         self._vibration: Vibration | None = None
+        self._answers: dict[str, ResponseCurves] = {}  # of the vibration, by force
         self.swing: Swing | None = None
 
     @property
@@ -74,8 +77,22 @@ class ModeShow:
 
     def _found(self, vibration: Vibration) -> None:
         if vibration.state is self._state:
-            self._vibration = vibration
+            self._vibration, self._answers = vibration, {}
             self._choose(vibration)
+
+    def _answer(self, vibration: Vibration) -> ResponseCurves | None:
+        """The response to the force that is chosen, if it is known; else it is worked out."""
+        force = self._panel.force
+        some = vibration.status is VibrationStatus.SOLVED and vibration.frequency.size > 0
+        if some and force not in self._answers and not self._aside.busy:
+
+            def answered(curves: ResponseCurves) -> None:
+                if vibration is self._vibration:
+                    self._answers[force] = curves
+                    self._choose(vibration)
+
+            self._aside.ask(lambda: response_curves(vibration, force), answered, self._panel.refuse)
+        return self._answers.get(force)
 
     def _choose(self, vibration: Vibration) -> None:
         mode = mode_of(vibration, self._panel.chosen)
@@ -83,7 +100,7 @@ class ModeShow:
             self._still()
         elif self.swing is None or self.swing.mode != mode or self.swing.state is not vibration.state:
             self.swing = Swing.of(vibration, mode)
-        self._panel.show(vibration, self.swing)
+        self._panel.show(vibration, self.swing, self._answer(vibration))
 
     def _still(self) -> None:
         if self.swing is not None:

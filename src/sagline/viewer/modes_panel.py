@@ -10,10 +10,9 @@ import numpy as np
 import viser
 
 from sagline.dynamics.mode_list import MASSLESS, ListedMode, listed_modes
-from sagline.dynamics.response_curves import MOTIONS, response_curves
+from sagline.dynamics.response_curves import MOTIONS, ResponseCurves
 from sagline.dynamics.vibration import Vibration
 from sagline.dynamics.vibration_status import VibrationStatus
-from sagline.errors import SaglineError
 from sagline.viewer.readout import block, refused, sentence, waiting
 from sagline.viewer.response_figure import response_figure
 from sagline.viewer.swing import Swing
@@ -54,6 +53,11 @@ class ModesPanel:
         value = float(self._up_to.value)
         return value if 1.0 <= value <= HIGHEST else UP_TO  # NaN neither
 
+    @property
+    def force(self) -> str:
+        """Whose response is drawn: one of `MOTIONS`."""
+        return self._force.value if self._force.value in MOTIONS else MOTIONS[0]
+
     def wait(self, seconds: float) -> None:
         """Say for how long the modes have been worked out."""
         self._told.content = sentence(f"Working out the modes: {seconds:.0f} s so far")
@@ -68,21 +72,22 @@ class ModesPanel:
         """Say that the modes are those of a rest that is to come."""
         self._told.content = sentence("The modes come when the platform rests.")
 
-    def show(self, vibration: Vibration, swing: Swing | None) -> None:
-        """Show the list, the response, and what moves."""
-        force = self._force.value if self._force.value in MOTIONS else MOTIONS[0]
+    def show(self, vibration: Vibration, swing: Swing | None, curves: ResponseCurves | None) -> None:
+        """Show the list, what moves, and the response to the force, None as long as it is worked out."""
         name = "" if swing is None else swing.mode.name
         self._told.content = _told(vibration, swing, self.chosen)
-        if self._shown == (vibration, force, name):
+        if self._shown == (vibration, curves, name):
             return
-        self._shown = (vibration, force, name)
+        self._shown = (vibration, curves, name)
         modes = listed_modes(vibration)
         self._list.content = _listed(vibration, modes, name)
-        try:
-            curves = response_curves(vibration, force)
-        except SaglineError:
+        if vibration.status is not VibrationStatus.SOLVED or not vibration.frequency.size:
             self._response.content = sentence("No response: there are no modes.")
             return
+        if curves is None:
+            self._response.content = waiting("The response is worked out.")
+            return
+        force = self.force
         words = f"{'rotation' if force.startswith('about') else 'motion along'} {force} for 1 {_unit(force)}"
         swinging = [mode for mode in modes if mode.kind != MASSLESS]
         self._response.content = response_figure(curves, swinging, f"{words} [{curves.unit}]", name)
