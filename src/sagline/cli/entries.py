@@ -162,10 +162,15 @@ def _periods() -> None:
     sl.Simulator(state.one_robot, state, winches="ideal").step(state.unstrained_length, 0.01)
 
 
-def _simulation() -> None:
+def _simulation(name: str = ROBOT) -> None:
     import sagline as sl
 
-    sl.simulate(_hung_state(), duration=0.01)
+    sl.simulate(_hung_state(name), duration=0.01)
+
+
+def _simulation_over_pulleys() -> None:
+    _simulation()
+    _simulation(OVER_PULLEYS)
 
 
 def _chains() -> None:
@@ -174,17 +179,22 @@ def _chains() -> None:
     sl.simulate(_hung_state(), duration=1e-4, cable_mass="lumped", nodes=4)
 
 
-def _hung_state() -> Equilibrium:
+def _hung_state(name: str = ROBOT) -> Equilibrium:
     """Cables that hang, all at one tension: nearly in balance, and none of what solves for it is needed."""
     import numpy as np
 
     import sagline as sl
     from sagline.arrays import locked
+    from sagline.robot.contact import Contact
 
-    robot, pose = sl.load_robot(ROBOT), sl.Pose(PLACE, LEVEL)
+    robot, pose = sl.load_robot(name), sl.Pose(PLACE, LEVEL)
     run = pose.transform(robot.platform_anchors) - robot.frame_anchors
     cables = sl.Catenary().from_tension(robot.cables, np.hypot(*run[:, :2].T), run[:, 2], 150.0, robot.gravity)
-    return sl.Equilibrium(robot, pose, locked(np.zeros(6)), cables)
+    none = locked(np.zeros(robot.cable_count))
+    contact = None
+    if robot.winches is not None:
+        contact = Contact(none, none, none, cables.chord_tension, locked(cables.rise / cables.chord))
+    return sl.Equilibrium(robot, pose, locked(np.zeros(6)), cables, contact)
 
 
 def _unknown_state(name: str = ROBOT) -> Equilibrium:
@@ -208,6 +218,7 @@ MARGINS, POLYGON, VIBRATION = "margins", "tension polygon", "stiffness and vibra
 MODES, SIMULATION, CHAINS = "modes with cable mass", "motion in time", "motion of cables with mass"
 LOSSES, ANSWERS, PERIODS = "losses in the cables' stretch", "answers with losses", "motion from period to period"
 FORWARD_OVER_PULLEYS, VIBRATION_OVER_PULLEYS = f"{FORWARD} over pulleys", f"{VIBRATION} over pulleys"
+SIMULATION_OVER_PULLEYS = f"{SIMULATION} over pulleys"
 
 ENTRIES = {
     entry.words: entry
@@ -225,7 +236,8 @@ ENTRIES = {
         Entry(LOSSES, "dynamics.spectral.stretch_matrices", 2, 1.0, _losses),
         Entry(ANSWERS, "dynamics.collocation.dynamic_stiffnesses", 3, 6.0, _answers, version=2),
         Entry(PERIODS, "dynamics.period.begin_period", 1, 1.0, _periods),
-        Entry(SIMULATION, "dynamics.motion.run", 60, 16.0, _simulation),
+        Entry(SIMULATION, "dynamics.motion.run", 65, 16.0, _simulation),
+        Entry(SIMULATION_OVER_PULLEYS, "dynamics.motion.run", 33, 14.0, _simulation_over_pulleys, version=2),
         Entry(CHAINS, "dynamics.chains.run_chains", 44, 17.0, _chains),
         Entry(
             VIBRATION_OVER_PULLEYS, "forward.sensitivity.describe_states", 39, 4.0, _vibration_over_pulleys, version=2

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from sagline.cli.choices import CableMass, ShaperKind, Tension, Variable
-from sagline.cli.entries import CHAINS, SIMULATION, VIBRATION, needed_for
+from sagline.cli.entries import CHAINS, SIMULATION, SIMULATION_OVER_PULLEYS, VIBRATION, needed_for
 from sagline.cli.results import figure_files, listed, write_figures
 from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
@@ -38,7 +38,8 @@ if TYPE_CHECKING:
     from sagline.kinematics.plan import Plan
     from sagline.motion.path import Path as MotionPath
     from sagline.robot.equilibrium import Equilibrium
-    from sagline.robot.robot import Robot
+    from sagline.robot.several import anything_behind
+from sagline.robot.robot import Robot
 
 SHAPERS = {ShaperKind.ZV: ZV, ShaperKind.ZVD: ZVD, ShaperKind.EI: EI}
 BREAK = re.compile(r"([0-9]{1,3})@([^@]+)")
@@ -94,7 +95,8 @@ def simulate(
     way = None if path is None else load_path(path)
     if path is not None and way is not None:
         check_unit(path, way, robot)
-    moving = {CableMass.NONE: (SIMULATION,), CableMass.LUMPED: (CHAINS,)}.get(asked.cable_mass, ())
+    massless = SIMULATION_OVER_PULLEYS if anything_behind(robot) else SIMULATION
+    moving = {CableMass.NONE: (massless,), CableMass.LUMPED: (CHAINS,)}.get(asked.cable_mass, ())
     needed = (*needed_for(asked.tension.build(Variable.CHORD)), VIBRATION, *moving)
     with working(f"{robot.name}: simulating", *needed) as line:
         start = _start(robot, way, asked, load, line)
