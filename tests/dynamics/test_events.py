@@ -210,9 +210,14 @@ def test_energy_that_grows_by_itself_stops_the_run_and_names_time_and_cable(monk
     monkeypatch.setattr("sagline.dynamics.simulate.checked_step", lambda *_: 0.09)
     state = still()
     with pytest.raises(
-        sl.InvalidValueError, match=r"grows by itself: at .* s most of it is in cable \d; .*Give step=0.018"
+        sl.InvalidValueError, match=r"grows or fades by itself: at .* s most of it is in cable \d; .*Give step=0.018"
     ):
         sl.simulate(state, wrench=np.array([50.0, 0, 0, 0, 0, 0]), duration=60.0, integrator="splitting")
+
+
+def test_energy_that_fades_by_itself_stops_the_run_too() -> None:
+    with pytest.raises(sl.InvalidValueError, match="grows or fades by itself"):
+        sl.simulate(still(), wrench=np.array([50.0, 0, 0, 0, 0, 0]), duration=60.0, step=0.05)
 
 
 def test_damping_is_that_of_the_linear_system() -> None:

@@ -162,6 +162,28 @@ def test_an_unstable_equilibrium_has_directions_and_no_frequencies() -> None:
     assert (work < 0.0).all()
 
 
+@pytest.mark.parametrize("yaw", [0.0, 0.3, 1.0, 2.0])
+@pytest.mark.parametrize("density", [1e-6, 0.01, 1.0])
+def test_a_motion_that_nothing_holds_has_exactly_no_frequency(yaw: float, density: float) -> None:
+    rope = sl.Cable(linear_density=density, axial_stiffness=1e5)
+    robot = sl.Robot("p", [[0, 0, 12.0]], [[0, 0, 0.5]], rope, mass=100.0, inertia=np.diag([5.0, 6.0, 7.0]))
+    state = sl.forward(robot, [10.0], start=sl.Pose.from_euler([0, 0, 1.4], 0, 0, yaw)).state
+    assert sl.modes(state).frequency[0] == 0.0
+    found = sl.vibration(state, up_to=30.0)
+    assert found.frequency[0] == found.massless_frequency[0] == 0.0
+    assert found.complete
+    assert found.frequency[1] > 0.1  # the pendulum's
+
+
+def test_an_unstable_equilibrium_answers_no_oscillating_force() -> None:
+    robot = sl.load_robot("article-suspended").replace(center_of_mass=(0.0, 0.0, 5.0))
+    state = sl.inverse(robot, sl.Pose([0.0, 0.0, 1.5], np.eye(3))).state
+    with pytest.raises(sl.InvalidValueError, match="state is an unstable equilibrium; allowed: a stable one"):
+        sl.frequency_response(state, [1.0])
+    with pytest.raises(sl.InvalidValueError, match="modes is of an unstable state"):
+        sl.to_shape(sl.modes(state), sl.quintic_path([(0, 0, 1.5), (1, 0, 1.5)], durations=2.0))
+
+
 def test_a_slack_cable_is_named_and_the_others_ring() -> None:
     """One cable far too long: it hangs folded, and the robot vibrates on the other seven."""
     robot = sl.load_robot("cogiro")

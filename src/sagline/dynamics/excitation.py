@@ -35,10 +35,13 @@ def most_excited(state: Equilibrium, frequency: Array, shape: Array, path: Path)
         InvalidValueError: If no mode has a frequency, or the path is in motion at an end or does not move.
     """
     moves = [move for move in moves_of(instance(path, Path, "path")) if move.curve is not None]
-    known = np.flatnonzero(np.isfinite(frequency) & (frequency > 0.0))
+    known = np.flatnonzero(frequency > 0.0)
     if not (moves and known.size):
         item, value = ("path", "without motion") if not moves else ("modes", "without a frequency")
         raise InvalidValueError(item, value, "a motion, and modes that it can excite", "Take another path, or state.")
+    if np.isnan(frequency).any():
+        step = "Take another: its platform falls."
+        raise InvalidValueError("modes", "of an unstable state", "of a stable one", step)
     frequency, shape = frequency[known], shape[:, known]
     excited = np.max([excitation(state.one_robot, move, frequency, shape) for move in moves], axis=0)
     order = np.argsort(-excited, kind="stable")[:2]

@@ -25,6 +25,7 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.slopes import cable_slopes
+from sagline.statics.stiffness import compliance_of
 from sagline.tension.closest import Closest
 from sagline.tension.method import TensionMethod
 
@@ -170,7 +171,7 @@ def _status(setting: Setting, row: int) -> tuple[VibrationStatus, float]:
 
 def _row(state: Equilibrium, setting: Setting, row: int, up_to: float, damping: Damping) -> _Row:
     freedom = setting.freedom
-    rest = (freedom.T @ np.linalg.inv(freedom @ setting.stiffness[row] @ freedom.T) @ freedom)[:3, :3]
+    rest = compliance_of(freedom, setting.stiffness[row])[:3, :3]
     found = modes_of(setting, row, up_to)
     if not found.number:
         return _Row(np.nan, np.nan, np.nan, float(np.linalg.norm(rest, 2)), 0.0)

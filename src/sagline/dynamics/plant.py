@@ -219,7 +219,7 @@ def principal_axes(robot: Robot, pose: Pose) -> tuple[Array, Array]:
 
 
 def grown(step: float, time: float, cable: int) -> InvalidValueError:
-    """What is said of a run whose energy has grown by itself.
+    """What is said of a run whose energy has come or gone by itself.
 
     Args:
         step: Of the integrator [s].
@@ -229,5 +229,5 @@ def grown(step: float, time: float, cable: int) -> InvalidValueError:
     Returns:
         The error, to be raised.
     """
-    value = f"{step:g} s, at which energy grows by itself: at {time:.6g} s most of it is in cable {cable}"
+    value = f"{step:g} s, at which energy grows or fades by itself: at {time:.6g} s most of it is in cable {cable}"
     return InvalidValueError("step", value, "one that keeps the energy", f"Give step={0.2 * step:.3g}.")

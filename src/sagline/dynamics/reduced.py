@@ -11,12 +11,11 @@ from sagline.dynamics.component_modes import Components, component_modes
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.several import first_of
 from sagline.statics.slopes import cable_slopes
-from sagline.statics.stiffness import mass_matrix
+from sagline.statics.stiffness import UNSTABLE, mass_matrix, natural_frequency
 from sagline.statics.strings import Strings, strings_of
 
 KEPT = 1.05  # of the frequency asked for: the cables' modes up to there are unknowns
 LEVELS = 4  # pairs of moments of those above that are matched
-UNSTABLE = 1e-10  # of the largest: a stiffness that is less negative is rounding
 _TINY = 1e-300
 
 
@@ -168,8 +167,7 @@ def massless(setting: Setting, row: int) -> tuple[Array, Array]:
     freedom = setting.freedom
     upper = np.linalg.inv(np.linalg.cholesky(freedom @ setting.mass[row] @ freedom.T)).T
     squares, vectors = np.linalg.eigh(upper.T @ freedom @ setting.stiffness[row] @ freedom.T @ upper)
-    frequency = np.sqrt(np.where(squares > 0.0, squares, np.nan)) / (2.0 * np.pi)
-    return frequency, freedom.T @ (upper @ vectors[:, squares < -UNSTABLE * np.abs(squares).max()])
+    return natural_frequency(squares), freedom.T @ (upper @ vectors[:, squares < -UNSTABLE * np.abs(squares).max()])
 
 
 def dynamic_matrix(setting: Setting, row: int, moving: Array, omega: float) -> Array:

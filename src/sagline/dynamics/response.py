@@ -14,7 +14,7 @@ from sagline.dynamics.answer import LOWEST, Answer
 from sagline.dynamics.cable_dynamics import Complex, check_lengths, one_state
 from sagline.dynamics.count import modes_below
 from sagline.dynamics.damping import Damping
-from sagline.dynamics.reduced import setting_of
+from sagline.dynamics.reduced import massless, setting_of
 from sagline.dynamics.robot_modes import check_number
 from sagline.errors import InvalidValueError
 from sagline.memory import check_memory
@@ -96,12 +96,13 @@ def frequency_response(state: Equilibrium, frequency: ArrayLike, damping: Dampin
     setting = setting_of(state)
     check_lengths(state)
     check_number(modes_below(setting, 0, max(float(given.max()), LOWEST)), float(given.max()), "frequency")
+    if massless(setting, 0)[1].shape[1]:
+        step = "Simulate it; vibration() names the directions in which it leaves."
+        raise InvalidValueError("state", "an unstable equilibrium", "a stable one, which has an answer", step)
     slopes = cable_slopes(state)
     answer = Answer(setting, slopes.matrix, slopes.blocks, known)
-    compliance, massless = answer.by_modes(given, answer.held(float(given.max())))
+    compliance, still = answer.by_modes(given, answer.held(float(given.max())))
     some = np.unique(np.linspace(0, given.size - 1, CHECKS).round().astype(np.int64))
     wanted = answer.exactly(given[some])
     off = np.linalg.norm(compliance[some] - wanted, axis=(1, 2)) / np.linalg.norm(wanted, axis=(1, 2))
-    return FrequencyResponse(
-        state, known, given, locked(compliance), locked(massless), locked(given[some]), locked(off)
-    )
+    return FrequencyResponse(state, known, given, locked(compliance), locked(still), locked(given[some]), locked(off))

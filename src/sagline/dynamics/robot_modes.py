@@ -12,10 +12,11 @@ from sagline.arrays import Array
 from sagline.dynamics.component_modes import Components, stretch
 from sagline.dynamics.count import modes_below
 from sagline.dynamics.damping import Damping
-from sagline.dynamics.reduced import Reduced, Setting, reduced
+from sagline.dynamics.reduced import Reduced, Setting, massless, reduced
 from sagline.errors import InvalidValueError, SaglineError
 
 MOST_MODES: Final = 2_000
+SLOW: Final = 1e-2  # of up_to: lower frequencies may be those of motions that nothing holds
 BORDER: Final = 1e-6  # of a frequency, within which the count says on which side of it a mode is
 
 
@@ -74,6 +75,8 @@ def modes_of(setting: Setting, row: int, up_to: float) -> Found:
     if not border[0] <= count <= border[1]:
         text = f"vibration up to {up_to:g} Hz: {border[0]} modes were found where the exact count has {count}"
         raise SaglineError(f"{text}. Ask for another up_to, and report the robot and its pose.")
+    if count and frequency[0] < SLOW * up_to:  # at rest the mass of the cables has no part: as many are exactly at 0 Hz
+        frequency[: np.count_nonzero(massless(setting, row)[0] == 0.0)] = 0.0
     vectors = vectors[:, :count]
     platform = problem.platform @ vectors[: problem.platform.shape[1]]
     return Found(frequency[:count], platform, setting.ends[row] @ platform, count, problem, vectors)

@@ -17,6 +17,8 @@ from sagline.statics.strings import strings_below, strings_of
 from sagline.statics.tension_slopes import tension_slopes
 
 _SINGULAR = 1e-14  # determinant, at diagonal elements of 1
+# of the largest square of a frequency: less positive, and less negative, is rounding
+NEUTRAL, UNSTABLE = 1e-13, 1e-10
 _STIFFNESS_BYTES, _MODES_BYTES = 2500.0, 800.0  # a cable of a state, while it is worked out
 
 
@@ -72,7 +74,8 @@ class Modes(Result):
 
     Attributes:
         state: The state it belongs to.
-        frequency: Natural frequencies [Hz], ascending, shape (..., n); NaN for a motion that the state does not hold.
+        frequency: Natural frequencies [Hz], ascending, shape (..., n); 0 for a motion that nothing holds and nothing
+            pushes, NaN for one in which the platform falls.
         shape: Motions (displacement of the center of mass, rotation vector, world axes) of unit modal mass, one a
             column, shape (..., 6, n) [m/sqrt(kg), rad/(sqrt(kg) m)].
     """
@@ -124,7 +127,7 @@ def stiffness(state: Equilibrium) -> Stiffness:
     _check_state(state, _STIFFNESS_BYTES)
     slopes = cable_slopes(state)
     freedom = first_of(state.robot).freedom
-    compliance = _compliance(freedom, slopes.matrix)
+    compliance = compliance_of(freedom, slopes.matrix)
     by_length = -compliance @ on_platform(slopes.by_length, slopes.levers)
     return Stiffness(
         state=state,
@@ -205,9 +208,19 @@ def modes(state: Equilibrium) -> Modes:
     absent = np.asarray(np.isnan(scaled).any(axis=(-1, -2), keepdims=True))
     squares, vectors = np.linalg.eigh(np.where(absent, 0.0, scaled))
     shape = freedom.T @ np.swapaxes(inverse, -1, -2) @ vectors
-    held = np.asarray((squares > 0.0) & ~absent[..., 0])
-    frequency = np.where(held, np.sqrt(np.where(held, squares, 0.0)) / (2.0 * np.pi), np.nan)
+    frequency = np.where(absent[..., 0], np.nan, natural_frequency(squares))
     return Modes(state, locked(frequency), locked(np.where(absent, np.nan, shape)))
+
+
+def natural_frequency(squares: Array) -> Array:
+    """Frequencies [Hz] of squares of angular frequencies, shape (..., n), n those of one platform.
+
+    What nothing holds and nothing pushes, as a turn about a single rope, has 0 Hz: squares that are rounding. What
+    falls has none: NaN.
+    """
+    largest = np.abs(squares).max(axis=-1, keepdims=True, initial=0.0)
+    known = np.where(squares > NEUTRAL * largest, squares, np.where(squares < -UNSTABLE * largest, np.nan, 0.0))
+    return np.asarray(np.sqrt(known) / (2.0 * np.pi))
 
 
 def _check_state(state: Equilibrium, cable_bytes: float) -> None:
@@ -215,8 +228,8 @@ def _check_state(state: Equilibrium, cable_bytes: float) -> None:
     check_memory("state", cable_bytes * size, "Take the poses in parts: state[:1000].")
 
 
-def _compliance(freedom: Array, matrix: Array) -> Array:
-    """Inverse on the free motions, zero on the others; NaN where it is singular."""
+def compliance_of(freedom: Array, matrix: Array) -> Array:
+    """Inverse of a stiffness on the free motions (n, 6), zero on the others; NaN where it is singular."""
     return freedom.T @ _inverse(freedom @ matrix @ freedom.T) @ freedom
 
 

@@ -19,7 +19,7 @@ from sagline.kernels.dynamics.rigid_body import CENTER, MOMENTUM, kinetic_energy
 from sagline.kernels.forward.platform import platform_energy
 from sagline.kernels.jit import kernel
 
-GROWTH = 0.1  # of all energy that moves: an integrator that invents more has left its limit of stability
+GROWTH = 0.1  # of all energy that moves: an integrator that invents or loses more has too long a step
 
 
 @kernel
@@ -40,7 +40,7 @@ def record(run: MasslessRun, records: Records) -> None:
     invented = kinetic + potential - audit[d.SUPPLIED] + audit[d.LOST] - audit[d.START]
     moved = kinetic + abs(potential - audit[d.START_POTENTIAL]) + abs(audit[d.SUPPLIED]) + abs(audit[d.LOST])
     audit[d.MOVED] = max(audit[d.MOVED], moved)
-    if not invented <= GROWTH * audit[d.MOVED] + ROUNDING * size:
+    if not abs(invented) <= GROWTH * audit[d.MOVED] + ROUNDING * size:
         at[FAILED] = 1
         for i in range(rows.shape[1]):
             if drives.now[d.AT_FRAME, i] > drives.now[d.AT_FRAME, at[FAILED] - 1]:
