@@ -30,6 +30,8 @@ run: env ## the main job: the article's test, its table, runs and figures in OUT
 article: env ## the article's figures, tables and errata redone, as one page in OUT
 	$(BIN)/sagline article --out $(OUT)
 
+test coverage: export OPENBLAS_NUM_THREADS := 1 # a worker has a core
+
 test: env check ## all checks, then the whole test suite
 	$(BIN)/python -m pytest --numprocesses auto --dist worksteal
 

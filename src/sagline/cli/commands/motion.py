@@ -65,7 +65,7 @@ def vibrate(
 
         sagline vibrate cogiro --pose 0,0,2 --up-to 20
         sagline vibrate article-suspended --damping "2 %" --force z --film 1
-        sagline vibrate cogiro --map 20x15x8 --out maps
+        sagline vibrate cogiro --map 8x6x4 --out maps
     """
     from sagline.cli.vibrate import Losses
     from sagline.cli.vibrate import vibrate as run
