@@ -188,7 +188,9 @@ def test_a_broken_cable_gives_the_same_tensions_at_half_the_step() -> None:
 def test_a_step_that_shakes_a_broken_robot_apart_is_told_with_time_and_cable() -> None:
     element = cogiro().free_length.min() / 20
     longest = 0.85 * element * float(np.sqrt(0.065 / 700e3))
-    with pytest.raises(sl.SaglineError, match=r"energy grows by itself: at 0\.\d+ s most of it is in cable \d"):
+    with pytest.raises(
+        sl.SaglineError, match=r"energy grows or fades by itself: at 0\.\d+ s most of it is in cable \d"
+    ):
         sl.simulate(cogiro(), cable_mass="lumped", duration=2.0, step=longest, events=sl.Break(0, 0.0))
 
 

@@ -29,6 +29,7 @@ from sagline.files.robot_file import load_robot
 from sagline.files.whole import check_files, made_folder
 from sagline.kinematics.inverse import inverse
 from sagline.numbers import n
+from sagline.robot.several import anything_behind
 from sagline.statics.stiffness import modes
 
 if TYPE_CHECKING:
@@ -38,8 +39,7 @@ if TYPE_CHECKING:
     from sagline.kinematics.plan import Plan
     from sagline.motion.path import Path as MotionPath
     from sagline.robot.equilibrium import Equilibrium
-    from sagline.robot.several import anything_behind
-from sagline.robot.robot import Robot
+    from sagline.robot.robot import Robot
 
 SHAPERS = {ShaperKind.ZV: ZV, ShaperKind.ZVD: ZVD, ShaperKind.EI: EI}
 BREAK = re.compile(r"([0-9]{1,3})@([^@]+)")
