@@ -6,7 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from sagline import plot
+    from sagline import control, plc, plot, twin
     from sagline.article.identify import EmpiricalFit, identify_empirical
     from sagline.article.identify_cable import CableFit, identify_cable
     from sagline.cables.cable import Cable
@@ -179,6 +179,7 @@ __all__ = [
     "article_path",
     "capacity_margin",
     "confirm",
+    "control",
     "dump_mjcf",
     "dump_robot",
     "dynamic_stiffness",
@@ -206,6 +207,7 @@ __all__ = [
     "load_wirex",
     "modes",
     "path_from_samples",
+    "plc",
     "plot",
     "quintic_path",
     "robot_names",
@@ -217,6 +219,7 @@ __all__ = [
     "structure_matrix",
     "tension_polygon",
     "to_shape",
+    "twin",
     "unresisted_motion",
     "vibration",
     "winch_drive",
@@ -309,6 +312,7 @@ _HOMES = {
     "article_path": "sagline.motion.planar",
     "capacity_margin": "sagline.tension.margin",
     "confirm": "sagline.kinematics.confirm",
+    "control": "sagline.control",
     "dump_mjcf": "sagline.files.mjcf",
     "dump_robot": "sagline.files.robot_file",
     "dynamic_stiffness": "sagline.dynamics.cable_dynamics",
@@ -336,6 +340,7 @@ _HOMES = {
     "load_wirex": "sagline.files.wirex",
     "modes": "sagline.statics.stiffness",
     "path_from_samples": "sagline.motion.sampled",
+    "plc": "sagline.plc",
     "plot": "sagline.plot",
     "quintic_path": "sagline.motion.rest_to_rest",
     "robot_names": "sagline.robot.catalogue",
@@ -347,6 +352,7 @@ _HOMES = {
     "structure_matrix": "sagline.statics.balance",
     "tension_polygon": "sagline.kinematics.polygon",
     "to_shape": "sagline.dynamics.to_shape",
+    "twin": "sagline.twin",
     "unresisted_motion": "sagline.tension.singular",
     "vibration": "sagline.dynamics.vibrating",
     "winch_drive": "sagline.robot.winch_drives",
@@ -363,7 +369,7 @@ def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     module = import_module(_HOMES[name])
-    value = module if name == "plot" else getattr(module, name)
+    value = module if module.__name__ == f"{__name__}.{name}" else getattr(module, name)
     globals()[name] = value
     return value
 

@@ -1,0 +1,177 @@
+"""What a controller and the machine say to each other: a command and a sample a cycle, whatever is between them."""
+
+from __future__ import annotations
+
+from enum import IntEnum, IntFlag
+from typing import Final, NamedTuple, Protocol, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sagline.arrays import Array
+
+Whole: TypeAlias = NDArray[np.int64]
+Flags: TypeAlias = NDArray[np.bool_]
+
+PERIOD: Final = 0.01  # s, of the controller's cycle: the article's 100 samples a second
+GROUP_SIZE: Final = 2  # winches behind one PLC
+HEARTBEAT: Final = 0.1  # s: so long may a command counter stand before a PLC ramps its winches down and holds
+OWNER_TIMEOUT: Final = 0.5  # s: so long may it stand before another controller may have the grant
+RAMP: Final = 0.2  # s, in which rates go to zero, here and in a PLC
+
+
+class Mode(IntEnum):
+    """What a command asks of the drives."""
+
+    LEAVE = 0  # brakes on; the grant is given back
+    HOLD = 1  # stay where you are
+    FOLLOW = 2  # go to the set points
+    LOCK = 3  # stop the drums at once, and stay so until the operator of the machine lets them go
+
+
+class GroupStatus(IntFlag):
+    """What a PLC says of its group."""
+
+    READY = 1  # drives have no fault, and power
+    BRAKED = 2
+    FOLLOWING = 4  # set points
+    RAMPING = 8  # slows down by itself
+    HOLDING = 16  # by itself: after a ramp, or at a limit
+    LOCKED = 32  # drums
+    EMERGENCY = 64  # stop, of the hardware
+
+
+class GroupFault(IntEnum):
+    """Why a PLC acts by itself."""
+
+    NONE = 0
+    HEARTBEAT = 1  # the command counter stood, or a command was valid no longer
+    OVER_TENSION = 2  # it lets no more cable in
+    FOLLOWING_ERROR = 3
+    SET_POINT = 4  # one that is out of range
+    EMERGENCY_STOP = 5
+    DRIVE = 6
+
+
+class WinchState(IntEnum):
+    """What a PLC says of one winch."""
+
+    BRAKED = 0
+    ENABLED = 1
+    SATURATED = 2  # its drive gives all it can
+    LOCKED = 3
+    FAULT = 4
+
+
+class Command(NamedTuple):
+    """What a controller asks for in a cycle.
+
+    Attributes:
+        counter: Of commands, one more each cycle; wraps to 1 after 2^31 - 1.
+        owner: The controller's random id, 1 to 2^31 - 1.
+        mode: What the drives are to do.
+        valid_for: How long a PLC may go on with it [s].
+        length: Set points of the unstrained lengths off the drums at the end of the cycle [m], shape (m,).
+        rate: Their rates [m/s], shape (m,).
+        tension: Expected at the drums, which the motors hold beforehand [N], shape (m,).
+        enable: Which drives may move, shape (m,).
+    """
+
+    counter: int
+    owner: int
+    mode: Mode
+    valid_for: float
+    length: Array
+    rate: Array
+    tension: Array
+    enable: Flags
+
+
+class Sample(NamedTuple):
+    """What the machine said last; arrays belong to the one who asked. G groups, m winches.
+
+    Attributes:
+        time: When it was asked, on the link's clock [s].
+        age: Since the newest good block of each group came in [s], shape (G,).
+        counter: Of each group's blocks, shape (G,).
+        plc_time: When each PLC wrote it, on its own clock [s], shape (G,).
+        owner: Who has each grant, 0 for nobody, shape (G,).
+        echo: Counter of the last command each PLC took, shape (G,).
+        status: Bits of `GroupStatus`, shape (G,).
+        fault: Codes of `GroupFault`, shape (G,).
+        length: Unstrained lengths off the drums, from the encoders [m], shape (m,).
+        rate: Their rates [m/s], shape (m,).
+        torque: Of the motors at their shafts, positive where it lets cable out [N m], shape (m,).
+        tension: T_A, at the frame ends, as the load cells read it [N], shape (m,).
+        filtered: The same behind the PLC's filter [N], shape (m,).
+        counts: Of the encoders, shape (m,).
+        state: Codes of `WinchState`, shape (m,).
+        winch_fault: The drives' own codes, 0 for none, shape (m,).
+        discarded: How many blocks of each group were no good so far, shape (G,).
+    """
+
+    time: float
+    age: Array
+    counter: Whole
+    plc_time: Array
+    owner: Whole
+    echo: Whole
+    status: Whole
+    fault: Whole
+    length: Array
+    rate: Array
+    torque: Array
+    tension: Array
+    filtered: Array
+    counts: Whole
+    state: Whole
+    winch_fault: Whole
+    discarded: Whole
+
+
+class Missing(NamedTuple):
+    """There is no sample: some groups have never answered.
+
+    Attributes:
+        time: When it was asked, on the link's clock [s].
+        groups: Which, from 0.
+        reasons: Why, one a group.
+    """
+
+    time: float
+    groups: tuple[int, ...]
+    reasons: tuple[str, ...]
+
+
+class Link(Protocol):
+    """The way to a machine.
+
+    What it hands over is never older than what it handed over before: a block that is torn, foreign, repeated or out of
+    order is discarded, and the group's age goes on.
+    """
+
+    @property
+    def groups(self) -> tuple[tuple[int, ...], ...]:
+        """The winches of each group, from 0."""
+
+    def exchange(self, command: Command | None) -> Sample | Missing:
+        """Send a command and take what there is, without waiting for an answer.
+
+        A group whose grant another id has, or nobody, is sent the claim of `command.owner` and no command.
+
+        Args:
+            command: What is asked for; None: nothing is sent, for those who only read.
+        """
+
+    def close(self) -> None:
+        """Let go of the machine."""
+
+
+def groups_of(cable_count: int) -> tuple[tuple[int, ...], ...]:
+    """The winches of each group: two neighbors share a PLC, the last may be alone.
+
+    Args:
+        cable_count: Number of winches m.
+    """
+    winches = range(cable_count)
+    return tuple(tuple(winches[i : i + GROUP_SIZE]) for i in range(0, cable_count, GROUP_SIZE))

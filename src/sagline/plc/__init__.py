@@ -1,0 +1,1 @@
+"""Links to real controllers of drives, over S7 or Modbus."""
