@@ -1,0 +1,60 @@
+"""What a fault is: a rule that looks at every cycle, what follows, and a line for the operator."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from enum import IntEnum
+from typing import ClassVar
+
+from sagline.control.cycle import Cycle
+
+
+class Reaction(IntEnum):
+    """What follows from a fault; of several at a time the largest counts."""
+
+    EVENT = 0  # it is told and recorded, and nothing else
+    DEGRADED = 1  # the tension loop keeps what it has added; the motion goes on
+    STOPPING = 2  # the ramp, then FAULT
+    EMERGENCY = 3  # drums locked, no motion offered
+    OFF = 4  # the grants are given back
+
+
+class Fault(ABC):
+    """One rule. A fresh set of them, from `faults_of`, remembers nothing: make one when the operator clears a fault.
+
+    Attributes:
+        name: What an event calls it.
+        rule: When it is there, in words.
+        reaction: What follows.
+        within: How long it takes to be found, in words.
+        homing: Whether it leaves a length in doubt, so that the robot must be homed again.
+        lasting: Whether it stays until a fresh set is made, though its rule holds no longer.
+        present: Whether it is there now.
+    """
+
+    name: ClassVar[str]
+    rule: ClassVar[str]
+    reaction: ClassVar[Reaction]
+    within: ClassVar[str]
+    homing: ClassVar[bool] = False
+    lasting: ClassVar[bool] = False
+    present: bool = False
+
+    def look(self, cycle: Cycle) -> str | None:
+        """Look at a cycle; every cycle once, in order.
+
+        Args:
+            cycle: The cycle.
+
+        Returns:
+            Where the fault begins a line for the operator: what, which item, value, limit, next step. None otherwise,
+            and while it lasts.
+        """
+        line = self.found(cycle)
+        begins = line is not None and not self.present
+        self.present = line is not None or (self.lasting and self.present)
+        return line if begins else None
+
+    @abstractmethod
+    def found(self, cycle: Cycle) -> str | None:
+        """The operator's line in every cycle in which the rule holds."""
