@@ -1,0 +1,227 @@
+"""What became of a plan on the machine: set points, samples, estimates and events, cycle by cycle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sagline.arrays import Array, Codes, Flags, Indices, locked
+from sagline.control.events import Event
+from sagline.control.link import Sample
+from sagline.control.recording import OF_GROUPS, OF_WINCHES, Tape
+from sagline.kinematics.plan import Plan
+from sagline.results import Result
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.status import Status
+
+_REAL: Final = frozenset({"age", "plc_time", "length", "rate", "torque", "tension", "filtered"})
+
+
+class ExecutionStatus(Status):
+    """How the execution of a plan ended."""
+
+    DONE = 0, "the plan was gone through to its end"
+    PAUSED = 1, "the platform stands on its way; resume() goes on"
+    STOPPED = 2, "the operator stopped it; plan anew from where the platform stands"
+    FAULT = 3, "a fault stopped it: read the events, mend it, acknowledge"
+    EMERGENCY = 4, "the drums are locked: read the events, free the machine by hand, connect and home again"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Samples(Result):
+    """What the machine said, N samples one below the other; names and units as of `Sample`.
+
+    Where a cycle had no sample, floats are NaN and whole numbers 0.
+
+    Attributes:
+        time: Shape (N,).
+        age: Shape (N, G).
+        counter: Shape (N, G).
+        plc_time: Shape (N, G).
+        owner: Shape (N, G).
+        echo: Shape (N, G).
+        status: Shape (N, G).
+        fault: Shape (N, G).
+        length: As read, before the zero of homing, shape (N, m).
+        rate: Shape (N, m).
+        torque: Shape (N, m).
+        tension: Shape (N, m).
+        filtered: Shape (N, m).
+        counts: Shape (N, m).
+        state: Shape (N, m).
+        winch_fault: Shape (N, m).
+        discarded: Shape (N, G).
+    """
+
+    time: Array
+    age: Array
+    counter: Indices
+    plc_time: Array
+    owner: Indices
+    echo: Indices
+    status: Indices
+    fault: Indices
+    length: Array
+    rate: Array
+    torque: Array
+    tension: Array
+    filtered: Array
+    counts: Indices
+    state: Indices
+    winch_fault: Indices
+    discarded: Indices
+
+    def __len__(self) -> int:
+        """Number of samples."""
+        return len(self.time)
+
+    def at(self, index: int) -> Sample:
+        """One sample, with arrays of its own.
+
+        Args:
+            index: Which, from 0.
+        """
+        return Sample(float(self.time[index]), *(getattr(self, name)[index].copy() for name in Sample._fields[1:]))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Execution(Result):
+    """What became of a plan on the machine, in N cycles of m winches.
+
+    The command of a cycle is what was sent in it; the sample came back in the same cycle, so that it knows nothing of
+    that command yet.
+
+    Attributes:
+        robot: The robot as the controller knows it.
+        plan: What was to be done, from its first pose to its last; None where nothing was planned, as of a jog.
+        status: How it ended.
+        reason: One line on how it ended.
+        period: Of a cycle [s].
+        zero: What homing found is to be added to the lengths that samples tell [m], shape (m,).
+        events: What happened.
+        time: On the link's clock [s], shape (N,).
+        answered: In which cycles there was a sample, shape (N,).
+        state: Codes of `State` at the end of each cycle, shape (N,).
+        late: By how much each cycle began too late [s], shape (N,).
+        clock: Where on the plan each cycle was, from its start [s], shape (N,); NaN beside it.
+        samples: What the machine said.
+        position: Of the platform's origin, estimated from the encoders [m], shape (N, 3).
+        quaternion: Its rotation, platform -> world, scalar last, shape (N, 4).
+        estimate: Codes of `ForwardStatus` of these, -1 where there is none, shape (N,).
+        mode: Codes of `Mode` of the commands, -1 where none was sent, shape (N,).
+        set_length: Set points of the unstrained lengths, with the zero of homing [m], shape (N, m).
+        set_rate: Of their rates [m/s], shape (N, m).
+        set_tension: Of the tensions at the drums [N], shape (N, m).
+        planned_tension: T_A planned for the moment of each sample [N], shape (N, m); NaN where nothing is planned.
+        correction: What the tension loop has in the set points [m], shape (N, m).
+    """
+
+    robot: Robot
+    plan: Plan | None
+    status: ExecutionStatus
+    reason: str
+    period: float
+    zero: Array
+    events: tuple[Event, ...]
+    time: Array
+    answered: Flags
+    state: Codes
+    late: Array
+    clock: Array
+    samples: Samples
+    position: Array
+    quaternion: Array
+    estimate: Codes
+    mode: Codes
+    set_length: Array
+    set_rate: Array
+    set_tension: Array
+    planned_tension: Array
+    correction: Array
+
+    def __len__(self) -> int:
+        """Number of cycles."""
+        return len(self.time)
+
+    @property
+    def length(self) -> Array:
+        """Unstrained lengths off the drums from the encoders, with the zero of homing [m], shape (N, m)."""
+        return locked(self.samples.length + self.zero)
+
+    @property
+    def tension(self) -> Array:
+        """T_A as the load cells read it [N], shape (N, m)."""
+        return self.samples.tension
+
+    @property
+    def pose(self) -> Pose:
+        """Estimated from the encoders, a batch of N; NaN where there is none."""
+        return Pose._adopt(self.position, self.quaternion)
+
+
+def execution_of(
+    tape: Tape,
+    robot: Robot,
+    plan: Plan | None,
+    status: ExecutionStatus,
+    reason: str,
+    period: float,
+    zero: Array,
+    events: tuple[Event, ...],
+) -> Execution:
+    """The execution that a tape holds.
+
+    Args:
+        tape: Its cycles.
+        robot: As `Execution` has it; so are the others.
+        plan: What was to be done.
+        status: How it ended.
+        reason: One line on that.
+        period: Of a cycle [s].
+        zero: Of homing [m], shape (m,).
+        events: What happened.
+    """
+
+    def column(name: str) -> Array:
+        return locked(tape.column(name))
+
+    def codes(name: str) -> Codes:
+        return locked(tape.column(name).astype(np.int8))
+
+    return Execution(
+        robot=robot,
+        plan=plan,
+        status=status,
+        reason=reason,
+        period=period,
+        zero=locked(zero.copy()),
+        events=events,
+        answered=locked(tape.column("answered").astype(np.bool_)),
+        samples=_samples(tape),
+        time=column("time"),
+        state=codes("state"),
+        late=column("late"),
+        clock=column("clock"),
+        position=column("position"),
+        quaternion=column("quaternion"),
+        estimate=codes("estimate"),
+        mode=codes("mode"),
+        set_length=column("set_length"),
+        set_rate=column("set_rate"),
+        set_tension=column("set_tension"),
+        planned_tension=column("planned_tension"),
+        correction=column("correction"),
+    )
+
+
+def _samples(tape: Tape) -> Samples:
+    found: dict[str, NDArray[Any]] = {"time": locked(tape.column("time"))}
+    for kind, names in (("group", OF_GROUPS), ("winch", OF_WINCHES)):
+        for name in names:
+            values = tape.column(f"{kind}_{name}")
+            found[name] = locked(values if name in _REAL else np.nan_to_num(values).astype(np.int64))
+    return Samples(**{field.name: found[field.name] for field in fields(Samples)})

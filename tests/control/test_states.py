@@ -1,0 +1,49 @@
+"""The table of states against section 13's, and what it refuses."""
+
+import pytest
+
+from sagline.control.states import EXITS, HOLDS_GRANT, TABLE, RefusedError, State, check_transition
+
+
+def test_every_state_has_one_row_in_the_order_of_the_codes() -> None:
+    assert [row.state for row in TABLE] == list(State)
+
+
+def test_every_state_that_holds_a_grant_and_is_no_end_stops_on_a_fault() -> None:
+    after = {State.STOPPING, State.FAULT, State.EMERGENCY}
+    for state in HOLDS_GRANT - after:
+        assert State.STOPPING in EXITS[state]
+
+
+def test_every_state_but_off_leads_to_emergency_and_only_off_leads_away() -> None:
+    for state in set(State) - {State.OFF, State.EMERGENCY}:
+        assert State.EMERGENCY in EXITS[state]
+    assert EXITS[State.EMERGENCY] == (State.OFF,)
+    assert EXITS[State.OFF] == (State.CONNECTING,)
+
+
+def test_nothing_moves_a_robot_whose_place_is_not_known() -> None:
+    """Only homing, or a place that is still known, leads to where paths begin."""
+    assert [state for state in State if State.MOVING in EXITS[state]] == [State.IDLE]
+    assert {state for state in State if State.IDLE in EXITS[state]} == {
+        State.READY,
+        State.HOMING,
+        State.MOVING,
+        State.JOGGING,
+        State.PAUSING,
+        State.STOPPING,
+    }
+
+
+def test_what_is_not_listed_is_refused_in_one_line_with_the_ways_that_there_are() -> None:
+    for state in State:
+        for to in State:
+            if to in EXITS[state]:
+                check_transition(state, to, "it")
+                continue
+            with pytest.raises(RefusedError) as caught:
+                check_transition(state, to, "it")
+            line = str(caught.value)
+            assert len(line) < 300
+            assert line.startswith("it is refused: ")
+            assert all(exit.name in line for exit in EXITS[state])
