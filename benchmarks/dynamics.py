@@ -8,11 +8,10 @@ from functools import partial
 from typing import Final
 
 import numpy as np
-from rich.console import Console
 
 import sagline as sl
 from benchmarks import vibrations
-from benchmarks.measure import Row, best_of_calls, best_seconds, one_core, show
+from benchmarks.measure import Row, best_of_calls, best_seconds, print_table
 from sagline.dynamics.simulate import Integrator
 from tests.dynamics.let_go import beside
 from tests.dynamics.machines import prototype
@@ -127,18 +126,7 @@ def lumped() -> Iterator[Row]:
         )
 
 
-def main() -> None:
-    """Measure and print."""
-    console = Console()
-    rows: list[Row] = []
-    one_core()
-    for part in PARTS:
-        Console(stderr=True).print(f"[dim]{part.__doc__}[/dim]")
-        rows.extend(part())
-    show("Dynamics", rows, console)
-
-
 PARTS = (residuals, shortest, speed, energies, lumped, *vibrations.PARTS)
 
 if __name__ == "__main__":
-    main()
+    print_table("Dynamics", PARTS)

@@ -6,10 +6,9 @@ from collections.abc import Callable, Iterator
 from functools import partial
 
 import numpy as np
-from rich.console import Console
 
 import sagline as sl
-from benchmarks.measure import Row, best_seconds, one_core, show
+from benchmarks.measure import Row, best_seconds, print_table
 from sagline.robot.drum import drums_of
 from tests.kernels.cable.test_pulley import there_and_back
 from tests.kinematics.test_pulleys import formula_error
@@ -96,18 +95,7 @@ def formula() -> Iterator[Row]:
         yield Row(f"straight exit and catenary from it, {what}", "state it", f"{1e6 * worst:.1f} um off at most")
 
 
-def main() -> None:
-    """Measure and print."""
-    console = Console()
-    rows: list[Row] = []
-    one_core()
-    for part in PARTS:
-        Console(stderr=True).print(f"[dim]{part.__doc__}[/dim]")
-        rows.extend(part())
-    show("The machine between encoder and cable", rows, console)
-
-
 PARTS = (counts, hard_cables, speed, formula)
 
 if __name__ == "__main__":
-    main()
+    print_table("The machine between encoder and cable", PARTS)

@@ -6,7 +6,7 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 from rich.console import Console
@@ -70,3 +70,13 @@ def show(title: str, rows: Sequence[Row], console: Console) -> None:
     print(f"\n### {title}\n\n| {' | '.join(Row._fields)} |\n|---|---|---|")
     for row in rows:
         print(f"| {' | '.join(row)} |")
+
+
+def print_table(title: str, parts: Sequence[Callable[[], Iterator[Row]]]) -> None:
+    """Measure one part after another on one core, and print a table of their rows."""
+    rows: list[Row] = []
+    one_core()
+    for part in parts:
+        Console(stderr=True).print(f"[dim]{part.__doc__}[/dim]")
+        rows.extend(part())
+    show(title, rows, Console())

@@ -6,10 +6,9 @@ from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
-from rich.console import Console
 
 import sagline as sl
-from benchmarks.measure import Row, best_seconds, one_core, show
+from benchmarks.measure import Row, best_seconds, print_table
 from sagline.dynamics.count import modes_below
 from sagline.dynamics.reduced import reduced, setting_of
 from tests.dynamics.states import at, middle
@@ -81,18 +80,7 @@ def speed() -> Iterator[Row]:
         yield Row(f"cogiro: response at 1,000 frequencies to 20 Hz, {words} damping", "state it", shown)
 
 
-def main() -> None:
-    """Measure and print."""
-    console = Console()
-    rows: list[Row] = []
-    one_core()
-    for part in PARTS:
-        Console(stderr=True).print(f"[dim]{part.__doc__}[/dim]")
-        rows.extend(part())
-    show("Vibrations", rows, console)
-
-
 PARTS = (cables, robots, speed)
 
 if __name__ == "__main__":
-    main()
+    print_table("Vibrations", PARTS)

@@ -14,8 +14,7 @@ from sagline.cli.results import figure_files, listed, write_figures
 from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.cli.track import check_unit
-from sagline.cli.values import loaded, middle_of, quantity, wrench_of
-from sagline.dynamics.damping import Damping
+from sagline.cli.values import damping_of, loaded, middle_of, quantity, wrench_of
 from sagline.dynamics.events import Break
 from sagline.dynamics.shaped import shaped
 from sagline.dynamics.shapers import EI, ZV, ZVD
@@ -80,10 +79,7 @@ def simulate(
     events = tuple(_break(text, robot) for text in asked.breaks)
     after = quantity(asked.after, "--after", "s", low=0.0)
     step = None if asked.step is None else quantity(asked.step, "--step", "s", above=0.0)
-    damping = Damping(
-        quantity(asked.loss_time, "--loss-time", "s", low=0.0),
-        quantity(asked.air_damping, "--air-damping", "N*s/m^2", low=0.0),
-    )
+    damping = damping_of(asked.loss_time, asked.air_damping)
     file = Path("output") / f"{file_stem(robot.name, 'simulation')}.nc" if out is None else out
     if file.suffix != ".nc":
         raise FileError(file, "does not end in .nc", "Name a NetCDF file: --out sim.nc.")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from sagline.arrays import Array, checked
+from sagline.dynamics.damping import Damping
 from sagline.errors import InvalidValueError
 from sagline.files.quantity import in_si, plain_number
 from sagline.robot.inertia import with_mass
@@ -71,6 +72,21 @@ def ratio(text: str, item: str) -> float:
     """
     number, percent = text.strip().removesuffix("%"), text.strip().endswith("%")
     return quantity(number, item, "", low=0.0) / (100.0 if percent else 1.0)
+
+
+def damping_of(loss_time: str, air_damping: str, modal_damping: str = "0") -> Damping:
+    """The losses of cables and modes.
+
+    Args:
+        loss_time: Of `--loss-time`, a time.
+        air_damping: Of `--air-damping`, a force on a length over a velocity.
+        modal_damping: Of `--damping`, a ratio.
+
+    Raises:
+        InvalidValueError: If one is no such quantity, or negative.
+    """
+    times = quantity(loss_time, "--loss-time", "s", low=0.0)
+    return Damping(times, quantity(air_damping, "--air-damping", "N*s/m^2", low=0.0), ratio(modal_damping, "--damping"))
 
 
 def middle_of(robot: Robot) -> Pose:

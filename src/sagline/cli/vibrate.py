@@ -14,7 +14,7 @@ from sagline.cli.maps import counts_of, vibrate_all_over
 from sagline.cli.results import figure_files, listed, write_figures
 from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
-from sagline.cli.values import loaded, middle_of, pose_of, quantity, ratio, wrench_of
+from sagline.cli.values import damping_of, loaded, middle_of, pose_of, quantity, wrench_of
 from sagline.dynamics.damping import Damping
 from sagline.dynamics.mode_list import MASSLESS, WITH_MASS, ListedMode, listed_modes, successors
 from sagline.dynamics.vibrating import vibration
@@ -45,11 +45,7 @@ class Losses(NamedTuple):
     @property
     def damping_of(self) -> Damping:
         """As numbers."""
-        return Damping(
-            quantity(self.loss_time, "--loss-time", "s", low=0.0),
-            quantity(self.air_damping, "--air-damping", "N*s/m^2", low=0.0),
-            ratio(self.damping, "--damping"),
-        )
+        return damping_of(self.loss_time, self.air_damping, self.damping)
 
 
 def vibrate(

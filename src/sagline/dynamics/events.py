@@ -14,7 +14,7 @@ from sagline.robot.robot import Robot
 
 @dataclass(frozen=True, slots=True)
 class Break:
-    """A cable breaks: from then on it is not there. Its energy counts as lost.
+    """A cable breaks: from then on it is not there. Its energy goes with it, as `energy.removed`.
 
     Attributes:
         cable: Which, from 0.
