@@ -1,0 +1,135 @@
+"""The outer loop: tensions are mended by lengths that do not move the platform, and by no others."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from sagline.arguments import instance, whole_number
+from sagline.arrays import Array, number
+from sagline.control.link import PERIOD
+from sagline.control.null_space import NullSpace
+from sagline.errors import InvalidValueError
+
+MOST_GAIN: Final = 0.1  # a cycle: a loop with five cycles of delay is unstable from 0.17 on
+
+
+@dataclass(frozen=True, slots=True)
+class TensionSettings:
+    """How the tension loop works; the defaults have 24 dB and 62 degrees at a delay of five cycles.
+
+    Attributes:
+        filter_time: Time constant of the filter in front of it [s], > 0.
+        gain: Share of the error that it makes up each cycle, >= 0, at most 0.1; 0 for a loop that is off.
+        act_above: It begins to act where a tension that it can change is further from the plan than this [N].
+        rest_below: It rests again where all are nearer than this [N], >= 0, less than `act_above`.
+        largest: It never changes a length by more [m], > 0.
+
+    Raises:
+        InvalidValueError: If a value is out of its range.
+    """
+
+    filter_time: float = 0.5
+    gain: float = 0.01
+    act_above: float = 3.0
+    rest_below: float = 0.5
+    largest: float = 5e-3
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        for name, unit in (("filter_time", "s"), ("act_above", "N"), ("largest", "m")):
+            object.__setattr__(self, name, number(getattr(self, name), name, unit, above=0.0))
+        for name, unit in (("gain", ""), ("rest_below", "N")):
+            object.__setattr__(self, name, number(getattr(self, name), name, unit, low=0.0))
+        if self.gain > MOST_GAIN:
+            step = "Take 0.01; with more it hunts on the friction of the drives."
+            raise InvalidValueError("gain", f"{self.gain:g}", f"0 to {MOST_GAIN:g}", step)
+        if self.rest_below >= self.act_above:
+            allowed = f"less than act_above, {self.act_above:g} N"
+            raise InvalidValueError("rest_below", f"{self.rest_below:g} N", allowed, "Lower rest_below.")
+
+
+class TensionLoop:
+    """Adds to the lengths of a plan what brings the tensions back to it; one for a session, as errors of lengths last.
+
+    f <- f + h/(tau + h) (T - T_plan - f), and while it acts delta <- delta - k N_L G f; docs/model.md, section 13.
+
+    Attributes:
+        settings: How it works.
+        acting: Whether it acts.
+    """
+
+    def __init__(self, cable_count: int, settings: TensionSettings | None = None, period: float = PERIOD) -> None:
+        """Begin with nothing added.
+
+        Args:
+            cable_count: Number of cables m.
+            settings: How it works; by default those of the docs.
+            period: Of a cycle [s], > 0.
+
+        Raises:
+            InvalidValueError: If an argument is of the wrong kind or out of its range.
+        """
+        m = whole_number(cable_count, "cable_count", 1)
+        self.settings = TensionSettings() if settings is None else instance(settings, TensionSettings, "settings")
+        cycle = number(period, "period", "s", above=0.0)
+        self._share = cycle / (self.settings.filter_time + cycle)
+        self._row: NullSpace | None = None
+        self._filtered, self._correction = np.zeros(m), np.zeros(m)
+        self._error, self._change = np.empty(m), np.empty(m)
+        self.acting = False
+
+    @property
+    def correction(self) -> Array:
+        """What it adds to the lengths of the plan [m], shape (m,)."""
+        return self._correction.copy()
+
+    @property
+    def error(self) -> float:
+        """The largest error of a tension that it sees and can change, filtered [N]; 0 before the first step."""
+        return 0.0 if self._row is None else float(np.abs(self._row.visible @ self._filtered).max())
+
+    def step(self, tension: Array, planned: Array, row: NullSpace, *, frozen: bool = False) -> Array:
+        """One cycle.
+
+        Args:
+            tension: T_A, as the load cells read it [N], shape (m,).
+            planned: The plan's, at the same time [N], shape (m,).
+            row: Of the plan's gains at this time.
+            frozen: Whether the tensions are old or not to be believed: nothing is learned from them. What was added is
+                still fitted to the pose.
+
+        Returns:
+            What to add to the lengths of the plan [m], shape (m,), the caller's own.
+        """
+        if row is not self._row:  # what leaves the platform alone at one pose moves it at the next
+            if self._row is not None:
+                np.matmul(row.projection, self._correction, out=self._change)
+                self._correction[:] = self._change
+            self._row = row
+        np.subtract(tension, planned, out=self._error)
+        if not frozen and math.isfinite(self._error.sum()):  # NaN would stay in the filter for ever
+            self._learn(row)
+        return self._correction.copy()
+
+    def _learn(self, row: NullSpace) -> None:
+        """Filter the error, and add to the lengths where it is large."""
+        settings, change = self.settings, self._change
+        self._error -= self._filtered
+        self._error *= self._share
+        self._filtered += self._error
+        np.matmul(row.visible, self._filtered, out=change)
+        np.abs(change, out=change)
+        self.acting = bool(change.max() > (settings.rest_below if self.acting else settings.act_above))
+        if not self.acting:
+            return
+        np.matmul(row.correction, self._filtered, out=change)
+        change *= settings.gain
+        self._correction -= change
+        np.abs(self._correction, out=change)
+        largest = float(change.max())
+        if largest > settings.largest:  # a fault tells of it
+            self._correction *= settings.largest / largest  # as a whole: each for itself would move the platform

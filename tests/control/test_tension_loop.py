@@ -1,0 +1,146 @@
+"""The tension loop on hand-made errors, and on the prototype's equilibria."""
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.arrays import Array
+from sagline.control.null_space import NullSpace, null_space
+from sagline.control.tension_loop import TensionLoop, TensionSettings
+from tests.control.stops import stops
+
+STATE = stops().state[0]
+ROW = null_space(STATE)
+PLANNED = STATE.cables.frame_end_tension
+QUIET = TensionSettings(filter_time=1e-9)  # acts on the reading itself
+
+
+def visible_error(newtons: float, row: NullSpace = ROW) -> Array:
+    """An error whose largest part is so large, and which lengths can make up."""
+    error = row.visible @ np.array([1.0, -2.0, 0.5, 1.5, -1.0, 0.3, 2.0, -0.7])
+    return np.asarray(newtons / np.abs(error).max() * error)
+
+
+def hidden_error(newtons: float) -> Array:
+    """One of the wrench alone, as an unknown load makes it."""
+    error = np.ones(8)
+    error -= ROW.visible @ error
+    return np.asarray(newtons / np.abs(error).max() * error)
+
+
+def test_it_acts_from_three_newtons_until_half_a_newton() -> None:
+    loop = TensionLoop(8, QUIET)
+    courses = [(2.99, False), (3.01, True), (0.6, True), (0.51, True), (0.49, False), (0.6, False), (2.99, False)]
+    for newtons, acts in courses:
+        before = loop.correction
+        after = loop.step(PLANNED + visible_error(newtons), PLANNED, ROW)
+        assert loop.acting is acts
+        assert bool((after != before).any()) is acts
+        assert loop.error == pytest.approx(newtons, rel=1e-6)
+
+
+def test_a_wrench_error_is_shown_and_never_fed_back() -> None:
+    loop = TensionLoop(8)
+    for _ in range(500):
+        added = loop.step(PLANNED + hidden_error(20.0), PLANNED, ROW)
+    assert not loop.acting
+    assert not added.any()
+    assert loop.error < 1e-9
+
+
+def test_one_step_is_that_of_the_formula() -> None:
+    settings, period = TensionSettings(filter_time=0.5, gain=0.02, act_above=1.0), 0.01
+    loop, error = TensionLoop(8, settings, period), visible_error(100.0)
+    added = loop.step(PLANNED + error, PLANNED, ROW)
+    filtered = period / (0.5 + period) * error
+    np.testing.assert_allclose(added, -0.02 * ROW.correction @ filtered, rtol=1e-12, atol=1e-18)
+    assert loop.error == pytest.approx(100.0 * 0.01 / 0.51)
+    again = loop.step(PLANNED + error, PLANNED, ROW)
+    filtered += period / (0.5 + period) * (error - filtered)
+    np.testing.assert_allclose(again - added, -0.02 * ROW.correction @ filtered, rtol=1e-12, atol=1e-18)
+
+
+def test_wrong_zeros_are_made_up_for_and_the_platform_stays() -> None:
+    """Lengths wrong inside the null space: tensions come back to the plan, within the band, and the platform rests."""
+    zeros = 5e-3 * ROW.projection @ np.random.default_rng(5).normal(size=8)
+    loop, added, moved = TensionLoop(8), np.zeros(8), 0.0
+    for i in range(1000):
+        found = sl.forward(STATE.robot, STATE.unstrained_length + zeros + added, start=STATE.pose)
+        moved = max(moved, float(np.abs(found.pose.position - STATE.pose.position).max()))
+        error = found.state.cables.frame_end_tension - PLANNED
+        left = np.abs(ROW.visible @ error).max()
+        if i == 0:
+            assert left > 3.0
+        added = loop.step(PLANNED + error, PLANNED, ROW)
+    assert left < 0.6
+    assert not loop.acting
+    assert np.abs(added + zeros).max() < np.abs(zeros).max() / 4.0
+    assert moved < 2e-5
+
+
+def test_what_was_added_is_fitted_to_the_next_pose_once() -> None:
+    other = null_space(stops().state[8])
+    loop = TensionLoop(8, QUIET)
+    for _ in range(100):
+        added = loop.step(PLANNED + visible_error(5.0), PLANNED, ROW)
+    assert np.abs(added - other.projection @ added).max() > 0.05 * np.abs(added).max()
+    fitted = loop.step(PLANNED, PLANNED, other)
+    np.testing.assert_allclose(fitted, other.projection @ added, atol=1e-16)
+    same = loop.step(PLANNED, PLANNED, other)
+    np.testing.assert_array_equal(same, fitted)
+
+
+def test_no_length_is_changed_by_more_than_the_largest_and_the_platform_stays_even_there() -> None:
+    loop = TensionLoop(8)
+    for _ in range(5000):
+        added = loop.step(PLANNED + visible_error(50.0), PLANNED, ROW)
+    assert np.abs(added).max() == pytest.approx(5e-3, rel=1e-12)
+    assert np.abs(added).max() <= 5e-3 * (1.0 + 1e-12)
+    np.testing.assert_allclose(ROW.projection @ added, added, atol=1e-16)
+    for _ in range(5000):  # it comes back from there
+        added = loop.step(PLANNED - visible_error(50.0), PLANNED, ROW)
+    np.testing.assert_allclose(ROW.projection @ added, added, atol=1e-16)
+    assert np.abs(added).max() == pytest.approx(5e-3, rel=1e-12)
+
+
+def test_frozen_it_learns_nothing_but_fits_to_the_pose() -> None:
+    other = null_space(stops().state[8])
+    loop = TensionLoop(8, QUIET)
+    added = loop.step(PLANNED + visible_error(5.0), PLANNED, ROW)
+    held = loop.step(PLANNED + visible_error(50.0), PLANNED, ROW, frozen=True)
+    np.testing.assert_array_equal(held, added)
+    assert loop.error == pytest.approx(5.0)
+    fitted = loop.step(PLANNED + visible_error(50.0), PLANNED, other, frozen=True)
+    np.testing.assert_allclose(fitted, other.projection @ added, atol=1e-18)
+
+
+def test_a_reading_that_is_no_number_is_not_learned() -> None:
+    loop, one = TensionLoop(8, QUIET), PLANNED.copy()
+    added = loop.step(PLANNED + visible_error(5.0), PLANNED, ROW)
+    one[2] = np.nan
+    np.testing.assert_array_equal(loop.step(one, PLANNED, ROW), added)
+    assert np.isfinite(loop.step(PLANNED, PLANNED, ROW)).all()
+
+
+def test_what_it_hands_out_is_the_callers() -> None:
+    loop = TensionLoop(8, QUIET)
+    added = loop.step(PLANNED + visible_error(5.0), PLANNED, ROW)
+    kept = added.copy()
+    loop.step(PLANNED + visible_error(5.0), PLANNED, ROW)
+    np.testing.assert_array_equal(added, kept)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "told"),
+    [
+        ("filter_time", 0.0, "filter_time is 0 s; allowed: > 0"),
+        ("gain", -0.01, "gain is -0.01"),
+        ("gain", 0.2, "gain is 0.2; allowed: 0 to 0.1"),
+        ("act_above", 0.0, "act_above is 0 N"),
+        ("rest_below", 3.0, "rest_below is 3 N; allowed: less than act_above, 3 N"),
+        ("largest", np.inf, "largest is inf m"),
+    ],
+)
+def test_settings_out_of_range_are_refused(name: str, value: float, told: str) -> None:
+    with pytest.raises(sl.InvalidValueError, match=told):
+        TensionSettings(**{name: value})
