@@ -1,24 +1,38 @@
 """The controller of a cable robot: states, loops, faults, and the link to a machine."""
 
+from sagline.control.cycle import Cycle
 from sagline.control.events import Event, EventKind
 from sagline.control.execution import Execution, ExecutionStatus, Samples
+from sagline.control.fault import Fault, Reaction
+from sagline.control.gains import Gains, gains_along
 from sagline.control.link import Command, Link, Missing, Mode, Sample
+from sagline.control.null_space import NullSpace, null_space
 from sagline.control.recording import Recorded, Recorder
 from sagline.control.states import RefusedError, State
+from sagline.control.tension_loop import TensionLoop, TensionSettings
 
 __all__ = [
     "Command",
+    "Cycle",
     "Event",
     "EventKind",
     "Execution",
     "ExecutionStatus",
+    "Fault",
+    "Gains",
     "Link",
     "Missing",
     "Mode",
+    "NullSpace",
+    "Reaction",
     "Recorded",
     "Recorder",
     "RefusedError",
     "Sample",
     "Samples",
     "State",
+    "TensionLoop",
+    "TensionSettings",
+    "gains_along",
+    "null_space",
 ]
