@@ -29,6 +29,7 @@ class ExecutionStatus(Status):
     STOPPED = 2, "the operator stopped it; plan anew from where the platform stands"
     FAULT = 3, "a fault stopped it: read the events, mend it, acknowledge"
     EMERGENCY = 4, "the drums are locked: read the events, free the machine by hand, connect and home again"
+    UNKNOWN = 5, "the record breaks off before the end; look at the machine"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

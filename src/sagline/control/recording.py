@@ -12,6 +12,8 @@ from sagline.arrays import Array
 from sagline.control.events import Event
 from sagline.control.link import Command, Missing, Sample
 from sagline.control.states import State
+from sagline.kinematics.plan import Plan
+from sagline.status import Status
 
 BLOCK: Final = 4096  # cycles that are made room for at once
 
@@ -59,6 +61,16 @@ class Recorded(NamedTuple):
 
 class Recorder(Protocol):
     """One who looks on: a log, a status line. It must never block: the loop waits for it."""
+
+    @property
+    def stopped(self) -> str:
+        """Why it takes nothing more, "" while it does: what `Cycle.recording` tells the rules for faults."""
+
+    def begins(self, plan: Plan) -> None:
+        """Take a plan, before the first cycle that follows it."""
+
+    def ends(self, status: Status, reason: str) -> None:
+        """Take how that plan ended, an `ExecutionStatus`, after its last cycle."""
 
     def cycle(self, cycle: Recorded) -> None:
         """Take a cycle."""
