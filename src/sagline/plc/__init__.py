@@ -1,1 +1,6 @@
 """Links to real controllers of drives, over S7 or Modbus."""
+
+from sagline.plc.s7_link import S7Link
+from sagline.plc.wire import LinkError
+
+__all__ = ["LinkError", "S7Link"]

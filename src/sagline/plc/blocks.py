@@ -1,0 +1,225 @@
+"""The data blocks a PLC and a controller share: one table of names, types and offsets, for packing, mirrors and SCL."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Final, NamedTuple
+
+from sagline.control.link import GROUP_SIZE
+
+LAYOUT: Final = 1  # version of the blocks; one more whenever anything below moves
+COUNTERS: Final = 2**31 - 1  # counters go from 1 to here, and begin again
+TYPES: Final = {  # of SCL, as `struct` has them; big-endian and without gaps, as the PLC has them
+    "DInt": "i",
+    "DWord": "I",
+    "LReal": "d",
+    "Real": "f",
+    "Time": "i",  # ms
+    "UDInt": "I",
+    "UInt": "H",
+}
+
+
+class Field(NamedTuple):
+    """One row of a block.
+
+    Attributes:
+        name: As packing and SCL have it.
+        type: One of `TYPES`; or the rows of a structure that is there once a winch, in an array from 1.
+        offset: From the beginning of the block, or of the structure [bytes].
+        meaning: Unit and sense, for people.
+    """
+
+    name: str
+    type: str | tuple[Field, ...]
+    offset: int
+    meaning: str
+
+
+class Refusal(NamedTuple):
+    """Why a block, or a PLC, cannot be used.
+
+    Attributes:
+        reason: What is wrong.
+        next_step: What to do about it.
+    """
+
+    reason: str
+    next_step: str
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """A data block with standard (not optimized) access: every byte stays where the table says.
+
+    Attributes:
+        number: Of the data block in the PLC.
+        name: Of it, in SCL.
+        magic: What its row `magic` holds.
+        register: First Modbus holding register of its mirror.
+        size: Of the whole [bytes].
+        fields: Its rows.
+    """
+
+    number: int
+    name: str
+    magic: int
+    register: int
+    size: int
+    fields: tuple[Field, ...]
+
+    @cached_property
+    def rows(self) -> tuple[tuple[str, str, int], ...]:
+        """Name, type and offset of every plain value; those of winches are `winch_row`'s."""
+        rows: list[tuple[str, str, int]] = []
+        for name, kind, offset, _ in self.fields:
+            if isinstance(kind, str):
+                rows.append((name, kind, offset))
+                continue
+            size = sum(_bytes(f.type) for f in kind)
+            for i in range(GROUP_SIZE):
+                rows += [(winch_row(i, f.name), str(f.type), offset + i * size + f.offset) for f in kind]
+        return tuple(rows)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Of the rows."""
+        return tuple(name for name, _, _ in self.rows)
+
+    @cached_property
+    def packer(self) -> struct.Struct:
+        """The block as `struct` packs it, every row at its offset."""
+        text, at = ">", 0
+        for _, kind, offset in self.rows:
+            text += "x" * (offset - at) + TYPES[kind]
+            at = offset + _bytes(kind)
+        return struct.Struct(text + "x" * (self.size - at))
+
+    def pack(self, values: Mapping[str, Any]) -> bytes:
+        """Bytes of the block.
+
+        Args:
+            values: By name of the row; what is not given is zero, but for magic, version and the counter's repetition.
+        """
+        known = {"magic": self.magic, "version": LAYOUT, AGAIN: values.get("counter", 0), **values}
+        return self.packer.pack(*[known.get(name, 0) for name in self.names])
+
+    def read(self, data: bytes) -> dict[str, Any] | Refusal:
+        """Values by name of the row, or what is wrong with bytes that came as this block.
+
+        Args:
+            data: What was read.
+        """
+        block = f"DB{self.number}"
+        if len(data) != self.size:
+            return Refusal(f"{block} has {len(data)} bytes instead of {self.size}", LOAD)
+        values = dict(zip(self.names, self.packer.unpack(data), strict=True))
+        if values["magic"] != self.magic:
+            begins = f"16#{values['magic']:08X} where sagline's has 16#{self.magic:08X}"
+            return Refusal(f"{block} is of another program: it has {begins}", f"Check the address. {LOAD}")
+        if values.get("version", LAYOUT) != LAYOUT:
+            return Refusal(f"{block} has layout {values['version']}; this sagline knows layout {LAYOUT}", LOAD)
+        if values.get(AGAIN) != values.get("counter"):
+            counters = f"its counter is {values['counter']} at the beginning and {values[AGAIN]} at the end"
+            return Refusal(f"{block} is torn: {counters}", "If it stays so, the PLC writes it in more than one scan")
+        return values
+
+
+def winch_row(index: int, name: str) -> str:
+    """Name of a value of a winch, as SCL has it.
+
+    Args:
+        index: Of the winch in its group, from 0.
+        name: Of the row.
+    """
+    return f"winch[{index + 1}].{name}"
+
+
+def _bytes(kind: str | tuple[Field, ...]) -> int:
+    assert isinstance(kind, str)  # no structure within a structure
+    return struct.calcsize(f">{TYPES[kind]}")
+
+
+AGAIN: Final = "counter_again"
+LOAD: Final = "Load the blocks of this version into the PLC: sagline twin ROBOT --scl FILE.scl"
+
+FROM_PLC: Final = Block(
+    number=101,
+    name="sagline_from_plc",
+    magic=int.from_bytes(b"SAGF"),
+    register=0,
+    size=104,
+    fields=(
+        Field("counter", "UDInt", 0, "of this block, one more each scan, 1 to 2147483647"),
+        Field("magic", "DWord", 4, "SAGF"),
+        Field("version", "UInt", 8, "of this layout"),
+        Field("group", "UInt", 10, "which group this PLC is, from 1"),
+        Field("time", "LReal", 12, "of the PLC [us]"),
+        Field("owner", "UDInt", 20, "who has the grant, 0 for nobody"),
+        Field("echo", "UDInt", 24, "counter of the last command taken"),
+        Field("status", "DWord", 28, "bits: ready, braked, following, ramping, holding, locked, emergency"),
+        Field("fault", "UInt", 32, "why the PLC acts by itself"),
+        Field("winches", "UInt", 34, "how many this PLC drives"),
+        Field(
+            "winch",
+            (
+                Field("length", "LReal", 0, "unstrained, off the drum [m]"),
+                Field("rate", "Real", 8, "of the length [m/s]"),
+                Field("torque", "Real", 12, "at the motor's shaft, positive lets out [N m]"),
+                Field("tension", "Real", 16, "of the load cell, raw [N]"),
+                Field("filtered", "Real", 20, "of the load cell, filtered [N]"),
+                Field("counts", "DInt", 24, "of the encoder"),
+                Field("state", "UInt", 28, "braked, enabled, saturated, locked, fault"),
+                Field("fault", "UInt", 30, "the drive's own code, 0 for none"),
+            ),
+            36,
+            "first and second winch of the group",
+        ),
+        Field(AGAIN, "UDInt", 100, "the same as counter, else the block is torn"),
+    ),
+)
+
+TO_PLC: Final = Block(
+    number=102,
+    name="sagline_to_plc",
+    magic=int.from_bytes(b"SAGT"),
+    register=100,
+    size=64,
+    fields=(
+        Field("counter", "UDInt", 0, "of commands, one more each cycle, 1 to 2147483647"),
+        Field("magic", "DWord", 4, "SAGT"),
+        Field("version", "UInt", 8, "of this layout"),
+        Field("mode", "UInt", 10, "0 leave, 1 hold, 2 follow, 3 lock"),
+        Field("owner", "UDInt", 12, "who commands"),
+        Field("valid_for", "Time", 16, "how long the PLC may go on with it [ms]"),
+        Field(
+            "winch",
+            (
+                Field("length", "LReal", 0, "set point, unstrained, off the drum [m]"),
+                Field("rate", "Real", 8, "of the set point [m/s]"),
+                Field("tension", "Real", 12, "expected at the drum [N]"),
+                Field("enable", "DWord", 16, "1: the drive may move"),
+            ),
+            20,
+            "first and second winch of the group",
+        ),
+        Field(AGAIN, "UDInt", 60, "the same as counter, else the block is torn"),
+    ),
+)
+
+CLAIM: Final = Block(
+    number=103,
+    name="sagline_claim",
+    magic=int.from_bytes(b"SAGC"),
+    register=200,
+    size=8,
+    fields=(
+        Field("magic", "DWord", 0, "SAGC"),
+        Field("owner", "UDInt", 4, "who asks for the grant; the PLC puts 0 here once it has looked"),
+    ),
+)
+
+BLOCKS: Final = (FROM_PLC, TO_PLC, CLAIM)

@@ -1,0 +1,308 @@
+"""The link over real sockets: what it sends, what it takes, and what it says of PLCs that are none."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from typing import Any
+
+import numpy as np
+import pytest
+from snap7 import Client
+from snap7.server import Server
+from snap7.type import SrvArea
+
+import sagline as sl
+from sagline.control.link import Mode, Sample
+from sagline.plc.blocks import BLOCKS, CLAIM, FROM_PLC, TO_PLC, Refusal
+from sagline.plc.packing import sample_blocks
+from sagline.twin.s7_mirrors import S7Mirrors
+from tests.plc.samples import a_command, a_sample
+from tests.plc.servers import PATIENCE, nobody, plcs, stranger, until
+
+OWNER = 4711
+
+
+def status(counter: int, owner: int = 0) -> Sample:
+    return a_sample(8, counter=np.full(4, counter), owner=np.full(4, owner))
+
+
+@contextmanager
+def linked(mirrors: S7Mirrors) -> Iterator[sl.plc.S7Link]:
+    with closing(sl.plc.S7Link(mirrors.addresses, 8, timeout=PATIENCE)) as link:
+        yield link
+
+
+def taken(link: sl.plc.S7Link) -> Sample:
+    sample = link.exchange(None)
+    assert isinstance(sample, Sample)
+    return sample
+
+
+def test_a_sample_comes_over_the_wire() -> None:
+    sample = status(7)
+    with plcs(sample) as mirrors, linked(mirrors) as link:
+        got = taken(link)
+        assert link.groups == ((0, 1), (2, 3), (4, 5), (6, 7))
+    np.testing.assert_array_equal(got.length, sample.length)
+    np.testing.assert_array_equal(got.counter, np.full(4, 7))
+    assert np.all((got.age > 0.0) & (got.age < PATIENCE))
+
+
+def test_a_group_whose_grant_is_not_ours_gets_the_claim_and_nothing_else() -> None:
+    with plcs(status(1, owner=99)) as mirrors, linked(mirrors) as link:
+        link.exchange(a_command(8, owner=OWNER))
+        written: list[tuple[bytes, bytes]] = [(b"", b"")] * 4
+
+        def claimed() -> bool:
+            written[:] = [
+                (w[0], w[1] if any(w[1]) else old[1]) for w, old in zip(mirrors.written(), written, strict=True)
+            ]
+            return all(claim for _, claim in written)
+
+        until(claimed)
+        for command, claim in written:
+            assert CLAIM.read(claim) == {"magic": CLAIM.magic, "owner": OWNER}
+            assert not any(command)
+
+
+def test_a_group_whose_grant_is_ours_gets_the_command() -> None:
+    command = a_command(8, owner=OWNER)
+    with plcs(status(1, owner=OWNER)) as mirrors, linked(mirrors) as link:
+        link.exchange(command)
+        until(lambda: all(any(command) for command, _ in mirrors.written()))
+        for i, (block, claim) in enumerate(mirrors.written()):
+            values = TO_PLC.read(block)
+            assert not isinstance(values, Refusal)
+            assert (values["counter"], values["mode"], values["owner"]) == (command.counter, Mode.FOLLOW, OWNER)
+            assert [values[f"winch[{k}].length"] for k in (1, 2)] == command.length[2 * i : 2 * i + 2].tolist()
+            assert not any(claim)
+
+
+def test_who_leaves_claims_nothing_back_and_his_last_command_is_written_before_the_link_closes() -> None:
+    owners = np.array([OWNER, 0, 99, OWNER])
+    with plcs(a_sample(8, owner=owners)) as mirrors:
+        with linked(mirrors) as link:
+            link.exchange(a_command(8, owner=OWNER, mode=Mode.LEAVE))
+        written = mirrors.written()
+    assert [any(command) for command, _ in written] == [True, False, False, True]
+    assert not any(any(claim) for _, claim in written)
+
+
+def test_who_only_reads_writes_nothing() -> None:
+    with plcs(status(1, owner=OWNER)) as mirrors, linked(mirrors) as link:
+        for counter in (2, 3):
+            mirrors.publish(sample_blocks(status(counter)))
+            until(lambda counter=counter: np.all(taken(link).counter == counter))  # type: ignore[misc]
+        assert not any(any(command) or any(claim) for command, claim in mirrors.written())
+
+
+def next_discarded(link: sl.plc.S7Link, group: int) -> Sample:
+    """The sample after one more block of a group was discarded."""
+    before = taken(link).discarded[group]
+    until(lambda: taken(link).discarded[group] > before)
+    return taken(link)
+
+
+def bad(counter: int, spoil: Callable[[bytearray], None]) -> list[bytes]:
+    blocks = sample_blocks(status(counter))
+    content = bytearray(blocks[2])
+    spoil(content)
+    return [*blocks[:2], bytes(content), blocks[3]]
+
+
+def torn(content: bytearray) -> None:
+    content[103] ^= 1
+
+
+def foreign(content: bytearray) -> None:
+    content[4] ^= 1
+
+
+def of_another_version(content: bytearray) -> None:
+    content[9] ^= 2
+
+
+def of_another_group(content: bytearray) -> None:
+    content[11] = 1
+
+
+def repeated(content: bytearray) -> None:
+    content[:] = sample_blocks(status(10))[2]
+
+
+def older(content: bytearray) -> None:
+    content[:] = sample_blocks(status(9))[2]
+
+
+@pytest.mark.parametrize("spoil", [torn, foreign, of_another_version, of_another_group, repeated, older])
+def test_a_block_that_is_no_news_is_counted_and_the_age_goes_on(spoil: Callable[[bytearray], None]) -> None:
+    with plcs(status(10)) as mirrors, linked(mirrors) as link:
+        mirrors.publish(bad(11, spoil))
+        sample = next_discarded(link, 2)
+        until(lambda: np.all(taken(link).counter == [11, 11, 10, 11]))
+        assert taken(link).age[2] >= sample.age[2]
+        np.testing.assert_array_equal(taken(link).length[4:6], status(10).length[4:6])
+        mirrors.publish(sample_blocks(status(12)))
+        until(lambda: np.all(taken(link).counter == 12))
+
+
+def test_counters_begin_again_after_the_largest() -> None:
+    with plcs(status(2**31 - 1)) as mirrors, linked(mirrors) as link:
+        mirrors.publish(sample_blocks(status(1)))
+        until(lambda: np.all(taken(link).counter == 1))
+
+
+def test_a_plc_that_begins_anew_is_believed_after_a_while_of_silence_and_one_that_stands_never() -> None:
+    with plcs(status(1000)) as mirrors, linked(mirrors) as link:
+        mirrors.publish([*sample_blocks(status(1))[:3], sample_blocks(status(1000))[3]])
+        until(lambda: np.all(taken(link).counter[:3] == 1))
+        sample = taken(link)
+        assert sample.counter[3] == 1000
+        assert sample.age[3] > 0.5
+
+
+def test_an_exchange_waits_for_nobody_and_a_silent_group_is_connected_anew() -> None:
+    with plcs(status(1)) as mirrors, linked(mirrors) as link:
+        server = mirrors._servers[1]
+        server.lock_area(SrvArea.DB, FROM_PLC.number)  # it answers no more
+        times = []
+
+        def age() -> float:
+            start = time.perf_counter()
+            sample = taken(link)
+            times.append(time.perf_counter() - start)
+            return float(sample.age[1])
+
+        until(lambda: age() > 1.0)
+        assert np.median(times) < 2e-3
+        server.unlock_area(SrvArea.DB, FROM_PLC.number)
+        mirrors.publish(sample_blocks(status(2)))
+        until(lambda: np.all(taken(link).counter == 2))
+
+
+def test_the_slowest_group_sets_the_time_not_the_sum() -> None:
+    wait = 0.03
+    with plcs(status(1)) as mirrors:
+        for server in mirrors._servers:
+            server.set_read_events_callback(lambda event: time.sleep(wait))
+        with linked(mirrors) as link:
+            mirrors.publish(sample_blocks(status(2)))
+            link.exchange(a_command(8))
+            until(lambda: np.all(taken(link).counter == 2))
+            assert wait <= link.round_trip.min()
+            assert link.round_trip.max() < 3 * wait  # in turn it would be at least 4
+
+
+def test_it_asks_for_the_pdu_of_an_s7_1200_and_the_twin_grants_no_other() -> None:
+    with plcs() as mirrors:
+        client = Client()
+        client.connect("127.0.0.1", 0, 1, tcp_port=int(mirrors.addresses[0].rpartition(":")[2]))
+        assert client.get_pdu_length() == 240  # it asked for 480
+        client.disconnect()
+    asked: list[int] = []
+
+    class Asked(Server):
+        def _handle_setup_communication(self, request: dict[str, Any]) -> bytes:
+            asked.append(request["parameters"]["pdu_length"])
+            return super()._handle_setup_communication(request)
+
+    server = Asked(log=False)
+    memory = {block: bytearray(block.size) for block in BLOCKS}
+    memory[FROM_PLC][:] = sample_blocks(a_sample(2))[0]
+    for block, content in memory.items():
+        server.register_area(SrvArea.DB, block.number, content)
+    server.start_to("127.0.0.1", 0)
+    assert server.server_socket is not None
+    port = server.server_socket.getsockname()[1]
+    sl.plc.S7Link(f"127.0.0.1:{port}", 2, timeout=PATIENCE).close()
+    server.stop()
+    assert asked == [240]
+
+
+def error_of(addresses: str | list[str], winches: int = 8, timeout: float = PATIENCE) -> str:
+    with pytest.raises(sl.SaglineError) as caught:
+        sl.plc.S7Link(addresses, winches, timeout=timeout)
+    assert len(str(caught.value)) < 300
+    assert str(caught.value).isprintable()
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("addresses", "said"),
+    [
+        ("127.0.0.1:1,127.0.0.1:2,127.0.0.1:3", "number of PLC addresses is 3; allowed: 4"),
+        ("127.0.0.1:1", "number of PLC addresses is 1; allowed: 4"),
+        (["a", "b", "c", "d", "e"], "number of PLC addresses is 5; allowed: 4"),
+        ("a,b,a,d", "address of group 3 is a:102, as that of group 1"),
+        ("a,b,a:102,d", "address of group 3 is a:102, as that of group 1"),
+        ("a,,c,d", "address of group 2 is ''"),
+        ("a,b,c,d:", "address of group 4 is 'd:'"),
+        ("a,b,c,d:0", "address of group 4 is 'd:0'"),
+        ("a,b,c,d:65536", "address of group 4 is 'd:65536'"),
+        ("a,b,c,d:102x", "address of group 4 is 'd:102x'"),
+        ("a,b,http://c,d", "address of group 3 is 'http://c'"),
+        ("a,b,c d,e", "address of group 3 is 'c d'"),
+        ("a,b,c\x1b[2J,e", "address of group 3 is 'c\\x1b[2J'"),
+        ([1, 2, 3, 4], "address of group 1 is 1"),
+    ],
+)
+def test_addresses_that_are_none_are_refused_before_anything_is_connected(addresses: Any, said: str) -> None:
+    assert said in error_of(addresses)
+
+
+def test_a_port_where_nothing_listens_is_named() -> None:
+    with plcs() as mirrors:
+        gone = nobody()
+        text = error_of([*mirrors.addresses[:2], gone, mirrors.addresses[3]])
+    assert text.startswith(f"group 3 at {gone}: nothing listens there. ")
+
+
+def test_a_mute_port_is_named_within_the_time_given() -> None:
+    with plcs() as mirrors, stranger() as mute:
+        start = time.monotonic()
+        text = error_of([mirrors.addresses[0], mute, *mirrors.addresses[2:]], timeout=0.5)
+        assert time.monotonic() - start < 4.0  # the library alone waits 5 s
+    assert text.startswith(f"group 2 at {mute}: something listens there, but has answered nothing for 0.5 s. ")
+
+
+@pytest.mark.parametrize(
+    "answer", [b"HTTP/1.1 400 Bad Request\r\n\r\n", b"SSH-2.0-OpenSSH_9.6\r\n", b"\x03\x00\x00\x04", b""]
+)
+def test_a_stranger_is_named(answer: bytes) -> None:
+    with plcs() as mirrors, stranger(answer) as address:
+        text = error_of([address, *mirrors.addresses[1:]])
+    assert text.startswith(f"group 1 at {address}: whoever is there speaks no S7 (")
+
+
+def test_groups_in_the_wrong_order_are_told() -> None:
+    with plcs() as mirrors:
+        first, second, *others = mirrors.addresses
+        text = error_of([second, first, *others])
+    assert text.startswith(f"group 1 at {second}: the PLC there is group 2, not 1 (group 2 cannot")
+
+
+def test_a_plc_of_another_layout_is_told_with_what_to_load() -> None:
+    with plcs() as mirrors:
+        mirrors.publish(bad(1, of_another_version))
+        text = error_of(list(mirrors.addresses))
+    assert "group 3 at" in text
+    assert "DB101 has layout 3; this sagline knows layout 1" in text
+    assert "sagline twin ROBOT --scl" in text
+
+
+def test_a_plc_without_the_blocks_is_told_with_what_to_load() -> None:
+    server = Server(log=False)
+    server.start_to("127.0.0.1", 0)
+    assert server.server_socket is not None
+    text = error_of(f"127.0.0.1:{server.server_socket.getsockname()[1]}", winches=2)
+    server.stop()
+    assert "it has no DB101 of 104 bytes. Load the blocks" in text
+
+
+def test_a_robot_of_another_number_of_winches_is_told() -> None:
+    with plcs() as mirrors:
+        text = error_of(list(mirrors.addresses), winches=7)
+    assert "group 4 at" in text
+    assert "the PLC there drives 2 winches, the robot has 1 in this group" in text
