@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from sagline.arrays import Array
 from sagline.control.link import Command, Mode, Sample
+from sagline.plc.packing import sample_blocks
 
 
 def a_sample(winches: int, seed: int = 0, **values: Any) -> Sample:
@@ -51,3 +53,39 @@ def a_command(winches: int, seed: int = 0, **values: Any) -> Command:
     enable = random.random(winches) < 0.5
     command = Command(2**31 - 1, 77, Mode.FOLLOW, 0.1, random.normal(size=winches), rate, tension, enable)
     return command._replace(**values)
+
+
+def status(counter: int, owner: int = 0) -> Sample:
+    return a_sample(8, counter=np.full(4, counter), owner=np.full(4, owner))
+
+
+def bad(counter: int, spoil: Callable[[bytearray], None]) -> list[bytes]:
+    """Good blocks, but for that of the third group."""
+    blocks = sample_blocks(status(counter))
+    content = bytearray(blocks[2])
+    spoil(content)
+    return [*blocks[:2], bytes(content), blocks[3]]
+
+
+def torn(content: bytearray) -> None:
+    content[103] ^= 1
+
+
+def foreign(content: bytearray) -> None:
+    content[4] ^= 1
+
+
+def of_another_version(content: bytearray) -> None:
+    content[9] ^= 2
+
+
+def of_another_group(content: bytearray) -> None:
+    content[11] = 1
+
+
+def repeated(content: bytearray) -> None:
+    content[:] = sample_blocks(status(10))[2]
+
+
+def older(content: bytearray) -> None:
+    content[:] = sample_blocks(status(9))[2]

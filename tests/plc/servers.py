@@ -6,14 +6,21 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
-from typing import Any
+from contextlib import closing, contextmanager, suppress
+from typing import Any, NamedTuple
 
+import pytest
+
+import sagline as sl
 from sagline.control.link import Sample
+from sagline.plc.block_link import BlockLink
 from sagline.plc.packing import sample_blocks
+from sagline.twin.mirrors import Mirrors
+from sagline.twin.modbus_mirrors import ModbusMirrors
 from sagline.twin.s7_mirrors import S7Mirrors
 from tests.plc.samples import a_sample
 
+OWNER = 4711
 PATIENCE = 20.0  # s: for a machine that has much else to do; nothing waits so long where all is well
 
 
@@ -25,14 +32,38 @@ def until(condition: Callable[[], Any], patience: float = PATIENCE) -> None:
         time.sleep(0.002)
 
 
+class Kind(NamedTuple):
+    """What carries the blocks."""
+
+    mirrors: Callable[[list[bytes]], Mirrors]
+    link: Callable[..., BlockLink]
+
+
+S7 = Kind(S7Mirrors, sl.plc.S7Link)
+MODBUS = Kind(ModbusMirrors, sl.plc.ModbusLink)
+BOTH = [pytest.param(S7, id="S7"), pytest.param(MODBUS, id="Modbus")]
+
+
 @contextmanager
-def plcs(sample: Sample | None = None) -> Iterator[S7Mirrors]:
+def plcs(kind: Kind = S7, sample: Sample | None = None) -> Iterator[Any]:
     """As many good groups as a sample has."""
-    mirrors = S7Mirrors(sample_blocks(a_sample(8) if sample is None else sample))
+    mirrors = kind.mirrors(sample_blocks(a_sample(8) if sample is None else sample))
     try:
         yield mirrors
     finally:
         mirrors.close()
+
+
+@contextmanager
+def linked(kind: Kind, mirrors: Mirrors) -> Iterator[BlockLink]:
+    with closing(kind.link(mirrors.addresses, 8, timeout=PATIENCE)) as link:
+        yield link
+
+
+def taken(link: BlockLink) -> Sample:
+    sample = link.exchange(None)
+    assert isinstance(sample, Sample)
+    return sample
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Final, Protocol
@@ -100,14 +101,18 @@ def refused(error: BaseException | None, speaks: str) -> Refusal:
         error: What the system or a library said, perhaps while it handled another.
         speaks: The protocol.
     """
+    text = " ".join(str(error).split()) or type(error).__name__
     cause = error
     while cause is not None and not isinstance(cause, OSError):
         cause = cause.__cause__ or cause.__context__
     if isinstance(cause, ConnectionRefusedError):
         return Refusal("nothing listens there", "Check address and port, and that the PLC or the twin runs")
-    if isinstance(cause, OSError) and "ame" in str(cause) and "known" in str(cause):
-        return Refusal("no such host", "Check the address")
-    if isinstance(cause, OSError) and not isinstance(cause, TimeoutError):
+    if isinstance(cause, socket.gaierror):
+        return Refusal("there is no such host", "Check the address")
+    if isinstance(cause, ConnectionResetError | BrokenPipeError) or "closed" in text:
+        return Refusal("whoever is there hangs up", "Check the port, and that not too many others are connected to it")
+    if isinstance(cause, TimeoutError) or "timeout" in text.lower() or "No response" in text:
+        return Refusal("it does not answer", "Check address and port, and that the PLC is on and in this network")
+    if isinstance(cause, OSError):
         return Refusal(f"no connection ({cause.strerror or cause})", "Check the network")
-    text = " ".join(str(error).split()) or type(error).__name__
     return Refusal(f"whoever is there speaks no {speaks} ({text})", "Check the port")

@@ -6,16 +6,14 @@ import socket
 import struct
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import Any, Final
+from typing import Any
 
 from snap7.server import Server
 from snap7.type import SrvArea
 
-from sagline.errors import InvalidValueError
 from sagline.plc.blocks import BLOCKS, CLAIM, FROM_PLC, TO_PLC, Block
 from sagline.plc.s7_wire import PDU
-
-LOOPBACK: Final = "127.0.0.1"
+from sagline.twin.mirrors import LOOPBACK, check_free
 
 
 class S71200(Server):
@@ -73,16 +71,17 @@ class S7Mirrors:
             self.close()
             raise
 
-    def publish(self, blocks: Sequence[bytes]) -> None:
+    def publish(self, blocks: Sequence[bytes | None]) -> None:
         """Replace each group's DB101, whole.
 
         Args:
-            blocks: One a group.
+            blocks: One a group; None leaves what is there.
         """
         for server, memory, block in zip(self._servers, self._memory, blocks, strict=True):
-            server.lock_area(SrvArea.DB, FROM_PLC.number)
-            memory[FROM_PLC][:] = block
-            server.unlock_area(SrvArea.DB, FROM_PLC.number)
+            if block is not None:
+                server.lock_area(SrvArea.DB, FROM_PLC.number)
+                memory[FROM_PLC][:] = block
+                server.unlock_area(SrvArea.DB, FROM_PLC.number)
 
     def written(self) -> list[tuple[bytes, bytes]]:
         """What each group's DB102 and DB103 hold; the claims are taken out, as a PLC does that has looked at them."""
@@ -101,7 +100,7 @@ class S7Mirrors:
         server = S71200()
         for kind, content in memory.items():
             server.register_area(SrvArea.DB, kind.number, content)
-        _check_free(host, port)
+        check_free(host, port)
         server.start_to(host, port)
         self._memory.append(memory)
         self._servers.append(server)
@@ -116,19 +115,3 @@ class S7Mirrors:
             content[:] = bytes(block.size)
         server.unlock_area(SrvArea.DB, block.number)
         return copy
-
-
-def _check_free(host: str, port: int) -> None:
-    """The library shares ports (SO_REUSEPORT): two twins at one would each have half of the connections."""
-    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((host, port))
-            probe.listen()
-        except OSError as error:
-            raise InvalidValueError(
-                "address of the twin",
-                f"{host}:{port} ({error.strerror or error})",
-                "a free port at an address of this machine",
-                "Choose another with --port, or end what listens there.",
-            ) from None

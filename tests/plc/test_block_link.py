@@ -1,0 +1,123 @@
+"""What a link sends and takes, over real sockets, whatever carries the blocks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from sagline.control.link import Mode, Sample
+from sagline.plc.block_link import BlockLink
+from sagline.plc.blocks import CLAIM, TO_PLC, Refusal
+from sagline.plc.packing import sample_blocks
+from tests.plc.samples import (
+    a_command,
+    a_sample,
+    bad,
+    foreign,
+    of_another_group,
+    of_another_version,
+    older,
+    repeated,
+    status,
+    torn,
+)
+from tests.plc.servers import BOTH, OWNER, PATIENCE, S7, Kind, linked, plcs, taken, until
+
+
+@pytest.mark.parametrize("kind", BOTH)
+def test_a_sample_comes_over_the_wire(kind: Kind) -> None:
+    sample = status(7)
+    with plcs(kind, sample) as mirrors, linked(kind, mirrors) as link:
+        got = taken(link)
+        assert link.groups == ((0, 1), (2, 3), (4, 5), (6, 7))
+    np.testing.assert_array_equal(got.length, sample.length)
+    np.testing.assert_array_equal(got.counter, np.full(4, 7))
+    assert np.all((got.age > 0.0) & (got.age < PATIENCE))
+
+
+@pytest.mark.parametrize("kind", BOTH)
+def test_a_group_whose_grant_is_not_ours_gets_the_claim_and_nothing_else(kind: Kind) -> None:
+    with plcs(kind, status(1, owner=99)) as mirrors, linked(kind, mirrors) as link:
+        link.exchange(a_command(8, owner=OWNER))
+        written: list[tuple[bytes, bytes]] = [(b"", b"")] * 4
+
+        def claimed() -> bool:
+            written[:] = [
+                (w[0], w[1] if any(w[1]) else old[1]) for w, old in zip(mirrors.written(), written, strict=True)
+            ]
+            return all(claim for _, claim in written)
+
+        until(claimed)
+        for command, claim in written:
+            assert CLAIM.read(claim) == {"magic": CLAIM.magic, "owner": OWNER}
+            assert not any(command)
+
+
+@pytest.mark.parametrize("kind", BOTH)
+def test_a_group_whose_grant_is_ours_gets_the_command(kind: Kind) -> None:
+    command = a_command(8, owner=OWNER)
+    with plcs(kind, status(1, owner=OWNER)) as mirrors, linked(kind, mirrors) as link:
+        link.exchange(command)
+        until(lambda: all(any(command) for command, _ in mirrors.written()))
+        for i, (block, claim) in enumerate(mirrors.written()):
+            values = TO_PLC.read(block)
+            assert not isinstance(values, Refusal)
+            assert (values["counter"], values["mode"], values["owner"]) == (command.counter, Mode.FOLLOW, OWNER)
+            assert [values[f"winch[{k}].length"] for k in (1, 2)] == command.length[2 * i : 2 * i + 2].tolist()
+            assert not any(claim)
+
+
+@pytest.mark.parametrize("kind", BOTH)
+def test_who_leaves_claims_nothing_back_and_his_last_command_is_written_before_the_link_closes(kind: Kind) -> None:
+    owners = np.array([OWNER, 0, 99, OWNER])
+    with plcs(kind, a_sample(8, owner=owners)) as mirrors:
+        with linked(kind, mirrors) as link:
+            link.exchange(a_command(8, owner=OWNER, mode=Mode.LEAVE))
+        written = mirrors.written()
+    assert [any(command) for command, _ in written] == [True, False, False, True]
+    assert not any(any(claim) for _, claim in written)
+
+
+@pytest.mark.parametrize("kind", BOTH)
+def test_who_only_reads_writes_nothing(kind: Kind) -> None:
+    with plcs(kind, status(1, owner=OWNER)) as mirrors, linked(kind, mirrors) as link:
+        for counter in (2, 3):
+            mirrors.publish(sample_blocks(status(counter)))
+            until(lambda counter=counter: np.all(taken(link).counter == counter))  # type: ignore[misc]
+        assert not any(any(command) or any(claim) for command, claim in mirrors.written())
+
+
+def next_discarded(link: BlockLink, group: int) -> Sample:
+    """The sample after one more block of a group was discarded."""
+    before = taken(link).discarded[group]
+    until(lambda: taken(link).discarded[group] > before)
+    return taken(link)
+
+
+@pytest.mark.parametrize("spoil", [torn, foreign, of_another_version, of_another_group, repeated, older])
+def test_a_block_that_is_no_news_is_counted_and_the_age_goes_on(spoil: Callable[[bytearray], None]) -> None:
+    with plcs(S7, status(10)) as mirrors, linked(S7, mirrors) as link:
+        mirrors.publish(bad(11, spoil))
+        sample = next_discarded(link, 2)
+        until(lambda: np.all(taken(link).counter == [11, 11, 10, 11]))
+        assert taken(link).age[2] >= sample.age[2]
+        np.testing.assert_array_equal(taken(link).length[4:6], status(10).length[4:6])
+        mirrors.publish(sample_blocks(status(12)))
+        until(lambda: np.all(taken(link).counter == 12))
+
+
+def test_counters_begin_again_after_the_largest() -> None:
+    with plcs(S7, status(2**31 - 1)) as mirrors, linked(S7, mirrors) as link:
+        mirrors.publish(sample_blocks(status(1)))
+        until(lambda: np.all(taken(link).counter == 1))
+
+
+def test_a_plc_that_begins_anew_is_believed_after_a_while_of_silence_and_one_that_stands_never() -> None:
+    with plcs(S7, status(1000)) as mirrors, linked(S7, mirrors) as link:
+        mirrors.publish([*sample_blocks(status(1))[:3], sample_blocks(status(1000))[3]])
+        until(lambda: np.all(taken(link).counter[:3] == 1))
+        sample = taken(link)
+        assert sample.counter[3] == 1000
+        assert sample.age[3] > 0.4
