@@ -25,6 +25,7 @@ from sagline.robot.several import anything_behind
 from sagline.statics.tables import cable_table
 
 MARGIN: Final = 5.0  # m of cable that a drum may let out beyond what it is asked for, and still remember
+BROKEN: Final = 1e-12  # of a cable's pull that is left when it is cut
 NOTES: Final = 1000  # of what begins by itself, between two events
 
 
@@ -162,6 +163,15 @@ class Plant:
         self._table = np.delete(self._table, place, axis=0)
         self.layers = np.delete(self.layers, place, axis=0)
         self.rows, self.now, self.data = (np.delete(array, place, axis=1) for array in (self.rows, self.now, self.data))
+
+    def cut(self, places: Any) -> None:
+        """Let cables break in the midst of a run, by their places: the kernel's arrays stay as they are.
+
+        Stiffness and weight fall by one factor, so that every cable hangs as before and all it pulls with is nothing.
+        """
+        for column in (tables.STIFFNESS, tables.DENSITY):
+            self._table[places, column] *= BROKEN
+        self.counters[k.READY] = 0  # look at all forces and energies anew
 
     def hold(self, places: Any) -> None:
         """Lock winches, by their places among the cables that are there; what moves of them is lost at once."""

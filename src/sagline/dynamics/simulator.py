@@ -57,6 +57,7 @@ class Reading(NamedTuple):
         tension: At the frame ends [N], shape (m,).
         length: Unstrained lengths off the drums [m], shape (m,).
         force: Of the motors, at the cable, outward [N], shape (m,); 0 without the robot's winches.
+        saturated: Which drives are at a limit of torque or speed, not 0 where they are, shape (m,).
     """
 
     counts: Array | None
@@ -67,6 +68,7 @@ class Reading(NamedTuple):
     tension: Array
     length: Array
     force: Array
+    saturated: Array
 
 
 class Simulator:
@@ -258,7 +260,9 @@ class Simulator:
         self._plant.hold(self._chosen(winches))
 
     def release(self, *winches: int) -> None:
-        """Let drums go that were locked; ideal winches go straight from where they stood to the next set points.
+        """Let drums go that were locked: from where they stood they go straight to the next set points.
+
+        A motor is switched on with an empty integral: it holds the tension that is expected, no more.
 
         Args:
             winches: Which, from 0; none for all.
@@ -269,22 +273,50 @@ class Simulator:
         plant, chosen = self._plant, np.zeros(len(self._asked), dtype=np.bool_)
         chosen[self._chosen(winches)] = True
         freed = chosen & (plant.now[d.HELD] > 0.0)
-        plant.now[d.HELD, freed] = 0.0
-        if self._kind == d.IDEAL:  # which has no way but that between set points
-            self._lengths[freed] = self._course.value[1, : len(freed)][freed] = plant.rows[LENGTH, freed]
+        plant.now[d.HELD, freed] = plant.now[d.INTEGRAL, freed] = 0.0
+        if self._kind != d.SECOND_ORDER:  # whose set points were not at where they stood before either
+            stood = plant.now[d.WOUND] if self._kind == d.DRUMS else plant.rows[LENGTH]
+            self._lengths[freed] = plant.rows[LENGTH, freed]
+            self._course.value[1, : len(freed)][freed] = stood[freed]
 
-    def _chosen(self, winches: tuple[Any, ...]) -> Any:
+    def cut(self, *cables: int) -> None:
+        """Let cables break: they pull and weigh no longer; their drums go on as they are asked to.
+
+        Args:
+            cables: Which, from 0; none for all.
+
+        Raises:
+            InvalidValueError: If there is no such cable.
+        """
+        self._plant.cut(self._chosen(cables, "cables"))
+
+    def limit_force(self, force: float, *winches: int) -> None:
+        """Let drives give no more than so much, a motor that is too hot for instance.
+
+        Args:
+            force: At the cable [N], >= 0.
+            winches: Which, from 0; none for all.
+
+        Raises:
+            InvalidValueError: If there is no such winch, the force is no such number, or the winches have no motors.
+        """
+        if self._kind != d.DRUMS:
+            step = "Leave it out: these winches have no motors."
+            raise InvalidValueError("force", "given", 'for winches="robot" alone', step)
+        self._plant.data[d.FORCE_LIMIT, self._chosen(winches)] = number(force, "force", "N", low=0.0)
+
+    def _chosen(self, winches: tuple[Any, ...], item: str = "winches") -> Any:
         m = len(self._asked)
         for winch in winches:
             if (found := integer(winch)) is None or not 0 <= found < m:
-                raise InvalidValueError("winches", brief(winch), f"0 to {m - 1}", "They count from 0.")
+                raise InvalidValueError(item, brief(winch), f"0 to {m - 1}", "They count from 0.")
         return [integer(winch) for winch in winches] if winches else slice(None)
 
     def _new_reading(self) -> Reading:
         plant = self._plant
         counts = None if self._encoders is None else locked(self._encoders.counts.view())
         own = (self._platform[:3], self._platform[3:7], self._platform[7:])
-        true = (*own, plant.now[d.AT_FRAME], plant.rows[LENGTH], plant.now[d.FORCE])
+        true = (*own, plant.now[d.AT_FRAME], plant.rows[LENGTH], plant.now[d.FORCE], plant.now[d.SATURATED])
         return Reading(counts, *(locked(array.view()) for array in (self._cells.reading, *true)))
 
     def _read(self) -> None:

@@ -1,0 +1,177 @@
+"""The in-process link: commands and samples over the machine's network, on the lockstep clock."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any, Final, Protocol
+
+import numpy as np
+
+from sagline.control.link import Command, Missing, Mode, Sample
+from sagline.twin.network import Network, Way
+from sagline.twin.plc_program import COUNTERS, Order
+from sagline.twin.snapshot import FIRST, Snapshot
+
+HISTORY: Final = 100  # blocks of the past that a group which goes back still has
+
+
+class Driven(Protocol):
+    """What a link needs of a machine."""
+
+    @property
+    def groups(self) -> tuple[tuple[int, ...], ...]:
+        """The winches of each group."""
+
+    @property
+    def time(self) -> float:
+        """Since the machine was switched on [s]."""
+
+    def deliver(self, group: int, message: int | Order) -> None:
+        """Let a claim or a command arrive at a PLC."""
+
+    def advance(self) -> None:
+        """Go on for one period."""
+
+
+class MachineLink:
+    """A `Link` to a machine in the same process: nothing waits, and nothing runs beside it."""
+
+    def __init__(self, machine: Driven, network: Network, moves: bool) -> None:
+        """Begin without having heard of any group; `Machine.link` makes it."""
+        self._machine, self._network, self._moves = machine, network, moves
+        self._groups = machine.groups
+        count = len(self._groups)
+        self._there = [Way(network) for _ in range(count)]
+        self._back = [Way(network) for _ in range(count)]
+        self._newest: list[Snapshot | None] = [None] * count
+        self._arrival = [0.0] * count
+        self._discarded = np.zeros(count, dtype=np.int64)
+        self._owner = [0] * count
+        self._held: list[Snapshot | None] = [None] * count
+        self._past: deque[Snapshot] = deque(maxlen=HISTORY)
+        self._steps_back = [0] * count
+        self._closed = False
+
+    @property
+    def groups(self) -> tuple[tuple[int, ...], ...]:
+        """The winches of each group, from 0."""
+        return self._groups
+
+    def exchange(self, command: Command | None) -> Sample | Missing:
+        """Send a command, let the machine go on for a period, and take what there is then.
+
+        Args:
+            command: What is asked for; None: nothing is sent. A group whose grant another id has, or nobody, is sent
+                the claim of its owner instead, unless it asks to leave.
+        """
+        machine = self._machine
+        if command is not None and not self._closed:
+            self._send(command, machine.time)
+        if self._moves:
+            machine.advance()
+        return self._look(machine.time)
+
+    def close(self) -> None:
+        """Send nothing any more; the machine stays."""
+        self._closed = True
+
+    def _send(self, command: Command, now: float) -> None:
+        numbers = (command.length.tolist(), command.rate.tolist(), command.tension.tolist(), command.enable.tolist())
+        for group, winches in enumerate(self._groups):
+            if self._owner[group] == command.owner:
+                part = slice(winches[0], winches[-1] + 1)
+                each = [row[part] for row in numbers]
+                message: Any = Order(command.counter, command.owner, command.mode, command.valid_for, *each)
+            elif command.mode != Mode.LEAVE:
+                message = command.owner
+            else:
+                continue
+            if self._network.ideal:
+                self._machine.deliver(group, message)
+            else:
+                self._there[group].send(now, message)
+
+    def before(self, now: float) -> None:
+        """Hand over to the PLCs what has arrived by the beginning of a scan [s]."""
+        if not self._network.ideal:
+            for group, way in enumerate(self._there):
+                for _, message in way.arrived(now):
+                    self._machine.deliver(group, message)
+
+    def after(self, now: float, snapshot: Snapshot, spoiled: dict[int, str]) -> None:
+        """Send what the PLCs say after a scan.
+
+        Args:
+            now: [s].
+            snapshot: What they say.
+            spoiled: What happens to the blocks of some groups.
+        """
+        if self._network.ideal and not spoiled:
+            for group in range(len(self._groups)):
+                self._take(group, now, snapshot)
+        else:
+            for group, back in enumerate(self._back):
+                for block in self._blocks(group, snapshot, spoiled.get(group)):
+                    back.send(now, block)
+                for arrival, block in back.arrived(now):
+                    self._take(group, arrival, block)
+        self._past.append(snapshot)
+
+    def _blocks(self, group: int, snapshot: Snapshot, how: str | None) -> list[Snapshot | None]:
+        """What goes out of a group in a scan; None for a block that is no good."""
+        held, self._held[group] = self._held[group], None
+        if how == "goes back":
+            self._steps_back[group] += 1
+            return [self._past[max(len(self._past) - 1 - self._steps_back[group], 0)]] if self._past else []
+        self._steps_back[group] = 0
+        if how == "swaps" and held is None:
+            self._held[group] = snapshot
+            return []
+        if how == "is silent":
+            return []
+        if how == "repeats":
+            return [self._newest[group]] if self._newest[group] is not None else []
+        if how in ("is torn", "is foreign"):
+            return [None]
+        return [snapshot, snapshot] if how == "doubles" else [snapshot, held] if held is not None else [snapshot]
+
+    def _take(self, group: int, arrival: float, block: Snapshot | None) -> None:
+        """Take a block in, if it is good and newer than what was there."""
+        known = self._newest[group]
+        if block is None or (known is not None and not _newer(block.counters[group], known.counters[group])):
+            self._discarded[group] += 1
+            return
+        self._newest[group], self._arrival[group] = block, arrival
+        self._owner[group] = block.owners[group]
+
+    def _look(self, now: float) -> Sample | Missing:
+        newest = self._newest
+        first = newest[0]
+        if first is not None and newest.count(first) == len(newest):
+            floats, whole, groups, clock = first.arrays
+            floats, whole, groups, clock = floats.copy(), whole.copy(), groups.copy(), clock.copy()
+        else:
+            silent = tuple(group for group, block in enumerate(newest) if block is None)
+            if silent:
+                return Missing(now, silent, ("no block has come yet",) * len(silent))
+            floats, whole, groups, clock = self._mixed([block for block in newest if block is not None])
+        age = now - np.array(self._arrival)
+        counter, owner, echo, status, fault = groups
+        length, rate, torque, tension, filtered = floats
+        counts, state, winch_fault = whole
+        told = (counter, clock, owner, echo, status, fault, length, rate, torque, tension, filtered)
+        return Sample(now, age, *told, counts, state, winch_fault, self._discarded.copy())
+
+    def _mixed(self, newest: list[Snapshot]) -> tuple[Any, ...]:
+        """Arrays of which each group's part is its newest."""
+        found = tuple(array.copy() for array in newest[0].arrays)
+        for group, (winches, block) in enumerate(zip(self._groups, newest, strict=True)):
+            part = slice(winches[0], winches[-1] + 1)
+            for k, (array, own) in enumerate(zip(found, block.arrays, strict=True)):
+                where = part if k < FIRST else group
+                array[..., where] = own[..., where]
+        return found
+
+
+def _newer(counter: int, known: int) -> bool:
+    return 0 < (counter - known) % COUNTERS < COUNTERS // 2

@@ -1,0 +1,321 @@
+"""A whole machine in one process: the robot as it is, its drives, its PLCs and the network before them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, Final
+
+import numpy as np
+
+from sagline.arguments import brief, instance, optional, whole_number
+from sagline.arrays import number
+from sagline.control.link import PERIOD, Command, groups_of
+from sagline.dynamics.damping import Damping
+from sagline.dynamics.simulator import Reading
+from sagline.errors import InvalidValueError
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.twin.hardware import Hardware
+from sagline.twin.injected import KINDS, Injected, Schedule, fault
+from sagline.twin.link import MachineLink
+from sagline.twin.network import Network
+from sagline.twin.plc_program import COUNTERS, Limits, Order, Program
+from sagline.twin.snapshot import Report, Snapshot
+from sagline.twin.start import check_step, limits_of, started
+
+LOSSES: Final = Damping(loss_time=1e-3, air_damping=0.2)  # ours; on the prototype as if the air took 2 N s/m
+MOST_SEED: Final = 2**63 - 1
+RIVAL: Final = 2**31 - 2  # the id of a controller that takes a grant it should not have
+TRIPPED: Final = 1  # the code of a drive that has
+
+
+class Machine:
+    """The machine behind the link, in steps of one period: what a controller drives, and a server shows to one.
+
+    In process, `link` gives the way to it, each of whose exchanges moves it on. A server that other processes talk to
+    drives it so, in every period:
+
+        machine.claim(group, owner)      # where somebody wrote a claim
+        machine.take(group, command)     # what stands in the group's block of commands, its own winches only
+        machine.advance()
+        machine.report(group)            # what its block says now; None: leave what is there
+
+    Each PLC runs its program at the beginning of a period, turns set points to counts with the nominal drums, and its
+    drives go there straight until the end of the period; the true drums turn counts to cable. The inner loops are
+    closed every millisecond on the drums themselves: the encoders' steps, of nanometers, are in what is read alone.
+
+    Attributes:
+        robot: The robot as it is.
+        nominal: As it was planned.
+        groups: The winches of each group, from 0.
+        period: Of controller and PLCs [s].
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        *,
+        nominal: Robot | None = None,
+        start: Pose | None = None,
+        surveyed: bool = False,
+        seed: int = 0,
+        period: float = PERIOD,
+        step: float = 1e-3,
+        delay: float = 0.0,
+        jitter: float = 0.0,
+        loss: float = 0.0,
+        damping: Damping | None = None,
+        faults: Iterable[str | Injected] = (),
+    ) -> None:
+        """Switch a machine on, its platform at rest, brakes on.
+
+        Args:
+            robot: The robot as it is, with all that its winches and encoders need.
+            nominal: As it was planned, by which the PLCs count and limit; None: as it is. Between the `length_zero` of
+                the two lies the error of an encoder's zero; where one has none, there is no such error.
+            start: The pose at which the encoders were set; None for the middle of the nominal robot's test_box. The
+                platform stands where the nominal lengths at that pose put it; what pulleys and dead cable of the true
+                robot add to them was not counted.
+            surveyed: Whether the true platform stood at that pose when the encoders were set.
+            seed: Of noise, clocks and the network.
+            period: Of controller and PLCs [s], of whole steps.
+            step: Of the plant [s].
+            delay: Of every message over `link`, each way [s].
+            jitter: On top of it, evenly up to this [s].
+            loss: Share of the messages that are lost.
+            damping: What takes energy out of the cables; None: a loss time of 1 ms, and air.
+            faults: What goes wrong, and when: texts as `fault` reads them, or what it makes of them.
+
+        Raises:
+            InvalidValueError: If data are missing, the step is too coarse for the robot's modes, the robot does not
+                rest there, or an argument is of the wrong kind.
+
+        Examples:
+            >>> import sagline as sl
+            >>> machine = sl.twin.Machine(sl.load_robot("article-prototype"), seed=1)
+            >>> sample = machine.link().exchange(None)
+            >>> print(f"{sample.time:g} s, {sample.length[0]:.3f} m")
+            0.01 s, 3.484 m
+        """
+        self.robot = instance(robot, Robot, "robot")
+        self.nominal = optional(nominal, Robot, "nominal") or robot
+        if self.nominal.cable_count != robot.cable_count:
+            allowed = f"of {robot.cable_count} cables, as {robot.name} has"
+            raise InvalidValueError("nominal", f"of {self.nominal.cable_count} cables", allowed, "Give its own plan's.")
+        self.groups, self.period = groups_of(robot.cable_count), number(period, "period", "s", above=0.0)
+        size = number(step, "step", "s", above=0.0)
+        losses = optional(damping, Damping, "damping") or LOSSES
+        noise = whole_number(seed, "seed", 0, MOST_SEED)
+        self._network = Network(delay, jitter, loss, noise)
+        begin = started(robot, self.nominal, start, bool(surveyed))
+        self._hardware = Hardware(robot, begin, losses, size, self.period, noise)
+        check_step(robot, begin.state, size)
+        self._parts = [slice(winches[0], winches[-1] + 1) for winches in self.groups]
+        self._programs = self._switched_on(limits_of(self.nominal, begin.nominal))
+        self._clocks = np.random.default_rng((noise, 2)).uniform(0.0, 1e3, len(self.groups))
+        self._counters, self._cycles = [0] * len(self.groups), 0
+        self._links: list[MachineLink] = []
+        self._schedule, self._commands = Schedule(), ""
+        self._spoiled: dict[int, str] = {}
+        self._stopped: set[int] = set()
+        self._taken: set[int] = set()
+        self._snapshot = self._written(None)
+        for one in faults:
+            self.inject(one)
+
+    def _switched_on(self, limits: Limits) -> list[Program]:
+        """The PLCs' programs, each with the limits of its own winches."""
+        programs, length = [], self._hardware.length.tolist()
+        for part in self._parts:
+            program = Program(Limits(*(column[part] for column in limits)), self.period)
+            program.length = length[part]
+            programs.append(program)
+        return programs
+
+    @property
+    def time(self) -> float:
+        """Since the machine was switched on [s]."""
+        return self._cycles * self.period
+
+    @property
+    def reading(self) -> Reading:
+        """What is true, platform and all; filled anew in every period."""
+        return self._hardware.reading
+
+    def link(self, *, moves: bool = True) -> MachineLink:
+        """A way to the machine for a controller in this process.
+
+        Args:
+            moves: Whether its exchanges move the machine on by a period each. Of several links one alone should.
+
+        Returns:
+            The link: a `sagline.control.link.Link`.
+        """
+        link = MachineLink(self, self._network, moves)
+        self._links.append(link)
+        return link
+
+    def claim(self, group: int, owner: int) -> None:
+        """Ask a PLC for its grant.
+
+        Args:
+            group: Which, from 0.
+            owner: Who asks.
+        """
+        self.deliver(group, owner)
+
+    def take(self, group: int, command: Command) -> None:
+        """Give a PLC a command; it looks itself whether that is new, and its owner's.
+
+        Args:
+            group: Which, from 0.
+            command: Its arrays are of the group's winches only.
+        """
+        rows = (np.asarray(row).tolist() for row in command[4:])
+        self.deliver(group, Order(command.counter, command.owner, command.mode, command.valid_for, *rows))
+
+    def deliver(self, group: int, message: int | Order) -> None:
+        """Let a claim or a command arrive at a PLC, unless a fault is in the way.
+
+        Args:
+            group: Which, from 0.
+            message: The owner who claims, or a command.
+        """
+        if group in self._stopped or self._commands not in ("", "are foreign"):
+            return
+        if isinstance(message, int):
+            self._programs[group].claim(message, self.time)
+        elif self._commands:
+            self._programs[group].take(message._replace(owner=message.owner % COUNTERS + 1))
+        else:
+            self._programs[group].take(message)
+
+    def advance(self) -> None:
+        """Go on for one period: what happens, the PLCs' scans, the drives and the plant, and what is read then."""
+        now = self.time
+        for link in self._links:
+            link.before(now)
+        for begins, what in self._schedule.due(now):
+            self._happen(what, begins)
+        self._scan(now)
+        self._cycles += 1
+        self._snapshot = self._written(self._snapshot)
+        for link in self._links:
+            link.after(self.time, self._snapshot, self._spoiled)
+
+    def _scan(self, now: float) -> None:
+        """Let the PLCs set the drives, and these move."""
+        hardware = self._hardware
+        encoder, cell = hardware.length.tolist(), hardware.cells.tolist()
+        length: list[float] = []
+        tension: list[float] = []
+        powered: list[bool] = []
+        for group, program in enumerate(self._programs):
+            if group in self._taken:
+                program.seize(RIVAL, now)
+            if group not in self._stopped:
+                part = self._parts[group]
+                program.scan(now, encoder[part], cell[part])
+            length += program.length
+            tension += program.tension
+            powered += program.powered
+        hardware.go_on(length, tension, powered)
+
+    def _written(self, before: Snapshot | None) -> Snapshot:
+        """The blocks of all groups; those of a PLC that stands stay as they were."""
+        hardware, programs = self._hardware, self._programs
+        saturated, states, drive_faults = hardware.saturated, list[int](), list[int]()
+        for program, part in zip(programs, self._parts, strict=True):
+            states += program.states(saturated[part])
+            drive_faults += program.drive_fault
+        counters = self._counters = [counter % COUNTERS + 1 for counter in self._counters]
+        floats = np.array((hardware.length, hardware.rate, hardware.torque, hardware.cells, hardware.filtered))
+        whole = np.array((hardware.counts, states, drive_faults), dtype=np.int64)
+        told = [(program.owner, program.echo, program.status, program.fault) for program in programs]
+        groups = np.array([counters, *zip(*told, strict=True)], dtype=np.int64)
+        new = Snapshot((floats, whole, groups, self.time + self._clocks), counters, [row[0] for row in told])
+        if before is not None:
+            for group in self._stopped:
+                new.keep(group, self._parts[group], before)
+        return new
+
+    def report(self, group: int) -> Report | None:
+        """What the block of a group says now.
+
+        Args:
+            group: Which, from 0.
+
+        Returns:
+            The block; None where a fault keeps what was there before.
+        """
+        how = self._spoiled.get(group, "")
+        if group in self._stopped or how in ("is silent", "repeats", "goes back"):
+            return None
+        floats, whole, groups, clock = self._snapshot.arrays
+        part = self._parts[group]
+        counter, *told = groups[:, group].tolist()
+        again = counter % COUNTERS + 1 if how == "is torn" else counter
+        rows: list[Any] = [*floats[:, part].tolist(), *whole[:, part].tolist()]
+        return Report(counter, again, how == "is foreign", float(clock[group]), *told, *rows)
+
+    def inject(self, what: str | Injected) -> None:
+        """Let something go wrong.
+
+        Args:
+            what: A text as `fault` reads it, or what it makes of it. What should have begun already begins at once.
+
+        Raises:
+            InvalidValueError: If there is no such fault, or the machine has no such part.
+        """
+        found = what if isinstance(what, Injected) else fault(what)
+        kind = KINDS[found.kind]
+        parts = len(self.groups) if kind.item == "group" else self.robot.cable_count
+        if kind.numbered and not 0 <= found.which < parts:
+            raise InvalidValueError("fault", brief(str(found)), f"{kind.item} 0 to {parts - 1}", "They count from 0.")
+        self._schedule.plan(found)
+
+    def _happen(self, what: Injected, begins: bool) -> None:
+        """Let a fault begin, or end."""
+        hardware, which, value = self._hardware, what.which, what.value
+        item, words = KINDS[what.kind].item, KINDS[what.kind].words
+        if item == "cell":
+            hardware.spoil_cell(which, words if begins else None, value)
+        elif item == "group":
+            self._spoil_group(which, words, begins)
+        elif item == "commands":
+            self._commands = words if begins else ""
+        elif item == "cable":
+            hardware.break_cable(which)
+        elif item == "encoder":
+            hardware.shift_encoder(which, value)
+        elif item == "load":
+            hardware.load(value if begins else -value)
+        elif item == "emergency stop":
+            self.emergency_stop()
+        elif words == "trips":
+            group = next(g for g, winches in enumerate(self.groups) if which in winches)
+            self._programs[group].trip(which - self.groups[group][0], TRIPPED)
+        else:
+            hardware.limit_force(which, value)
+
+    def _spoil_group(self, group: int, words: str, begins: bool) -> None:
+        """Let a fault of a group begin, or end."""
+        kept = {"is taken": self._taken, "stops": self._stopped}.get(words)
+        if kept is not None:
+            (kept.add if begins else kept.discard)(group)
+            if words == "stops" or not begins:
+                self._programs[group].restart()
+        elif begins:
+            self._spoiled[group] = words
+        else:
+            self._spoiled.pop(group, None)
+
+    def emergency_stop(self) -> None:
+        """Press the emergency stop: hardware locks the drums and takes the power; the PLCs only tell."""
+        for program in self._programs:
+            program.emergency = True
+
+    def reset(self) -> None:
+        """Let the emergency stop and locked drums go and clear the drives, as the operator at the machine does."""
+        for program in self._programs:
+            program.reset()

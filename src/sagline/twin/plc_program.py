@@ -1,0 +1,303 @@
+"""What the program in the PLC of one group does in a scan: grant, heartbeat, ramp, limits, hold.
+
+The SCL source does the same, line by line. Numbers here are plain ones: a scan costs microseconds.
+"""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import Final, NamedTuple
+
+from sagline.control.link import (
+    HEARTBEAT,
+    OWNER_TIMEOUT,
+    RAMP,
+    GroupFault,
+    GroupStatus,
+    Mode,
+    WinchState,
+)
+
+COUNTERS: Final = 2**31 - 1  # go from 1 to here, and begin again
+FOLLOWING: Final = 0.01  # m, between set point and encoder: the controller stops at half of it
+TINY: Final = 1e-9  # m and s: of rounding
+LEFT: Final = 0.1  # m: so much hanging cable there is at least
+
+
+class Order(NamedTuple):
+    """A command, as one PLC has it: of its own winches only."""
+
+    counter: int
+    owner: int
+    mode: int
+    valid_for: float
+    length: list[float]
+    rate: list[float]
+    tension: list[float]
+    enable: list[bool]
+
+
+class Limits(NamedTuple):
+    """What a PLC knows of its winches.
+
+    Attributes:
+        least: Shortest set points [m].
+        most: Longest [m].
+        speed: Largest rates [m/s].
+        tension: Largest at which cable is taken in [N].
+    """
+
+    least: list[float]
+    most: list[float]
+    speed: list[float]
+    tension: list[float]
+
+
+class Program:
+    """The program of one group.
+
+    What it reads stands in `order`, `encoder` and `cell`; what it sets in the attributes below.
+
+    Attributes:
+        owner: Who has the grant, 0 for nobody.
+        echo: Counter of the last command taken, 0 before the first.
+        fault: Why it acts by itself, until a command to hold acknowledges it.
+        powered: Which drives have power, and no brake.
+        length: Set points at the end of the scan's period [m].
+        tension: Expected at the drums [N].
+        drive_fault: Codes of the drives, not 0 where one has tripped.
+        emergency: Whether the emergency stop is pressed.
+        locked: Whether the drums are locked until the operator lets them go.
+    """
+
+    def __init__(self, limits: Limits, period: float) -> None:
+        """Begin with brakes on, and nobody's.
+
+        Args:
+            limits: Of its winches.
+            period: Of a scan [s].
+        """
+        self.limits, self.period = limits, period
+        count = len(limits.least)
+        self.winches = range(count)
+        self.owner, self.echo, self.fault = 0, 0, GroupFault.NONE
+        self.powered = [False] * count
+        self._loaded = [False] * count  # which drives have taken up the tension
+        self.length, self.tension = [0.0] * count, [0.0] * count
+        self.drive_fault = [0] * count
+        self.emergency = self.locked = False
+        self._order: Order | None = None
+        self._fresh = False
+        self._moved = -OWNER_TIMEOUT  # when the command counter moved last
+        self._asked = [0.0] * count  # set points of the last command, or where the drives stood
+        self._rate = [0.0] * count
+        self._ramp = 0.0  # what is left of it [s]
+        self._mode = int(Mode.LEAVE)
+
+    def claim(self, owner: int, now: float) -> None:
+        """Give the grant, where it is free or its holder's counter has stood for OWNER_TIMEOUT.
+
+        Args:
+            owner: Who asks.
+            now: On the PLC's clock [s].
+        """
+        if owner > 0 and owner != self.owner and (not self.owner or now - self._moved >= OWNER_TIMEOUT - TINY):
+            self.seize(owner, now)
+
+    def seize(self, owner: int, now: float) -> None:
+        """Give the grant, whoever has it."""
+        self.owner, self.echo, self._moved = owner, 0, now
+        self._order, self._fresh = None, False
+        if any(self._rate) and not self._ramp:
+            self._stop(GroupFault.HEARTBEAT)
+
+    def take(self, order: Order) -> None:
+        """Take a command, if it is the owner's and newer than the last one."""
+        newer = not self.echo or 0 < (order.counter - self.echo) % COUNTERS < COUNTERS // 2
+        if self.owner and order.owner == self.owner and newer:
+            self.echo, self._order, self._fresh = order.counter, order, True
+
+    def reset(self) -> None:
+        """Let the drums go and clear the drives, as the operator of the machine does; brakes stay on for now."""
+        self.emergency = self.locked = False
+        self.drive_fault = [0] * len(self.drive_fault)
+        self.fault = GroupFault.NONE
+        self._brake()
+
+    def restart(self) -> None:
+        """Begin anew, as a PLC does that was stopped: brakes on, and nobody's."""
+        self.owner, self.echo, self._order, self._fresh = 0, 0, None, False
+        self.fault = GroupFault.NONE
+        self._brake()
+
+    def trip(self, winch: int, code: int) -> None:
+        """Let a drive trip: it has no power until the operator resets it."""
+        self.drive_fault[winch], self.powered[winch] = code, False
+
+    def scan(self, now: float, encoder: list[float], cell: list[float]) -> None:
+        """Set the drives for the next period.
+
+        Args:
+            now: On the PLC's clock [s].
+            encoder: Lengths off the drums [m].
+            cell: Raw readings of the load cells [N].
+        """
+        order, fresh = self._order, self._fresh
+        self._fresh = False
+        if fresh:
+            before, self._moved = self._moved, now
+        if self.emergency or self.locked:
+            self.fault = GroupFault.EMERGENCY_STOP if self.emergency else self.fault
+            self._brake()
+            return
+        if self._lags(encoder):
+            self._stop(GroupFault.FOLLOWING_ERROR)
+        if order is None:
+            self._slow_down(cell)
+        elif order.mode == Mode.LEAVE:
+            self.owner, self._order = 0, None
+            self.fault = GroupFault.NONE
+            self._brake()
+        elif order.mode == Mode.LOCK:
+            self.locked = True
+            self._brake()
+        elif any(self.drive_fault):
+            self._stop(GroupFault.DRIVE)
+            self._slow_down(cell)
+        elif self.fault and not (fresh and order.mode == Mode.HOLD and not self._ramp):
+            self._slow_down(cell)
+        elif fresh:
+            self.fault = GroupFault.NONE
+            if order.enable != self.powered:
+                self._switch(order, encoder)
+            self._obey(order, max(now - before, self.period), cell)
+        elif now - self._moved >= min(HEARTBEAT, order.valid_for) - TINY:
+            self._stop(GroupFault.HEARTBEAT)
+            self._slow_down(cell)
+        elif self._mode == Mode.FOLLOW:
+            self._drive(self._rate, cell)
+        else:
+            self._slow_down(cell)
+
+    def _lags(self, encoder: list[float]) -> bool:
+        """Whether a drive is too far from its set point, which is then where it is."""
+        lags = False
+        for i in self.winches:
+            if self.powered[i] and abs(self.length[i] - encoder[i]) > FOLLOWING:
+                self.length[i], self._rate[i], lags = encoder[i], 0.0, True
+        return lags
+
+    def _brake(self) -> None:
+        """Take the power from all drives, whose brakes fall."""
+        self.powered = [False] * len(self.powered)
+        self._loaded = list(self.powered)
+        self._rate, self._ramp, self._mode = [0.0] * len(self._rate), 0.0, int(Mode.LEAVE)
+
+    def _switch(self, order: Order, encoder: list[float]) -> None:
+        """Give power to the drives that may move, which begin where they stand, and take it from the others.
+
+        A drive takes up the tension that is expected first; its brake goes with the next command.
+        """
+        for i in self.winches:
+            has = order.enable[i] and (self.powered[i] or self._loaded[i])
+            if has and not self.powered[i]:
+                self.length[i] = self._asked[i] = encoder[i]
+            if not has or not self.powered[i]:
+                self._rate[i] = 0.0
+            self.powered[i] = has
+        self._loaded = order.enable
+
+    def _obey(self, order: Order, waited: float, cell: list[float]) -> None:
+        """Do what a new command says."""
+        if order.mode != Mode.FOLLOW or not any(self.powered):
+            self.tension = [new if isfinite(new) else old for new, old in zip(order.tension, self.tension, strict=True)]
+            if self._mode == Mode.FOLLOW and any(self._rate):
+                self._ramp = RAMP
+            self._mode = order.mode
+            self._slow_down(cell)
+            return
+        self._mode, self._ramp = order.mode, 0.0
+        if self._acceptable(order, waited):
+            self.tension = order.tension
+            period, length = self.period, self.length
+            self._drive([(order.length[i] - length[i]) / period for i in self.winches], cell)
+            if not self.fault:
+                self._asked, self._rate = order.length, order.rate
+        else:
+            self._stop(GroupFault.SET_POINT)
+            self._slow_down(cell)
+
+    def _acceptable(self, order: Order, waited: float) -> bool:
+        """Whether set points are within their limits, and no faster than the winches since the last ones."""
+        least, most, speed, _ = self.limits
+        for i in self.winches:
+            if self.powered[i]:
+                length = order.length[i]
+                if not (
+                    least[i] <= length <= most[i]
+                    and abs(length - self._asked[i]) <= speed[i] * waited + TINY
+                    and abs(order.rate[i]) <= speed[i] + TINY
+                    and isfinite(order.tension[i])
+                ):
+                    return False
+        return True
+
+    def _drive(self, rate: list[float], cell: list[float]) -> None:
+        """Move the set points on for a period, unless that would take in a cable that pulls too hard."""
+        limit, length, period = self.limits.tension, self.length, self.period
+        for i in self.winches:
+            if cell[i] > limit[i] and rate[i] < 0.0 and self.powered[i]:
+                self._stop(GroupFault.OVER_TENSION)
+                self._slow_down(cell)
+                return
+        self.length = [length[i] + rate[i] * period if self.powered[i] else length[i] for i in self.winches]
+
+    def _stop(self, fault: GroupFault) -> None:
+        """Slow down by itself, and hold."""
+        if not self.fault:
+            self._ramp = RAMP if any(self._rate) and not self._ramp else self._ramp
+        self.fault = self.fault or fault
+
+    def _slow_down(self, cell: list[float]) -> None:
+        """Lead the rates to zero, evenly, and stay there; what pulls too hard takes in no more cable."""
+        if self._ramp <= 0.0:
+            return
+        share, period = self._ramp / RAMP, min(self.period, self._ramp)
+        mean = period * (share - 0.5 * period / RAMP)
+        self._ramp = self._ramp - period if self._ramp - period > TINY else 0.0
+        for i in self.winches:
+            if self.powered[i] and not (cell[i] > self.limits.tension[i] and self._rate[i] < 0.0):
+                self.length[i] += self._rate[i] * mean
+        if not self._ramp:
+            self._rate = [0.0] * len(self._rate)
+            self._asked = list(self.length)
+
+    @property
+    def status(self) -> int:
+        """Bits of `GroupStatus`."""
+        if self.emergency:
+            return _EMERGENCY
+        if self.locked:
+            return _LOCKED
+        ready = 0 if any(self.drive_fault) else _READY
+        if not any(self.powered):
+            return ready | _BRAKED
+        if self._ramp > 0.0:
+            return ready | _RAMPING
+        if self.fault:
+            return ready | _HOLDING
+        return ready | _FOLLOWING if self._mode == _FOLLOW else ready
+
+    def states(self, saturated: list[float]) -> list[int]:
+        """Codes of `WinchState`, by which drives are at a limit."""
+        if self.emergency or self.locked:
+            return [int(WinchState.LOCKED)] * len(saturated)
+        return [
+            4 if self.drive_fault[i] else 0 if not self.powered[i] else 2 if saturated[i] else 1 for i in self.winches
+        ]
+
+
+_EMERGENCY: Final = int(GroupStatus.EMERGENCY | GroupStatus.LOCKED | GroupStatus.BRAKED)
+_LOCKED: Final = int(GroupStatus.READY | GroupStatus.LOCKED | GroupStatus.BRAKED)
+_READY, _BRAKED, _RAMPING = int(GroupStatus.READY), int(GroupStatus.BRAKED), int(GroupStatus.RAMPING)
+_HOLDING, _FOLLOWING, _FOLLOW = int(GroupStatus.HOLDING), int(GroupStatus.FOLLOWING), int(Mode.FOLLOW)

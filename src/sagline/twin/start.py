@@ -1,0 +1,153 @@
+"""Where a machine stands when it is switched on: what its encoders read, and what hangs off its drums."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from sagline.arguments import optional
+from sagline.arrays import Array
+from sagline.dynamics.drives import drive_data
+from sagline.dynamics.steps import highest_frequency, with_drives
+from sagline.errors import InvalidValueError
+from sagline.kernels.dynamics import drives as d
+from sagline.kinematics.forward import forward
+from sagline.kinematics.inverse import inverse
+from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.robot.wheels import dead_cable
+from sagline.twin.plc_program import LEFT, Limits
+from sagline.twin.scale import Scale
+
+SHARE: Final = 0.2  # radians of the highest mode in a step
+REACH: Final = 2.0  # of the largest distance between frame anchors: no cable is longer, where cable_length is not known
+
+
+class Start(NamedTuple):
+    """A machine before it is switched on.
+
+    Attributes:
+        state: The true robot at rest.
+        nominal: What the PLCs take the encoders for.
+        true: What they are.
+    """
+
+    state: Equilibrium
+    nominal: Scale
+    true: Scale
+
+
+def started(true: Robot, nominal: Robot, start: Any, surveyed: bool) -> Start:
+    """Where the true platform rests, and what its encoders read there.
+
+    Args:
+        true: The robot as it is.
+        nominal: The robot as it is planned.
+        start: The pose at which the encoders were set; None for the middle of the robot's test_box.
+        surveyed: Whether the true platform stood at that pose then. Otherwise the lengths off its drums were those of
+            the nominal plan there, and what is wrapped and dead on the true machine was not counted: the platform
+            stands where these lengths put it.
+    """
+    pose = start_pose(nominal, start)
+    plan = inverse(nominal, pose)
+    planned = _answered(plan.unstrained_length, nominal, "start")
+    counts = np.zeros(nominal.cable_count)
+    scale = Scale(nominal, planned, counts)
+    if (winch := nominal.winches) is not None and winch.length_zero is not None:
+        stretch = 1.0 + winch.winding_tension / nominal.cables.axial_stiffness
+        counts = np.rint(winch.count_zero - scale.counts(winch.length_zero / stretch))
+        scale = Scale(nominal, planned, counts)
+    if surveyed:
+        state = inverse(true, pose).state
+        _answered(state.unstrained_length, true, "start")
+    else:
+        state = _left_there(true, planned + _not_counted(true, nominal, pose) + _zero_errors(true, nominal), pose)
+    return Start(state, scale, Scale(true, state.unstrained_length, counts))
+
+
+def start_pose(robot: Robot, start: Any) -> Pose:
+    """The pose at which encoders are set; None for the middle of the robot's test_box, level."""
+    pose = optional(start, Pose, "start")
+    if pose is not None:
+        if pose.shape:
+            raise InvalidValueError("start", f"a batch of {len(pose)}", "a single pose", "Give one of them: start[0].")
+        return pose
+    if robot.test_box is None:
+        allowed = f"a pose: {robot.name} has no test_box, whose middle it would be"
+        step = "Give that at which encoders are set: start=Pose.from_euler([0, 0, 1.5], 0, 0, 0)."
+        raise InvalidValueError("start", "not given", allowed, step)
+    return Pose.from_euler(0.5 * (robot.test_box.low + robot.test_box.high), 0.0, 0.0, 0.0)
+
+
+def limits_of(robot: Robot, scale: Scale) -> Limits:
+    """What the PLCs know of a robot's winches, one list over all of them."""
+    winch, anchors = robot.winches, robot.frame_anchors
+    assert winch is not None
+    apart = np.linalg.norm(anchors[:, None] - anchors, axis=-1).max()
+    dead = dead_cable(robot) + np.zeros(robot.cable_count)
+    most = dead + REACH * apart if winch.cable_length is None else winch.cable_length
+    speed = np.full(robot.cable_count, np.inf)
+    if winch.speed_limit is not None and winch.counts_per_turn is not None:
+        speed = winch.speed_limit * winch.counts_per_turn / (2.0 * math.pi * np.abs(scale.per_meter))
+    tension = robot.tension_max + np.zeros(robot.cable_count)
+    return Limits(*(column.tolist() for column in (dead + LEFT, most, speed, tension)))
+
+
+def check_step(robot: Robot, state: Equilibrium, step: float) -> None:
+    """Refuse a step that is too coarse for the robot's modes, its cables taut and its drums on their cables.
+
+    Raises:
+        InvalidValueError: If it is more than 0.2 radians of the highest of them.
+    """
+    length = state.unstrained_length
+    pose = Pose.from_quaternion(state.pose.position[None], state.pose.quaternion[None])
+    data = drive_data(robot, "robot", length, False)
+    platform = highest_frequency(robot, pose, length[None])
+    highest = with_drives(platform, d.DRUMS, data, length[None], robot.cables.axial_stiffness)
+    if step * highest > SHARE:
+        limit, frequency = SHARE / highest, highest / (2.0 * math.pi)
+        finer = 1e-3 / math.ceil(1e-3 / limit)
+        allowed = f"<= {limit:.3g} s, {SHARE:g} rad of the highest mode, {frequency:.3g} Hz, cables taut"
+        raise InvalidValueError("step", f"{step:g} s", allowed, f"Give step={finer:.3g}.")
+
+
+def _answered(length: Array, robot: Robot, item: str) -> Array:
+    if np.isnan(length).any():
+        allowed = f"one that {robot.name} can hold within its tension limits"
+        raise InvalidValueError(item, "a pose without an answer", allowed, "Give another pose as start.")
+    return length
+
+
+def _left_there(robot: Robot, length: Array, pose: Pose) -> Equilibrium:
+    """The true robot at rest on given lengths, near a pose."""
+    dead = dead_cable(robot) + np.zeros(robot.cable_count)
+    found = forward(robot, length, start=pose) if (length > dead).all() else None
+    if found is None or not found.stable:
+        allowed, step = "one that hangs at rest there", "Change it by less, or give surveyed=True."
+        raise InvalidValueError("robot", "one that does not rest on the nominal lengths", allowed, step)
+    return found.state
+
+
+def _zero_errors(true: Robot, nominal: Robot) -> Array:
+    """By how much more is off the drums than the encoders say [m], shape (m,)."""
+    error = np.zeros(true.cable_count)
+    if true.winches is not None and nominal.winches is not None:
+        there, thought = true.winches.length_zero, nominal.winches.length_zero
+        if there is not None and thought is not None:
+            error = there - thought
+    return error
+
+
+def _not_counted(true: Robot, nominal: Robot, pose: Pose) -> Array:
+    """What pulleys and dead cable of the true robot add to lengths at a pose that the nominal one has not [m], (m,)."""
+    return _behind(true, pose) - _behind(nominal, pose)
+
+
+def _behind(robot: Robot, pose: Pose) -> Array:
+    if robot.winches is None or not robot.winches.anything_behind:
+        return np.zeros(robot.cable_count)
+    whole, bare = (inverse(some, pose).unstrained_length for some in (robot, robot.replace(winches=None)))
+    return _answered(whole - bare, robot, "start")
