@@ -6,6 +6,7 @@ from typing import Final, NamedTuple
 
 from sagline.arrays import Array
 from sagline.control.link import Command, Mode, Sample
+from sagline.control.null_space import NullSpace
 
 MOVING: Final = 1e-3  # m/s: a set point that changes faster is in motion
 
@@ -18,6 +19,7 @@ class Cycle(NamedTuple):
         before: What it had said in the cycle before; None in the first.
         command: What was sent in the cycle before; None where nothing was, by those who only read.
         tension: T_A, planned for this cycle [N], shape (m,); NaN where there is no plan, as before homing.
+        gains: Row of the plan's gains at this time; None where there is none.
         correction: What the tension loop adds to the lengths of the plan [m], shape (m,).
         late: How much later than planned the cycle began [s]; 0 on the clock of an in-process machine.
         recording: Why recording has stopped; "" while it goes on, or where nothing is recorded.
@@ -27,6 +29,7 @@ class Cycle(NamedTuple):
     before: Sample | None
     command: Command | None
     tension: Array
+    gains: NullSpace | None
     correction: Array
     late: float = 0.0
     recording: str = ""

@@ -7,6 +7,7 @@ from enum import IntEnum
 from typing import ClassVar
 
 from sagline.control.cycle import Cycle
+from sagline.control.evidence import Evidence
 
 
 class Reaction(IntEnum):
@@ -28,8 +29,9 @@ class Fault(ABC):
         reaction: What follows.
         within: How long it takes to be found, in words.
         homing: Whether it leaves a length in doubt, so that the robot must be homed again.
-        lasting: Whether it stays until a fresh set is made, though its rule holds no longer.
+        lasting: Whether it stays until a fresh set is made, though its rule holds no longer; each item is told once.
         present: Whether it is there now.
+        seen: What the set of faults has seen.
     """
 
     name: ClassVar[str]
@@ -38,7 +40,14 @@ class Fault(ABC):
     within: ClassVar[str]
     homing: ClassVar[bool] = False
     lasting: ClassVar[bool] = False
-    present: bool = False
+
+    def __init__(self, seen: Evidence) -> None:
+        """Begin with nothing found.
+
+        Args:
+            seen: Shared by the whole set.
+        """
+        self.seen, self.present = seen, False
 
     def look(self, cycle: Cycle) -> str | None:
         """Look at a cycle; every cycle once, in order.
@@ -50,11 +59,12 @@ class Fault(ABC):
             Where the fault begins a line for the operator: what, which item, value, limit, next step. None otherwise,
             and while it lasts.
         """
+        self.seen.at(cycle)
         line = self.found(cycle)
-        begins = line is not None and not self.present
+        begins = line is not None and (self.lasting or not self.present)
         self.present = line is not None or (self.lasting and self.present)
         return line if begins else None
 
     @abstractmethod
     def found(self, cycle: Cycle) -> str | None:
-        """The operator's line in every cycle in which the rule holds."""
+        """The operator's line in every cycle in which the rule holds; of one that lasts, where an item is new."""

@@ -7,22 +7,25 @@ from typing import NamedTuple
 import numpy as np
 
 from sagline.arrays import Array, locked
+from sagline.control.load_cells import parity
 from sagline.robot.equilibrium import Equilibrium
 from sagline.statics.stiffness import stiffness
 
 
 class NullSpace(NamedTuple):
-    """What the tension loop needs of a pose; with N_L = `null_lengths` and K_A = `tension_sensitivity` of `stiffness`.
+    """What can be mended at a pose, and what can be told; N_L = `null_lengths`, K_A = `tension_sensitivity`.
 
     Attributes:
         projection: Pi = N_L N_L^T, of lengths on those that do not move the platform, shape (..., m, m).
         visible: K_A N_L G, of tensions on those that such lengths change, shape (..., m, m); G = (K_A N_L)^+.
         correction: N_L G, lengths that make up such tensions, shape (..., m, m) [m/N].
+        parity: Of the load cells, shape (..., m, m): see `parity`.
     """
 
     projection: Array
     visible: Array
     correction: Array
+    parity: Array
 
 
 def null_space(state: Equilibrium) -> NullSpace:
@@ -46,4 +49,4 @@ def null_space(state: Equilibrium) -> NullSpace:
     lost = np.isnan(slope).any(axis=(-1, -2), keepdims=True)
     inverse = np.where(lost, np.nan, np.linalg.pinv(np.where(lost, 0.0, slope)))
     projection = basis @ np.swapaxes(basis, -1, -2)
-    return NullSpace(locked(projection), locked(slope @ inverse), locked(basis @ inverse))
+    return NullSpace(locked(projection), locked(slope @ inverse), locked(basis @ inverse), parity(state))

@@ -1,0 +1,135 @@
+"""What several rules for faults look at, worked out once a cycle."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from sagline.arrays import Array, Flags
+from sagline.control.cycle import Cycle
+from sagline.control.link import groups_of
+from sagline.robot.robot import Robot
+
+SIGMAS: Final = 5.0  # by which a reading may be off before it means something
+SLACK_SHARE: Final = 0.3  # of the lower limit: a cable that pulls less is slack
+PLANNED_SHARE: Final = 0.9  # of the lower limit: from there on a plan wants the cable taut
+PULLING: Final = 0.5  # of the planned tension: a motor that holds more has a cable that pulls
+STEADY_TIME: Final = 0.5  # s, of the filter that learns what the tensions are off the plan all the time
+QUICK_TIME: Final = 0.1  # s, of the one that is held against the balance of the platform
+
+
+class Evidence:
+    """The tensions of this cycle, and what is known of the machine; shared by one set of faults.
+
+    Attributes:
+        group_of: Group of each winch, shape (m,).
+        period: Of a cycle [s].
+        largest: Correction of a length beyond which something is wrong [m].
+        noise: Standard deviation of a reading [N].
+        sigma: The same with the bias that a good cell may have [N].
+        limit: Upper limits of T_A [N], shape (m,).
+        full_scale: Of the cells [N], infinite where it is not known, shape (m,).
+        believed: Which cells are, shape (m,).
+        fresh: Which winches' data are new in this cycle, shape (m,).
+        low: For how many new readings in a row each cable has been slack that the plan wants taut, shape (m,).
+        before_low: The reading before these [N], shape (m,).
+        steady: T_A less the plan, behind the slow filter, which rests while a cable is slack [N], shape (m,).
+        quick: The same behind the quick one [N], shape (m,).
+        compared: Whether there is a plan that tensions could be held against.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        period: float,
+        groups: tuple[tuple[int, ...], ...] | None,
+        cell: tuple[float, float],
+        largest: float,
+    ) -> None:
+        """Begin with nothing seen.
+
+        Args:
+            robot: The robot as it is planned for.
+            period: Of a cycle [s].
+            groups: Winches of each group; None: two neighbors each.
+            cell: Standard deviation of a reading, and the bias that a good cell may have [N].
+            largest: Correction of a length beyond which something is wrong [m].
+        """
+        m, winch = robot.cable_count, robot.winches
+        self.group_of = np.zeros(m, dtype=np.int64)
+        for g, members in enumerate(groups_of(m) if groups is None else groups):
+            self.group_of[list(members)] = g
+        self.period, self.largest = period, largest
+        self.noise, self.sigma = cell[0], math.hypot(*cell)
+        self.limit = robot.tension_max
+        least = robot.tension_min
+        self._slack = np.where(least > 0.0, SLACK_SHARE * least, SIGMAS * self.sigma)
+        self._taut = np.where(least > 0.0, PLANNED_SHARE * least, 2.0 * SIGMAS * self.sigma)
+        self._most_slack = float(self._slack.max())
+        known = winch is not None and winch.load_cell_range is not None
+        self.full_scale = np.broadcast_to(winch.load_cell_range if known else np.inf, (m,))  # type: ignore[union-attr, arg-type]
+        self._set_up_motors(robot)
+        self.believed: Flags = np.ones(m, dtype=bool)
+        self.fresh: Flags = np.ones(m, dtype=bool)
+        self.low = np.zeros(m, dtype=np.int64)
+        self.before_low, self.steady, self.quick = np.full(m, np.nan), np.zeros(m), np.zeros(m)
+        self.compared = self.any_low = False
+        self._shares = [period / (time + period) for time in (STEADY_TIME, QUICK_TIME)]
+        self._cycle: Cycle | None = None
+
+    def _set_up_motors(self, robot: Robot) -> None:
+        """How a motor's torque tells of the tension, where drum and gear are known."""
+        winch, m = robot.winches, robot.cable_count
+        self._pull_of_torque: Array | None = None
+        self._friction = np.zeros(m)
+        if winch is not None and winch.drum_radius is not None:
+            self._pull_of_torque = np.broadcast_to(-np.abs(winch.gear) / winch.drum_radius, (m,))
+            self._friction = np.broadcast_to(winch.friction, (m,))
+
+    def at(self, cycle: Cycle) -> None:
+        """Look at a cycle, once."""
+        if cycle is self._cycle:
+            return
+        self._cycle = cycle
+        sample, before = cycle.sample, cycle.before
+        if before is not None:
+            self.fresh = (sample.counter != before.counter)[self.group_of]
+        self._look_for_slack(cycle)
+        self._compare(cycle)
+
+    def _look_for_slack(self, cycle: Cycle) -> None:
+        tension = cycle.sample.tension
+        self.any_low = False
+        if tension.min() < self._most_slack:
+            low = (tension < self._slack) & (cycle.tension >= self._taut) & self.believed
+            self.any_low = bool(low.any())
+            if self.any_low:
+                self.low = np.where(low, self.low + self.fresh, 0)
+                self.before_low = np.where(low, self.before_low, tension)
+                return
+        self.low.fill(0)
+        self.before_low = tension
+
+    def _compare(self, cycle: Cycle) -> None:
+        error = cycle.sample.tension - cycle.tension
+        if not math.isfinite(error.sum()):
+            self.compared = False
+            return
+        if not self.compared:
+            self.compared = True
+            self.steady[:], self.quick[:] = error, 0.0
+        if not self.any_low:
+            self.steady += self._shares[0] * (error - self.steady)
+        self.quick += self._shares[1] * (error - self.quick)
+
+    def pull(self, cycle: Cycle) -> Array:
+        """What each motor holds at the cable [N], to its friction; NaN where drums are not known, shape (m,)."""
+        torque = cycle.sample.torque
+        return np.full(torque.shape, np.nan) if self._pull_of_torque is None else self._pull_of_torque * torque
+
+    def pulling(self, cycle: Cycle) -> Flags:
+        """Which cables pull by the torque of their motors, whatever the cells say, shape (m,)."""
+        found: Flags = self.pull(cycle) > np.maximum(PULLING * cycle.tension, 2.0 * self._friction)
+        return found

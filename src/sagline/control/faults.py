@@ -1,0 +1,132 @@
+"""All faults as one table, and a fresh set of the rules for a robot."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+from sagline.arguments import instance
+from sagline.arrays import number
+from sagline.control.evidence import Evidence
+from sagline.control.fault import Fault
+from sagline.control.faults_cells import CellDead, CellOff, CellStuck
+from sagline.control.faults_drives import CorrectionAtLimit, EncoderJump, FollowingError, ServoSaturated
+from sagline.control.faults_link import (
+    BlockDiscarded,
+    CycleLate,
+    CycleLost,
+    EmergencyStop,
+    GroupActs,
+    GroupSilent,
+    GroupStale,
+    OwnerLost,
+    RecordingStopped,
+)
+from sagline.control.faults_tension import CableBroken, OverTension, Slack
+from sagline.control.link import PERIOD
+from sagline.robot.robot import Robot
+
+CELL_DEVIATION: Final = 1.0  # N, of a reading
+CELL_BIAS: Final = 2.0  # N, that a good cell may have: 0.1 % of 2 kN
+LARGEST_CORRECTION: Final = 5e-3  # m
+
+# in the order in which they look: a cell that is found dead is not taken for a cable that is slack
+FAULTS: Final[tuple[type[Fault], ...]] = (
+    EmergencyStop,
+    OwnerLost,
+    GroupActs,
+    GroupSilent,
+    GroupStale,
+    BlockDiscarded,
+    CellDead,
+    CellStuck,
+    CellOff,
+    OverTension,
+    CableBroken,
+    Slack,
+    EncoderJump,
+    FollowingError,
+    ServoSaturated,
+    CorrectionAtLimit,
+    CycleLost,
+    CycleLate,
+    RecordingStopped,
+)
+
+
+class FaultRow(NamedTuple):
+    """One fault, as the docs list it.
+
+    Attributes:
+        name: What an event calls it.
+        rule: When it is there.
+        to: What follows.
+        within: How long it takes.
+        by: Who looks.
+    """
+
+    name: str
+    rule: str
+    to: str
+    within: str
+    by: str
+
+
+_ELSEWHERE: Final = (
+    FaultRow(
+        "controller dead",
+        "its command counter stands for 100 ms",
+        "ramp of 0.2 s, hold",
+        "300 ms",
+        "each PLC by itself",
+    ),
+    FaultRow(
+        "foreign block", "magic, version, group or size differ while connecting", "OFF", "1 cycle", "the connection"
+    ),
+    FaultRow("second controller", "another has a grant while connecting", "OFF", "1 cycle", "the connection"),
+    FaultRow("set point infeasible", "the plan's own status", "refused before it is sent", "", "the check of the plan"),
+)
+FAULT_TABLE: Final = (
+    *(FaultRow(kind.name, kind.rule, kind.reaction.name, kind.within, "the controller") for kind in FAULTS),
+    *_ELSEWHERE,
+)
+
+
+def faults_of(
+    robot: Robot,
+    period: float = PERIOD,
+    *,
+    groups: tuple[tuple[int, ...], ...] | None = None,
+    cell_deviation: float = CELL_DEVIATION,
+    cell_bias: float = CELL_BIAS,
+    largest_correction: float = LARGEST_CORRECTION,
+) -> tuple[Fault, ...]:
+    """A fresh set of rules, which remember nothing: one for each time that a controller leaves OFF, FAULT or homing.
+
+    Args:
+        robot: As it is planned for.
+        period: Of a cycle [s], > 0.
+        groups: The winches of each group, as the link has them; None: two neighbors each.
+        cell_deviation: Standard deviation of a reading of a good load cell [N], > 0.
+        cell_bias: Bias that a good one may have [N], >= 0.
+        largest_correction: Of a length by the tension loop [m], > 0.
+
+    Returns:
+        The rules, to be asked in this order, every one in every cycle.
+
+    Raises:
+        InvalidValueError: If an argument is of the wrong kind or out of its range.
+
+    Examples:
+        >>> import sagline as sl
+        >>> rules = sl.control.faults_of(sl.load_robot("article-prototype"))
+        >>> print(len(rules), "rules,", rules[0].name, "first:", rules[0].reaction.name)
+        19 rules, emergency stop first: EMERGENCY
+    """
+    seen = Evidence(
+        instance(robot, Robot, "robot"),
+        number(period, "period", "s", above=0.0),
+        groups,
+        (number(cell_deviation, "cell_deviation", "N", above=0.0), number(cell_bias, "cell_bias", "N", low=0.0)),
+        number(largest_correction, "largest_correction", "m", above=0.0),
+    )
+    return tuple(kind(seen) for kind in FAULTS)

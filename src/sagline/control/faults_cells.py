@@ -1,0 +1,137 @@
+"""Faults of the load cells: the motion goes on, the tension loop rests."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from sagline.arrays import Array
+from sagline.control.cycle import Cycle
+from sagline.control.evidence import SIGMAS, Evidence
+from sagline.control.fault import Fault, Reaction
+from sagline.control.faults_tension import SLACK_SAMPLES
+
+STUCK_SAMPLES: Final = 50
+ODD_TIME: Final = 0.35  # s: for so long a cell must be at odds; the ramps and swings of the platform take less
+DISPROVED: Final = 0.5  # of full scale: what the motor holds less of is not there
+_STEP: Final = "The tension loop rests. Check cell, plug and amplifier when the platform stands, then acknowledge."
+
+
+class CellDead(Fault):
+    """A cell reads what cannot be."""
+
+    name = "cell zero or saturated"
+    rule = (
+        f"a reading below -{SIGMAS:g} sigma, at full scale while the motor holds less than {DISPROVED:g} of it, or "
+        f"slack in {SLACK_SAMPLES} samples while the motor pulls"
+    )
+    reaction = Reaction.DEGRADED
+    within = "30 ms"
+    lasting = True
+
+    def __init__(self, seen: Evidence) -> None:
+        """Begin with all cells alive."""
+        super().__init__(seen)
+        self._least, self._most = -SIGMAS * seen.sigma, float(seen.full_scale.min())
+
+    def found(self, cycle: Cycle) -> str | None:
+        """The first cell that is newly found dead."""
+        seen, tension = self.seen, cycle.sample.tension
+        if tension.min() >= self._least and tension.max() < self._most and not seen.any_low:
+            return None
+        pull = seen.pull(cycle)
+        dead = ~(tension >= self._least)  # no number either
+        dead |= (tension >= seen.full_scale) & (pull < DISPROVED * seen.full_scale)
+        dead |= (seen.low >= SLACK_SAMPLES) & seen.pulling(cycle)
+        dead &= seen.believed
+        if not dead.any():
+            return None
+        seen.believed &= ~dead
+        cell = int(np.argmax(dead))
+        holds = f" while its motor holds {pull[cell]:.0f} N" if np.isfinite(pull[cell]) else ""
+        return f"cell {cell} reads {tension[cell]:.1f} N{holds}; planned: {cycle.tension[cell]:.0f} N. {_STEP}"
+
+
+class CellStuck(Fault):
+    """A cell always reads the same."""
+
+    name = "cell stuck"
+    rule = f"the same reading in {STUCK_SAMPLES} samples in motion"
+    reaction = Reaction.DEGRADED
+    within = "0.5 s"
+    lasting = True
+
+    def __init__(self, seen: Evidence) -> None:
+        """Begin with no cell stuck."""
+        super().__init__(seen)
+        self._for = np.zeros(seen.limit.size, dtype=np.int64)
+
+    def found(self, cycle: Cycle) -> str | None:
+        """The first cell that is newly found stuck."""
+        seen = self.seen
+        if cycle.before is None:
+            return None
+        same = cycle.sample.tension == cycle.before.tension
+        if not same.any():
+            self._for.fill(0)
+            return None
+        if not cycle.moving:
+            return None
+        self._for = np.where(same, self._for + seen.fresh, 0)
+        stuck = (self._for >= STUCK_SAMPLES - 1) & seen.believed  # so many after the first of them
+        if not stuck.any():
+            return None
+        seen.believed &= ~stuck
+        cell = int(np.argmax(stuck))
+        reading = cycle.sample.tension[cell]
+        return f"cell {cell} has read {reading:.1f} N in {STUCK_SAMPLES} samples of a motion. {_STEP}"
+
+
+class CellOff(Fault):
+    """A cell is at odds with the others: the platform would not be in balance."""
+
+    name = "cell wrong"
+    rule = f"parity of the cells > {SIGMAS:g} sigma names it for {ODD_TIME:g} s, whatever the load weighs"
+    reaction = Reaction.DEGRADED
+    within = "0.5 s"
+    lasting = True
+
+    def __init__(self, seen: Evidence) -> None:
+        """Begin with no cell at odds."""
+        super().__init__(seen)
+        self._signs, self._for = np.zeros(seen.limit.size), np.zeros(seen.limit.size, dtype=np.int64)
+        self._samples = round(ODD_TIME / seen.period)
+        self._quiet = True
+
+    def found(self, cycle: Cycle) -> str | None:
+        """The cell, the first time; with one in doubt the others have nothing to be held against."""
+        seen = self.seen
+        error = self._error(cycle)
+        limit = SIGMAS * seen.sigma
+        if error is None or not np.abs(error).max() > limit:
+            if not self._quiet:
+                self._signs.fill(0.0)
+                self._for.fill(0)
+                self._quiet = True
+            return None
+        signs = np.sign(error) * (np.abs(error) > limit)
+        self._for = np.where((signs == self._signs) & (signs != 0.0), self._for + 1, signs != 0.0)
+        self._signs, self._quiet = signs, False
+        cell = int(np.argmax(np.abs(error)))
+        if self._for[cell] < self._samples:
+            return None
+        seen.believed[cell] = False
+        seen_of_it = float(cycle.gains.parity[cell, cell]) if cycle.gains is not None else 1.0
+        return (
+            f"cell {cell} is off by about {error[cell] / seen_of_it:.0f} N by the platform's balance; "
+            f"allowed: {limit / seen_of_it:.0f} N. "
+            f"It reads {cycle.sample.tension[cell]:.0f} N, planned: {cycle.tension[cell]:.0f} N. {_STEP}"
+        )
+
+    def _error(self, cycle: Cycle) -> Array | None:
+        """What the balance says of each cell [N], (m,), where there is something to say."""
+        seen = self.seen
+        if cycle.gains is None or not seen.compared or seen.any_low or not seen.believed.all():
+            return None
+        return cycle.gains.parity @ seen.quick

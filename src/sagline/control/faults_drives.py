@@ -1,0 +1,157 @@
+"""Faults of encoders and drives, and of what the tension loop asks of them."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Final
+
+import numpy as np
+
+from sagline.arrays import Array
+from sagline.control.cycle import Cycle
+from sagline.control.evidence import Evidence
+from sagline.control.fault import Fault, Reaction
+from sagline.control.link import Command, Mode, WinchState
+
+JUMP: Final = 1e-3  # m a cycle
+FOLLOWING: Final = 5e-3  # m
+SATURATED: Final = 0.2  # s
+_AT_LIMIT: Final = int(WinchState.SATURATED)
+REMEMBERED: Final = 32  # commands: more than may be on their way
+LONGEST: Final = 1.0  # s between two samples of a PLC; more is its clock that began again
+
+
+class EncoderJump(Fault):
+    """Length and speed of a drum do not agree."""
+
+    name = "encoder jump"
+    rule = f"|change of length - rate x time| > {1e3 * JUMP:g} mm from sample to sample"
+    reaction = Reaction.STOPPING
+    within = "10 ms"
+    homing = True
+
+    def found(self, cycle: Cycle) -> str | None:
+        """The largest jump."""
+        sample, before = cycle.sample, cycle.before
+        if before is None:
+            return None
+        period, time = self.seen.period, sample.plc_time - before.plc_time
+        passed = time[self.seen.group_of]
+        jump = np.abs(sample.length - before.length - 0.5 * (sample.rate + before.rate) * passed)
+        if jump.max() <= JUMP:
+            return None
+        known = (passed >= 0.0) & (passed < LONGEST)
+        allowed = JUMP * np.maximum(1.0, passed / period)  # over a gap rates may have changed more
+        jumped = known & ~(jump <= allowed)
+        if not jumped.any():
+            return None
+        winch = int(np.argmax(np.where(jumped, jump, 0.0)))
+        return (
+            f"encoder {winch} jumped by {1e3 * jump[winch]:.1f} mm against its speed; allowed: {1e3 * JUMP:g} mm. "
+            "Check its plug and coupling, acknowledge, and home again."
+        )
+
+
+class FollowingError(Fault):
+    """A drum is not where it was sent."""
+
+    name = "following error"
+    rule = f"|set point - length| > {1e3 * FOLLOWING:g} mm, set points being those that the PLC has taken"
+    reaction = Reaction.STOPPING
+    within = "10 ms"
+    homing = True
+
+    def __init__(self, seen: Evidence) -> None:
+        """Begin with no command."""
+        super().__init__(seen)
+        self._sent: deque[Command] = deque(maxlen=REMEMBERED)
+
+    def found(self, cycle: Cycle) -> str | None:
+        """The drum furthest away."""
+        command, length = cycle.command, cycle.sample.length
+        if command is None or command.mode != Mode.FOLLOW:
+            self._sent.clear()
+            return None
+        self._sent.append(command)
+        if np.abs(command.length - length).max() <= FOLLOWING:
+            return None
+        away = self._away(cycle)
+        far = ~(away <= FOLLOWING)
+        if not far.any():
+            return None
+        winch = int(np.argmax(np.where(far, away, 0.0)))
+        return (
+            f"winch {winch} is {1e3 * away[winch]:.1f} mm from its set point; allowed: {1e3 * FOLLOWING:g} mm. "
+            "See what holds it, acknowledge, and home again."
+        )
+
+    def _away(self, cycle: Cycle) -> Array:
+        """How far each drum is from the way between the command its PLC took last and the one before, (m,).
+
+        A command that is still on its way does not count, nor do drives that may not move.
+        """
+        sent = {command.counter: k for k, command in enumerate(self._sent)}
+        length = cycle.sample.length
+        away = np.zeros(length.size)
+        for g, echo in enumerate(cycle.sample.echo.tolist()):
+            k = sent.get(echo, 0)
+            if k == 0:  # not known, or without one before
+                continue
+            mine = self.seen.group_of == g
+            last, first = self._sent[k], self._sent[k - 1]
+            low, high = np.minimum(first.length, last.length), np.maximum(first.length, last.length)
+            out = np.maximum(np.maximum(low - length, length - high), 0.0)
+            # a length that is no number is nowhere
+            away[mine & last.enable] = np.where(np.isfinite(out), out, np.inf)[mine & last.enable]
+        return away
+
+
+class ServoSaturated(Fault):
+    """A drive gives all it can."""
+
+    name = "servo at its limit"
+    rule = f"a drive's force at its limit for {SATURATED:g} s"
+    reaction = Reaction.STOPPING
+    within = "0.2 s"
+
+    def __init__(self, seen: Evidence) -> None:
+        """Begin with no drive at its limit."""
+        super().__init__(seen)
+        self._for = np.zeros(seen.limit.size, dtype=np.int64)
+        self._samples = round(SATURATED / seen.period)
+
+    def found(self, cycle: Cycle) -> str | None:
+        """The drive that has been there longest."""
+        at_limit = cycle.sample.state == _AT_LIMIT
+        if not at_limit.any():
+            self._for.fill(0)
+            return None
+        self._for = np.where(at_limit, self._for + 1, 0)
+        winch = int(np.argmax(self._for))
+        if self._for[winch] < self._samples:
+            return None
+        return (
+            f"drive {winch} has been at its limit of force for {self._for[winch] * self.seen.period:.1f} s at "
+            f"{cycle.sample.torque[winch]:.2f} N m; allowed: {SATURATED:g} s. See what holds it, then acknowledge."
+        )
+
+
+class CorrectionAtLimit(Fault):
+    """The tension loop would change a length further than any good encoder is off."""
+
+    name = "correction at its limit"
+    rule = "the tension loop has changed a length by as much as it may, 5 mm unless set otherwise"
+    reaction = Reaction.STOPPING
+    within = "1 cycle"
+    homing = True
+
+    def found(self, cycle: Cycle) -> str | None:
+        """The length that is changed most."""
+        size = np.abs(cycle.correction)
+        if size.max() < self.seen.largest * (1.0 - 1e-9):
+            return None
+        winch = int(np.argmax(size))
+        return (
+            f"the tension loop has changed length {winch} by {1e3 * cycle.correction[winch]:+.1f} mm; allowed: "
+            f"{1e3 * self.seen.largest:g} mm. A length is in doubt: acknowledge, and home again."
+        )

@@ -1,0 +1,261 @@
+"""Faults of what is between controller and machine: blocks, grants, PLCs, the clock, the recording."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Final
+
+import numpy as np
+
+from sagline.arrays import Flags
+from sagline.control.cycle import Cycle
+from sagline.control.evidence import Evidence
+from sagline.control.fault import Fault, Reaction
+from sagline.control.link import GroupFault, GroupStatus, Mode, WinchState
+
+STALE, SILENT = 3, 10  # cycles
+WINDOW: Final = 100  # cycles that are looked back on
+LATE, LATE_OFTEN, LOST = 0.02, 0.005, 0.1  # s
+OFTEN: Final = 3  # of a window
+HALF: Final = 0.5  # of a cycle: what is left of it to rounding
+
+# plain integers: an enumeration's member makes each operation on an array four times slower
+_LOCKED, _EMERGENCY, _PRESSED = int(GroupStatus.LOCKED), int(GroupStatus.EMERGENCY), int(GroupFault.EMERGENCY_STOP)
+_TRIPPED: Final = int(WinchState.FAULT)
+
+_ACTS = {
+    GroupFault.HEARTBEAT: "no command came for 100 ms",
+    GroupFault.OVER_TENSION: "a cable pulled too hard while it was wound in",
+    GroupFault.FOLLOWING_ERROR: "a drive lagged too far behind its set points",
+    GroupFault.SET_POINT: "a set point was out of its range",
+    GroupFault.DRIVE: "a drive tripped",
+}
+
+
+class _Old(Fault):
+    """A group's newest sample is older than so many cycles."""
+
+    cycles: int
+    step: str
+
+    def found(self, cycle: Cycle) -> str | None:
+        """The oldest group, and how old."""
+        age = cycle.sample.age
+        worst = float(age.max())
+        limit = self.cycles * self.seen.period
+        if worst <= limit + HALF * 1e-3 * self.seen.period:
+            return None
+        group = int(np.argmax(age))
+        return (
+            f"group {group}: its newest sample is {1e3 * worst:.0f} ms old, more than {1e3 * limit:.0f} ms. {self.step}"
+        )
+
+
+class GroupStale(_Old):
+    """A group is late; the tension loop rests until it is back."""
+
+    name = "group stale"
+    rule = f"newest sample of a group older than {STALE} cycles: it is silent, or what it sends is repeated, late, bad"
+    reaction = Reaction.DEGRADED
+    within = "30 ms"
+    cycles = STALE
+    step = "The tension loop rests until it is back."
+
+
+class GroupSilent(_Old):
+    """A group is gone."""
+
+    name = "group silent"
+    rule = f"newest sample of a group older than {SILENT} cycles"
+    reaction = Reaction.STOPPING
+    within = "100 ms"
+    cycles = SILENT
+    step = "Check its PLC and the network, then acknowledge."
+
+
+class BlockDiscarded(Fault):
+    """Blocks come in that are no good; if no good ones come either, the group is stale."""
+
+    name = "block discarded"
+    rule = "torn or foreign: counters at both ends, magic, version or size differ"
+    reaction = Reaction.EVENT
+    within = "1 cycle"
+
+    def __init__(self, seen: Evidence) -> None:
+        """Begin with nothing found."""
+        super().__init__(seen)
+        self._quiet, self._line = WINDOW, ""
+
+    def found(self, cycle: Cycle) -> str | None:
+        """The group and how many of its blocks; it ends after a second without another."""
+        sample, before = cycle.sample, cycle.before
+        self._quiet += 1
+        if before is not None and sample.discarded is not before.discarded:
+            more = sample.discarded - before.discarded
+            if more.any():
+                group = int(np.argmax(more))
+                count = int(sample.discarded[group])
+                self._quiet = 0
+                self._line = (
+                    f"group {group}: a block was discarded as torn or foreign, {count} so far. Check the network."
+                )
+        return self._line if self._quiet < WINDOW else None
+
+
+class OwnerLost(Fault):
+    """Somebody else has a grant that was ours, or nobody."""
+
+    name = "owner lost"
+    rule = "grant of a group differs after all were held"
+    reaction = Reaction.STOPPING
+    within = "1 cycle"
+
+    def __init__(self, seen: Evidence) -> None:
+        """Begin with nothing held."""
+        super().__init__(seen)
+        self._held = False
+
+    def found(self, cycle: Cycle) -> str | None:
+        """The first group that is not ours."""
+        command = cycle.command
+        if command is None or command.mode == Mode.LEAVE:
+            self._held = False
+            return None
+        other = cycle.sample.owner != command.owner
+        if not other.any():
+            self._held = True
+            return None
+        if not self._held:
+            return None
+        group = int(np.argmax(other))
+        owner = int(cycle.sample.owner[group])
+        who = f"controller {owner} has its grant" if owner else "nobody has its grant"
+        return f"group {group}: {who}, not this one, {command.owner}. Stop the other controller, then connect again."
+
+
+class GroupActs(Fault):
+    """A PLC or a drive has stopped by itself."""
+
+    name = "group acts by itself"
+    rule = "a PLC reports a fault or locked drums, or a drive a fault, after there was none"
+    reaction = Reaction.STOPPING
+    within = "1 cycle"
+
+    def __init__(self, seen: Evidence) -> None:
+        """Begin with no group seen without fault: what an earlier controller left is not this one's."""
+        super().__init__(seen)
+        self._clean: Flags = np.zeros(int(seen.group_of.max()) + 1, dtype=bool)
+
+    def found(self, cycle: Cycle) -> str | None:
+        """The first such group, and why."""
+        sample = cycle.sample
+        locked = (sample.status & _LOCKED) != 0
+        tripped = (sample.winch_fault != 0) | (sample.state == _TRIPPED)
+        if not (sample.fault.any() or locked.any() or tripped.any()):
+            self._clean.fill(True)
+            return None
+        if cycle.command is not None and cycle.command.mode in (Mode.LOCK, Mode.LEAVE):
+            return None
+        acting = (sample.fault != 0) | locked
+        acting[self.seen.group_of[tripped]] = True
+        self._clean |= ~acting
+        new = acting & self._clean
+        if not new.any():
+            return None
+        group = int(np.argmax(new))
+        return f"group {group} stopped by itself: {self._why(cycle, group, tripped)}. Mend that, then acknowledge."
+
+    def _why(self, cycle: Cycle, group: int, tripped: Flags) -> str:
+        mine = np.flatnonzero(tripped & (self.seen.group_of == group))
+        if mine.size:
+            return f"drive {mine[0]} tripped with code {cycle.sample.winch_fault[mine[0]]}"
+        code = int(cycle.sample.fault[group])
+        return _ACTS.get(GroupFault(code), "drums are locked") if code in set(GroupFault) else f"with code {code}"
+
+
+class EmergencyStop(Fault):
+    """The hardware has taken the power; the PLC mirrors it."""
+
+    name = "emergency stop"
+    rule = "a PLC reports that the emergency stop is pressed"
+    reaction = Reaction.EMERGENCY
+    within = "a scan of the PLC, 1 cycle"
+    homing = True
+
+    def found(self, cycle: Cycle) -> str | None:
+        """The groups that report it."""
+        sample = cycle.sample
+        pressed = ((sample.status & _EMERGENCY) != 0) | (sample.fault == _PRESSED)
+        if not pressed.any():
+            return None
+        groups = ", ".join(str(g) for g in np.flatnonzero(pressed))
+        return f"emergency stop, reported by group {groups}. Make the machine safe, release it, then connect and home."
+
+
+class CycleLate(Fault):
+    """This computer is too busy."""
+
+    name = "cycle late"
+    rule = f"> {1e3 * LATE:g} ms late, or {OFTEN} of {WINDOW} cycles late by {1e3 * LATE_OFTEN:g} ms"
+    reaction = Reaction.EVENT
+    within = "1 cycle"
+
+    def __init__(self, seen: Evidence) -> None:
+        """Begin with no cycle late."""
+        super().__init__(seen)
+        self._cycle = 0
+        self._late: deque[tuple[int, float]] = deque()  # of the window: when, and by how much
+
+    def found(self, cycle: Cycle) -> str | None:
+        """The latest; it ends after a second in which there were few."""
+        self._cycle += 1
+        late = self._late
+        if cycle.late > LATE_OFTEN:
+            late.append((self._cycle, cycle.late))
+        if late and late[0][0] <= self._cycle - WINDOW:
+            late.popleft()
+        if not late:
+            return None
+        worst = max(by for _, by in late)
+        if len(late) < OFTEN and worst <= LATE:
+            return None
+        return (
+            f"{len(late)} of the last {WINDOW} cycles were late, by up to {1e3 * worst:.0f} ms; "
+            f"allowed: {1e3 * LATE:g} ms. Free this computer of other work."
+        )
+
+
+class CycleLost(Fault):
+    """This computer stood still."""
+
+    name = "cycle lost"
+    rule = f"> {1e3 * LOST:g} ms late"
+    reaction = Reaction.STOPPING
+    within = "1 cycle"
+
+    def found(self, cycle: Cycle) -> str | None:
+        """How late."""
+        if cycle.late <= LOST:
+            return None
+        return (
+            f"a cycle began {1e3 * cycle.late:.0f} ms late, more than {1e3 * LOST:g} ms: the PLCs have stopped the "
+            "winches by themselves. Free this computer of other work, then acknowledge."
+        )
+
+
+class RecordingStopped(Fault):
+    """The motion goes on."""
+
+    name = "recording stopped"
+    rule = "a write fails, as where the disk is full, or the queue to the writer is full"
+    reaction = Reaction.EVENT
+    within = "1 s"
+
+    def found(self, cycle: Cycle) -> str | None:
+        """Why."""
+        if not cycle.recording:
+            return None
+        why = cycle.recording if len(cycle.recording) <= 120 else cycle.recording[:117] + "..."
+        return (
+            f"recording has stopped: {why}. The motion goes on; what was written stands. Free space for the next one."
+        )

@@ -1,0 +1,167 @@
+"""Hand-made samples of the prototype on the lockstep clock: a good machine that moves, and what is done to it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+import sagline as sl
+from sagline.arrays import Array
+from sagline.article.table2 import table2
+from sagline.article.ten_poses import HOME
+from sagline.control.cycle import Cycle
+from sagline.control.faults import faults_of
+from sagline.control.gains import Gains, gains_along
+from sagline.control.link import PERIOD, Command, GroupFault, GroupStatus, Mode, Sample, WinchState
+from tests.dynamics.machines import prototype
+
+ROBOT = prototype(load_cell_gain=1.0, load_cell_bias=0.0)
+OWNER = 4711
+DURATION = 8.0  # s, home -> P2, and home again where a run goes on
+FRICTION = 15.0
+RADIUS, GEAR = 0.03, 20.0
+
+Change = Callable[[int, Cycle], Cycle]
+
+
+class Course(NamedTuple):
+    """Where the prototype goes, and what its cells read there of a load that is not the planned one."""
+
+    length: Array
+    rate: Array
+    tension: Array
+    read: Array
+    gains: Gains
+
+
+@cache
+def course(more_mass: float = 0.0) -> Course:
+    """Home -> P2 and back, 100 samples a second."""
+    places = [HOME, table2().desired[1], HOME]
+    plan = sl.inverse(ROBOT, sl.quintic_path(places, durations=DURATION))
+    tension = read = plan.state.cables.frame_end_tension
+    if more_mass:
+        heavy = ROBOT.replace(mass=ROBOT.mass + more_mass)
+        wrench = plan.state.wrench * np.array([heavy.mass / ROBOT.mass] * 3 + [1.0] * 3)
+        found = sl.forward(heavy, plan.unstrained_length, plan.state.pose, wrench=wrench)
+        assert found.stable.all()
+        read = found.state.cables.frame_end_tension
+    gains = gains_along(plan)
+    assert gains is not None
+    return Course(plan.unstrained_length, np.gradient(plan.unstrained_length, PERIOD, axis=0), tension, read, gains)
+
+
+def cycles(count: int, seed: int = 0, more_mass: float = 0.0, unsteady: bool = False) -> Iterator[Cycle]:
+    """A good machine: cells with 1 N of noise and up to 2 N of bias, friction, and a link of a cycle's delay.
+
+    Args:
+        count: How many cycles.
+        seed: Of the noise.
+        more_mass: Of the load, which the plan does not know [kg].
+        unsteady: Whether blocks are lost, two cycles in a row at most, and cycles begin up to 4 ms late.
+    """
+    way, rng = course(more_mass), np.random.default_rng(seed)
+    bias = rng.uniform(-2.0, 2.0, 8)
+    commands: list[Command] = []
+    before: Sample | None = None
+    age = np.zeros(4)
+    for k in range(count):
+        at = k % len(way.length)
+        sample = _sample(way, k, at, commands, bias, rng)
+        if unsteady and before is not None:
+            lost = (rng.random(4) < 0.1) & (age < 2 * PERIOD)
+            age = np.where(lost, age + PERIOD, 0.0)
+            sample = _without(sample, before, lost, age)
+        late = float(rng.uniform(0.0, 0.004)) if unsteady else 0.0
+        command = commands[-1] if commands else None
+        row = way.gains.at(at * PERIOD)
+        yield Cycle(sample, before, command, way.tension[at], row, np.zeros(8), late)
+        before = sample
+        following = (k + 1) % len(way.length)
+        pace = way.rate[following]
+        commands.append(_command(k + 1, way.length[following], pace, way.tension[following]))
+
+
+def _command(counter: int, length: Array, rate: Array, tension: Array) -> Command:
+    return Command(counter, OWNER, Mode.FOLLOW, 0.1, length, rate, tension, np.ones(8, dtype=bool))
+
+
+def _sample(
+    way: Course, k: int, at: int, commands: list[Command], bias: Array, rng: np.random.Generator
+) -> Sample:
+    """What a good machine says one cycle after the command that it has taken."""
+    true = way.read[at]
+    rubs = FRICTION * rng.uniform(-1.0, 1.0, 8)
+    tension = true + bias + rng.normal(0.0, 1.0, 8)
+    encoder = way.length[at] + rng.normal(0.0, 1e-5, 8)
+    return Sample(
+        time=k * PERIOD,
+        age=np.full(4, 0.004),
+        counter=np.full(4, k + 1),
+        plc_time=np.full(4, 100.0 + k * PERIOD),
+        owner=np.full(4, OWNER),
+        echo=np.full(4, len(commands)),
+        status=np.full(4, int(GroupStatus.READY | GroupStatus.FOLLOWING)),
+        fault=np.zeros(4, dtype=np.int64),
+        length=encoder,
+        rate=way.rate[at] + rng.normal(0.0, 1e-3, 8),
+        torque=-(true + rubs) * RADIUS / GEAR,
+        tension=tension,
+        filtered=tension,
+        counts=np.zeros(8, dtype=np.int64),
+        state=np.full(8, int(WinchState.ENABLED)),
+        winch_fault=np.zeros(8, dtype=np.int64),
+        discarded=np.zeros(4, dtype=np.int64),
+    )
+
+
+def _without(sample: Sample, before: Sample, lost: Array, age: Array) -> Sample:
+    """The newest blocks of some groups are those of before."""
+    both = np.repeat(lost, 2)
+    old = {
+        name: np.where(both if value.size == 8 else lost, getattr(before, name), value)
+        for name, value in sample._asdict().items()
+        if name not in ("time", "age")
+    }
+    return sample._replace(age=age + 0.004, **old)
+
+
+def with_sample(cycle: Cycle, **fields: object) -> Cycle:
+    """The same cycle with other fields in its sample."""
+    return cycle._replace(sample=cycle.sample._replace(**fields))
+
+
+def one(array: Array, index: int, value: float) -> Array:
+    """A copy with one value changed."""
+    copy = array.copy()
+    copy[index] = value
+    return copy
+
+
+class Told(NamedTuple):
+    """A fault that began."""
+
+    cycle: int
+    name: str
+    line: str
+
+
+def told(change: Change | None, count: int = 300, robot: sl.Robot = ROBOT, **options: object) -> list[Told]:
+    """What a fresh set of rules tells of a run."""
+    rules = faults_of(robot)
+    found, before = [], None
+    for k, good in enumerate(cycles(count, **options)):  # type: ignore[arg-type]
+        cycle = good if change is None else change(k, good)
+        cycle = cycle._replace(before=before)
+        for rule in rules:
+            line = rule.look(cycle)
+            if line is not None:
+                found.append(Told(k, rule.name, line))
+        before = cycle.sample
+    return found
+
+
+__all__ = ["GroupFault", "GroupStatus", "Mode", "WinchState", "course", "cycles", "one", "told", "with_sample"]
