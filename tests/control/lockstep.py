@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from functools import cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.arrays import Array, Flags
 from sagline.article.table2 import table2
 from sagline.article.ten_poses import HOME
 from sagline.control.cycle import Cycle
 from sagline.control.faults import faults_of
 from sagline.control.gains import Gains, gains_along
-from sagline.control.link import PERIOD, Command, GroupFault, GroupStatus, Mode, Sample, WinchState
+from sagline.control.link import PERIOD, Command, GroupStatus, Mode, Sample, WinchState
 from tests.dynamics.machines import prototype
 
 ROBOT = prototype(load_cell_gain=1.0, load_cell_bias=0.0)
@@ -89,9 +89,7 @@ def _command(counter: int, length: Array, rate: Array, tension: Array) -> Comman
     return Command(counter, OWNER, Mode.FOLLOW, 0.1, length, rate, tension, np.ones(8, dtype=bool))
 
 
-def _sample(
-    way: Course, k: int, at: int, commands: list[Command], bias: Array, rng: np.random.Generator
-) -> Sample:
+def _sample(way: Course, k: int, at: int, commands: list[Command], bias: Array, rng: np.random.Generator) -> Sample:
     """What a good machine says one cycle after the command that it has taken."""
     true = way.read[at]
     rubs = FRICTION * rng.uniform(-1.0, 1.0, 8)
@@ -118,7 +116,7 @@ def _sample(
     )
 
 
-def _without(sample: Sample, before: Sample, lost: Array, age: Array) -> Sample:
+def _without(sample: Sample, before: Sample, lost: Flags, age: Array) -> Sample:
     """The newest blocks of some groups are those of before."""
     both = np.repeat(lost, 2)
     old = {
@@ -126,10 +124,10 @@ def _without(sample: Sample, before: Sample, lost: Array, age: Array) -> Sample:
         for name, value in sample._asdict().items()
         if name not in ("time", "age")
     }
-    return sample._replace(age=age + 0.004, **old)
+    return Sample(sample.time, age + 0.004, **old)
 
 
-def with_sample(cycle: Cycle, **fields: object) -> Cycle:
+def with_sample(cycle: Cycle, **fields: Any) -> Cycle:
     """The same cycle with other fields in its sample."""
     return cycle._replace(sample=cycle.sample._replace(**fields))
 
@@ -149,11 +147,11 @@ class Told(NamedTuple):
     line: str
 
 
-def told(change: Change | None, count: int = 300, robot: sl.Robot = ROBOT, **options: object) -> list[Told]:
+def told(change: Change | None, count: int = 300, robot: sl.Robot = ROBOT, **options: Any) -> list[Told]:
     """What a fresh set of rules tells of a run."""
     rules = faults_of(robot)
     found, before = [], None
-    for k, good in enumerate(cycles(count, **options)):  # type: ignore[arg-type]
+    for k, good in enumerate(cycles(count, **options)):
         cycle = good if change is None else change(k, good)
         cycle = cycle._replace(before=before)
         for rule in rules:
@@ -162,6 +160,3 @@ def told(change: Change | None, count: int = 300, robot: sl.Robot = ROBOT, **opt
                 found.append(Told(k, rule.name, line))
         before = cycle.sample
     return found
-
-
-__all__ = ["GroupFault", "GroupStatus", "Mode", "WinchState", "course", "cycles", "one", "told", "with_sample"]

@@ -4,14 +4,17 @@ from sagline.control.cycle import Cycle
 from sagline.control.events import Event, EventKind
 from sagline.control.execution import Execution, ExecutionStatus, Samples
 from sagline.control.fault import Fault, Reaction
+from sagline.control.faults import FAULT_TABLE, FaultRow, faults_of
 from sagline.control.gains import Gains, gains_along
 from sagline.control.link import Command, Link, Missing, Mode, Sample
+from sagline.control.load_cells import parity
 from sagline.control.null_space import NullSpace, null_space
 from sagline.control.recording import Recorded, Recorder
 from sagline.control.states import RefusedError, State
 from sagline.control.tension_loop import TensionLoop, TensionSettings
 
 __all__ = [
+    "FAULT_TABLE",
     "Command",
     "Cycle",
     "Event",
@@ -19,6 +22,7 @@ __all__ = [
     "Execution",
     "ExecutionStatus",
     "Fault",
+    "FaultRow",
     "Gains",
     "Link",
     "Missing",
@@ -33,6 +37,8 @@ __all__ = [
     "State",
     "TensionLoop",
     "TensionSettings",
+    "faults_of",
     "gains_along",
     "null_space",
+    "parity",
 ]
