@@ -30,6 +30,7 @@ class ExecutionStatus(Status):
     FAULT = 3, "a fault stopped it: read the events, mend it, acknowledge"
     EMERGENCY = 4, "the drums are locked: read the events, free the machine by hand, connect and home again"
     UNKNOWN = 5, "the record breaks off before the end; look at the machine"
+    RUNNING = 6, "it is on its way"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,0 +1,214 @@
+"""Where set points come from, one a cycle: standing, along a plan, and slowing down."""
+
+from __future__ import annotations
+
+from math import ceil
+from typing import Final, NamedTuple, Protocol, TypeVar
+
+import numpy as np
+
+from sagline.arrays import Array, Flags
+from sagline.control.checks import Motion
+from sagline.control.link import RAMP
+from sagline.control.null_space import NullSpace, null_space
+from sagline.robot.drum import drum_tension
+from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.pose import Pose
+
+LEAD_SPEED: Final = 0.01  # m/s: so fast at most goes what a plan's first lengths are off those that are held
+WHOLE: Final = 1e-9  # of a row
+
+
+class SetPoint(NamedTuple):
+    """What is asked for at the end of a cycle.
+
+    Attributes:
+        length: Unstrained lengths off the drums, of the model [m], shape (m,).
+        rate: Their rates [m/s], shape (m,).
+        tension: T_A planned there [N], shape (m,); NaN where nothing is known.
+        drum_tension: Expected at the drums [N], shape (m,).
+        wrench: External plus inertial, on the platform [N, N m], shape (6,); None for none.
+        row: What the tension loop needs there; None where there is none.
+        clock: On the plan [s]; NaN beside one.
+        done: Whether the course ends here.
+        enable: Which drives may move, shape (m,); None for all.
+    """
+
+    length: Array
+    rate: Array
+    tension: Array
+    drum_tension: Array
+    wrench: Array | None
+    row: NullSpace | None
+    clock: float
+    done: bool
+    enable: Flags | None = None
+
+
+class Course(Protocol):
+    """Set points, one after the other."""
+
+    def step(self) -> SetPoint:
+        """The next one; beyond the end the last one again, with rates of zero."""
+
+
+class Standing:
+    """Stays where it is."""
+
+    def __init__(self, point: SetPoint, pose: Pose | None = None) -> None:
+        """Stay at a set point.
+
+        Args:
+            point: Where to stay.
+            pose: Of the platform there, where it is known.
+        """
+        self.pose = pose
+        self._point = point._replace(rate=np.zeros(len(point.length)), done=True)
+
+    @classmethod
+    def at(cls, state: Equilibrium) -> Standing:
+        """Stay in an equilibrium, a single one."""
+        robot = state.one_robot
+        redundant = robot.cable_count > robot.degrees_of_freedom
+        length = state.unstrained_length
+        row = null_space(state) if redundant else None
+        return cls(
+            SetPoint(
+                length,
+                np.zeros(len(length)),
+                state.cables.frame_end_tension,
+                drum_tension(state),
+                None,
+                row,
+                np.nan,
+                True,
+            ),
+            state.pose,
+        )
+
+    def step(self) -> SetPoint:
+        """The same."""
+        return self._point
+
+
+class Along:
+    """Along a motion, on a clock of its own that can slow down and go on."""
+
+    def __init__(self, motion: Motion, period: float, lead: Array) -> None:
+        """Begin at its first row, where the platform is.
+
+        Args:
+            motion: What was planned and checked.
+            period: Of a cycle, and between two rows [s].
+            lead: By how much the lengths that are held are off its first ones [m], shape (m,); it fades away.
+        """
+        self.motion = motion
+        self._period, self._last = period, len(motion) - 1
+        self._row = 0.0
+        self._speed = self._wanted = 1.0
+        self._change = period / RAMP
+        self._lead = lead
+        largest = float(np.abs(lead).max())
+        self._lead_cycles = ceil(max(RAMP, 1.5 * largest / LEAD_SPEED) / period) if largest > 0.0 else 0
+        self._cycle = 0
+
+    @property
+    def clock(self) -> float:
+        """On the plan [s]."""
+        return self._row * self._period
+
+    @property
+    def pose(self) -> Pose:
+        """Of the row that is nearest."""
+        return self.motion.state.pose[round(self._row)]
+
+    @property
+    def at_end(self) -> bool:
+        """Whether the end is reached."""
+        return self._row >= self._last and self._cycle >= self._lead_cycles
+
+    def pause(self) -> None:
+        """Slow the clock down, in the time of a ramp."""
+        self._wanted = 0.0
+
+    def resume(self) -> None:
+        """Let it go on, in the time of a ramp."""
+        self._wanted = 1.0
+
+    def step(self) -> SetPoint:
+        """The set point at the end of the next cycle."""
+        before, change = self._speed, self._change
+        if before != self._wanted:
+            self._speed = max(before - change, 0.0) if self._wanted < before else min(before + change, 1.0)
+            if abs(self._speed - self._wanted) < WHOLE:
+                self._speed = self._wanted
+        self._row = row = min(self._row + 0.5 * (before + self._speed), float(self._last))
+        self._cycle += 1
+        motion, k = self.motion, int(row)
+        share = row - k
+        if share < WHOLE:
+            length, rate = motion.length[k], motion.rate[k]
+            tension, drum = motion.tension[k], motion.drum_tension[k]
+            if self._speed != 1.0:
+                rate = self._speed * rate
+        else:
+            length, rate, tension, drum = self._between(k, share)
+        if self._cycle < self._lead_cycles:
+            length, rate = self._led(length, rate)
+        done = self.at_end or (self._wanted == 0.0 and self._speed == 0.0)
+        clock = row * self._period
+        gains = motion.gains
+        at = None if gains is None else gains.at(clock)
+        return SetPoint(length, rate, tension, drum, motion.wrench[k], at, clock, done)
+
+    def _between(self, k: int, u: float) -> tuple[Array, Array, Array, Array]:
+        """Between two rows: cubic in the lengths, as their rates are known; linear in tensions."""
+        motion, h = self.motion, self._period
+        step = motion.length[k + 1] - motion.length[k]
+        begin, end = h * motion.rate[k] - step, h * motion.rate[k + 1] - step
+        length = motion.length[k] + u * step + u * (1.0 - u) * ((1.0 - u) * begin - u * end)
+        slope = step + (1.0 - u) * (1.0 - 3.0 * u) * begin + u * (3.0 * u - 2.0) * end
+        tension = (1.0 - u) * motion.tension[k] + u * motion.tension[k + 1]
+        drum = (1.0 - u) * motion.drum_tension[k] + u * motion.drum_tension[k + 1]
+        return length, (self._speed / h) * slope, tension, drum
+
+    def _led(self, length: Array, rate: Array) -> tuple[Array, Array]:
+        """With what is left of the lead."""
+        done = self._cycle / self._lead_cycles
+        left, fall = 1.0 - smooth(done), smooth_slope(done) / (self._lead_cycles * self._period)
+        return length + left * self._lead, rate - fall * self._lead
+
+
+class Ramp:
+    """All rates to zero in the same time, so that the direction is kept: l' = l'_0 (1 - t/t_s)."""
+
+    def __init__(self, point: SetPoint, period: float) -> None:
+        """Begin where set points are.
+
+        Args:
+            point: The last set point that was sent.
+            period: Of a cycle [s].
+        """
+        self._begin = point
+        self._share, self._cycle = period / RAMP, 0
+
+    def step(self) -> SetPoint:
+        """The set point at the end of the next cycle."""
+        self._cycle += 1
+        u = min(self._cycle * self._share, 1.0)
+        begin = self._begin
+        length = begin.length + (RAMP * (u - 0.5 * u * u)) * begin.rate
+        return begin._replace(length=length, rate=(1.0 - u) * begin.rate, done=u > 1.0 - WHOLE)
+
+
+_Real = TypeVar("_Real", float, Array)
+
+
+def smooth(share: _Real) -> _Real:
+    """From 0 to 1 with slopes of zero at both ends, 1.5 at most."""
+    return share * share * (3.0 - 2.0 * share)
+
+
+def smooth_slope(share: _Real) -> _Real:
+    """The slope of `smooth`."""
+    return 6.0 * share * (1.0 - share)

@@ -1,0 +1,150 @@
+"""Homing: the operator names the pose in which the platform is held, and jogs until the tensions say so too."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from sagline.arrays import Array
+from sagline.cables.model import CableModel
+from sagline.control.courses import SetPoint
+from sagline.control.jogging import winch_lengths
+from sagline.control.link import Sample
+from sagline.control.states import RefusedError
+from sagline.kinematics.inverse import inverse
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.statics.stiffness import stiffness
+from sagline.tension.method import TensionMethod
+
+WINDOW: Final = 50  # samples whose mean is judged, all of them taken at rest
+MOST: Final = 1.2  # times the plan's tension: more ends a jog
+SIGMAS: Final = 5.0
+OWN_DEVIATION: Final = 1.0  # N, of a cell that does not say
+BIAS: Final = 2.0  # N, 0.1 % of a cell of 2 kN
+
+
+class Homing:
+    """One pose at which lengths are set to those of the plan.
+
+    Attributes:
+        plan: The robot at that pose.
+        state: The same as an equilibrium.
+        tension: T_A there [N], shape (m,).
+        sigma: Of the load cells [N], shape (m,).
+        off: By how much the mean of the tensions was above these when looked at last [N], shape (m,).
+        zero: What is to be added to the lengths that were read [m], shape (m,).
+        agrees: Whether every tension was within 5 sigma.
+    """
+
+    def __init__(self, robot: Robot, pose: Pose, model: CableModel, method: TensionMethod) -> None:
+        """Plan the pose.
+
+        Args:
+            robot: The robot.
+            pose: Where the platform is held, a single pose.
+            model: Of the cables.
+            method: How the load is shared.
+
+        Raises:
+            RefusedError: If the pose has no tensions within the limits.
+        """
+        self.plan = inverse(robot, pose, model, method)
+        if not self.plan.feasible:
+            gap = self.plan.gaps[0]
+            step = "Name another pose: every cable must pull there."
+            raise RefusedError("homing", f"the pose has no tensions within the limits, {gap.status.name}", step)
+        self.state = self.plan.state
+        self.tension = self.state.cables.frame_end_tension
+        self.sigma = cell_sigma(robot)
+        self._pose, self._robot = pose, robot
+        m = robot.cable_count
+        self._lengths, self._tensions = np.zeros(m), np.zeros(m)
+        self._count = 0
+        self.off, self.zero, self.agrees = np.full(m, np.nan), np.zeros(m), False
+
+    def rest(self) -> None:
+        """Begin anew to look: something moved."""
+        self._count = 0
+        self._lengths[:] = self._tensions[:] = 0.0
+
+    def look(self, sample: Sample) -> bool:
+        """Take a sample at rest.
+
+        Args:
+            sample: What the machine said.
+
+        Returns:
+            Whether enough of them are there, and agree with the plan.
+        """
+        self._count += 1
+        self._lengths += sample.length
+        self._tensions += sample.tension
+        if self._count < WINDOW:
+            return False
+        self.off = self._tensions / WINDOW - self.tension
+        self.zero = self.state.unstrained_length - self._lengths / WINDOW
+        self.agrees = bool((np.abs(self.off) <= SIGMAS * self.sigma).all())
+        self.rest()
+        return self.agrees
+
+    def refusal(self) -> RefusedError:
+        """Which tensions are off, and which jog brings them nearer."""
+        off, beyond = self.off, np.abs(self.off) - SIGMAS * self.sigma
+        named = ", ".join(f"{i} by {off[i]:+.1f} N" for i in np.argsort(-beyond)[:3] if beyond[i] > 0.0)
+        allowed = f"{SIGMAS * float(self.sigma.max()):.3g} N"
+        winch, by = self._jog(off)
+        step = f"jog {winch} {1e3 * by:+.1f}mm, one winch at a time, or place the platform; then home again."
+        return RefusedError(
+            "homing", f"tensions are off the plan, of cables {named}; allowed: {allowed}", f"Try {step}"
+        )
+
+    def _jog(self, off: Array) -> tuple[int, float]:
+        """The jog of one winch that takes most of the error away, and by how much."""
+        slope = stiffness(self.state).tension_sensitivity
+        by = -(slope.T @ off) / (slope**2).sum(axis=0)
+        left = np.linalg.norm(off[:, None] + slope * by, axis=0)
+        winch = int(np.argmin(left))
+        return winch, float(np.clip(by[winch], -0.01, 0.01))
+
+
+class HomingJog:
+    """One winch jogged while the platform's place is not known: its tensions alone are watched."""
+
+    def __init__(self, point: SetPoint, winch: int, by: float, period: float) -> None:
+        """Begin where the winches stand.
+
+        Args:
+            point: Where they stand.
+            winch: Which is jogged; the others have no power.
+            by: How far [m].
+            period: Of a cycle [s].
+        """
+        self._lengths, self._rates = winch_lengths(point.length, winch, by, period)
+        self._row, self._point = 0, point
+        self._enable = np.zeros(len(point.length), dtype=np.bool_)
+        self._enable[winch] = True
+
+    def step(self) -> SetPoint:
+        """The set point at the end of the next cycle."""
+        last = len(self._lengths) - 1
+        self._row = min(self._row + 1, last)
+        return self._point._replace(
+            length=self._lengths[self._row],
+            rate=self._rates[self._row],
+            done=self._row == last,
+            enable=self._enable,
+        )
+
+
+def cell_sigma(robot: Robot) -> Array:
+    """Standard deviation of what the load cells read, bias included [N], shape (m,)."""
+    winches = robot.winches
+    own = np.full(robot.cable_count, OWN_DEVIATION) if winches is None else winches.load_cell_deviation
+    return np.hypot(np.where(own > 0.0, own, OWN_DEVIATION), BIAS)
+
+
+def tension_limits(homing: Homing, sample: Sample) -> Array:
+    """What a jog may bring the tensions to [N], shape (m,): 1.2 of the plan; those that are above already, no more."""
+    return np.maximum(MOST * homing.tension, sample.tension + 3.0 * homing.sigma)

@@ -1,0 +1,211 @@
+"""Jogging: one winch, or the platform along a straight line, as the operator asks."""
+
+from __future__ import annotations
+
+from math import ceil
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sagline.arguments import whole_number
+from sagline.arrays import Array, checked, number
+from sagline.cables.model import CableModel
+from sagline.control.checks import Motion
+from sagline.control.courses import SetPoint, smooth, smooth_slope
+from sagline.control.states import RefusedError
+from sagline.errors import InvalidValueError
+from sagline.kinematics.forward import forward
+from sagline.kinematics.forward_status import ForwardStatus
+from sagline.kinematics.inverse_solver import InverseSolver
+from sagline.kinematics.status import PoseStatus
+from sagline.robot.drum import drum_tension
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.tension.method import TensionMethod
+
+WINCH_SPEED: Final = 0.01  # m/s, of a winch that is jogged
+PLATFORM_SPEED: Final = 0.02  # m/s
+PLATFORM_TURNING: Final = 0.05  # rad/s
+SHORTEST: Final = 0.4  # s, of a jog
+MOST_WINCH: Final = 0.1  # m at a time
+MOST_PLATFORM: Final = 0.2  # m, rad at a time
+
+
+def checked_winch(robot: Robot, winch: int, by: float) -> tuple[int, float]:
+    """A winch, and by how much it is jogged [m], positive where it lets cable out.
+
+    Raises:
+        InvalidValueError: If there is no such winch, or it is too far for a jog.
+    """
+    chosen = whole_number(winch, "winch", 0, robot.cable_count - 1)
+    return chosen, _at_most(number(by, "by", "m"), "m", MOST_WINCH)
+
+
+def winch_lengths(length: Array, winch: int, by: float, period: float) -> tuple[Array, Array]:
+    """Lengths and rates of a jog of one winch, one row a cycle, from where it stands.
+
+    Args:
+        length: Before it [m], shape (m,).
+        winch: Which.
+        by: How far [m].
+        period: Of a cycle [s].
+
+    Returns:
+        Both of shape (N, m); the first row is where it stands.
+    """
+    count = ceil(max(SHORTEST, 1.5 * abs(by) / WINCH_SPEED) / period)
+    share = np.arange(count + 1) / count
+    lengths, rates = np.repeat(length[None], count + 1, axis=0), np.zeros((count + 1, len(length)))
+    lengths[:, winch] += by * smooth(share)
+    rates[:, winch] = by * smooth_slope(share) / (count * period)
+    return lengths, rates
+
+
+def winch_jog(
+    robot: Robot, length: Array, here: Pose, winch: int, by: float, period: float, model: CableModel
+) -> Motion:
+    """One winch jogged from an equilibrium, where the platform goes along: planned and checked.
+
+    Args:
+        robot: The robot.
+        length: Unstrained lengths off the drums there [m], shape (m,).
+        here: Where the platform is.
+        winch: Which winch.
+        by: How far [m], positive where it lets cable out.
+        period: Of a cycle [s].
+        model: Of the cables.
+
+    Raises:
+        RefusedError: If the platform would have no stable place on the way, or a tension leaves its limits.
+    """
+    lengths, rates = winch_lengths(length, winch, by, period)
+    found = forward(robot, lengths, here, model)
+    what, step = f"a jog of winch {winch} by {1e3 * by:+g} mm", "Jog it by less, or another one."
+    if not found.solved.all():
+        k = int(np.argmin(found.solved))
+        raise RefusedError(what, f"{1e3 * abs(lengths[k, winch] - lengths[0, winch]):.2g} mm on its way the platform "
+                           f"has no place: {ForwardStatus(found.status[k]).name}", step)  # fmt: skip
+    tension = found.state.limited_tension
+    for name, limit, wrong in (
+        ("tension_min", robot.tension_min, tension < robot.tension_min),
+        ("tension_max", robot.tension_max, tension > robot.tension_max),
+    ):
+        leaves = wrong & ~wrong[0]  # what is beyond it already may be jogged back
+        if leaves.any():
+            k, i = (int(index) for index in np.argwhere(leaves)[0])
+            reason = f"cable {i} would have {tension[k, i]:.3g} N; allowed: its {name}, {limit[i]:.3g} N"
+            raise RefusedError(what, reason, step)
+    return Motion(
+        plan=None,
+        state=found.state,
+        length=lengths,
+        rate=rates,
+        tension=found.state.cables.frame_end_tension,
+        drum_tension=drum_tension(found.state),
+        wrench=np.zeros((len(lengths), 6)),
+        gains=None,
+    )
+
+
+class PlatformJog:
+    """The platform jogged along a straight line, each pose solved when it is due."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        begin: SetPoint,
+        pose: Pose,
+        by: Array,
+        period: float,
+        model: CableModel,
+        method: TensionMethod,
+    ) -> None:
+        """Prepare the solver.
+
+        Args:
+            robot: The robot.
+            begin: The set point that is held.
+            pose: Where the platform is.
+            by: Displacement [m] and rotation vector [rad], world axes, shape (6,).
+            period: Of a cycle [s].
+            model: Of the cables.
+            method: How the load is shared.
+
+        Raises:
+            RefusedError: If the pose at the end, or the first one, has no tensions within the limits.
+        """
+        self._robot, self._pose, self._by, self._period = robot, pose, by, period
+        self._solver = InverseSolver(robot, model, method)
+        move, turn = float(np.linalg.norm(by[:3])), float(np.linalg.norm(by[3:]))
+        lasting = max(SHORTEST, 1.5 * move / PLATFORM_SPEED, 1.5 * turn / PLATFORM_TURNING)
+        self._count, self._cycle = ceil(lasting / period), 0
+        self._weight = robot.cables.linear_density * robot.gravity
+        self._point = begin
+        self.failed, self.stops_hard = "", False
+        end = self._solver.step(*self._at(1.0))
+        if end.status is not PoseStatus.SOLVED:
+            reason = f"where it ends the status is {end.status.name}"
+            raise RefusedError("the jog", reason, "Jog by less, or elsewhere.")
+        self._solver.reset()
+        first = self._solver.step(*self._at(0.0))
+        self._lead = begin.length - first.unstrained_length
+
+    def step(self) -> SetPoint:
+        """The set point at the end of the next cycle; where the pose has no answer the last one, and `failed` why."""
+        self._cycle = min(self._cycle + 1, self._count)
+        share = self._cycle / self._count
+        found = self._solver.step(*self._at(smooth(share)))
+        if found.status is not PoseStatus.SOLVED:
+            self.failed = f"the jog ended {1e2 * share:.0f} % on its way: the pose there is {found.status.name}"
+            self._point, self.stops_hard = self._point._replace(done=True), bool(self._point.rate.any())
+            return self._point
+        length = found.unstrained_length + (1.0 - smooth(share)) * self._lead
+        rate = (length - self._point.length) / self._period
+        hanging = found.vertical_force - self._weight * found.unstrained_length  # pulleys and dead cable left out
+        tension = np.hypot(found.horizontal_tension, hanging)
+        done = self._cycle == self._count
+        self._point = self._point._replace(
+            length=length, rate=np.zeros(len(rate)) if done else rate, tension=tension, drum_tension=tension, done=done
+        )
+        return self._point
+
+    def _at(self, share: float) -> tuple[Array, Array]:
+        """Position and quaternion when so much of the way is done."""
+        by = share * self._by
+        half = 0.5 * float(np.linalg.norm(by[3:]))
+        x, y, z = 0.5 * np.sinc(half / np.pi) * by[3:]
+        w = np.cos(half)
+        a, b, c, d = self._pose.quaternion
+        turned = np.array(
+            [
+                w * a + x * d + y * c - z * b,
+                w * b - x * c + y * d + z * a,
+                w * c + x * b - y * a + z * d,
+                w * d - x * a - y * b - z * c,
+            ]
+        )
+        return self._pose.position + by[:3], turned / np.linalg.norm(turned)
+
+
+def checked_displacement(by: ArrayLike) -> Array:
+    """A displacement of the platform, with or without a rotation, as shape (6,).
+
+    Raises:
+        InvalidValueError: If it is neither of shape (3,) nor (6,), or too far for a jog.
+    """
+    given = checked(by, "by", "m or rad")
+    if given.shape not in ((3,), (6,)):
+        step = "Give a displacement, or that and a rotation vector."
+        raise InvalidValueError("by", f"of shape {given.shape}", "shape (3,) or (6,)", step)
+    whole = np.zeros(6)
+    whole[: given.size] = given
+    for part, unit in ((whole[:3], "m"), (whole[3:], "rad")):
+        _at_most(float(np.linalg.norm(part)), unit, MOST_PLATFORM)
+    return whole
+
+
+def _at_most(by: float, unit: str, most: float) -> float:
+    if abs(by) <= most:
+        return by
+    raise InvalidValueError("by", f"{by:g} {unit}", f"up to {most:g} {unit} at a time", "Jog in parts, or go there.")

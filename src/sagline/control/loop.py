@@ -1,0 +1,465 @@
+"""The loop of the controller: what a cycle sends, and what follows from what comes back."""
+
+from __future__ import annotations
+
+from math import nan
+from typing import Final
+
+import numpy as np
+
+from sagline.arguments import instance, optional
+from sagline.arrays import Array, Flags
+from sagline.cables.catenary import Catenary
+from sagline.cables.model import CableModel
+from sagline.control.checks import Motion
+from sagline.control.connecting import COUNTERS, Claim
+from sagline.control.courses import Along, Course, Ramp, SetPoint, Standing
+from sagline.control.cycle import Cycle
+from sagline.control.events import Event, EventKind
+from sagline.control.execution import Execution, ExecutionStatus, execution_of
+from sagline.control.fault import Fault, Reaction
+from sagline.control.faults import faults_of
+from sagline.control.guard import Garbage
+from sagline.control.homing import Homing
+from sagline.control.jogging import PlatformJog
+from sagline.control.link import HEARTBEAT, PERIOD, Command, Link, Missing, Mode, Sample
+from sagline.control.pace import Pace
+from sagline.control.recording import Recorded, Recorder, Tape
+from sagline.control.states import MOTION, State, check_transition
+from sagline.control.tension_loop import TensionLoop, TensionSettings
+from sagline.dynamics.drives import lever_of
+from sagline.errors import InvalidValueError
+from sagline.kinematics.forward import forward
+from sagline.kinematics.forward_solver import ForwardSolver
+from sagline.kinematics.forward_status import STABLE, ForwardStatus
+from sagline.kinematics.plan import Plan
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.tension.closest import Closest
+from sagline.tension.method import TensionMethod
+
+VALID_FOR: Final = HEARTBEAT  # s: so long a PLC may go on with a command
+LEAVING: Final = 0.3  # s, at most, until all grants are given back
+MOST_OWNER: Final = 2**31
+ROOM: Final = 500  # cycles beside the plan's: ramps, pauses
+FOLLOWING: Final = frozenset({State.IDLE, State.MOVING, State.JOGGING, State.PAUSING, State.STOPPING})
+LOOP_ON: Final = frozenset({State.IDLE, State.MOVING, State.PAUSING})
+UNWATCHED: Final = frozenset({State.OFF, State.CONNECTING})
+STOPPED: Final = frozenset({State.STOPPING, State.FAULT, State.EMERGENCY})
+
+
+class Loop:
+    """One cycle after the other; `Controller` is what an operator has of it."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        link: Link,
+        pace: Pace | None,
+        model: CableModel | None,
+        method: TensionMethod | None,
+        settings: TensionSettings | None,
+        record: Recorder | None,
+        shadow: bool,
+        seed: int | None,
+    ) -> None:
+        """Prepare everything; the arguments are those of `Controller`."""
+        self.robot = instance(robot, Robot, "robot")
+        m = robot.cable_count
+        lever_of(robot, np.ones(m))  # what is missing is told now
+        if sorted(winch for group in link.groups for winch in group) != list(range(m)):
+            count = sum(map(len, link.groups))
+            raise InvalidValueError("link", f"of {count} winches", f"{m}, as {robot.name} has", "Check its addresses.")
+        self._link, self._pace = link, optional(pace, Pace, "pace")
+        self.period = PERIOD if pace is None else pace.period
+        self._model = optional(model, CableModel, "model") or Catenary()
+        self._method = optional(method, TensionMethod, "tension") or Closest()
+        self._settings = optional(settings, TensionSettings, "loop") or TensionSettings()
+        self._record, self._shadow = record, shadow
+        self._random = np.random.default_rng(seed)
+        self.owner = int(self._random.integers(1, MOST_OWNER))
+        self._counter = int(self._random.integers(1, MOST_OWNER))
+        self._solver = ForwardSolver(robot, self._model)
+        self._garbage = Garbage()
+        self.state = State.OFF
+        self.sample: Sample | None = None
+        self.zero, self.homed = np.zeros(m), False
+        self._unknown, self._enabled = np.full(m, nan), np.ones(m, dtype=np.bool_)
+        self._disabled = ~self._enabled
+        self._number, self._time = 0, 0.0
+        self._events: list[Event] = []
+        self._begin_without_motion(m)
+        self._clear_faults()
+        self._new_loop()
+
+    def _begin_without_motion(self, m: int) -> None:
+        """What there is before anything is sent."""
+        self._claim: Claim | None = None
+        self._homing: Homing | None = None
+        self._most_tension: Array | None = None  # while a winch is jogged in homing
+        self._course: Course | None = None
+        self._paused: Along | None = None
+        self._motion: Motion | None = None
+        self._held: Plan | None = None  # what the next plan goes on from
+        self._tape: Tape | None = None
+        self._taping, self._told, self._told_of_plan = False, 0, False
+        self._status, self._reason = ExecutionStatus.RUNNING, ""
+        self._after, self._stop_asked, self._leaving = State.IDLE, False, 0
+        self._command: Command | None = None
+        self._point: SetPoint | None = None  # of that command, where it has one
+        self._hold = self._unknown, np.zeros(m)  # lengths as read, and tensions at the drums, where nothing is followed
+        self._place, self._turn, self._estimate = np.full(3, nan), np.full(4, nan), -1
+
+    @property
+    def degraded(self) -> bool:
+        """Whether tensions are not to be believed: the tension loop keeps what it has added, and learns nothing."""
+        return any(fault.present for fault in self._degrading)
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """What happened so far."""
+        return tuple(self._events)
+
+    @property
+    def execution(self) -> Execution | None:
+        """What became of the last motion, or has so far; None before the first."""
+        if self._tape is None:
+            return None
+        plan, events = None if self._motion is None else self._motion.plan, tuple(self._events[self._told :])
+        how = (self._status, self._reason, self.period, self.zero, events)
+        return execution_of(self._tape, self.robot, plan, *how)
+
+    def cycle(self) -> None:
+        """Do one cycle: send and take, estimate, look for faults, and prepare what goes out next."""
+        late = 0.0 if self._pace is None else self._pace.wait()
+        command, point, correction = self._command, self._point, self._correction
+        answer = self._link.exchange(command)
+        self._time = answer.time
+        if isinstance(answer, Sample):
+            before, self.sample = self.sample, answer
+            planned = self._unknown if point is None else point.tension
+            if self.homed or self._shadow:
+                self._locate(answer, None if point is None else point.wrench)
+            elif self._estimate >= 0:
+                self._place, self._turn, self._estimate = np.full(3, nan), np.full(4, nan), -1
+            if self._shadow or self.state not in UNWATCHED:
+                row = None if point is None else point.row
+                self._look(Cycle(answer, before, command, planned, row, correction, late, self._recording))
+        if self._stop_asked:
+            self._stop_now()
+        self._prepare(answer)
+        if self._taping or self._record is not None:
+            self._keep(command, answer, point, correction, late)
+        self._number += 1
+
+    @property
+    def _recording(self) -> str:
+        return "" if self._record is None else self._record.stopped
+
+    def _keep(
+        self,
+        command: Command | None,
+        answer: Sample | Missing,
+        point: SetPoint | None,
+        correction: Array,
+        late: float,
+    ) -> None:
+        """Hand the cycle to those who keep it."""
+        clock, planned = (nan, self._unknown) if point is None else (point.clock, point.tension)
+        cycle = Recorded(
+            self._number, self.state, self.degraded, late, clock, command, answer, self._place, self._turn,
+            self._estimate, self.zero, planned, correction,
+        )  # fmt: skip
+        if self._taping and self._tape is not None:
+            self._tape.add(cycle)
+            self._taping = self.state in MOTION
+        if self._record is not None:
+            self._record.cycle(cycle)
+            if self._told_of_plan and not self._taping and self._paused is None:
+                self._tell_end()
+
+    def _tell_end(self) -> None:
+        """Tell the one who looks on how the plan ended."""
+        self._told_of_plan = False
+        if self._record is not None:
+            self._record.ends(self._status, self._reason)
+
+    # what comes back
+
+    def _locate(self, sample: Sample, wrench: Array | None) -> None:
+        """Where the platform is by the encoders; what the tension loop added is taken for an error of theirs."""
+        length = sample.length + self.zero
+        length -= self._correction
+        place, turn = np.empty(3), np.empty(4)
+        status = self._solver.step_into(length, place, turn, wrench)
+        if status not in STABLE and self._estimate in STABLE:
+            self._say(EventKind.NOTE, "estimate", f"the platform's place is lost: {status.text}")
+        self._place, self._turn, self._estimate = place, turn, int(status)
+
+    def _look(self, cycle: Cycle) -> None:
+        """Let every rule look at the cycle, and do what follows."""
+        reaction, first, homing = Reaction.EVENT, "", False
+        for fault in self._faults:
+            line = fault.look(cycle)
+            if line is None:
+                continue
+            self._say(EventKind.FAULT, fault.name, line)
+            homing |= fault.homing
+            if fault.reaction > reaction:
+                reaction, first = fault.reaction, line
+        if first:
+            self._react(reaction, first)
+        if homing:
+            self.homed = False
+
+    def _react(self, reaction: Reaction, line: str) -> None:
+        """Do what a fault asks for."""
+        if self._shadow or reaction <= Reaction.DEGRADED:
+            return
+        if reaction is Reaction.OFF:
+            self._leave(line)
+        elif reaction is Reaction.EMERGENCY:
+            if self.state is not State.EMERGENCY:
+                self._end(ExecutionStatus.EMERGENCY, line)
+                self.homed = False
+                self._enter(State.EMERGENCY, line)
+        elif self.state is State.STOPPING:
+            self._after, self._status, self._reason = State.FAULT, ExecutionStatus.FAULT, line
+        elif self.state not in STOPPED:
+            self._begin_stop(State.FAULT, ExecutionStatus.FAULT, line)
+
+    def _stop_now(self) -> None:
+        """The operator asked for it."""
+        self._stop_asked = False
+        if self.state is State.CONNECTING:
+            self._leave("the operator stopped")
+        elif self.state in MOTION and self.state is not State.STOPPING:
+            after = State.READY if self.state is State.HOMING else State.IDLE
+            self._begin_stop(after, ExecutionStatus.STOPPED, "the operator stopped")
+
+    def _begin_stop(self, after: State, status: ExecutionStatus, reason: str) -> None:
+        """Lead the rates to zero from the set points that were sent last."""
+        self._after, self._status, self._reason, self._paused = after, status, reason, None
+        if self._point is not None:
+            self._point = self._point._replace(done=False)
+            self._course = Ramp(self._point, self.period)
+        self._enter(State.STOPPING, reason)
+
+    # what goes out
+
+    def _prepare(self, answer: Sample | Missing) -> None:
+        """The command of the next cycle."""
+        state = self.state
+        if state in FOLLOWING:
+            if state in MOTION and (self._point is None or self._point.done):
+                self._finish()
+            if self.state in FOLLOWING:
+                self._follow()
+                return
+        state, sample = self.state, self.sample
+        if state is State.CONNECTING and self._claim is not None:
+            self._connect(self._claim, answer)
+        elif state is State.HOMING and self._homing is not None and sample is not None:
+            self._go_on_homing(self._homing, sample)
+        elif state is State.OFF:
+            self._send_leave(sample)
+        elif state is State.EMERGENCY:
+            self._send_hold(Mode.LOCK, self._disabled)
+        else:
+            self._send_hold(Mode.HOLD, self._enabled)
+
+    def _follow(self) -> None:
+        """The next set point of the course, with what the tension loop adds."""
+        assert self._course is not None
+        due, point = self._point, self._course.step()
+        row, sample = point.row, self.sample
+        if self._loop is not None and row is not None and sample is not None and self.state in LOOP_ON:
+            planned = point.tension if due is None else due.tension
+            self._correction = self._loop.step(sample.tension, planned, row, frozen=self.degraded)
+        length = point.length + self._correction
+        length -= self.zero
+        self._point = point
+        enable = self._enabled if point.enable is None else point.enable
+        self._send(Mode.FOLLOW, length, point.rate, point.drum_tension, enable)
+
+    def _send(self, mode: Mode, length: Array, rate: Array, tension: Array, enable: Flags) -> None:
+        self._counter = self._counter % COUNTERS + 1
+        self._command = Command(self._counter, self.owner, mode, VALID_FOR, length, rate, tension, enable)
+
+    def _send_hold(self, mode: Mode, enable: Flags) -> None:
+        length, tension = self._hold
+        self._point = None
+        self._send(mode, length, np.zeros(len(length)), tension, enable)
+
+    def _send_leave(self, sample: Sample | None) -> None:
+        """Give the grants back, until they are."""
+        self._leaving = max(self._leaving - 1, 0)
+        if self._leaving and (sample is None or bool((sample.owner == self.owner).any())):
+            self._send_hold(Mode.LEAVE, self._disabled)
+        else:
+            self._command = self._point = None
+
+    def _connect(self, claim: Claim, answer: Sample | Missing) -> None:
+        """Claim the groups, or give it up."""
+        claim.look(answer, self._counter)
+        if self.sample is not None:
+            self._hold = self.sample.length, self.sample.filtered
+        if claim.ready:
+            self._clear_faults()
+            self._enter(State.READY, "all groups agree")
+            self._send_hold(Mode.HOLD, self._enabled)
+        elif claim.refused:
+            self._leave(claim.refused)
+            self._send_leave(self.sample)
+        elif claim.mode is None:
+            self._command = None
+        else:
+            self._send_hold(claim.mode, self._disabled)
+
+    def _go_on_homing(self, homing: Homing, sample: Sample) -> None:
+        """Jog, or look whether the tensions agree."""
+        if self._course is not None:
+            if self._most_tension is not None and (wrong := sample.tension > self._most_tension).any():
+                i = int(np.argmax(wrong))
+                line = f"the jog ended: cable {i} has {sample.tension[i]:.1f} N; allowed: {self._most_tension[i]:.1f} N"
+                self._say(EventKind.NOTE, "jog", line)
+                self._end_jog(homing, sample)
+            elif self._point is not None and self._point.done:
+                self._end_jog(homing, sample)
+            else:
+                self._follow()
+                return
+        elif homing.look(sample):
+            self._accept(homing)
+            self._follow()
+            return
+        self._send_hold(Mode.HOLD, self._enabled)
+
+    def _end_jog(self, homing: Homing, sample: Sample) -> None:
+        self._course = None
+        self._hold = sample.length, sample.filtered
+        homing.rest()
+
+    def _accept(self, homing: Homing) -> None:
+        """Lengths are those of the plan from here on."""
+        self.zero, self.homed = homing.zero, True
+        pose = homing.state.pose
+        self._solver.reset(pose)
+        self._place, self._turn, self._estimate = pose.position, pose.quaternion, int(ForwardStatus.SOLVED)
+        self._course = Standing.at(homing.state)
+        self._held, self._homing = homing.plan, None
+        largest = 1e3 * float(np.abs(self.zero).max())
+        self._enter(State.IDLE, f"the tensions agree; lengths set to the plan's, by up to {largest:.2f} mm")
+
+    def _stand_at(self, length: Array) -> bool:
+        """Stay at lengths, wherever the platform is with them; whether that is known."""
+        start = Pose.from_quaternion(self._place, self._turn) if self._estimate in STABLE else None
+        found = forward(self.robot, length, start, self._model)
+        self._held = None
+        if found.status in STABLE:
+            self._course = Standing.at(found.state)
+            return True
+        self._say(EventKind.NOTE, "estimate", f"no place for these lengths: {ForwardStatus(int(found.status)).text}")
+        return False
+
+    def _finish(self) -> None:
+        """The last set point of a course was sent."""
+        point, course = self._point, self._course
+        if self.state is State.STOPPING:
+            self._stopped(point)
+        elif isinstance(course, PlatformJog) and course.failed and course.stops_hard:
+            self._begin_stop(State.IDLE, ExecutionStatus.STOPPED, course.failed)
+        elif isinstance(course, Along) and course.motion.plan is not None and point is not None:
+            self._end(*(_DONE if course.at_end else _PAUSED))
+            if course.at_end:
+                self._held = course.motion.plan
+            else:
+                self._paused = course
+            self._course = Standing(point, course.pose)
+            self._enter(State.IDLE, self._reason)
+        elif point is not None:
+            self._end(ExecutionStatus.DONE, "the jog ended")
+            self._idle_or_fault(point.length)
+
+    def _stopped(self, point: SetPoint | None) -> None:
+        """The ramp ended."""
+        self._end(self._status, self._reason)
+        if self._after is State.IDLE and point is not None:
+            self._idle_or_fault(point.length)
+            return
+        if self.sample is not None:
+            self._hold = self.sample.length, self.sample.filtered if point is None else point.drum_tension
+        self._course = None
+        self._enter(self._after, self._reason)
+
+    def _idle_or_fault(self, length: Array) -> None:
+        """Be idle at lengths, if it is known where the platform is with them."""
+        if self._stand_at(length):
+            self._enter(State.IDLE, self._reason)
+        else:
+            self.homed = False
+            self._begin_stop(State.FAULT, ExecutionStatus.FAULT, "it is not known where the platform is; home again")
+
+    # what the operator's methods use too
+
+    def _begin(self, state: State, course: Course, motion: Motion | None, text: str) -> None:
+        """Begin to follow a course."""
+        assert self._point is not None
+        self._course, self._motion, self._paused = course, motion, None
+        self._tape = Tape(self.robot.cable_count, len(self._link.groups), ROOM + (0 if motion is None else len(motion)))
+        self._told = len(self._events)
+        if self._told_of_plan:
+            self._tell_end()  # of one that was paused
+        if self._record is not None and motion is not None and motion.plan is not None:
+            self._told_of_plan = True
+            self._record.begins(motion.plan)
+        self._go(state, text)
+
+    def _go(self, state: State, text: str) -> None:
+        """Set off, or go on."""
+        assert self._point is not None
+        self._point = self._point._replace(done=False)
+        self._taping, self._status, self._reason = True, ExecutionStatus.RUNNING, ExecutionStatus.RUNNING.text
+        self._garbage.stop()
+        self._enter(state, text)
+
+    def _end(self, status: ExecutionStatus, reason: str) -> None:
+        """Nothing moves any more."""
+        self._status, self._reason = status, reason
+        self._garbage.go_on()
+
+    def _leave(self, reason: str) -> None:
+        """Give the grants back."""
+        self._end(ExecutionStatus.STOPPED, reason)
+        self._course, self._paused, self._homing, self._claim = None, None, None, None
+        self.homed, self._leaving = False, round(LEAVING / self.period)
+        if self.sample is not None:
+            self._hold = self.sample.length, self.sample.filtered
+        self._enter(State.OFF, reason)
+
+    def _enter(self, state: State, text: str) -> None:
+        """Change the state, as the table allows."""
+        check_transition(self.state, state, state.name)
+        self.state = state
+        self._say(EventKind.STATE, state.name, text)
+
+    def _say(self, kind: EventKind, name: str, text: str) -> None:
+        event = Event(self._time, self._number, kind, name, self.state, text)
+        self._events.append(event)
+        if self._record is not None:
+            self._record.event(event)
+
+    def _clear_faults(self) -> None:
+        """Rules that remember nothing."""
+        self._faults: tuple[Fault, ...] = faults_of(self.robot, self.period, groups=self._link.groups)
+        self._degrading = tuple(fault for fault in self._faults if fault.reaction is Reaction.DEGRADED)
+
+    def _new_loop(self) -> None:
+        """A tension loop that has added nothing; none for a robot without redundancy."""
+        m, n = self.robot.cable_count, self.robot.degrees_of_freedom
+        self._loop = TensionLoop(m, self._settings, self.period) if m > n else None
+        self._correction = np.zeros(m)
+
+
+_DONE: Final = (ExecutionStatus.DONE, "the end of the plan")
+_PAUSED: Final = (ExecutionStatus.PAUSED, "paused; resume goes on")
