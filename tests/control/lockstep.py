@@ -54,7 +54,9 @@ def course(more_mass: float = 0.0) -> Course:
     return Course(plan.unstrained_length, np.gradient(plan.unstrained_length, PERIOD, axis=0), tension, read, gains)
 
 
-def cycles(count: int, seed: int = 0, more_mass: float = 0.0, unsteady: bool = False) -> Iterator[Cycle]:
+def cycles(
+    count: int, seed: int = 0, more_mass: float = 0.0, unsteady: bool = False, delay: int = 0
+) -> Iterator[Cycle]:
     """A good machine: cells with 1 N of noise and up to 2 N of bias, friction, and a link of a cycle's delay.
 
     Args:
@@ -62,6 +64,7 @@ def cycles(count: int, seed: int = 0, more_mass: float = 0.0, unsteady: bool = F
         seed: Of the noise.
         more_mass: Of the load, which the plan does not know [kg].
         unsteady: Whether blocks are lost, two cycles in a row at most, and cycles begin up to 4 ms late.
+        delay: For how many cycles more than one a command is on its way.
     """
     way, rng = course(more_mass), np.random.default_rng(seed)
     bias = rng.uniform(-2.0, 2.0, 8)
@@ -70,7 +73,7 @@ def cycles(count: int, seed: int = 0, more_mass: float = 0.0, unsteady: bool = F
     age = np.zeros(4)
     for k in range(count):
         at = k % len(way.length)
-        sample = _sample(way, k, at, commands, bias, rng)
+        sample = _sample(way, k, max(0, k - delay), bias, rng)
         if unsteady and before is not None:
             lost = (rng.random(4) < 0.1) & (age < 2 * PERIOD)
             age = np.where(lost, age + PERIOD, 0.0)
@@ -89,8 +92,9 @@ def _command(counter: int, length: Array, rate: Array, tension: Array) -> Comman
     return Command(counter, OWNER, Mode.FOLLOW, 0.1, length, rate, tension, np.ones(8, dtype=bool))
 
 
-def _sample(way: Course, k: int, at: int, commands: list[Command], bias: Array, rng: np.random.Generator) -> Sample:
-    """What a good machine says one cycle after the command that it has taken."""
+def _sample(way: Course, k: int, taken: int, bias: Array, rng: np.random.Generator) -> Sample:
+    """What a good machine says in cycle k that has taken so many commands."""
+    at = taken % len(way.length)
     true = way.read[at]
     rubs = FRICTION * rng.uniform(-1.0, 1.0, 8)
     tension = true + bias + rng.normal(0.0, 1.0, 8)
@@ -101,7 +105,7 @@ def _sample(way: Course, k: int, at: int, commands: list[Command], bias: Array, 
         counter=np.full(4, k + 1),
         plc_time=np.full(4, 100.0 + k * PERIOD),
         owner=np.full(4, OWNER),
-        echo=np.full(4, len(commands)),
+        echo=np.full(4, taken),
         status=np.full(4, int(GroupStatus.READY | GroupStatus.FOLLOWING)),
         fault=np.zeros(4, dtype=np.int64),
         length=encoder,
@@ -132,7 +136,7 @@ def with_sample(cycle: Cycle, **fields: Any) -> Cycle:
     return cycle._replace(sample=cycle.sample._replace(**fields))
 
 
-def one(array: Array, index: int, value: float) -> Array:
+def one(array: Any, index: int, value: float) -> Any:
     """A copy with one value changed."""
     copy = array.copy()
     copy[index] = value

@@ -18,6 +18,7 @@ PLANNED_SHARE: Final = 0.9  # of the lower limit: from there on a plan wants the
 PULLING: Final = 0.5  # of the planned tension: a motor that holds more has a cable that pulls
 STEADY_TIME: Final = 0.5  # s, of the filter that learns what the tensions are off the plan all the time
 QUICK_TIME: Final = 0.1  # s, of the one that is held against the balance of the platform
+MOST_CHANGE: Final = 3.0  # N a cycle, of the latter: a few readings far out do not stay in it
 
 
 class Evidence:
@@ -32,6 +33,8 @@ class Evidence:
         limit: Upper limits of T_A [N], shape (m,).
         full_scale: Of the cells [N], infinite where it is not known, shape (m,).
         believed: Which cells are, shape (m,).
+        broken: Which cables are known to be, shape (m,).
+        jumped: Which encoders have, shape (m,).
         fresh: Which winches' data are new in this cycle, shape (m,).
         low: For how many new readings in a row each cable has been slack that the plan wants taut, shape (m,).
         before_low: The reading before these [N], shape (m,).
@@ -72,6 +75,8 @@ class Evidence:
         self.full_scale = np.broadcast_to(winch.load_cell_range if known else np.inf, (m,))  # type: ignore[union-attr, arg-type]
         self._set_up_motors(robot)
         self.believed: Flags = np.ones(m, dtype=bool)
+        self.broken: Flags = np.zeros(m, dtype=bool)
+        self.jumped: Flags = np.zeros(m, dtype=bool)
         self.fresh: Flags = np.ones(m, dtype=bool)
         self.low = np.zeros(m, dtype=np.int64)
         self.before_low, self.steady, self.quick = np.full(m, np.nan), np.zeros(m), np.zeros(m)
@@ -122,7 +127,11 @@ class Evidence:
             self.steady[:], self.quick[:] = error, 0.0
         if not self.any_low:
             self.steady += self._shares[0] * (error - self.steady)
-        self.quick += self._shares[1] * (error - self.quick)
+        change = self._shares[1] * (error - self.quick)
+        largest = float(np.abs(change).max())
+        if largest > MOST_CHANGE:  # as a whole, so that what is a load stays like a load
+            change *= MOST_CHANGE / largest
+        self.quick += change
 
     def pull(self, cycle: Cycle) -> Array:
         """What each motor holds at the cable [N], to its friction; NaN where drums are not known, shape (m,)."""

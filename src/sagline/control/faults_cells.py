@@ -49,8 +49,8 @@ class CellDead(Fault):
             return None
         seen.believed &= ~dead
         cell = int(np.argmax(dead))
-        holds = f" while its motor holds {pull[cell]:.0f} N" if np.isfinite(pull[cell]) else ""
-        return f"cell {cell} reads {tension[cell]:.1f} N{holds}; planned: {cycle.tension[cell]:.0f} N. {_STEP}"
+        holds = f" while its motor holds {pull[cell]:.4g} N" if np.isfinite(pull[cell]) else ""
+        return f"cell {cell} reads {tension[cell]:.4g} N{holds}; planned: {cycle.tension[cell]:.4g} N. {_STEP}"
 
 
 class CellStuck(Fault):
@@ -85,7 +85,7 @@ class CellStuck(Fault):
         seen.believed &= ~stuck
         cell = int(np.argmax(stuck))
         reading = cycle.sample.tension[cell]
-        return f"cell {cell} has read {reading:.1f} N in {STUCK_SAMPLES} samples of a motion. {_STEP}"
+        return f"cell {cell} has read {reading:.4g} N in {STUCK_SAMPLES} samples of a motion. {_STEP}"
 
 
 class CellOff(Fault):
@@ -126,7 +126,7 @@ class CellOff(Fault):
         return (
             f"cell {cell} is off by about {error[cell] / seen_of_it:.0f} N by the platform's balance; "
             f"allowed: {limit / seen_of_it:.0f} N. "
-            f"It reads {cycle.sample.tension[cell]:.0f} N, planned: {cycle.tension[cell]:.0f} N. {_STEP}"
+            f"It reads {cycle.sample.tension[cell]:.4g} N, planned: {cycle.tension[cell]:.4g} N. {_STEP}"
         )
 
     def _error(self, cycle: Cycle) -> Array | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from typing import Final
 
@@ -11,7 +12,7 @@ from sagline.arrays import Array
 from sagline.control.cycle import Cycle
 from sagline.control.evidence import Evidence
 from sagline.control.fault import Fault, Reaction
-from sagline.control.link import Command, Mode, WinchState
+from sagline.control.link import Command, Mode, Sample, WinchState
 
 JUMP: Final = 1e-3  # m a cycle
 FOLLOWING: Final = 5e-3  # m
@@ -25,16 +26,28 @@ class EncoderJump(Fault):
     """Length and speed of a drum do not agree."""
 
     name = "encoder jump"
-    rule = f"|change of length - rate x time| > {1e3 * JUMP:g} mm from sample to sample"
+    rule = f"|change of length - rate x time| > {1e3 * JUMP:g} mm from sample to sample, or no number"
     reaction = Reaction.STOPPING
     within = "10 ms"
     homing = True
 
+    def __init__(self, seen: Evidence) -> None:
+        """Begin with nothing read."""
+        super().__init__(seen)
+        self._numbers = False  # whether the sample before had numbers
+
     def found(self, cycle: Cycle) -> str | None:
-        """The largest jump."""
+        """The largest jump, or what is no number."""
         sample, before = cycle.sample, cycle.before
-        if before is None:
-            return None
+        known, self._numbers = self._numbers, math.isfinite(sample.length.sum() + sample.rate.sum())
+        if not self._numbers:
+            wrong = ~(np.isfinite(sample.length) & np.isfinite(sample.rate))
+            self.seen.jumped |= wrong
+            winch = int(np.argmax(wrong))
+            return f"encoder {winch} reads no number. Check its drive, acknowledge, and home again."
+        return self._jump(sample, before) if known and before is not None else None
+
+    def _jump(self, sample: Sample, before: Sample) -> str | None:
         period, time = self.seen.period, sample.plc_time - before.plc_time
         passed = time[self.seen.group_of]
         jump = np.abs(sample.length - before.length - 0.5 * (sample.rate + before.rate) * passed)
@@ -45,9 +58,10 @@ class EncoderJump(Fault):
         jumped = known & ~(jump <= allowed)
         if not jumped.any():
             return None
+        self.seen.jumped |= jumped
         winch = int(np.argmax(np.where(jumped, jump, 0.0)))
         return (
-            f"encoder {winch} jumped by {1e3 * jump[winch]:.1f} mm against its speed; allowed: {1e3 * JUMP:g} mm. "
+            f"encoder {winch} jumped by {1e3 * jump[winch]:.4g} mm against its speed; allowed: {1e3 * JUMP:g} mm. "
             "Check its plug and coupling, acknowledge, and home again."
         )
 
@@ -76,12 +90,12 @@ class FollowingError(Fault):
         if np.abs(command.length - length).max() <= FOLLOWING:
             return None
         away = self._away(cycle)
-        far = ~(away <= FOLLOWING)
+        far = ~(away <= FOLLOWING) & ~self.seen.jumped  # that has been told
         if not far.any():
             return None
         winch = int(np.argmax(np.where(far, away, 0.0)))
         return (
-            f"winch {winch} is {1e3 * away[winch]:.1f} mm from its set point; allowed: {1e3 * FOLLOWING:g} mm. "
+            f"winch {winch} is {1e3 * away[winch]:.4g} mm from its set point; allowed: {1e3 * FOLLOWING:g} mm. "
             "See what holds it, acknowledge, and home again."
         )
 
@@ -132,7 +146,7 @@ class ServoSaturated(Fault):
             return None
         return (
             f"drive {winch} has been at its limit of force for {self._for[winch] * self.seen.period:.1f} s at "
-            f"{cycle.sample.torque[winch]:.2f} N m; allowed: {SATURATED:g} s. See what holds it, then acknowledge."
+            f"{cycle.sample.torque[winch]:.3g} N m; allowed: {SATURATED:g} s. See what holds it, then acknowledge."
         )
 
 

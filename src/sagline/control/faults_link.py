@@ -158,6 +158,8 @@ class GroupActs(Fault):
             return None
         acting = (sample.fault != 0) | locked
         acting[self.seen.group_of[tripped]] = True
+        acting &= (sample.status & _EMERGENCY) == 0  # locked as it must be
+        acting &= sample.fault != _PRESSED
         self._clean |= ~acting
         new = acting & self._clean
         if not new.any():
@@ -210,7 +212,7 @@ class CycleLate(Fault):
         """The latest; it ends after a second in which there were few."""
         self._cycle += 1
         late = self._late
-        if cycle.late > LATE_OFTEN:
+        if LATE_OFTEN < cycle.late <= LOST:
             late.append((self._cycle, cycle.late))
         if late and late[0][0] <= self._cycle - WINDOW:
             late.popleft()

@@ -40,9 +40,10 @@ class OverTension(Fault):
         over = ((tension > seen.limit) & seen.believed) | (self._for >= NEAR_SAMPLES)
         if not over.any():
             return None
-        cable = int(np.argmax(np.where(over, tension / seen.limit, 0.0)))
+        cables = np.flatnonzero(over)
+        cable = int(cables[np.argmax(tension[cables] / seen.limit[cables])])
         return (
-            f"cable {cable} pulls {tension[cable]:.0f} N; allowed: up to {self._near[cable]:.0f} N, "
+            f"cable {cable} pulls {tension[cable]:.4g} N; allowed: up to {self._near[cable]:.0f} N, "
             f"{seen.limit[cable]:.0f} N for an instant. See what it hangs on, then jog it out."
         )
 
@@ -60,18 +61,13 @@ class CableBroken(Fault):
     homing = True
     lasting = True
 
-    def __init__(self, seen: Evidence) -> None:
-        """Begin with no cable broken."""
-        super().__init__(seen)
-        self._broken = np.zeros(seen.limit.size, dtype=bool)
-
     def found(self, cycle: Cycle) -> str | None:
         """The first cable that is newly found broken."""
         seen = self.seen
         if not (seen.any_low and seen.compared):
             return None
         sudden = (seen.low >= SLACK_SAMPLES) & seen.believed & (seen.before_low > SUDDEN * cycle.tension)
-        new = sudden & ~self._broken
+        new = sudden & ~seen.broken
         if not new.any():
             return None
         left = np.abs(cycle.sample.tension - cycle.tension - seen.steady)
@@ -79,11 +75,11 @@ class CableBroken(Fault):
         furthest = float(left[others].max(initial=0.0))
         if furthest <= SIGMAS * seen.noise:
             return None
-        self._broken |= new
+        seen.broken |= new
         cable = int(np.argmax(new))
         return (
-            f"cable {cable} is broken: {cycle.sample.tension[cable]:.1f} N after {seen.before_low[cable]:.0f} N, "
-            f"others have changed by up to {furthest:.0f} N. Drums are locked: prop the platform up before it moves."
+            f"cable {cable} is broken: {cycle.sample.tension[cable]:.4g} N after {seen.before_low[cable]:.4g} N, "
+            f"others have changed by up to {furthest:.4g} N. Drums are locked: prop the platform up before it moves."
         )
 
 
@@ -103,11 +99,11 @@ class Slack(Fault):
         seen = self.seen
         if not seen.any_low:
             return None
-        slack = (seen.low >= SLACK_SAMPLES) & seen.believed
+        slack = (seen.low >= SLACK_SAMPLES) & seen.believed & ~seen.broken
         if not slack.any():
             return None
         cable = int(np.argmax(slack))
         return (
-            f"cable {cable} is slack: it pulls {cycle.sample.tension[cable]:.1f} N where the plan has "
-            f"{cycle.tension[cable]:.0f} N. See whether it has left its pulley or drum, then acknowledge."
+            f"cable {cable} is slack: it pulls {cycle.sample.tension[cable]:.4g} N where the plan has "
+            f"{cycle.tension[cable]:.4g} N. See whether it has left its pulley or drum, then acknowledge."
         )

@@ -27,7 +27,7 @@ def balance_slope(state: Equilibrium) -> Array:
     """
     slopes = cable_slopes(state)
     wrench = on_platform(slopes.by_length, slopes.levers) / tension_slopes(state, slopes).by_length[..., None, :]
-    found: Array = first_of(state.robot).freedom @ wrench
+    found: Array = -first_of(state.robot).freedom @ wrench  # the slopes are of the force on the cable
     return found
 
 

@@ -1,0 +1,516 @@
+"""Every rule for faults on hand-made samples, on the lockstep clock: when it tells, how soon, and when it must not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from sagline.arrays import Array
+from sagline.control.cycle import Cycle
+from sagline.control.fault import Reaction
+from sagline.control.faults import FAULT_TABLE, FAULTS, faults_of
+from sagline.control.link import GroupFault, GroupStatus, Mode, Sample, WinchState
+from tests.control.lockstep import OWNER, ROBOT, Change, course, cycles, one, told, with_sample
+
+START = 60  # cycle; the prototype moves
+FALLING = -1.0  # N m at a motor: 667 N that its cable pulls
+
+
+def since(alter: Callable[[int, Cycle], Cycle], start: int = START, end: int = 10**9) -> Change:
+    """What is altered from a cycle on, by how long ago that is."""
+    return lambda k, cycle: alter(k - start, cycle) if start <= k < end else cycle
+
+
+def silent(group: int, count: int) -> Change:
+    """A group says nothing new for so many cycles."""
+    last: list[Sample] = []
+
+    def alter(k: int, cycle: Cycle) -> Cycle:
+        if k < START or k >= START + count:
+            if k < START:
+                last[:] = [cycle.sample]
+            return cycle
+        mine = {4: np.arange(4) == group, 8: np.arange(8) // 2 == group}
+        old = {
+            name: np.where(mine[value.size], getattr(last[0], name), value)
+            for name, value in cycle.sample._asdict().items()
+            if name not in ("time", "age")
+        }
+        age = one(cycle.sample.age, group, 0.004 + 0.01 * (k - START + 1))
+        return cycle._replace(sample=Sample(cycle.sample.time, age, **old))
+
+    return alter
+
+
+def cell(index: int, reading: Callable[[int, float], float], torque: float | None = None) -> Change:
+    """A cell reads a function of the time since START and of what is there, its motor perhaps holds something else."""
+
+    def alter(k: int, cycle: Cycle) -> Cycle:
+        sample = cycle.sample
+        value = reading(k, float(sample.tension[index]))
+        fields = {"tension": one(sample.tension, index, value + 0.01 * (k % 7))}  # none sticks
+        if torque is not None:
+            fields["torque"] = one(sample.torque, index, torque)
+        return with_sample(cycle, **fields)
+
+    return since(alter)
+
+
+def field(name: str, index: int, value: float, start: int = START, end: int = 10**9) -> Change:
+    """One value of the sample is another."""
+    return since(
+        lambda k, cycle: with_sample(cycle, **{name: one(getattr(cycle.sample, name), index, value)}), start, end
+    )
+
+
+def both(first: Change, second: Change) -> Change:
+    return lambda k, cycle: second(k, first(k, cycle))
+
+
+def broken(index: int, others: float = 5.0) -> Change:
+    """The others change by so much more each cycle, in turn up and down."""
+    turns = np.where(np.arange(8) % 2, 1.0, -1.0)
+
+    def alter(k: int, cycle: Cycle) -> Cycle:
+        sample = cycle.sample
+        return with_sample(
+            cycle,
+            tension=one(sample.tension + others * min(k, 8) * turns, index, 2.0 + 0.1 * (k % 3)),
+            torque=one(sample.torque, index, 0.01),
+        )
+
+    return since(alter)
+
+
+def slackens(index: int) -> Change:
+    """Bit by bit, as a plan does that is wrong; the others take over."""
+
+    def alter(k: int, cycle: Cycle) -> Cycle:
+        sample = cycle.sample
+        given = min(8.0 * k, sample.tension[index] - 2.0)
+        tension = one(sample.tension + 0.3 * given, index, sample.tension[index] - given + 0.01 * (k % 7))
+        return with_sample(cycle, tension=tension, torque=one(sample.torque, index, -tension[index] * 0.0015))
+
+    return since(alter)
+
+
+def stuck(index: int) -> Change:
+    kept: list[float] = []
+
+    def alter(k: int, cycle: Cycle) -> Cycle:
+        if k == 0:
+            kept[:] = [float(cycle.sample.tension[index])]
+        return with_sample(cycle, tension=one(cycle.sample.tension, index, kept[0]))
+
+    return since(alter)
+
+
+def jump(index: int, by: float) -> Change:
+    return since(lambda k, cycle: with_sample(cycle, length=_added(cycle.sample.length, index, by)))
+
+
+def lags(index: int, speed: float) -> Change:
+    """A drum stays behind, and its encoder says so."""
+    return since(
+        lambda k, cycle: with_sample(
+            cycle,
+            length=_added(cycle.sample.length, index, -speed * 0.01 * (k + 0.5)),
+            rate=_added(cycle.sample.rate, index, -speed),
+        )
+    )
+
+
+def _added(array: Array, index: int, by: float) -> Array:
+    more = array.copy()
+    more[index] += by
+    return more
+
+
+def late(*times: tuple[int, float]) -> Change:
+    by = dict(times)
+    return lambda k, cycle: cycle._replace(late=by.get(k - START, 0.0))
+
+
+def drive_trips(k: int, cycle: Cycle) -> Cycle:
+    if k < START:
+        return cycle
+    sample = cycle.sample
+    return with_sample(cycle, winch_fault=one(sample.winch_fault, 5, 17), state=one(sample.state, 5, WinchState.FAULT))
+
+
+def emergency(k: int, cycle: Cycle) -> Cycle:
+    """As a PLC does it: the power is off, the drums are locked, it says why."""
+    if k < START:
+        return cycle
+    bits = int(GroupStatus.EMERGENCY | GroupStatus.LOCKED | GroupStatus.BRAKED)
+    return with_sample(
+        cycle,
+        status=np.full(4, bits),
+        fault=np.full(4, int(GroupFault.EMERGENCY_STOP)),
+        state=np.full(8, int(WinchState.LOCKED)),
+    )
+
+
+class Case(NamedTuple):
+    """A fault that is injected at START.
+
+    Attributes:
+        change: What is done.
+        names: What is told, in order, each once.
+        reaction: The largest of it.
+        cycles: How many cycles later the last of it is told, at most and at least.
+        words: What its line says among other things.
+    """
+
+    change: Change
+    names: tuple[str, ...]
+    reaction: Reaction
+    cycles: tuple[int, int]
+    words: str
+
+
+EVENT, DEGRADED, STOPPING, EMERGENCY = Reaction.EVENT, Reaction.DEGRADED, Reaction.STOPPING, Reaction.EMERGENCY
+CASES = {
+    "group late": Case(silent(2, 5), ("group stale",), DEGRADED, (2, 2), "group 2: its newest sample is 34 ms old"),
+    "group gone": Case(silent(1, 10**6), ("group stale", "group silent"), STOPPING, (9, 9), "group 1: its newest"),
+    "block discarded": Case(field("discarded", 3, 1), ("block discarded",), EVENT, (0, 0), "group 3: a block"),
+    "grant taken": Case(
+        field("owner", 1, 99),
+        ("owner lost",),
+        STOPPING,
+        (0, 0),
+        "group 1: controller 99 has its grant, not this one, 4711",
+    ),
+    "grant lost": Case(field("owner", 3, 0), ("owner lost",), STOPPING, (0, 0), "group 3: nobody has its grant"),
+    "PLC stopped": Case(
+        field("fault", 0, GroupFault.HEARTBEAT),
+        ("group acts by itself",),
+        STOPPING,
+        (0, 0),
+        "no command came for 100 ms",
+    ),
+    "PLC locked": Case(
+        field("status", 2, int(GroupStatus.LOCKED)), ("group acts by itself",), STOPPING, (0, 0), "drums are locked"
+    ),
+    "drive": Case(
+        drive_trips, ("group acts by itself",), STOPPING, (0, 0), "group 2 stopped by itself: drive 5 tripped"
+    ),
+    "emergency stop": Case(emergency, ("emergency stop",), EMERGENCY, (0, 0), "reported by group 0, 1, 2, 3"),
+    "tight": Case(
+        cell(3, lambda k, t: 1850.0 if k < 5 else t, -2.8), ("over-tension",), STOPPING, (4, 4), "cable 3 pulls 1850 N"
+    ),
+    "too tight": Case(
+        since(
+            lambda k, cycle: with_sample(
+                cycle,
+                tension=cycle.sample.tension + one(np.zeros(8), 3, 2000.0),
+                torque=one(cycle.sample.torque, 3, -3.0),
+            ),
+            end=START + 1,
+        ),
+        ("over-tension",),
+        STOPPING,
+        (0, 0),
+        "2000 N for an instant",
+    ),
+    "slack": Case(slackens(4), ("slack",), STOPPING, (2, 30), "cable 4 is slack"),
+    "broken": Case(broken(4), ("cable broken",), EMERGENCY, (2, 2), "cable 4 is broken: 2.2 N after "),
+    "cell zero": Case(cell(5, lambda k, t: 0.0), ("cell zero or saturated",), DEGRADED, (2, 2), "cell 5 reads 0.0"),
+    "cell negative": Case(
+        cell(0, lambda k, t: -300.0), ("cell zero or saturated",), DEGRADED, (0, 0), "cell 0 reads -300"
+    ),
+    "cell at full scale": Case(
+        cell(7, lambda k, t: 2000.0),
+        ("cell zero or saturated",),
+        DEGRADED,
+        (0, 0),
+        "cell 7 reads 2000 N while its motor",
+    ),
+    "cell without a number": Case(
+        cell(6, lambda k, t: np.nan), ("cell zero or saturated",), DEGRADED, (0, 0), "cell 6 reads nan"
+    ),
+    "cell stuck": Case(stuck(2), ("cell stuck",), DEGRADED, (49, 49), "cell 2 has read "),
+    "cell wrong": Case(cell(1, lambda k, t: t + 25.0), ("cell wrong",), DEGRADED, (35, 49), "cell 1 is off by about "),
+    "encoder jump": Case(jump(1, 0.002), ("encoder jump",), STOPPING, (0, 0), "encoder 1 jumped by 2.0"),
+    "encoder jumps far": Case(jump(6, -0.5), ("encoder jump",), STOPPING, (0, 0), "encoder 6 jumped by 500 mm"),
+    "encoder without a number": Case(jump(2, np.nan), ("encoder jump",), STOPPING, (0, 0), "encoder 2 reads no number"),
+    "encoder beyond numbers": Case(jump(2, np.inf), ("encoder jump",), STOPPING, (0, 0), "encoder 2 reads no number"),
+    "drum lags": Case(lags(7, 0.05), ("following error",), STOPPING, (9, 16), "winch 7 is 5."),
+    "servo": Case(
+        field("state", 3, WinchState.SATURATED),
+        ("servo at its limit",),
+        STOPPING,
+        (19, 19),
+        "drive 3 has been at its limit",
+    ),
+    "correction": Case(
+        since(lambda k, cycle: cycle._replace(correction=one(np.zeros(8), 2, -5e-3))),
+        ("correction at its limit",),
+        STOPPING,
+        (0, 0),
+        "length 2 by -5.0 mm",
+    ),
+    "late once": Case(late((0, 0.021)), ("cycle late",), EVENT, (0, 0), "late, by up to 21 ms"),
+    "late often": Case(
+        late((0, 0.006), (40, 0.006), (99, 0.006)), ("cycle late",), EVENT, (99, 99), "3 of the last 100"
+    ),
+    "stood still": Case(late((0, 0.15)), ("cycle lost",), STOPPING, (0, 0), "began 150 ms late"),
+    "disk full": Case(
+        since(lambda k, cycle: cycle._replace(recording="no space left on device")),
+        ("recording stopped",),
+        EVENT,
+        (0, 0),
+        "no space left on device",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_fault_is_told_once_in_time_and_alone(name: str) -> None:
+    case = CASES[name]
+    found = told(case.change, 180, seed=8)
+    assert tuple(each.name for each in found) == case.names
+    after = found[-1].cycle - START
+    assert case.cycles[0] <= after <= case.cycles[1]
+    kinds = {kind.name: kind for kind in FAULTS}
+    assert max(kinds[each.name].reaction for each in found) == case.reaction
+    assert case.words in found[-1].line
+    for each in found:
+        assert len(each.line) < 250
+        assert each.line.isprintable()
+        assert each.line.endswith(".")  # with what to do
+        assert ". " in each.line
+
+
+def test_every_rule_is_injected() -> None:
+    assert {name for case in CASES.values() for name in case.names} == {kind.name for kind in FAULTS}
+
+
+QUIET = {
+    "a group is late by two cycles": silent(0, 2),
+    "a plan that is nearly slack": None,
+    "four samples near the limit": since(
+        lambda k, cycle: with_sample(
+            cycle,
+            tension=one(cycle.sample.tension, 3, 1850.0),
+            torque=one(cycle.sample.torque, 3, -2.8),
+        )._replace(gains=None),
+        end=START + 4,
+    ),
+    "two slack samples": since(
+        lambda k, cycle: with_sample(cycle, tension=one(cycle.sample.tension, 3, 2.0), torque=np.zeros(8)),
+        end=START + 2,
+    ),
+    "a little below zero": since(
+        lambda k, cycle: with_sample(cycle, tension=one(cycle.sample.tension, 3, -5.0)), end=START + 2
+    ),
+    "a cell off by less than is known": cell(2, lambda k, t: t + 8.0),
+    "49 equal samples": since(
+        lambda k, cycle: with_sample(cycle, tension=one(cycle.sample.tension, 2, 141.0)), end=START + 49
+    ),
+    "a jump of less than a millimeter": jump(3, 0.9e-3),
+    "a drum that lags by less": since(
+        lambda k, cycle: with_sample(cycle, length=_added(cycle.sample.length, 7, -4e-4 * min(k, 11)))
+    ),
+    "a drive at its limit for less": field("state", 3, WinchState.SATURATED, end=START + 19),
+    "a correction that is allowed": since(lambda k, cycle: cycle._replace(correction=np.full(8, 4.9e-3))),
+    "late twice": late((0, 0.006), (50, 0.019)),
+    "late three times in longer": late((0, 0.006), (50, 0.006), (100, 0.006)),
+}
+
+
+@pytest.mark.parametrize("name", QUIET)
+def test_less_than_that_is_no_fault(name: str) -> None:
+    assert told(QUIET[name], 180, seed=8) == []
+
+
+@pytest.mark.parametrize(
+    ("options", "count"),
+    [
+        ({}, 1700),
+        ({"unsteady": True, "more_mass": 2.0}, 1700),
+        ({"unsteady": True, "more_mass": -8.0, "delay": 5}, 1700),
+        pytest.param({"unsteady": True, "more_mass": 2.0, "delay": 2}, 84_000, marks=pytest.mark.soak),
+    ],
+)
+def test_a_good_machine_is_left_alone(options: dict[str, Any], count: int) -> None:
+    """Noise, bias, friction, lost blocks, a load that is another, commands on their way: 20 s, or 14 minutes."""
+    assert told(None, count, seed=11, **options) == []
+
+
+@pytest.mark.parametrize("index", range(8))
+@pytest.mark.parametrize("error", [-25.0, 25.0])
+def test_a_cell_that_is_off_is_named_whatever_the_load_weighs(index: int, error: float) -> None:
+    found = told(cell(index, lambda k, t: t + error), 150, seed=index, more_mass=2.0)
+    assert [each.name for each in found] == ["cell wrong"]
+    assert found[0].line.startswith(f"cell {index} is off by about ")
+    assert float(found[0].line.split("about ")[1].split(" N")[0]) == pytest.approx(error, abs=8.0)
+    assert found[0].cycle - START < 50
+
+
+def test_two_cells_that_die_are_told_one_by_one_and_no_cable_is_slack() -> None:
+    second = since(lambda k, cycle: with_sample(cycle, tension=one(cycle.sample.tension, 2, 0.0)), START + 60)
+    found = told(both(cell(5, lambda k, t: 0.0), second), 180)
+    assert [each.name for each in found] == ["cell zero or saturated"] * 2
+    assert [each.line[:6] for each in found] == ["cell 5", "cell 2"]
+
+
+def test_where_motors_tell_nothing_a_reading_of_zero_is_a_slack_cable() -> None:
+    bare = ROBOT.replace(winches=None)
+    found = told(cell(5, lambda k, t: 0.0), 150, robot=bare)
+    assert [(each.name, each.cycle) for each in found] == [("slack", START + 2)]
+
+
+def test_a_cable_that_breaks_without_notice_to_the_others_is_slack_until_they_notice() -> None:
+    found = told(broken(4, others=1.0), 180)
+    assert [each.name for each in found] == ["slack", "cable broken"]
+    assert found[0].cycle == START + 2
+    assert found[1].cycle <= START + 7
+
+
+def test_where_the_lower_limit_is_zero_the_noise_of_the_cells_stands_in() -> None:
+    free = ROBOT.replace(tension_min=0.0)
+    found = told(cell(5, lambda k, t: 11.1, torque=0.0), 150, robot=free)
+    assert [each.name for each in found] == ["slack"]
+    assert told(cell(5, lambda k, t: 11.4, torque=0.0), 80, robot=free) == []
+
+
+def test_a_plan_that_lets_a_cable_hang_has_no_slack_cable() -> None:
+    def hangs(k: int, cycle: Cycle) -> Cycle:
+        altered = with_sample(
+            cycle, tension=one(cycle.sample.tension, 4, 3.0 + 0.01 * (k % 7)), torque=one(cycle.sample.torque, 4, 0.0)
+        )
+        return altered._replace(tension=one(cycle.tension, 4, 4.0))
+
+    assert told(hangs, 180) == []
+
+
+def test_without_a_plan_tensions_are_held_against_nothing() -> None:
+    def homing(k: int, cycle: Cycle) -> Cycle:
+        sample = with_sample(cycle, tension=np.random.default_rng(k).uniform(0.0, 300.0, 8))
+        return sample._replace(tension=np.full(8, np.nan), gains=None)
+
+    assert told(homing, 180) == []
+
+
+def test_what_an_earlier_controller_left_is_not_told() -> None:
+    left = field("fault", 1, GroupFault.HEARTBEAT, start=0, end=30)
+    assert told(left, 300) == []
+    assert [each.cycle for each in told(both(left, field("fault", 1, GroupFault.DRIVE)), 300)] == [START]
+
+
+def test_a_grant_that_was_never_held_is_not_lost() -> None:
+    assert told(field("owner", 2, 99, start=0), 300) == []
+
+
+def test_a_grant_that_was_given_back_is_not_lost() -> None:
+    def leaves(k: int, cycle: Cycle) -> Cycle:
+        if k < START or cycle.command is None:
+            return cycle
+        return with_sample(cycle, owner=np.zeros(4))._replace(command=cycle.command._replace(mode=Mode.LEAVE))
+
+    assert told(leaves, 300) == []
+
+
+def test_drums_that_were_locked_by_us_are_no_fault() -> None:
+    def locks(k: int, cycle: Cycle) -> Cycle:
+        if k < START or cycle.command is None:
+            return cycle
+        still = with_sample(
+            cycle, status=np.full(4, int(GroupStatus.LOCKED)), rate=np.zeros(8), length=course().length[START - 1]
+        )
+        return still._replace(command=cycle.command._replace(mode=Mode.LOCK))
+
+    assert told(locks, 300) == []
+
+
+def test_a_cell_that_does_not_change_at_rest_is_not_stuck() -> None:
+    def rests(k: int, cycle: Cycle) -> Cycle:
+        if cycle.command is None:
+            return cycle
+        still = with_sample(cycle, tension=course().tension[0], rate=np.zeros(8), length=course().length[0])._replace(
+            tension=course().tension[0]
+        )
+        return still._replace(command=cycle.command._replace(rate=np.zeros(8), length=course().length[0]))
+
+    assert told(rests, 180) == []
+
+
+def test_a_set_point_that_is_on_its_way_is_no_following_error() -> None:
+    """At 0.37 m/s and five cycles of delay set points are 19 mm ahead of the drums."""
+    ahead = [
+        np.abs(cycle.command.length - cycle.sample.length).max()
+        for cycle in cycles(400, delay=5)
+        if cycle.command is not None
+    ]
+    assert max(ahead) > 0.015
+    assert told(None, 180, delay=5) == []
+    assert [each.name for each in told(lags(7, 0.05), 180, delay=5)] == ["following error"]
+
+
+def test_two_bursts_of_bad_blocks_are_two_events() -> None:
+    def bad(k: int, cycle: Cycle) -> Cycle:
+        count = min(max(k - START, 0), 10) + min(max(k - START - 150, 0), 10)
+        return with_sample(cycle, discarded=one(cycle.sample.discarded, 0, count))
+
+    found = told(bad, 350)
+    assert [each.cycle for each in found] == [START + 1, START + 151]
+
+
+def test_it_is_present_as_long_as_its_rule_holds_and_a_lasting_one_from_then_on() -> None:
+    rules = {rule.name: rule for rule in faults_of(ROBOT)}
+    change, before, seen = both(silent(2, 5), cell(5, lambda k, t: 0.0)), None, []
+    for k, good in enumerate(cycles(200, seed=8)):
+        cycle = change(k, good)._replace(before=before)
+        for rule in rules.values():
+            rule.look(cycle)
+        seen.append((rules["group stale"].present, rules["cell zero or saturated"].present))
+        before = cycle.sample
+    stale, dead = np.array(seen).T
+    assert np.flatnonzero(stale).tolist() == [START + 2, START + 3, START + 4]
+    assert np.flatnonzero(dead).tolist() == list(range(np.flatnonzero(dead)[0], 200))
+    assert not next(rule for rule in faults_of(ROBOT) if rule.name == "cell zero or saturated").present
+
+
+def test_nonsense_neither_raises_nor_warns() -> None:
+    rng = np.random.default_rng(6)
+    strange = np.array([np.nan, np.inf, -np.inf, 1e300, -1e300, 0.0])
+
+    def alter(k: int, cycle: Cycle) -> Cycle:
+        name = rng.choice(["length", "rate", "torque", "tension", "filtered"])
+        values = getattr(cycle.sample, name).copy()
+        values[rng.random(8) < 0.5] = rng.choice(strange)
+        codes = {
+            which: rng.integers(-(2**40), 2**40, getattr(cycle.sample, which).size)
+            for which in ("owner", "echo", "status", "fault", "state", "winch_fault", "counter", "discarded")
+            if rng.random() < 0.1
+        }
+        return with_sample(cycle, **{str(name): values}, **codes)
+
+    found = told(alter, 1500)
+    assert len({each.name for each in found}) >= 6
+    assert all(len(each.line) < 300 and each.line.isprintable() for each in found)
+
+
+def test_the_table_has_every_rule_and_what_others_look_after() -> None:
+    names = [row.name for row in FAULT_TABLE]
+    assert len(set(names)) == len(names)
+    assert [row.name for row in FAULT_TABLE if row.by == "the controller"] == [kind.name for kind in FAULTS]
+    assert {"controller dead", "foreign block", "second controller", "set point infeasible"} <= set(names)
+    assert all(row.rule and row.to for row in FAULT_TABLE)
+    for one_row, other in pairwise(row for row in FAULT_TABLE if row.by == "the controller"):
+        assert one_row.rule != other.rule
+
+
+def test_rules_of_one_set_know_nothing_of_another() -> None:
+    first, second = faults_of(ROBOT), faults_of(ROBOT)
+    assert first[0].seen is first[-1].seen
+    assert first[0].seen is not second[0].seen
+    assert first[0].seen.group_of.tolist() == [0, 0, 1, 1, 2, 2, 3, 3]
+    other = faults_of(ROBOT, groups=((0, 4), (1, 5), (2, 6), (3, 7)))
+    assert other[0].seen.group_of.tolist() == [0, 1, 2, 3, 0, 1, 2, 3]
+    assert OWNER == 4711
