@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable
 from typing import Any
 
@@ -10,7 +11,6 @@ from numpy.typing import NDArray
 
 from sagline.arrays import Array
 from sagline.control.link import Command, Mode, Sample
-from sagline.plc.packing import sample_blocks
 
 
 def a_sample(winches: int, seed: int = 0, **values: Any) -> Sample:
@@ -44,6 +44,21 @@ def a_sample(winches: int, seed: int = 0, **values: Any) -> Sample:
         discarded=np.zeros(groups, dtype=np.int64),
     )
     return sample._replace(**values)
+
+
+def sample_blocks(sample: Sample) -> list[bytes]:
+    """The blocks of the groups, packed by hand: an independent opinion of where everything is."""
+    blocks = []
+    for g, (counter, owner, echo) in enumerate(zip(sample.counter, sample.owner, sample.echo, strict=True)):
+        winches = range(2 * g, min(2 * g + 2, len(sample.length)))
+        head = struct.pack(">I4sHHdII", counter, b"SAGF", 1, g + 1, 1e6 * sample.plc_time[g], owner, echo)
+        head += struct.pack(">IHH", sample.status[g], sample.fault[g], len(winches))
+        for i in winches:
+            forces = sample.torque[i], sample.tension[i], sample.filtered[i]
+            whole = sample.counts[i], sample.state[i], sample.winch_fault[i]
+            head += struct.pack(">dffffiHH", sample.length[i], sample.rate[i], *forces, *whole)
+        blocks.append(head.ljust(100, b"\0") + struct.pack(">I", counter))
+    return blocks
 
 
 def a_command(winches: int, seed: int = 0, **values: Any) -> Command:

@@ -14,11 +14,10 @@ import pytest
 import sagline as sl
 from sagline.control.link import Sample
 from sagline.plc.block_link import BlockLink
-from sagline.plc.packing import sample_blocks
 from sagline.twin.mirrors import Mirrors
 from sagline.twin.modbus_mirrors import ModbusMirrors
 from sagline.twin.s7_mirrors import S7Mirrors
-from tests.plc.samples import a_sample
+from tests.plc.samples import a_sample, sample_blocks
 
 OWNER = 4711
 PATIENCE = 20.0  # s: for a machine that has much else to do; nothing waits so long where all is well

@@ -10,7 +10,6 @@ import pytest
 from sagline.control.link import Mode, Sample
 from sagline.plc.block_link import BlockLink
 from sagline.plc.blocks import CLAIM, TO_PLC, Refusal
-from sagline.plc.packing import sample_blocks
 from tests.plc.samples import (
     a_command,
     a_sample,
@@ -20,6 +19,7 @@ from tests.plc.samples import (
     of_another_version,
     older,
     repeated,
+    sample_blocks,
     status,
     torn,
 )

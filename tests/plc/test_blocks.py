@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from sagline.plc.blocks import BLOCKS, CLAIM, FROM_PLC, TO_PLC, TYPES, Block, Refusal
-from sagline.plc.packing import claim_block, command_blocks, sample_blocks, sample_of
-from tests.plc.samples import a_command, a_sample
+from sagline.plc.packing import claim_block, command_blocks, sample_of
+from tests.plc.samples import a_command, a_sample, sample_blocks
 
 
 def test_sizes_are_those_of_the_protocol() -> None:
@@ -28,24 +28,6 @@ def test_rows_follow_each_other_without_gap_or_overlap(block: Block) -> None:
         assert offset % 2 == 0, name  # a PLC begins every value of a standard block at a word
         at += struct.calcsize(f">{TYPES[kind]}")
     assert at == block.size
-
-
-def test_bytes_of_a_sample_are_where_a_plc_has_them() -> None:
-    sample = a_sample(8)
-    data = sample_blocks(sample)[2]
-    assert data[4:8] == b"SAGF"
-    assert struct.unpack_from(">I", data, 0) == struct.unpack_from(">I", data, 100) == (sample.counter[2],)
-    assert struct.unpack_from(">HH", data, 8) == (1, 3)
-    assert struct.unpack_from(">d", data, 12) == (1e6 * sample.plc_time[2],)
-    assert struct.unpack_from(">IIIHH", data, 20) == (
-        *(sample.owner[2], sample.echo[2], sample.status[2], sample.fault[2]),
-        2,
-    )
-    for winch, offset in ((4, 36), (5, 68)):
-        assert struct.unpack_from(">dffffiHH", data, offset) == (
-            *(sample.length[winch], sample.rate[winch], sample.torque[winch], sample.tension[winch]),
-            *(sample.filtered[winch], sample.counts[winch], sample.state[winch], sample.winch_fault[winch]),
-        )
 
 
 def test_bytes_of_a_command_and_a_claim_are_where_a_plc_looks_for_them() -> None:

@@ -10,8 +10,7 @@ import pytest
 from pymodbus.client import ModbusTcpClient
 
 import sagline as sl
-from sagline.plc.packing import sample_blocks
-from tests.plc.samples import a_sample
+from tests.plc.samples import a_sample, sample_blocks
 from tests.plc.servers import MODBUS, PATIENCE, S7, nobody, plcs, stranger
 
 

@@ -13,8 +13,7 @@ from snap7.type import SrvArea
 
 import sagline as sl
 from sagline.plc.blocks import BLOCKS, FROM_PLC
-from sagline.plc.packing import sample_blocks
-from tests.plc.samples import a_command, a_sample, bad, of_another_version, status
+from tests.plc.samples import a_command, a_sample, bad, of_another_version, sample_blocks, status
 from tests.plc.servers import PATIENCE, S7, linked, nobody, plcs, stranger, taken, until
 
 

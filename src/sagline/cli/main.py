@@ -18,6 +18,7 @@ from sagline.cli.commands.motion import simulate, vibrate
 from sagline.cli.commands.poses import forward, tension
 from sagline.cli.commands.robots import convert, examples, new, robots, show
 from sagline.cli.commands.track import encoder, lengths, run, track
+from sagline.cli.commands.twin import twin
 from sagline.cli.commands.view import view
 from sagline.cli.ending import ended
 from sagline.files.whole import finished_files
@@ -40,6 +41,7 @@ Start here:
     sagline simulate cogiro --break 3@1s what comes when a cable breaks
     sagline article                      the article redone, as one page
     sagline view cogiro                  drag a platform in the browser
+    sagline twin article-prototype       a machine to drive, over S7
     sagline new my_robot.yaml            a robot of your own, by questions
 """
 
@@ -139,7 +141,7 @@ def sagline(
 
 for command in (
     track, lengths, encoder, run, article, identify, forward, tension, vibrate, simulate, robots, show, examples, new,
-    convert, view,
+    convert, view, twin,
 ):  # fmt: skip
     text = _help(command.__doc__)
     app.command(cls=Command, help=text, short_help=text.partition("\n\n")[0])(command)

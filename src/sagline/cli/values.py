@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, cast
 
@@ -17,6 +18,7 @@ from sagline.robot.pose import Pose
 if TYPE_CHECKING:
     from sagline.robot.robot import Robot
 
+LAST_PORT = 65535
 FARTHEST, STRONGEST, HEAVIEST = 1e6, 1e12, 1e12  # m; N and N m; kg: beyond all machines, far below what overflows
 
 
@@ -58,6 +60,32 @@ def quantity(text: str, item: str, unit: str, *, low: float = -np.inf, above: fl
     if abs(number) > HEAVIEST:
         raise InvalidValueError(item, repr(text), f"up to {HEAVIEST:g} {unit}", f"Correct {item}.")
     return float(checked(number, item, unit, shape=(), low=low, above=above))
+
+
+def whole_of(text: str, item: str, least: int, most: int) -> int:
+    """A whole number from its digits.
+
+    Args:
+        text: Such as "8080".
+        item: What it is, for the message.
+        least: Smallest that will do.
+        most: Largest.
+
+    Raises:
+        InvalidValueError: If it is none of these.
+    """
+    if not re.fullmatch(r"[0-9]{1,20}", text) or not least <= int(text) <= most:
+        raise InvalidValueError(item, repr(text), f"a whole number from {least} to {most}", "Choose another.")
+    return int(text)
+
+
+def port_of(text: str) -> int:
+    """A TCP port from its digits; 0 for any.
+
+    Raises:
+        InvalidValueError: If it is none.
+    """
+    return whole_of(text, "--port", 0, LAST_PORT)
 
 
 def ratio(text: str, item: str) -> float:

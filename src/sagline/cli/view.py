@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from sagline.arrays import Array
 from sagline.cli.entries import FORWARD
 from sagline.cli.terminal import note, show, working
-from sagline.cli.values import loaded, pose_of, wrench_of
+from sagline.cli.values import loaded, port_of, pose_of, wrench_of
 from sagline.errors import FileError, InvalidValueError
 from sagline.files.dataset import is_of
 from sagline.files.plan_file import load_plan
@@ -25,9 +25,6 @@ from sagline.robot.robot import Robot
 
 if TYPE_CHECKING:
     from sagline.viewer.played import Played
-
-
-LAST_PORT = 65535
 
 
 def view(
@@ -47,7 +44,7 @@ def view(
     Raises:
         SaglineError: If the robot or the run cannot be read, or nothing can listen there.
     """
-    number = _port(port)
+    number = port_of(port)
     alone = {"--wrench": wrench, "--payload": payload, "--pose": pose, "--mode": mode}
     given = [item for item, value in alone.items() if value is not None]
     if run is not None and given:
@@ -104,12 +101,6 @@ def serve(robot: Robot, run: Path | None, host: str, port: int, *, browser: bool
     finally:
         web.stop(server)
     return 0
-
-
-def _port(text: str) -> int:
-    if not re.fullmatch(r"[0-9]{1,5}", text) or int(text) > LAST_PORT:
-        raise InvalidValueError("--port", repr(text), f"a whole number from 0 to {LAST_PORT}", "Choose another.")
-    return int(text)
 
 
 def _mode(text: str | None) -> str:

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
 from sagline.arrays import Array
 from sagline.control.link import GROUP_SIZE, Command, Sample, Whole, groups_of
-from sagline.plc.blocks import CLAIM, FROM_PLC, TO_PLC, winch_row
-
-_HEAD: Final = ("counter", "owner", "echo", "status", "fault")
-_WINCH: Final = ("length", "rate", "torque", "tension", "filtered", "counts", "state")  # and fault, as winch_fault
+from sagline.plc.blocks import CLAIM, TO_PLC, winch_row
 
 
 def claim_block(owner: int) -> bytes:
@@ -41,7 +38,10 @@ def command_blocks(command: Command) -> list[bytes]:
     }
     names = ("length", "rate", "tension", "enable")
     columns = [getattr(command, name).tolist() for name in names]
-    return [TO_PLC.pack(head | _winches(group, names, columns)) for group in groups_of(len(command.length))]
+    return [
+        TO_PLC.pack(head | winch_rows(names, [column[group[0] : group[-1] + 1] for column in columns]))
+        for group in groups_of(len(command.length))
+    ]
 
 
 def sample_of(
@@ -85,29 +85,13 @@ def sample_of(
     )
 
 
-def sample_blocks(sample: Sample) -> list[bytes]:
-    """A sample as the blocks of its groups: what the PLCs of a twin write.
+def winch_rows(names: Sequence[str], columns: Sequence[Sequence[Any]]) -> dict[str, Any]:
+    """Values of a group's winches by name of the row.
 
     Args:
-        sample: Of all m winches.
-
-    Returns:
-        One block a group.
+        names: Of what there is of each winch ("length").
+        columns: The values of each of these, one a winch.
     """
-    names = (*_WINCH, "fault")
-    columns = [getattr(sample, name).tolist() for name in (*_WINCH, "winch_fault")]
-    heads = [getattr(sample, name).tolist() for name in (*_HEAD, "plc_time")]
-    blocks = []
-    for i, (group, *head, time) in enumerate(zip(groups_of(len(sample.length)), *heads, strict=True)):
-        values = {"group": i + 1, "winches": len(group), "time": 1e6 * time, **dict(zip(_HEAD, head, strict=True))}
-        blocks.append(FROM_PLC.pack(values | _winches(group, names, columns)))
-    return blocks
-
-
-def _winches(group: Sequence[int], names: Sequence[str], columns: Sequence[Sequence[float]]) -> dict[str, float]:
-    """The rows of a group's winches, of columns over all winches."""
     return {
-        winch_row(i, name): column[winch]
-        for i, winch in enumerate(group)
-        for name, column in zip(names, columns, strict=True)
+        winch_row(i, name): value for name, column in zip(names, columns, strict=True) for i, value in enumerate(column)
     }

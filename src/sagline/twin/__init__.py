@@ -2,6 +2,7 @@
 
 from sagline.twin.injected import KINDS, Injected, fault
 from sagline.twin.machine import Machine
+from sagline.twin.server import SCAN, Server
 from sagline.twin.snapshot import Report
 
-__all__ = ["KINDS", "Injected", "Machine", "Report", "fault"]
+__all__ = ["KINDS", "SCAN", "Injected", "Machine", "Report", "Server", "fault"]

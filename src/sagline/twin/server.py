@@ -1,0 +1,154 @@
+"""A machine in real time behind servers of its own, for controllers in other processes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from sagline.control.link import Command, Mode
+from sagline.control.pace import Pace
+from sagline.plc.blocks import AGAIN, CLAIM, FROM_PLC, TO_PLC, Refusal, winch_row
+from sagline.plc.packing import winch_rows
+from sagline.plc.wire import needed
+from sagline.twin.machine import Machine
+from sagline.twin.mirrors import LOOPBACK, Mirrors
+from sagline.twin.snapshot import Report
+
+if TYPE_CHECKING:
+    from sagline.dynamics.simulator import Reading
+
+SCAN: Final = 0.005  # s, of a twin's PLCs: half a cycle, so that none of a controller's meets the same block twice
+SILENT: Final = bytes(FROM_PLC.size)
+HALF: Final = 2**31
+MODES: Final = frozenset(Mode)
+ROWS: Final = ("length", "rate", "torque", "tension", "filtered", "counts", "state", "fault")
+
+
+class Server:
+    """The PLCs of a machine, each at an address of its own, as controllers meet them; the plant goes by the wall clock.
+
+    Attributes:
+        machine: The machine.
+        addresses: "host:port" of each group's PLC, in the groups' order.
+
+    Examples:
+        >>> server = sl.twin.Server(sl.twin.Machine(robot, period=sl.twin.SCAN))  # doctest: +SKIP
+        ... server.run()
+    """
+
+    def __init__(self, machine: Machine, *, host: str = LOOPBACK, port: int = 0, modbus: bool = False) -> None:
+        """Listen.
+
+        Args:
+            machine: What stands behind the PLCs; its period is that of their scans.
+            host: Address to listen at; this machine only, unless told otherwise.
+            port: Of the first group, the others follow; 0: any that are free.
+            modbus: Whether they speak Modbus TCP instead of S7.
+
+        Raises:
+            InvalidValueError: If a port is in use, or the address is none of this machine.
+            FileError: If the package for it is not installed.
+        """
+        self.machine = machine
+        self._pace = Pace(machine.period)
+        self._groups = range(len(machine.groups))
+        first = [self._block(group) or SILENT for group in self._groups]
+        self._mirrors = _mirrors(first, host, port, modbus)
+        self.addresses = self._mirrors.addresses
+
+    @property
+    def late(self) -> float:
+        """The most by which a scan began too late so far [s]; by as much the plant lost on the clock."""
+        return self._pace.lateness.longest
+
+    def run(self, watch: Callable[[float, Reading], None] | None = None) -> None:
+        """Serve until interrupted.
+
+        Args:
+            watch: Told after every scan what is true: the machine's time [s], and a reading that the next one replaces.
+        """
+        while True:
+            self._pace.wait()
+            self.scan()
+            if watch is not None:
+                watch(self.machine.time, self.machine.reading)
+
+    def scan(self) -> None:
+        """Let the PLCs take what was written, move the machine on by a period, and show what they say then."""
+        for group, (command, claim) in enumerate(self._mirrors.written()):
+            asked = CLAIM.read(claim)
+            if not isinstance(asked, Refusal):
+                self.machine.claim(group, asked["owner"])
+            order = self._command(group, command)
+            if order is not None:
+                self.machine.take(group, order)
+        self.machine.advance()
+        self._mirrors.publish([self._block(group) for group in self._groups])
+
+    def close(self) -> None:
+        """Listen no more."""
+        self._mirrors.close()
+
+    def _command(self, group: int, data: bytes) -> Command | None:
+        """What stands in DB102; None where it is no command, or torn."""
+        values = TO_PLC.read(data)
+        if isinstance(values, Refusal):
+            return None
+        winches = range(len(self.machine.groups[group]))
+        length, rate, tension, enable = (
+            np.array([values[winch_row(i, name)] for i in winches]) for name in ("length", "rate", "tension", "enable")
+        )
+        mode = values["mode"]
+        return Command(
+            values["counter"],
+            values["owner"],
+            Mode(mode) if mode in MODES else Mode.HOLD,
+            1e-3 * values["valid_for"],
+            length,
+            rate,
+            tension,
+            enable != 0,
+        )
+
+    def _block(self, group: int) -> bytes | None:
+        """What the PLC of a group says; None where a fault keeps what is there."""
+        report = self.machine.report(group)
+        return None if report is None else block_of(group, report)
+
+
+def block_of(group: int, report: Report) -> bytes:
+    """What a PLC says, as its block.
+
+    Args:
+        group: Which, from 0.
+        report: What it says.
+    """
+    head = {
+        "counter": report.counter,
+        AGAIN: report.counter_again,
+        "group": group + 1,
+        "time": 1e6 * report.plc_time,
+        "owner": report.owner,
+        "echo": report.echo,
+        "status": report.status,
+        "fault": report.fault,
+        "winches": len(report.length),
+    }
+    if report.foreign:
+        head["magic"] = 0
+    counts = [(count + HALF) % (2 * HALF) - HALF for count in report.counts]  # a PLC's begin again, too
+    columns: list[list[Any]] = [*report[8:13], counts, report.state, report.winch_fault]
+    return FROM_PLC.pack(head | winch_rows(ROWS, columns))
+
+
+def _mirrors(blocks: list[bytes], host: str, port: int, modbus: bool) -> Mirrors:
+    with needed():
+        if modbus:
+            from sagline.twin.modbus_mirrors import ModbusMirrors
+
+            return ModbusMirrors(blocks, host, port)
+        from sagline.twin.s7_mirrors import S7Mirrors
+
+        return S7Mirrors(blocks, host, port)
