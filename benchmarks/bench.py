@@ -13,7 +13,7 @@ import numpy as np
 from rich.console import Console
 
 import sagline as sl
-from benchmarks import dynamics, machine
+from benchmarks import c_source, dynamics, machine
 from benchmarks.formula import algebraic, as_printed
 from benchmarks.measure import (
     Row,
@@ -180,6 +180,7 @@ def main() -> None:
         whole_processes,
         *machine.PARTS,
         *dynamics.PARTS,
+        *c_source.PARTS,
     ):
         Console(stderr=True).print(f"[dim]{part.__doc__}[/dim]")
         rows.extend(part())

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from sagline.dynamics.vibration import Vibration
     from sagline.dynamics.vibration_status import VibrationStatus
     from sagline.errors import CableGeometryError, FileError, InvalidValueError, SaglineError, SaglineWarning
+    from sagline.files.c_source import export_c
     from sagline.files.caspr import load_caspr
     from sagline.files.imported import Imported
     from sagline.files.measurements import load_measurements
@@ -185,6 +186,7 @@ __all__ = [
     "dynamic_stiffness",
     "encoder_counts",
     "equilibria",
+    "export_c",
     "fastest",
     "forward",
     "frequency_map",
@@ -318,6 +320,7 @@ _HOMES = {
     "dynamic_stiffness": "sagline.dynamics.cable_dynamics",
     "encoder_counts": "sagline.kinematics.encoder",
     "equilibria": "sagline.kinematics.equilibria",
+    "export_c": "sagline.files.c_source",
     "fastest": "sagline.dynamics.fastest",
     "forward": "sagline.kinematics.forward",
     "frequency_map": "sagline.dynamics.frequency_map",

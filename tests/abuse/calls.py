@@ -580,6 +580,10 @@ def _files(given: _Given) -> dict[str, Call]:
             _all(source=("file", str(folder / "swing_bodies.xml")), cables=cable, cable_set=("word", "basic", True)),
         ),
         "dump_robot": Call(sl.dump_robot, _all(robot=("one", given.robot))),
+        "export_c": Call(
+            sl.export_c,
+            _all(robot=("one", given.robot), file=("file", str(folder / "sagline.c")), single_precision=("one", True)),
+        ),
         "dump_mjcf": Call(
             sl.dump_mjcf,
             _all(robot=("one", given.robot), pose=("one", given.pose), unstrained_length=("array", given.length, True)),

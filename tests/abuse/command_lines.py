@@ -26,6 +26,7 @@ LINES = {
     "examples": ["examples"],
     "new": ["new", "my_robot.yaml"],
     "convert": ["convert", "robot.wcrfx"],
+    "export-c": ["export-c", "cogiro"],
     "view": ["view", "cogiro", "--no-browser"],
 }
 

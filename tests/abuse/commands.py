@@ -30,6 +30,7 @@ COMMANDS = {
     "article": ("article", "errata", "--out", "out"),
     "convert": ("convert", ROBOT, "--out", "out/robot.yaml"),
     "mjcf": ("convert", ROBOT, "--format", "mjcf", "--out", "out/robot.xml"),
+    "export-c": ("export-c", ROBOT, "--out", "out/sagline.c"),
     "new": ("new", "out/mine.yaml", "--force"),
 }
 

@@ -16,7 +16,7 @@ from typer.core import TyperCommand, TyperGroup
 from sagline.cli.commands.article import article, identify
 from sagline.cli.commands.motion import simulate, vibrate
 from sagline.cli.commands.poses import forward, tension
-from sagline.cli.commands.robots import convert, examples, new, robots, show
+from sagline.cli.commands.robots import convert, examples, export_c, new, robots, show
 from sagline.cli.commands.track import encoder, lengths, run, track
 from sagline.cli.commands.twin import twin
 from sagline.cli.commands.view import view
@@ -141,7 +141,7 @@ def sagline(
 
 for command in (
     track, lengths, encoder, run, article, identify, forward, tension, vibrate, simulate, robots, show, examples, new,
-    convert, view, twin,
+    convert, export_c, view, twin,
 ):  # fmt: skip
     text = _help(command.__doc__)
     app.command(cls=Command, help=text, short_help=text.partition("\n\n")[0])(command)

@@ -1,4 +1,4 @@
-"""`sagline robots`, `show`, `new`, `convert`, `examples`: robots and their files."""
+"""`sagline robots`, `show`, `new`, `convert`, `export-c`, `examples`: robots and their files."""
 
 from __future__ import annotations
 
@@ -119,6 +119,30 @@ def convert(
     from sagline.cli.convert import convert as run
 
     run(source, out, form, linear_density, axial_stiffness, cable_set, at)
+
+
+def export_c(
+    robot: RobotArgument,
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FILE", help="The source, sagline.c; header and SCL text stand beside it.")
+    ] = Path("sagline.c"),
+    single: Annotated[
+        bool, typer.Option("--float", help="Single precision, for controllers that compute no other in hardware.")
+    ] = False,
+) -> None:
+    """Write C99 that finds a robot's tensions and lengths on a microcontroller, and a cable's length in SCL for a PLC.
+
+    The source needs no heap and answers every call with a status; tensions are those of Closest or MinimumNorm. It
+    covers robots with two redundant cables and nothing behind their frame anchors.
+
+    For example:
+
+        sagline export-c article-prototype --out sagline.c
+        sagline export-c own_robot.yaml --out robot.c --float
+    """
+    from sagline.cli.export_c import export
+
+    export(robot, out, single_precision=single)
 
 
 def examples(

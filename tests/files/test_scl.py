@@ -1,0 +1,77 @@
+"""P3 in SCL, which nothing here compiles: its statements are run one by one as Python's, and compared."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from math import sqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from tests.files.test_c_source import any_cables, reference
+
+
+def as_python(scl: str) -> Callable[..., dict[str, Any]]:
+    """The block as a function of its inputs; what is no statement of the few that it uses is an error."""
+    body = scl.partition("\nBEGIN\n")[2].partition("END_FUNCTION")[0]
+    words = re.sub(r"//[^\n]*", "", body).replace("#", "")
+    words = re.sub(r"\bSQRT\b", "sqrt", words)
+    lines, depth = [], 1
+    for statement in re.findall(r"\s*(IF\s.*?THEN|FOR\s.*?DO|[^;]+?;)", words, re.DOTALL):
+        text = " ".join(statement.split()).rstrip(";").strip()
+        if text.startswith("IF "):
+            condition = text[3:-5].replace("NOT", "not").replace("AND", "and")
+            lines.append("    " * depth + f"if {condition}:")
+            depth += 1
+        elif found := re.fullmatch(r"FOR (\w+) := (\w+) TO (\w+) DO", text):
+            lines.append("    " * depth + f"for {found[1]} in range({found[2]}, {found[3]} + 1):")
+            depth += 1
+        elif text in ("END_IF", "END_FOR"):
+            depth -= 1
+        elif text == "RETURN":
+            lines.append("    " * depth + "return locals()")
+        else:
+            target, expression = re.fullmatch(r"(\w+) := (.+)", text).groups()  # type: ignore[union-attr]
+            lines.append("    " * depth + f"{target} = {expression}")
+    scope: dict[str, Any] = {"sqrt": sqrt}
+    head = "def block(Span, Rise, Tension, Weight, Stiffness):\n"
+    exec(head + "\n".join([*lines, "    return locals()"]), scope)
+    function: Callable[..., dict[str, Any]] = scope["block"]
+    return function
+
+
+@pytest.fixture(scope="module")
+def text(tmp_path_factory: pytest.TempPathFactory) -> str:
+    folder: Path = tmp_path_factory.mktemp("scl")
+    return sl.export_c(sl.load_robot("article-prototype"), folder / "sagline.c")[2].read_text()
+
+
+def test_its_numbers_are_those_of_the_kernels(text: str) -> None:
+    block = as_python(text)
+    cables = any_cables(np.random.default_rng(2))
+    state = reference(cables)
+    for k in range(0, len(cables[0]), 4):
+        found = block(*(float(x[k]) for x in cables))
+        assert found["SaglineLength"] == 0
+        assert found["Length"] == pytest.approx(state.unstrained_length[k], rel=1e-14)
+        assert abs(found["Vertical"] - state.vertical_force[k]) <= 1e-14 * state.platform_end_tension[k]
+
+
+@pytest.mark.parametrize(
+    ("tension", "status"), [(-1.0, 1), (0.0, 1), (0.5, 2), (0.89, 2), (0.91, 0), (1400.0, 0), (1500.0, 3)]
+)
+def test_what_it_does_not_cover_has_a_status(text: str, tension: float, status: int) -> None:
+    assert as_python(text)(4.0, 0.0, tension, 0.9, 14e3)["SaglineLength"] == status
+
+
+def test_every_variable_is_declared_and_it_says_that_it_is_not_compiled(text: str) -> None:
+    head, _, body = text.partition("\nBEGIN\n")
+    declared = set(re.findall(r"^\s+(\w+) : (?:LReal|Int);", head, re.MULTILINE))
+    used = set(re.findall(r"#(\w+)", body)) - {"SaglineLength"}
+    assert used == declared
+    assert "NOT COMPILED" in head
+    assert max(map(len, text.splitlines())) <= 120
