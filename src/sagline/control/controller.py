@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Final, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -34,6 +36,7 @@ from sagline.tension.method import TensionMethod
 SETTLING: Final = 3.0  # s that homing looks, at most
 SPEED: Final = 0.1  # m/s, of go_to
 TURNING: Final = 0.2  # rad/s
+T = TypeVar("T")
 
 
 class Controller(Loop):
@@ -153,7 +156,8 @@ class Controller(Loop):
             check_transition(self.state, State.HOMING, "homing")
         elif self._course is not None:
             raise RefusedError("homing", "a winch is being jogged", "Wait until it stands.")
-        self._homing = Homing(self.robot, instance(pose, Pose, "pose"), self._model, self._method)
+        place = instance(pose, Pose, "pose")
+        self._homing = self._beside(lambda: Homing(self.robot, place, self._model, self._method))
         self.zero, self.homed = np.zeros(self.robot.cable_count), False
         self._new_loop()
         if self.state is not State.HOMING:
@@ -194,7 +198,8 @@ class Controller(Loop):
             RefusedError: If a check fails; it says which, where, and the next step.
         """
         given = instance(path, Path, "path")
-        return motion_along(self.robot, given, self.period, self._model, self._method, self._held)
+        arguments = self.robot, given, self.period, self._model, self._method, self._held
+        return self._beside(lambda: motion_along(*arguments))
 
     def start(self, path: Path | Motion) -> None:
         """Begin to follow a path.
@@ -208,6 +213,7 @@ class Controller(Loop):
         """
         check_transition(self.state, State.MOVING, "the path")
         motion = path if isinstance(path, Motion) else self.plan(path)
+        check_transition(self.state, State.MOVING, "the path")
         check_start(self.robot, self.estimate, motion.state.pose[0])
         assert self._point is not None
         course = Along(motion, self.period, self._point.length - motion.length[0])
@@ -262,7 +268,7 @@ class Controller(Loop):
             RefusedError: As `start`.
         """
         check_transition(self.state, State.MOVING, "the way")
-        return self.execute(self.path_to(pose, speed, angular_speed))
+        return self.execute(self._beside(lambda: self.path_to(pose, speed, angular_speed)))
 
     def start_jog(self, winch: int, by: float) -> None:
         """Begin to jog one winch.
@@ -282,7 +288,8 @@ class Controller(Loop):
         here = self._here()
         assert self._point is not None
         length = self._point.length
-        motion = winch_jog(self.robot, length, here, chosen, far, self.period, self._model)
+        motion = self._beside(lambda: winch_jog(self.robot, length, here, chosen, far, self.period, self._model))
+        check_transition(self.state, State.JOGGING, "the jog")
         course = Along(motion, self.period, np.zeros(len(length)))
         self._begin(State.JOGGING, course, motion, f"winch {chosen} by {1e3 * far:+g} mm")
 
@@ -327,8 +334,10 @@ class Controller(Loop):
         far = checked_displacement(by)
         check_transition(self.state, State.JOGGING, "the jog")
         here = self._here()
-        assert self._point is not None
-        course = PlatformJog(self.robot, self._point, here, far, self.period, self._model, self._method)
+        point = self._point
+        assert point is not None
+        course = self._beside(lambda: PlatformJog(self.robot, point, here, far, self.period, self._model, self._method))
+        check_transition(self.state, State.JOGGING, "the jog")
         self._begin(State.JOGGING, course, None, "the platform")
 
     def jog_platform(self, by: ArrayLike) -> None:
@@ -381,6 +390,16 @@ class Controller(Loop):
         self._course, self._paused = self._paused, None
         self._course.resume()
         self._go(State.MOVING, f"goes on at {self._course.clock:.2f} s of the path")
+
+    def _beside(self, work: Callable[[], T]) -> T:
+        """Do what may take longer than a cycle; in real time the cycles go on beside it, or the PLCs would hold."""
+        if self._pace is None or self.state is State.OFF:
+            return work()
+        with interrupt_calls(self.stop), ThreadPoolExecutor(1, "sagline planning") as pool:
+            future = pool.submit(work)
+            while not future.done():
+                self.cycle()
+        return future.result()
 
     def stop(self) -> None:
         """Lead all rates to zero, from the next cycle on; where nothing moves, nothing happens."""
