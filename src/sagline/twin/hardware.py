@@ -7,7 +7,6 @@ from typing import Final
 import numpy as np
 
 from sagline.arrays import Array
-from sagline.control.link import Whole
 from sagline.dynamics.damping import Damping
 from sagline.dynamics.drives import lever_of
 from sagline.dynamics.simulator import Reading, Simulator
@@ -15,18 +14,18 @@ from sagline.robot.robot import Robot
 from sagline.twin.start import Start
 
 FILTER: Final = 0.05  # s, of the PLCs' filters of load cells
+LENGTH, RATE, TORQUE, CELL, FILTERED = range(5)  # rows of what is read
 
 
 class Hardware:
     """Drives and sensors, and the plant.
 
     Attributes:
-        length: Unstrained lengths off the drums, as nominal drums have them at what the encoders count [m], (m,).
-        rate: Their change in the last period [m/s], (m,).
-        torque: Of the motors at their shafts, positive where it lets cable out [N m], (m,).
-        cells: What the load cells read [N], (m,).
-        filtered: The same behind a filter [N], (m,).
-        counts: Of the encoders, (m,).
+        read: What a period ends with, in the rows LENGTH: unstrained, off the drums, as nominal drums have it at what
+            the encoders count [m]; RATE: its change in the period [m/s]; TORQUE: of the motors at their shafts,
+            positive where it lets cable out [N m]; CELL: what the load cells read [N]; FILTERED: the same behind a
+            filter [N], (5, m).
+        counts: Of the encoders, whole numbers as floats, (m,).
     """
 
     def __init__(self, robot: Robot, begin: Start, damping: Damping, step: float, period: float, seed: int) -> None:
@@ -49,12 +48,12 @@ class Hardware:
         self._lever = lever_of(robot, reading.length) / np.abs(winch.gear)
         self._weight, self._gravity, self._slip = np.zeros(6), robot.gravity, np.zeros(m)
         self._wrong: dict[int, tuple[float, float]] = {}  # load cells: what counts of a reading, and what is added
-        self._powered, self._mask = [False] * m, np.zeros(m)
+        self._powered, self._torque_of_force = [False] * m, np.zeros(m)
         self._share = period / (FILTER + period)
-        self.length, self.cells = np.zeros(m), np.zeros(m)
-        self.filtered = np.array(reading.load_cell)
-        self._read(reading)
-        self.rate = np.zeros(m)
+        self.read = np.zeros((5, m))
+        self.read[FILTERED] = reading.load_cell
+        self._take(reading)
+        self.read[RATE] = 0.0
 
     @property
     def reading(self) -> Reading:
@@ -73,7 +72,7 @@ class Hardware:
             self._switch(powered)
         counts = np.rint(self._nominal.counts(np.array(length)))
         targets = self._true.lengths(counts - self._slip)
-        self._read(self._simulator.step(targets, self._period, tension=np.array(tension), wrench=self._weight))
+        self._take(self._simulator.step(targets, self._period, tension=tension, wrench=self._weight))
 
     def _switch(self, powered: list[bool]) -> None:
         """Give power to drives, or take it from them."""
@@ -82,28 +81,25 @@ class Hardware:
             self._simulator.release(*on)
         if off := [i for i in changed if not powered[i]]:
             self._simulator.hold(*off)
-        self._powered, self._mask[:] = list(powered), powered
+        self._powered, self._torque_of_force = list(powered), self._lever * powered
 
-    def _read(self, reading: Reading) -> None:
+    def _take(self, reading: Reading) -> None:
         """Fill what encoders, drives and cells read."""
-        counts = np.rint(self._true.counts(reading.length) + self._slip)
-        length = self._nominal.lengths(counts)
-        self.rate = (length - self.length) / self._period
-        self.length, self.counts = length, counts.astype(np.int64)
-        self.torque = reading.force * self._lever * self._mask
-        self.cells = reading.load_cell.copy()
+        read = self.read
+        self.counts = np.rint(self._true.counts(reading.length) + self._slip)
+        length = self._nominal.lengths(self.counts)
+        read[RATE] = (length - read[LENGTH]) / self._period
+        read[LENGTH] = length
+        read[TORQUE] = reading.force * self._torque_of_force
+        read[CELL] = reading.load_cell
         for cell, (kept, added) in self._wrong.items():
-            self.cells[cell] = kept * self.cells[cell] + added
-        self.filtered += self._share * (self.cells - self.filtered)
-
-    counts: Whole
-    torque: Array
+            read[CELL, cell] = kept * read[CELL, cell] + added
+        read[FILTERED] += self._share * (read[CELL] - read[FILTERED])
 
     @property
-    def saturated(self) -> list[float]:
-        """Which drives are at a limit, not 0 where they are."""
-        found: list[float] = self._simulator.reading.saturated.tolist()
-        return found
+    def saturated(self) -> Array:
+        """Which drives are at a limit of torque or speed, not 0 where they are, (m,)."""
+        return self._simulator.reading.saturated
 
     def spoil_cell(self, cell: int, words: str | None, value: float) -> None:
         """Let a load cell be wrong in one of the ways of `KINDS`, or right again."""
@@ -112,7 +108,7 @@ class Hardware:
         elif words == "is wrong by # N":
             self._wrong[cell] = (1.0, value)
         else:
-            fixed = {"sticks": self.cells[cell], "saturates": self._full[cell]}.get(words, value)
+            fixed = {"sticks": self.read[CELL, cell], "saturates": self._full[cell]}.get(words, value)
             self._wrong[cell] = (0.0, float(fixed))
 
     def break_cable(self, cable: int) -> None:

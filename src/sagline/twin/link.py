@@ -107,8 +107,8 @@ class MachineLink:
             spoiled: What happens to the blocks of some groups.
         """
         if self._network.ideal and not spoiled:
-            for group in range(len(self._groups)):
-                self._take(group, now, snapshot)
+            count = len(self._groups)
+            self._newest, self._arrival, self._owner = [snapshot] * count, [now] * count, list(snapshot.owners)
         else:
             for group, back in enumerate(self._back):
                 for block in self._blocks(group, snapshot, spoiled.get(group)):
@@ -138,7 +138,7 @@ class MachineLink:
     def _take(self, group: int, arrival: float, block: Snapshot | None) -> None:
         """Take a block in, if it is good and newer than what was there."""
         known = self._newest[group]
-        if block is None or (known is not None and not _newer(block.counters[group], known.counters[group])):
+        if block is None or (known is not None and not _newer(block.counter(group), known.counter(group))):
             self._discarded[group] += 1
             return
         self._newest[group], self._arrival[group] = block, arrival

@@ -15,12 +15,12 @@ from sagline.dynamics.simulator import Reading
 from sagline.errors import InvalidValueError
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.twin.hardware import Hardware
+from sagline.twin.hardware import CELL, LENGTH, Hardware
 from sagline.twin.injected import KINDS, Injected, Schedule, fault
 from sagline.twin.link import MachineLink
 from sagline.twin.network import Network
 from sagline.twin.plc_program import COUNTERS, Limits, Order, Program
-from sagline.twin.snapshot import Report, Snapshot
+from sagline.twin.snapshot import COUNTER, COUNTS, DRIVE_FAULT, ECHO, FAULT, OWNER, STATE, STATUS, Report, Snapshot
 from sagline.twin.start import check_step, limits_of, started
 
 LOSSES: Final = Damping(loss_time=1e-3, air_damping=0.2)  # ours; on the prototype as if the air took 2 N s/m
@@ -113,7 +113,10 @@ class Machine:
         self._parts = [slice(winches[0], winches[-1] + 1) for winches in self.groups]
         self._programs = self._switched_on(limits_of(self.nominal, begin.nominal))
         self._clocks = np.random.default_rng((noise, 2)).uniform(0.0, 1e3, len(self.groups))
-        self._counters, self._cycles = [0] * len(self.groups), 0
+        self._told = np.zeros((5, len(self.groups)), dtype=np.int64)
+        self._whole = np.zeros((3, robot.cable_count), dtype=np.int64)
+        self._news: Any = None  # what was told last but for counters
+        self._cycles = 0
         self._links: list[MachineLink] = []
         self._schedule, self._commands = Schedule(), ""
         self._spoiled: dict[int, str] = {}
@@ -125,7 +128,7 @@ class Machine:
 
     def _switched_on(self, limits: Limits) -> list[Program]:
         """The PLCs' programs, each with the limits of its own winches."""
-        programs, length = [], self._hardware.length.tolist()
+        programs, length = [], self._hardware.read[LENGTH].tolist()
         for part in self._parts:
             program = Program(Limits(*(column[part] for column in limits)), self.period)
             program.length = length[part]
@@ -206,7 +209,7 @@ class Machine:
     def _scan(self, now: float) -> None:
         """Let the PLCs set the drives, and these move."""
         hardware = self._hardware
-        encoder, cell = hardware.length.tolist(), hardware.cells.tolist()
+        encoder, cell = hardware.read[LENGTH].tolist(), hardware.read[CELL].tolist()
         length: list[float] = []
         tension: list[float] = []
         powered: list[bool] = []
@@ -223,17 +226,18 @@ class Machine:
 
     def _written(self, before: Snapshot | None) -> Snapshot:
         """The blocks of all groups; those of a PLC that stands stay as they were."""
-        hardware, programs = self._hardware, self._programs
-        saturated, states, drive_faults = hardware.saturated, list[int](), list[int]()
-        for program, part in zip(programs, self._parts, strict=True):
-            states += program.states(saturated[part])
-            drive_faults += program.drive_fault
-        counters = self._counters = [counter % COUNTERS + 1 for counter in self._counters]
-        floats = np.array((hardware.length, hardware.rate, hardware.torque, hardware.cells, hardware.filtered))
-        whole = np.array((hardware.counts, states, drive_faults), dtype=np.int64)
-        told = [(program.owner, program.echo, program.status, program.fault) for program in programs]
-        groups = np.array([counters, *zip(*told, strict=True)], dtype=np.int64)
-        new = Snapshot((floats, whole, groups, self.time + self._clocks), counters, [row[0] for row in told])
+        hardware, programs, groups = self._hardware, self._programs, self._told
+        groups[COUNTER] = groups[COUNTER] % COUNTERS + 1
+        groups[ECHO] = [program.echo for program in programs]
+        saturated = hardware.saturated.tolist()
+        news = [(program.owner, program.status, program.fault, *program.powered) for program in programs], saturated
+        if news != self._news:
+            self._news = news
+            groups[OWNER], groups[STATUS], groups[FAULT] = zip(*(row[:3] for row in news[0]), strict=True)
+            for program, part in zip(programs, self._parts, strict=True):
+                self._whole[STATE, part], self._whole[DRIVE_FAULT, part] = program.states(saturated[part])
+        self._whole[COUNTS] = hardware.counts
+        new = Snapshot((hardware.read.copy(), self._whole.copy(), groups.copy(), self.time + self._clocks))
         if before is not None:
             for group in self._stopped:
                 new.keep(group, self._parts[group], before)

@@ -23,6 +23,13 @@ FOLLOWING: Final = 0.01  # m, between set point and encoder: the controller stop
 TINY: Final = 1e-9  # m and s: of rounding
 LEFT: Final = 0.1  # m: so much hanging cable there is at least
 
+# plain numbers, which Python compares ten times as fast as members of an enumeration
+_EMERGENCY: Final = int(GroupStatus.EMERGENCY | GroupStatus.LOCKED | GroupStatus.BRAKED)
+_LOCKED: Final = int(GroupStatus.READY | GroupStatus.LOCKED | GroupStatus.BRAKED)
+_READY, _BRAKED, _RAMPING = int(GroupStatus.READY), int(GroupStatus.BRAKED), int(GroupStatus.RAMPING)
+_HOLDING, _FOLLOWING = int(GroupStatus.HOLDING), int(GroupStatus.FOLLOWING)
+_LEAVE, _HOLD, _FOLLOW, _LOCK = (int(mode) for mode in (Mode.LEAVE, Mode.HOLD, Mode.FOLLOW, Mode.LOCK))
+
 
 class Order(NamedTuple):
     """A command, as one PLC has it: of its own winches only."""
@@ -92,7 +99,7 @@ class Program:
         self._asked = [0.0] * count  # set points of the last command, or where the drives stood
         self._rate = [0.0] * count
         self._ramp = 0.0  # what is left of it [s]
-        self._mode = int(Mode.LEAVE)
+        self._mode = _LEAVE
 
     def claim(self, owner: int, now: float) -> None:
         """Give the grant, where it is free or its holder's counter has stood for OWNER_TIMEOUT.
@@ -121,7 +128,7 @@ class Program:
         """Let the drums go and clear the drives, as the operator of the machine does; brakes stay on for now."""
         self.emergency = self.locked = False
         self.drive_fault = [0] * len(self.drive_fault)
-        self.fault = GroupFault.NONE
+        self.fault, self._order = GroupFault.NONE, None
         self._brake()
 
     def restart(self) -> None:
@@ -142,62 +149,66 @@ class Program:
             encoder: Lengths off the drums [m].
             cell: Raw readings of the load cells [N].
         """
-        order, fresh = self._order, self._fresh
-        self._fresh = False
-        if fresh:
-            before, self._moved = self._moved, now
+        order, fresh, waited = self._order, self._fresh, now - self._moved
+        if fresh and order is not None:
+            self._fresh, self._moved = False, now
+            if order.mode == _FOLLOW and order.enable == self.powered and not self.stands and not self._lags(encoder):
+                self._follow(order, waited, cell)
+                return
+            if order.mode == _LEAVE:
+                self.owner, self._order = 0, None
+                self.fault = GroupFault.NONE
+                self._brake()
+            elif order.mode == _LOCK:
+                self.locked = True
         if self.emergency or self.locked:
             self.fault = GroupFault.EMERGENCY_STOP if self.emergency else self.fault
             self._brake()
             return
         if self._lags(encoder):
+            self._let_lag(encoder)
             self._stop(GroupFault.FOLLOWING_ERROR)
-        if order is None:
-            self._slow_down(cell)
-        elif order.mode == Mode.LEAVE:
-            self.owner, self._order = 0, None
-            self.fault = GroupFault.NONE
-            self._brake()
-        elif order.mode == Mode.LOCK:
-            self.locked = True
-            self._brake()
-        elif any(self.drive_fault):
+        if any(self.drive_fault):
             self._stop(GroupFault.DRIVE)
-            self._slow_down(cell)
-        elif self.fault and not (fresh and order.mode == Mode.HOLD and not self._ramp):
-            self._slow_down(cell)
-        elif fresh:
+        elif fresh and order is not None and (not self.fault or (order.mode == _HOLD and not self._ramp)):
             self.fault = GroupFault.NONE
-            if order.enable != self.powered:
-                self._switch(order, encoder)
-            self._obey(order, max(now - before, self.period), cell)
-        elif now - self._moved >= min(HEARTBEAT, order.valid_for) - TINY:
+            self._switch(order, encoder)
+            self._obey(order, waited, cell)
+            return
+        elif order is not None and waited >= min(HEARTBEAT, order.valid_for) - TINY:
             self._stop(GroupFault.HEARTBEAT)
-            self._slow_down(cell)
-        elif self._mode == Mode.FOLLOW:
-            self._drive(self._rate, cell)
-        else:
-            self._slow_down(cell)
+        elif self._mode == _FOLLOW and not self.fault:
+            self._drive([a + b * self.period for a, b in zip(self.length, self._rate, strict=True)], cell)
+            return
+        self._slow_down(cell)
 
     def _lags(self, encoder: list[float]) -> bool:
-        """Whether a drive is too far from its set point, which is then where it is."""
-        lags = False
-        for i in self.winches:
-            if self.powered[i] and abs(self.length[i] - encoder[i]) > FOLLOWING:
-                self.length[i], self._rate[i], lags = encoder[i], 0.0, True
-        return lags
+        """Whether a drive is too far from its set point."""
+        for has, length, there in zip(self.powered, self.length, encoder, strict=True):
+            if has and not -FOLLOWING <= length - there <= FOLLOWING:
+                return True
+        return False
+
+    def _let_lag(self, encoder: list[float]) -> None:
+        """Set points of drives that are too far from theirs are where they are."""
+        rows = zip(self.powered, self.length, self._rate, encoder, strict=True)
+        parts = [(there, 0.0) if has and abs(at - there) > FOLLOWING else (at, rate) for has, at, rate, there in rows]
+        self.length, self._rate = [at for at, _ in parts], [rate for _, rate in parts]
 
     def _brake(self) -> None:
         """Take the power from all drives, whose brakes fall."""
         self.powered = [False] * len(self.powered)
         self._loaded = list(self.powered)
-        self._rate, self._ramp, self._mode = [0.0] * len(self._rate), 0.0, int(Mode.LEAVE)
+        self._rate, self._ramp, self._mode = [0.0] * len(self._rate), 0.0, _LEAVE
 
     def _switch(self, order: Order, encoder: list[float]) -> None:
         """Give power to the drives that may move, which begin where they stand, and take it from the others.
 
         A drive takes up the tension that is expected first; its brake goes with the next command.
         """
+        if order.enable == self.powered:
+            return
+        self.length, self._asked, self._rate = list(self.length), list(self._asked), list(self._rate)
         for i in self.winches:
             has = order.enable[i] and (self.powered[i] or self._loaded[i])
             if has and not self.powered[i]:
@@ -209,48 +220,47 @@ class Program:
 
     def _obey(self, order: Order, waited: float, cell: list[float]) -> None:
         """Do what a new command says."""
-        if order.mode != Mode.FOLLOW or not any(self.powered):
-            self.tension = [new if isfinite(new) else old for new, old in zip(order.tension, self.tension, strict=True)]
-            if self._mode == Mode.FOLLOW and any(self._rate):
-                self._ramp = RAMP
-            self._mode = order.mode
-            self._slow_down(cell)
+        if order.mode == _FOLLOW and any(self.powered):
+            self._follow(order, waited, cell)
             return
-        self._mode, self._ramp = order.mode, 0.0
-        if self._acceptable(order, waited):
-            self.tension = order.tension
-            period, length = self.period, self.length
-            self._drive([(order.length[i] - length[i]) / period for i in self.winches], cell)
-            if not self.fault:
-                self._asked, self._rate = order.length, order.rate
-        else:
-            self._stop(GroupFault.SET_POINT)
-            self._slow_down(cell)
+        self.tension = [new if isfinite(new) else old for new, old in zip(order.tension, self.tension, strict=True)]
+        if self._mode == _FOLLOW and any(self._rate):
+            self._ramp = RAMP
+        self._mode = order.mode
+        self._slow_down(cell)
 
-    def _acceptable(self, order: Order, waited: float) -> bool:
-        """Whether set points are within their limits, and no faster than the winches since the last ones."""
+    def _follow(self, order: Order, waited: float, cell: list[float]) -> None:
+        """Take new set points, if they are within their limits and no faster than the winches since the last ones."""
         least, most, speed, _ = self.limits
+        lengths, rates, tensions, asked = order.length, order.rate, order.tension, self._asked
+        self._mode, self._ramp = _FOLLOW, 0.0
+        if waited < self.period:
+            waited = self.period
         for i in self.winches:
-            if self.powered[i]:
-                length = order.length[i]
-                if not (
-                    least[i] <= length <= most[i]
-                    and abs(length - self._asked[i]) <= speed[i] * waited + TINY
-                    and abs(order.rate[i]) <= speed[i] + TINY
-                    and isfinite(order.tension[i])
-                ):
-                    return False
-        return True
-
-    def _drive(self, rate: list[float], cell: list[float]) -> None:
-        """Move the set points on for a period, unless that would take in a cable that pulls too hard."""
-        limit, length, period = self.limits.tension, self.length, self.period
-        for i in self.winches:
-            if cell[i] > limit[i] and rate[i] < 0.0 and self.powered[i]:
-                self._stop(GroupFault.OVER_TENSION)
+            length, fastest = lengths[i], speed[i]
+            if self.powered[i] and not (
+                least[i] <= length <= most[i]
+                and -fastest * waited - TINY <= length - asked[i] <= fastest * waited + TINY
+                and -fastest - TINY <= rates[i] <= fastest + TINY
+                and isfinite(tensions[i])
+            ):
+                self._stop(GroupFault.SET_POINT)
                 self._slow_down(cell)
                 return
-        self.length = [length[i] + rate[i] * period if self.powered[i] else length[i] for i in self.winches]
+        if self._drive(lengths, cell):
+            self.tension, self._asked, self._rate = tensions, lengths, rates
+
+    def _drive(self, lengths: list[float], cell: list[float]) -> bool:
+        """Move the set points on for a period, unless that would take in a cable that pulls too hard."""
+        limit, length, powered, moved = self.limits.tension, self.length, self.powered, []
+        for i in self.winches:
+            if cell[i] > limit[i] and lengths[i] < length[i] and powered[i]:
+                self._stop(GroupFault.OVER_TENSION)
+                self._slow_down(cell)
+                return False
+            moved.append(lengths[i] if powered[i] else length[i])
+        self.length = moved
+        return True
 
     def _stop(self, fault: GroupFault) -> None:
         """Slow down by itself, and hold."""
@@ -265,12 +275,18 @@ class Program:
         share, period = self._ramp / RAMP, min(self.period, self._ramp)
         mean = period * (share - 0.5 * period / RAMP)
         self._ramp = self._ramp - period if self._ramp - period > TINY else 0.0
+        self.length = list(self.length)
         for i in self.winches:
             if self.powered[i] and not (cell[i] > self.limits.tension[i] and self._rate[i] < 0.0):
                 self.length[i] += self._rate[i] * mean
+        self._asked = list(self.length)
         if not self._ramp:
             self._rate = [0.0] * len(self._rate)
-            self._asked = list(self.length)
+
+    @property
+    def stands(self) -> bool:
+        """Whether it does not do what commands say."""
+        return bool(self.fault or self.emergency or self.locked or any(self.drive_fault))
 
     @property
     def status(self) -> int:
@@ -288,16 +304,14 @@ class Program:
             return ready | _HOLDING
         return ready | _FOLLOWING if self._mode == _FOLLOW else ready
 
-    def states(self, saturated: list[float]) -> list[int]:
-        """Codes of `WinchState`, by which drives are at a limit."""
-        if self.emergency or self.locked:
-            return [int(WinchState.LOCKED)] * len(saturated)
-        return [
-            4 if self.drive_fault[i] else 0 if not self.powered[i] else 2 if saturated[i] else 1 for i in self.winches
-        ]
-
-
-_EMERGENCY: Final = int(GroupStatus.EMERGENCY | GroupStatus.LOCKED | GroupStatus.BRAKED)
-_LOCKED: Final = int(GroupStatus.READY | GroupStatus.LOCKED | GroupStatus.BRAKED)
-_READY, _BRAKED, _RAMPING = int(GroupStatus.READY), int(GroupStatus.BRAKED), int(GroupStatus.RAMPING)
-_HOLDING, _FOLLOWING, _FOLLOW = int(GroupStatus.HOLDING), int(GroupStatus.FOLLOWING), int(Mode.FOLLOW)
+    def states(self, saturated: list[float]) -> tuple[list[int], list[int]]:
+        """Codes of `WinchState`, by which drives are at a limit, and the drives' own codes."""
+        states = [WinchState.SATURATED if full else WinchState.ENABLED for full in saturated]
+        for i in self.winches:
+            if self.drive_fault[i]:
+                states[i] = WinchState.FAULT
+            elif self.emergency or self.locked:
+                states[i] = WinchState.LOCKED
+            elif not self.powered[i]:
+                states[i] = WinchState.BRAKED
+        return list(map(int, states)), self.drive_fault

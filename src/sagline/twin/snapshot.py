@@ -9,6 +9,9 @@ from sagline.control.link import Whole
 
 FIRST: Final = 2  # of the arrays of a snapshot that are of groups rather than winches
 
+COUNTS, STATE, DRIVE_FAULT = range(3)  # rows of the second
+COUNTER, OWNER, ECHO, STATUS, FAULT = range(5)  # rows of the third
+
 
 class Snapshot:
     """Blocks of all groups, in a few arrays.
@@ -16,15 +19,19 @@ class Snapshot:
     Attributes:
         arrays: Length, rate, torque, tension, filtered (5, m); counts, state, winch fault (3, m); counter, owner,
             echo, status, fault (5, G); the PLCs' clocks [s] (G,).
-        counters: The counters again, as plain numbers.
-        owners: Likewise.
+        owners: Who has the grants, as plain numbers.
     """
 
-    __slots__ = ("arrays", "counters", "owners")
+    __slots__ = ("arrays", "owners")
 
-    def __init__(self, arrays: tuple[Array, Whole, Whole, Array], counters: list[int], owners: list[int]) -> None:
+    def __init__(self, arrays: tuple[Array, Whole, Whole, Array]) -> None:
         """Keep what there is."""
-        self.arrays, self.counters, self.owners = arrays, counters, owners
+        self.arrays = arrays
+        self.owners: list[int] = arrays[FIRST][OWNER].tolist()
+
+    def counter(self, group: int) -> int:
+        """Of a group's block."""
+        return int(self.arrays[FIRST][COUNTER, group])
 
     def keep(self, group: int, part: slice, before: Snapshot) -> None:
         """Let a group say again what it said before.
@@ -37,7 +44,7 @@ class Snapshot:
         for k, (array, old) in enumerate(zip(self.arrays, before.arrays, strict=True)):
             where = part if k < FIRST else group
             array[..., where] = old[..., where]
-        self.counters[group], self.owners[group] = before.counters[group], before.owners[group]
+        self.owners[group] = before.owners[group]
 
 
 class Report(NamedTuple):
