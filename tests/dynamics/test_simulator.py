@@ -178,3 +178,64 @@ def test_what_a_period_cannot_be_is_refused_and_changes_nothing(winches: Any) ->
 def test_a_start_is_of_this_robot() -> None:
     with pytest.raises(sl.InvalidValueError, match="start is of 8 cables"):
         sl.Simulator(sl.without_cables(prototype(), 3), sl.inverse(prototype(), PLACE).state)
+
+
+@pytest.mark.parametrize("winches", ["ideal", "robot"])
+def test_a_cable_is_cut_as_simulate_breaks_one(winches: str) -> None:
+    state = sl.inverse(prototype(), PLACE).state
+    machine = sl.Simulator(prototype(), state, winches=winches, step=1e-3)  # type: ignore[arg-type]
+    run = sl.simulate(state, duration=0.6, step=1e-3, winches=winches, events=sl.Break(4, 0.2))  # type: ignore[arg-type]
+    for _ in range(20):
+        machine.step(state.unstrained_length, 0.01)
+    machine.cut(4)
+    for _ in range(40):
+        reading = machine.step(state.unstrained_length, 0.01)
+    np.testing.assert_allclose(reading.position, run.pose.position[-1], atol=1e-9)
+    np.testing.assert_allclose(reading.tension, np.nan_to_num(run.tensions[-1]), atol=1e-6)
+    assert np.linalg.norm(reading.position - PLACE.position) > 0.02
+
+
+def test_a_drive_that_gives_less() -> None:
+    """It holds what its friction holds, then lets the cable go; the reading tells that it is at its limit."""
+    robot = prototype(load_cell_deviation=0.0, load_cell_bias=0.0, load_cell_gain=1.0)
+    state = sl.inverse(robot, PLACE).state
+    machine, pull = sl.Simulator(robot, state), state.cables.frame_end_tension[2]
+    machine.limit_force(pull - 14.0, 2)
+    reading = machine.step(state.unstrained_length, 0.3)
+    assert np.flatnonzero(reading.saturated).tolist() == [2]
+    assert reading.force[2] == pytest.approx(14.0 - pull)
+    assert reading.length[2] == state.unstrained_length[2]
+    machine.limit_force(pull - 16.0, 2)
+    assert machine.step(state.unstrained_length, 0.3).length[2] > state.unstrained_length[2] + 1e-5
+    for force, says in ((-1.0, "force is -1 N"), (np.nan, "force is nan")):
+        with pytest.raises(sl.InvalidValueError, match=says):
+            machine.limit_force(force)
+    with pytest.raises(sl.InvalidValueError, match="these winches have no motors"):
+        sl.Simulator(robot, state, winches="ideal").limit_force(1.0)
+
+
+def test_set_points_that_jump_are_come_after_with_the_gain_of_the_loop() -> None:
+    """20 /s: what is left of a jump falls by e in 50 ms; asked for straight, it would be there in a period."""
+    robot = prototype(friction=0.0)
+    state = sl.inverse(robot, PLACE).state
+    machine = sl.Simulator(robot, state)
+    machine.shift(1e-3, 3)
+    target = state.unstrained_length + np.where(np.arange(8) == 3, 1e-3, 0.0)
+    left = [target[3] - machine.step(target, 0.01).length[3] for _ in range(20)]
+    assert left[0] > 0.7e-3
+    assert left[9] / left[4] == pytest.approx(np.exp(-1.0), rel=0.1)
+
+
+def test_drums_that_are_released_begin_where_they_stood_with_an_empty_integral() -> None:
+    robot = prototype()
+    state = sl.inverse(robot, PLACE).state
+    machine, twin = sl.Simulator(robot, state), sl.Simulator(robot, state)
+    machine.hold()
+    for _ in range(200):
+        machine.step(state.unstrained_length + 0.02, 0.01)  # would fill the integral to its limit
+    machine.release()
+    place = machine.reading.position.copy()
+    for _ in range(100):
+        machine.step(state.unstrained_length, 0.01)
+        assert np.abs(machine.reading.force - twin.step(state.unstrained_length, 0.01).force).max() < 1e-6
+    np.testing.assert_allclose(machine.reading.position, place, atol=1e-12)

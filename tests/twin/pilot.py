@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 import sagline as sl
@@ -34,9 +36,13 @@ class Pilot:
         )
         return self._sample(self.link.exchange(command))
 
+    def look(self) -> Sample:
+        """Let a cycle pass without a command; the sample."""
+        return self._sample(self.link.exchange(None))
+
     def wait(self, seconds: float) -> list[Sample]:
         """Send nothing for a while; the samples."""
-        return [self._sample(self.link.exchange(None)) for _ in range(round(seconds / 0.01))]
+        return [self.look() for _ in range(round(seconds / 0.01))]
 
     def hold(self, seconds: float) -> list[Sample]:
         """Hold for a while; the samples."""
@@ -59,6 +65,7 @@ class Pilot:
 P2 = (-0.13, 1.42, 0.68)  # m, of Table 2
 
 
+@cache
 def leg(robot: sl.Robot, speed: float) -> Plan:
     """A plan straight from home to the second of the ten poses, whose middle is passed at a speed [m/s]."""
     waypoints = [HOME, sl.Pose.from_euler(list(P2), 0.0, 0.0, 0.0)]

@@ -279,6 +279,22 @@ class Simulator:
             self._lengths[freed] = plant.rows[LENGTH, freed]
             self._course.value[1, : len(freed)][freed] = stood[freed]
 
+    def shift(self, length: float, *winches: int) -> None:
+        """Let set points jump, as they do for a drive whose encoder loses counts; it comes after as its gains say.
+
+        Args:
+            length: By how much the way to the next set points begins elsewhere [m].
+            winches: Which, from 0; none for all.
+
+        Raises:
+            InvalidValueError: If there is no such winch, or the length is no number.
+        """
+        chosen, by = self._chosen(winches), number(length, "length", "m")
+        drums = self._kind == d.DRUMS
+        self._lengths[chosen] += by
+        own = self._course.value[1, : len(self._asked)]
+        own[chosen] += by * (1.0 + self._plant.data[d.WINDING_STRAIN, chosen] if drums else 1.0)
+
     def cut(self, *cables: int) -> None:
         """Let cables break: they pull and weigh no longer; their drums go on as they are asked to.
 

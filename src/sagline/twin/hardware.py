@@ -116,8 +116,10 @@ class Hardware:
         self._simulator.cut(cable)
 
     def shift_encoder(self, winch: int, length: float) -> None:
-        """Let an encoder count so much more cable than there is [m]."""
-        self._slip[winch] += np.rint(length * self._nominal.per_meter[winch])
+        """Let an encoder count so much more cable than there is [m]; its drive winds that in, as its gains say."""
+        slip = np.rint(length * self._nominal.per_meter[winch])
+        self._slip[winch] += slip
+        self._simulator.shift(-slip / self._true.per_meter[winch], winch)
 
     def limit_force(self, winch: int, force: float) -> None:
         """Let a drive give no more than so much at the cable [N]."""

@@ -85,14 +85,14 @@ class Injected:
     Attributes:
         kind: One of `KINDS`, "cell sticks" for instance.
         which: Number of the cell, cable, encoder, servo or group, from 0; 0 where there is only one.
-        value: Its number, SI; NaN where it has none.
+        value: Its number, SI; 0 where it has none.
         time: When it begins, since the start of the machine [s].
         duration: How long it lasts [s]; infinite unless told.
     """
 
     kind: str
     which: int = 0
-    value: float = math.nan
+    value: float = 0.0
     time: float = 0.0
     duration: float = math.inf
 
@@ -136,12 +136,12 @@ def fault(text: str) -> Injected:
         raise _refused(text, "a duration > 0 s")
     for name, kind in KINDS.items():
         number = r" (?P<which>\d{1,6})" if kind.numbered else ""
-        happens = kind.words.replace("#", f"{_NUMBER} {kind.unit}").lower()
+        happens = kind.words.replace("#", f"{_NUMBER} {kind.unit.lower()}")
         if match := re.fullmatch(f"{kind.item}{number} {happens}".strip(), what, re.ASCII):
             found = match.groupdict()
             if kind.for_good and duration < math.inf:
                 raise _refused(text, f"no duration: what {kind.words or 'is pressed'} does not end by itself")
-            value = _number(text, found.get("value"), math.nan, kind.unit) * kind.scale
+            value = _number(text, found.get("value"), 0.0, kind.unit) * kind.scale
             return Injected(name, int(found.get("which") or 0), value, time, duration)
     raise _unknown(text, what)
 

@@ -109,7 +109,7 @@ class Machine:
         self._network = Network(delay, jitter, loss, noise)
         begin = started(robot, self.nominal, start, bool(surveyed))
         self._hardware = Hardware(robot, begin, losses, size, self.period, noise)
-        check_step(robot, begin.state, size)
+        check_step(robot, begin.state, size, self.period)
         self._parts = [slice(winches[0], winches[-1] + 1) for winches in self.groups]
         self._programs = self._switched_on(limits_of(self.nominal, begin.nominal))
         self._clocks = np.random.default_rng((noise, 2)).uniform(0.0, 1e3, len(self.groups))
@@ -194,17 +194,16 @@ class Machine:
             self._programs[group].take(message)
 
     def advance(self) -> None:
-        """Go on for one period: what happens, the PLCs' scans, the drives and the plant, and what is read then."""
+        """Go on for one period: the PLCs' scans, drives and plant, and what is read then; then what goes wrong next."""
         now = self.time
         for link in self._links:
             link.before(now)
-        for begins, what in self._schedule.due(now):
-            self._happen(what, begins)
         self._scan(now)
         self._cycles += 1
         self._snapshot = self._written(self._snapshot)
         for link in self._links:
             link.after(self.time, self._snapshot, self._spoiled)
+        self._let_happen()
 
     def _scan(self, now: float) -> None:
         """Let the PLCs set the drives, and these move."""
@@ -277,6 +276,12 @@ class Machine:
         if kind.numbered and not 0 <= found.which < parts:
             raise InvalidValueError("fault", brief(str(found)), f"{kind.item} 0 to {parts - 1}", "They count from 0.")
         self._schedule.plan(found)
+        self._let_happen()
+
+    def _let_happen(self) -> None:
+        """Let begin and end what is due."""
+        for begins, what in self._schedule.due(self.time):
+            self._happen(what, begins)
 
     def _happen(self, what: Injected, begins: bool) -> None:
         """Let a fault begin, or end."""
@@ -309,10 +314,9 @@ class Machine:
             (kept.add if begins else kept.discard)(group)
             if words == "stops" or not begins:
                 self._programs[group].restart()
-        elif begins:
+        self._spoiled.pop(group, None)
+        if begins and words != "is taken":
             self._spoiled[group] = words
-        else:
-            self._spoiled.pop(group, None)
 
     def emergency_stop(self) -> None:
         """Press the emergency stop: hardware locks the drums and takes the power; the PLCs only tell."""

@@ -68,7 +68,7 @@ class Program:
     Attributes:
         owner: Who has the grant, 0 for nobody.
         echo: Counter of the last command taken, 0 before the first.
-        fault: Why it acts by itself, until a command to hold acknowledges it.
+        fault: Why it acts by itself, until a command to hold acknowledges it: after the ramp, and 100 ms at least.
         powered: Which drives have power, and no brake.
         length: Set points at the end of the scan's period [m].
         tension: Expected at the drums [N].
@@ -99,6 +99,7 @@ class Program:
         self._asked = [0.0] * count  # set points of the last command, or where the drives stood
         self._rate = [0.0] * count
         self._ramp = 0.0  # what is left of it [s]
+        self._now = self._since = 0.0  # of this scan, and of that in which the fault came [s]
         self._mode = _LEAVE
 
     def claim(self, owner: int, now: float) -> None:
@@ -149,7 +150,7 @@ class Program:
             encoder: Lengths off the drums [m].
             cell: Raw readings of the load cells [N].
         """
-        order, fresh, waited = self._order, self._fresh, now - self._moved
+        order, fresh, waited, self._now = self._order, self._fresh, now - self._moved, now
         if fresh and order is not None:
             self._fresh, self._moved = False, now
             if order.mode == _FOLLOW and order.enable == self.powered and not self.stands and not self._lags(encoder):
@@ -170,7 +171,7 @@ class Program:
             self._stop(GroupFault.FOLLOWING_ERROR)
         if any(self.drive_fault):
             self._stop(GroupFault.DRIVE)
-        elif fresh and order is not None and (not self.fault or (order.mode == _HOLD and not self._ramp)):
+        elif fresh and order is not None and (not self.fault or (order.mode == _HOLD and self._was_told)):
             self.fault = GroupFault.NONE
             self._switch(order, encoder)
             self._obey(order, waited, cell)
@@ -265,8 +266,8 @@ class Program:
     def _stop(self, fault: GroupFault) -> None:
         """Slow down by itself, and hold."""
         if not self.fault:
+            self.fault, self._since = fault, self._now
             self._ramp = RAMP if any(self._rate) and not self._ramp else self._ramp
-        self.fault = self.fault or fault
 
     def _slow_down(self, cell: list[float]) -> None:
         """Lead the rates to zero, evenly, and stay there; what pulls too hard takes in no more cable."""
@@ -282,6 +283,11 @@ class Program:
         self._asked = list(self.length)
         if not self._ramp:
             self._rate = [0.0] * len(self._rate)
+
+    @property
+    def _was_told(self) -> bool:
+        """Whether the ramp is over, and the fault was in the blocks so long that nobody missed it."""
+        return not self._ramp and self._now - self._since >= HEARTBEAT - TINY
 
     @property
     def stands(self) -> bool:

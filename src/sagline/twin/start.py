@@ -23,6 +23,7 @@ from sagline.twin.plc_program import LEFT, Limits
 from sagline.twin.scale import Scale
 
 SHARE: Final = 0.2  # radians of the highest mode in a step
+NEAR: Final = 1e-6  # of a period: so far may it be from whole steps
 REACH: Final = 2.0  # of the largest distance between frame anchors: no cable is longer, where cable_length is not known
 
 
@@ -96,12 +97,20 @@ def limits_of(robot: Robot, scale: Scale) -> Limits:
     return Limits(*(column.tolist() for column in (dead + LEFT, most, speed, tension)))
 
 
-def check_step(robot: Robot, state: Equilibrium, step: float) -> None:
+def check_step(robot: Robot, state: Equilibrium, step: float, period: float) -> None:
     """Refuse a step that is too coarse for the robot's modes, its cables taut and its drums on their cables.
 
+    Args:
+        robot: The true robot.
+        state: Where it stands.
+        step: Of the plant [s].
+        period: Of controller and PLCs [s].
+
     Raises:
-        InvalidValueError: If it is more than 0.2 radians of the highest of them.
+        InvalidValueError: If a step is more than 0.2 radians of the highest of them, or the period not of whole ones.
     """
+    if not (parts := period / step) >= 0.5 or abs(parts - round(parts)) > NEAR * parts:
+        raise InvalidValueError("period", f"{period:g} s", f"a whole multiple of {step:g} s, the step", "Correct it.")
     length = state.unstrained_length
     pose = Pose.from_quaternion(state.pose.position[None], state.pose.quaternion[None])
     data = drive_data(robot, "robot", length, False)

@@ -1,0 +1,245 @@
+"""The machine behind the link: where it begins, how it stops, that it is the same in every run."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.article.machine import DEAD, LOAD, MODULUS, PULLEY, machine, rest
+from sagline.control.link import PERIOD, Command, GroupFault, GroupStatus, Mode, Sample
+from tests.dynamics.machines import prototype
+from tests.twin.pilot import HOME, Pilot, leg
+
+ROBOT = sl.load_robot("article-prototype")
+PLAN = sl.inverse(ROBOT, HOME)
+OWN = 77
+
+
+def test_it_stands_still_on_its_drives() -> None:
+    rig = sl.twin.Machine(ROBOT, seed=1)
+    pilot, place = Pilot(rig.link(), PLAN), rig.reading.position.copy()
+    assert np.abs(place - HOME.position).max() < 1e-12
+    sample = pilot.hold(10.0)[-1]
+    assert np.abs(rig.reading.position - place).max() < 1e-13
+    assert np.abs(sample.length - PLAN.unstrained_length).max() < 0.5 * 72e-9
+    assert (sample.status == GroupStatus.READY).all()
+    assert np.abs(sample.filtered - PLAN.state.cables.frame_end_tension).max() < 1.0
+
+
+STOPS = [  # model.md, section 13: how, m/s, N, mm
+    (Mode.LOCK, 0.06, 13.0, 2.3),
+    (Mode.HOLD, 0.06, 8.0, 5.1),
+    (Mode.LOCK, 0.3, 63.0, 11.7),
+    (Mode.HOLD, 0.3, 39.0, 26.7),
+]
+
+
+@pytest.mark.parametrize(("mode", "speed", "peak", "travel"), STOPS)
+def test_stops_of_the_study(mode: Mode, speed: float, peak: float, travel: float) -> None:
+    plan = leg(ROBOT, speed)
+    assert plan.path is not None
+    rig = sl.twin.Machine(ROBOT, seed=1)
+    pilot = Pilot(rig.link(), plan)
+    pilot.hold(0.05)
+    pilot.go(0.5 * plan.path.time[-1])
+    place, before, largest = rig.reading.position.copy(), rig.reading.tension.copy(), 0.0
+    for _ in range(300):
+        pilot.send(mode)
+        largest = max(largest, (rig.reading.tension - before).max())
+    assert largest == pytest.approx(peak, abs=0.5)
+    assert 1e3 * np.linalg.norm(rig.reading.position - place) == pytest.approx(travel, abs=0.15)
+
+
+@pytest.mark.parametrize("speed", [0.06, 0.3])
+def test_a_dead_controller_costs_speed_times_heartbeat_and_half_the_ramp(speed: float) -> None:
+    """The study: +8 and +39 N, 12.7 and 61.7 mm; it counts the heartbeat from the end of the last period."""
+    plan = leg(ROBOT, speed)
+    assert plan.path is not None
+    rig = sl.twin.Machine(ROBOT, seed=1)
+    pilot = Pilot(rig.link(), plan)
+    pilot.hold(0.05)
+    pilot.go(0.5 * plan.path.time[-1] - PERIOD)
+    place, before, largest = rig.reading.position.copy(), rig.reading.tension.copy(), 0.0
+    asked = pilot.go(PERIOD)[-1]
+    rate = pilot.rate[pilot.at]
+    samples = []
+    for _ in range(300):
+        samples += pilot.wait(PERIOD)
+        largest = max(largest, (rig.reading.tension - before).max())
+    assert largest == pytest.approx({0.06: 8.0, 0.3: 39.0}[speed], abs=0.5)
+    travel = 1e3 * np.linalg.norm(rig.reading.position - place)
+    assert travel == pytest.approx({0.06: 12.7, 0.3: 61.7}[speed], rel=0.015)
+    np.testing.assert_allclose(samples[-1].length - pilot.length[pilot.at], rate * (0.1 - PERIOD + 0.1), atol=1e-4)
+    ramps = [bool((sample.status & GroupStatus.RAMPING).all()) for sample in samples]
+    assert ramps.index(True) == 9  # the scan 100 ms after that of the last command
+    holds = [bool((sample.status & GroupStatus.HOLDING).all()) for sample in samples]
+    assert holds.index(True) <= 29
+    assert (samples[-1].fault == GroupFault.HEARTBEAT).all()
+    assert (asked.fault == GroupFault.NONE).all()
+
+
+def test_an_ideal_link_changes_no_bit() -> None:
+    """Driven over the link, and as a server does it: claims and commands by hand, blocks as reports."""
+    plan = leg(ROBOT, 0.3)
+    linked, served = (sl.twin.Machine(ROBOT, seed=5, faults=["cell 3 sticks at 0.4 s"]) for _ in range(2))
+    pilot = Pilot(linked.link(), plan)
+    for cycle in range(100):
+        mode = Mode.HOLD if cycle < 5 else Mode.FOLLOW
+        pilot.at = max(cycle - 5, 0)
+        sample = pilot.send(mode)
+        for group, winches in enumerate(served.groups):
+            part = list(winches)
+            if cycle == 0:
+                served.claim(group, OWN)
+                continue
+            arrays = (pilot.length[pilot.at][part], np.zeros(2), pilot.tension[pilot.at][part], np.ones(2, dtype=bool))
+            served.take(group, Command(pilot.counter, OWN, mode, pilot.valid_for, *arrays))
+        served.advance()
+        for group, winches in enumerate(served.groups):
+            report, part = served.report(group), list(winches)
+            assert report is not None
+            for name in ("length", "rate", "torque", "tension", "filtered", "counts", "state", "winch_fault"):
+                assert getattr(report, name) == getattr(sample, name)[part].tolist()
+            for name in ("counter", "plc_time", "owner", "echo", "status", "fault"):
+                assert getattr(report, name) == getattr(sample, name)[group]
+    assert (linked.reading.position == served.reading.position).all()
+    assert (sample.status & GroupStatus.FOLLOWING).all()
+    assert np.linalg.norm(linked.reading.position - HOME.position) > 0.005
+
+
+def test_a_seed_is_a_run() -> None:
+    def run(seed: int) -> list[float]:
+        rig = sl.twin.Machine(ROBOT, seed=seed, jitter=0.03, loss=0.1)
+        pilot = Pilot(rig.link(), PLAN)
+        rig.link(moves=False)  # a second listener does not change the first one's way
+        found: list[float] = []
+        for _ in range(50):
+            pilot.counter += 1
+            arrays = (pilot.length[0], pilot.rate[0], pilot.tension[0], pilot.enable)
+            sample = pilot.link.exchange(Command(pilot.counter, OWN, Mode.HOLD, 0.1, *arrays))
+            if isinstance(sample, Sample):
+                found += [float(value) for row in sample[1:] for value in row]
+        return found
+
+    assert run(1) == run(1)
+    assert run(1) != run(2)
+
+
+def test_counts_are_those_of_the_drums() -> None:
+    """72 nm, 2 pi 30 mm / (20 2^17), from the mark at 3 m; whole drums as `encoder_counts` has them."""
+    sample = Pilot(sl.twin.Machine(ROBOT).link(), PLAN).look()
+    step = 2.0 * np.pi * 0.03 / (20 * 2**17)
+    assert step == pytest.approx(72e-9, rel=2e-3)
+    np.testing.assert_array_equal(sample.counts, np.rint((PLAN.unstrained_length - 3.0) / step))
+    for wound in (
+        prototype(count_zero=500.0),
+        prototype(gear=-20.0, winding_tension=300.0),
+        prototype(layers=3, drum_width=0.03, cable_length=6.5, drum_distance=1.0, drum_offset=-0.015),
+    ):
+        place = sl.Pose.from_euler([0.4, -1.0, 1.1], 0.0, 0.0, 0.0)
+        plan = sl.inverse(wound, place)
+        sample = Pilot(sl.twin.Machine(wound, start=place).link(), plan).look()
+        assert np.abs(sample.counts - sl.encoder_counts(plan)).max() <= 1
+        assert np.abs(sample.length - plan.unstrained_length).max() < 76e-9
+
+
+def test_zeros_of_the_encoders_are_off_by_what_length_zero_is() -> None:
+    error = np.linspace(-0.002, 0.003, 8)
+    assert ROBOT.winches is not None
+    true = ROBOT.replace(winches=ROBOT.winches.replace(length_zero=3.0 + error))
+    rig = sl.twin.Machine(true, nominal=ROBOT)
+    sample = Pilot(rig.link(), PLAN).look()
+    assert np.abs(sample.length - PLAN.unstrained_length).max() < 72e-9
+    np.testing.assert_allclose(rig.reading.length, PLAN.unstrained_length + error, atol=1e-13)
+    there = sl.forward(true, PLAN.unstrained_length + error, start=HOME).pose
+    np.testing.assert_allclose(rig.reading.position, there.position, atol=1e-12)
+    assert np.linalg.norm(there.position - HOME.position) > 1e-4
+    surveyed = sl.twin.Machine(true, nominal=ROBOT, surveyed=True)
+    np.testing.assert_allclose(surveyed.reading.position, HOME.position, atol=1e-12)
+    assert np.abs(Pilot(surveyed.link(), PLAN).look().length - PLAN.unstrained_length).max() < 72e-9
+
+
+def test_a_smaller_drum_lets_out_less() -> None:
+    assert ROBOT.winches is not None
+    true = ROBOT.replace(winches=ROBOT.winches.replace(drum_radius=0.99 * 0.03))
+    rig = sl.twin.Machine(true, nominal=ROBOT)
+    plan = leg(ROBOT, 0.3)
+    pilot = Pilot(rig.link(), plan)
+    pilot.hold(0.05)
+    sample, last = pilot.go(11.0)[-1], plan.unstrained_length[-1]
+    assert np.abs(sample.length - last).max() < 1e-5
+    told = sample.length - PLAN.unstrained_length
+    np.testing.assert_allclose(rig.reading.length - PLAN.unstrained_length, 0.99 * told, atol=2e-7)
+    assert np.abs(told).max() > 0.5
+
+
+@pytest.mark.parametrize(
+    "error", [{PULLEY: 33.0}, {DEAD: 0.5}, {MODULUS: 20.0}, {LOAD: 2.0}, {DEAD: 1.0, PULLEY: 20.0}]
+)
+def test_it_begins_where_the_article_s_machine_rests(error: dict[str, float]) -> None:
+    """What pulleys and dead cable add to the lengths at home was not counted when the encoders were set."""
+    home = sl.inverse(ROBOT, sl.Pose.from_quaternion(HOME.position[None], [[0.0, 0.0, 0.0, 1.0]]))
+    rig = sl.twin.Machine(machine(ROBOT, error), nominal=ROBOT)
+    np.testing.assert_allclose(rig.reading.position, rest(ROBOT, home, home, [error])[0, 0], atol=1e-9)
+
+
+def test_the_start_is_the_middle_of_the_test_box() -> None:
+    assert np.abs(sl.twin.Machine(ROBOT).reading.position - HOME.position).max() < 1e-12
+    bare = ROBOT.replace(test_box=None)
+    with pytest.raises(sl.InvalidValueError, match=r"^start is not given; .*has no test_box.*start=Pose"):
+        sl.twin.Machine(bare)
+    place = sl.Pose.from_euler([0.2, -0.4, 1.4], 0.0, 0.0, 0.0)
+    assert np.abs(sl.twin.Machine(bare, start=place).reading.position - place.position).max() < 1e-12
+
+
+def test_a_step_that_is_too_coarse_for_the_modes() -> None:
+    """sqrt(k/J_e) of the stiffest drum on its cable counts too."""
+    stiff = ROBOT.replace(cables=ROBOT.cables.replace(axial_stiffness=3e6))
+    with pytest.raises(sl.InvalidValueError, match=r"^step is 0\.001 s; allowed: <= .* rad .*Hz.*Give step=") as told:
+        sl.twin.Machine(stiff)
+    sl.twin.Machine(stiff, step=float(str(told.value).rpartition("step=")[2].rstrip(".")))
+    assert ROBOT.winches is not None
+    light = ROBOT.replace(winches=ROBOT.winches.replace(inertia=2.77e-8, speed_gain=10.0, integral_gain=100.0))
+    drum = np.sqrt(1.4e4 / PLAN.unstrained_length.min() / (2.77e-8 * (20 / 0.03) ** 2))
+    limit = 0.2 / np.hypot(drum, 2.0 * np.pi * 6.2)
+    with pytest.raises(sl.InvalidValueError, match=r"^step is 0\.001 s; allowed: <= ") as told:
+        sl.twin.Machine(light)
+    assert float(str(told.value).split("<= ")[1].split(" s")[0]) == pytest.approx(limit, rel=0.03)
+
+
+def test_what_cannot_be_a_machine() -> None:
+    assert ROBOT.winches is not None
+    blind = ROBOT.replace(winches=sl.Winch(drum_radius=0.03, inertia=1e-5))
+    for robot, given, says in (
+        (ROBOT.replace(winches=None), {}, "winches: counts_per_turn is not given"),
+        (blind, {}, "winches: counts_per_turn is not given"),
+        (blind.replace(winches=sl.Winch(drum_radius=0.03, counts_per_turn=4096)), {}, "without winches: inertia"),
+        (ROBOT, {"nominal": sl.load_robot("fast")}, "nominal is of 6 cables"),
+        (ROBOT, {"loss": 1.0}, "loss is 1; allowed: >= 0, < 1"),
+        (ROBOT, {"delay": -1.0}, "delay is -1 s"),
+        (ROBOT, {"seed": -1}, "seed is -1"),
+        (ROBOT, {"period": 0.0123456}, "period is"),
+        (ROBOT, {"faults": ["cell 8 sticks"]}, "cell 0 to 7"),
+        (ROBOT, {"start": sl.Pose.from_euler([9.0, 0.0, 1.0], 0.0, 0.0, 0.0)}, "start is a pose without an answer"),
+        (ROBOT.replace(mass=5000.0), {"surveyed": True, "nominal": ROBOT}, "start is a pose without an answer"),
+    ):
+        with pytest.raises(sl.InvalidValueError, match=says):
+            sl.twin.Machine(robot, **given)
+
+
+def test_two_controllers_on_one_machine() -> None:
+    rig = sl.twin.Machine(ROBOT)
+    first, second = Pilot(rig.link(), PLAN, 1), Pilot(rig.link(moves=False), PLAN, 2)
+    first.hold(0.03)
+    for _ in range(60):
+        sample = first.send(Mode.HOLD)
+        second.send(Mode.HOLD)
+    assert (sample.owner == 1).all()
+    first.send(Mode.LEAVE)
+    second.send(Mode.HOLD)
+    for _ in range(3):
+        sample = first.wait(PERIOD)[-1]
+        second.send(Mode.HOLD)
+    assert (sample.owner == 2).all()
+    assert rig.time == pytest.approx(67 * PERIOD)

@@ -1,0 +1,288 @@
+"""What a PLC does by itself, scan by scan."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sagline.control.link import HEARTBEAT, OWNER_TIMEOUT, RAMP, GroupFault, GroupStatus, Mode, WinchState
+from sagline.twin.plc_program import COUNTERS, Limits, Order, Program
+
+PERIOD = 0.01
+LIMITS = Limits([0.5, 0.5], [8.0, 9.0], [0.4, 0.5], [1000.0, 2000.0])
+
+
+class Group:
+    """A program, whose drives are where their set points were, unless told otherwise."""
+
+    def __init__(self) -> None:
+        self.program, self.now, self.counter = Program(LIMITS, PERIOD), 100.0, 0
+        self.encoder, self.cell = [3.0, 4.0], [150.0, 160.0]
+        self.owner = 7
+
+    def scan(self) -> Program:
+        before = list(self.program.powered)
+        self.program.scan(self.now, list(self.encoder), list(self.cell))
+        self.now += PERIOD
+        for i, (was, has) in enumerate(zip(before, self.program.powered, strict=True)):
+            if was or has:
+                self.encoder[i] = self.program.length[i]
+        return self.program
+
+    def order(
+        self, mode: int, length: list[float] | None = None, rate: list[float] | None = None, **other: Any
+    ) -> Order:
+        self.counter += 1
+        length, rate = length or list(self.program.length), rate or [0.0, 0.0]
+        order = Order(self.counter, self.owner, mode, HEARTBEAT, length, rate, [150.0, 160.0], [True, True])
+        return order._replace(**other)
+
+    def do(
+        self, mode: int, length: list[float] | None = None, rate: list[float] | None = None, **other: Any
+    ) -> Program:
+        self.program.take(self.order(mode, length, rate, **other))
+        return self.scan()
+
+    def ready(self) -> Program:
+        self.program.claim(self.owner, self.now)
+        self.do(Mode.HOLD)
+        return self.do(Mode.HOLD)
+
+    def moving(self, rate: tuple[float, float] = (0.2, -0.1), cycles: int = 5) -> Program:
+        self.ready()
+        for _ in range(cycles):
+            length = [at + r * PERIOD for at, r in zip(self.program.length, rate, strict=True)]
+            self.do(Mode.FOLLOW, length, list(rate))
+        return self.program
+
+
+def test_a_grant_is_for_one() -> None:
+    group = Group()
+    program = group.scan()
+    assert program.status == GroupStatus.READY | GroupStatus.BRAKED
+    program.claim(0, group.now)
+    assert program.owner == 0
+    program.claim(7, group.now)
+    program.claim(8, group.now)
+    assert program.owner == 7
+    program.take(group.order(Mode.HOLD, owner=8))
+    assert program.echo == 0
+    group.do(Mode.HOLD)
+    begin = group.now - PERIOD
+    while group.now < begin + OWNER_TIMEOUT - 1e-6:
+        program.claim(8, group.now)
+        assert program.owner == 7
+        group.scan()
+    program.claim(8, group.now)
+    assert (program.owner, program.echo) == (8, 0)
+
+
+def test_who_leaves_gives_it_back_and_the_brakes_fall() -> None:
+    group = Group()
+    program = group.ready()
+    assert program.powered == [True, True]
+    group.do(Mode.LEAVE)
+    assert (program.owner, program.powered) == (0, [False, False])
+    assert program.status == GroupStatus.READY | GroupStatus.BRAKED
+    program.take(group.order(Mode.HOLD))
+    assert group.scan().powered == [False, False]
+
+
+@pytest.mark.parametrize("first", [1, COUNTERS - 2])
+def test_commands_are_taken_once_and_in_order(first: int) -> None:
+    group = Group()
+    group.program.claim(7, group.now)
+    taken = []
+    for step in (0, 1, 1, 4, 3, 0, 5):
+        counter = (first - 1 + step) % COUNTERS + 1
+        group.program.take(group.order(Mode.HOLD, counter=counter))
+        taken.append((group.program.echo - first) % COUNTERS)
+    assert taken == [0, 1, 1, 4, 4, 4, 5]
+
+
+def test_drives_take_up_their_tension_before_the_brakes_go() -> None:
+    group = Group()
+    group.program.claim(7, group.now)
+    program = group.do(Mode.HOLD)
+    assert (program.powered, program.tension) == ([False, False], [150.0, 160.0])
+    group.encoder = [3.001, 4.002]
+    program = group.do(Mode.HOLD, enable=[True, False])
+    assert program.powered == [True, False]
+    assert program.length[0] == 3.001
+    assert program.states([0.0, 0.0])[0] == [WinchState.ENABLED, WinchState.BRAKED]
+    assert program.states([1.0, 1.0])[0] == [WinchState.SATURATED, WinchState.BRAKED]
+    program = group.do(Mode.HOLD, enable=[False, False])
+    assert program.powered == [False, False]
+
+
+def test_a_counter_that_stands_goes_on_then_ramps_then_holds() -> None:
+    group = Group()
+    program = group.moving()
+    begin, rate = np.array(program.length), np.array([0.2, -0.1])
+    path = np.array([begin, *(group.scan().length for _ in range(40))])
+    speed = np.diff(path, axis=0) / PERIOD
+    waits = round(HEARTBEAT / PERIOD) - 1  # the command's own period has passed
+    np.testing.assert_allclose(speed[:waits], np.tile(rate, (waits, 1)), atol=1e-12)
+    times = PERIOD * (np.arange(round(RAMP / PERIOD)) + 0.5)
+    np.testing.assert_allclose(speed[waits : waits + 20], np.outer(1.0 - times / RAMP, rate), atol=1e-12)
+    assert (speed[waits + 20 :] == 0.0).all()
+    assert program.fault == GroupFault.HEARTBEAT
+    assert program.status == GroupStatus.READY | GroupStatus.HOLDING
+    group.do(Mode.FOLLOW, [program.length[0] + 0.001, program.length[1]], [0.1, 0.0])
+    assert program.fault == GroupFault.HEARTBEAT
+    assert program.length == path[-1].tolist()
+    group.do(Mode.HOLD)
+    assert (program.fault, program.status) == (GroupFault.NONE, GroupStatus.READY)
+    moved = program.length[0] + 0.001
+    assert group.do(Mode.FOLLOW, [moved, program.length[1]], [0.1, 0.0]).length[0] == moved
+    assert program.status == GroupStatus.READY | GroupStatus.FOLLOWING
+
+
+@pytest.mark.parametrize(("valid_for", "scans"), [(0.03, 3), (0.0, 1), (5.0, 10), (math.nan, 10), (-1.0, 1)])
+def test_a_command_is_valid_for_so_long_and_no_longer_than_the_heartbeat(valid_for: float, scans: int) -> None:
+    group = Group()
+    program = group.moving()
+    group.do(Mode.FOLLOW, program.length, [0.2, -0.1], valid_for=valid_for)
+    found = [bool(group.scan().fault) for _ in range(12)]
+    assert found.index(True) == scans - 1
+
+
+def test_a_lost_command_is_no_stop() -> None:
+    group = Group()
+    program = group.moving()
+    begin = list(program.length)
+    for _ in range(4):
+        group.scan()
+    length = [begin[0] + 0.2 * 5 * PERIOD, begin[1] - 0.1 * 5 * PERIOD]
+    program = group.do(Mode.FOLLOW, length, [0.2, -0.1])
+    assert (program.fault, program.length) == (GroupFault.NONE, length)
+
+
+def test_a_command_to_hold_ramps_too() -> None:
+    group = Group()
+    program = group.moving()
+    begin = program.length[0]
+    assert group.do(Mode.HOLD).status & GroupStatus.RAMPING
+    for _ in range(25):
+        group.do(Mode.HOLD)
+    assert program.length[0] - begin == pytest.approx(0.2 * RAMP / 2)
+    assert (program.fault, program.status) == (GroupFault.NONE, GroupStatus.READY)
+
+
+@pytest.mark.parametrize("broken", ["nan", "inf", "fast", "rate", "tension"])
+def test_set_points_that_are_refused(broken: str) -> None:
+    group = Group()
+    program = group.moving()
+    length, rate, tension = list(program.length), [0.2, -0.1], [150.0, 160.0]
+    index = 1
+    if broken == "tension":
+        tension[index] = math.nan
+    elif broken == "rate":
+        rate[index] = -0.51
+    else:
+        length[index] = {"nan": math.nan, "inf": math.inf, "fast": length[index] + 1.01 * 0.5 * PERIOD}[broken]
+    before = list(program.length)
+    group.do(Mode.FOLLOW, length, rate, tension=tension)
+    assert program.fault == GroupFault.SET_POINT
+    for _ in range(30):
+        group.scan()
+    assert np.isfinite(program.length).all()
+    assert np.abs(np.array(program.length) - before).max() <= 0.2 * RAMP / 2 + 1e-9
+
+
+@pytest.mark.parametrize(("start", "step"), [(0.501, -0.001), (8.999, 0.001)])
+def test_set_points_at_the_ends_of_their_range(start: float, step: float) -> None:
+    group = Group()
+    group.encoder = [3.0, start]
+    program = group.ready()
+    for scale, fault in ((0.999, GroupFault.NONE), (2.0, GroupFault.SET_POINT)):
+        group.do(Mode.FOLLOW, [3.0, start + scale * step])
+        assert program.fault == fault
+    assert program.length[1] == start + 0.999 * step
+
+
+def test_too_much_tension_takes_in_no_more_cable() -> None:
+    group = Group()
+    program = group.moving()
+    group.cell = [900.0, 2001.0]
+    before = list(program.length)
+    for cycle in range(1, 30):
+        group.do(Mode.FOLLOW, [before[0] + 0.002 * cycle, before[1] - 0.001 * cycle], [0.2, -0.1])
+        assert program.length[1] >= before[1]
+    assert GroupFault(program.fault) == GroupFault.OVER_TENSION
+    assert program.length[0] - before[0] == pytest.approx(0.2 * RAMP / 2)
+    group.do(Mode.HOLD)
+    at = list(program.length)
+    for cycle in range(1, 20):  # to let it out is allowed, so that somebody can
+        group.do(Mode.FOLLOW, [at[0], at[1] + 0.001 * cycle], [0.0, 0.1])
+    assert program.length[1] == pytest.approx(at[1] + 0.019)
+    assert not program.fault
+
+
+def test_a_drive_that_does_not_follow() -> None:
+    group = Group()
+    program = group.moving()
+    group.encoder[0] = program.length[0] + 0.0101
+    group.do(Mode.FOLLOW, program.length, [0.2, -0.1])
+    assert program.fault == GroupFault.FOLLOWING_ERROR
+    assert program.length[0] == group.encoder[0]
+
+
+def test_locked_drums_are_the_operator_s() -> None:
+    group = Group()
+    program = group.moving()
+    group.do(Mode.LOCK)
+    for mode in (Mode.HOLD, Mode.FOLLOW):
+        group.do(mode)
+        assert program.powered == [False, False]
+        assert program.status & GroupStatus.LOCKED
+        assert program.states([0.0, 0.0])[0] == [WinchState.LOCKED] * 2
+    program.reset()
+    assert group.scan().status == GroupStatus.READY | GroupStatus.BRAKED
+    group.do(Mode.HOLD)
+    assert group.do(Mode.HOLD).powered == [True, True]
+
+
+def test_an_emergency_stop_is_mirrored_and_the_grant_can_still_be_given_back() -> None:
+    group = Group()
+    program = group.moving()
+    program.emergency = True
+    group.do(Mode.FOLLOW)
+    assert program.powered == [False, False]
+    assert program.status == GroupStatus.EMERGENCY | GroupStatus.LOCKED | GroupStatus.BRAKED
+    assert program.fault == GroupFault.EMERGENCY_STOP
+    group.do(Mode.LEAVE)
+    assert program.owner == 0
+    assert program.fault == GroupFault.EMERGENCY_STOP
+    program.reset()
+    assert group.scan().fault == GroupFault.NONE
+
+
+def test_a_drive_that_trips_stops_its_group() -> None:
+    group = Group()
+    program = group.moving()
+    program.trip(1, 9)
+    for _ in range(25):
+        group.do(Mode.FOLLOW, program.length, [0.2, 0.0])
+    assert program.fault == GroupFault.DRIVE
+    assert program.powered == [True, False]
+    assert program.states([0.0, 0.0]) == ([WinchState.ENABLED, WinchState.FAULT], [0, 9])
+    assert not program.status & GroupStatus.READY
+    group.do(Mode.HOLD)
+    assert (program.fault, program.powered) == (GroupFault.DRIVE, [True, False])
+    program.reset()
+    group.do(Mode.HOLD)
+    assert group.do(Mode.HOLD).powered == [True, True]
+
+
+def test_a_grant_that_is_taken_in_motion_is_a_stop() -> None:
+    group = Group()
+    program = group.moving()
+    program.seize(8, group.now)
+    for _ in range(25):
+        group.do(Mode.FOLLOW, program.length, [0.2, -0.1])
+    assert program.status & GroupStatus.HOLDING
+    assert program.fault == GroupFault.HEARTBEAT
