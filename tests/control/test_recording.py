@@ -34,8 +34,7 @@ def made(k: int) -> Recorded:
 
 
 @pytest.mark.parametrize("expected", [1, 3, 9])
-def test_everything_that_was_put_in_comes_out(expected: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sagline.control.recording.BLOCK", 2)
+def test_everything_that_was_put_in_comes_out(expected: int) -> None:
     tape, cycles = Tape(M, G, expected), [made(k) for k in range(8)]
     for cycle in cycles:
         tape.add(cycle)
@@ -62,3 +61,14 @@ def test_everything_that_was_put_in_comes_out(expected: int, monkeypatch: pytest
             assert np.array_equal(done.length[k], cycle.answer.length + 0.25)
     assert np.isnan(done.samples.length[2]).all()
     assert np.isnan(done.set_length[1]).all()
+
+
+def test_what_was_taken_out_stays_while_more_comes() -> None:
+    tape, cycles = Tape(M, G, 2), [made(k) for k in range(4)]
+    for cycle in cycles[:2]:
+        tape.add(cycle)
+    column, before = tape.column("winch_rate"), tape.column("winch_rate").copy()
+    for cycle in cycles[2:]:
+        tape.add(cycle)
+    assert np.array_equal(column, before)
+    assert len(tape.column("winch_rate")) == 4

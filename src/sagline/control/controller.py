@@ -28,7 +28,7 @@ from sagline.control.tension_loop import TensionSettings
 from sagline.errors import InvalidValueError
 from sagline.kinematics.forward_status import STABLE
 from sagline.motion.path import Path
-from sagline.motion.rest_to_rest import quintic_path
+from sagline.motion.rest_to_rest import septic_path
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
@@ -36,6 +36,7 @@ from sagline.tension.method import TensionMethod
 SETTLING: Final = 3.0  # s that homing looks, at most
 SPEED: Final = 0.1  # m/s, of go_to
 TURNING: Final = 0.2  # rad/s
+SPEEDING_UP: Final = 0.5  # s, to full speed at least: a short way is a slow one
 T = TypeVar("T")
 
 
@@ -251,7 +252,14 @@ class Controller(Loop):
         points = self.robot.platform_anchors
         if float(np.abs(pose.transform(points) - here.transform(points)).max()) < 1e-6:
             raise RefusedError("the way", "the platform is there already", "Name another pose.")
-        return quintic_path([here, pose], speed=speed, angular_speed=angular_speed, rate=round(1.0 / self.period))
+        return septic_path(
+            [here, pose],
+            speed=speed,
+            acceleration=speed / SPEEDING_UP,
+            angular_speed=angular_speed,
+            angular_acceleration=angular_speed / SPEEDING_UP,
+            rate=round(1.0 / self.period),
+        )
 
     def go_to(self, pose: Pose, speed: float = SPEED, angular_speed: float = TURNING) -> Execution:
         """Go straight to a pose.
@@ -320,7 +328,7 @@ class Controller(Loop):
             RefusedError: As `start_jog`.
         """
         self.start_jog(winch, by)
-        self.wait()
+        self._rest()
 
     def start_jog_platform(self, by: ArrayLike) -> None:
         """Begin to jog the platform along a straight line, each pose solved when it is due.
@@ -350,21 +358,31 @@ class Controller(Loop):
             RefusedError: As `start_jog_platform`.
         """
         self.start_jog_platform(by)
-        self.wait()
+        self._rest()
 
     def wait(self) -> Execution:
         """Go on until nothing moves; Ctrl-C stops the robot, and interrupts then.
 
+        Returns:
+            What became of the motion.
+
         Raises:
             RefusedError: If nothing has moved yet.
         """
-        with interrupt_calls(self.stop):
-            while self.moving:
-                self.cycle()
+        self._rest()
         done = self.execution
         if done is None:
             raise RefusedError("waiting", "nothing has moved yet", "Begin with start(path).")
         return done
+
+    def _rest(self) -> None:
+        """Go on until nothing moves."""
+        try:
+            with interrupt_calls(self.stop):
+                while self.moving:
+                    self.cycle()
+        finally:
+            self._garbage.go_on()
 
     def pause(self) -> None:
         """Slow down on the path, and stand; `resume` goes on.

@@ -195,10 +195,12 @@ class Ramp:
     def step(self) -> SetPoint:
         """The set point at the end of the next cycle."""
         self._cycle += 1
-        u = min(self._cycle * self._share, 1.0)
+        u = self._cycle * self._share
+        done = u > 1.0 - WHOLE
+        u = 1.0 if done else u
         begin = self._begin
         length = begin.length + (RAMP * (u - 0.5 * u * u)) * begin.rate
-        return begin._replace(length=length, rate=(1.0 - u) * begin.rate, done=u > 1.0 - WHOLE)
+        return begin._replace(length=length, rate=(1.0 - u) * begin.rate, done=done)
 
 
 _Real = TypeVar("_Real", float, Array)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from typing import Any, Final
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,14 +11,18 @@ from numpy.typing import NDArray
 from sagline.arrays import Array, Codes, Flags, Indices, locked
 from sagline.control.events import Event
 from sagline.control.link import Sample
-from sagline.control.recording import OF_GROUPS, OF_WINCHES, Tape
+from sagline.control.recording import (
+    REAL_OF_GROUPS,
+    REAL_OF_WINCHES,
+    WHOLE_OF_GROUPS,
+    WHOLE_OF_WINCHES,
+    Tape,
+)
 from sagline.kinematics.plan import Plan
 from sagline.results import Result
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.status import Status
-
-_REAL: Final = frozenset({"age", "plc_time", "length", "rate", "torque", "tension", "filtered"})
 
 
 class ExecutionStatus(Status):
@@ -222,8 +226,9 @@ def execution_of(
 
 def _samples(tape: Tape) -> Samples:
     found: dict[str, NDArray[Any]] = {"time": locked(tape.column("time"))}
-    for kind, names in (("group", OF_GROUPS), ("winch", OF_WINCHES)):
-        for name in names:
-            values = tape.column(f"{kind}_{name}")
-            found[name] = locked(values if name in _REAL else np.nan_to_num(values).astype(np.int64))
-    return Samples(**{field.name: found[field.name] for field in fields(Samples)})
+    for kind, names in (
+        ("group", REAL_OF_GROUPS + WHOLE_OF_GROUPS),
+        ("winch", REAL_OF_WINCHES + WHOLE_OF_WINCHES),
+    ):
+        found |= {name: locked(tape.column(f"{kind}_{name}")) for name in names}
+    return Samples(**found)

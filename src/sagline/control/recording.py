@@ -8,21 +8,22 @@ from typing import Any, Final, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.arrays import Array
+from sagline.arrays import Array, Indices
 from sagline.control.events import Event
 from sagline.control.link import Command, Missing, Sample
 from sagline.control.states import State
 from sagline.kinematics.plan import Plan
 from sagline.status import Status
 
-BLOCK: Final = 4096  # cycles that are made room for at once
-
-# what a cycle leaves: name, and how many numbers of it there are, of m winches and G groups
-OWN: Final = ("time", "answered", "state", "late", "clock", "estimate", "mode")
+# what a cycle leaves, of m winches and G groups: real numbers, and whole ones
+REAL_OWN: Final = ("time", "late", "clock")
 PLACE: Final = (("position", 3), ("quaternion", 4))
-OF_GROUPS: Final = ("age", "counter", "plc_time", "owner", "echo", "status", "fault", "discarded")
-OF_WINCHES: Final = ("length", "rate", "torque", "tension", "filtered", "counts", "state", "winch_fault")
+REAL_OF_GROUPS: Final = ("age", "plc_time")
+REAL_OF_WINCHES: Final = ("length", "rate", "torque", "tension", "filtered")
 ASKED: Final = ("set_length", "set_rate", "set_tension", "planned_tension", "correction")
+WHOLE_OWN: Final = ("answered", "state", "estimate", "mode")
+WHOLE_OF_GROUPS: Final = ("counter", "owner", "echo", "status", "fault", "discarded")
+WHOLE_OF_WINCHES: Final = ("counts", "state", "winch_fault")
 
 
 class Recorded(NamedTuple):
@@ -90,67 +91,72 @@ class Tape:
             group_count: Number of groups G.
             expected: How many cycles are to come; there may be more.
         """
-        widths = [(name, 1) for name in OWN]
-        widths += PLACE
-        widths += [(f"group_{name}", group_count) for name in OF_GROUPS]
-        widths += [(f"winch_{name}", cable_count) for name in OF_WINCHES]
-        widths += [(name, cable_count) for name in ASKED]
-        ends = np.cumsum([width for _, width in widths])
-        self._columns = {
-            name: slice(int(end) - width, int(end)) for (name, width), end in zip(widths, ends, strict=True)
-        }
-        self._width = int(ends[-1])
-        self._blocks = [np.empty((max(expected, 1), self._width))]
-        self._row = 0  # in the last block
-        self._full = 0  # rows in those before it
-        self._absent = (
-            np.full(len(OF_GROUPS) * group_count + len(OF_WINCHES) * cable_count, nan),
-            np.full(3 * cable_count, nan),
-        )
+        m, g = cable_count, group_count
+        own = dict.fromkeys(REAL_OWN, 1)
+        groups = {f"group_{name}": g for name in REAL_OF_GROUPS}
+        winches = {f"winch_{name}": m for name in REAL_OF_WINCHES}
+        self._real = _columns(own | dict(PLACE) | groups | winches | dict.fromkeys(ASKED, m))
+        groups = {f"group_{name}": g for name in WHOLE_OF_GROUPS}
+        winches = {f"winch_{name}": m for name in WHOLE_OF_WINCHES}
+        self._whole = _columns(dict.fromkeys(WHOLE_OWN, 1) | groups | winches)
+        rows, (real, whole) = max(expected, 1), (_width(columns) for columns in (self._real, self._whole))
+        self._numbers, self._codes = np.empty((rows, real)), np.empty((rows, whole), dtype=np.int64)
+        self._count = 0
+        self._no_sample = np.full(len(REAL_OF_GROUPS) * g + len(REAL_OF_WINCHES) * m, nan)
+        self._no_codes = np.zeros(whole - len(WHOLE_OWN), dtype=np.int64)
+        self._no_command = np.full(3 * m, nan)
 
     def __len__(self) -> int:
         """Number of cycles so far."""
-        return self._full + self._row
+        return self._count
 
     def add(self, cycle: Recorded) -> None:
         """Keep a cycle."""
-        block = self._blocks[-1]
-        if self._row == len(block):
-            self._full, self._row = self._full + len(block), 0
-            block = np.empty((BLOCK, self._width))
-            self._blocks.append(block)
+        k = self._count
+        if k == len(self._numbers):
+            self._numbers, self._codes = (np.concatenate((old, np.empty_like(old))) for old in self._tables)
         answer, command = cycle.answer, cycle.command
-        answered = isinstance(answer, Sample)
-        mode = -1 if command is None else command.mode
-        own = (answer.time, answered, cycle.state, cycle.late, cycle.clock, cycle.estimate, mode)
+        read: tuple[Array, ...] = (self._no_sample,)
+        codes: tuple[Indices, ...] = (self._no_codes,)
+        asked: tuple[Array, ...] = (self._no_command,)
+        mode = -1
         if isinstance(answer, Sample):
-            read: tuple[NDArray[Any], ...] = (
-                answer.age, answer.counter, answer.plc_time, answer.owner, answer.echo, answer.status, answer.fault,
-                answer.discarded, answer.length, answer.rate, answer.torque, answer.tension, answer.filtered,
-                answer.counts, answer.state, answer.winch_fault,
-            )  # fmt: skip
-        else:
-            read = self._absent[:1]
-        if command is None:
-            asked: tuple[Array, ...] = self._absent[1:]
-        else:
-            asked = (command.length + cycle.zero, command.rate, command.tension)
-        np.concatenate(
-            (own, cycle.position, cycle.quaternion, *read, *asked, cycle.planned_tension, cycle.correction),
-            out=block[self._row],
-        )
-        self._row += 1
+            _, age, counter, plc_time, owner, echo, status, fault, *winches, counts, state, drive, discarded = answer
+            read = (age, plc_time, *winches)
+            codes = (counter, owner, echo, status, fault, discarded, counts, state, drive)
+        if command is not None:
+            mode, asked = command.mode, (command.length + cycle.zero, command.rate, command.tension)
+        own = (answer.time, cycle.late, cycle.clock)
+        sight = (cycle.position, cycle.quaternion)
+        np.concatenate((own, *sight, *read, *asked, cycle.planned_tension, cycle.correction), out=self._numbers[k])
+        about = (answer.__class__ is Sample, cycle.state, cycle.estimate, mode)
+        np.concatenate((about, *codes), out=self._codes[k])
+        self._count = k + 1
 
-    def column(self, name: str) -> Array:
-        """One quantity over the cycles: a copy.
+    @property
+    def _tables(self) -> tuple[NDArray[Any], NDArray[Any]]:
+        return self._numbers, self._codes
+
+    def column(self, name: str) -> NDArray[Any]:
+        """One quantity over the cycles: a part of the tape, which is not copied and will not change.
 
         Args:
-            name: One of `OWN`, `PLACE`, `ASKED`; group_ or winch_ before one of `OF_GROUPS`, `OF_WINCHES`.
+            name: Of what a cycle leaves; what a sample has, with group_ or winch_ before it.
 
         Returns:
-            Shape (N,) for one of `OWN`, else (N, width).
+            Shape (N,) for what there is one of, else (N, width); float64 or int64.
         """
-        part = self._columns[name]
-        blocks = [*self._blocks[:-1], self._blocks[-1][: self._row]]
-        whole = np.concatenate([block[:, part] for block in blocks])
-        return whole[:, 0].copy() if name in OWN else whole
+        rows = slice(self._count)
+        whole = name in self._whole
+        found: NDArray[Any] = self._codes[rows, self._whole[name]] if whole else self._numbers[rows, self._real[name]]
+        return found[:, 0] if name in REAL_OWN or name in WHOLE_OWN else found
+
+
+def _columns(widths: dict[str, int]) -> dict[str, slice]:
+    """Which columns of a table each quantity has."""
+    ends = np.cumsum(list(widths.values())).tolist()
+    return {name: slice(end - width, end) for (name, width), end in zip(widths.items(), ends, strict=True)}
+
+
+def _width(columns: dict[str, slice]) -> int:
+    return max(int(part.stop) for part in columns.values())

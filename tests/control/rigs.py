@@ -1,0 +1,142 @@
+"""A machine and its controller in one process, on the lockstep clock."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+import sagline as sl
+from sagline.arrays import Array
+from sagline.control.controller import Controller
+from sagline.control.link import Command, Missing, Sample
+from sagline.control.recording import Recorded
+from sagline.control.states import State
+from sagline.twin.machine import Machine
+
+HOME = sl.Pose.from_euler([0.0, 0.0, 1.5], 0.0, 0.0, 0.0)
+
+
+@cache
+def prototype() -> sl.Robot:
+    """As it is planned for: load cells without noise, encoders with a zero."""
+    robot = sl.load_robot("article-prototype")
+    assert robot.winches is not None
+    return robot.replace(winches=robot.winches.replace(length_zero=3.0))
+
+
+def imperfect(zero: float = 0.0, noise: float = 1.0, bias: float = 2.0, seed: int = 5) -> sl.Robot:
+    """The same with load cells as they are, and encoders whose zeros are wrong by so much, rms [m]."""
+    robot, random = prototype(), np.random.default_rng(seed)
+    signs, errors = random.choice([-1.0, 1.0], 8), random.standard_normal(8)
+    errors *= zero / np.sqrt(np.mean(errors**2))
+    return with_zero_errors(robot, errors, load_cell_deviation=noise, load_cell_bias=bias * signs)
+
+
+def with_zero_errors(robot: sl.Robot, errors: Array, **fields: Any) -> sl.Robot:
+    """A robot with so much more cable off its drums than its encoders say [m], and other fields of its winches."""
+    assert robot.winches is not None
+    assert robot.winches.length_zero is not None
+    return robot.replace(winches=robot.winches.replace(length_zero=robot.winches.length_zero + errors, **fields))
+
+
+class Spy:
+    """A link that keeps what goes through it."""
+
+    def __init__(self, link: Any) -> None:
+        """Stand before a link."""
+        self._link, self.groups = link, link.groups
+        self.commands: list[Command | None] = []
+        self.answers: list[Sample | Missing] = []
+
+    def exchange(self, command: Command | None) -> Sample | Missing:
+        answer: Sample | Missing = self._link.exchange(command)
+        self.commands.append(command)
+        self.answers.append(answer)
+        return answer
+
+    def close(self) -> None:
+        """Nothing to do."""
+
+
+class Replay:
+    """A link that answers what was answered before, whatever is sent."""
+
+    def __init__(self, spy: Spy) -> None:
+        """Begin at the beginning."""
+        self.groups, self._answers = spy.groups, iter(spy.answers)
+        self.commands: list[Command | None] = []
+
+    def exchange(self, command: Command | None) -> Sample | Missing:
+        self.commands.append(command)
+        return next(self._answers)
+
+    def close(self) -> None:
+        """Nothing to do."""
+
+
+class Watcher:
+    """One who looks on, and calls a function in a cycle."""
+
+    stopped = ""
+
+    def __init__(self, at: int = -1, call: Any = None) -> None:
+        """See everything; call once, in the cycle with this number of those that move."""
+        self.cycles: list[Recorded] = []
+        self.told: list[tuple[Any, ...]] = []
+        self._at, self._call, self.count = at, call, 0
+
+    def begins(self, plan: sl.Plan) -> None:
+        self.told.append(("begins", len(self.cycles)))
+
+    def ends(self, status: Any, reason: str) -> None:
+        self.told.append(("ends", len(self.cycles), status, reason))
+
+    def cycle(self, cycle: Recorded) -> None:
+        self.cycles.append(cycle)
+        if self.told:
+            self.count += 1
+            if self.count == self._at:
+                self._call()
+
+    def event(self, event: Any) -> None:
+        self.told.append(("event", len(self.cycles), event))
+
+
+def rig(true: sl.Robot | None = None, home: bool = True, seed: int = 1, **settings: Any) -> tuple[Controller, Machine]:
+    """A controller that is connected, and homed, and its machine."""
+    machine = Machine(true or prototype(), nominal=prototype(), start=HOME, seed=seed)
+    link = Spy(machine.link())
+    control = Controller(prototype(), link, seed=2, **settings)
+    if home:
+        control.connect()
+        control.home(HOME)
+    return control, machine
+
+
+def spy_of(control: Controller) -> Spy:
+    """The link that keeps what goes through it."""
+    link: Any = control._link
+    assert isinstance(link, Spy)
+    return link
+
+
+def state_of(control: Controller) -> State:
+    """What it does now."""
+    return control.state
+
+
+def at(x: float, y: float, z: float) -> sl.Pose:
+    """A level pose."""
+    return sl.Pose.from_euler([x, y, z], 0.0, 0.0, 0.0)
+
+
+def rest(control: Controller, machine: Machine, seconds: float) -> Array:
+    """Where the true platform is on average while it stands [m], shape (3,)."""
+    places = []
+    for _ in range(round(seconds / control.period)):
+        control.cycle()
+        places.append(machine.reading.position.copy())
+    mean: Array = np.mean(places, axis=0)
+    return mean
