@@ -1,0 +1,144 @@
+"""The servers of a twin, on the lockstep clock: over the sockets comes what the machine says, to the last bit."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.arrays import Array
+from sagline.control.link import Command, GroupStatus, Mode, Sample
+from sagline.plc.block_link import BlockLink
+from sagline.plc.blocks import CLAIM, FROM_PLC, TO_PLC, Block, Refusal
+from sagline.twin.modbus_mirrors import ModbusMirrors
+from sagline.twin.s7_mirrors import S7Mirrors
+from sagline.twin.server import block_of
+from tests.plc.samples import a_sample, sample_blocks
+from tests.plc.servers import BOTH, MODBUS, PATIENCE, S7, Kind, taken, until
+
+OWNER = 5
+
+
+def machine(*faults: str) -> sl.twin.Machine:
+    return sl.twin.Machine(sl.load_robot("article-prototype"), seed=3, faults=faults)
+
+
+@contextmanager
+def served(kind: Kind, *faults: str) -> Iterator[tuple[sl.twin.Server, BlockLink]]:
+    with (
+        closing(sl.twin.Server(machine(*faults), modbus=kind is MODBUS)) as server,
+        closing(kind.link(server.addresses, 8, timeout=PATIENCE)) as link,
+    ):
+        yield server, link
+
+
+def gone_on(server: sl.twin.Server, link: BlockLink) -> Sample:
+    """The sample after a scan."""
+    before = taken(link).counter
+    server.scan()
+    until(lambda: np.all(taken(link).counter == before + 1))
+    return taken(link)
+
+
+def memory(server: sl.twin.Server) -> list[dict[Block, bytearray]]:
+    """The blocks of each group, as they are."""
+    mirrors = server._mirrors
+    assert isinstance(mirrors, S7Mirrors | ModbusMirrors)
+    return [each if isinstance(each, dict) else each.blocks for each in mirrors._memory]
+
+
+def send(server: sl.twin.Server, link: BlockLink, command: Command) -> None:
+    """Send a command, or the claim where there is no grant, and wait until it has arrived."""
+    link.exchange(command)
+    told = struct.pack(">I", command.counter)
+    until(lambda: all(bytes(each[TO_PLC][:4]) == told or any(each[CLAIM]) for each in memory(server)))
+
+
+def command_of(counter: int, mode: Mode, length: Array) -> Command:
+    count = len(length)
+    on = np.ones(count, dtype=np.bool_)
+    return Command(counter, OWNER, mode, 0.1, length, np.zeros(count), np.full(count, 150.0), on)
+
+
+@pytest.mark.parametrize("kind", BOTH)
+def test_a_machine_behind_sockets_does_what_it_does_in_process(kind: Kind) -> None:
+    alone = machine()
+    with served(kind) as (server, link):
+        begin = taken(link).length
+        for counter in range(1, 12):
+            length, mode = begin + 1e-4 * max(counter - 4, 0), Mode.FOLLOW if counter > 3 else Mode.HOLD
+            send(server, link, command_of(counter, mode, length))
+            for group, winches in enumerate(alone.groups):
+                if counter == 1:
+                    alone.claim(group, OWNER)
+                else:
+                    alone.take(group, command_of(counter, mode, length[list(winches)]))
+            alone.advance()
+            sample = gone_on(server, link)
+            for group, winches in enumerate(alone.groups):
+                report = alone.report(group)
+                assert report is not None
+                assert sample.owner[group] == report.owner == OWNER
+                assert sample.echo[group] == report.echo == (counter if counter > 1 else 0)
+                assert sample.status[group] == report.status
+                assert sample.length[list(winches)].tolist() == report.length
+                assert sample.counts[list(winches)].tolist() == report.counts
+                assert sample.tension[list(winches)].tolist() == np.array(report.tension, dtype=np.float32).tolist()
+        assert (sample.status == GroupStatus.READY | GroupStatus.FOLLOWING).all()
+        assert (sample.length - begin > 2e-4).all()
+
+
+def test_a_report_is_packed_as_a_plc_has_it() -> None:
+    sample = a_sample(8, counts=np.arange(8) * 2**20)
+    heads = [int(column[1]) for column in (sample.owner, sample.echo, sample.status, sample.fault)]
+    floats = [column[2:4].tolist() for column in sample[8:13]]
+    whole = [column[2:4].tolist() for column in (sample.counts, sample.state, sample.winch_fault)]
+    counter = int(sample.counter[1])
+    rows: list[Any] = [counter, counter, False, float(sample.plc_time[1]), *heads, *floats, *whole]
+    report = sl.twin.Report(*rows)
+    assert block_of(1, report) == sample_blocks(sample)[1]
+    for spoiled, said in ((report._replace(counter_again=3), "torn"), (report._replace(foreign=True), "of another")):
+        refusal = FROM_PLC.read(block_of(1, spoiled))
+        assert isinstance(refusal, Refusal)
+        assert refusal.reason.startswith(f"DB101 is {said}")
+    beyond = block_of(1, report._replace(counts=[2**31, -(2**31) - 1]))
+    values = FROM_PLC.read(beyond)
+    assert isinstance(values, dict)
+    assert [values["winch[1].counts"], values["winch[2].counts"]] == [-(2**31), 2**31 - 1]
+
+
+def test_what_is_written_but_no_command_moves_nothing() -> None:
+    random = np.random.default_rng(0)
+    with closing(sl.twin.Server(machine())) as server:
+        good = bytearray(TO_PLC.pack({"counter": 1, "owner": OWNER, "mode": 2, "valid_for": 100}))
+        for k in range(40):
+            for blocks in memory(server):
+                spoiled = bytearray(good)
+                spoiled[random.integers(0, 10)] ^= random.integers(1, 256)
+                blocks[TO_PLC][:] = spoiled if k % 2 else random.bytes(64)
+            server.scan()
+        for group in range(4):
+            report = server.machine.report(group)
+            assert report is not None
+            assert (report.owner, report.echo) == (0, 0)
+            assert report.status & GroupStatus.BRAKED
+
+
+def test_a_silent_group_keeps_its_block() -> None:
+    with served(S7, "group 1 is silent at 0.02 s") as (server, link):
+        gone_on(server, link)
+        before = gone_on(server, link)
+        server.scan()
+        until(lambda: np.all(taken(link).counter == before.counter + np.array([1, 0, 1, 1])))
+
+
+def test_a_port_in_use_is_told() -> None:
+    with closing(sl.twin.Server(machine())) as server:
+        port = int(server.addresses[2].rpartition(":")[2])
+        with pytest.raises(sl.SaglineError, match=f"address of the twin is 127.0.0.1:{port} .Address already in use"):
+            sl.twin.Server(server.machine, port=port)
