@@ -79,7 +79,7 @@ def _greet(name: str, server: Server, asked: Asked) -> None:
     machine = server.machine
     winches, groups = machine.robot.cable_count, len(machine.groups)
     spoken = "Modbus TCP" if asked.modbus else "S7"
-    show(f"{machine.nominal.name}: {winches} winches behind {groups} PLCs, which speak {spoken}; brakes are on.")
+    show(f"{machine.nominal.name}: {winches} winches behind {groups} PLCs that speak {spoken}, brakes on.")
     show("From another terminal:")
     show(f"  sagline control {name}{' --modbus' * asked.modbus} \\", whole=True)
     show(f"    --plc {','.join(server.addresses)}", whole=True)
