@@ -161,6 +161,25 @@ def test_a_lost_command_is_no_stop() -> None:
     assert (program.fault, program.length) == (GroupFault.NONE, length)
 
 
+@pytest.mark.parametrize("scan", [0.001, 0.004, 0.005, 0.01])
+def test_a_fast_scan_is_on_a_straight_way_between_set_points(scan: float) -> None:
+    """Whatever the scan, the set points are those of a command a cycle after it came, and between them even."""
+    group = Group()
+    group.program = Program(LIMITS, scan)
+    program, begin, commands = group.ready(), group.now, 0
+    start, times, found = program.length[0], [], []
+    while group.now < begin + 0.4:
+        if group.now - begin >= commands * PERIOD - 1e-9:
+            commands += 1
+            program.take(group.order(Mode.FOLLOW, [start + 0.2 * PERIOD * commands, 4.0], [0.2, 0.0]))
+        group.scan()
+        group.now += scan - PERIOD
+        times.append(group.now - begin)
+        found.append(program.length[0] - start)
+    late = 0.2 * (0.004 if scan == 0.004 else 0.0)  # a command waits for the next scan
+    assert np.abs(np.array(found) - 0.2 * np.array(times)).max() <= late + 1e-12
+
+
 def test_a_command_to_hold_ramps_too() -> None:
     group = Group()
     program = group.moving()
@@ -183,7 +202,7 @@ def test_set_points_that_are_refused(broken: str) -> None:
     elif broken == "rate":
         rate[index] = -0.51
     else:
-        length[index] = {"nan": math.nan, "inf": math.inf, "fast": length[index] + 1.01 * 0.5 * PERIOD}[broken]
+        length[index] = {"nan": math.nan, "inf": math.inf, "fast": length[index] + 2.01 * 0.5 * PERIOD}[broken]
     before = list(program.length)
     group.do(Mode.FOLLOW, length, rate, tension=tension)
     assert program.fault == GroupFault.SET_POINT

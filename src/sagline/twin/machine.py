@@ -184,6 +184,7 @@ class Machine:
             group: Which, from 0.
             message: The owner who claims, or a command.
         """
+        self._let_happen()
         if group in self._stopped or self._commands not in ("", "are foreign"):
             return
         if isinstance(message, int):
@@ -194,8 +195,9 @@ class Machine:
             self._programs[group].take(message)
 
     def advance(self) -> None:
-        """Go on for one period: the PLCs' scans, drives and plant, and what is read then; then what goes wrong next."""
+        """Go on for one period: what goes wrong now, the PLCs' scans, drives and plant, and what is read then."""
         now = self.time
+        self._let_happen()
         for link in self._links:
             link.before(now)
         self._scan(now)
@@ -203,7 +205,6 @@ class Machine:
         self._snapshot = self._written(self._snapshot)
         for link in self._links:
             link.after(self.time, self._snapshot, self._spoiled)
-        self._let_happen()
 
     def _scan(self, now: float) -> None:
         """Let the PLCs set the drives, and these move."""
@@ -276,7 +277,6 @@ class Machine:
         if kind.numbered and not 0 <= found.which < parts:
             raise InvalidValueError("fault", brief(str(found)), f"{kind.item} 0 to {parts - 1}", "They count from 0.")
         self._schedule.plan(found)
-        self._let_happen()
 
     def _let_happen(self) -> None:
         """Let begin and end what is due."""

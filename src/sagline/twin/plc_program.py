@@ -11,6 +11,7 @@ from typing import Final, NamedTuple
 from sagline.control.link import (
     HEARTBEAT,
     OWNER_TIMEOUT,
+    PERIOD,
     RAMP,
     GroupFault,
     GroupStatus,
@@ -99,6 +100,7 @@ class Program:
         self._asked = [0.0] * count  # set points of the last command, or where the drives stood
         self._rate = [0.0] * count
         self._ramp = 0.0  # what is left of it [s]
+        self._left = 0.0  # of the cycle after a command, at whose end its set points are reached [s]
         self._now = self._since = 0.0  # of this scan, and of that in which the fault came [s]
         self._mode = _LEAVE
 
@@ -179,7 +181,7 @@ class Program:
         elif order is not None and waited >= min(HEARTBEAT, order.valid_for) - TINY:
             self._stop(GroupFault.HEARTBEAT)
         elif self._mode == _FOLLOW and not self.fault:
-            self._drive([a + b * self.period for a, b in zip(self.length, self._rate, strict=True)], cell)
+            self._drive(cell)
             return
         self._slow_down(cell)
 
@@ -235,8 +237,7 @@ class Program:
         least, most, speed, _ = self.limits
         lengths, rates, tensions, asked = order.length, order.rate, order.tension, self._asked
         self._mode, self._ramp = _FOLLOW, 0.0
-        if waited < self.period:
-            waited = self.period
+        waited = max(waited, 0.0) + PERIOD  # one may have come late, and this one not
         for i in self.winches:
             length, fastest = lengths[i], speed[i]
             if self.powered[i] and not (
@@ -248,20 +249,31 @@ class Program:
                 self._stop(GroupFault.SET_POINT)
                 self._slow_down(cell)
                 return
-        if self._drive(lengths, cell):
-            self.tension, self._asked, self._rate = tensions, lengths, rates
+        self.tension, self._asked, self._rate, self._left = tensions, lengths, rates, PERIOD
+        self._drive(cell)
 
-    def _drive(self, lengths: list[float], cell: list[float]) -> bool:
-        """Move the set points on for a period, unless that would take in a cable that pulls too hard."""
-        limit, length, powered, moved = self.limits.tension, self.length, self.powered, []
+    def _drive(self, cell: list[float]) -> None:
+        """Move the set points on for a scan, unless that would take in a cable that pulls too hard.
+
+        They go straight to those of the last command, where they are a cycle after it, and then on at its rates.
+        """
+        limit, length, powered, asked, rate = self.limits.tension, self.length, self.powered, self._asked, self._rate
+        left, period, moved = self._left, self.period, []
         for i in self.winches:
-            if cell[i] > limit[i] and lengths[i] < length[i] and powered[i]:
-                self._stop(GroupFault.OVER_TENSION)
-                self._slow_down(cell)
-                return False
-            moved.append(lengths[i] if powered[i] else length[i])
-        self.length = moved
-        return True
+            at = length[i]
+            if powered[i]:
+                if left <= TINY:
+                    at += rate[i] * period
+                elif left > period + TINY:
+                    at += (asked[i] - at) * period / left
+                else:
+                    at = asked[i] + rate[i] * max(period - left, 0.0)
+                if cell[i] > limit[i] and at < length[i]:
+                    self._stop(GroupFault.OVER_TENSION)
+                    self._slow_down(cell)
+                    return
+            moved.append(at)
+        self.length, self._left = moved, max(left - period, 0.0)
 
     def _stop(self, fault: GroupFault) -> None:
         """Slow down by itself, and hold."""
