@@ -53,6 +53,7 @@ class Axis(NamedTuple):
         integral: k_i [N/m].
         system: A, B, C, D from the rates of the lengths to the tensions at the frame ends.
         lengths: Which states of A are lengths.
+        by_wrench: What a wrench on the platform adds to the rates of the states.
     """
 
     inertia: float
@@ -61,6 +62,7 @@ class Axis(NamedTuple):
     integral: float
     system: tuple[Array, Array, Array, Array]
     lengths: Indices
+    by_wrench: Array
 
 
 def axis(state: sl.Equilibrium, damping: sl.Damping) -> Axis:
@@ -77,7 +79,7 @@ def axis(state: sl.Equilibrium, damping: sl.Damping) -> Axis:
     slowed = linear.A.copy()
     slowed[6:12, 6:12] -= np.linalg.solve(mass_matrix(state), _air(state, damping.air_damping))
     system = (slowed, linear.B[:, :m], linear.C[6 : 6 + m], linear.D[6 : 6 + m, :m])
-    return Axis(inertia, position, speed, integral, system, np.arange(12, 12 + m))
+    return Axis(inertia, position, speed, integral, system, np.arange(12, 12 + m), linear.B[:, m:])
 
 
 def _air(state: sl.Equilibrium, damping: float) -> Array:
@@ -110,7 +112,12 @@ def inner_loops(drives: Axis, delay: float = DELAY) -> Array:
 
 
 def closed_poles(drives: Axis, delay: float = DELAY) -> Array:
-    """Poles of platform and drums with all loops closed [rad/s], each delay as its quotient of second order.
+    """Poles of platform and drums with all loops closed [rad/s]."""
+    return np.asarray(np.linalg.eigvals(closed_loops(drives, delay)))
+
+
+def closed_loops(drives: Axis, delay: float = DELAY) -> Array:
+    """Platform and drums with all loops closed, as A of dx/dt = A x; each delay as its quotient of second order.
 
     e^(-s h) = 1 - (12/h) s/(s^2 + 6 s/h + 12/h^2): q1' = q2, q2' = w - (6/h) q2 - (12/h^2) q1, u = w - (12/h) q2.
     """
@@ -134,4 +141,4 @@ def closed_poles(drives: Axis, delay: float = DELAY) -> Array:
     matrix[second] = wanted
     matrix[np.ix_(second, second)] -= 6.0 / delay * one
     matrix[np.ix_(second, first)] -= 12.0 / delay**2 * one
-    return np.asarray(np.linalg.eigvals(matrix))
+    return matrix
