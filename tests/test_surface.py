@@ -6,7 +6,8 @@ import pytest
 import sagline as sl
 
 # yaml is no matter: numba loads it
-HEAVY = ("matplotlib", "xarray", "h5netcdf", "h5py", "pint", "pydantic", "typer", "rich", "scipy.spatial")
+PACKAGES = ("matplotlib", "xarray", "h5netcdf", "h5py", "pint", "pydantic", "typer", "rich", "scipy.spatial")
+HEAVY = (*PACKAGES, "mcap", "mcap_protobuf", "google.protobuf", "zstandard", "snap7", "pymodbus")
 
 
 def test_every_public_name_is_there() -> None:

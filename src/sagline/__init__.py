@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from sagline.errors import CableGeometryError, FileError, InvalidValueError, SaglineError, SaglineWarning
     from sagline.files.c_source import export_c
     from sagline.files.caspr import load_caspr
+    from sagline.files.execution_file import load_execution
     from sagline.files.imported import Imported
     from sagline.files.measurements import load_measurements
     from sagline.files.mjcf import dump_mjcf
@@ -201,6 +202,7 @@ __all__ = [
     "limit_margin",
     "linearized",
     "load_caspr",
+    "load_execution",
     "load_measurements",
     "load_path",
     "load_plan",
@@ -335,6 +337,7 @@ _HOMES = {
     "limit_margin": "sagline.tension.margin",
     "linearized": "sagline.dynamics.linearized",
     "load_caspr": "sagline.files.caspr",
+    "load_execution": "sagline.files.execution_file",
     "load_measurements": "sagline.files.measurements",
     "load_path": "sagline.files.path_file",
     "load_plan": "sagline.files.plan_file",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
@@ -167,6 +168,21 @@ class Execution(Result):
     def pose(self) -> Pose:
         """Estimated from the encoders, a batch of N; NaN where there is none."""
         return Pose._adopt(self.position, self.quaternion)
+
+    def save(self, file: FilePath | str) -> None:
+        """Write it to a log in MCAP, or to NetCDF, whole or not at all: every number as it is, plan and robot inside.
+
+        Args:
+            file: The file; "run.mcap" is a log, which `load_execution` reads, "run.nc" a data set with the plan as its
+                group `plan`. One that exists is replaced.
+
+        Raises:
+            FileError: If the file has another suffix, cannot be written, or a package is missing; what was there
+                before is untouched.
+        """
+        from sagline.files.execution_file import save  # the one call outward
+
+        save(self, file)
 
 
 def execution_of(

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Literal
 
 from sagline.errors import FileError
 from sagline.files.content import Content
@@ -24,21 +25,27 @@ INFLATION = 1000  # times the size of a file that its numbers may take in memory
 HEADERS: Final = 1 << 18  # bytes, more than all names and attributes take beside the robot
 
 
-def write_dataset(data: Dataset, file: Path) -> None:
+def write_dataset(data: Dataset, file: Path, groups: Mapping[str, Dataset] | None = None) -> None:
     """Write a data set, with a digest over all values and attributes at the end, behind what NetCDF reads.
 
     Args:
         data: The data set; one of its attributes is the robot.
         file: The file; a regular file that exists is replaced, anything else is refused.
+        groups: Data sets that stand in groups of their own inside, each with its robot.
 
     Raises:
         FileError: If the file cannot be written; what was there before is untouched.
     """
-    with written_whole(file, size=data.nbytes + HEADERS + len(data.attrs["robot"].encode())) as partial:
-        # _FillValue None: numbers are stored as they are, and NaN needs no second meaning
-        encoding = {str(name): {"_FillValue": None} for name in data.variables}
+    parts: list[tuple[str | None, Dataset]] = [(None, data), *(groups or {}).items()]
+    size = sum(part.nbytes + HEADERS + len(part.attrs["robot"].encode()) for _, part in parts)
+    with written_whole(file, size=size) as partial:
         try:
-            data.to_netcdf(partial.absolute(), engine="h5netcdf", encoding=encoding)  # xarray takes ~ for the home
+            for group, part in parts:
+                # _FillValue None: numbers are stored as they are, and NaN needs no second meaning
+                encoding = {str(name): {"_FillValue": None} for name in part.variables}
+                mode: Literal["w", "a"] = "w" if group is None else "a"
+                # absolute: xarray takes ~ for the home
+                part.to_netcdf(partial.absolute(), mode, group=group, engine="h5netcdf", encoding=encoding)
         except RuntimeError as error:  # what h5py makes of a disk that fills up meanwhile
             raise OSError(str(error)) from error
         seal(partial)

@@ -71,7 +71,7 @@ def save_plan(plan: Plan, file: os.PathLike[str] | str) -> None:
             none of sagline's; or if its values are none that `inverse` gives.
         FileError: If the file cannot be written; what was there before is untouched.
     """
-    data = _dataset(instance(plan, Plan, "plan"))
+    data = plan_dataset(instance(plan, Plan, "plan"))
     check_plan(data, plan.state.one_robot.cable_count)
     write_dataset(data, file_path(file))
 
@@ -108,14 +108,22 @@ def load_plan(file: os.PathLike[str] | str) -> Plan:
         text = f"{path} is from before plans carried a digest: damage to it need not show. Save it again to have one."
         warnings.warn(text, SaglineWarning, stacklevel=2)
     try:
-        return _plan(path, data, parse_robot(str(data.attrs["robot"]), f"{path}, robot"))
+        return plan_of(path, data, parse_robot(str(data.attrs["robot"]), f"{path}, robot"))
     except KeyError as error:
         raise FileError(path, f"has no {error.args[0]}", "Write it again; it is incomplete or was edited.") from None
     except InvalidValueError as error:
         raise FileError.of(path, error) from None
 
 
-def _dataset(plan: Plan) -> Dataset:
+def plan_dataset(plan: Plan) -> Dataset:
+    """A plan as a data set, with the robot among its attributes.
+
+    Args:
+        plan: The plan, of one robot.
+
+    Raises:
+        InvalidValueError: If it is of several robots, or of a model or way of sharing that is none of sagline's.
+    """
     from xarray import Coordinates, Dataset
 
     rows = ("pose",) * len(plan.state.pose.shape)
@@ -177,7 +185,19 @@ def _plain(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else value
 
 
-def _plan(path: FilePath, data: Dataset, robot: Robot) -> Plan:
+def plan_of(path: FilePath, data: Dataset, robot: Robot) -> Plan:
+    """The plan of a data set.
+
+    Args:
+        path: The file it is from, for messages.
+        data: What `plan_dataset` gave.
+        robot: The robot among its attributes.
+
+    Raises:
+        FileError: If it is none of a plan.
+        InvalidValueError: If one of its values is none.
+    """
+
     def values(name: str) -> Any:
         return locked(np.asarray(data[name].values, order="C"))
 

@@ -1,0 +1,221 @@
+"""Executions read back from a log in MCAP, and as data sets in NetCDF with the plan inside."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sagline.arguments import file_path, instance
+from sagline.arrays import locked
+from sagline.control.execution import Execution, ExecutionStatus, Samples
+from sagline.control.states import State
+from sagline.errors import FileError, InvalidValueError, SaglineWarning
+from sagline.files.content import Content
+from sagline.files.dataset import write_dataset
+from sagline.files.execution_layout import CABLE, CYCLES, EVENTS, EVERY, GROUP, NONE, ROWS, SMALL, TIME
+from sagline.files.mcap_log import save_execution
+from sagline.files.mcap_reader import AGAIN, Ending, Log, read_log
+from sagline.files.packed_dataset import unpack_dataset
+from sagline.files.plan_file import plan_dataset, plan_of
+from sagline.files.robot_file import dump_robot, parse_robot
+from sagline.files.variables import PARTS, Quantity
+from sagline.kinematics.plan import Plan
+from sagline.robot.robot import Robot
+
+if TYPE_CHECKING:
+    from xarray import Dataset
+
+CONTENT: Final = Content(
+    name="execution",
+    made="execution of sagline log",
+    give="Give the .nc file that sagline log wrote.",
+    again="Write it again with sagline log.",
+    key="sagline_execution_format",
+    format=1,
+)
+PLAN_GROUP: Final = "plan"
+
+
+def load_execution(file: os.PathLike[str] | str, plan: int | None = None) -> Execution:
+    """Read a log in MCAP, of an execution or of a whole session, also of a process that was killed.
+
+    What an execution's `save` wrote is read back to the last bit.
+
+    Args:
+        file: The log.
+        plan: Which of its plans, from 0; -1 is the last. None: all cycles, with the plan if the log has one alone.
+
+    Returns:
+        The execution; one whose end is not in the log is UNKNOWN.
+
+    Raises:
+        FileError: If the file is missing, no log, of a newer format, damaged, cut off before its first cycle was kept,
+            or a package is missing.
+        InvalidValueError: If it has no such plan.
+
+    Warns:
+        SaglineWarning: If the log was cut off: what was recorded in its last second is not there.
+    """
+    log = read_log(file)
+    if not log.complete:
+        text = f"{log.path} was cut off: what was recorded in its last second is not there."
+        warnings.warn(text, SaglineWarning, stacklevel=2)
+    return execution_of_log(log, plan)
+
+
+def execution_of_log(log: Log, plan: int | None = None) -> Execution:
+    """The execution that is in a log.
+
+    Args:
+        log: What was read.
+        plan: As for `load_execution`.
+
+    Returns:
+        The execution.
+
+    Raises:
+        FileError: If nothing is in it, or not what is said to be.
+        InvalidValueError: If it has no such plan.
+    """
+    count = len(log.plans)
+    if plan is not None and not -count <= plan < count:
+        has = f"{-count} to {count - 1}" if count else "none: the log has no plan"
+        raise InvalidValueError("plan", plan, has, "Choose one of them, or None for all cycles.")
+    number = (0 if count == 1 else None) if plan is None else plan % count
+    blocks = [block for block in log.blocks if plan is None or block.get("plan") == number]
+    if log.robot is None or not blocks:
+        raise FileError(log.path, "has no cycle", "Nothing was recorded in it, or it was cut off at once.")
+    try:
+        return _execution(log, log.robot, blocks, number)
+    except (InvalidValueError, ValueError, KeyError) as error:
+        raise FileError(log.path, f"does not hold what it says ({error})", AGAIN) from None
+
+
+def _execution(log: Log, robot: Robot, blocks: list[dict[str, NDArray[Any]]], number: int | None) -> Execution:
+    columns = {quantity.name: _column(quantity, blocks) for quantity in EVERY}
+    _check_shapes(columns, robot)
+    found = {quantity.place: locked(columns[quantity.name]) for quantity in EVERY}
+    samples = {field.name: found.pop(f"samples.{field.name}", found["time"]) for field in fields(Samples)}
+    first, last = (found["time"][[0, -1]].tolist()) if len(found["time"]) else (0.0, 0.0)
+    whole = len(blocks) == len(log.blocks)
+    ending = log.endings.get(NONE if number is None else number)
+    if ending is None:
+        ending = Ending(ExecutionStatus.UNKNOWN.name, "the log does not say how it ended")
+    return Execution(
+        robot=robot,
+        plan=None if number is None else plan_of_log(log, number),
+        status=ExecutionStatus[ending.status],
+        reason=str(ending.reason),
+        period=log.period,
+        zero=locked(blocks[-1]["zero"]),
+        events=tuple(event for event in log.events if whole or first <= event.time <= last),
+        samples=Samples(**samples),
+        **found,
+    )
+
+
+def plan_of_log(log: Log, number: int) -> Plan:
+    """A plan of a log.
+
+    Args:
+        log: What was read.
+        number: Which, from 0.
+
+    Raises:
+        ValueError: If its bytes are none of a plan.
+        InvalidValueError: If its values are none.
+    """
+    data = unpack_dataset(log.plans[number])
+    return plan_of(log.path, data, parse_robot(str(data.attrs["robot"]), f"{log.path}, robot of plan {number}"))
+
+
+def _column(quantity: Quantity, blocks: list[dict[str, NDArray[Any]]]) -> NDArray[Any]:
+    whole = np.concatenate([block[quantity.name] for block in blocks])
+    wanted = np.dtype(np.int8) if quantity.name in SMALL else quantity.type
+    if whole.dtype != wanted:
+        raise InvalidValueError(f"{quantity.name}: type", whole.dtype, str(wanted), AGAIN)
+    return whole
+
+
+def _check_shapes(columns: dict[str, NDArray[Any]], robot: Robot) -> None:
+    groups = columns["age"].shape[1:] or (0,)
+    sizes = {"cable": robot.cable_count, "group": groups[0], **{part: len(names) for part, names in PARTS.items()}}
+    rows = columns[TIME.name].size
+    for quantity in EVERY:
+        shape, wanted = columns[quantity.name].shape, (rows, *(sizes[part] for part in quantity.parts))
+        if shape != wanted:
+            raise InvalidValueError(f"{quantity.name}: shape", shape, str(wanted), AGAIN)
+
+
+def to_dataset(execution: Execution) -> Dataset:
+    """An execution as a data set: every quantity over time, with its unit.
+
+    Args:
+        execution: The execution.
+
+    Returns:
+        The data set; the robot is one of its attributes.
+    """
+    from xarray import Coordinates, Dataset
+
+    done = instance(execution, Execution, "execution")
+    variables: dict[str, Any] = {
+        quantity.name: ((ROWS, *quantity.parts), quantity.of(done), quantity.attributes) for quantity in CYCLES
+    }
+    variables["zero"] = (CABLE, done.zero, {"units": "m", "long_name": "what homing adds to lengths"})
+    for name, what in EVENTS.items() if done.events else ():
+        values = [getattr(event, name) for event in done.events]
+        variables[f"event_{name}"] = ("event", [_plain(value) for value in values], {"long_name": what})
+    used = {part for quantity in EVERY for part in quantity.parts} & PARTS.keys()
+    coordinates: dict[str, Any] = {part: (part, list(PARTS[part])) for part in sorted(used)}
+    for (part,), count in ((CABLE, done.robot.cable_count), (GROUP, done.samples.age.shape[1])):
+        coordinates[part] = (part, np.arange(count), {"long_name": f"{part}, counted from 0"})
+    coordinates[TIME.name] = (ROWS, done.time, TIME.attributes)
+    attributes = {
+        **CONTENT.attributes(f"Execution on {done.robot.name}"),
+        **{"status": done.status.name, "reason": done.reason, "period": done.period, "period_units": "s"},
+        "robot": dump_robot(done.robot),
+    }
+    return Dataset(variables, Coordinates(coordinates, indexes={}), attributes)
+
+
+def save(execution: Execution, file: os.PathLike[str] | str) -> None:
+    """Write an execution to a log or to NetCDF, as its name says.
+
+    Args:
+        execution: The execution.
+        file: The file: "run.mcap" or "run.nc".
+
+    Raises:
+        FileError: If the name is of neither, the file cannot be written, or a package is missing.
+    """
+    path = file_path(file)
+    ways = {".mcap": save_execution, ".nc": save_dataset}
+    if path.suffix.lower() not in ways:
+        raise FileError(path, "is no name for an execution", "Let it end in .mcap, or in .nc.")
+    ways[path.suffix.lower()](execution, path)
+
+
+def save_dataset(execution: Execution, file: os.PathLike[str] | str) -> None:
+    """Write an execution to a NetCDF file, whole or not at all; its plan is the group `plan`.
+
+    Args:
+        execution: The execution.
+        file: The file, "run.nc" for instance; a regular file that exists is replaced, anything else is refused.
+
+    Raises:
+        FileError: If the file cannot be written; what was there before is untouched.
+    """
+    plan = instance(execution, Execution, "execution").plan
+    groups = {} if plan is None else {PLAN_GROUP: plan_dataset(plan)}
+    write_dataset(to_dataset(execution), file_path(file), groups)
+
+
+def _plain(value: Any) -> Any:
+    """A number or a text as it is; a state by its name."""
+    return value.name if isinstance(value, State) else str(value) if isinstance(value, str) else value

@@ -1,0 +1,277 @@
+"""A log in MCAP as it is read: whole, cut off by a killed process, or while it still grows."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from io import BytesIO
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from numpy.typing import NDArray
+
+from sagline.arguments import file_path
+from sagline.control.events import Event
+from sagline.errors import FileError, InvalidValueError
+from sagline.files.kinds import kind_of
+from sagline.files.mcap_file import check_packages
+from sagline.files.mcap_layout import END, EVENT, FORMAT, HEAD, PLAN, RECORD, TRUTH, event_of
+from sagline.files.packed import unpack
+from sagline.files.robot_file import parse_robot
+from sagline.memory import check_memory
+from sagline.robot.robot import Robot
+
+MAGIC: Final = bytes((137, 77, 67, 65, 80, 48, 13, 10))
+AGAIN: Final = "Take the file from where it came."
+_HEAD: Final = 9  # bytes of a record before its content: what it is, and how long
+_CHUNK, _ATTACHMENT, _DATA_END = 0x06, 0x09, 0x0F
+_LARGEST: Final = 1 << 27  # bytes of a chunk: a second of ours has a thousandth of that
+_PLAN_NAME, _END_NAME = (re.compile(name.replace(".", r"\.").format(r"(\d+|none)")) for name in (PLAN, END))
+
+
+class Ending(NamedTuple):
+    """How a plan ended.
+
+    Attributes:
+        status: Name of its `ExecutionStatus`.
+        reason: One line.
+    """
+
+    status: str
+    reason: str
+
+
+class Truth(NamedTuple):
+    """Where the platform really was, once.
+
+    Attributes:
+        stamp: When, on the log's own clock [ns].
+        time: On the twin's [s].
+        position: [m], 3.
+        quaternion: Scalar last, 4.
+    """
+
+    stamp: int
+    time: float
+    position: list[float]
+    quaternion: list[float]
+
+
+@dataclass(slots=True)
+class Log:
+    """What has been read of a log so far.
+
+    Attributes:
+        path: The file.
+        robot: The robot; None until it has been read.
+        period: Of a cycle [s].
+        plans: The plans, packed.
+        endings: How they ended, by their numbers; -1 for what had none.
+        blocks: Columns of cycles, chunk by chunk.
+        events: What happened.
+        truth: Where the platform really was, in the log of a twin.
+        epoch: Of the log's own clock [ns].
+        complete: Whether the log has its end.
+    """
+
+    path: Path
+    robot: Robot | None = None
+    period: float = 0.0
+    plans: list[bytes] = field(default_factory=list)
+    endings: dict[int, Ending] = field(default_factory=dict)
+    blocks: list[dict[str, NDArray[Any]]] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list)
+    truth: list[Truth] = field(default_factory=list)
+    epoch: int = 0
+    complete: bool = False
+
+
+class LogReader:
+    """A log that is read as far as it goes, and again when it has grown.
+
+    Attributes:
+        log: What has been read so far.
+    """
+
+    def __init__(self, file: os.PathLike[str] | str) -> None:
+        """Name the file; `more` reads it.
+
+        Args:
+            file: The file.
+
+        Raises:
+            FileError: If a package is missing.
+        """
+        self.log = Log(file_path(file))
+        check_packages()
+        self._offset = self._digest = 0
+        self._topics: dict[int, str] = {}
+
+    def more(self) -> bool:
+        """Read what has been added since.
+
+        Returns:
+            Whether there was anything.
+
+        Raises:
+            FileError: If the file is missing, no MCAP file, no log of ours, of a newer format, or damaged.
+        """
+        before, data = self._offset, self._bytes()
+        if not before:
+            self._check_kind(data)
+        try:
+            for code, record in self._records(data):
+                self._take(code, record)
+        except (FileError, MemoryError):
+            raise
+        except Exception as error:  # the libraries have no error of their own for a damaged file: any will do
+            raise self._damaged() from error
+        torn = self._offset - before < len(data) and not self.log.complete
+        if torn and data.endswith(MAGIC) and len(data) > len(MAGIC):
+            raise self._damaged()
+        return self._offset > before
+
+    def _bytes(self) -> bytes:
+        path = self.log.path
+        try:
+            status = path.stat()
+            if kind := kind_of(status.st_mode):
+                raise FileError(path, f"is {kind.text}", kind.next_step)
+            if status.st_size < self._offset:
+                raise FileError(path, "has become shorter while it was read", "Read it again; it was begun anew.")
+            check_memory(f"{path.name}", 2.0 * (status.st_size - self._offset), "Take a shorter log.")
+            with path.open("rb") as file:
+                file.seek(self._offset)
+                return file.read(status.st_size - self._offset)
+        except FileNotFoundError:
+            raise FileError(path, "does not exist", "Check its name.") from None
+        except InvalidValueError as error:
+            raise FileError.of(path, error) from None
+        except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
+            reason = getattr(error, "strerror", None) or error
+            raise FileError(path, f"cannot be read ({reason})", "Check its name and its permissions.") from None
+
+    def _check_kind(self, data: bytes) -> None:
+        if data[: len(MAGIC)] == MAGIC:
+            return
+        if MAGIC.startswith(data):  # nothing, or the first few bytes
+            raise FileError(self.log.path, "is empty", "Nothing was recorded in it, or it was cut off at once.")
+        step = "Give the .mcap file that was recorded, or that an execution's save wrote."
+        raise FileError(self.log.path, "is another kind of file, no log in MCAP", step)
+
+    def _records(self, data: bytes) -> Iterator[tuple[int, bytes]]:
+        """The records that are there whole; what follows the last one comes with the next look."""
+        place = 0 if self._offset else len(MAGIC)
+        start = self._offset
+        if not start:
+            self._advance(data[:place])
+        while not self.log.complete and place + _HEAD <= len(data):
+            end = place + _HEAD + int.from_bytes(data[place + 1 : place + _HEAD], "little")
+            if end > len(data):
+                return
+            code, record = data[place], data[place:end]
+            if code == _DATA_END:
+                said = int.from_bytes(record[_HEAD : _HEAD + 4], "little")
+                if said and said != self._digest:
+                    raise ValueError("wrong digest")
+                self.log.complete = True
+            yield code, record
+            self._advance(record)
+            place = end
+
+    def _advance(self, read: bytes) -> None:
+        self._offset += len(read)
+        self._digest = zlib.crc32(read, self._digest)
+
+    def _take(self, code: int, record: bytes) -> None:
+        if code not in (_CHUNK, _ATTACHMENT) or (code == _CHUNK and self.log.robot is None):
+            return  # a log of ours begins with its robot
+        from mcap.records import Attachment, Channel, Chunk, Message
+        from mcap.stream_reader import StreamReader, breakup_chunk
+
+        found = next(iter(StreamReader(BytesIO(record), skip_magic=True, emit_chunks=True).records))
+        if isinstance(found, Attachment):
+            if zlib.crc32(record[_HEAD:-4]) != int.from_bytes(record[-4:], "little"):
+                raise ValueError("wrong digest")
+            self._attached(found.name, found.log_time, found.data)
+        elif isinstance(found, Chunk):
+            self._check_size(found)
+            for part in breakup_chunk(found, validate_crc=True):
+                if isinstance(part, Channel):
+                    self._topics[part.id] = part.topic
+                elif isinstance(part, Message):
+                    self._message(self._topics[part.channel_id], part.log_time, part.sequence, part.data)
+
+    @staticmethod
+    def _check_size(chunk: Any) -> None:
+        from zstandard import get_frame_parameters
+
+        sizes = [chunk.uncompressed_size]
+        if chunk.compression == "zstd":
+            sizes.append(get_frame_parameters(chunk.data).content_size)
+        if max(sizes) > _LARGEST:
+            raise ValueError("a chunk that says to be larger than any")
+
+    def _attached(self, name: str, epoch: int, data: bytes) -> None:
+        if name == HEAD:
+            self.log.epoch = epoch
+            self._begin(json.loads(data))
+        elif match := _PLAN_NAME.fullmatch(name):
+            if int(match[1]) != len(self.log.plans):
+                raise ValueError("a plan is missing")
+            self.log.plans.append(data)
+        elif match := _END_NAME.fullmatch(name):
+            self.log.endings[-1 if match[1] == "none" else int(match[1])] = Ending(**json.loads(data))
+
+    def _begin(self, said: dict[str, Any]) -> None:
+        found = said["sagline_log_format"]
+        if found > FORMAT:
+            text = f"is of format {found}, written by {said['source']}; this is sagline {version('sagline')}, which "
+            raise FileError(self.log.path, f"{text}reads up to {FORMAT}", "Install a newer sagline.")
+        self.log.period = float(said["period"])
+        self.log.robot = parse_robot(said["robot"], f"{self.log.path}, robot")
+
+    def _message(self, topic: str, stamp: int, number: int, data: bytes) -> None:
+        log = self.log
+        if log.robot is None:
+            return
+        if topic == RECORD:
+            if number != len(log.blocks):
+                raise ValueError("a chunk is missing")
+            log.blocks.append(unpack(data))
+        elif topic == EVENT:
+            log.events.append(event_of(data))
+        elif topic == TRUTH:
+            said = json.loads(data)
+            log.truth.append(Truth(stamp, float(said["time"]), said["position"], said["quaternion"]))
+
+    def _damaged(self) -> FileError:
+        return FileError(self.log.path, f"is damaged at byte {self._offset:,}", AGAIN)
+
+
+def read_log(file: os.PathLike[str] | str) -> Log:
+    """A log as far as it goes.
+
+    Args:
+        file: The file.
+
+    Returns:
+        What is in it: all, or what stands before where it was cut off.
+
+    Raises:
+        FileError: If the file is missing, no MCAP file, no log of ours, cut off before it says of what robot it is, of
+            a newer format, or damaged.
+    """
+    reader = LogReader(file)
+    reader.more()
+    log = reader.log
+    if log.robot is None and log.complete:
+        raise FileError(log.path, "is an MCAP file, but no log of sagline", "Check that this is the file you mean.")
+    if log.robot is None:
+        raise FileError(log.path, "was cut off before it says of what robot it is", "Nothing of it can be read.")
+    return log

@@ -1,0 +1,193 @@
+"""Courses of numbers in few bytes, and back to the last bit.
+
+What a machine does is smooth: each number is nearly foretold by those before it. A column is taken as whole numbers
+(decimals where all of it has few, else the bits of its floats, which are ordered as the numbers are), and differences
+of an order from 0 to 5 are kept. They are small, so that their upper bytes are nearly all zero; bytes of equal weight
+stand together, and zstandard makes nothing of zeros.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import prod
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sagline.memory import check_memory
+
+MOST_ORDER: Final = 5
+LEVEL: Final = 9  # of zstandard: above it takes much longer and saves little
+TYPES: Final = ("float64", "int64", "int8", "bool")
+_EXACT: Final = 2.0**53  # whole numbers that floats have all of
+_GAPS: Final = np.iinfo(np.int64).min + np.arange(3)  # what stands for NaN, infinite and -infinite among decimals
+_GAP_VALUES: Final = np.array([np.nan, np.inf, -np.inf])
+
+
+@dataclass(frozen=True, slots=True)
+class _Column:
+    """How a column was packed.
+
+    Attributes:
+        name: What it is called.
+        type: Of its numbers.
+        shape: Its own.
+        decimals: How many its numbers have at most; -1: the bits of its floats are kept, or it is whole.
+        order: Of the differences.
+    """
+
+    name: str
+    type: str
+    shape: tuple[int, ...]
+    decimals: int
+    order: int
+
+
+def rounded(values: NDArray[np.float64], decimals: int) -> NDArray[np.float64]:
+    """The nearest numbers of so many decimals, each as the float that its digits are read as.
+
+    Args:
+        values: Any shape.
+        decimals: How many.
+    """
+    scale = 10.0**decimals
+    return np.asarray(np.rint(values * scale) / scale + 0.0)  # + 0.0: no -0.0
+
+
+def pack(columns: Mapping[str, NDArray[Any]], decimals: Mapping[str, int] | None = None) -> bytes:
+    """Columns in few bytes.
+
+    Args:
+        columns: Floats, whole numbers or flags of any shape; the first axis is the course.
+        decimals: Of columns that may have no more than so many: one that has more is kept bit by bit.
+
+    Returns:
+        The bytes; `unpack` reads them.
+    """
+    from zstandard import compress
+
+    known = decimals or {}
+    heads, parts = [], []
+    for name, values in columns.items():
+        whole, places = _whole(np.asarray(values), known.get(name, -1))
+        order, small = _smallest(whole.reshape(len(whole) if whole.ndim else 1, -1) if whole.size else whole)
+        heads.append((name, values.dtype.name, values.shape, places, order))
+        parts.append(_planes(small))
+    head = json.dumps(heads, separators=(",", ":")).encode()
+    return compress(b"".join((len(head).to_bytes(4, "little"), head, *parts)), LEVEL)
+
+
+def unpack(data: bytes) -> dict[str, NDArray[Any]]:
+    """The columns that `pack` packed, the same to the last bit.
+
+    Args:
+        data: The bytes.
+
+    Returns:
+        The columns, in their order.
+
+    Raises:
+        ValueError: If the bytes are none of its.
+        InvalidValueError: If they hold more than fits into memory.
+    """
+    from zstandard import ZstdDecompressor, ZstdError, get_frame_parameters
+
+    try:
+        size = get_frame_parameters(data).content_size
+    except ZstdError as error:
+        raise ValueError(f"no packed columns ({error})") from None
+    check_memory("what is packed", 3.0 * size, "Take the file from where it came.")
+    try:
+        plain = ZstdDecompressor().decompress(data, allow_extra_data=False)
+        start = 4 + int.from_bytes(plain[:4], "little")
+        heads = json.loads(plain[4:start])
+        columns = [_Column(name, kind, tuple(shape), *rest) for name, kind, shape, *rest in heads]
+    except (ZstdError, TypeError, ValueError) as error:  # the last is that of JSON too
+        raise ValueError(f"no packed columns ({error})") from None
+    found: dict[str, NDArray[Any]] = {}
+    for column in columns:
+        end = start + 8 * _count(column)
+        if end > len(plain):
+            raise ValueError(f"column {column.name!r} is cut off")
+        found[column.name] = _values(column, plain[start:end])
+        start = end
+    if start != len(plain):
+        raise ValueError("more is packed than its head says")
+    return found
+
+
+def _count(column: _Column) -> int:
+    """How many numbers a column has.
+
+    Raises:
+        ValueError: If its head is none that `pack` writes.
+    """
+    sizes = all(0 <= size < 1 << 40 for size in column.shape)
+    if not (
+        column.type in TYPES and sizes and column.order in range(MOST_ORDER + 1) and column.decimals in range(-1, 16)
+    ):
+        raise ValueError(f"a column has a head that is none: {column}")
+    return prod(column.shape)
+
+
+def _whole(values: NDArray[Any], decimals: int) -> tuple[NDArray[np.int64], int]:
+    """Numbers as whole ones, and how many decimals were taken away; -1 for none, or for bits."""
+    if values.dtype.name not in TYPES:
+        raise TypeError(f"columns of {values.dtype} are not packed")
+    if values.dtype != np.float64:
+        return values.astype(np.int64), -1
+    bits = np.ascontiguousarray(values).view(np.int64).reshape(values.shape)
+    if decimals < 0:
+        return bits, -1
+    gaps = ~np.isfinite(values)
+    scaled = np.rint(np.where(gaps, 0.0, values) * 10.0**decimals)
+    if not (np.abs(scaled) < _EXACT).all():
+        return bits, -1
+    whole = scaled.astype(np.int64)
+    if gaps.any():
+        whole[gaps] = _GAPS[np.where(np.isnan(values[gaps]), 0, np.where(values[gaps] > 0.0, 1, 2))]
+    if not np.array_equal(_decimal(whole, decimals).view(np.int64), bits):
+        return bits, -1
+    return whole, decimals
+
+
+def _decimal(whole: NDArray[np.int64], decimals: int) -> NDArray[np.float64]:
+    values = np.asarray(whole / 10.0**decimals)  # the float nearest to the decimal: both are exact
+    for gap, value in zip(_GAPS, _GAP_VALUES, strict=True):
+        values[whole == gap] = value
+    return values
+
+
+def _smallest(whole: NDArray[np.int64]) -> tuple[int, NDArray[np.uint64]]:
+    """The order whose differences take the fewest bits, and these, with the sign in the lowest bit."""
+    best: tuple[float, int, NDArray[np.uint64]] | None = None
+    for order in range(MOST_ORDER + 1):
+        small = ((whole << 1) ^ (whole >> 63)).view(np.uint64)
+        bits = float(np.log2(small + 1.0).sum())
+        if best is None or bits < best[0]:
+            best = bits, order, small
+        whole = np.diff(whole, axis=0, prepend=np.int64(0)) if whole.size else whole  # wraps around, and back
+    assert best is not None
+    return best[1], best[2]
+
+
+def _planes(small: NDArray[np.uint64]) -> bytes:
+    """Bytes of equal weight together, column by column."""
+    courses = np.ascontiguousarray(small.T).view(np.uint8)
+    return courses.reshape(-1, 8).T.tobytes()
+
+
+def _values(column: _Column, planes: bytes) -> NDArray[Any]:
+    rows = column.shape[0] if column.shape else 1
+    packed = np.frombuffer(planes, dtype=np.uint8).reshape(8, -1).T
+    small = np.ascontiguousarray(packed).view(np.uint64).reshape(-1, rows).T if packed.size else np.empty(0, np.uint64)
+    whole = (small >> np.uint64(1)).view(np.int64) ^ -(small & np.uint64(1)).view(np.int64)
+    for _ in range(column.order):
+        whole = np.cumsum(whole, axis=0)
+    whole = np.ascontiguousarray(whole).reshape(column.shape)
+    if column.type != "float64":
+        return whole.astype(column.type)
+    return whole.view(np.float64) if column.decimals < 0 else _decimal(whole, column.decimals)
