@@ -88,9 +88,10 @@ class Hardware:
         read = self.read
         self.counts = np.rint(self._true.counts(reading.length) + self._slip)
         length = self._nominal.lengths(self.counts)
-        read[RATE] = (length - read[LENGTH]) / self._period
+        np.subtract(length, read[LENGTH], out=read[RATE])
+        read[RATE] /= self._period
         read[LENGTH] = length
-        read[TORQUE] = reading.force * self._torque_of_force
+        np.multiply(reading.force, self._torque_of_force, out=read[TORQUE])
         read[CELL] = reading.load_cell
         for cell, (kept, added) in self._wrong.items():
             read[CELL, cell] = kept * read[CELL, cell] + added

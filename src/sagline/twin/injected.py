@@ -193,6 +193,11 @@ class Schedule:
         self._due: list[tuple[float, int, bool, Injected]] = []
         self._planned = 0
 
+    @property
+    def waiting(self) -> bool:
+        """Whether there are any."""
+        return bool(self._due)
+
     def plan(self, what: Injected) -> None:
         """Put a fault where it begins, and where it ends."""
         self._push(what.time, True, what)

@@ -184,7 +184,8 @@ class Machine:
             group: Which, from 0.
             message: The owner who claims, or a command.
         """
-        self._let_happen()
+        if self._schedule.waiting:
+            self._let_happen()
         if group in self._stopped or self._commands not in ("", "are foreign"):
             return
         if isinstance(message, int):
@@ -197,7 +198,8 @@ class Machine:
     def advance(self) -> None:
         """Go on for one period: what goes wrong now, the PLCs' scans, drives and plant, and what is read then."""
         now = self.time
-        self._let_happen()
+        if self._schedule.waiting:
+            self._let_happen()
         for link in self._links:
             link.before(now)
         self._scan(now)

@@ -143,6 +143,7 @@ class Program:
     def trip(self, winch: int, code: int) -> None:
         """Let a drive trip: it has no power until the operator resets it."""
         self.drive_fault[winch], self.powered[winch] = code, False
+        self._stop(GroupFault.DRIVE)
 
     def scan(self, now: float, encoder: list[float], cell: list[float]) -> None:
         """Set the drives for the next period.
@@ -155,7 +156,8 @@ class Program:
         order, fresh, waited, self._now = self._order, self._fresh, now - self._moved, now
         if fresh and order is not None:
             self._fresh, self._moved = False, now
-            if order.mode == _FOLLOW and order.enable == self.powered and not self.stands and not self._lags(encoder):
+            stands = self.fault or self.emergency or self.locked
+            if order.mode == _FOLLOW and order.enable == self.powered and not stands and not self._lags(encoder):
                 self._follow(order, waited, cell)
                 return
             if order.mode == _LEAVE:
@@ -172,7 +174,7 @@ class Program:
             self._let_lag(encoder)
             self._stop(GroupFault.FOLLOWING_ERROR)
         if any(self.drive_fault):
-            self._stop(GroupFault.DRIVE)
+            self.fault = self.fault or GroupFault.DRIVE
         elif fresh and order is not None and (not self.fault or (order.mode == _HOLD and self._was_told)):
             self.fault = GroupFault.NONE
             self._switch(order, encoder)
@@ -187,10 +189,13 @@ class Program:
 
     def _lags(self, encoder: list[float]) -> bool:
         """Whether a drive is too far from its set point."""
-        for has, length, there in zip(self.powered, self.length, encoder, strict=True):
-            if has and not -FOLLOWING <= length - there <= FOLLOWING:
-                return True
-        return False
+        length, powered = self.length, self.powered
+        for i in self.winches:
+            if powered[i] and not -FOLLOWING <= length[i] - encoder[i] <= FOLLOWING:
+                break
+        else:
+            return False
+        return True
 
     def _let_lag(self, encoder: list[float]) -> None:
         """Set points of drives that are too far from theirs are where they are."""
@@ -300,11 +305,6 @@ class Program:
     def _was_told(self) -> bool:
         """Whether the ramp is over, and the fault was in the blocks so long that nobody missed it."""
         return not self._ramp and self._now - self._since >= HEARTBEAT - TINY
-
-    @property
-    def stands(self) -> bool:
-        """Whether it does not do what commands say."""
-        return bool(self.fault or self.emergency or self.locked or any(self.drive_fault))
 
     @property
     def status(self) -> int:
