@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import typer.main
@@ -26,6 +27,9 @@ RINGS = {  # package -> title and opening line of its page of reference
     "dynamics": ("Dynamics", "How the robot vibrates and moves."),
     "tension": ("Tension", "How redundant cables share the load."),
     "statics": ("Statics", "Structure matrix, wrenches, stiffness."),
+    "control": ("Controller", "`sl.control`: what drives a machine, cycle by cycle."),
+    "plc": ("Links", "`sl.plc`: the way to real controllers of drives, over S7 or Modbus."),
+    "twin": ("Twin", "`sl.twin`: the machine behind a link, in this process or behind servers of its own."),
     "article": ("Identification", "Constants of cables and of the empirical model, from measurements."),
     "files": ("Files", "What is read and written."),
     "plot": ("Figures", "`sl.plot`: figures for papers, on Matplotlib."),
@@ -107,9 +111,11 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def names_by_ring() -> dict[str, list[str]]:
-    """Full names of everything public, by the package it lives in; functions of `sl.plot` among them."""
-    full = [f"{value.__module__}.{name}" for name in sl.__all__ if hasattr(value := getattr(sl, name), "__module__")]
-    full += [f"{getattr(sl.plot, name).__module__}.{name}" for name in sl.plot.__all__]
+    """Full names of everything public, by the package it lives in; what `sl.plot` and its like list among them."""
+    modules = (getattr(sl, name) for name in sl.__all__)
+    places = [(sl, sl.__all__), *((module, module.__all__) for module in modules if isinstance(module, ModuleType))]
+    listed = [(name, getattr(place, name)) for place, names in places for name in names]
+    full = [f"{value.__module__}.{name}" for name, value in listed if callable(value) and hasattr(value, "__module__")]
     rings: dict[str, list[str]] = {ring: [] for ring in RINGS}
     for name in full:
         rings.setdefault(name.split(".")[1], []).append(name)

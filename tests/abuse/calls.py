@@ -14,6 +14,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import sagline as sl
+from sagline.control.link import Command, Mode
 from sagline.robot.winch import RULES
 from tests.files.simulations import a_simulation
 from tests.kinematics.winches import wound
@@ -51,12 +52,17 @@ def public_names() -> set[str]:
     for name in sl.__all__:
         value = getattr(sl, name)
         if isinstance(value, ModuleType):
-            found |= {f"{name}.{function}" for function in value.__all__}
-        elif inspect.isclass(value):
-            found |= _of_class(name, value)
-        elif callable(value) and inspect.signature(value).parameters:
-            found.add(name)
+            for part in value.__all__:
+                found |= _of_value(f"{name}.{part}", getattr(value, part))
+        else:
+            found |= _of_value(name, value)
     return found
+
+
+def _of_value(name: str, value: Any) -> set[str]:
+    if inspect.isclass(value):
+        return _of_class(name, value)
+    return {name} if callable(value) and inspect.signature(value).parameters else set()
 
 
 def _of_class(name: str, kind: type) -> set[str]:
@@ -76,10 +82,11 @@ RESULTS = frozenset(
     {"CableFit", "CableState", "Confirmation", "EmpiricalFit", "Equilibria", "Equilibrium", "ForwardSolution"}
     | {"FrequencySlopes", "WinchDrive"}
     | {"EnergyBalance", "Imported", "Linearized", "Modes", "Occurrence", "Plan", "Simulation", "Stiffness"}
+    | {"twin.Injected"}
     | {"FrequencyMap", "FrequencyResponse", "TensionPolygon", "Vibration", "WinchRates"}
 )
 # asked by sagline itself, with numbers of its own
-INTERNAL = frozenset({"TensionMethod.preference", "QuadraticProgram.preference"})
+INTERNAL = frozenset({"TensionMethod.preference", "QuadraticProgram.preference", "twin.Machine.deliver"})
 
 
 @cache
@@ -102,6 +109,7 @@ def calls(folder: Path) -> dict[str, Call]:
         _files,
         _in_time,
         _figures,
+        _twins,
     ):
         table |= part(given)
     return table
@@ -647,6 +655,37 @@ def _figures(given: _Given) -> dict[str, Call]:
     return {f"plot.{name}": Call(draw(function), _all(**arguments)) for name, (function, arguments) in table.items()}
 
 
+def _twins(given: _Given) -> dict[str, Call]:
+    robot = sl.load_robot("article-prototype")
+    place = sl.Pose.from_euler([0.0, 0.0, 1.5], 0.0, 0.0, 0.0)
+    machine, two = sl.twin.Machine(robot), np.array([3.0, 3.5])
+    command = Command(1, 7, Mode.HOLD, 0.1, two, 0.0 * two, 50.0 * two, two > 0.0)
+    text, group = ("text", "cell 3 sticks at 40 s"), ("whole", 3)
+    return {
+        "twin.fault": Call(sl.twin.fault, _all(text=text)),
+        "twin.Machine": Call(
+            lambda **a: (sl.twin.Machine(**a), None)[1],
+            _all(
+                robot=("one", robot),
+                nominal=("one", robot, True),
+                start=("one", place, True),
+                seed=("seed", 3),
+                period=("number", 0.01),
+                step=("number", 1e-3),
+                delay=("number", 0.01),
+                jitter=("number", 0.01),
+                loss=("number", 0.25),
+                damping=("one", sl.Damping(1e-3), True),
+            ),
+        ),
+        "twin.Machine.link": Call(lambda: (machine.link(), None)[1], {}),
+        "twin.Machine.claim": Call(machine.claim, _all(group=group, owner=("whole", 7))),
+        "twin.Machine.take": Call(machine.take, _all(group=group, command=("object", command))),
+        "twin.Machine.report": Call(lambda group: (machine.report(group), None)[1], _all(group=group)),
+        "twin.Machine.inject": Call(machine.inject, _all(what=text)),
+    }
+
+
 _WIREX = """<models version="0.32"><robot name="swing" motionpattern="3T"><geometry>
 <chain><base x="-1" y="-1" z="2"/><platform x="0" y="0" z="0"/></chain>
 <chain><base x="1" y="-1" z="2"/><platform x="0" y="0" z="0"/></chain>
@@ -717,6 +756,13 @@ def _in_time(given: _Given) -> dict[str, Call]:
             ),
         ),
         "Simulator.hold": Call(lambda winch: machine.hold(winch), _all(winch=("cable", 3))),
+        "Simulator.shift": Call(
+            lambda length, winch: machine.shift(length, winch), _all(length=("number", 1e-3), winch=("cable", 3))
+        ),
+        "Simulator.cut": Call(lambda cable: sl.Simulator(driven, driven_state).cut(cable), _all(cable=("cable", 3))),
+        "Simulator.limit_force": Call(
+            lambda force, winch: machine.limit_force(force, winch), _all(force=("number", 1e3), winch=("cable", 3))
+        ),
         "Simulator.release": Call(lambda winch: machine.release(winch), _all(winch=("cable", 3))),
         "SecondOrder": Call(sl.SecondOrder, _all(bandwidth=("number", 10.0), damping_ratio=("number", 0.75))),
         "Break": Call(sl.Break, _all(cable=("whole", 3), time=("number", 0.5))),

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from sagline.arguments import brief, instance, optional, whole_number
+from sagline.arguments import brief, choice, instance, optional, whole_number
 from sagline.arrays import number
 from sagline.control.link import PERIOD, Command, groups_of
 from sagline.dynamics.damping import Damping
@@ -25,6 +25,7 @@ from sagline.twin.start import check_step, limits_of, started
 
 LOSSES: Final = Damping(loss_time=1e-3, air_damping=0.2)  # ours; on the prototype as if the air took 2 N s/m
 MOST_SEED: Final = 2**63 - 1
+LARGEST_ID: Final = 2**32 - 1
 RIVAL: Final = 2**31 - 2  # the id of a controller that takes a grant it should not have
 TRIPPED: Final = 1  # the code of a drive that has
 
@@ -65,7 +66,7 @@ class Machine:
         jitter: float = 0.0,
         loss: float = 0.0,
         damping: Damping | None = None,
-        faults: Iterable[str | Injected] = (),
+        faults: str | Injected | Iterable[str | Injected] = (),
     ) -> None:
         """Switch a machine on, its platform at rest, brakes on.
 
@@ -84,7 +85,7 @@ class Machine:
             jitter: On top of it, evenly up to this [s].
             loss: Share of the messages that are lost.
             damping: What takes energy out of the cables; None: a loss time of 1 ms, and air.
-            faults: What goes wrong, and when: texts as `fault` reads them, or what it makes of them.
+            faults: What goes wrong, and when: texts as `fault` reads them, or what it makes of them; one, or several.
 
         Raises:
             InvalidValueError: If data are missing, the step is too coarse for the robot's modes, the robot does not
@@ -123,7 +124,7 @@ class Machine:
         self._stopped: set[int] = set()
         self._taken: set[int] = set()
         self._snapshot = self._written(None)
-        for one in faults:
+        for one in _several(faults):
             self.inject(one)
 
     def _switched_on(self, limits: Limits) -> list[Program]:
@@ -163,9 +164,12 @@ class Machine:
 
         Args:
             group: Which, from 0.
-            owner: Who asks.
+            owner: Who asks; 0 for nobody.
+
+        Raises:
+            InvalidValueError: If there is no such group, or the id is no whole number of 32 bits.
         """
-        self.deliver(group, owner)
+        self.deliver(self._group(group), whole_number(owner, "owner", 0, LARGEST_ID))
 
     def take(self, group: int, command: Command) -> None:
         """Give a PLC a command; it looks itself whether that is new, and its owner's.
@@ -173,9 +177,21 @@ class Machine:
         Args:
             group: Which, from 0.
             command: Its arrays are of the group's winches only.
+
+        Raises:
+            InvalidValueError: If there is no such group, or the command is none, or of other winches.
         """
-        rows = (np.asarray(row).tolist() for row in command[4:])
-        self.deliver(group, Order(command.counter, command.owner, command.mode, command.valid_for, *rows))
+        chosen = self._group(group)
+        count = len(self.groups[chosen])
+        rows = [np.asarray(row) for row in instance(command, Command, "command")[4:]]
+        if any(row.shape != (count,) for row in rows):
+            shapes = f"of shapes {', '.join(str(row.shape) for row in rows)}"
+            raise InvalidValueError("command", shapes, f"({count},), as group {chosen} has winches", "Give these only.")
+        lists = (row.tolist() for row in rows)
+        self.deliver(chosen, Order(command.counter, command.owner, command.mode, command.valid_for, *lists))
+
+    def _group(self, group: Any) -> int:
+        return whole_number(group, "group", 0, len(self.groups) - 1)
 
     def deliver(self, group: int, message: int | Order) -> None:
         """Let a claim or a command arrive at a PLC, unless a fault is in the way.
@@ -253,7 +269,11 @@ class Machine:
 
         Returns:
             The block; None where a fault keeps what was there before.
+
+        Raises:
+            InvalidValueError: If there is no such group.
         """
+        group = self._group(group)
         how = self._spoiled.get(group, "")
         if group in self._stopped or how in ("is silent", "repeats", "goes back"):
             return None
@@ -274,7 +294,7 @@ class Machine:
             InvalidValueError: If there is no such fault, or the machine has no such part.
         """
         found = what if isinstance(what, Injected) else fault(what)
-        kind = KINDS[found.kind]
+        kind = KINDS[choice(found.kind, "fault: kind", KINDS)]
         parts = len(self.groups) if kind.item == "group" else self.robot.cable_count
         if kind.numbered and not 0 <= found.which < parts:
             raise InvalidValueError("fault", brief(str(found)), f"{kind.item} 0 to {parts - 1}", "They count from 0.")
@@ -329,3 +349,13 @@ class Machine:
         """Let the emergency stop and locked drums go and clear the drives, as the operator at the machine does."""
         for program in self._programs:
             program.reset()
+
+
+def _several(faults: Any) -> Iterable[Any]:
+    """Faults, of which one may be given by itself."""
+    if isinstance(faults, str | Injected):
+        return (faults,)
+    if isinstance(faults, Iterable):
+        return faults
+    step = 'Give texts: faults=["cell 3 sticks at 40 s"].'
+    raise InvalidValueError("faults", brief(faults), "faults, or none", step)

@@ -9,6 +9,7 @@ import numpy as np
 
 from sagline.arguments import optional
 from sagline.arrays import Array
+from sagline.control.link import HEARTBEAT
 from sagline.dynamics.drives import drive_data
 from sagline.dynamics.steps import highest_frequency, with_drives
 from sagline.errors import InvalidValueError
@@ -107,10 +108,14 @@ def check_step(robot: Robot, state: Equilibrium, step: float, period: float) -> 
         period: Of controller and PLCs [s].
 
     Raises:
-        InvalidValueError: If a step is more than 0.2 radians of the highest of them, or the period not of whole ones.
+        InvalidValueError: If a step is more than 0.2 radians of the highest of them, or the period not of whole ones or
+            longer than a PLC waits for a command.
     """
     if not (parts := period / step) >= 0.5 or abs(parts - round(parts)) > NEAR * parts:
         raise InvalidValueError("period", f"{period:g} s", f"a whole multiple of {step:g} s, the step", "Correct it.")
+    if period > HEARTBEAT:
+        step_to = "Give 0.01, the article's."
+        raise InvalidValueError("period", f"{period:g} s", f"<= {HEARTBEAT:g} s, the heartbeat", step_to)
     length = state.unstrained_length
     pose = Pose.from_quaternion(state.pose.position[None], state.pose.quaternion[None])
     data = drive_data(robot, "robot", length, False)
