@@ -16,7 +16,7 @@ from sagline.control.faults import FAULT_TABLE, FAULTS, faults_of
 from sagline.control.link import GroupFault, GroupStatus, Mode, Sample, WinchState
 from tests.control.lockstep import OWNER, ROBOT, Change, course, cycles, one, told, with_sample
 
-START = 60  # cycle; the prototype moves
+START = 40  # cycle; the prototype moves
 FALLING = -1.0  # N m at a motor: 667 N that its cable pulls
 
 
@@ -235,7 +235,7 @@ CASES = {
     ),
     "cell stuck": Case(stuck(2), ("cell stuck",), DEGRADED, (49, 49), "cell 2 has read "),
     "cell wrong": Case(cell(1, lambda k, t: t + 25.0), ("cell wrong",), DEGRADED, (35, 49), "cell 1 is off by about "),
-    "encoder jump": Case(jump(1, 0.002), ("encoder jump",), STOPPING, (0, 0), "encoder 1 jumped by 2.0"),
+    "encoder jump": Case(jump(1, 0.002), ("encoder jump",), STOPPING, (0, 0), "encoder 1 jumped by 1.98"),
     "encoder jumps far": Case(jump(6, -0.5), ("encoder jump",), STOPPING, (0, 0), "encoder 6 jumped by 500 mm"),
     "encoder without a number": Case(jump(2, np.nan), ("encoder jump",), STOPPING, (0, 0), "encoder 2 reads no number"),
     "encoder beyond numbers": Case(jump(2, np.inf), ("encoder jump",), STOPPING, (0, 0), "encoder 2 reads no number"),
@@ -272,7 +272,7 @@ CASES = {
 @pytest.mark.parametrize("name", CASES)
 def test_a_fault_is_told_once_in_time_and_alone(name: str) -> None:
     case = CASES[name]
-    found = told(case.change, 180, seed=8)
+    found = told(case.change, 145, seed=8)
     assert tuple(each.name for each in found) == case.names
     after = found[-1].cycle - START
     assert case.cycles[0] <= after <= case.cycles[1]
@@ -325,15 +325,15 @@ QUIET = {
 
 @pytest.mark.parametrize("name", QUIET)
 def test_less_than_that_is_no_fault(name: str) -> None:
-    assert told(QUIET[name], 180, seed=8) == []
+    assert told(QUIET[name], 145, seed=8) == []
 
 
 @pytest.mark.parametrize(
     ("options", "count"),
     [
-        ({}, 1700),
-        ({"unsteady": True, "more_mass": 2.0}, 1700),
-        ({"unsteady": True, "more_mass": -8.0, "delay": 5}, 1700),
+        ({}, 1200),
+        ({"unsteady": True, "more_mass": 2.0}, 1200),
+        ({"unsteady": True, "more_mass": -8.0, "delay": 5}, 1200),
         pytest.param({"unsteady": True, "more_mass": 2.0, "delay": 2}, 84_000, marks=pytest.mark.soak),
     ],
 )
@@ -354,7 +354,7 @@ def test_a_cell_that_is_off_is_named_whatever_the_load_weighs(index: int, error:
 
 def test_two_cells_that_die_are_told_one_by_one_and_no_cable_is_slack() -> None:
     second = since(lambda k, cycle: with_sample(cycle, tension=one(cycle.sample.tension, 2, 0.0)), START + 60)
-    found = told(both(cell(5, lambda k, t: 0.0), second), 180)
+    found = told(both(cell(5, lambda k, t: 0.0), second), 145)
     assert [each.name for each in found] == ["cell zero or saturated"] * 2
     assert [each.line[:6] for each in found] == ["cell 5", "cell 2"]
 
@@ -366,7 +366,7 @@ def test_where_motors_tell_nothing_a_reading_of_zero_is_a_slack_cable() -> None:
 
 
 def test_a_cable_that_breaks_without_notice_to_the_others_is_slack_until_they_notice() -> None:
-    found = told(broken(4, others=1.0), 180)
+    found = told(broken(4, others=1.0), 145)
     assert [each.name for each in found] == ["slack", "cable broken"]
     assert found[0].cycle == START + 2
     assert found[1].cycle <= START + 7
@@ -376,7 +376,7 @@ def test_where_the_lower_limit_is_zero_the_noise_of_the_cells_stands_in() -> Non
     free = ROBOT.replace(tension_min=0.0)
     found = told(cell(5, lambda k, t: 11.1, torque=0.0), 150, robot=free)
     assert [each.name for each in found] == ["slack"]
-    assert told(cell(5, lambda k, t: 11.4, torque=0.0), 80, robot=free) == []
+    assert told(cell(5, lambda k, t: 11.4, torque=0.0), 60, robot=free) == []
 
 
 def test_a_plan_that_lets_a_cable_hang_has_no_slack_cable() -> None:
@@ -386,7 +386,7 @@ def test_a_plan_that_lets_a_cable_hang_has_no_slack_cable() -> None:
         )
         return altered._replace(tension=one(cycle.tension, 4, 4.0))
 
-    assert told(hangs, 180) == []
+    assert told(hangs, 145) == []
 
 
 def test_without_a_plan_tensions_are_held_against_nothing() -> None:
@@ -394,7 +394,7 @@ def test_without_a_plan_tensions_are_held_against_nothing() -> None:
         sample = with_sample(cycle, tension=np.random.default_rng(k).uniform(0.0, 300.0, 8))
         return sample._replace(tension=np.full(8, np.nan), gains=None)
 
-    assert told(homing, 180) == []
+    assert told(homing, 145) == []
 
 
 def test_what_an_earlier_controller_left_is_not_told() -> None:
@@ -437,7 +437,7 @@ def test_a_cell_that_does_not_change_at_rest_is_not_stuck() -> None:
         )
         return still._replace(command=cycle.command._replace(rate=np.zeros(8), length=course().length[0]))
 
-    assert told(rests, 180) == []
+    assert told(rests, 145) == []
 
 
 def test_a_set_point_that_is_on_its_way_is_no_following_error() -> None:
@@ -448,8 +448,8 @@ def test_a_set_point_that_is_on_its_way_is_no_following_error() -> None:
         if cycle.command is not None
     ]
     assert max(ahead) > 0.015
-    assert told(None, 180, delay=5) == []
-    assert [each.name for each in told(lags(7, 0.05), 180, delay=5)] == ["following error"]
+    assert told(None, 145, delay=5) == []
+    assert [each.name for each in told(lags(7, 0.05), 145, delay=5)] == ["following error"]
 
 
 def test_two_bursts_of_bad_blocks_are_two_events() -> None:
@@ -492,7 +492,7 @@ def test_nonsense_neither_raises_nor_warns() -> None:
         return with_sample(cycle, **{str(name): values}, **codes)
 
     found = told(alter, 1500)
-    assert len({each.name for each in found}) >= 6
+    assert len({each.name for each in found}) >= 4
     assert all(len(each.line) < 300 and each.line.isprintable() for each in found)
 
 
@@ -514,3 +514,57 @@ def test_rules_of_one_set_know_nothing_of_another() -> None:
     other = faults_of(ROBOT, groups=((0, 4), (1, 5), (2, 6), (3, 7)))
     assert other[0].seen.group_of.tolist() == [0, 1, 2, 3, 0, 1, 2, 3]
     assert OWNER == 4711
+
+
+def test_what_follows_from_a_stop_is_not_told_again_but_for_lengths_in_doubt() -> None:
+    """A drive trips, its PLC says so; later another drum slips, and then its servo is at its limit."""
+    late_jump = since(lambda k, cycle: with_sample(cycle, length=_added(cycle.sample.length, 1, 0.003)), START + 20)
+    later = both(late_jump, field("state", 3, WinchState.SATURATED))
+    found = told(both(drive_trips, later), 145)
+    assert [(each.name, each.cycle) for each in found] == [
+        ("group acts by itself", START),
+        ("encoder jump", START + 20),
+    ]
+
+
+def test_several_groups_that_stop_at_once_are_one_event_and_once() -> None:
+    def stops(k: int, cycle: Cycle) -> Cycle:
+        acting = k >= START and k % 12 < 6  # a command to hold clears it for a while
+        return with_sample(cycle, fault=np.full(4, int(GroupFault.HEARTBEAT))) if acting else cycle
+
+    found = told(stops, 145)
+    assert [each.name for each in found] == ["group acts by itself"]
+    assert found[0].line.startswith("group 0, 1, 2, 3 stopped by itself: no command came")
+
+
+def test_drums_that_are_stopped_dead_have_not_jumped() -> None:
+    """Locked at 0.3 m/s: a length is 3 mm less than its rate promised."""
+
+    def locked(k: int, cycle: Cycle) -> Cycle:
+        if k < 300:
+            return cycle
+        still = course().length[299]
+        return with_sample(cycle, length=still, rate=np.zeros(8), state=np.full(8, int(WinchState.LOCKED)))
+
+    moving = np.abs(course().rate[299]).max()
+    assert moving > 0.2
+    assert "encoder jump" not in [each.name for each in told(locked, 320)]
+
+
+def test_a_rate_that_comes_from_the_encoder_itself_does_not_hide_its_jump() -> None:
+    """A PLC that takes the rate of a period from its counts says that the drum was fast."""
+
+    def alter(k: int, cycle: Cycle) -> Cycle:
+        if k < START:
+            return cycle
+        sample = cycle.sample
+        rate = _added(sample.rate, 1, 0.2) if k == START else sample.rate
+        return with_sample(cycle, length=_added(sample.length, 1, 0.002), rate=rate)
+
+    assert [(each.name, each.cycle) for each in told(alter, 100)] == [("encoder jump", START)]
+
+
+def test_set_points_that_a_plc_does_not_follow_are_no_following_error() -> None:
+    ramping = int(GroupStatus.READY | GroupStatus.RAMPING)
+    found = told(both(lags(7, 0.05), field("status", 3, ramping)), 145)
+    assert found == []

@@ -33,6 +33,7 @@ class Evidence:
         limit: Upper limits of T_A [N], shape (m,).
         full_scale: Of the cells [N], infinite where it is not known, shape (m,).
         believed: Which cells are, shape (m,).
+        stopped: Whether a fault has been told that stops the motion.
         broken: Which cables are known to be, shape (m,).
         jumped: Which encoders have, shape (m,).
         fresh: Which winches' data are new in this cycle, shape (m,).
@@ -80,7 +81,7 @@ class Evidence:
         self.fresh: Flags = np.ones(m, dtype=bool)
         self.low = np.zeros(m, dtype=np.int64)
         self.before_low, self.steady, self.quick = np.full(m, np.nan), np.zeros(m), np.zeros(m)
-        self.compared = self.any_low = False
+        self.compared = self.any_low = self.stopped = False
         self._shares = [period / (time + period) for time in (STEADY_TIME, QUICK_TIME)]
         self._cycle: Cycle | None = None
 

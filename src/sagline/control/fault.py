@@ -57,12 +57,19 @@ class Fault(ABC):
 
         Returns:
             Where the fault begins a line for the operator: what, which item, value, limit, next step. None otherwise,
-            and while it lasts.
+            while it lasts, and where another has stopped the motion already.
         """
         self.seen.at(cycle)
         line = self.found(cycle)
-        begins = line is not None and (self.lasting or not self.present)
-        self.present = line is not None or (self.lasting and self.present)
+        if line is None:
+            self.present &= self.lasting
+            return None
+        begins = self.lasting or not self.present
+        self.present = True
+        if self.reaction is Reaction.STOPPING:
+            # what comes after it is mostly its consequence; what puts a length in doubt is told for all that
+            begins &= not self.seen.stopped or self.homing
+            self.seen.stopped = True
         return line if begins else None
 
     @abstractmethod

@@ -12,12 +12,13 @@ from sagline.arrays import Array
 from sagline.control.cycle import Cycle
 from sagline.control.evidence import Evidence
 from sagline.control.fault import Fault, Reaction
-from sagline.control.link import Command, Mode, Sample, WinchState
+from sagline.control.link import Command, GroupStatus, Mode, Sample, WinchState
 
 JUMP: Final = 1e-3  # m a cycle
 FOLLOWING: Final = 5e-3  # m
 SATURATED: Final = 0.2  # s
-_AT_LIMIT: Final = int(WinchState.SATURATED)
+_AT_LIMIT, _ENABLED = int(WinchState.SATURATED), int(WinchState.ENABLED)
+_FOLLOWING: Final = int(GroupStatus.FOLLOWING)
 REMEMBERED: Final = 32  # commands: more than may be on their way
 LONGEST: Final = 1.0  # s between two samples of a PLC; more is its clock that began again
 
@@ -26,7 +27,10 @@ class EncoderJump(Fault):
     """Length and speed of a drum do not agree."""
 
     name = "encoder jump"
-    rule = f"|change of length - rate x time| > {1e3 * JUMP:g} mm from sample to sample, or no number"
+    rule = (
+        f"|change of length - rate x time| > {1e3 * JUMP:g} mm from sample to sample, by the rate before it and by "
+        "that of the set points; or no number"
+    )
     reaction = Reaction.STOPPING
     within = "10 ms"
     homing = True
@@ -45,17 +49,22 @@ class EncoderJump(Fault):
             self.seen.jumped |= wrong
             winch = int(np.argmax(wrong))
             return f"encoder {winch} reads no number. Check its drive, acknowledge, and home again."
-        return self._jump(sample, before) if known and before is not None else None
+        return self._jump(cycle, sample, before) if known and before is not None else None
 
-    def _jump(self, sample: Sample, before: Sample) -> str | None:
-        period, time = self.seen.period, sample.plc_time - before.plc_time
-        passed = time[self.seen.group_of]
-        jump = np.abs(sample.length - before.length - 0.5 * (sample.rate + before.rate) * passed)
+    def _jump(self, cycle: Cycle, sample: Sample, before: Sample) -> str | None:
+        """The rate at the end is that of the jump itself, where a drive takes it from its encoder."""
+        passed = (sample.plc_time - before.plc_time)[self.seen.group_of]
+        change = sample.length - before.length
+        jump = np.abs(change - before.rate * passed)
         if jump.max() <= JUMP:
             return None
-        known = (passed >= 0.0) & (passed < LONGEST)
-        allowed = JUMP * np.maximum(1.0, passed / period)  # over a gap rates may have changed more
-        jumped = known & ~(jump <= allowed)
+        if cycle.command is not None:
+            jump = np.minimum(jump, np.abs(change - cycle.command.rate * passed))
+        # a drum that is locked stops at once, and one whose drive gives all it can goes where the cable pulls it
+        free = (sample.state == _ENABLED) & (before.state == _ENABLED)
+        free &= (passed >= 0.0) & (passed < LONGEST)
+        allowed = JUMP * np.maximum(1.0, passed / self.seen.period)  # over a gap rates may have changed more
+        jumped = free & ~(jump <= allowed)
         if not jumped.any():
             return None
         self.seen.jumped |= jumped
@@ -70,7 +79,7 @@ class FollowingError(Fault):
     """A drum is not where it was sent."""
 
     name = "following error"
-    rule = f"|set point - length| > {1e3 * FOLLOWING:g} mm, set points being those that the PLC has taken"
+    rule = f"|set point - length| > {1e3 * FOLLOWING:g} mm, set points being those that the PLC has taken and follows"
     reaction = Reaction.STOPPING
     within = "10 ms"
     homing = True
@@ -109,7 +118,7 @@ class FollowingError(Fault):
         away = np.zeros(length.size)
         for g, echo in enumerate(cycle.sample.echo.tolist()):
             k = sent.get(echo, 0)
-            if k == 0:  # not known, or without one before
+            if k == 0 or not cycle.sample.status[g] & _FOLLOWING:  # not known, or nothing before, or not followed
                 continue
             mine = self.seen.group_of == g
             last, first = self._sent[k], self._sent[k - 1]

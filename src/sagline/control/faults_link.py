@@ -17,7 +17,7 @@ STALE, SILENT = 3, 10  # cycles
 WINDOW: Final = 100  # cycles that are looked back on
 LATE, LATE_OFTEN, LOST = 0.02, 0.005, 0.1  # s
 OFTEN: Final = 3  # of a window
-HALF: Final = 0.5  # of a cycle: what is left of it to rounding
+ROUNDING: Final = 1e-6  # of an age
 
 # plain integers: an enumeration's member makes each operation on an array four times slower
 _LOCKED, _EMERGENCY, _PRESSED = int(GroupStatus.LOCKED), int(GroupStatus.EMERGENCY), int(GroupFault.EMERGENCY_STOP)
@@ -33,7 +33,7 @@ _ACTS = {
 
 
 class _Old(Fault):
-    """A group's newest sample is older than so many cycles."""
+    """A group's newest sample is so many cycles old."""
 
     cycles: int
     step: str
@@ -43,19 +43,18 @@ class _Old(Fault):
         age = cycle.sample.age
         worst = float(age.max())
         limit = self.cycles * self.seen.period
-        if worst <= limit + HALF * 1e-3 * self.seen.period:
+        if worst < limit * (1.0 - ROUNDING):
             return None
         group = int(np.argmax(age))
-        return (
-            f"group {group}: its newest sample is {1e3 * worst:.0f} ms old, more than {1e3 * limit:.0f} ms. {self.step}"
-        )
+        what = f"its newest sample is {1e3 * worst:.0f} ms old; allowed: below {1e3 * limit:.0f} ms"
+        return f"group {group}: {what}. {self.step}"
 
 
 class GroupStale(_Old):
     """A group is late; the tension loop rests until it is back."""
 
     name = "group stale"
-    rule = f"newest sample of a group older than {STALE} cycles: it is silent, or what it sends is repeated, late, bad"
+    rule = f"newest sample of a group {STALE} cycles old: it is silent, or what it sends is repeated, late, bad"
     reaction = Reaction.DEGRADED
     within = "30 ms"
     cycles = STALE
@@ -66,7 +65,7 @@ class GroupSilent(_Old):
     """A group is gone."""
 
     name = "group silent"
-    rule = f"newest sample of a group older than {SILENT} cycles"
+    rule = f"newest sample of a group {SILENT} cycles old"
     reaction = Reaction.STOPPING
     within = "100 ms"
     cycles = SILENT
@@ -77,7 +76,7 @@ class BlockDiscarded(Fault):
     """Blocks come in that are no good; if no good ones come either, the group is stale."""
 
     name = "block discarded"
-    rule = "torn or foreign: counters at both ends, magic, version or size differ"
+    rule = "torn or foreign, by counters at both ends, magic, version or size; repeated, or older than one before"
     reaction = Reaction.EVENT
     within = "1 cycle"
 
@@ -97,7 +96,7 @@ class BlockDiscarded(Fault):
                 count = int(sample.discarded[group])
                 self._quiet = 0
                 self._line = (
-                    f"group {group}: a block was discarded as torn or foreign, {count} so far. Check the network."
+                    f"group {group}: a block was torn, foreign, repeated or late, {count} so far. Check the network."
                 )
         return self._line if self._quiet < WINDOW else None
 
@@ -140,14 +139,16 @@ class GroupActs(Fault):
     rule = "a PLC reports a fault or locked drums, or a drive a fault, after there was none"
     reaction = Reaction.STOPPING
     within = "1 cycle"
+    lasting = True
 
     def __init__(self, seen: Evidence) -> None:
         """Begin with no group seen without fault: what an earlier controller left is not this one's."""
         super().__init__(seen)
         self._clean: Flags = np.zeros(int(seen.group_of.max()) + 1, dtype=bool)
+        self._told = self._clean.copy()
 
     def found(self, cycle: Cycle) -> str | None:
-        """The first such group, and why."""
+        """The groups of which it is new, and why the first of them."""
         sample = cycle.sample
         locked = (sample.status & _LOCKED) != 0
         tripped = (sample.winch_fault != 0) | (sample.state == _TRIPPED)
@@ -161,11 +162,15 @@ class GroupActs(Fault):
         acting &= (sample.status & _EMERGENCY) == 0  # locked as it must be
         acting &= sample.fault != _PRESSED
         self._clean |= ~acting
-        new = acting & self._clean
+        new = acting & self._clean & ~self._told
         if not new.any():
             return None
-        group = int(np.argmax(new))
-        return f"group {group} stopped by itself: {self._why(cycle, group, tripped)}. Mend that, then acknowledge."
+        self._told |= new
+        groups = np.flatnonzero(new)
+        names = ", ".join(str(g) for g in groups)
+        return (
+            f"group {names} stopped by itself: {self._why(cycle, int(groups[0]), tripped)}. Mend it, then acknowledge."
+        )
 
     def _why(self, cycle: Cycle, group: int, tripped: Flags) -> str:
         mine = np.flatnonzero(tripped & (self.seen.group_of == group))
