@@ -28,6 +28,7 @@ TOLD = (
     "statics",
     "status",
     "tension",
+    "twin",
 )
 WIDTH = 80  # columns of code that a page shows without scrolling
 CHECKS = ("checked", "exactly", "choice")  # these raise InvalidValueError for their caller
@@ -50,14 +51,21 @@ class Public(NamedTuple):
 
 def public_functions() -> Iterator[Public]:
     """The functions of the public surface, public methods and constructors of its classes."""
-    for name in sl.__all__:
-        value = getattr(sl, name)
+    for value in public_values():
         if isinstance(value, FunctionType):
             yield _public(value)
-        elif isinstance(value, ModuleType):
-            yield from (_public(getattr(value, inner)) for inner in value.__all__)
         elif inspect.isclass(value):
             yield from _methods(value)
+
+
+def public_values() -> Iterator[Any]:
+    """What sagline lists, and what its modules list."""
+    for name in sl.__all__:
+        value = getattr(sl, name)
+        if isinstance(value, ModuleType):
+            yield from (getattr(value, inner) for inner in value.__all__)
+        else:
+            yield value
 
 
 def _methods(owner: type) -> Iterator[Public]:
