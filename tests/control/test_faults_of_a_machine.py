@@ -23,6 +23,8 @@ CASES = {  # what happens: what is told, the state that follows, within how many
 MORE = {
     "cell 3 sticks": ((("cell stuck", 500),), None),
     "cell 3 reads -50 N": ((("cell zero or saturated", 10),), None),
+    "cell 3 is wrong by 30 N": ((("cell wrong", 500),), None),
+    "cell 6 is wrong by -25 N": ((("cell wrong", 500),), None),
     "load grows by 5 kg": ((), None),
     "load grows by -10 kg": ((), None),
     "servo 3 is limited to 60 N": ((("following error", 200),), (State.STOPPING, 200)),

@@ -131,7 +131,7 @@ def test_a_cell_that_reads_something_else(words: str, reads: float) -> None:
 
 
 def test_a_cell_that_is_wrong_by_so_much() -> None:
-    right = run("cell 0 is wrong by 0 N", moving=False)[2]
+    right = run("cell 1 is wrong by 0 N", moving=False)[2]
     wrong = run("cell 0 is wrong by 50 N", moving=False)[2]
     np.testing.assert_allclose([a.tension[0] - b.tension[0] for a, b in zip(wrong, right, strict=True)], 50.0)
 

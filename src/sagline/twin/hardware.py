@@ -106,7 +106,7 @@ class Hardware:
         """Let a load cell be wrong in one of the ways of `KINDS`, or right again."""
         if words is None:
             self._wrong.pop(cell, None)
-        elif words == "is wrong by # N":
+        elif words == "is wrong by #":
             self._wrong[cell] = (1.0, value)
         else:
             fixed = {"sticks": self.read[CELL, cell], "saturates": self._full[cell]}.get(words, value)
