@@ -14,6 +14,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from sagline.cli.commands.article import article, identify
+from sagline.cli.commands.control import control
 from sagline.cli.commands.motion import simulate, vibrate
 from sagline.cli.commands.poses import forward, tension
 from sagline.cli.commands.robots import convert, examples, export_c, new, robots, show
@@ -42,6 +43,7 @@ Start here:
     sagline article                      the article redone, as one page
     sagline view cogiro                  drag a platform in the browser
     sagline twin article-prototype       a machine to drive, over S7
+    sagline control article-prototype --plc ADDRESSES  drive it, line by line
     sagline new my_robot.yaml            a robot of your own, by questions
 """
 
@@ -141,7 +143,7 @@ def sagline(
 
 for command in (
     track, lengths, encoder, run, article, identify, forward, tension, vibrate, simulate, robots, show, examples, new,
-    convert, export_c, view, twin,
+    convert, export_c, view, twin, control,
 ):  # fmt: skip
     text = _help(command.__doc__)
     app.command(cls=Command, help=text, short_help=text.partition("\n\n")[0])(command)

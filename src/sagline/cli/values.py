@@ -128,14 +128,19 @@ def middle_of(robot: Robot) -> Pose:
     return Pose((robot.test_box.low + robot.test_box.high) / 2, np.eye(3))
 
 
-def pose_of(text: str) -> Pose:
+def pose_of(text: str, item: str = "--pose", step: str | None = None) -> Pose:
     """A pose from X,Y,Z in meters, or X,Y,Z,A,B,C with the angles about z, y and x in degrees.
+
+    Args:
+        text: The text.
+        item: What it is, for the message.
+        step: What a message tells to do; None: that of --pose.
 
     Raises:
         InvalidValueError: If it is none.
     """
-    step = "Give meters, and degrees about z, y and x: --pose 1,0,1.5 or --pose 1,0,1.5,10,0,0."
-    place = _three_or_six(text, "--pose", "m or degrees", FARTHEST, step)
+    step = step or "Give meters, and degrees about z, y and x: --pose 1,0,1.5 or --pose 1,0,1.5,10,0,0."
+    place = _three_or_six(text, item, "m or degrees", FARTHEST, step)
     return Pose.from_euler(place[:3], *np.radians(place[3:]))
 
 

@@ -27,6 +27,7 @@ from sagline.control.pace import Pace
 from sagline.control.recording import Recorded, Recorder, Tape
 from sagline.control.states import MOTION, State, check_transition
 from sagline.control.tension_loop import TensionLoop, TensionSettings
+from sagline.control.warm import load_all
 from sagline.dynamics.drives import lever_of
 from sagline.errors import InvalidValueError
 from sagline.kinematics.forward import forward
@@ -92,6 +93,8 @@ class Loop:
         self._degrading: list[Fault] = []
         self._clear_faults()
         self._new_loop()
+        if pace is not None:
+            load_all(robot, self.period, self._model, self._method)
 
     def _begin_without_motion(self, m: int) -> None:
         """What there is before anything is sent."""
@@ -120,6 +123,27 @@ class Loop:
     def events(self) -> tuple[Event, ...]:
         """What happened so far."""
         return tuple(self._events)
+
+    def events_from(self, first: int) -> list[Event]:
+        """The events from one of them on.
+
+        Args:
+            first: How many there were when somebody looked last.
+        """
+        return self._events[first:]
+
+    @property
+    def pace(self) -> Pace | None:
+        """Real time; None on a lockstep clock."""
+        return self._pace
+
+    @property
+    def clock(self) -> tuple[float, float] | None:
+        """Where on the path it is, and how long that takes [s]; None beside one."""
+        course = self._course
+        if not isinstance(course, Along):
+            return None
+        return course.clock, self.period * (len(course.motion) - 1)
 
     @property
     def execution(self) -> Execution | None:

@@ -1,0 +1,88 @@
+"""The operator's place: lines from a pipe against a machine in the same process, where nobody waits for a clock."""
+
+import io
+import sys
+from typing import Any
+
+import pytest
+
+import sagline as sl
+from sagline.cli.control import Session
+from sagline.cli.status_line import StatusLine
+from sagline.control.states import State
+from tests.control.rigs import rig
+
+
+def session(monkeypatch: pytest.MonkeyPatch, lines: str) -> tuple[Session, Any]:
+    control, machine = rig(home=False)
+    monkeypatch.setattr(sys, "stdin", io.StringIO(lines))
+    return Session(control, alone=True, shadow=False), machine
+
+
+def test_lines_from_a_pipe_are_done_one_after_the_other(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    place, machine = session(monkeypatch, "home 0,0,1.5; goto 0.05,0,1.5\n# a word\n\njog 3 +2mm\njog z -5 mm\nstate\n")
+    assert place.run() == 0
+    out = capsys.readouterr().out
+    order = ["READY: all groups agree", "> home", "IDLE: the tensions agree", "> goto", "IDLE: the end of the plan",
+             "> jog 3 +2mm", "JOGGING: winch 3 by +2 mm", "> jog z", "JOGGING: the platform", "> state", "OFF: the operator"]  # fmt: skip
+    places = [out.index(words) for words in order]
+    assert places == sorted(places)
+    assert place.control.state is State.OFF
+    assert abs(machine.reading.position - [0.05, 0.0, 1.495]).max() < 3e-3
+
+
+@pytest.mark.parametrize(
+    ("line", "why"),
+    [
+        ("gotto 0,0,1", "Did you mean goto"),
+        ("goto 1,2", "three or six numbers"),
+        ("goto", "without a pose"),
+        ("goto 0,0,9", "its status is"),
+        ("jog 8 +5mm", "from 0 to 7"),
+        ("jog 3 5 kg", "m"),
+        ("run nowhere.yaml", "nowhere.yaml"),
+        ("stop now", "that word alone"),
+        ("resume", "no path was paused"),
+        ("ack", "nothing to acknowledge"),
+    ],
+)
+def test_a_line_that_is_refused_ends_it_and_the_machine_is_given_back(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], line: str, why: str
+) -> None:
+    place, _ = session(monkeypatch, f"home\n{line}\ngoto 0.05,0,1.5\n")
+    with pytest.raises(sl.SaglineError, match=why) as caught:
+        place.run()
+    assert len(str(caught.value)) < 300
+    assert place.control.state is State.OFF
+    assert "MOVING" not in capsys.readouterr().out
+
+
+def test_a_fault_ends_it_with_an_exit_code(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    place, machine = session(monkeypatch, "home\ngoto 0.1,0,1.5\ngoto 0,0,1.5\n")
+    machine.inject("cable 3 breaks at 1.5 s")
+    assert place.run() == 1
+    assert capsys.readouterr().out.count("MOVING") == 1
+    assert place.control.state is State.EMERGENCY
+
+
+def test_the_last_line_of_a_terminal_is_as_wide_as_it_and_given_back(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setenv("LINES", "24")
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    with StatusLine(shown=True) as line:
+        line.update("x" * 200)
+        line.update("y" * 200)  # too soon
+    out = capsys.readouterr().out
+    assert "\x1b[1;23r" in out
+    shown = out.split("\x1b[7m")[1].split("\x1b[0m")[0]
+    assert len(shown) == 79
+    assert "y" not in out
+    assert "\x1b[r" in out.rsplit("\x1b[7m", 1)[1]
+    with StatusLine(shown=False) as line:
+        line.update("x")
+        line.ask()
+    assert capsys.readouterr().out == ""

@@ -1,0 +1,67 @@
+"""Ticks that do not drift, and how late they were, on a clock that the test turns."""
+
+import time
+
+import pytest
+
+from sagline.control.pace import Histogram, Pace
+
+
+class Clock:
+    """Stands where it is put; sleeping moves it on, by a little too much."""
+
+    def __init__(self, over: float) -> None:
+        self.now, self._over = 100.0, over
+
+    def sleep(self, seconds: float) -> None:
+        self.now += seconds + self._over
+
+
+def turned(monkeypatch: pytest.MonkeyPatch, over: float = 0.0) -> Clock:
+    clock = Clock(over)
+    monkeypatch.setattr(time, "perf_counter", lambda: clock.now)
+    monkeypatch.setattr(time, "sleep", clock.sleep)
+    return clock
+
+
+def test_ticks_do_not_drift_whatever_a_cycle_takes_and_a_sleep_adds(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = turned(monkeypatch, over=2e-4)
+    pace = Pace(0.01)
+    begins = []
+    for k in range(200):
+        late = pace.wait()
+        begins.append(clock.now)
+        assert late == pytest.approx(0.0 if k == 0 else 2e-4, abs=1e-9)
+        clock.now += (0.001, 0.004, 0.009)[k % 3]
+    assert begins[-1] == pytest.approx(100.0 + 199 * 0.01 + 2e-4, abs=1e-9)
+    assert pace.periods.quantile(0.999) == pytest.approx(0.0102, abs=2e-4)
+
+
+def test_a_cycle_that_took_too_long_is_told_and_missed_ticks_do_not_come_in_a_burst(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    clock = turned(monkeypatch)
+    pace = Pace(0.01)
+    pace.wait()
+    clock.now += 0.013
+    assert pace.wait() == pytest.approx(0.003, abs=1e-9)  # less than a period: the ticks stay where they were
+    assert pace.wait() == 0.0
+    assert clock.now == pytest.approx(100.02, abs=1e-9)
+    clock.now += 0.05
+    assert pace.wait() == pytest.approx(0.04, abs=1e-9)
+    before = clock.now
+    assert pace.wait() == 0.0
+    assert clock.now - before == pytest.approx(0.01, abs=1e-9)
+    assert pace.lateness.longest == pytest.approx(0.04, abs=1e-9)
+
+
+def test_quantiles_are_the_ends_of_their_bins() -> None:
+    histogram = Histogram()
+    assert histogram.quantile(0.5) == 0.0
+    for duration in [0.00005] * 90 + [0.00125] * 9 + [0.5]:
+        histogram.add(duration)
+    assert histogram.quantile(0.5) == pytest.approx(1e-4)
+    assert histogram.quantile(0.95) == pytest.approx(1.3e-3)
+    assert histogram.quantile(1.0) == histogram.longest == 0.5
+    assert histogram.counts.sum() == 100
+    assert histogram.counts[-1] == 1
