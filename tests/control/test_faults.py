@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
+import sagline as sl
 from sagline.arrays import Array
 from sagline.control.cycle import Cycle
 from sagline.control.fault import Reaction
@@ -568,3 +569,22 @@ def test_set_points_that_a_plc_does_not_follow_are_no_following_error() -> None:
     ramping = int(GroupStatus.READY | GroupStatus.RAMPING)
     found = told(both(lags(7, 0.05), field("status", 3, ramping)), 145)
     assert found == []
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"groups": ((0, 1), (2, 3))}, "groups is .*; allowed: tuples with each winch from 0 to 7 once"),
+        ({"groups": 4}, "groups is 4"),
+        ({"groups": ((0, 1, 2, 3, 4, 5, 6, None),)}, "groups is "),
+        ({"period": 0.0}, "period is 0 s"),
+        ({"cell_deviation": 0.0}, "cell_deviation is 0 N"),
+        ({"cell_bias": -1.0}, "cell_bias is -1 N"),
+        ({"largest_correction": np.nan}, "largest_correction is nan m"),
+    ],
+)
+def test_what_rules_cannot_be_made_of_is_refused(options: dict[str, Any], words: str) -> None:
+    with pytest.raises(sl.InvalidValueError, match=words):
+        faults_of(ROBOT, **options)
+    with pytest.raises(sl.InvalidValueError, match="robot is None"):
+        faults_of(None)  # type: ignore[arg-type]

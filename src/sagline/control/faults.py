@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from sagline.arguments import instance
+from sagline.arguments import brief, instance
 from sagline.arrays import number
 from sagline.control.evidence import Evidence
 from sagline.control.fault import Fault
@@ -23,6 +23,7 @@ from sagline.control.faults_link import (
 )
 from sagline.control.faults_tension import CableBroken, OverTension, Slack
 from sagline.control.link import PERIOD
+from sagline.errors import InvalidValueError
 from sagline.robot.robot import Robot
 
 CELL_DEVIATION: Final = 1.0  # N, of a reading
@@ -122,11 +123,26 @@ def faults_of(
         >>> print(len(rules), "rules,", rules[0].name, "first:", rules[0].reaction.name)
         19 rules, emergency stop first: EMERGENCY
     """
+    checked_robot = instance(robot, Robot, "robot")
+    if groups is not None:
+        _check_groups(groups, checked_robot.cable_count)
     seen = Evidence(
-        instance(robot, Robot, "robot"),
+        checked_robot,
         number(period, "period", "s", above=0.0),
         groups,
         (number(cell_deviation, "cell_deviation", "N", above=0.0), number(cell_bias, "cell_bias", "N", low=0.0)),
         number(largest_correction, "largest_correction", "m", above=0.0),
     )
     return tuple(kind(seen) for kind in FAULTS)
+
+
+def _check_groups(groups: object, cable_count: int) -> None:
+    """Refuse what does not have every winch once."""
+    try:
+        winches = sorted(winch for group in groups for winch in group)  # type: ignore[attr-defined]
+        fits = winches == list(range(cable_count))
+    except TypeError:
+        fits = False
+    if not fits:
+        allowed = f"tuples with each winch from 0 to {cable_count - 1} once"
+        raise InvalidValueError("groups", brief(groups), allowed, "Take those of the link: link.groups.")

@@ -55,10 +55,11 @@ def gains_along(plan: Plan, every: float = EVERY) -> Gains | None:
 
     Examples:
         >>> import sagline as sl
+        >>> robot = sl.load_robot("article-prototype")
         >>> path = sl.quintic_path([(0, 0, 1.5), (0.3, 0, 1.5)], speed=0.1)
-        >>> gains = sl.control.gains_along(sl.inverse(sl.load_robot("article-prototype"), path))
+        >>> gains = sl.control.gains_along(sl.inverse(robot, path))
         >>> print(len(gains.rows), "rows")
-        12 rows
+        13 rows
 
     Source:
         docs/model.md, section 13.

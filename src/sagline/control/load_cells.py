@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 
+from sagline.arguments import instance
 from sagline.arrays import Array, locked
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.several import first_of
@@ -46,10 +47,13 @@ def parity(state: Equilibrium) -> Array:
     Returns:
         Shape (..., m, m); zero rows for cells whose errors are not visible, NaN where the state has no lengths.
 
+    Raises:
+        InvalidValueError: If the state is no Equilibrium (of a plan: plan.state).
+
     Source:
         docs/model.md, section 13.
     """
-    slope = balance_slope(state)
+    slope = balance_slope(instance(state, Equilibrium, "state"))
     lost = np.isnan(slope).any(axis=(-1, -2), keepdims=True)
     slope = np.where(lost, 0.0, slope)
     inverse = np.linalg.pinv(slope)

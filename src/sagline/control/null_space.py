@@ -40,6 +40,9 @@ def null_space(state: Equilibrium) -> NullSpace:
     Returns:
         The matrices, single or N of them; NaN where the state has no lengths or its stiffness is singular.
 
+    Raises:
+        InvalidValueError: If the state is no Equilibrium (of a plan: plan.state).
+
     Source:
         docs/model.md, section 13.
     """
