@@ -26,7 +26,8 @@ def test_lines_from_a_pipe_are_done_one_after_the_other(
     assert place.run() == 0
     out = capsys.readouterr().out
     order = ["READY: all groups agree", "> home", "IDLE: the tensions agree", "> goto", "IDLE: the end of the plan",
-             "> jog 3 +2mm", "JOGGING: winch 3 by +2 mm", "> jog z", "JOGGING: the platform", "> state", "OFF: the operator"]  # fmt: skip
+             "> jog 3 +2mm", "JOGGING: winch 3 by +2 mm", "> jog z", "JOGGING: the platform", "> state",
+             "OFF: the operator"]  # fmt: skip
     places = [out.index(words) for words in order]
     assert places == sorted(places)
     assert place.control.state is State.OFF
