@@ -37,7 +37,7 @@ KEEP_NOTES = """() => {
         for (const [note] of document.body.innerText.matchAll(/Picture \\d of \\d/g)) window.notes.add(note)
     }).observe(document.body, { subtree: true, childList: true, characterData: true })
 }"""
-PATIENCE = 60.0  # s: the picture is computed without a graphics card
+PATIENCE = 240.0  # s: the picture is computed without a graphics card
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None and not os.environ.get("CI"), reason="Chromium is not installed")
 
@@ -86,7 +86,7 @@ def opened(
     finally:
         page.close()
         viewer.stop()
-        thread.join(timeout=30.0)
+        thread.join(timeout=PATIENCE)
         stop(server)
     assert complains or complaints == []
 
@@ -150,9 +150,9 @@ def test_a_film_shows_the_run_and_leaves_the_scene_as_it_was(
     with opened(browser, robot, run) as (page, viewer):
         page.get_by_text("Take away").click()
         page.evaluate(KEEP_NOTES)  # a fast machine shows one for less time than it takes to ask
-        with page.expect_download(timeout=240_000) as download:
+        with page.expect_download(timeout=1e3 * PATIENCE) as download:
             page.get_by_role("button", name="Film of the run (GIF)").click()
-            page.wait_for_function("window.notes.size > 0", timeout=240_000)
+            page.wait_for_function("window.notes.size > 0", timeout=1e3 * PATIENCE)
         download.value.save_as(tmp_path / "film.gif")
         assert page.get_by_label("Follow the run").is_checked()
         page.get_by_text(re.compile(r"Picture \d of 3")).wait_for(state="detached")
