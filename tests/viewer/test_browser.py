@@ -291,11 +291,18 @@ def test_a_frequency_that_is_clicked_moves(browser: Browser) -> None:
         await_that(page, lambda: not viewer._modes.moving)
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_the_modes_can_be_read(browser: Browser, theme: Literal["light", "dark"]) -> None:
-    with opened(browser, sl.load_robot("cogiro"), theme=theme, width=390 if theme == "dark" else 1000) as (page, _):
+def test_the_modes_can_be_read_in_the_light_and_in_the_dark_on_a_small_screen(browser: Browser) -> None:
+    with opened(browser, sl.load_robot("cogiro")) as (page, _):
         page.get_by_role("tab", name="Modes").click()
         page.locator("tr[data-mode='1']").click()
+        page.get_by_text("Hz, with cable mass").wait_for()
+        least_contrast(page)
+        assert page.evaluate(OVERFLOWING) == []
+        light = page.evaluate(BACKGROUND)
+        page.emulate_media(color_scheme="dark")
+        await_that(page, lambda: page.evaluate(BACKGROUND) != light)
+        page.set_viewport_size({"width": 390, "height": 640})
+        page.get_by_role("tab", name="Modes").click()  # in the sheet below
         page.get_by_text("Hz, with cable mass").wait_for()
         least_contrast(page)
         assert page.evaluate(OVERFLOWING) == []
