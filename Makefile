@@ -9,6 +9,7 @@ FOUND = $(shell for p in python3 python3.13 python3.12 python3.11 python3.14; do
 PYTHON ?= $(FOUND)
 
 .DEFAULT_GOAL := help
+unexport PYTHONDONTWRITEBYTECODE # else each of a hundred processes compiles anew all that it imports
 .PHONY: help env run article test coverage check format bench soak docs clean
 
 help: ## show this list

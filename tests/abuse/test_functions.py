@@ -21,8 +21,9 @@ import sagline as sl
 from sagline.errors import printable
 from tests.abuse.bad_values import REFUSED, SAME, Bad, bad_values
 from tests.abuse.calls import INTERNAL, Call, calls, public_names
+from tests.effort import least_seconds
 
-SLOWEST = 2.0  # s of processor time
+SLOWEST = 2.0  # s of the processor of an ordinary machine
 LONGEST = 300  # characters
 MOST_MEMORY = 500_000  # kB
 SHARE = 0.08  # of the cases that are tried each time; all of them in a long run
@@ -94,10 +95,13 @@ def _fault(call: Call, argument: str, bad: Bad, right: Any) -> str:
             error = refusal
         except Exception as other:
             return f"{type(other).__name__}: {other}"
+    seconds = time.process_time() - begin
     if said:
         return f"a warning: {said[0].message}"
-    if time.process_time() - begin > SLOWEST:
-        return f"{time.process_time() - begin:.1f} s"
+    if seconds > SLOWEST:
+        seconds = least_seconds(lambda: call.with_one(argument, bad.value), SLOWEST, seconds)
+    if seconds > SLOWEST:
+        return f"{seconds:.1f} s"
     if error is not None:
         return _fault_of_text(str(error)) or (f"refused: {error}" if bad.verdict == SAME else "")
     if bad.verdict == REFUSED:

@@ -20,12 +20,11 @@ from sagline.cli.examples import write_examples
 
 Whole = Callable[[tuple[str, ...]], tuple[float, set[str]]]
 SHARE, ALL = 4, 200  # moments, over all commands
-COMMANDS: tuple[tuple[str, ...], ...] = (
-    ("track", "cogiro", "own_path.yaml", "--csv", "--out", "out"),
+TRACK = ("track", "cogiro", "own_path.yaml", "--csv", "--out", "out")
+COMMANDS: tuple[tuple[str, ...], ...] = (  # the longest last, which test_killed_commands.py tries each time
     ("forward", "cogiro", "lengths.csv", "--out", "out"),
     ("article", "figures", "6-7", "--out", "out"),
     ("convert", "cogiro", "--format", "mjcf", "--out", "out.xml"),
-    ("tension", "cogiro", "--out", "out"),
     (
         "new",
         "my_robot.yaml",
@@ -44,6 +43,8 @@ COMMANDS: tuple[tuple[str, ...], ...] = (
         "--diameter",
         "4 mm",
     ),
+    ("tension", "cogiro", "--out", "out"),
+    TRACK,
 )
 INTERRUPTED = "Interrupted. What has been written is whole.\n"
 
@@ -160,7 +161,7 @@ def test_ctrl_c_that_the_shell_told_to_ignore_is_ignored(tmp_path: Path) -> None
 def test_all_at_once_ends_at_once(tmp_path: Path) -> None:
     """Ctrl-C held down: many signals, one line."""
     write_examples(tmp_path, force=False)
-    process = started(tmp_path, 0.3, signal.SIGINT, COMMANDS[0], HELD)
+    process = started(tmp_path, 0.3, signal.SIGINT, TRACK, HELD)
     _, errors = process.communicate(timeout=120)
     assert process.returncode == 130, errors
     assert errors == INTERRUPTED

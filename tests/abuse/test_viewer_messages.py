@@ -13,11 +13,10 @@ import sagline as sl
 from sagline.viewer.run import Run
 from sagline.viewer.server import started, stop
 from sagline.viewer.viewer import Viewer
-from tests.viewer.client import Client
+from tests.viewer.client import PATIENCE, Client
 
 ROBOT = sl.load_robot("article-suspended")
 BATCH = 20  # odd messages between two that make sense
-PATIENCE = 240.0  # s: far more than it takes, verdicts that are compiled first on a busy machine included
 AGAIN = 5.0  # s: after which the client asks once more
 ODD: tuple[Any, ...] = (
     None, True, "", "nonsense", "50", "1e308", float("nan"), float("inf"), -1.0, 0.0, 1e308, -1e-320, 2**62, [], [1, 2],
@@ -68,7 +67,7 @@ def press(count: int, seed: int) -> None:
     thread = threading.Thread(target=viewer.serve)
     thread.start()
     try:
-        assert viewer.shown.wait(300.0)
+        assert viewer.shown.wait(PATIENCE)
         handles = server.gui._gui_input_handle_from_uuid.items()
         usual = {uuid: each.value for uuid, each in handles if not isinstance(each, viser.GuiButtonHandle)}
         for _ in range(0, count, BATCH):
@@ -90,7 +89,7 @@ def press(count: int, seed: int) -> None:
                     await_that(lambda place=place, expected=expected: shows(viewer, place, expected))  # type: ignore[misc]
     finally:
         viewer.stop()
-        thread.join(timeout=30.0)
+        thread.join(timeout=PATIENCE)
         stop(server)
 
 

@@ -38,7 +38,7 @@ def printed() -> list[list[str]]:
     assert len(found) >= 9
     for command in commands().values():
         found += lines_of(command.help)
-    return found
+    return [line for k, line in enumerate(found) if line not in found[:k]]
 
 
 @pytest.fixture(scope="module")

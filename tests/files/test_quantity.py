@@ -1,6 +1,5 @@
 import subprocess
 import sys
-import time
 from math import inf, isinf, isnan
 
 import pytest
@@ -10,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from sagline.errors import InvalidValueError
 from sagline.files.quantity import in_si, plain_number, within_reach
+from tests.effort import least_seconds
 
 
 @pytest.mark.parametrize(
@@ -141,10 +141,9 @@ def test_not_a_number_is_a_word_that_nobody_takes() -> None:
     ],
 )
 def test_units_that_will_not_do_are_told_at_once(text: str, unit: str) -> None:
-    start = time.process_time()
     with pytest.raises(InvalidValueError) as caught:
         in_si(text, unit, "x")
-    assert time.process_time() - start < 1.0
+    assert least_seconds(lambda: in_si(text, unit, "x"), 1.0) < 1.0
     assert len(str(caught.value)) < 300
 
 
@@ -158,6 +157,7 @@ def test_plain_numbers_do_not_load_pint() -> None:
     code = """
 import sys
 from sagline.files.quantity import in_si, plain_number, within_reach
+from tests.effort import least_seconds
 
 in_si([1, "2e3"], "m", "x")
 print("pint" in sys.modules)

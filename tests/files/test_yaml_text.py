@@ -1,11 +1,11 @@
 import math
-import time
 
 import pytest
 import yaml
 
 from sagline.errors import FileError
 from sagline.files.yaml_text import dump_mapping, parse_mapping
+from tests.effort import least_seconds
 
 
 @pytest.mark.parametrize(
@@ -84,10 +84,9 @@ def _bomb(first: str, item: str, between: str) -> str:
     ],
 )
 def test_nothing_grows_while_it_is_read(text: str) -> None:
-    start = time.process_time()
     with pytest.raises(FileError, match=r"an alias that stands for itself|more than 20 levels or 25000 values"):
         parse_mapping(text, "x.yaml")
-    assert time.process_time() - start < 2.0
+    assert least_seconds(lambda: parse_mapping(text, "x.yaml"), 2.0) < 2.0
 
 
 @pytest.mark.parametrize(

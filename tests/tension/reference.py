@@ -1,5 +1,6 @@
 """The balance and its sharing written out in NumPy and handed to other programs: the tests' independent reference."""
 
+from functools import cache
 from typing import Any, NamedTuple
 
 import daqp
@@ -31,8 +32,9 @@ def random_poses(robot: Robot, count: int, rng: np.random.Generator, stretch: fl
     return Pose(middle + half * rng.uniform(-1, 1, (count, 3)), Rotation.from_rotvec(turns))
 
 
-def presets() -> list[Robot]:
-    return [load_robot(name) for name in robot_names()]
+@cache
+def presets() -> tuple[Robot, ...]:
+    return tuple(load_robot(name) for name in robot_names())
 
 
 def ropes(robot: Robot, ends: np.ndarray) -> np.ndarray:

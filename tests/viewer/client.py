@@ -1,8 +1,9 @@
-"""A client without a browser: speaks viser's protocol over a bare websocket."""
+"""A client without a browser: speaks viser's protocol over a bare websocket; and how to wait for what it asks."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import TracebackType
 from typing import Any
@@ -12,6 +13,16 @@ import viser
 import zstandard
 from websockets.sync.client import connect
 from websockets.typing import Subprotocol
+
+PATIENCE = 300.0  # s: far more than anything takes, kernels that are compiled first on a busy machine included
+
+
+def await_that(done: Callable[[], bool]) -> None:
+    """Wait until it is done, which it must be some time."""
+    end = time.monotonic() + PATIENCE
+    while not done():
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.01)
 
 
 class Client:

@@ -1,7 +1,6 @@
 """Where the camera stands."""
 
 import time
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,7 @@ import sagline as sl
 from sagline.viewer import solids
 from sagline.viewer.framing import BORDER, FIELD, Framing, fitted
 from sagline.viewer.server import started, stop
-from tests.viewer.client import Client
+from tests.viewer.client import Client, await_that
 
 
 def seen(points: np.ndarray, camera: np.ndarray, target: np.ndarray, aspect: float, field: float) -> np.ndarray:
@@ -38,13 +37,6 @@ def test_every_robot_fills_the_picture_and_no_more(name: str, aspect: float) -> 
 
 def at(camera: Any, position: Any) -> bool:
     return bool(np.allclose(camera.position, position, rtol=1e-6))
-
-
-def await_that(done: Callable[[], bool]) -> None:
-    end = time.monotonic() + 10.0
-    while not done():
-        assert time.monotonic() < end, "waited in vain"
-        time.sleep(0.01)
 
 
 def test_the_box_stays_in_the_picture_until_someone_looks_from_elsewhere() -> None:

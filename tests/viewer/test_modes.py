@@ -19,9 +19,10 @@ from sagline.viewer.server import Server, started, stop
 from sagline.viewer.swing import PERIOD
 from sagline.viewer.tension_scale import TensionScale
 from sagline.viewer.viewer import Viewer
+from tests.effort import best_rate
 from tests.plot import made
-from tests.viewer.client import Client
-from tests.viewer.test_viewer import ROBOT, Shown, await_that, handle
+from tests.viewer.client import PATIENCE, Client, await_that
+from tests.viewer.test_viewer import ROBOT, Shown, handle
 
 POSE = sl.Pose([3.0, 2.0, 1.5], np.eye(3))
 
@@ -32,10 +33,10 @@ def page() -> Iterator[Shown]:
     viewer = Viewer(server, ROBOT, pose=POSE, mode="2")
     thread = threading.Thread(target=viewer.serve)
     thread.start()
-    await_that(lambda: viewer.view is not None, seconds=300.0)
+    await_that(lambda: viewer.view is not None)
     yield Shown(server, viewer, thread)
     viewer.stop()
-    thread.join(timeout=10.0)
+    thread.join(timeout=PATIENCE)
     stop(server)
     assert not thread.is_alive()
 
@@ -52,22 +53,28 @@ def heard_for(client: Client, seconds: float) -> list[Any]:
 
 def test_a_mode_moves_at_the_rate_of_the_page_and_stops(page: Shown) -> None:
     show = page.viewer._modes
-    await_that(lambda: show.moving and not show.waiting, seconds=300.0)  # the response is there too
+    await_that(lambda: show.moving and not show.waiting)  # the response is there too
     assert show.swing is not None
     found = vibration(show.swing.state, up_to=20.0)
     assert show.swing.mode.frequency == pytest.approx(found.frequency[1], rel=1e-12)
     with Client(page.port) as client:
         heard_for(client, 0.5)
         before = page.viewer.updates
-        heard = heard_for(client, 2.0)
-        drawn = sum(m.get("name") == "/cables" and "points" in m.get("updates", {}) for m in heard)
-        assert drawn / 2.0 >= 30.0  # pictures a second
+
+        def rate() -> float:
+            heard = heard_for(client, 2.0)
+            drawn = sum(m.get("name") == "/cables" and "points" in m.get("updates", {}) for m in heard)
+            return float(drawn) / 2.0
+
+        assert best_rate(rate, 30.0) >= 30.0  # pictures a second
         assert page.viewer.updates == before  # nothing is solved for them
-        rest, away, end = lines.segments(show.swing.rest, dashed=False), [], time.monotonic() + PERIOD
-        while time.monotonic() < end:
+        farthest = np.linalg.norm(show.swing.courses(0.5 * np.pi) - show.swing.rest, axis=-1).max()
+        rest, away, start = lines.segments(show.swing.rest, dashed=False), [0.0], time.monotonic()
+        while time.monotonic() < start + PERIOD or (
+            max(away) < 0.9 * farthest and time.monotonic() < start + 20 * PERIOD  # a busy machine leaves pictures out
+        ):
             away.append(np.linalg.norm(page.viewer._stage._cables.points - rest, axis=-1).max())
             time.sleep(0.01)
-        farthest = np.linalg.norm(show.swing.courses(0.5 * np.pi) - show.swing.rest, axis=-1).max()
         assert max(away) == pytest.approx(farthest, rel=0.1)
         client.set(handle(page, "Mode")._impl.uuid, "")
         await_that(lambda: not show.moving)
