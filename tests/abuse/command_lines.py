@@ -27,6 +27,7 @@ LINES = {
     "new": ["new", "my_robot.yaml"],
     "convert": ["convert", "robot.wcrfx"],
     "export-c": ["export-c", "cogiro"],
+    "experiment": ["experiment", "nothing"],
     "view": ["view", "cogiro", "--no-browser"],
 }
 

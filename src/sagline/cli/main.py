@@ -15,6 +15,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from sagline.cli.commands.article import article, identify
 from sagline.cli.commands.control import control
+from sagline.cli.commands.experiment import experiment
 from sagline.cli.commands.motion import simulate, vibrate
 from sagline.cli.commands.poses import forward, tension
 from sagline.cli.commands.robots import convert, examples, export_c, new, robots, show
@@ -143,7 +144,7 @@ def sagline(
 
 for command in (
     track, lengths, encoder, run, article, identify, forward, tension, vibrate, simulate, robots, show, examples, new,
-    convert, export_c, view, twin, control,
+    convert, export_c, view, twin, control, experiment,
 ):  # fmt: skip
     text = _help(command.__doc__)
     app.command(cls=Command, help=text, short_help=text.partition("\n\n")[0])(command)

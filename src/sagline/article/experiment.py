@@ -1,0 +1,337 @@
+"""The experiment of ten points, done again: home, the ten poses of Table 2, home, with a controller and a machine.
+
+The article orders its prototype from point to point "with low speed", stops at each while its place is measured, and
+takes about 14 minutes; speed and stops are ours, chosen so that it takes as long. The machine is one whose place is
+known: a twin.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import hypot
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sagline.arrays import Array, locked
+from sagline.article.machine import DRUM, ZERO, Errors, machine
+from sagline.article.table2 import Table2, table2
+from sagline.article.ten_poses import HOME
+from sagline.control.controller import Controller
+from sagline.control.events import Event
+from sagline.control.execution import ExecutionStatus
+from sagline.control.link import PERIOD, Sample
+from sagline.control.null_space import null_space
+from sagline.control.recording import Recorded
+from sagline.control.states import RefusedError, State
+from sagline.control.tension_loop import TensionSettings
+from sagline.files.robot_file import load_robot
+from sagline.kinematics.inverse import inverse
+from sagline.kinematics.plan import Plan
+from sagline.motion.rest_to_rest import quintic_path
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.status import Status
+from sagline.twin.machine import Machine
+
+PROTOTYPE: Final = "article-prototype"
+SPEED: Final = 0.06  # m/s of the platform at most: the fastest winch then has 61 mm/s
+STOP: Final = 14.0  # s at each point, home twice among them: the whole takes 13.9 minutes
+LOOK: Final = 1.0  # s at the end of a stop, whose mean is taken for what is measured there
+NOISE: Final = 1.0  # N, of load cells, standard deviation
+BIAS: Final = 2.0  # N, 0.1 % of a cell of 2 kN
+EVERY: Final = 10  # cycles between two points of a course: drawn, not filed
+
+Where = Callable[[], Array]  # the true position of the platform's origin [m], shape (3,)
+Tell = Callable[[float], None]  # share of the experiment that is over
+
+
+class Watch:
+    """Looks on: what is to be seen at a stop, and the courses between stops. A `sagline.control.Recorder`."""
+
+    def __init__(self, where: Where, tell: Tell | None = None) -> None:
+        """Begin with nothing seen.
+
+        Args:
+            where: The true position.
+            tell: Told how far it is, every second.
+        """
+        self.stopped = ""  # nothing stops it
+        self.farthest = self.misjudged = 0.0
+        self.courses: list[Array] = []
+        self.cycles = self.acted = self.stood = 0
+        self._where, self._tell, self._expected = where, tell, duration() / PERIOD
+        self._plan: Plan | None = None
+        self._begun = False
+        self._seen: deque[tuple[Array, ...]] = deque(maxlen=round(LOOK / PERIOD))
+        self._before: Array | None = None
+
+    def begins(self, plan: Plan) -> None:
+        """Take the plan of a leg; the first cycle still tells of the stop before it."""
+        self._plan, self._begun = plan, False
+
+    def ends(self, status: Status, reason: str) -> None:
+        """Leave how it ended to the one who asked for it."""
+
+    def event(self, event: Event) -> None:
+        """Leave events to the controller, which keeps them."""
+
+    def cycle(self, cycle: Recorded) -> None:
+        """Look at a cycle."""
+        answer = cycle.answer
+        if not isinstance(answer, Sample) or cycle.state not in (State.MOVING, State.IDLE):
+            return
+        self.cycles += 1
+        if self._tell is not None and self.cycles % round(1.0 / PERIOD) == 0:
+            self._tell(min(self.cycles / self._expected, 1.0))
+        place = self._where()
+        self.misjudged = max(self.misjudged, _apart(place, cycle.position))
+        if cycle.state is State.IDLE:
+            self._stand(place, cycle, answer)
+        elif not self._begun:
+            self._begun = True
+        elif self._plan is not None and np.isfinite(cycle.clock):
+            row = min(round(cycle.clock / PERIOD), len(self._plan.status) - 1)
+            self.farthest = max(self.farthest, _apart(place, self._plan.state.pose.position[row]))
+            if self.cycles % EVERY == 0:
+                self.courses.append(
+                    np.concatenate(([cycle.clock], answer.tension, cycle.planned_tension, answer.length + cycle.zero))
+                )
+
+    def _stand(self, place: Array, cycle: Recorded, answer: Sample) -> None:
+        """Keep the last second of a stop."""
+        self.stood += 1
+        self.acted += self._before is not None and bool((cycle.correction != self._before).any())
+        self._before = cycle.correction.copy()
+        self._seen.append((place.copy(), cycle.position, answer.tension, self._before))
+
+    def seen(self) -> tuple[Array, ...]:
+        """Means over the last second: true and estimated position, tension, correction."""
+        return tuple(np.mean(rows, axis=0) for rows in zip(*self._seen, strict=True))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Experiment:
+    """What became of it; K points of the courses, m winches.
+
+    Attributes:
+        table: The article's Table 2.
+        robot: As the controller knew it.
+        true: Where the platform was at the ten stops [m], shape (10, 3).
+        estimated: Where the encoders put it [m], shape (10, 3).
+        tension: What the load cells read there, mean of a second [N], shape (10, m).
+        planned_tension: What was planned there [N], shape (10, m).
+        null_error: What of their error lengths can mend that do not move the platform: largest of a cable [N], (10,).
+        correction: What the tension loop had in the lengths there [m], shape (10, m).
+        back: Where the platform was at home in the end, less where it began [m], shape (3,).
+        time: Of the courses, without the stops [s], shape (K,).
+        cells: What the load cells read [N], shape (K, m).
+        planned: What they should have read by the plan [N], shape (K, m).
+        lengths: Less those at home [m], shape (K, m).
+        stops: When the ten stops were, in the same time [s], shape (10,).
+        duration: From home to home, stops included [s].
+        winch_speed: Of the fastest winch [m/s].
+        farthest: Largest distance of the true position from the set point, under way [m].
+        misjudged: Largest distance of the true position from the estimate [m].
+        acting: Share of the cycles at stops in which the tension loop changed the lengths.
+        events: What the controller had to say.
+    """
+
+    table: Table2
+    robot: Robot
+    true: Array
+    estimated: Array
+    tension: Array
+    planned_tension: Array
+    null_error: Array
+    correction: Array
+    back: Array
+    time: Array
+    cells: Array
+    planned: Array
+    lengths: Array
+    stops: Array
+    duration: float
+    winch_speed: float
+    farthest: float
+    misjudged: float
+    acting: float
+    events: tuple[Event, ...]
+
+    @property
+    def error(self) -> Array:
+        """True less desired position [m], shape (10, 3)."""
+        return self.true - self.table.desired
+
+    @property
+    def distance(self) -> Array:
+        """Euclidean distance of true and desired position [m], shape (10,)."""
+        return np.asarray(np.linalg.norm(self.error, axis=1))
+
+
+def pair(robot: Robot, errors: Errors) -> tuple[Robot, Robot]:
+    """A robot that is other than it was planned, and how it was planned, both with what a twin needs.
+
+    Args:
+        robot: As it was planned; it has winches.
+        errors: By how much parameters are off, as of `machine`; drums and the zero of the lengths too.
+
+    Returns:
+        The robot as it is, and as it was planned.
+    """
+    true, nominal = machine(robot, errors), robot
+    assert true.winches is not None
+    assert robot.winches is not None
+    if errors.get(DRUM):
+        radius = robot.winches.drum_radius
+        assert radius is not None
+        true = true.replace(winches=true.winches.replace(drum_radius=radius * (1.0 + 0.01 * errors[DRUM])))
+    if errors.get(ZERO):
+        assert true.winches is not None
+        zero = inverse(robot, level(HOME)).unstrained_length
+        nominal = robot.replace(winches=robot.winches.replace(length_zero=zero))
+        true = true.replace(winches=true.winches.replace(length_zero=zero + 1e-3 * errors[ZERO]))
+    return true, nominal
+
+
+def with_cells(robot: Robot) -> Robot:
+    """A robot whose load cells are as ours would be, unless it says how they are: 1 N of noise, 2 N of bias.
+
+    Args:
+        robot: The robot; it has winches.
+    """
+    winches = robot.winches
+    if winches is None or winches.load_cell_deviation.any() or winches.load_cell_bias.any():
+        return robot
+    signs = np.where(np.arange(robot.cable_count) % 3 == 0, -1.0, 1.0)  # no wrench, and no error of lengths alone
+    return robot.replace(winches=winches.replace(load_cell_deviation=NOISE, load_cell_bias=BIAS * signs))
+
+
+def in_process(
+    true: Robot | None = None,
+    nominal: Robot | None = None,
+    *,
+    seed: int = 1,
+    loop: TensionSettings | None = None,
+    tell: Tell | None = None,
+) -> Experiment:
+    """Do the experiment on a twin in this process, whose clock waits for the controller.
+
+    Args:
+        true: The robot as it is, see `with_cells`; None: as it was planned.
+        nominal: As it was planned; None: the prototype.
+        seed: Of the twin's noise and the controller's id.
+        loop: How the tension loop works.
+        tell: Told how far it is, now and then.
+
+    Returns:
+        What became of it.
+
+    Raises:
+        RefusedError: If the machine does not agree that it is at home, or the experiment ends on the way.
+        InvalidValueError: If the true robot lacks data, or does not rest where it should begin.
+    """
+    planned = load_robot(PROTOTYPE) if nominal is None else nominal
+    real = with_cells(planned if true is None else true)
+    twin = Machine(real, nominal=planned, start=level(HOME), seed=seed)
+    watch = Watch(lambda: twin.reading.position, tell)
+    return experiment(Controller(planned, twin.link(), loop=loop, record=watch, seed=seed), watch)
+
+
+def experiment(controller: Controller, watch: Watch) -> Experiment:
+    """Do the experiment.
+
+    Args:
+        controller: Not connected yet.
+        watch: What it records to.
+
+    Returns:
+        What became of it.
+
+    Raises:
+        RefusedError: If it cannot be connected or homed, or the experiment ends on the way; it says where.
+    """
+    table = table2()
+    controller.connect()
+    controller.home(level(HOME))
+    _stand(controller)
+    stops, plans, ends = [watch.seen()], list[Plan](), [0.0]
+    for name, place in zip([*table.points, "home"], points()[1:], strict=True):
+        first = len(watch.courses)
+        done = controller.go_to(level(place), speed=SPEED)
+        if done.status is not ExecutionStatus.DONE:
+            raise RefusedError(f"the experiment, on its way to {name}", done.reason, "Mend that, and begin anew.")
+        assert done.plan is not None
+        plans.append(done.plan)
+        for row in watch.courses[first:]:
+            row[0] += ends[-1]
+        ends.append(ends[-1] + float(done.clock[np.isfinite(done.clock)][-1]))
+        _stand(controller)
+        stops.append(watch.seen())
+    controller.off()
+    return _result(controller, watch, stops, plans, np.array(ends))
+
+
+def _stand(controller: Controller) -> None:
+    """Stop, for as long as the place is measured; Ctrl-C is heard at the end of a cycle."""
+    for _ in range(round(STOP / PERIOD)):
+        controller.cycle()
+        if controller.state is not State.IDLE:
+            raise RefusedError("the experiment, at a stop", controller.events[-1].text, "Mend that, and begin anew.")
+
+
+def _result(
+    controller: Controller, watch: Watch, stops: Sequence[tuple[Array, ...]], plans: Sequence[Plan], ends: Array
+) -> Experiment:
+    m = controller.robot.cable_count
+    true, estimated, tension, correction = (np.array(column) for column in zip(*stops[1:], strict=True))
+    planned = np.array([plan.state.cables.frame_end_tension[-1] for plan in plans])
+    seen = [null_space(plan.state[-1]).visible @ off for plan, off in zip(plans, tension - planned, strict=True)]
+    rates = [plan.length_rate for plan in plans]
+    time, cells, expected, lengths = np.split(np.array(watch.courses), [1, 1 + m, 1 + 2 * m], axis=1)
+    return Experiment(
+        table=table2(),
+        robot=controller.robot,
+        true=locked(true[:-1].copy()),
+        estimated=locked(estimated[:-1].copy()),
+        tension=locked(tension[:-1].copy()),
+        planned_tension=locked(planned[:-1].copy()),
+        null_error=locked(np.abs(seen[:-1]).max(axis=1)),
+        correction=locked(correction[:-1].copy()),
+        back=locked(true[-1] - stops[0][0]),
+        time=locked(time[:, 0].copy()),
+        cells=locked(cells.copy()),
+        planned=locked(expected.copy()),
+        lengths=locked(lengths - plans[0].unstrained_length[0]),
+        stops=locked(ends[1:-1].copy()),
+        duration=PERIOD * watch.cycles,
+        winch_speed=max(float(np.abs(rate).max()) for rate in rates if rate is not None),
+        farthest=watch.farthest,
+        misjudged=watch.misjudged,
+        acting=watch.acted / watch.stood,
+        events=controller.events,
+    )
+
+
+def duration() -> float:
+    """How long it takes, stops included [s]; home has one before and one after."""
+    path = quintic_path(points(), speed=SPEED, rate=10.0)
+    return float(path.time[-1] - path.time[0]) + STOP * len(points())
+
+
+def points() -> Array:
+    """Home, the ten poses, home [m], shape (12, 3)."""
+    return np.vstack((HOME, table2().desired, HOME))
+
+
+def level(position: ArrayLike) -> Pose:
+    """Poses at positions (..., 3), the platform not turned, as all of the article's."""
+    return Pose.from_euler(np.asarray(position, dtype=np.float64), 0.0, 0.0, 0.0)
+
+
+def _apart(one: Array, other: Array) -> float:
+    x, y, z = (one - other).tolist()
+    return hypot(x, y, z)

@@ -1,0 +1,247 @@
+"""The page of an experiment: Table 2 and figures 25 to 27, ours beside the article's."""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+from sagline.arrays import Array
+from sagline.article.experiment import SPEED, STOP, Experiment
+from sagline.control.events import EventKind
+from sagline.files.json_text import json_text, plain
+from sagline.files.whole import made_folder, written_together
+from sagline.numbers import n
+from sagline.plot.sheet import BLUE, COLORS, TICK, VERMILLION
+from sagline.report.blocks import Chapter, Finding, Panel, Table, Verdict
+from sagline.report.drawing import Drawings, axes, legend, thinned
+from sagline.report.page import page
+
+NAMES = ("experiment.html", "experiment.json")
+TITLE = "The experiment, done again"
+NOTATION = "Errors are true less desired positions. A twin's true position is known; a prototype's has to be measured."
+JERK = 2.0  # s, as long as the article's lasts
+AREA = 600.0  # pt^2 of the largest error of a figure
+
+
+def write_experiment(result: Experiment, folder: Path | str, how: str) -> Path:
+    """Write an HTML page that needs nothing else, and its numbers as JSON.
+
+    Args:
+        result: What became of the experiment.
+        folder: Where to; created if missing.
+        how: What was driven, and over what: a sentence.
+
+    Returns:
+        The page.
+
+    Raises:
+        FileError: If the folder cannot be written; then nothing has been.
+    """
+    chapter = experiment_chapter(result, how)
+    lead = (
+        "Gia Luan & Truong Thinh, Appl. Sci. 2020, 10(15), 5318, section 7: home, ten points, home, with a stop at "
+        f"each. {how}"
+    )
+    made = f"Made by sagline {version('sagline')}: sagline experiment article."
+    numbers = {finding.key: plain(finding.numbers) for finding in chapter.findings}
+    contents = page(TITLE, lead, NOTATION, [chapter], None, made), json_text(numbers) + "\n"
+    place = made_folder(folder)
+    with written_together(place, NAMES) as files:
+        for file, content in zip(files, contents, strict=True):
+            file.write_text(content, encoding="utf-8")
+    return place / NAMES[0]
+
+
+def experiment_chapter(result: Experiment, how: str) -> Chapter:
+    """Everything that is told of an experiment.
+
+    Args:
+        result: What became of it.
+        how: What was driven, and over what.
+    """
+    draw = Drawings("experiment")
+    return Chapter(
+        "experiment",
+        "Home, ten points, home",
+        how,
+        (_stops(result), _cells(result, draw), _lengths(result, draw), _space(result, draw), _run(result)),
+    )
+
+
+def _stops(result: Experiment) -> Finding:
+    table = result.table
+    rows = [
+        (
+            point,
+            ", ".join(n(x, ".2f") for x in table.desired[k]),
+            _millimeters(table.error[k], ".0f"),
+            n(1e3 * table.distance[k], ".1f"),
+            _millimeters(result.error[k], "+.3f"),
+            n(1e3 * result.distance[k], ".3f"),
+            n(result.null_error[k], ".1f"),
+        )
+        for k, point in enumerate(table.points)
+    ]
+    worst, ours, theirs = int(np.argmax(result.distance)), 1e3 * result.distance, 1e3 * table.distance
+    rows.append(("mean", "", "", n(1e3 * table.distance.mean(), ".1f"), "", n(ours.mean(), ".3f"), ""))
+    return Finding(
+        key="stops",
+        tables=(2,),
+        title="Table 2, ours beside the article's",
+        statement=f"Errors from {n(theirs.min(), '.1f')} to {n(theirs.max(), '.1f', 'mm')}, "
+        f"{n(theirs.mean(), '.1f', 'mm')} in the mean.",
+        measured=f"Ours: {n(ours.mean(), '.3f', 'mm')} in the mean, {n(ours.max(), '.3f', 'mm')} at most, at "
+        f"{table.points[worst]}. Back at home the platform is {n(1e3 * np.linalg.norm(result.back), '.3f', 'mm')} from "
+        "where it began.",
+        verdict=Verdict.OURS,
+        numbers={
+            "error_mm": 1e3 * result.error,
+            "distance_mm": ours,
+            "mean_mm": ours.mean(),
+            "article_distance_mm": 1e3 * table.distance,
+            "estimated_m": result.estimated,
+            "null_error_N": result.null_error,
+            "back_mm": 1e3 * result.back,
+        },
+        data=(
+            Table(
+                "The ten points; null-space error: what of the load cells' error lengths could mend without moving the "
+                "platform, largest of a cable",
+                (
+                    "point",
+                    "desired x, y, z [m]",
+                    "article: error x, y, z [mm]",
+                    "article [mm]",
+                    "ours: error x, y, z [mm]",
+                    "ours [mm]",
+                    "null-space error [N]",
+                ),
+                rows,
+            ),
+        ),
+    )
+
+
+def _cells(result: Experiment, draw: Drawings) -> Finding:
+    off, cells, early = result.cells - result.planned, result.cells, result.time < JERK
+    at_stops = result.tension - result.planned_tension
+    return Finding(
+        key="load-cells",
+        figures=(25,),
+        title="what the load cells read",
+        statement="Amplified signals, without numbers. The torque fluctuates most when the platform starts, from the "
+        "overshoot of the PID controller; this jerk lasts about 2 s.",
+        measured=f"From {n(cells.min(), '.0f')} to {n(cells.max(), '.0f', 'N')} under way, at most "
+        f"{n(np.abs(off).max(), '.1f', 'N')} off the plan; in the first two seconds "
+        f"{n(np.abs(off[early]).max(), '.1f', 'N')}. At the stops, in the mean of a second, they are at most "
+        f"{n(np.abs(at_stops).max(), '.1f', 'N')} off.",
+        verdict=Verdict.OURS,
+        numbers={
+            "least_N": cells.min(),
+            "largest_N": cells.max(),
+            "off_plan_N": np.abs(off).max(),
+            "off_plan_at_first_N": np.abs(off[early]).max(),
+            "off_plan_at_stops_N": at_stops,
+        },
+        panels=(_courses(result, cells, "load cells [N]", "Load cells; dashed: the ten stops, left out.", draw),),
+    )
+
+
+def _lengths(result: Experiment, draw: Drawings) -> Finding:
+    lengths = 1e3 * result.lengths
+    caption = "Lengths by the encoders, less those at home; dashed: the ten stops, left out."
+    return Finding(
+        key="encoders",
+        figures=(26,),
+        title="how the lengths differ from those at home",
+        statement="Differences of cable length from the encoders, without numbers.",
+        measured=f"From {n(lengths.min(), '.0f')} to {n(lengths.max(), '.0f', 'mm')}.",
+        verdict=Verdict.OURS,
+        numbers={"least_mm": lengths.min(), "largest_mm": lengths.max()},
+        panels=(_courses(result, lengths, "$L - L_{home}$ [mm]", caption, draw),),
+    )
+
+
+def _courses(result: Experiment, values: Array, label: str, caption: str, draw: Drawings) -> Panel:
+    figure, ax = axes("time without stops [s]", label, height=2.7)
+    part = thinned(len(values))
+    for i, course in enumerate(values[part].T):
+        color, style = COLORS[i // 2 % len(COLORS)], "-" if i % 2 == 0 else (0, (4.0, 1.6))
+        ax.plot(result.time[part], course, color=color, linestyle=style, linewidth=0.9, label=f"cable {i}")
+    for stop in result.stops:
+        ax.axvline(stop, color="0.75", linewidth=0.6, linestyle="--")
+    legend(ax)
+    return draw.panel(figure, caption)
+
+
+def _space(result: Experiment, draw: Drawings) -> Finding:
+    table, panels = result.table, []
+    scales = AREA / np.array([table.distance.max(), result.distance.max()])
+    for column, name in ((0, "x"), (1, "y")):
+        figure, ax = axes(f"${name}$ [m]", "$z$ [m]")
+        place = table.desired[:, [column, 2]]
+        for who, distance, scale, color in (
+            ("article", table.distance, scales[0], VERMILLION),
+            ("ours", result.distance, scales[1], BLUE),
+        ):
+            text = f"{who}, largest {n(1e3 * distance.max(), '.2g', 'mm')}"
+            ax.scatter(place[:, 0], place[:, 1], s=scale * distance, color=color, alpha=0.3, linewidths=0.0, label=text)
+        for point, (x, z) in zip(table.points, place, strict=True):
+            ax.annotate(point, (x, z), fontsize=TICK, ha="center", va="center")
+        ax.margins(0.16)
+        legend(ax)
+        panels.append(draw.panel(figure, f"The points in the {name}-z plane; areas are errors, each on its own scale."))
+    height = table.desired[:, 2]
+    slopes = [float(np.polyfit(height, 1e3 * error[:, 2], 1)[0]) for error in (table.error, result.error)]
+    return Finding(
+        key="space",
+        figures=(27,),
+        title="where the errors are",
+        statement="The lower the platform, the larger the error: the vertical error changes by "
+        f"{n(slopes[0], '+.1f', 'mm')} with every meter of height.",
+        measured=f"Ours changes by {n(slopes[1], '+.3g', 'mm')} with every meter.",
+        verdict=Verdict.OURS,
+        numbers={"article_slope_mm_per_m": slopes[0], "slope_mm_per_m": slopes[1]},
+        panels=tuple(panels),
+    )
+
+
+def _run(result: Experiment) -> Finding:
+    told = [event for event in result.events if event.kind is not EventKind.STATE]
+    rows = [
+        ("how long it took", "about 14 min", n(result.duration / 60.0, ".1f", "min")),
+        ("samples", "100 a second", "100 a second"),
+        (
+            "speed of the platform, stop at each point",
+            "“low”, until it is measured",
+            f"{SPEED:g} m/s at most, {STOP:g} s",
+        ),
+        ("the fastest winch", "", n(1e3 * result.winch_speed, ".0f", "mm/s")),
+        ("true position from the set point under way, at most", "", n(1e3 * result.farthest, ".2f", "mm")),
+        ("true position from the estimate, at most", "", n(1e3 * result.misjudged, ".2f", "mm")),
+        ("the tension loop acted, of the time at stops", "", n(100.0 * result.acting, ".1f", "%")),
+        ("lengths it had changed at the stops, at most", "", n(1e3 * np.abs(result.correction).max(), ".2f", "mm")),
+        ("faults and notes", "", "; ".join(event.text for event in told) or "none"),
+    ]
+    return Finding(
+        key="run",
+        title="how it went",
+        statement="“The test was done in about 14 min with 100 samples/s.”",
+        measured=f"{n(result.duration / 60.0, '.1f')} minutes, {len(told) or 'no'} faults or notes.",
+        verdict=Verdict.OURS,
+        numbers={
+            "duration_min": result.duration / 60.0,
+            "winch_speed_mm_per_s": 1e3 * result.winch_speed,
+            "farthest_mm": 1e3 * result.farthest,
+            "misjudged_mm": 1e3 * result.misjudged,
+            "acting_share": result.acting,
+            "correction_mm": 1e3 * np.abs(result.correction).max(),
+        },
+        data=(Table("The run", ("", "article", "ours"), rows),),
+    )
+
+
+def _millimeters(error: Array, form: str) -> str:
+    return ", ".join(n(1e3 * x, form) for x in error)
