@@ -11,7 +11,7 @@ import numpy as np
 from sagline.arrays import Array, locked
 from sagline.article.explanations import ErrorOf, Explanation, explanations, subsets, tangents
 from sagline.article.fits import Line, fit_line
-from sagline.article.machine import ANCHORS, PARAMETERS, PULLEY, ZERO, Errors, Parameter, machine, rest
+from sagline.article.machine import ANCHORS, DEAD, PARAMETERS, PULLEY, ZERO, Errors, Parameter, machine, rest
 from sagline.article.table2 import Table2, table2
 from sagline.cables.empirical import Empirical
 from sagline.files.robot_file import load_robot
@@ -83,6 +83,7 @@ class TenPoses:
         trends: One parameter off at a time.
         explanations: All explanations by one, by two and by three parameters, those that leave least first within each.
         limits: What the poses cannot tell apart.
+        dead_meter: Predicted actual less desired position with 1 m of dead cable [m], shape (10, 3).
         measured_rms: Root mean square of the measured errors, over all coordinates [m].
     """
 
@@ -94,6 +95,7 @@ class TenPoses:
     trends: tuple[Trend, ...]
     explanations: tuple[tuple[Explanation, ...], ...]
     limits: Limits
+    dead_meter: Array
     measured_rms: float
 
     def best(self, count: int) -> Explanation:
@@ -123,7 +125,7 @@ def ten_poses(most: int = 3) -> TenPoses:
     def error_of(errors: Sequence[Errors]) -> Array:
         return rest(robot, plan, home, errors) - table.desired
 
-    nominal, *off = error_of([{}, *({parameter.name: parameter.typical} for parameter in PARAMETERS)])
+    nominal, dead, *off = error_of([{}, {DEAD: 1.0}, *({one.name: one.typical} for one in PARAMETERS)])
     found = sorted(explanations(error_of, table.error, subsets(PARAMETERS, most)), key=lambda one: one.rms)
     ranked = tuple(tuple(one for one in found if len(one.parameters) == count + 1) for count in range(most))
     return TenPoses(
@@ -135,6 +137,7 @@ def ten_poses(most: int = 3) -> TenPoses:
         trends=tuple(_trend(parameter, error, table) for parameter, error in zip(PARAMETERS, off, strict=True)),
         explanations=ranked,
         limits=_limits(robot, error_of, plan, ranked[1][0]),
+        dead_meter=dead,
         measured_rms=float(np.sqrt(np.mean(table.error**2))),
     )
 

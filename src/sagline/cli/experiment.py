@@ -63,7 +63,9 @@ def experiment(name: str, asked: Asked) -> None:
             line.progress(round(PARTS * share), PARTS)
 
         result = (
-            in_process(true, nominal, seed=seed, tell=tell) if asked.in_process else _apart(true, nominal, seed, tell)
+            in_process(true, nominal, seed=seed, tell=tell)
+            if asked.in_process
+            else apart_over_s7(true, nominal, seed, tell)
         )
     place = write_experiment(result, asked.out, how)
     if asked.as_json:
@@ -73,7 +75,7 @@ def experiment(name: str, asked: Asked) -> None:
     note("", f"The report: {place.resolve()}; its numbers: {NAMES[1]}")
 
 
-def _apart(true: Robot, nominal: Robot, seed: int, tell: Tell) -> Experiment:
+def apart_over_s7(true: Robot, nominal: Robot, seed: int, tell: Tell) -> Experiment:
     """Drive a twin in another process, over S7, in real time."""
     from sagline.plc.s7_link import S7Link
     from sagline.twin.apart import apart

@@ -46,7 +46,7 @@ def write_experiment(result: Experiment, folder: Path | str, how: str) -> Path:
     )
     made = f"Made by sagline {version('sagline')}: sagline experiment article."
     numbers = {finding.key: plain(finding.numbers) for finding in chapter.findings}
-    contents = page(TITLE, lead, NOTATION, [chapter], None, made), json_text(numbers) + "\n"
+    contents = page(TITLE, lead, NOTATION, [chapter], None, made, summary=False), json_text(numbers) + "\n"
     place = made_folder(folder)
     with written_together(place, NAMES) as files:
         for file, content in zip(files, contents, strict=True):
@@ -89,11 +89,11 @@ def _stops(result: Experiment) -> Finding:
     return Finding(
         key="stops",
         tables=(2,),
-        title="Table 2, ours beside the article's",
+        title="ours beside the article's",
         statement=f"Errors from {n(theirs.min(), '.1f')} to {n(theirs.max(), '.1f', 'mm')}, "
         f"{n(theirs.mean(), '.1f', 'mm')} in the mean.",
-        measured=f"Ours: {n(ours.mean(), '.3f', 'mm')} in the mean, {n(ours.max(), '.3f', 'mm')} at most, at "
-        f"{table.points[worst]}. Back at home the platform is {n(1e3 * np.linalg.norm(result.back), '.3f', 'mm')} from "
+        measured=f"Ours: {n(ours.mean(), '.2g', 'mm')} in the mean, {n(ours.max(), '.2g', 'mm')} at most, at "
+        f"{table.points[worst]}. Back at home the platform is {n(1e3 * np.linalg.norm(result.back), '.2g', 'mm')} from "
         "where it began.",
         verdict=Verdict.OURS,
         numbers={
@@ -103,7 +103,8 @@ def _stops(result: Experiment) -> Finding:
             "article_distance_mm": 1e3 * table.distance,
             "estimated_m": result.estimated,
             "null_error_N": result.null_error,
-            "back_mm": 1e3 * result.back,
+            "largest_mm": ours.max(),
+            "back_mm": 1e3 * np.linalg.norm(result.back),
         },
         data=(
             Table(
@@ -143,24 +144,24 @@ def _cells(result: Experiment, draw: Drawings) -> Finding:
             "largest_N": cells.max(),
             "off_plan_N": np.abs(off).max(),
             "off_plan_at_first_N": np.abs(off[early]).max(),
-            "off_plan_at_stops_N": at_stops,
+            "off_plan_at_stops_N": np.abs(at_stops).max(),
         },
         panels=(_courses(result, cells, "load cells [N]", "Load cells; dashed: the ten stops, left out.", draw),),
     )
 
 
 def _lengths(result: Experiment, draw: Drawings) -> Finding:
-    lengths = 1e3 * result.lengths
+    lengths = result.lengths
     caption = "Lengths by the encoders, less those at home; dashed: the ten stops, left out."
     return Finding(
         key="encoders",
         figures=(26,),
         title="how the lengths differ from those at home",
         statement="Differences of cable length from the encoders, without numbers.",
-        measured=f"From {n(lengths.min(), '.0f')} to {n(lengths.max(), '.0f', 'mm')}.",
+        measured=f"From {n(lengths.min(), '.3g')} to {n(lengths.max(), '.3g', 'm')}.",
         verdict=Verdict.OURS,
-        numbers={"least_mm": lengths.min(), "largest_mm": lengths.max()},
-        panels=(_courses(result, lengths, "$L - L_{home}$ [mm]", caption, draw),),
+        numbers={"least_m": lengths.min(), "largest_m": lengths.max()},
+        panels=(_courses(result, 1e3 * lengths, "$L - L_{home}$ [mm]", caption, draw),),
     )
 
 
@@ -238,6 +239,7 @@ def _run(result: Experiment) -> Finding:
             "misjudged_mm": 1e3 * result.misjudged,
             "acting_share": result.acting,
             "correction_mm": 1e3 * np.abs(result.correction).max(),
+            "faults_and_notes": len(told),
         },
         data=(Table("The run", ("", "article", "ours"), rows),),
     )

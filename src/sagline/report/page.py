@@ -32,7 +32,16 @@ CLASSES = {
 }
 
 
-def page(title: str, lead: str, notation: str, chapters: Sequence[Chapter], picture: Panel | None, footer: str) -> str:
+def page(
+    title: str,
+    lead: str,
+    notation: str,
+    chapters: Sequence[Chapter],
+    picture: Panel | None,
+    footer: str,
+    *,
+    summary: bool = True,
+) -> str:
     """The whole page: the result on one screen, then every finding.
 
     Args:
@@ -42,11 +51,13 @@ def page(title: str, lead: str, notation: str, chapters: Sequence[Chapter], pict
         chapters: What it consists of.
         picture: The drawing beside the result; None for none.
         footer: How it was made.
+        summary: Whether verdicts are counted and findings are listed first; no use on a page of few.
 
     Returns:
         The text of an HTML file.
     """
     style = files("sagline.report").joinpath("page.css").read_text(encoding="utf-8")
+    before = f"{_result(chapters, picture)}\n{_contents(chapters)}\n" if summary else ""
     body = "\n".join(_chapter(number, chapter) for number, chapter in enumerate(chapters, start=1))
     return (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
@@ -54,7 +65,7 @@ def page(title: str, lead: str, notation: str, chapters: Sequence[Chapter], pict
         '<meta name="color-scheme" content="light dark">\n'
         f"<title>{escape(title)}</title>\n<style>\n{style}</style>\n</head>\n<body>\n"
         f"<header>\n<h1>{escape(title)}</h1>\n<p>{escape(lead)}</p>\n</header>\n"
-        f"{_result(chapters, picture)}\n{_contents(chapters)}\n<p>{_text(notation)}</p>\n"
+        f"{before}<p>{_text(notation)}</p>\n"
         f"<main>\n{body}\n</main>\n<footer>{escape(footer)}</footer>\n</body>\n</html>\n"
     )
 

@@ -9,6 +9,7 @@ from sagline.article.ten_poses import TenPoses, Tour, ten_poses, tour
 from sagline.numbers import n
 from sagline.plot.sheet import BLUE, COLORS, TICK
 from sagline.report.blocks import Chapter, Finding, Table, Verdict
+from sagline.report.classes import classes
 from sagline.report.drawing import Drawings, axes, legend, thinned
 from sagline.report.explanations import explained, untold
 
@@ -25,6 +26,7 @@ def poses_chapter() -> Chapter:
         "than planned.",
         (
             _table(study),
+            classes(study),
             _tour(way, draw),
             _space(study, draw),
             _trends(study, draw),
