@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 import sagline as sl
 from sagline.control.link import Command, Mode
 from sagline.robot.winch import RULES
+from tests.control.rigs import HOME, at, prototype, rig
 from tests.files.simulations import a_simulation
 from tests.kinematics.winches import wound
 from tests.plot import made
@@ -82,11 +83,16 @@ RESULTS = frozenset(
     {"CableFit", "CableState", "Confirmation", "EmpiricalFit", "Equilibria", "Equilibrium", "ForwardSolution"}
     | {"FrequencySlopes", "WinchDrive"}
     | {"EnergyBalance", "Imported", "Linearized", "Modes", "Occurrence", "Plan", "Simulation", "Stiffness"}
-    | {"twin.Injected"}
+    | {"control.Execution", "control.Gains", "control.Motion", "control.Samples", "twin.Injected"}
     | {"FrequencyMap", "FrequencyResponse", "TensionPolygon", "Vibration", "WinchRates"}
 )
 # asked by sagline itself, with numbers of its own
-INTERNAL = frozenset({"TensionMethod.preference", "QuadraticProgram.preference", "twin.Machine.deliver"})
+INTERNAL = frozenset(
+    {"TensionMethod.preference", "QuadraticProgram.preference", "twin.Machine.deliver"}
+    | {"control.Fault", "control.Fault.look", "control.Fault.found", "control.Histogram.add"}
+    | {"control.TensionLoop.step", "control.Gains.at", "control.Link", "control.Link.exchange", "control.Recorder"}
+    | {f"control.Recorder.{method}" for method in ("begins", "ends", "cycle", "event")}
+)
 
 
 @cache
@@ -110,6 +116,7 @@ def calls(folder: Path) -> dict[str, Call]:
         _in_time,
         _figures,
         _twins,
+        _controls,
     ):
         table |= part(given)
     return table
@@ -683,6 +690,89 @@ def _twins(given: _Given) -> dict[str, Call]:
         "twin.Machine.take": Call(machine.take, _all(group=group, command=("object", command))),
         "twin.Machine.report": Call(lambda group: (machine.report(group), None)[1], _all(group=group)),
         "twin.Machine.inject": Call(machine.inject, _all(what=text)),
+    }
+
+
+def _controls(given: _Given) -> dict[str, Call]:
+    robot, place = prototype(), at(0.02, 0.0, 1.5)
+    path = sl.septic_path([HOME, place], durations=1.0)
+    plan, settings = sl.inverse(robot, path), sl.control.TensionSettings()
+    machine = sl.twin.Machine(robot)
+    done = rig()[0].go_to(place)
+    histogram, pose, number = sl.control.Histogram(), ("one", place), ("number", 0.1)
+    where = str(given.folder / "run.mcap")
+    speeds = _all(pose=pose, speed=number, angular_speed=number)
+
+    def ready(method: str, home: bool = True) -> Callable[..., Any]:
+        def call(**arguments: Any) -> None:
+            control, _ = rig(home=home)
+            if not home:
+                control.connect()
+            getattr(control, method)(**arguments)
+
+        return call
+
+    found = {
+        f"control.Controller.{method}": Call(ready(method), arguments)
+        for method, arguments in {
+            "plan": _all(path=("one", path)),
+            "start": _all(path=("one", path)),
+            "execute": _all(path=("one", path)),
+            "path_to": speeds,
+            "go_to": speeds,
+            "jog": _all(winch=("cable", 3), by=("number", 1e-3)),
+            "start_jog": _all(winch=("cable", 3), by=("number", 1e-3)),
+            "jog_platform": _all(by=("array", np.array([1e-3, 0.0, 2e-3]))),
+            "start_jog_platform": _all(by=("array", np.array([1e-3, 0.0, 2e-3]))),
+        }.items()
+    }
+    for method in ("home", "begin_homing"):
+        found[f"control.Controller.{method}"] = Call(ready(method, home=False), _all(pose=("one", HOME)))
+    return found | {
+        "control.Controller": Call(
+            lambda **a: (sl.control.Controller(**a), None)[1],
+            _all(
+                robot=("one", robot),
+                link=("object", machine.link()),
+                model=("one", sl.Catenary(), True),
+                tension=("one", sl.Closest(), True),
+                loop=("one", settings, True),
+                seed=("seed", 3, True),
+            ),
+        ),
+        "control.faults_of": Call(
+            lambda **a: (sl.control.faults_of(**a), None)[1],
+            _all(
+                robot=("one", robot),
+                period=("number", 0.01),
+                cell_deviation=("number", 1.0),
+                cell_bias=("number", 2.0),
+                largest_correction=("number", 5e-3),
+            ),
+        ),
+        "control.gains_along": Call(
+            lambda **a: (sl.control.gains_along(**a), None)[1], _all(plan=("one", plan), every=("number", 0.5))
+        ),
+        "control.null_space": Call(sl.control.null_space, _all(state=("one", plan.state[0]))),
+        "control.parity": Call(sl.control.parity, _all(state=("one", plan.state[0]))),
+        "control.TensionLoop": Call(
+            lambda **a: (sl.control.TensionLoop(**a), None)[1],
+            _all(cable_count=("whole", 8), settings=("one", settings, True), period=("number", 0.01)),
+        ),
+        "control.TensionSettings": Call(
+            sl.control.TensionSettings,
+            _all(
+                filter_time=("number", 0.5),
+                gain=("number", 0.01),
+                act_above=("number", 3.0),
+                rest_below=("number", 0.5),
+                largest=("number", 5e-3),
+            ),
+        ),
+        "control.Histogram.quantile": Call(histogram.quantile, _all(share=("number", 0.5))),
+        "control.Pace": Call(lambda period: (sl.control.Pace(period), None)[1], _all(period=("number", 0.01))),
+        "control.Samples.at": Call(lambda index: (done.samples.at(index), None)[1], _all(index=("whole", 1))),
+        "control.Execution.save": Call(done.save, _all(file=("file", where))),
     }
 
 

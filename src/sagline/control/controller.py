@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.arguments import instance
+from sagline.arrays import number
 from sagline.cables.model import CableModel
 from sagline.control.checks import Motion, check_start, motion_along
 from sagline.control.connecting import Claim
@@ -246,6 +247,7 @@ class Controller(Loop):
         Raises:
             RefusedError: If the platform's place is not known, or it is there already.
         """
+        limits = number(speed, "speed", "m/s", above=0.0), number(angular_speed, "angular_speed", "rad/s", above=0.0)
         here = self._here()
         if instance(pose, Pose, "pose").shape:
             raise InvalidValueError("pose", f"a batch of {len(pose)}", "a single pose", "Give one: pose[0].")
@@ -254,10 +256,10 @@ class Controller(Loop):
             raise RefusedError("the way", "the platform is there already", "Name another pose.")
         return septic_path(
             [here, pose],
-            speed=speed,
-            acceleration=speed / SPEEDING_UP,
-            angular_speed=angular_speed,
-            angular_acceleration=angular_speed / SPEEDING_UP,
+            speed=limits[0],
+            acceleration=limits[0] / SPEEDING_UP,
+            angular_speed=limits[1],
+            angular_acceleration=limits[1] / SPEEDING_UP,
             rate=round(1.0 / self.period),
         )
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sagline.arguments import whole_number
 from sagline.arrays import Array, Codes, Flags, Indices, locked
 from sagline.control.events import Event
 from sagline.control.link import Sample
@@ -91,8 +92,12 @@ class Samples(Result):
 
         Args:
             index: Which, from 0.
+
+        Raises:
+            InvalidValueError: If there is none.
         """
-        return Sample(float(self.time[index]), *(getattr(self, name)[index].copy() for name in Sample._fields[1:]))
+        row = whole_number(index, "index", 0, len(self) - 1)
+        return Sample(float(self.time[row]), *(getattr(self, name)[row].copy() for name in Sample._fields[1:]))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

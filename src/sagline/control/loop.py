@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arguments import instance, optional
+from sagline.arguments import brief, instance, optional, whole_number
 from sagline.arrays import Array, Flags
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
@@ -42,6 +42,7 @@ from sagline.tension.method import TensionMethod
 VALID_FOR: Final = HEARTBEAT  # s: so long a PLC may go on with a command
 LEAVING: Final = 0.3  # s, at most, until all grants are given back
 MOST_OWNER: Final = 2**31
+MOST_SEED: Final = 2**128
 ROOM: Final = 500  # cycles beside the plan's: ramps, pauses
 FOLLOWING: Final = frozenset({State.IDLE, State.MOVING, State.JOGGING, State.PAUSING, State.STOPPING})
 LOOP_ON: Final = frozenset({State.IDLE, State.MOVING, State.PAUSING})
@@ -67,6 +68,7 @@ class Loop:
         """Prepare everything; the arguments are those of `Controller`."""
         self.robot = instance(robot, Robot, "robot")
         m = robot.cable_count
+        _check_link(link)
         lever_of(robot, np.ones(m))  # what is missing is told now
         if sorted(winch for group in link.groups for winch in group) != list(range(m)):
             count = sum(map(len, link.groups))
@@ -77,7 +79,7 @@ class Loop:
         self._method = optional(method, TensionMethod, "tension") or Closest()
         self._settings = optional(settings, TensionSettings, "loop") or TensionSettings()
         self._record, self._shadow = record, shadow
-        self._random = np.random.default_rng(seed)
+        self._random = np.random.default_rng(None if seed is None else whole_number(seed, "seed", 0, MOST_SEED))
         self.owner = int(self._random.integers(1, MOST_OWNER))
         self._counter = int(self._random.integers(1, MOST_OWNER))
         self._solver = ForwardSolver(robot, self._model)
@@ -487,6 +489,13 @@ class Loop:
         m, n = self.robot.cable_count, self.robot.degrees_of_freedom
         self._loop = TensionLoop(m, self._settings, self.period) if m > n else None
         self._correction = np.zeros(m)
+
+
+def _check_link(link: object) -> None:
+    """Refuse what is no link at all."""
+    if isinstance(link, type) or not (hasattr(link, "groups") and callable(getattr(link, "exchange", None))):
+        step = "Take that of a machine, machine.link(), or make one: sl.plc.S7Link(addresses, robot)."
+        raise InvalidValueError("link", brief(link), "a Link", step)
 
 
 _DONE: Final = (ExecutionStatus.DONE, "the end of the plan")

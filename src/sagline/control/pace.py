@@ -10,6 +10,7 @@ import numpy as np
 
 from sagline.arrays import Indices, locked, number
 from sagline.control.link import PERIOD
+from sagline.errors import InvalidValueError
 
 BIN: Final = 1e-4  # s
 BINS: Final = 1000  # and one for all that is longer
@@ -42,7 +43,12 @@ class Histogram:
 
         Args:
             share: Of all, 0 to 1.
+
+        Raises:
+            InvalidValueError: If it is no such number.
         """
+        if not number(share, "share", "", low=0.0) <= 1.0:
+            raise InvalidValueError("share", f"{share:g}", "0 to 1", "Give 0.999 for what 999 of 1000 do not exceed.")
         counts = np.cumsum(self._counts)
         if not counts[-1]:
             return 0.0

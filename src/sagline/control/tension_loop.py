@@ -14,6 +14,7 @@ from sagline.control.link import PERIOD
 from sagline.control.null_space import NullSpace
 from sagline.errors import InvalidValueError
 
+MOST_CABLES: Final = 10**6
 MOST_GAIN: Final = 0.1  # a cycle: a loop with five cycles of delay is unstable from 0.17 on
 
 
@@ -73,7 +74,7 @@ class TensionLoop:
         Raises:
             InvalidValueError: If an argument is of the wrong kind or out of its range.
         """
-        m = whole_number(cable_count, "cable_count", 1)
+        m = whole_number(cable_count, "cable_count", 1, MOST_CABLES)
         self.settings = TensionSettings() if settings is None else instance(settings, TensionSettings, "settings")
         cycle = number(period, "period", "s", above=0.0)
         self._share = cycle / (self.settings.filter_time + cycle)
