@@ -305,3 +305,71 @@ def test_a_grant_that_is_taken_in_motion_is_a_stop() -> None:
         group.do(Mode.FOLLOW, program.length, [0.2, -0.1])
     assert program.status & GroupStatus.HOLDING
     assert program.fault == GroupFault.HEARTBEAT
+
+
+def anything(generator: np.random.Generator, group: Group) -> None:
+    """One scan of a group to which anything may happen, most of it now and then."""
+    program = group.program
+
+    def seldom(share: float, strange: Any, usual: Any) -> Any:
+        return strange if generator.random() < share else usual
+
+    def spoiled(share: float, usual: float) -> float:
+        return float(seldom(share, generator.choice([math.nan, math.inf, -math.inf, -1.0, 0.0, 1e300]), usual))
+
+    if (pick := generator.random()) < 0.1:
+        program.claim(int(generator.choice([0, 7, 8])), group.now)
+    elif pick < 0.105:
+        program.trip(int(generator.integers(2)), 1)
+    elif pick < 0.11:
+        program.emergency = True
+    elif pick < 0.15:
+        program.reset()
+    group.cell = [seldom(0.01, 1e4, 150.0) for _ in range(2)]
+    group.encoder = [at + seldom(0.02, 0.02, 0.0) for at in group.encoder]
+    if generator.random() < 0.9:
+        rate = generator.uniform(-0.4, 0.4, 2)
+        order = group.order(
+            seldom(0.2, int(generator.choice([*Mode, 9])), Mode.FOLLOW),
+            [spoiled(0.01, at + r * PERIOD) for at, r in zip(program.length, rate, strict=True)],
+            [spoiled(0.01, r) for r in rate],
+            owner=seldom(0.02, 8, 7),
+            valid_for=spoiled(0.05, 0.1),
+            tension=[spoiled(0.05, 150.0) for _ in range(2)],
+            enable=seldom(0.1, [bool(generator.integers(2)), True], [True, True]),
+        )
+        program.take(order)
+    program.scan(group.now, list(group.encoder), list(group.cell))
+    group.now += PERIOD
+
+
+@pytest.mark.parametrize("seeds", [30, pytest.param(1000, marks=pytest.mark.soak)])
+def test_whatever_comes_drives_do_what_they_may(seeds: int) -> None:
+    followed = 0
+    for seed in range(seeds):
+        generator, group = np.random.default_rng(seed), Group()
+        program = group.program
+        program.length = list(group.encoder)
+        program.claim(7, group.now)
+        for _ in range(200):
+            before, powered, encoder = list(program.length), list(program.powered), list(group.encoder)
+            anything(generator, group)
+            after = np.array(program.length)
+            followed += program.status == GroupStatus.READY | GroupStatus.FOLLOWING
+            assert np.isfinite([*after, *program.tension]).all()
+            assert program.owner or not any(program.powered)
+            assert not (any(program.powered) and (program.emergency or program.locked))
+            for i in range(2):
+                begun = program.powered[i] and not powered[i]
+                assert not (program.drive_fault[i] and program.powered[i])
+                if not program.powered[i] and not powered[i]:
+                    assert after[i] == before[i]
+                if powered[i] and program.powered[i] and group.cell[i] > LIMITS.tension[i]:
+                    assert after[i] >= min(before[i], group.encoder[i])
+                if begun:
+                    assert abs(after[i] - group.encoder[i]) <= 0.5 * 2 * PERIOD + 1e-9
+            assert len(encoder) == 2
+            group.encoder = [
+                at if has else stood for at, has, stood in zip(after, program.powered, encoder, strict=True)
+            ]
+    assert followed > 100

@@ -177,7 +177,9 @@ class Program:
             self.fault = self.fault or GroupFault.DRIVE
         elif fresh and order is not None and (not self.fault or (order.mode == _HOLD and self._was_told)):
             self.fault = GroupFault.NONE
-            self._switch(order, encoder)
+            if order.enable != self.powered:
+                self._switch(order, encoder)
+                waited = 0.0  # one that begins where it stands has no way to make up for
             self._obey(order, waited, cell)
             return
         elif order is not None and waited >= min(HEARTBEAT, order.valid_for) - TINY:
@@ -214,8 +216,6 @@ class Program:
 
         A drive takes up the tension that is expected first; its brake goes with the next command.
         """
-        if order.enable == self.powered:
-            return
         self.length, self._asked, self._rate = list(self.length), list(self._asked), list(self._rate)
         for i in self.winches:
             has = order.enable[i] and (self.powered[i] or self._loaded[i])
@@ -231,11 +231,15 @@ class Program:
         if order.mode == _FOLLOW and any(self.powered):
             self._follow(order, waited, cell)
             return
-        self.tension = [new if isfinite(new) else old for new, old in zip(order.tension, self.tension, strict=True)]
+        self.tension = self._known(order.tension)
         if self._mode == _FOLLOW and any(self._rate):
             self._ramp = RAMP
         self._mode = order.mode
         self._slow_down(cell)
+
+    def _known(self, tension: list[float]) -> list[float]:
+        """Tensions that are expected; where none is told, that of before."""
+        return [new if isfinite(new) else old for new, old in zip(tension, self.tension, strict=True)]
 
     def _follow(self, order: Order, waited: float, cell: list[float]) -> None:
         """Take new set points, if they are within their limits and no faster than the winches since the last ones."""
@@ -254,6 +258,8 @@ class Program:
                 self._stop(GroupFault.SET_POINT)
                 self._slow_down(cell)
                 return
+            if not isfinite(tensions[i]):  # of a drive that has no power
+                tensions = self._known(tensions)
         self.tension, self._asked, self._rate, self._left = tensions, lengths, rates, PERIOD
         self._drive(cell)
 
