@@ -131,7 +131,7 @@ def test_what_is_written_but_no_command_moves_nothing() -> None:
 
 def test_a_silent_group_keeps_its_block() -> None:
     with served(S7, "group 1 is silent at 0.01 s") as (server, link):
-        before = taken(link)
+        before = gone_on(server, link)
         server.scan()
         until(lambda: np.all(taken(link).counter == before.counter + np.array([1, 0, 1, 1])))
 
