@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from sagline.files.mjcf import dump_mjcf
     from sagline.files.path_file import load_path
     from sagline.files.plan_file import load_plan, save_plan
+    from sagline.files.plc_source import export_scl
     from sagline.files.robot_file import dump_robot, load_robot
     from sagline.files.simulation_file import load_simulation
     from sagline.files.wirex import load_wirex
@@ -188,6 +189,7 @@ __all__ = [
     "encoder_counts",
     "equilibria",
     "export_c",
+    "export_scl",
     "fastest",
     "forward",
     "frequency_map",
@@ -323,6 +325,7 @@ _HOMES = {
     "encoder_counts": "sagline.kinematics.encoder",
     "equilibria": "sagline.kinematics.equilibria",
     "export_c": "sagline.files.c_source",
+    "export_scl": "sagline.files.plc_source",
     "fastest": "sagline.dynamics.fastest",
     "forward": "sagline.kinematics.forward",
     "frequency_map": "sagline.dynamics.frequency_map",

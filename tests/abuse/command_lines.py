@@ -28,6 +28,8 @@ LINES = {
     "convert": ["convert", "robot.wcrfx"],
     "export-c": ["export-c", "cogiro"],
     "experiment": ["experiment", "nothing"],
+    "export-scl": ["export-scl", "article-prototype"],
+    "twin": ["twin", "article-prototype", "--port", "0"],
     "view": ["view", "cogiro", "--no-browser"],
 }
 

@@ -31,6 +31,7 @@ COMMANDS = {
     "convert": ("convert", ROBOT, "--out", "out/robot.yaml"),
     "mjcf": ("convert", ROBOT, "--format", "mjcf", "--out", "out/robot.xml"),
     "export-c": ("export-c", ROBOT, "--out", "out/sagline.c"),
+    "export-scl": ("export-scl", "article-prototype", "--out", "out/plc.scl"),
     "new": ("new", "out/mine.yaml", "--force"),
 }
 

@@ -67,6 +67,10 @@ def short_of_work(stocked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         server._check(host, port)
         raise SystemExit(0)
 
+    def served(server: Any, watch: Any) -> None:
+        raise SystemExit(0)
+
+    monkeypatch.setattr("sagline.twin.server.Server.run", served)
     from sagline.viewer import server
 
     monkeypatch.setattr(server, "started", started)

@@ -34,9 +34,15 @@ def told(*words: str) -> str:
         (["nobody"], "nobody"),
         (["article-prototype", "--port", "65536"], "--port is '65536'; allowed: a whole number from 0 to 65535"),
         (["article-prototype", "--port", "-1"], "--port is '-1'"),
-        (["article-prototype", "--port", "65534"], "address of the twin is 127.0.0.1:65536"),
-        (["article-prototype", "--host", "192.0.2.1", "--port", "0"], "address of the twin is 192.0.2.1:0 (Cannot"),
-        (["article-prototype", "--host", "nobody.invalid", "--port", "0"], "address of the twin is nobody.invalid:0"),
+        (["article-prototype", "--port", "65534"], "address of the twin is '127.0.0.1', port 65536"),
+        (
+            ["article-prototype", "--host", "192.0.2.1", "--port", "0"],
+            "is '192.0.2.1', port 0 (Cannot",
+        ),
+        (
+            ["article-prototype", "--host", "nobody.invalid", "--port", "0"],
+            "is 'nobody.invalid', port 0",
+        ),
         (["article-prototype", "--seed", "x"], "--seed is 'x'"),
         (["article-prototype", "--fault", "cell 3 stucks"], "fault is 'cell 3 stucks'"),
         (["article-prototype", "--fault", "cell 8 sticks"], "allowed: cell 0 to 7"),

@@ -141,7 +141,7 @@ def test_a_plc_of_another_layout_is_told_with_what_to_load() -> None:
         text = error_of(list(mirrors.addresses))
     assert "group 3 at" in text
     assert "DB101 has layout 3; this sagline knows layout 1" in text
-    assert "sagline twin ROBOT --scl" in text
+    assert "sagline export-scl ROBOT" in text
 
 
 def test_a_plc_without_the_blocks_is_told_with_what_to_load() -> None:

@@ -139,5 +139,5 @@ def test_a_silent_group_keeps_its_block() -> None:
 def test_a_port_in_use_is_told() -> None:
     with closing(sl.twin.Server(machine())) as server:
         port = int(server.addresses[2].rpartition(":")[2])
-        with pytest.raises(sl.SaglineError, match=f"address of the twin is 127.0.0.1:{port} .Address already in use"):
+        with pytest.raises(sl.SaglineError, match=f"twin is .127.0.0.1., port {port} .Address already"):
             sl.twin.Server(server.machine, port=port)

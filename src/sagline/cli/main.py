@@ -18,7 +18,7 @@ from sagline.cli.commands.control import control
 from sagline.cli.commands.experiment import experiment
 from sagline.cli.commands.motion import simulate, vibrate
 from sagline.cli.commands.poses import forward, tension
-from sagline.cli.commands.robots import convert, examples, export_c, new, robots, show
+from sagline.cli.commands.robots import convert, examples, export_c, export_scl, new, robots, show
 from sagline.cli.commands.track import encoder, lengths, run, track
 from sagline.cli.commands.twin import twin
 from sagline.cli.commands.view import view
@@ -144,7 +144,7 @@ def sagline(
 
 for command in (
     track, lengths, encoder, run, article, identify, forward, tension, vibrate, simulate, robots, show, examples, new,
-    convert, export_c, view, twin, control, experiment,
+    convert, export_c, export_scl, view, twin, control, experiment,
 ):  # fmt: skip
     text = _help(command.__doc__)
     app.command(cls=Command, help=text, short_help=text.partition("\n\n")[0])(command)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 from collections.abc import Sequence
 from contextlib import ExitStack, closing
+from socket import gethostname
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from sagline.cli.entries import FORWARD, INVERSE, SIMULATION
@@ -82,7 +83,9 @@ def _greet(name: str, server: Server, asked: Asked) -> None:
     show(f"{machine.nominal.name}: {winches} winches behind {groups} PLCs that speak {spoken}, brakes on.")
     show("From another terminal:")
     show(f"  sagline control {name}{' --modbus' * asked.modbus} \\", whole=True)
-    show(f"    --plc {','.join(server.addresses)}", whole=True)
+    everywhere = "0.0.0.0:"
+    places = [place.replace(everywhere, f"{gethostname()}:") for place in server.addresses]
+    show(f"    --plc {','.join(places)}", whole=True)
     show("Ctrl-C switches it off.")
     if asked.host != "127.0.0.1":
         note("Note: ", "everyone who can reach this machine can drive it: nothing asks for a password.", style="bold")

@@ -144,7 +144,7 @@ def _bytes(kind: str | tuple[Field, ...]) -> int:
 
 
 AGAIN: Final = "counter_again"
-LOAD: Final = "Load the blocks of this version into the PLC: sagline twin ROBOT --scl FILE.scl"
+LOAD: Final = "Load the blocks of this version into the PLC: sagline export-scl ROBOT --out plc.scl"
 
 FROM_PLC: Final = Block(
     number=101,

@@ -34,14 +34,17 @@ class Mirrors(Protocol):
         """Listen no more, and let go of who is connected."""
 
 
-def check_free(host: str, port: int) -> None:
-    """Refuse an address that cannot be listened at.
+def free(host: str, port: int) -> str:
+    """The number of a host, where it can be listened at.
 
     python-snap7 shares ports (SO_REUSEPORT): two twins at one would each have half of the connections.
 
     Args:
-        host: Address.
+        host: Address of this machine, or its name.
         port: TCP port; 0: any.
+
+    Returns:
+        The IPv4 address.
 
     Raises:
         InvalidValueError: If the port is in use, or the address is none of this machine.
@@ -49,13 +52,15 @@ def check_free(host: str, port: int) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
-            probe.bind((host, port))
+            number = socket.gethostbyname(host)
+            probe.bind((number, port))
             probe.listen()
-        except (OSError, OverflowError) as error:
+        except (OSError, OverflowError, ValueError) as error:  # ValueError: of what is no name at all
             reason = getattr(error, "strerror", None) or str(error)
             raise InvalidValueError(
                 "address of the twin",
-                f"{host}:{port} ({reason})",
+                f"{host!r}, port {port} ({reason})",
                 "a free port at an address of this machine",
                 "Choose another with --port, or end what listens there.",
             ) from None
+    return number

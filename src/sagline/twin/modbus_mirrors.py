@@ -13,7 +13,7 @@ from pymodbus.server import ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
 from sagline.plc.blocks import BLOCKS, CLAIM, FROM_PLC, TO_PLC, Block
-from sagline.twin.mirrors import LOOPBACK, check_free
+from sagline.twin.mirrors import LOOPBACK, free
 
 T = TypeVar("T")
 
@@ -105,14 +105,13 @@ class ModbusMirrors:
             InvalidValueError: If a port is in use, or the address is none of this machine.
         """
         ports = [port + i if port else 0 for i in range(len(blocks))]
-        for each in ports:
-            check_free(host, each)
+        numbers = [free(host, each) for each in ports]
         self._memory = [Memory(block) for block in blocks]
         self._loop = asyncio.new_event_loop()
         self._thread = Thread(target=self._loop.run_forever, name="sagline modbus", daemon=True)
         self._thread.start()
-        self._servers = self._call(self._listen(host, ports))
-        self.addresses = tuple(f"{host}:{_port(server)}" for server in self._servers)
+        self._servers = self._call(self._listen(numbers[0], ports))
+        self.addresses = tuple(f"{numbers[0]}:{_port(server)}" for server in self._servers)
 
     def publish(self, blocks: Sequence[bytes | None]) -> None:
         """Replace each group's DB101, whole.

@@ -13,7 +13,7 @@ from snap7.type import SrvArea
 
 from sagline.plc.blocks import BLOCKS, CLAIM, FROM_PLC, TO_PLC, Block
 from sagline.plc.s7_wire import PDU
-from sagline.twin.mirrors import LOOPBACK, check_free
+from sagline.twin.mirrors import LOOPBACK, free
 
 
 class S71200(Server):
@@ -100,12 +100,12 @@ class S7Mirrors:
         server = S71200()
         for kind, content in memory.items():
             server.register_area(SrvArea.DB, kind.number, content)
-        check_free(host, port)
-        server.start_to(host, port)
+        number = free(host, port)
+        server.start_to(number, port)
         self._memory.append(memory)
         self._servers.append(server)
         assert server.server_socket is not None
-        self.addresses += (f"{host}:{server.server_socket.getsockname()[1]}",)
+        self.addresses += (f"{number}:{server.server_socket.getsockname()[1]}",)
 
     def _copy(self, index: int, block: Block, *, empty: bool = False) -> bytes:
         server, content = self._servers[index], self._memory[index][block]

@@ -54,6 +54,7 @@ class Server:
         self.machine = machine
         self._pace = Pace(machine.period)
         self._groups = range(len(machine.groups))
+        self._seen = [b""] * len(machine.groups)  # commands that were looked at
         first = [self._block(group) or SILENT for group in self._groups]
         self._mirrors = _mirrors(first, host, port, modbus)
         self.addresses = self._mirrors.addresses
@@ -81,9 +82,11 @@ class Server:
             asked = CLAIM.read(claim)
             if not isinstance(asked, Refusal):
                 self.machine.claim(group, asked["owner"])
-            order = self._command(group, command)
-            if order is not None:
-                self.machine.take(group, order)
+            if command != self._seen[group]:  # what stood there before its owner had the grant is history
+                self._seen[group] = command
+                order = self._command(group, command)
+                if order is not None:
+                    self.machine.take(group, order)
         self.machine.advance()
         self._mirrors.publish([self._block(group) for group in self._groups])
 

@@ -165,3 +165,16 @@ def _behind(robot: Robot, pose: Pose) -> Array:
         return np.zeros(robot.cable_count)
     whole, bare = (inverse(some, pose).unstrained_length for some in (robot, robot.replace(winches=None)))
     return _answered(whole - bare, robot, "start")
+
+
+def plc_limits(robot: Robot) -> Limits:
+    """What the PLCs of a robot know of its winches, one list over all of them.
+
+    Args:
+        robot: The robot as it is planned for.
+
+    Raises:
+        InvalidValueError: If data of the winches are missing.
+    """
+    planned = _answered(inverse(robot, start_pose(robot, None)).unstrained_length, robot, "test_box")
+    return limits_of(robot, Scale(robot, planned, np.zeros(robot.cable_count)))

@@ -1,4 +1,4 @@
-"""`sagline robots`, `show`, `new`, `convert`, `export-c`, `examples`: robots and their files."""
+"""`sagline robots`, `show`, `new`, `convert`, `export-c`, `export-scl`, `examples`: robots and their files."""
 
 from __future__ import annotations
 
@@ -143,6 +143,24 @@ def export_c(
     from sagline.cli.export_c import export
 
     export(robot, out, single_precision=single)
+
+
+def export_scl(
+    robot: RobotArgument,
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The source.")] = Path("plc.scl"),
+) -> None:
+    """Write the PLCs' side of a robot as SCL source for TIA Portal: data blocks, limits, and the program of a group.
+
+    The program grants control to one controller at a time, keeps to the limits, and slows the winches down by itself
+    when commands stay away. No compiler has seen it; its head says what is to be set in the CPU.
+
+    For example:
+
+        sagline export-scl article-prototype --out plc.scl
+    """
+    from sagline.cli.export_scl import export
+
+    export(robot, out)
 
 
 def examples(

@@ -1,0 +1,144 @@
+"""SCL for TIA Portal: the blocks a PLC shares with a controller, and its side of what they agree on."""
+
+from __future__ import annotations
+
+import os
+from importlib.metadata import version
+from importlib.resources import files
+from pathlib import Path
+from typing import Final
+
+from sagline.arguments import file_path, instance
+from sagline.control.link import GROUP_SIZE, HEARTBEAT, OWNER_TIMEOUT, RAMP, GroupFault, GroupStatus, Mode, WinchState
+from sagline.errors import FileError
+from sagline.files.whole import written_together
+from sagline.plc.blocks import BLOCKS, COUNTERS, LAYOUT, Block, Field
+from sagline.robot.robot import Robot
+from sagline.twin.plc_program import FOLLOWING, TINY
+from sagline.twin.start import plc_limits
+
+ENDING: Final = ".scl"
+FINITE: Final = 3.4e38  # no greater number is a REAL
+STOP: Final = """\
+   // slow down by itself, and hold
+   IF #wanted <> 0 AND #fault = 0 THEN
+      #fault := #wanted;
+      #since := #now;
+      FOR #i := 1 TO #count DO
+         IF #going[#i] <> 0.0 AND #ramp = 0.0 THEN
+            #ramp := @ramp@;
+         END_IF;
+      END_FOR;
+   END_IF;
+   #wanted := 0;"""
+
+
+def export_scl(robot: Robot, file: str | os.PathLike[str]) -> Path:
+    """Write what the PLCs of a robot need, as an SCL source for TIA Portal: data blocks, limits, and their program.
+
+    The program grants and takes back control, takes commands, keeps to the limits, and slows the winches down by itself
+    when commands stay away; its head says what is to be set in the CPU. No compiler has seen it yet.
+
+    Args:
+        robot: The robot as it is planned for; its winches need drum_radius and counts_per_turn.
+        file: Where to write it, plc.scl for instance. A file that exists is replaced.
+
+    Returns:
+        The path.
+
+    Raises:
+        InvalidValueError: If data of the winches are missing.
+        FileError: If the name does not end in .scl, or the file cannot be written.
+
+    Examples:
+        >>> import sagline as sl
+        >>> path = sl.export_scl(sl.load_robot("article-prototype"), "plc.scl")
+    """
+    instance(robot, Robot, "robot")
+    path = file_path(file)
+    if path.suffix != ENDING:
+        raise FileError(path, "is no name for an SCL source", f"Let it end in {ENDING}: {path.stem or 'plc'}{ENDING}.")
+    text = source_text(robot)
+    with written_together(path.parent, [path.name]) as partials:
+        partials[0].write_text(text, encoding="utf-8", newline="\r\n")
+    return path
+
+
+def source_text(robot: Robot) -> str:
+    """The SCL source.
+
+    Args:
+        robot: The robot.
+
+    Raises:
+        InvalidValueError: If data of the winches are missing.
+    """
+    text = (files("sagline.files") / "scl" / "sagline_plc.scl").read_text(encoding="utf-8").replace("@stop@", STOP)
+    for word, value in _words(robot).items():
+        text = text.replace(f"@{word}@", value)
+    return text
+
+
+def _words(robot: Robot) -> dict[str, str]:
+    limits = plc_limits(robot)
+    name = "".join(x if x.isascii() and (x.isalnum() or x in " -_.,()") else "_" for x in robot.name)
+    words = {
+        "name": name,
+        "version": version("sagline"),
+        "group_size": str(GROUP_SIZE),
+        "numbers": ", ".join(str(block.number) for block in BLOCKS),
+        "blocks": "\n".join(_block(block) for block in BLOCKS),
+        "winches": str(robot.cable_count),
+        "most_winches": str(robot.cable_count),
+        "limits": "\n".join(_row(name, values) for name, values in limits._asdict().items()),
+        "layout": str(LAYOUT),
+        "counters": str(COUNTERS),
+        "half": str(COUNTERS // 2),
+        "finite": f"{FINITE:.1E}",
+        "tiny": f"{TINY:.1E}",
+        "following_error": str(FOLLOWING),
+        "heartbeat": str(HEARTBEAT),
+        "owner_timeout": str(OWNER_TIMEOUT),
+        "ramp": str(RAMP),
+    }
+    words |= {
+        f"{end}_magic": f"16#{block.magic:08X}" for end, block in zip(("from", "to", "claim"), BLOCKS, strict=True)
+    }
+    words |= {mode.name.lower(): str(int(mode)) for mode in Mode}
+    words |= {f"{fault.name.lower()}_fault": str(int(fault)) for fault in GroupFault}
+    words["emergency_fault"] = words["emergency_stop_fault"]
+    words |= {f"{status.name.lower()}_bit": str(int(status)) for status in GroupStatus if status.name}
+    words |= {f"state_{state.name.lower()}": str(int(state)) for state in WinchState}
+    words["emergency_bits"] = str(int(GroupStatus.EMERGENCY | GroupStatus.LOCKED | GroupStatus.BRAKED))
+    words["locked_bits"] = str(int(GroupStatus.READY | GroupStatus.LOCKED | GroupStatus.BRAKED))
+    return words
+
+
+def _block(block: Block) -> str:
+    """A data block, its rows in their order, as TIA Portal lays them out without optimized access."""
+    start = [f"   magic := 16#{block.magic:08X};"]
+    if any(field.name == "version" for field in block.fields):
+        start.append(f"   version := {LAYOUT};")
+    head = [f'DATA_BLOCK "{block.name}"', "{ S7_Optimized_Access := 'FALSE' }", "VERSION : 0.1", "   STRUCT"]
+    rows = [line for field in block.fields for line in _field(field, "      ")]
+    tail = ["   END_STRUCT;", "BEGIN", *start, "END_DATA_BLOCK", ""]
+    return "\n".join([f"// DB{block.number}, {block.size} bytes", *head, *rows, *tail])
+
+
+def _field(field: Field, indent: str) -> list[str]:
+    kind = field.type
+    if isinstance(kind, str):
+        return [f"{indent}{field.name} : {kind};".ljust(40) + f"// {field.offset}: {field.meaning}"]
+    inside = [line for each in kind for line in _field(each, indent + "   ")]
+    begin = f"{indent}{field.name} : Array[1..{GROUP_SIZE}] of Struct".ljust(40) + f"// {field.offset}: {field.meaning}"
+    return [begin, *inside, f"{indent}END_STRUCT;"]
+
+
+def _row(name: str, values: list[float]) -> str:
+    return "\n".join(f"   {name}[{i + 1}] := {_literal(value)};" for i, value in enumerate(values))
+
+
+def _literal(value: float) -> str:
+    """A number as SCL writes it; no infinite ones are known there."""
+    text = repr(min(value, 1e300)).upper()
+    return text if "." in text else text.replace("E", ".0E")

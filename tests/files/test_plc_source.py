@@ -1,0 +1,207 @@
+"""The SCL source for PLCs, which nothing here compiles: its offsets, and its statements against the twin's program."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.control.link import GroupFault, Mode
+from sagline.files.plc_source import source_text
+from sagline.plc.blocks import BLOCKS, CLAIM, FROM_PLC, TO_PLC, Block
+from sagline.twin.plc_program import Limits, Order, Program
+from tests.files.scl import Array, data_block, function_block, variables
+
+PERIOD = 0.005
+ROBOT = sl.load_robot("article-prototype")
+TEXT = source_text(ROBOT)
+SPEED = 0.4
+
+
+@pytest.mark.parametrize("block", BLOCKS, ids=lambda block: block.name)
+def test_offsets_in_scl_are_those_of_packing(block: Block) -> None:
+    rows, size = data_block(TEXT, block.name)
+    assert rows == {name: (kind, offset) for name, kind, offset in block.rows}
+    assert size == block.size == block.packer.size
+    values = {name: i + 1 for i, (name, _, _) in enumerate(block.rows) if name not in ("magic", "version")}
+    data = block.pack(values)
+    for name, (kind, offset) in rows.items():  # and mirrors hold these bytes as they are
+        if name in values:
+            code = {"LReal": ">f8", "Real": ">f4", "UInt": ">u2", "DInt": ">i4", "Time": ">i4"}.get(kind, ">u4")
+            assert np.frombuffer(data, code, 1, offset)[0] == values[name]
+
+
+def namespace(block: Block, data: bytes | None = None) -> SimpleNamespace:
+    """A data block with what some bytes say."""
+    values = block.read(data) if data else {name: 0 for name, _, _ in block.rows}
+    assert isinstance(values, dict)
+    found = SimpleNamespace(winch=Array([SimpleNamespace(), SimpleNamespace()]))
+    for name, value in values.items():
+        winch = re.fullmatch(r"winch\[(\d)\]\.(\w+)", name)
+        setattr(found.winch[int(winch[1])] if winch else found, winch[2] if winch else name, value)
+    return found
+
+
+class Bench:
+    """The program of the twin and the statements of the source, side by side."""
+
+    def __init__(self, count: int) -> None:
+        self.count = count
+        limits = Limits([0.5] * count, [6.0] * count, [SPEED] * count, [300.0] * count)
+        self.program = Program(limits, PERIOD)
+        self.block, self.v = function_block(TEXT, "SaglineGroup"), variables(TEXT, "SaglineGroup")
+        filled = {name: Array([0.0] * 6 + values) for name, values in limits._asdict().items()}
+        config = SimpleNamespace(group=4, winches=6 + count, **filled)
+        self.db = SimpleNamespace(
+            sagline_from_plc=namespace(FROM_PLC), sagline_to_plc=namespace(TO_PLC), sagline_claim=namespace(CLAIM),
+            sagline_config=config,
+        )  # fmt: skip
+        self.time, self.order = 0.0, b""
+        self.encoder = [3.0 + 0.1 * i for i in range(count)]
+        self.program.length = list(self.encoder)
+        self.v.length = Array(pad(self.encoder))
+
+    def claim(self, owner: int) -> None:
+        self.db.sagline_claim = namespace(CLAIM, CLAIM.pack({"owner": owner}))
+        self.program.claim(owner, self.time)
+
+    def command(self, values: dict[str, Any]) -> None:
+        data = TO_PLC.pack(values)
+        if data == self.order:
+            return  # what stands there is looked at once
+        self.order = data
+        self.db.sagline_to_plc = namespace(TO_PLC, data)
+        read = TO_PLC.read(data)  # rates and tensions in single precision, as they go over the wire
+        assert isinstance(read, dict)
+        columns = [
+            [read[f"winch[{i + 1}].{name}"] for i in range(self.count)]
+            for name in ("length", "rate", "tension", "enable")
+        ]
+        lengths, rates, tensions, enable = columns
+        head = read["counter"], read["owner"], read["mode"], read["valid_for"] / 1000.0
+        self.program.take(Order(*head, lengths, rates, tensions, [bool(each) for each in enable]))
+
+    def scan(self, cell: list[float], *, reset: bool, saturated: list[bool]) -> None:
+        v, program, count = self.v, self.program, self.count
+        if reset:
+            program.reset()
+        program.scan(self.time, self.encoder, cell)
+        v.now, v.period, v.stopped, v.reset = self.time, PERIOD, program.emergency, reset
+        v.encoder, v.cell, v.saturated = Array(pad(self.encoder)), Array(pad(cell)), Array(pad(saturated))
+        v.driveFault = Array(pad(program.drive_fault))
+        self.block(v, self.db)
+        self.compare(saturated)
+        self.time += PERIOD
+        assert count <= 2
+
+    def compare(self, saturated: list[bool]) -> None:
+        program, said, v = self.program, self.db.sagline_from_plc, self.v
+        states, codes = program.states([float(each) for each in saturated])
+        n = range(1, self.count + 1)
+        found = (
+            said.owner, said.echo, said.fault, said.status, v.mode, v.emergency, v.locked,
+            [v.powered[i] for i in n], [v.length[i] for i in n], [v.tension[i] for i in n],
+            [said.winch[i].state for i in n], [said.winch[i].fault for i in n],
+        )  # fmt: skip
+        expected = (
+            program.owner, program.echo, program.fault, program.status, program._mode, program.emergency,
+            program.locked, program.powered, program.length, program.tension, states, codes,
+        )  # fmt: skip
+        assert found == expected, self.time
+        assert said.counter == said.counter_again == v.counter
+        assert said.winches == self.count
+        assert said.group == 4
+
+
+def pad(values: list[Any]) -> list[Any]:
+    return [*values, *[0] * (2 - len(values))]
+
+
+def drive(bench: Bench, seed: int, scans: int) -> dict[str, int]:
+    """Do this and that to both; how often what came about."""
+    random, seen = np.random.default_rng(seed), dict[str, int]()
+    last: dict[str, Any] = {}
+    counter, silent, asked = int(random.integers(1, 2**31 - 1)), 0, list(bench.encoder)
+    for _ in range(scans):
+        program = bench.program
+        owner = int(random.choice([1, 1, 1, 1, 1, 1, 1, 1, 1, 2]))
+        if random.random() < 0.05 or not program.owner:
+            bench.claim(owner)
+        silent = silent - 1 if silent else int(random.integers(5, 130)) if random.random() < 0.01 else 0
+        if not silent and random.random() < 0.6:
+            counter = counter % (2**31 - 1) + 1
+            mode = int(random.choice([0, 1, 2, 3], p=[0.003, 0.1, 0.895, 0.002]))
+            speed = SPEED * (0.9 if random.random() < 0.99 else 1.3) * random.uniform(-1.0, 1.0)
+            asked = [at + speed * PERIOD for at in (program.length if random.random() < 0.1 else asked)]
+            if random.random() < 0.01 or not program._mode:
+                asked = [at + (10.0 if random.random() < 0.03 else 0.0) for at in program.length]
+            values: dict[str, Any] = {"counter": counter, "mode": mode, "owner": owner, "valid_for": 100}
+            for i, at in enumerate(asked):
+                broken = random.random() < 0.002
+                row = (at, speed, np.nan if broken else random.uniform(50, 200), random.random() < 0.995)
+                values |= {
+                    f"winch[{i + 1}].{name}": value
+                    for name, value in zip(("length", "rate", "tension", "enable"), row, strict=True)
+                }
+            bench.command(values)
+            last = values
+        elif last and random.random() < 0.1:
+            bench.command(last)
+        moved = zip(program.length, bench.encoder, strict=True)
+        bench.encoder = [to if random.random() < 0.9 else there for to, there in moved]
+        if random.random() < 0.002:
+            bench.encoder = [there + 0.02 for there in bench.encoder]
+        program.emergency |= bool(random.random() < 0.001)
+        if random.random() < 0.001:
+            program.trip(int(random.integers(bench.count)), 7)
+        stuck = program.emergency or program.locked or any(program.drive_fault)
+        cell = [
+            float(np.float32(each))
+            for each in random.uniform(100.0, 301.0 if random.random() < 0.2 else 290.0, bench.count)
+        ]
+        saturated = (random.random(bench.count) < 0.1).tolist()
+        bench.scan(cell, reset=bool(stuck and random.random() < 0.02), saturated=saturated)
+        for what in (GroupFault(program.fault).name, f"status {program.status}", f"mode {Mode(program._mode).name}"):
+            seen[what] = seen.get(what, 0) + 1
+    return seen
+
+
+@pytest.mark.parametrize("count", [2, 1])
+def test_the_source_does_what_the_twins_program_does(count: int) -> None:
+    seen = drive(Bench(count), seed=count, scans=6_000)
+    assert set(seen) >= {each.name for each in GroupFault}
+    assert set(seen) >= {f"status {code}" for code in (1, 2, 3, 5, 9, 17, 35, 98)}
+
+
+@pytest.mark.soak
+def test_the_source_does_what_the_twins_program_does_for_long() -> None:
+    for seed in range(40):
+        drive(Bench(2), seed, 20_000)
+
+
+def test_the_file_names_what_is_to_be_set_and_that_it_is_not_compiled(tmp_path: Path) -> None:
+    path = sl.export_scl(ROBOT, tmp_path / "plc.scl")
+    text = path.read_bytes().decode()
+    assert text.replace("\r\n", "\n") == TEXT
+    assert "@" not in text
+    assert max(map(len, text.splitlines())) <= 120
+    for words in ("NOT COMPILED", "PUT/GET", "VLAN", "access level", "101, 102, 103"):
+        assert words in text.partition("DATA_BLOCK")[0]
+    speed = [float(each) for each in re.findall(r" speed\[\d\] := ([^;]+);", text)]
+    drums = ROBOT.winches
+    assert drums is not None
+    assert drums.speed_limit is not None
+    assert speed == pytest.approx(drums.speed_limit * drums.drum_radius / drums.gear, rel=1e-3)  # type: ignore[operator]
+
+
+def test_what_it_cannot_be_written_for_is_told(tmp_path: Path) -> None:
+    with pytest.raises(sl.FileError, match=r"Let it end in \.scl: plc\.scl"):
+        sl.export_scl(ROBOT, tmp_path / "plc.txt")
+    with pytest.raises(sl.InvalidValueError, match="winches"):
+        sl.export_scl(sl.load_robot("cogiro"), tmp_path / "plc.scl")
+    assert not list(tmp_path.iterdir())
