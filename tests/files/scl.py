@@ -11,6 +11,7 @@ SIZES = {"DInt": 4, "DWord": 4, "LReal": 8, "Real": 4, "Time": 4, "UDInt": 4, "U
 START = {"Bool": False, "Int": 0, "UInt": 0, "UDInt": 0, "DInt": 0, "Real": 0.0, "LReal": 0.0}
 FUNCTIONS = {
     "ABS": abs,
+    "MAX": max,
     "MIN": min,
     "UINT_TO_INT": int,
     "INT_TO_UINT": int,

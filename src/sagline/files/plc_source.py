@@ -9,7 +9,17 @@ from pathlib import Path
 from typing import Final
 
 from sagline.arguments import file_path, instance
-from sagline.control.link import GROUP_SIZE, HEARTBEAT, OWNER_TIMEOUT, RAMP, GroupFault, GroupStatus, Mode, WinchState
+from sagline.control.link import (
+    GROUP_SIZE,
+    HEARTBEAT,
+    OWNER_TIMEOUT,
+    PERIOD,
+    RAMP,
+    GroupFault,
+    GroupStatus,
+    Mode,
+    WinchState,
+)
 from sagline.errors import FileError
 from sagline.files.whole import written_together
 from sagline.plc.blocks import BLOCKS, COUNTERS, LAYOUT, Block, Field
@@ -100,6 +110,7 @@ def _words(robot: Robot) -> dict[str, str]:
         "heartbeat": str(HEARTBEAT),
         "owner_timeout": str(OWNER_TIMEOUT),
         "ramp": str(RAMP),
+        "cycle": str(PERIOD),
     }
     words |= {
         f"{end}_magic": f"16#{block.magic:08X}" for end, block in zip(("from", "to", "claim"), BLOCKS, strict=True)
