@@ -26,13 +26,13 @@ def since(alter: Callable[[int, Cycle], Cycle], start: int = START, end: int = 1
     return lambda k, cycle: alter(k - start, cycle) if start <= k < end else cycle
 
 
-def silent(group: int, count: int) -> Change:
+def silent(group: int, count: int, start: int = START) -> Change:
     """A group says nothing new for so many cycles."""
     last: list[Sample] = []
 
     def alter(k: int, cycle: Cycle) -> Cycle:
-        if k < START or k >= START + count:
-            if k < START:
+        if k < start or k >= start + count:
+            if k < start:
                 last[:] = [cycle.sample]
             return cycle
         mine = {4: np.arange(4) == group, 8: np.arange(8) // 2 == group}
@@ -41,7 +41,7 @@ def silent(group: int, count: int) -> Change:
             for name, value in cycle.sample._asdict().items()
             if name not in ("time", "age")
         }
-        age = one(cycle.sample.age, group, 0.004 + 0.01 * (k - START + 1))
+        age = one(cycle.sample.age, group, 0.004 + 0.01 * (k - start + 1))
         return cycle._replace(sample=Sample(cycle.sample.time, age, **old))
 
     return alter
@@ -310,6 +310,11 @@ QUIET = {
         lambda k, cycle: with_sample(cycle, tension=one(cycle.sample.tension, 3, -5.0)), end=START + 2
     ),
     "a cell off by less than is known": cell(2, lambda k, t: t + 8.0),
+    "a platform that swings at 2 Hz": since(
+        lambda k, cycle: with_sample(
+            cycle, tension=cycle.sample.tension + one(np.zeros(8), 1, 60.0 if k % 50 < 25 else -60.0)
+        )
+    ),
     "49 equal samples": since(
         lambda k, cycle: with_sample(cycle, tension=one(cycle.sample.tension, 2, 141.0)), end=START + 49
     ),
@@ -588,3 +593,68 @@ def test_what_rules_cannot_be_made_of_is_refused(options: dict[str, Any], words:
         faults_of(ROBOT, **options)
     with pytest.raises(sl.InvalidValueError, match="robot is None"):
         faults_of(None)  # type: ignore[arg-type]
+
+
+def test_an_emergency_stop_that_a_plc_gives_as_its_fault_is_one_event() -> None:
+    found = told(field("fault", 2, GroupFault.EMERGENCY_STOP), 100)
+    assert [each.name for each in found] == ["emergency stop"]
+    assert "reported by group 2." in found[0].line
+
+
+def test_a_drum_that_follows_a_step_of_its_rate_has_not_jumped() -> None:
+    def steps(k: int, cycle: Cycle) -> Cycle:
+        if k < START or cycle.command is None:
+            return cycle
+        command, away = cycle.command, 0.002 * (k - START + 1)
+        altered = with_sample(
+            cycle, length=_added(cycle.sample.length, 3, away), rate=_added(cycle.sample.rate, 3, 0.2)
+        )
+        asked = command._replace(length=_added(command.length, 3, away), rate=_added(command.rate, 3, 0.2))
+        return altered._replace(command=asked)
+
+    assert told(steps, 100) == []
+
+
+def test_a_drive_that_may_not_move_does_not_lag() -> None:
+    def disabled(k: int, cycle: Cycle) -> Cycle:
+        if cycle.command is None:
+            return cycle
+        return cycle._replace(command=cycle.command._replace(enable=np.arange(8) != 7))
+
+    assert told(both(lags(7, 0.05), disabled), 145) == []
+
+
+def test_what_others_are_off_the_plan_is_not_learned_while_a_cable_is_slack() -> None:
+    rules, before, learned = faults_of(ROBOT), None, []
+    change = broken(4, others=2.0)
+    for k, good in enumerate(cycles(START + 30, seed=8)):
+        cycle = change(k, good)._replace(before=before)
+        for rule in rules:
+            rule.look(cycle)
+        learned.append(rules[0].seen.steady.copy())
+        before = cycle.sample
+    assert (learned[START - 1] == learned[-1]).all()
+    assert (learned[START - 1] != learned[START - 2]).all()
+
+
+def test_a_motor_that_may_hold_its_own_friction_alone_does_not_prove_a_cable_taut() -> None:
+    """26 N planned, nothing read, 20 N held, of which 15 N may be friction."""
+
+    def doubtful(k: int, cycle: Cycle) -> Cycle:
+        if k < START:
+            return cycle
+        sample = cycle.sample
+        tension = one(sample.tension, 4, 0.01 * (k % 7))
+        altered = with_sample(cycle, tension=tension, torque=one(sample.torque, 4, -20.0 * 0.03 / 20.0))
+        return altered._replace(tension=one(cycle.tension, 4, 26.0))
+
+    assert [each.name for each in told(doubtful, 60)] == ["slack"]
+
+
+def test_one_slack_sample_that_is_seen_again_and_again_is_one() -> None:
+    once = since(
+        lambda k, cycle: with_sample(cycle, tension=one(cycle.sample.tension, 3, 2.0), torque=np.zeros(8)),
+        end=START + 1,
+    )
+    found = told(both(once, silent(1, 6, START + 1)), 100)
+    assert [each.name for each in found] == ["group stale"]

@@ -18,7 +18,7 @@ PLANNED_SHARE: Final = 0.9  # of the lower limit: from there on a plan wants the
 PULLING: Final = 0.5  # of the planned tension: a motor that holds more has a cable that pulls
 STEADY_TIME: Final = 0.5  # s, of the filter that learns what the tensions are off the plan all the time
 QUICK_TIME: Final = 0.1  # s, of the one that is held against the balance of the platform
-MOST_CHANGE: Final = 3.0  # N a cycle, of the latter: a few readings far out do not stay in it
+MOST_CHANGE: Final = 6.0  # N a cycle, of the latter: a few readings far out do not stay in it
 
 
 class Evidence:

@@ -100,7 +100,7 @@ class CellOff(Fault):
     def __init__(self, seen: Evidence) -> None:
         """Begin with no cell at odds."""
         super().__init__(seen)
-        self._signs, self._for = np.zeros(seen.limit.size), np.zeros(seen.limit.size, dtype=np.int64)
+        self._for = np.zeros(seen.limit.size, dtype=np.int64)
         self._samples = round(ODD_TIME / seen.period)
         self._quiet = True
 
@@ -111,13 +111,12 @@ class CellOff(Fault):
         limit = SIGMAS * seen.sigma
         if error is None or not np.abs(error).max() > limit:
             if not self._quiet:
-                self._signs.fill(0.0)
                 self._for.fill(0)
                 self._quiet = True
             return None
-        signs = np.sign(error) * (np.abs(error) > limit)
-        self._for = np.where((signs == self._signs) & (signs != 0.0), self._for + 1, signs != 0.0)
-        self._signs, self._quiet = signs, False
+        # a swing of the platform goes through zero, and the filter slowly enough to be seen there
+        self._for = np.where(np.abs(error) > limit, self._for + 1, 0)
+        self._quiet = False
         cell = int(np.argmax(np.abs(error)))
         if self._for[cell] < self._samples:
             return None
