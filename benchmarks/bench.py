@@ -13,7 +13,7 @@ import numpy as np
 from rich.console import Console
 
 import sagline as sl
-from benchmarks import c_source, dynamics, machine
+from benchmarks import c_source, dynamics, experiment, machine
 from benchmarks.formula import algebraic, as_printed
 from benchmarks.measure import (
     Row,
@@ -181,6 +181,7 @@ def main() -> None:
         *machine.PARTS,
         *dynamics.PARTS,
         *c_source.PARTS,
+        *experiment.PARTS,
     ):
         Console(stderr=True).print(f"[dim]{part.__doc__}[/dim]")
         rows.extend(part())

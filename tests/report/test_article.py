@@ -129,6 +129,15 @@ def test_the_numbers_are_in_the_json_file(report: ArticleReport) -> None:
     assert poses["explanations"]["models"] == 175
     assert poses["ten-points"]["pulley_imitated_by_zero_and_anchor_height"] == pytest.approx(0.990, abs=1e-3)
     assert len(numbers["errata"]) == 11
+    classes = poses["classes"]
+    left = {"anchor height": 9.0, "pulley radius": 10.6, "zero of the lengths": 11.2, "Young's modulus E": 12.7}
+    assert {name: classes["left_mm"][name] for name in left} == pytest.approx(left, abs=0.05)
+    assert classes["fall_as_measured"] == ["pulley radius"]
+    assert classes["slope_of_best_mm_per_m"]["pulley radius"] == pytest.approx(-18.0, abs=0.1)
+    assert set(classes["explain_nothing"]) == {"linear density ρ", "drum radius", "dead cable"}
+    assert classes["dead_meter_mm"] == pytest.approx({"P8": 4.8, "P7": -64.0}, abs=0.1)
+    assert min(classes["left_mm"].values()) > 0.66 * classes["measured_rms_mm"]  # as docs/experiment.md says
+    assert classes["two_left_mm"] < classes["measured_rms_mm"] / 3.0
 
 
 NUMBER = re.compile(r"(?<![\w.])([-−]?\d[\d,]*(?:\.\d+)?)(?:\u00a0([fpnµmkMG](?=[mNgs](?![\w²]))))?")

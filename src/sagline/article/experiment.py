@@ -21,8 +21,8 @@ from sagline.article.machine import DRUM, ZERO, Errors, machine
 from sagline.article.table2 import Table2, table2
 from sagline.article.ten_poses import HOME
 from sagline.control.controller import Controller
-from sagline.control.events import Event
-from sagline.control.execution import ExecutionStatus
+from sagline.control.events import Event, EventKind
+from sagline.control.execution import Execution, ExecutionStatus
 from sagline.control.link import PERIOD, Sample
 from sagline.control.null_space import null_space
 from sagline.control.recording import Recorded
@@ -43,6 +43,7 @@ SPEED: Final = 0.06  # m/s of the platform at most: the fastest winch then has 6
 STOP: Final = 14.0  # s at each point, home twice among them: the whole takes 13.9 minutes
 LOOK: Final = 1.0  # s at the end of a stop, whose mean is taken for what is measured there
 BIAS: Final = 2.0  # N, 0.1 % of a cell of 2 kN
+NEXT: Final = "Mend that, and begin anew."
 EVERY: Final = 10  # cycles between two points of a course: drawn, not filed
 
 Where = Callable[[], Array]  # the true position of the platform's origin [m], shape (3,)
@@ -257,30 +258,46 @@ def experiment(controller: Controller, watch: Watch) -> Experiment:
     legs = _legs(controller.period)
     controller.connect()
     controller.home(level(HOME))
-    _stand(controller)
+    _stand(controller, "home")
     stops, plans, ends = [watch.seen()], list[Plan](), [0.0]
     for name, leg in zip([*table2().points, "home"], legs, strict=True):
         first = len(watch.courses)
-        done = controller.execute(leg)
-        if done.status is not ExecutionStatus.DONE:
-            raise RefusedError(f"the experiment, on its way to {name}", done.reason, "Mend that, and begin anew.")
+        done = _executed(controller, leg, name)
         assert done.plan is not None
         plans.append(done.plan)
         for row in watch.courses[first:]:
             row[0] += ends[-1]
         ends.append(ends[-1] + float(done.clock[np.isfinite(done.clock)][-1]))
-        _stand(controller)
+        _stand(controller, name)
         stops.append(watch.seen())
     controller.off()
     return _result(controller, watch, stops, plans, np.array(ends))
 
 
-def _stand(controller: Controller) -> None:
-    """Stop, for as long as the place is measured; Ctrl-C is heard at the end of a cycle."""
+def _executed(controller: Controller, leg: Path, name: str) -> Execution:
+    """What became of a leg, which was gone to its end."""
+    try:
+        done = controller.execute(leg)
+    except RefusedError as error:  # a fault while it was planned, which takes its time
+        raise error if controller.state is State.IDLE else _ended(controller, f"before its way to {name}") from None
+    if done.status is not ExecutionStatus.DONE:
+        raise RefusedError(f"the experiment, on its way to {name}", done.reason.rstrip("."), NEXT)
+    return done
+
+
+def _stand(controller: Controller, name: str) -> None:
+    """Stop, for as long as the place is measured."""
     for _ in range(round(STOP / PERIOD)):
         controller.cycle()
         if controller.state is not State.IDLE:
-            raise RefusedError("the experiment, at a stop", controller.events[-1].text, "Mend that, and begin anew.")
+            raise _ended(controller, f"at {name}")
+
+
+def _ended(controller: Controller, where: str) -> RefusedError:
+    """The error of an experiment that a fault has ended."""
+    faults = [event.text for event in controller.events if event.kind is EventKind.FAULT]
+    reason = faults[-1] if faults else controller.events[-1].text
+    return RefusedError(f"the experiment, {where}", reason.rstrip("."), NEXT)
 
 
 def _result(
