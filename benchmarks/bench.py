@@ -15,6 +15,7 @@ from rich.console import Console
 import sagline as sl
 from benchmarks import c_source, dynamics, experiment, machine
 from benchmarks.formula import algebraic, as_printed
+from benchmarks.links import links
 from benchmarks.measure import (
     Row,
     best_of_calls,
@@ -171,7 +172,7 @@ def whole_processes() -> Iterator[Row]:
 def main() -> None:
     """Measure and print."""
     console = Console()
-    rows: list[Row] = [*two_threads()]
+    rows: list[Row] = [*two_threads(), *links()]
     one_core()
     for part in (
         accuracy_of_cables,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import closing
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +13,8 @@ from typer.testing import CliRunner
 import sagline as sl
 from sagline.cli.main import app
 from sagline.cli.twin import Watch
+from sagline.files.mcap_log import Recorder
+from sagline.files.mcap_reader import read_log
 from sagline.twin import Machine, Server
 from tests.plc.samples import a_command
 
@@ -90,3 +93,17 @@ def test_what_the_plcs_do_is_told_when_it_changes(capsys: pytest.CaptureFixture[
         f"group 3: holding by itself (a drive has tripped), driven by {OWNER}",
     ]
     assert [float(line.split()[0]) for line in said] == pytest.approx([0.0, 0.1, 0.6], abs=0.11)
+
+
+def test_a_log_says_where_the_platform_was(tmp_path: Path) -> None:
+    machine = Machine(sl.load_robot("article-prototype"), seed=1, faults=["cable 0 breaks at 0 s"])
+    watch, seen = Watch(machine), []
+    with Recorder(tmp_path / "twin.mcap", machine.robot) as watch.recorder:
+        for _ in range(30):
+            machine.advance()
+            watch(machine.time, machine.reading)
+            seen.append((machine.time, *machine.reading.position, *machine.reading.quaternion))
+    truth = read_log(tmp_path / "twin.mcap").truth
+    found = [(each.time, *each.position, *each.quaternion) for each in truth]
+    np.testing.assert_allclose(found, seen, atol=1e-6)
+    assert abs(seen[-1][3] - seen[0][3]) > 1e-4  # it moved meanwhile

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 from collections.abc import Sequence
 from contextlib import ExitStack, closing
+from pathlib import Path
 from socket import gethostname
 from typing import TYPE_CHECKING, Final, NamedTuple
 
@@ -18,6 +19,7 @@ from sagline.twin.server import SCAN, Server
 
 if TYPE_CHECKING:
     from sagline.dynamics.simulator import Reading
+    from sagline.files.mcap_log import Recorder
     from sagline.twin.snapshot import Report
 
 LOOK: Final = 0.1  # s, between two looks at what the PLCs do
@@ -49,6 +51,7 @@ class Asked(NamedTuple):
     modbus: bool
     seed: str
     faults: tuple[str, ...]
+    log: Path | None
 
 
 def twin(name: str, true: str | None, asked: Asked) -> int:
@@ -65,6 +68,10 @@ def twin(name: str, true: str | None, asked: Asked) -> int:
             machine = Machine(real, nominal=robot, seed=seed, period=SCAN, faults=asked.faults)
             server = stack.enter_context(closing(Server(machine, host=asked.host, port=port, modbus=asked.modbus)))
         watch = Watch(machine)
+        if asked.log is not None:
+            from sagline.files.mcap_log import Recorder
+
+            watch.recorder = stack.enter_context(Recorder(asked.log, real, period=SCAN))
         _greet(name, server, asked)
         gc.collect()
         gc.freeze()  # nothing of all that was made so far is looked at again, while time counts
@@ -100,6 +107,8 @@ class Watch:
         Args:
             machine: Which.
         """
+        self.recorder: Recorder | None = None
+        self._stopped = ""
         self._machine = machine
         self._known = self._look()
         self._next = 0.0
@@ -111,6 +120,8 @@ class Watch:
             time: On its clock [s].
             reading: What is true.
         """
+        if self.recorder is not None:
+            self.recorder.truth(time, reading.position.copy(), reading.quaternion.copy())
         if time >= self._next:
             self._next = time + LOOK
             self._tell(time)
@@ -125,6 +136,9 @@ class Watch:
         for what in dict.fromkeys(now[i] for i in changed):
             show(f"{time:9.1f} s  {_groups([i for i in changed if now[i] == what])} {what}")
         self._known = now
+        if self.recorder is not None and self.recorder.stopped != self._stopped:
+            self._stopped = self.recorder.stopped
+            note("Note: ", f"nothing more is written: {self._stopped}", style="bold")
 
 
 def _doing(report: Report) -> str:

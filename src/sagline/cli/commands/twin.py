@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -37,6 +38,10 @@ def twin(
             show_default=False,
         ),
     ] = None,
+    log: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.mcap", help="Write where the platform truly is, until Ctrl-C.", show_default=False),
+    ] = None,
 ) -> int:
     """Be the machine: plant, drives and PLCs of a robot, in real time, until Ctrl-C.
 
@@ -47,10 +52,10 @@ def twin(
 
         sagline twin article-prototype
         sagline twin article-prototype --fault "cell 3 sticks at 40 s"
-        sagline twin article-prototype --true worn.yaml
+        sagline twin article-prototype --true worn.yaml --log twin.mcap
         sagline twin article-prototype --modbus --port 5020
     """
     from sagline.cli.twin import Asked
     from sagline.cli.twin import twin as run
 
-    return run(robot, true, Asked(host, port, modbus, seed, tuple(faults or ())))
+    return run(robot, true, Asked(host, port, modbus, seed, tuple(faults or ()), log))

@@ -1,0 +1,111 @@
+"""The links to PLCs, on the loopback: four servers in a process of their own, as of `sagline twin`; write and read."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+
+import numpy as np
+from rich.console import Console
+
+import sagline as sl
+from benchmarks.measure import Row, show
+from sagline.arrays import Array
+from sagline.control.link import PERIOD, Command, Mode
+from sagline.plc.block_link import BlockLink
+from sagline.plc.blocks import FROM_PLC
+from sagline.twin.mirrors import Mirrors
+
+GROUPS, WINCHES, OWNER = 4, 8, 7
+CYCLES = 600
+SLOW = 3e-3  # s, in which a slow server answers
+KINDS = {"s7": sl.plc.S7Link, "slow": sl.plc.S7Link, "modbus": sl.plc.ModbusLink}
+
+
+def blocks(counter: int) -> list[bytes]:
+    """What four PLCs say that have nothing to do."""
+    head = {"counter": counter, "owner": OWNER, "winches": 2}
+    return [FROM_PLC.pack({**head, "group": group + 1}) for group in range(GROUPS)]
+
+
+def serve(kind: str) -> None:
+    """Be the servers, until stdin ends."""
+    mirrors = _mirrors(kind)
+    sys.stdout.write(",".join(mirrors.addresses) + "\n")
+    sys.stdout.flush()
+    ended, counter = threading.Event(), 1
+
+    def listen() -> None:
+        sys.stdin.read()
+        ended.set()
+
+    threading.Thread(target=listen, daemon=True).start()
+    while not ended.wait(sl.twin.SCAN):
+        counter += 1
+        mirrors.publish(blocks(counter))
+    mirrors.close()
+
+
+def _mirrors(kind: str) -> Mirrors:
+    if kind == "modbus":
+        from sagline.twin.modbus_mirrors import ModbusMirrors
+
+        return ModbusMirrors(blocks(1))
+    from sagline.twin.s7_mirrors import S7Mirrors
+
+    mirrors = S7Mirrors(blocks(1))
+    if kind == "slow":
+        for server in mirrors._servers:
+            server.set_read_events_callback(lambda event: time.sleep(SLOW))
+    return mirrors
+
+
+@contextmanager
+def linked(kind: str) -> Iterator[BlockLink]:
+    """A link to servers in another process."""
+    words = [sys.executable, "-m", "benchmarks.links", kind]
+    with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        addresses = process.stdout.readline().strip()
+        with closing(KINDS[kind](addresses, WINCHES, timeout=10.0)) as link:
+            yield link
+        process.communicate()
+
+
+def round_trips(kind: str) -> tuple[Array, Array]:
+    """Of the slowest group in each cycle, and how long `exchange` took [s]."""
+    none, on = np.zeros(WINCHES), np.ones(WINCHES, dtype=np.bool_)
+    slowest, taken = [], []
+    with linked(kind) as link:
+        for counter in range(1, CYCLES):
+            start = time.perf_counter()
+            link.exchange(Command(counter, OWNER, Mode.HOLD, 0.1, none, none, none, on))
+            taken.append(time.perf_counter() - start)
+            time.sleep(PERIOD)
+            slowest.append(link.round_trip.max())
+    return np.array(slowest), np.array(taken)
+
+
+def links() -> Iterator[Row]:
+    """Four groups: write a command and read a block of each."""
+    for kind, name, target in (
+        ("s7", "four S7 servers, write and read, slowest group", "p50 <= 1.5 ms"),
+        ("slow", "the same where each takes 3 ms to answer", "not their sum, 12 ms"),
+        ("modbus", "four Modbus servers", "about 3.7 ms"),
+    ):
+        slowest, taken = round_trips(kind)
+        p50, p99 = 1e3 * np.quantile(slowest, (0.5, 0.99))
+        yield Row(name, target, f"p50 {p50:.2f} ms, p99 {p99:.2f} ms")
+        if kind == "s7":
+            yield Row("exchange, which waits for none of them", "", f"p50 {1e6 * np.median(taken):.0f} us")
+
+
+if __name__ == "__main__":
+    if sys.argv[1:]:
+        serve(sys.argv[1])
+    else:
+        show("Links", list(links()), Console())
