@@ -13,7 +13,7 @@ import numpy as np
 from rich.console import Console
 
 import sagline as sl
-from benchmarks import c_source, dynamics, experiment, machine
+from benchmarks import c_source, controller, dynamics, experiment, machine
 from benchmarks.formula import algebraic, as_printed
 from benchmarks.links import links
 from benchmarks.measure import (
@@ -180,6 +180,7 @@ def main() -> None:
         inverse_kinematics,
         whole_processes,
         *machine.PARTS,
+        *controller.PARTS,
         *dynamics.PARTS,
         *c_source.PARTS,
         *experiment.PARTS,

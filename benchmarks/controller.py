@@ -1,0 +1,73 @@
+"""The controller: what a cycle takes, alone and with a machine in the same process; one core."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+
+import numpy as np
+
+import sagline as sl
+from benchmarks.measure import Row, print_table
+from sagline.article.table2 import table2
+from sagline.control.link import Command, Missing, Sample
+from tests.control.rigs import HOME, Spy, imperfect, rig
+from tests.control.tours import OFF, tour
+
+SPEED, STAND = 0.047, 3.0  # m/s, s: fourteen minutes through the ten poses
+
+
+class Timed(Spy):
+    """A link that says how long the machine behind it took."""
+
+    seconds = 0.0
+
+    def exchange(self, command: Command | None) -> Sample | Missing:
+        """Exchange, and measure."""
+        begin = time.perf_counter()
+        answer: Sample | Missing = self._link.exchange(command)
+        self.seconds += time.perf_counter() - begin
+        return answer
+
+
+def cycles() -> Iterator[Row]:
+    """Home and the ten poses without standing, cycle by cycle: what of each is the controller's."""
+    control, machine = rig(imperfect(zero=2e-3))
+    link = control._link = Timed(machine.link())
+    path = sl.quintic_path([HOME.position, *table2().desired], speed=0.2)
+    begin = time.perf_counter()
+    motion = control.plan(path)
+    planning = time.perf_counter() - begin
+    control.start(motion)
+    own, whole = [], time.perf_counter()
+    while control.moving:
+        begin, before = time.perf_counter(), link.seconds
+        control.cycle()
+        own.append(time.perf_counter() - begin - (link.seconds - before))
+    whole = time.perf_counter() - whole
+    half, rare = 1e3 * np.quantile(own, (0.5, 0.999))
+    real = control.period * len(own) / whole
+    yield Row("compute of a cycle: forward, law, faults", "p50 0.2, p99.9 0.5 ms", f"{half:.3f}, {rare:.3f} ms")
+    yield Row("controller and machine, of real time", ">= 80", f"{real:.0f} ({1e6 * whole / len(own):.0f} us a cycle)")
+    yield Row("of that the machine", "", f"{1e6 * link.seconds / len(own):.0f} us a cycle")
+    yield Row(f"planning and checking {path.duration:.0f} s", "", f"{planning:.2f} s, {path.duration / planning:.0f} x")
+
+
+def stops() -> Iterator[Row]:
+    """Fourteen minutes through the ten poses."""
+    right = tour(imperfect(), SPEED, STAND)
+    mean, most = 1e3 * right.error.mean(), 1e3 * right.error.max()
+    yield Row(
+        "pose error at the ten stops, perfect parameters", "<= 0.05 mm", f"{mean:.3f} mean, {most:.3f} mm at most"
+    )
+    on, off = (tour(imperfect(zero=2e-3), SPEED, STAND, loop=loop) for loop in (None, OFF))
+    errors = [float(np.sqrt(np.mean(one.tension**2))) for one in (off, on)]
+    moved = 1e3 * np.linalg.norm(on.place - off.place, axis=1).max()
+    yield Row("zeros wrong by 2 mm rms: null-space tension", "<= 1.5 N", f"{errors[0]:.1f} -> {errors[1]:.2f} N")
+    yield Row("what the loop moves the platform", "<= 0.05 mm", f"{moved:.3f} mm, acting {1e2 * on.acting:.1f} %")
+
+
+PARTS = (cycles, stops)
+
+if __name__ == "__main__":
+    print_table("The controller", PARTS)

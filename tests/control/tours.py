@@ -1,0 +1,87 @@
+"""Through the article's ten poses, standing at each: what is left of errors there."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+import sagline as sl
+from sagline.arrays import Array
+from sagline.article.table2 import table2
+from sagline.control.controller import Controller
+from sagline.control.tension_loop import TensionSettings
+from sagline.twin.machine import Machine
+from tests.control.rigs import HOME, rig
+
+OFF = TensionSettings(gain=0.0)
+SEEN = 1.0  # s at the end of each stop, over which is averaged: the platform swings by hundredths of a millimeter
+
+
+class Stops(NamedTuple):
+    """What was found at N stops.
+
+    Attributes:
+        place: Of the true platform [m], shape (N, 3).
+        error: Of that [m], shape (N,).
+        tension: Error of the tensions in the directions that the loop can change, rms over cables [N], shape (N,).
+        correction: Of the tension loop, largest of a stop [m], shape (N,).
+        acting: Share of the cycles in which the loop acted.
+        seconds: On the machine's clock [s].
+        cycles: Of the whole tour.
+    """
+
+    place: Array
+    error: Array
+    tension: Array
+    correction: Array
+    acting: float
+    seconds: float
+    cycles: int
+
+
+def tour(true: sl.Robot, speed: float, stand: float, count: int = 10, loop: TensionSettings | None = None) -> Stops:
+    """Home, so many of the ten poses, standing at each.
+
+    Args:
+        true: The robot as it is.
+        speed: Largest on the way [m/s].
+        stand: How long it stands at each [s].
+        count: Of the poses.
+        loop: The tension loop.
+    """
+    control, machine = rig(true, loop=loop)
+    begin, first, here = machine.time, len(control.events), HOME.position
+    stops, acting, cycles = [], 0, 0
+    for pose in table2().desired[:count]:
+        motion = control.plan(sl.quintic_path([here, pose], speed=speed))
+        control.start(motion)
+        while control.moving:
+            control.cycle()
+            acting, cycles = acting + acts(control), cycles + 1
+        here = pose
+        stops.append(_stop(control, machine, motion.tension[-1], stand))
+        cycles += round(stand / control.period)
+    assert {event.kind.value for event in control.events[first:]} == {"state"}  # no fault, no note
+    place, tension, correction = (np.array(column) for column in zip(*stops, strict=True))
+    error = np.linalg.norm(place - table2().desired[:count], axis=1)
+    return Stops(place, error, tension, correction, acting / cycles, machine.time - begin, cycles)
+
+
+def acts(control: Controller) -> bool:
+    """Whether the tension loop acts."""
+    return control._loop is not None and control._loop.acting
+
+
+def _stop(control: Controller, machine: Machine, planned: Array, stand: float) -> tuple[Array, float, float]:
+    places, tensions = [], []
+    for left in range(round(stand / control.period), 0, -1):
+        control.cycle()
+        if left <= round(SEEN / control.period):
+            places.append(machine.reading.position.copy())
+            tensions.append(machine.reading.tension.copy())
+    assert control._point is not None
+    assert control._point.row is not None
+    seen = control._point.row.visible @ (np.mean(tensions, axis=0) - planned)
+    largest = float(np.abs(control._correction).max())
+    return np.mean(places, axis=0), float(np.sqrt(np.mean(seen**2))), largest
