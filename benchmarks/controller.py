@@ -57,9 +57,7 @@ def stops() -> Iterator[Row]:
     """Fourteen minutes through the ten poses."""
     right = tour(imperfect(), SPEED, STAND)
     mean, most = 1e3 * right.error.mean(), 1e3 * right.error.max()
-    yield Row(
-        "pose error at the ten stops, perfect parameters", "<= 0.05 mm", f"{mean:.3f} mean, {most:.3f} mm at most"
-    )
+    yield Row("pose error at the ten stops, perfect parameters", "<= 0.05 mm", f"{mean:.3f} mean, {most:.3f} mm worst")
     on, off = (tour(imperfect(zero=2e-3), SPEED, STAND, loop=loop) for loop in (None, OFF))
     errors = [float(np.sqrt(np.mean(one.tension**2))) for one in (off, on)]
     moved = 1e3 * np.linalg.norm(on.place - off.place, axis=1).max()

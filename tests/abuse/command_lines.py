@@ -30,6 +30,8 @@ LINES = {
     "experiment": ["experiment", "nothing"],
     "export-scl": ["export-scl", "article-prototype"],
     "twin": ["twin", "article-prototype", "--port", "0"],
+    # nobody listens there
+    "control": ["control", "article-prototype", "--plc", "127.0.0.1:1,127.0.0.1:2,127.0.0.1:3,127.0.0.1:4"],
     "view": ["view", "cogiro", "--no-browser"],
 }
 

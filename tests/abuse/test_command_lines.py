@@ -18,6 +18,7 @@ from typer.testing import CliRunner, Result
 import sagline as sl
 from sagline.cli.examples import example_files
 from sagline.cli.main import app
+from sagline.plc.addresses import addresses_of, groups_at
 from sagline.report.blocks import Chapter
 from tests.abuse.command_lines import LINES, Case, cases, commands
 from tests.effort import least_seconds
@@ -70,7 +71,12 @@ def short_of_work(stocked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def served(server: Any, watch: Any) -> None:
         raise SystemExit(0)
 
+    def linked(robot: sl.Robot, asked: Any) -> Any:
+        groups_at(addresses_of(asked.plc, 102), robot)
+        return sl.twin.Machine(robot).link()
+
     monkeypatch.setattr("sagline.twin.server.Server.run", served)
+    monkeypatch.setattr("sagline.cli.control._link", linked)
     from sagline.viewer import server
 
     monkeypatch.setattr(server, "started", started)

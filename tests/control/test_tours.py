@@ -13,7 +13,7 @@ RUNS = [pytest.param(SHORT, id="short"), pytest.param(LONG, id="fourteen minutes
 
 
 @pytest.mark.parametrize("run", RUNS)
-def test_with_perfect_parameters_it_stands_within_five_hundredths_of_a_millimeter(
+def test_with_perfect_parameters_it_stands_where_it_should(
     run: tuple[float, float, int],
 ) -> None:
     """Cells with 1 N of noise and 2 N of bias, 15 N of stiction; a study had 0.007 mm in the mean, 0.014 at most."""

@@ -66,8 +66,8 @@ def control(name: str, asked: Asked) -> int:
     robot = load_robot(name)
     with ExitStack() as stack:
         with working("preparing the controller", INVERSE, FORWARD):
-            record = None if asked.log is None else stack.enter_context(_log(asked.log, robot))
             link = stack.enter_context(closing(_link(robot, asked)))
+            record = None if asked.log is None else stack.enter_context(_log(asked.log, robot))
             controller = Controller(robot, link, pace=Pace(), record=record, shadow=asked.shadow)
         session = Session(controller, alone=not sys.stdin.isatty(), shadow=asked.shadow)
         return session.run()
