@@ -86,6 +86,8 @@ RESULTS = frozenset(
     | {"control.Execution", "control.Gains", "control.Motion", "control.Samples", "twin.Injected"}
     | {"FrequencyMap", "FrequencyResponse", "TensionPolygon", "Vibration", "WinchRates"}
 )
+# need a machine at the other end, or are one: tests/plc/test_bad_arguments.py
+LINKS = frozenset({"plc.ModbusLink", "plc.S7Link", "twin.Server", "twin.Server.run"})
 # asked by sagline itself, with numbers of its own
 INTERNAL = frozenset(
     {"TensionMethod.preference", "QuadraticProgram.preference", "twin.Machine.deliver"}
@@ -598,6 +600,10 @@ def _files(given: _Given) -> dict[str, Call]:
         "export_c": Call(
             sl.export_c,
             _all(robot=("one", given.robot), file=("file", str(folder / "sagline.c")), single_precision=("one", True)),
+        ),
+        "export_scl": Call(
+            sl.export_scl,
+            _all(robot=("one", sl.load_robot("article-prototype")), file=("file", str(folder / "plc.scl"))),
         ),
         "dump_mjcf": Call(
             sl.dump_mjcf,

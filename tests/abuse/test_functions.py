@@ -20,7 +20,7 @@ import pytest
 import sagline as sl
 from sagline.errors import printable
 from tests.abuse.bad_values import REFUSED, SAME, Bad, bad_values
-from tests.abuse.calls import INTERNAL, Call, calls, public_names
+from tests.abuse.calls import INTERNAL, LINKS, Call, calls, public_names
 from tests.effort import least_seconds
 
 SLOWEST = 2.0  # s of the processor of an ordinary machine
@@ -38,7 +38,7 @@ def table(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Call]:
 
 
 def test_every_public_callable_is_in_the_table(table: dict[str, Call]) -> None:
-    assert {name.split(":")[0] for name in table} == public_names() - INTERNAL
+    assert {name.split(":")[0] for name in table} == public_names() - INTERNAL - LINKS
 
 
 def test_every_call_succeeds_as_it_is(table: dict[str, Call]) -> None:

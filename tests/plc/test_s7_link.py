@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from typing import Any
 
@@ -158,3 +159,16 @@ def test_a_robot_of_another_number_of_winches_is_told() -> None:
         text = error_of(list(mirrors.addresses), winches=7)
     assert "group 4 at" in text
     assert "the PLC there drives 2 winches, the robot has 1 in this group" in text
+
+
+@pytest.mark.parametrize(("package", "link"), [("snap7", sl.plc.S7Link), ("pymodbus", sl.plc.ModbusLink)])
+def test_a_package_that_is_missing_is_named_with_the_extra(
+    package: str, link: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in [*sys.modules]:
+        if name.startswith((package, "sagline.plc.s7_wire", "sagline.plc.modbus_wire")):
+            monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(sl.FileError) as caught:
+        link("a,b,c,d", 8)
+    assert str(caught.value) == f'package {package}: is not installed. PLCs need it: pip install "sagline[plc]"'

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
+from sagline.arguments import brief, whole_number
 from sagline.control.link import groups_of
 from sagline.errors import InvalidValueError
 from sagline.robot.robot import Robot
 
 LAST_PORT: Final = 65535
+MOST: Final = 10_000  # addresses, or characters of all of them
 
 
 class Address(NamedTuple):
@@ -38,7 +40,11 @@ def addresses_of(given: str | Sequence[str], port: int) -> tuple[Address, ...]:
     Raises:
         InvalidValueError: If one is no address, or two are the same.
     """
-    texts = given.split(",") if isinstance(given, str) else list(given)
+    items: Any = given
+    if not isinstance(items, Sequence) or isinstance(items, bytes) or not 0 < len(items) <= MOST:
+        step = "Give a list of them, or one text with commas between."
+        raise InvalidValueError("addresses", brief(items), f"a text, or 1 to {MOST} of them", step)
+    texts = items.split(",") if isinstance(items, str) else list(items)
     addresses: list[Address] = []
     for i, text in enumerate(texts):
         address = _address(i, text, port)
@@ -63,7 +69,8 @@ def groups_at(addresses: Sequence[Address], robot: Robot | int) -> tuple[tuple[i
     Raises:
         InvalidValueError: If there are more or fewer addresses than groups.
     """
-    winches = robot if isinstance(robot, int) else robot.cable_count
+    known: Any = robot
+    winches = known.cable_count if isinstance(known, Robot) else whole_number(known, "robot", 1, MOST)
     groups = groups_of(winches)
     if len(addresses) != len(groups):
         raise InvalidValueError(
@@ -81,7 +88,7 @@ def _address(index: int, text: object, port: int) -> Address:
     if not host or not known or any(c.isspace() or not c.isprintable() or c in "/@,;" for c in host):
         raise InvalidValueError(
             f"address of group {index + 1}",
-            repr(text),
+            brief(text),
             f"host or host:port, port 1 to {LAST_PORT}",
             "The twin prints its addresses; a PLC has its own in TIA Portal.",
         )

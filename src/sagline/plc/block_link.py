@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from time import perf_counter
+from typing import Final
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.arrays import Array, number
 from sagline.control.link import Command, Missing, Mode, Sample
 from sagline.errors import InvalidValueError
 from sagline.plc.addresses import Address, groups_at
@@ -16,6 +17,8 @@ from sagline.plc.group import Group
 from sagline.plc.packing import claim_block, command_blocks, sample_of
 from sagline.plc.wire import LinkError, Wire
 from sagline.robot.robot import Robot
+
+LONGEST: Final = 3600.0  # s, that a PLC may take to answer first
 
 
 class BlockLink:
@@ -33,8 +36,11 @@ class BlockLink:
         Raises:
             LinkError: If one does not answer, or not as sagline's PLC would.
         """
-        if not timeout > 0.0:
-            raise InvalidValueError("timeout", f"{timeout} s", "above 0 s", "2 s do for most networks.")
+        patience = number(timeout, "timeout", "s", above=0.0)
+        if patience > LONGEST:
+            raise InvalidValueError(
+                "timeout", f"{patience:g} s", f"above 0 s, to {LONGEST:g} s", "2 s do for most networks."
+            )
         self._groups = groups_at(addresses, robot)
         self._addresses = tuple(addresses)
         self._began = perf_counter()
@@ -44,7 +50,7 @@ class BlockLink:
         ]
         for group in self._exchanges:
             group.start()
-        self._wait(timeout)
+        self._wait(patience)
 
     @property
     def groups(self) -> tuple[tuple[int, ...], ...]:

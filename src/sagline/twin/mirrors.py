@@ -55,7 +55,7 @@ def free(host: str, port: int) -> str:
             number = socket.gethostbyname(host)
             probe.bind((number, port))
             probe.listen()
-        except (OSError, OverflowError, ValueError) as error:  # ValueError: of what is no name at all
+        except (OSError, OverflowError, ValueError, TypeError) as error:  # the last two of what is no name
             reason = getattr(error, "strerror", None) or str(error)
             raise InvalidValueError(
                 "address of the twin",

@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from sagline.arguments import instance, whole_number
 from sagline.control.link import Command, Mode
 from sagline.control.pace import Pace
+from sagline.plc.addresses import LAST_PORT
 from sagline.plc.blocks import AGAIN, CLAIM, FROM_PLC, TO_PLC, Refusal, winch_row
 from sagline.plc.packing import winch_rows
 from sagline.plc.wire import needed
@@ -51,12 +53,13 @@ class Server:
             InvalidValueError: If a port is in use, or the address is none of this machine.
             FileError: If the package for it is not installed.
         """
-        self.machine = machine
+        self.machine = instance(machine, Machine, "machine")
+        place, first_port = instance(host, str, "host"), whole_number(port, "port", 0, LAST_PORT)
         self._pace = Pace(machine.period)
         self._groups = range(len(machine.groups))
         self._seen = [b""] * len(machine.groups)  # commands that were looked at
         first = [self._block(group) or SILENT for group in self._groups]
-        self._mirrors = _mirrors(first, host, port, modbus)
+        self._mirrors = _mirrors(first, place, first_port, instance(modbus, bool, "modbus"))
         self.addresses = self._mirrors.addresses
 
     @property

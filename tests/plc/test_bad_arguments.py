@@ -1,0 +1,82 @@
+"""Links and servers, given what they cannot take: one line, before anything is connected."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from typing import Any
+
+import pytest
+
+import sagline as sl
+from tests.abuse.bad_values import REFUSED, Bad, bad_values
+from tests.plc.servers import nobody
+
+ROBOT = sl.load_robot("article-prototype")
+VALID: dict[str, tuple[str, Any, bool]] = {
+    "robot": ("one", ROBOT, False),
+    "timeout": ("number", 2.0, False),
+    "device": ("whole", 1, False),
+    "machine": ("one", sl.twin.Machine, False),
+    "port": ("whole", 0, False),
+}
+
+
+def refused(call: Callable[..., Any], name: str, expected: type[Exception] | None, **others: Any) -> Iterator[str]:
+    """What is wrong with how bad values of an argument are answered."""
+    kind, valid, optional = VALID[name]
+    for bad in bad_values(kind, valid, optional):
+        if problem := _problem(call, {**others, name: bad.value}, bad, expected):
+            yield f"{name} = {bad.label}: {problem}"
+
+
+def _problem(call: Callable[..., Any], arguments: dict[str, Any], bad: Bad, expected: type[Exception] | None) -> str:
+    try:
+        call(**arguments)
+    except sl.SaglineError as error:
+        if expected is None or not isinstance(error, expected):
+            return "" if len(str(error)) < 300 and str(error).isprintable() else "a long line"
+    except Exception as error:
+        return repr(error)
+    return "taken" if bad.verdict is REFUSED else ""
+
+
+@pytest.mark.parametrize("kind", [sl.plc.S7Link, sl.plc.ModbusLink])
+def test_links_refuse_in_a_line_before_they_connect(kind: Callable[..., Any]) -> None:
+    given: dict[str, Any] = {"addresses": [nobody() for _ in range(4)], "robot": ROBOT}
+    names = ("robot", "timeout", *(("device",) if kind is sl.plc.ModbusLink else ()))
+    for name in names:
+        others = {key: value for key, value in given.items() if key != name}
+        assert list(refused(kind, name, sl.plc.LinkError, **others)) == []
+
+
+@pytest.mark.parametrize(
+    "addresses", [None, 5, b"a,b,c,d", [], "", [None] * 4, {"a": 1}, "a" * 20_000, ["a", "b", "c", object()]]
+)
+def test_addresses_of_another_kind_are_refused(addresses: Any) -> None:
+    with pytest.raises(sl.InvalidValueError) as caught:
+        sl.plc.S7Link(addresses, 8)
+    assert len(str(caught.value)) < 300
+
+
+def test_a_server_refuses_in_a_line() -> None:
+    machine = sl.twin.Machine(ROBOT)
+
+    def served(**arguments: Any) -> None:
+        with closing(sl.twin.Server(**arguments)):
+            pass
+
+    assert list(refused(served, "port", None, machine=machine)) == []
+    for arguments in (
+        {"host": 5},
+        {"host": "a b"},
+        {"host": "\0"},
+        {"host": "x" * 300},
+        {"modbus": 1},
+        {"port": 65534},
+    ):
+        with pytest.raises(sl.SaglineError) as caught:
+            served(machine=machine, **arguments)
+        assert len(str(caught.value)) < 300
+    with pytest.raises(sl.InvalidValueError, match="machine is"):
+        served(machine=ROBOT)
