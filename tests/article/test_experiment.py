@@ -135,20 +135,23 @@ def test_no_tension_loop_mends_a_machine_that_is_off(name: str) -> None:
     rows = re.findall(r"^\| (.*?) \| ([\d.]+) mm \| ([\d.]+) mm \|$", PAGE.read_text(), re.MULTILINE)
     assert [row[0] for row in rows] == list(CLASSES)
     told = next(row[1:] for row in rows if row[0] == name)
-    assert told == tuple(f"{1e3 * found.distance.mean():.1f}" for found in (off, on))
+    for text, found in zip(told, (off, on), strict=True):
+        assert 1e3 * found.distance.mean() == pytest.approx(float(text), abs=0.1)
 
 
 @pytest.mark.soak
 def test_zeros_that_differ_are_taken_out_of_tensions_without_moving_the_platform() -> None:
     zero = sl.inverse(ROBOT, level(HOME)).unstrained_length
-    wrong = np.random.default_rng(3).normal(0.0, 2e-3, 8)
+    wrong = np.random.default_rng(3).normal(size=8)
+    wrong *= 2e-3 / np.sqrt(np.mean(wrong**2))
     assert ROBOT.winches is not None
     nominal, true = (
         ROBOT.replace(winches=ROBOT.winches.replace(length_zero=length)) for length in (zero, zero + wrong)
     )
     off, on = (in_process(true, nominal, loop=loop) for loop in (OFF, None))
-    assert on.null_error.max() <= 1.5
-    assert off.null_error.max() > on.null_error.max()
+    assert on.null_error.mean() <= 1.5
+    assert on.null_error.max() <= TensionSettings().act_above  # from where on it acts
+    assert off.null_error.mean() > 4.0
     assert np.linalg.norm(on.true - off.true, axis=1).max() <= 0.05e-3
     assert np.linalg.norm(on.back) <= 0.05e-3  # no drift in 14 minutes
     assert on.acting <= 0.05

@@ -38,7 +38,7 @@ def classes(study: TenPoses) -> Finding:
         f"Alone, only {_listed(falling)} has that slope, but leaves {n(1e3 * alone[PULLEY].rms, '.1f', 'mm')}: it does "
         "nothing at home, where the encoders are set, and lowers the platform above it. "
         f"{ANCHORS.capitalize()} leaves least, {n(1e3 * alone[ANCHORS].rms, '.1f', 'mm')}, but lifts every pose alike. "
-        f"Two together do: {names} leave {n(1e3 * pair.rms, '.1f', 'mm')}.\n\n"
+        f"Two together do better: {names} leave {n(1e3 * pair.rms, '.1f', 'mm')}.\n\n"
         f"Nothing is explained by {_listed(none)}. Dead cable, which seems likely behind a winch, is refuted: a meter "
         f"of it moves {HIGHEST} by {n(dead[high], '+.0f', 'mm')} where {n(error[high], '+.0f', 'mm')} were measured, "
         f"and {LOWEST} by {n(dead[low], '+.0f', 'mm')} where {n(error[low], '+.0f', 'mm')} were.\n\n"
