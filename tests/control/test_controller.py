@@ -41,6 +41,7 @@ def test_the_platform_goes_where_it_is_told() -> None:
     assert done.status is ExecutionStatus.DONE
     assert state_of(control) is State.IDLE
     assert np.linalg.norm(done.position[-1] - [0.1, -0.1, 1.45]) < 2e-4  # the drives' integrals are still at it
+    rest(control, machine, 2.0)
     assert np.linalg.norm(rest(control, machine, 2.0) - [0.1, -0.1, 1.45]) < 5e-5
     assert np.linalg.norm(control.estimate.position - [0.1, -0.1, 1.45]) < 1e-5
     assert done.plan is not None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.linalg import expm
@@ -125,7 +127,7 @@ def inner_margins(robot: sl.Robot, count: int, above: float = 0.0) -> tuple[Marg
         loops = inner_loops(drives)[used]
         found += [margins(loops[:, i], FREQUENCY[used]) for i in range(8)]
     gain, phase, crossover = np.array(found).T
-    assert 50.0 < crossover.min() <= crossover.max() < 54.0
+    assert 45.0 < crossover.min() <= crossover.max() < 45.1
     return Margins(gain.min(), phase.min(), crossover.max()), max(poles)
 
 
@@ -133,29 +135,32 @@ COUNTS = [16, pytest.param(400, marks=pytest.mark.soak)]
 
 
 @pytest.mark.parametrize("count", COUNTS)
-def test_the_drives_have_8_db_and_30_degrees_at_their_own_bandwidth(count: int) -> None:
-    """Each loop with 1.5 ms of delay, the seven others closed; the platform's modes lie below 8 Hz.
-
-    There the integral gain of 80 kN/m gives way ahead of the force, below sqrt(k_p k_i/k_v) or 3.2 Hz: it feeds the
-    modes of 1 to 3 Hz about as much as the cables' losses take, without the drives' friction.
-    """
-    found, slowest = inner_margins(PROTOTYPE, count, above=8.0)
-    assert found.gain >= 9.9
-    assert found.phase >= 54.0
-    assert slowest < 0.01
+def test_the_drives_have_11_db_and_60_degrees_all_over_the_test_box(count: int) -> None:
+    """Each loop with 1.5 ms of delay, the seven others closed on the platform that swings; 8 dB and 30 degrees do."""
+    found, slowest = inner_margins(PROTOTYPE, count)
+    assert found.gain >= 11.0
+    assert found.phase >= 60.0
+    assert slowest < -0.01
 
 
 @pytest.mark.parametrize("count", COUNTS)
-def test_with_a_tenth_of_the_integral_gain_they_have_them_at_the_platforms_modes_too(count: int) -> None:
-    found, slowest = inner_margins(integral(8e3), count)
-    assert found.gain >= 10.0
-    assert found.phase >= 50.0
-    assert slowest < -0.01
+def test_ten_times_the_integral_gain_feeds_the_slowest_modes(count: int) -> None:
+    """Below sqrt(k_p k_i/k_v), 3.2 Hz, such a drive gives way ahead of the force: as much as the cables' losses take.
+
+    At its own bandwidth, above 8 Hz, nothing of it is seen.
+    """
+    found, slowest = inner_margins(integral(80e3), count)
+    assert found.gain < 1.0
+    assert slowest > 0.0
+    above, _ = inner_margins(integral(80e3), count, above=8.0)
+    assert above.gain >= 10.0
+    assert above.phase >= 54.0
 
 
 def test_what_the_integral_gain_feeds_the_friction_of_the_drives_takes() -> None:
     """At a stop whose linear model grows: a swing of the platform dies away."""
-    state = stops().state[10]
+    planned = stops().state[10]
+    state = replace(planned, robot=integral(80e3))
     assert closed_poles(axis(state, LOSSES)).real.max() > 0.0
     push = np.array([60.0, 60.0, -40.0, 8.0, 8.0, 5.0])
     table = (np.array([0.0, 0.3, 0.3001, 30.0]), np.outer([1.0, 1.0, 0.0, 0.0], push))

@@ -146,12 +146,13 @@ def test_a_cable_that_breaks() -> None:
 
 
 def test_an_encoder_that_jumps_moves_its_cable() -> None:
-    rig, before, after = run("encoder 5 jumps by 2 mm", moving=False)
+    rig, before, after = run("encoder 5 jumps by 2 mm", 2.0, moving=False)
     first = after[0].length - before[-1].length
     np.testing.assert_allclose(first[5], 0.002, atol=6e-4)  # its drive, of 20 /s, is on its way back already
     np.testing.assert_allclose(np.delete(first, 5), 0.0, atol=1e-4)
-    assert after[-1].length[5] == pytest.approx(before[-1].length[5], abs=5e-5)
-    assert rig.reading.length[5] == pytest.approx(PLAN.unstrained_length[5] - 0.002, abs=5e-5)
+    # friction of 15 N holds the last tenth of a millimeter for seconds, until the integral of 8 kN/m overcomes it
+    assert after[-1].length[5] == pytest.approx(before[-1].length[5], abs=1.5e-4)
+    assert rig.reading.length[5] == pytest.approx(PLAN.unstrained_length[5] - 0.002, abs=1.5e-4)
     assert (after[-1].fault == 0).all()
 
 

@@ -35,11 +35,19 @@ STOPS = [  # model.md, section 13: how, m/s, N, mm
 ]
 
 
+def studied() -> sl.Robot:
+    """The prototype with the drives of the study."""
+    assert ROBOT.winches is not None
+    return ROBOT.replace(winches=ROBOT.winches.replace(integral_gain=80e3))
+
+
 @pytest.mark.parametrize(("mode", "speed", "peak", "travel"), STOPS)
 def test_stops_of_the_study(mode: Mode, speed: float, peak: float, travel: float) -> None:
-    plan = leg(ROBOT, speed)
+    """Whose drives had an integral gain of 80 kN/m."""
+    robot = studied()
+    plan = leg(robot, speed)
     assert plan.path is not None
-    rig = sl.twin.Machine(ROBOT, seed=1)
+    rig = sl.twin.Machine(robot, seed=1)
     pilot = Pilot(rig.link(), plan)
     pilot.hold(0.05)
     pilot.go(0.5 * plan.path.time[-1])
@@ -54,9 +62,10 @@ def test_stops_of_the_study(mode: Mode, speed: float, peak: float, travel: float
 @pytest.mark.parametrize("speed", [0.06, 0.3])
 def test_a_dead_controller_costs_speed_times_heartbeat_and_half_the_ramp(speed: float) -> None:
     """The study: +8 and +39 N, 12.7 and 61.7 mm; it counts the heartbeat from the end of the last period."""
-    plan = leg(ROBOT, speed)
+    robot = studied()
+    plan = leg(robot, speed)
     assert plan.path is not None
-    rig = sl.twin.Machine(ROBOT, seed=1)
+    rig = sl.twin.Machine(robot, seed=1)
     pilot = Pilot(rig.link(), plan)
     pilot.hold(0.05)
     pilot.go(0.5 * plan.path.time[-1] - PERIOD)

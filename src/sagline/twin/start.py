@@ -123,9 +123,9 @@ def check_step(robot: Robot, state: Equilibrium, step: float, period: float) -> 
     highest = with_drives(platform, d.DRUMS, data, length[None], robot.cables.axial_stiffness)
     if step * highest > SHARE:
         limit, frequency = SHARE / highest, highest / (2.0 * math.pi)
-        finer = 1e-3 / math.ceil(1e-3 / limit)
+        finer = 1e-3 / 2 ** math.ceil(math.log2(1e-3 / limit))
         allowed = f"<= {limit:.3g} s, {SHARE:g} rad of the highest mode, {frequency:.3g} Hz, cables taut"
-        raise InvalidValueError("step", f"{step:g} s", allowed, f"Give step={finer:.3g}.")
+        raise InvalidValueError("step", f"{step:g} s", allowed, f"Give step={finer:.6g}.")
 
 
 def _answered(length: Array, robot: Robot, item: str) -> Array:
