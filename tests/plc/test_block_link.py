@@ -9,7 +9,8 @@ import pytest
 
 from sagline.control.link import Mode, Sample
 from sagline.plc.block_link import BlockLink
-from sagline.plc.blocks import CLAIM, TO_PLC, Refusal
+from sagline.plc.blocks import CLAIM, TO_PLC, Block, Refusal
+from sagline.plc.group import Group
 from tests.plc.samples import (
     a_command,
     a_sample,
@@ -121,3 +122,36 @@ def test_a_plc_that_begins_anew_is_believed_after_a_while_of_silence_and_one_tha
         sample = taken(link)
         assert sample.counter[3] == 1000
         assert sample.age[3] > 0.4
+
+
+@pytest.mark.parametrize(("late", "written"), [(0.05, [b"command"]), (0.15, [])])
+def test_what_waited_too_long_for_a_connection_is_never_written(late: float, written: list[bytes]) -> None:
+    class Wire:
+        def __init__(self) -> None:
+            self.written: list[bytes] = []
+
+        def open(self) -> None:
+            clock[0] = late
+
+        def write(self, block: Block, data: bytes) -> None:
+            self.written.append(data)
+
+        def read(self, block: Block) -> bytes:
+            return b""
+
+        def close(self) -> None:
+            pass
+
+        abort = close
+
+        def reached(self) -> bool:
+            return True
+
+    clock, wire = [0.0], Wire()
+    group = Group(1, 2, wire, lambda: clock[0])
+    group.hand_over(TO_PLC, b"command")
+    group.start()
+    group.settled.wait(PATIENCE)
+    group.finish()
+    group.join(PATIENCE)
+    assert wire.written == written

@@ -32,6 +32,9 @@ def test_an_exchange_waits_for_nobody_and_a_silent_group_is_connected_anew() -> 
 
         until(lambda: age() > 1.0)
         assert np.median(times) < 2e-3
+        trouble = link._exchanges[1].trouble
+        assert trouble is not None
+        assert trouble.reason == "it does not answer"
         server.unlock_area(SrvArea.DB, FROM_PLC.number)
         mirrors.publish(sample_blocks(status(2)))
         until(lambda: np.all(taken(link).counter == 2))

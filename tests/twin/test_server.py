@@ -141,3 +141,14 @@ def test_a_port_in_use_is_told() -> None:
         port = int(server.addresses[2].rpartition(":")[2])
         with pytest.raises(sl.SaglineError, match=f"twin is .127.0.0.1., port {port} .Address already"):
             sl.twin.Server(server.machine, port=port)
+
+
+def test_the_last_command_of_before_a_grant_is_history() -> None:
+    with served(S7) as (server, link):
+        length = taken(link).length
+        owners = []
+        for counter, mode in enumerate((Mode.HOLD, Mode.HOLD, Mode.LEAVE, Mode.HOLD), 1):
+            send(server, link, command_of(counter, mode, length))
+            owners.append(int(gone_on(server, link).owner[0]))
+        owners.append(int(gone_on(server, link).owner[0]))
+        assert owners == [OWNER, OWNER, 0, OWNER, OWNER]
