@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sagline.control.link import HEARTBEAT, OWNER_TIMEOUT, RAMP, GroupFault, GroupStatus, Mode, WinchState
-from sagline.twin.plc_program import COUNTERS, Limits, Order, Program
+from sagline.control.link import COUNTERS, HEARTBEAT, OWNER_TIMEOUT, RAMP, GroupFault, GroupStatus, Mode, WinchState
+from sagline.twin.plc_program import Limits, Order, Program
 
 PERIOD = 0.01
 LIMITS = Limits([0.5, 0.5], [8.0, 9.0], [0.4, 0.5], [1000.0, 2000.0])

@@ -6,9 +6,8 @@ from typing import Final
 
 import numpy as np
 
-from sagline.control.link import OWNER_TIMEOUT, GroupStatus, Missing, Mode, Sample
+from sagline.control.link import COUNTERS, OWNER_TIMEOUT, GroupStatus, Missing, Mode, Sample
 
-COUNTERS: Final = 2**31 - 1  # of commands go from 1 to here, and begin again
 CLAIMING: Final = OWNER_TIMEOUT + 0.7  # s, at most, until all grants are there
 SILENT: Final = 7.0  # s, at most, until every group has answered once
 GIVING_BACK: Final = 0.05  # s, for grants of some groups only

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from enum import IntEnum, IntFlag
+from enum import Enum, IntEnum, IntFlag
 from typing import Final, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.arrays import Array
+from sagline.arrays import Array, Flags
 
 Whole: TypeAlias = NDArray[np.int64]
-Flags: TypeAlias = NDArray[np.bool_]
 
 PERIOD: Final = 0.01  # s, of the controller's cycle: the article's 100 samples a second
 GROUP_SIZE: Final = 2  # winches behind one PLC
+COUNTERS: Final = 2**31 - 1  # of commands and blocks go from 1 to here, and begin again
 HEARTBEAT: Final = 0.1  # s: so long may a command counter stand before a PLC ramps its winches down and holds
 OWNER_TIMEOUT: Final = 0.5  # s: so long may it stand before another controller may have the grant
 RAMP: Final = 0.2  # s, in which rates go to zero, here and in a PLC
@@ -75,6 +75,7 @@ class Command(NamedTuple):
         rate: Their rates [m/s], shape (m,).
         tension: Expected at the drums, which the motors hold beforehand [N], shape (m,).
         enable: Which drives may move, shape (m,).
+        claims: Whether a group whose grant another id has, or nobody, is asked for it; no command to leave does so.
     """
 
     counter: int
@@ -85,6 +86,7 @@ class Command(NamedTuple):
     rate: Array
     tension: Array
     enable: Flags
+    claims: bool = True
 
 
 class Sample(NamedTuple):
@@ -157,7 +159,7 @@ class Link(Protocol):
     def exchange(self, command: Command | None) -> Sample | Missing:
         """Send a command and take what there is, without waiting for an answer.
 
-        A group whose grant another id has, or nobody, is sent the claim of `command.owner` and no command.
+        What each group is sent, `sent_to` says: the command only where its owner has the grant.
 
         Args:
             command: What is asked for; None: nothing is sent, for those who only read.
@@ -165,6 +167,36 @@ class Link(Protocol):
 
     def close(self) -> None:
         """Let go of the machine."""
+
+
+class Sent(Enum):
+    """What a group is sent in a cycle."""
+
+    COMMAND = "the command"
+    CLAIM = "the claim of its owner"
+    NOTHING = "nothing"
+
+
+def sent_to(owner: int, command: Command) -> Sent:
+    """What a group is sent.
+
+    Args:
+        owner: Who has its grant, as it said last; 0 for nobody.
+        command: What a controller asks for.
+    """
+    if owner == command.owner:
+        return Sent.COMMAND
+    return Sent.CLAIM if command.claims and command.mode != Mode.LEAVE else Sent.NOTHING
+
+
+def newer(counter: int, known: int) -> bool:
+    """Whether a counter is ahead of another, by less than half of all there are.
+
+    Args:
+        counter: Of a command or block.
+        known: Of another.
+    """
+    return 0 < (counter - known) % COUNTERS < COUNTERS // 2
 
 
 def groups_of(cable_count: int) -> tuple[tuple[int, ...], ...]:

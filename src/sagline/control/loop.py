@@ -12,7 +12,7 @@ from sagline.arrays import Array, Flags
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.control.checks import Motion
-from sagline.control.connecting import COUNTERS, Claim
+from sagline.control.connecting import Claim
 from sagline.control.courses import Along, Course, Ramp, SetPoint, Standing
 from sagline.control.cycle import Cycle
 from sagline.control.events import Event, EventKind
@@ -22,7 +22,7 @@ from sagline.control.faults import faults_of
 from sagline.control.guard import Garbage
 from sagline.control.homing import Homing
 from sagline.control.jogging import PlatformJog
-from sagline.control.link import HEARTBEAT, PERIOD, Command, Link, Missing, Mode, Sample
+from sagline.control.link import COUNTERS, HEARTBEAT, PERIOD, Command, Link, Missing, Mode, Sample
 from sagline.control.pace import Pace
 from sagline.control.recording import Recorded, Recorder, Tape
 from sagline.control.states import MOTION, State, check_transition

@@ -10,6 +10,7 @@ from typing import Final
 
 from sagline.arguments import file_path, instance
 from sagline.control.link import (
+    COUNTERS,
     GROUP_SIZE,
     HEARTBEAT,
     OWNER_TIMEOUT,
@@ -22,7 +23,7 @@ from sagline.control.link import (
 )
 from sagline.errors import FileError
 from sagline.files.whole import written_together
-from sagline.plc.blocks import BLOCKS, COUNTERS, LAYOUT, Block, Field
+from sagline.plc.blocks import BLOCKS, LAYOUT, Block, Field
 from sagline.robot.robot import Robot
 from sagline.twin.plc_program import FOLLOWING, TINY
 from sagline.twin.start import plc_limits

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from sagline.arrays import Array, number
-from sagline.control.link import Command, Missing, Mode, Sample
+from sagline.control.link import Command, Missing, Sample, Sent, sent_to
 from sagline.errors import InvalidValueError
 from sagline.plc.addresses import Address, groups_at
 from sagline.plc.blocks import CLAIM, TO_PLC, Refusal
@@ -65,8 +65,8 @@ class BlockLink:
     def exchange(self, command: Command | None) -> Sample | Missing:
         """Hand a command to the groups' threads and take what they have; waits for nothing.
 
-        A group whose grant another id has, or nobody, is sent the claim of `command.owner` and no command; nothing
-        where `command.mode` is LEAVE.
+        A group whose grant another id has, or nobody, is sent the claim of `command.owner` where it says so, and no
+        command.
 
         Args:
             command: What is asked for; None: nothing is sent, for those who only read.
@@ -107,12 +107,11 @@ class BlockLink:
     def _send(self, command: Command, owners: Sequence[int]) -> None:
         claim = claim_block(command.owner)
         for group, owner, block in zip(self._exchanges, owners, command_blocks(command), strict=True):
-            if owner == command.owner:
-                group.hand_over(TO_PLC, block)
-            elif command.mode is Mode.LEAVE:
+            what = sent_to(owner, command)
+            if what is Sent.NOTHING:
                 group.ask()
             else:
-                group.hand_over(CLAIM, claim)
+                group.hand_over(*((TO_PLC, block) if what is Sent.COMMAND else (CLAIM, claim)))
 
     def _missing(self, now: float) -> Missing:
         silent = [i for i, group in enumerate(self._exchanges) if group.newest is None]

@@ -11,7 +11,6 @@ from typing import Any, Final, NamedTuple
 from sagline.control.link import GROUP_SIZE
 
 LAYOUT: Final = 1  # version of the blocks; one more whenever anything below moves
-COUNTERS: Final = 2**31 - 1  # counters go from 1 to here, and begin again
 TYPES: Final = {  # of SCL, as `struct` has them; big-endian and without gaps, as the PLC has them
     "DInt": "i",
     "DWord": "I",

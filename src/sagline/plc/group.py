@@ -7,8 +7,8 @@ from collections.abc import Callable
 from threading import Event, Thread
 from typing import Any, Final, NamedTuple
 
-from sagline.control.link import HEARTBEAT, OWNER_TIMEOUT
-from sagline.plc.blocks import COUNTERS, FROM_PLC, Block, Refusal
+from sagline.control.link import HEARTBEAT, OWNER_TIMEOUT, newer
+from sagline.plc.blocks import FROM_PLC, Block, Refusal
 from sagline.plc.wire import Wire, WireError
 
 RETRY: Final = 0.2  # s between attempts to connect
@@ -168,6 +168,6 @@ class Group(Thread):
         newest = self.newest
         if newest is None:
             return True
-        ahead = (counter - newest.values["counter"]) % COUNTERS
+        known = newest.values["counter"]
         anew = newest.arrived < connected or arrived - newest.arrived > OWNER_TIMEOUT
-        return ahead > 0 and (ahead < COUNTERS // 2 or anew)
+        return newer(counter, known) or (anew and counter != known)

@@ -7,9 +7,9 @@ from typing import Any, Final, Protocol
 
 import numpy as np
 
-from sagline.control.link import Command, Missing, Mode, Sample
+from sagline.control.link import Command, Missing, Sample, Sent, newer, sent_to
 from sagline.twin.network import Network, Way
-from sagline.twin.plc_program import COUNTERS, Order
+from sagline.twin.plc_program import Order
 from sagline.twin.snapshot import FIRST, Snapshot
 
 HISTORY: Final = 100  # blocks of the past that a group which goes back still has
@@ -62,7 +62,7 @@ class MachineLink:
 
         Args:
             command: What is asked for; None: nothing is sent. A group whose grant another id has, or nobody, is sent
-                the claim of its owner instead, unless it asks to leave.
+                the claim of its owner instead where it says so.
         """
         machine = self._machine
         if command is not None and not self._closed:
@@ -78,14 +78,15 @@ class MachineLink:
     def _send(self, command: Command, now: float) -> None:
         numbers = (command.length.tolist(), command.rate.tolist(), command.tension.tolist(), command.enable.tolist())
         for group, winches in enumerate(self._groups):
-            if self._owner[group] == command.owner:
+            what = sent_to(self._owner[group], command)
+            if what is Sent.NOTHING:
+                continue
+            if what is Sent.COMMAND:
                 part = slice(winches[0], winches[-1] + 1)
                 each = [row[part] for row in numbers]
                 message: Any = Order(command.counter, command.owner, command.mode, command.valid_for, *each)
-            elif command.mode != Mode.LEAVE:
-                message = command.owner
             else:
-                continue
+                message = command.owner
             if self._network.ideal:
                 self._machine.deliver(group, message)
             else:
@@ -138,7 +139,7 @@ class MachineLink:
     def _take(self, group: int, arrival: float, block: Snapshot | None) -> None:
         """Take a block in, if it is good and newer than what was there."""
         known = self._newest[group]
-        if block is None or (known is not None and not _newer(block.counter(group), known.counter(group))):
+        if block is None or (known is not None and not newer(block.counter(group), known.counter(group))):
             self._discarded[group] += 1
             return
         self._newest[group], self._arrival[group] = block, arrival
@@ -171,7 +172,3 @@ class MachineLink:
                 where = part if k < FIRST else group
                 array[..., where] = own[..., where]
         return found
-
-
-def _newer(counter: int, known: int) -> bool:
-    return 0 < (counter - known) % COUNTERS < COUNTERS // 2

@@ -9,7 +9,7 @@ import numpy as np
 
 from sagline.arguments import brief, choice, instance, optional, whole_number
 from sagline.arrays import number
-from sagline.control.link import PERIOD, Command, groups_of
+from sagline.control.link import COUNTERS, PERIOD, Command, groups_of
 from sagline.dynamics.damping import Damping
 from sagline.dynamics.simulator import Reading
 from sagline.errors import InvalidValueError
@@ -19,7 +19,7 @@ from sagline.twin.hardware import CELL, LENGTH, Hardware
 from sagline.twin.injected import KINDS, Injected, Schedule, fault
 from sagline.twin.link import MachineLink
 from sagline.twin.network import Network
-from sagline.twin.plc_program import COUNTERS, Limits, Order, Program
+from sagline.twin.plc_program import Limits, Order, Program
 from sagline.twin.snapshot import COUNTER, COUNTS, DRIVE_FAULT, ECHO, FAULT, OWNER, STATE, STATUS, Report, Snapshot
 from sagline.twin.start import check_step, limits_of, started
 

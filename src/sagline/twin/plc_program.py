@@ -17,9 +17,9 @@ from sagline.control.link import (
     GroupStatus,
     Mode,
     WinchState,
+    newer,
 )
 
-COUNTERS: Final = 2**31 - 1  # go from 1 to here, and begin again
 FOLLOWING: Final = 0.01  # m, between set point and encoder: the controller stops at half of it
 TINY: Final = 1e-9  # m and s: of rounding
 LEFT: Final = 0.1  # m: so much hanging cable there is at least
@@ -123,8 +123,7 @@ class Program:
 
     def take(self, order: Order) -> None:
         """Take a command, if it is the owner's and newer than the last one."""
-        newer = not self.echo or 0 < (order.counter - self.echo) % COUNTERS < COUNTERS // 2
-        if self.owner and order.owner == self.owner and newer:
+        if self.owner and order.owner == self.owner and (not self.echo or newer(order.counter, self.echo)):
             self.echo, self._order, self._fresh = order.counter, order, True
 
     def reset(self) -> None:

@@ -1,0 +1,42 @@
+"""What a link sends, and which of two counters is newer."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.control.link import COUNTERS, Command, Mode, Sample, Sent, newer, sent_to
+
+MINE, OTHER = 7, 8
+
+
+def command(mode: Mode, claims: bool) -> Command:
+    return Command(5, MINE, mode, 0.1, np.full(8, 2.0), np.zeros(8), np.full(8, 100.0), np.zeros(8, dtype=bool), claims)
+
+
+@pytest.mark.parametrize("mode", Mode)
+@pytest.mark.parametrize("claims", [True, False])
+@pytest.mark.parametrize("owner", [0, MINE, OTHER])
+def test_a_command_goes_to_its_owners_groups_and_a_claim_where_it_says_so(mode: Mode, claims: bool, owner: int) -> None:
+    asks = claims and mode is not Mode.LEAVE
+    expected = Sent.COMMAND if owner == MINE else Sent.CLAIM if asks else Sent.NOTHING
+    assert sent_to(owner, command(mode, claims)) is expected
+
+
+def test_a_counter_is_newer_by_less_than_half_of_all() -> None:
+    half = COUNTERS // 2
+    for known in (1, 2, half, COUNTERS - 1, COUNTERS):
+        ahead = [(known - 1 + step) % COUNTERS + 1 for step in (0, 1, 99, half - 1, half, COUNTERS - 1)]
+        assert [newer(counter, known) for counter in ahead] == [False, True, True, True, False, False]
+
+
+def test_a_link_claims_nothing_where_the_command_does_not() -> None:
+    link = sl.twin.Machine(sl.load_robot("article-prototype"), seed=1).link()
+    owners = []
+    for claims in (False, False, True, True):
+        answer = link.exchange(command(Mode.HOLD, claims))
+        assert isinstance(answer, Sample)
+        owners.append(set(answer.owner.tolist()))
+    assert owners[:2] == [{0}, {0}]
+    assert owners[-1] == {MINE}
