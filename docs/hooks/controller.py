@@ -84,7 +84,7 @@ def _arrow(start: State, end: State, both_ways: bool) -> str:
     length = ((to_x - x) ** 2 + (to_y - y) ** 2) ** 0.5
     aside = 7.0 if both_ways else 0.0
     off_x, off_y = -aside * (to_y - y) / length, aside * (to_x - x) / length
-    room = 4.0 + 2.0 * aside * (y != to_y) * (x != to_x)
+    room = 4.0 + aside * (y != to_y) * (x != to_x)
     share = min(_half(WIDE + room, to_x - x), _half(HIGH + room, to_y - y))
     points = (x + share * (to_x - x), y + share * (to_y - y), to_x - share * (to_x - x), to_y - share * (to_y - y))
     first = f"M{points[0] + off_x:.1f} {points[1] + off_y:.1f}"
