@@ -27,7 +27,7 @@ def test_it_stands_still_on_its_drives() -> None:
     assert np.abs(sample.filtered - PLAN.state.cables.frame_end_tension).max() < 1.0
 
 
-STOPS = [  # model.md, section 13: how, m/s, N, mm
+STOPS = [  # model.md, section 12: how, m/s, N, mm
     (Mode.LOCK, 0.06, 13.0, 2.3),
     (Mode.HOLD, 0.06, 8.0, 5.1),
     (Mode.LOCK, 0.3, 63.0, 11.7),

@@ -62,7 +62,7 @@ def gains_along(plan: Plan, every: float = EVERY) -> Gains | None:
         13 rows
 
     Source:
-        docs/model.md, section 13.
+        docs/model.md, section 12.
     """
     step = number(every, "every", "s", above=0.0)
     state = instance(plan, Plan, "plan").state

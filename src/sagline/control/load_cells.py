@@ -51,7 +51,7 @@ def parity(state: Equilibrium) -> Array:
         InvalidValueError: If the state is no Equilibrium (of a plan: plan.state).
 
     Source:
-        docs/model.md, section 13.
+        docs/model.md, section 12.
     """
     slope = balance_slope(instance(state, Equilibrium, "state"))
     lost = np.isnan(slope).any(axis=(-1, -2), keepdims=True)

@@ -44,7 +44,7 @@ def null_space(state: Equilibrium) -> NullSpace:
         InvalidValueError: If the state is no Equilibrium (of a plan: plan.state).
 
     Source:
-        docs/model.md, section 13.
+        docs/model.md, section 12.
     """
     known = stiffness(state)
     basis = known.null_lengths

@@ -56,7 +56,7 @@ class TensionSettings:
 class TensionLoop:
     """Adds to the lengths of a plan what brings the tensions back to it; one for a session, as errors of lengths last.
 
-    f <- f + h/(tau + h) (T - T_plan - f), and while it acts delta <- delta - k N_L G f; docs/model.md, section 13.
+    f <- f + h/(tau + h) (T - T_plan - f), and while it acts delta <- delta - k N_L G f; docs/model.md, section 12.
 
     Attributes:
         settings: How it works.
