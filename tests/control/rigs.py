@@ -46,7 +46,7 @@ class Spy:
 
     def __init__(self, link: Any) -> None:
         """Stand before a link."""
-        self._link, self.groups = link, link.groups
+        self._link, self.groups, self.period = link, link.groups, link.period
         self.commands: list[Command | None] = []
         self.answers: list[Sample | Missing] = []
 
@@ -65,7 +65,7 @@ class Replay:
 
     def __init__(self, spy: Spy) -> None:
         """Begin at the beginning."""
-        self.groups, self._answers = spy.groups, iter(spy.answers)
+        self.groups, self.period, self._answers = spy.groups, spy.period, iter(spy.answers)
         self.commands: list[Command | None] = []
 
     def exchange(self, command: Command | None) -> Sample | Missing:

@@ -12,6 +12,7 @@ import sagline as sl
 from sagline.control.controller import Controller
 from sagline.control.execution import ExecutionStatus
 from sagline.control.link import Command, Mode, Sample
+from sagline.control.pace import Pace
 from sagline.control.states import RefusedError, State
 from sagline.twin.injected import Injected
 from sagline.twin.machine import Machine
@@ -406,6 +407,16 @@ def test_a_link_of_another_robot_is_refused() -> None:
         Controller(prototype(), _short(machine), seed=2)
     with pytest.raises(sl.InvalidValueError, match="drum_radius"):
         Controller(sl.load_robot("cogiro"), machine.link(), seed=2)
+
+
+@pytest.mark.parametrize("period", [0.005, 0.02])
+def test_plcs_of_another_period_are_refused(period: float) -> None:
+    """At 5 ms the platform went through a path of 10 ms a row at double speed."""
+    machine = Machine(prototype(), start=HOME, seed=1, period=period)
+    with pytest.raises(sl.InvalidValueError, match=rf"a period of {1e3 * period:g} ms; allowed: 10 ms"):
+        Controller(prototype(), machine.link(), seed=2)
+    control = Controller(prototype(), machine.link(), seed=2, pace=Pace(period))
+    assert control.period == period
 
 
 def _short(machine: Machine) -> Any:

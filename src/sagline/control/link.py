@@ -156,6 +156,10 @@ class Link(Protocol):
     def groups(self) -> tuple[tuple[int, ...], ...]:
         """The winches of each group, from 0."""
 
+    @property
+    def period(self) -> float:
+        """Between two commands, as the PLCs expect them: set points are reached so long after their command [s]."""
+
     def exchange(self, command: Command | None) -> Sample | Missing:
         """Send a command and take what there is, without waiting for an answer.
 

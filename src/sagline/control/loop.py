@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from sagline.arguments import brief, instance, optional, whole_number
-from sagline.arrays import Array, Flags
+from sagline.arrays import Array, Flags, number
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.control.checks import Motion
@@ -43,6 +43,7 @@ VALID_FOR: Final = HEARTBEAT  # s: so long a PLC may go on with a command
 LEAVING: Final = 0.3  # s, at most, until all grants are given back
 MOST_OWNER: Final = 2**31
 MOST_SEED: Final = 2**128
+SAME: Final = 1e-9  # of a period
 ROOM: Final = 500  # cycles beside the plan's: ramps, pauses
 FOLLOWING: Final = frozenset({State.IDLE, State.MOVING, State.JOGGING, State.PAUSING, State.STOPPING})
 LOOP_ON: Final = frozenset({State.IDLE, State.MOVING, State.PAUSING})
@@ -75,6 +76,7 @@ class Loop:
             raise InvalidValueError("link", f"of {count} winches", f"{m}, as {robot.name} has", "Check its addresses.")
         self._link, self._pace = link, optional(pace, Pace, "pace")
         self.period = PERIOD if pace is None else pace.period
+        _check_period(link, self.period)
         self._model = optional(model, CableModel, "model") or Catenary()
         self._method = optional(method, TensionMethod, "tension") or Closest()
         self._settings = optional(settings, TensionSettings, "loop") or TensionSettings()
@@ -493,9 +495,19 @@ class Loop:
 
 def _check_link(link: object) -> None:
     """Refuse what is no link at all."""
-    if isinstance(link, type) or not (hasattr(link, "groups") and callable(getattr(link, "exchange", None))):
+    has = all(hasattr(link, name) for name in ("groups", "period")) and callable(getattr(link, "exchange", None))
+    if isinstance(link, type) or not has:
         step = "Take that of a machine, machine.link(), or make one: sl.plc.S7Link(addresses, robot)."
         raise InvalidValueError("link", brief(link), "a Link", step)
+
+
+def _check_period(link: Link, period: float) -> None:
+    """Refuse PLCs that would reach each set point sooner or later than it is meant."""
+    told = number(link.period, "link.period", "s", above=0.0)
+    if abs(told - period) > SAME * period:
+        step = f"Give the machine period={period:g}, or the controller pace=Pace({told:g})."
+        allowed = f"{1e3 * period:g} ms, the controller's"
+        raise InvalidValueError("link", f"of PLCs with a period of {1e3 * told:g} ms", allowed, step)
 
 
 _DONE: Final = (ExecutionStatus.DONE, "the end of the plan")

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from sagline.arrays import Array, number
-from sagline.control.link import Command, Missing, Sample, Sent, sent_to
+from sagline.control.link import PERIOD, Command, Missing, Sample, Sent, sent_to
 from sagline.errors import InvalidValueError
 from sagline.plc.addresses import Address, groups_at
 from sagline.plc.blocks import CLAIM, TO_PLC, Refusal
@@ -56,6 +56,11 @@ class BlockLink:
     def groups(self) -> tuple[tuple[int, ...], ...]:
         """The winches of each group, from 0."""
         return self._groups
+
+    @property
+    def period(self) -> float:
+        """Between two commands, as the program in the PLCs has it [s]."""
+        return PERIOD
 
     @property
     def round_trip(self) -> Array:

@@ -23,6 +23,10 @@ class Driven(Protocol):
         """The winches of each group."""
 
     @property
+    def period(self) -> float:
+        """By which it goes on in an exchange [s]."""
+
+    @property
     def time(self) -> float:
         """Since the machine was switched on [s]."""
 
@@ -56,6 +60,11 @@ class MachineLink:
     def groups(self) -> tuple[tuple[int, ...], ...]:
         """The winches of each group, from 0."""
         return self._groups
+
+    @property
+    def period(self) -> float:
+        """Between two commands [s]: so far an exchange moves the machine on."""
+        return self._machine.period
 
     def exchange(self, command: Command | None) -> Sample | Missing:
         """Send a command, let the machine go on for a period, and take what there is then.
