@@ -183,7 +183,7 @@ class Machine:
         """
         chosen = self._group(group)
         count = len(self.groups[chosen])
-        rows = [np.asarray(row) for row in instance(command, Command, "command")[4:]]
+        rows = [np.asarray(row) for row in instance(command, Command, "command")[4:8]]
         if any(row.shape != (count,) for row in rows):
             shapes = f"of shapes {', '.join(str(row.shape) for row in rows)}"
             raise InvalidValueError("command", shapes, f"({count},), as group {chosen} has winches", "Give these only.")
