@@ -9,7 +9,8 @@ import numpy as np
 
 from sagline.arrays import Array, Flags
 from sagline.control.cycle import Cycle
-from sagline.control.link import groups_of
+from sagline.control.ends import ends, finite, largest
+from sagline.control.link import WinchState, groups_of
 from sagline.robot.robot import Robot
 
 SIGMAS: Final = 5.0  # by which a reading may be off before it means something
@@ -19,6 +20,7 @@ PULLING: Final = 0.5  # of the planned tension: a motor that holds more has a ca
 STEADY_TIME: Final = 0.5  # s, of the filter that learns what the tensions are off the plan all the time
 QUICK_TIME: Final = 0.1  # s, of the one that is held against the balance of the platform
 MOST_CHANGE: Final = 6.0  # N a cycle, of the latter: a few readings far out do not stay in it
+_TRIPPED: Final = int(WinchState.FAULT)
 
 
 class Evidence:
@@ -36,7 +38,13 @@ class Evidence:
         stopped: Whether a fault has been told that stops the motion.
         broken: Which cables are known to be, shape (m,).
         jumped: Which encoders have, shape (m,).
-        fresh: Which winches' data are new in this cycle, shape (m,).
+        least: Smallest reading of a cell in this cycle [N]; NaN where one is no number.
+        most: Largest [N]; likewise.
+        oldest: Age of the oldest group's sample [s].
+        bits: Of the status, those that any group has.
+        faulted: Whether a PLC reports a fault.
+        tripped: Whether a drive does.
+        states: Of the winches, as plain numbers.
         low: For how many new readings in a row each cable has been slack that the plan wants taut, shape (m,).
         before_low: The reading before these [N], shape (m,).
         steady: T_A less the plan, behind the slow filter, which rests while a cable is slack [N], shape (m,).
@@ -78,12 +86,14 @@ class Evidence:
         self.believed: Flags = np.ones(m, dtype=bool)
         self.broken: Flags = np.zeros(m, dtype=bool)
         self.jumped: Flags = np.zeros(m, dtype=bool)
-        self.fresh: Flags = np.ones(m, dtype=bool)
         self.low = np.zeros(m, dtype=np.int64)
         self.before_low, self.steady, self.quick = np.full(m, np.nan), np.zeros(m), np.zeros(m)
         self.compared = self.any_low = self.stopped = False
         self._shares = [period / (time + period) for time in (STEADY_TIME, QUICK_TIME)]
-        self._cycle: Cycle | None = None
+        self.cycle: Cycle | None = None
+        self.least = self.most = self.oldest = math.nan
+        self.bits, self.states = 0, list[int]()
+        self.faulted = self.tripped = False
 
     def _set_up_motors(self, robot: Robot) -> None:
         """How a motor's torque tells of the tension, where drum and gear are known."""
@@ -95,20 +105,31 @@ class Evidence:
             self._friction = np.broadcast_to(winch.friction, (m,))
 
     def at(self, cycle: Cycle) -> None:
-        """Look at a cycle, once."""
-        if cycle is self._cycle:
-            return
-        self._cycle = cycle
-        sample, before = cycle.sample, cycle.before
-        if before is not None:
-            self.fresh = (sample.counter != before.counter)[self.group_of]
+        """Look at a cycle that is a new one: first at what most rules need one comparison with."""
+        self.cycle, sample = cycle, cycle.sample
+        self.least, self.most = ends(sample.tension)
+        self.oldest = ends(sample.age)[1]
+        self.bits, self.states = 0, sample.state.tolist()
+        for bits in sample.status.tolist():
+            self.bits |= bits
+        self.faulted = any(sample.fault.tolist())
+        self.tripped = _TRIPPED in self.states or any(sample.winch_fault.tolist())
         self._look_for_slack(cycle)
         self._compare(cycle)
+
+    @property
+    def fresh(self) -> Flags:
+        """Which winches' data are new in this cycle, shape (m,)."""
+        before = None if self.cycle is None else self.cycle.before
+        if self.cycle is None or before is None:
+            return np.ones(len(self.group_of), dtype=bool)
+        found: Flags = (self.cycle.sample.counter != before.counter)[self.group_of]
+        return found
 
     def _look_for_slack(self, cycle: Cycle) -> None:
         tension = cycle.sample.tension
         self.any_low = False
-        if tension.min() < self._most_slack:
+        if self.least < self._most_slack:
             low = (tension < self._slack) & (cycle.tension >= self._taut) & self.believed
             self.any_low = bool(low.any())
             if self.any_low:
@@ -120,7 +141,7 @@ class Evidence:
 
     def _compare(self, cycle: Cycle) -> None:
         error = cycle.sample.tension - cycle.tension
-        if not math.isfinite(error.sum()):
+        if not finite(error):
             self.compared = False
             return
         if not self.compared:
@@ -129,9 +150,8 @@ class Evidence:
         if not self.any_low:
             self.steady += self._shares[0] * (error - self.steady)
         change = self._shares[1] * (error - self.quick)
-        largest = float(np.abs(change).max())
-        if largest > MOST_CHANGE:  # as a whole, so that what is a load stays like a load
-            change *= MOST_CHANGE / largest
+        if (most := largest(change)) > MOST_CHANGE:  # as a whole, so that what is a load stays like a load
+            change *= MOST_CHANGE / most
         self.quick += change
 
     def pull(self, cycle: Cycle) -> Array:

@@ -59,10 +59,12 @@ class Fault(ABC):
             Where the fault begins a line for the operator: what, which item, value, limit, next step. None otherwise,
             while it lasts, and where another has stopped the motion already.
         """
-        self.seen.at(cycle)
+        if cycle is not self.seen.cycle:  # what the first rule lets be worked out serves them all
+            self.seen.at(cycle)
         line = self.found(cycle)
         if line is None:
-            self.present &= self.lasting
+            if not self.lasting:
+                self.present = False
             return None
         begins = self.lasting or not self.present
         self.present = True

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from operator import eq
 from typing import Final
 
 import numpy as np
 
 from sagline.arrays import Array
 from sagline.control.cycle import Cycle
+from sagline.control.ends import largest
 from sagline.control.evidence import SIGMAS, Evidence
 from sagline.control.fault import Fault, Reaction
 from sagline.control.faults_tension import SLACK_SAMPLES
@@ -38,7 +40,7 @@ class CellDead(Fault):
     def found(self, cycle: Cycle) -> str | None:
         """The first cell that is newly found dead."""
         seen, tension = self.seen, cycle.sample.tension
-        if tension.min() >= self._least and tension.max() < self._most and not seen.any_low:
+        if seen.least >= self._least and seen.most < self._most and not seen.any_low:
             return None
         pull = seen.pull(cycle)
         dead = ~(tension >= self._least)  # no number either
@@ -72,12 +74,13 @@ class CellStuck(Fault):
         seen = self.seen
         if cycle.before is None:
             return None
-        same = cycle.sample.tension == cycle.before.tension
-        if not same.any():
+        tension, before = cycle.sample.tension, cycle.before.tension
+        if not any(map(eq, tension.tolist(), before.tolist())):
             self._for.fill(0)
             return None
         if not cycle.moving:
             return None
+        same = tension == before
         self._for = np.where(same, self._for + seen.fresh, 0)
         stuck = (self._for >= STUCK_SAMPLES - 1) & seen.believed  # so many after the first of them
         if not stuck.any():
@@ -109,7 +112,7 @@ class CellOff(Fault):
         seen = self.seen
         error = self._error(cycle)
         limit = SIGMAS * seen.sigma
-        if error is None or not np.abs(error).max() > limit:
+        if error is None or not largest(error) > limit:
             if not self._quiet:
                 self._for.fill(0)
                 self._quiet = True
@@ -131,6 +134,6 @@ class CellOff(Fault):
     def _error(self, cycle: Cycle) -> Array | None:
         """What the balance says of each cell [N], (m,), where there is something to say."""
         seen = self.seen
-        if cycle.gains is None or not seen.compared or seen.any_low or not seen.believed.all():
+        if cycle.gains is None or not seen.compared or seen.any_low or not all(seen.believed.tolist()):
             return None
-        return cycle.gains.parity @ seen.quick
+        return cycle.gains.parity.dot(seen.quick)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from typing import Final
 
@@ -10,6 +9,7 @@ import numpy as np
 
 from sagline.arrays import Array
 from sagline.control.cycle import Cycle
+from sagline.control.ends import finite, largest
 from sagline.control.evidence import Evidence
 from sagline.control.fault import Fault, Reaction
 from sagline.control.link import Command, GroupStatus, Mode, Sample, WinchState
@@ -18,7 +18,7 @@ JUMP: Final = 1e-3  # m a cycle
 FOLLOWING: Final = 5e-3  # m
 SATURATED: Final = 0.2  # s
 _AT_LIMIT, _ENABLED = int(WinchState.SATURATED), int(WinchState.ENABLED)
-_FOLLOWING: Final = int(GroupStatus.FOLLOWING)
+_FOLLOWING, _FOLLOW = int(GroupStatus.FOLLOWING), int(Mode.FOLLOW)
 REMEMBERED: Final = 32  # commands: more than may be on their way
 LONGEST: Final = 1.0  # s between two samples of a PLC; more is its clock that began again
 
@@ -43,7 +43,7 @@ class EncoderJump(Fault):
     def found(self, cycle: Cycle) -> str | None:
         """The largest jump, or what is no number."""
         sample, before = cycle.sample, cycle.before
-        known, self._numbers = self._numbers, math.isfinite(sample.length.sum() + sample.rate.sum())
+        known, self._numbers = self._numbers, finite(sample.length) and finite(sample.rate)
         if not self._numbers:
             wrong = ~(np.isfinite(sample.length) & np.isfinite(sample.rate))
             self.seen.jumped |= wrong
@@ -55,9 +55,10 @@ class EncoderJump(Fault):
         """The rate at the end is that of the jump itself, where a drive takes it from its encoder."""
         passed = (sample.plc_time - before.plc_time)[self.seen.group_of]
         change = sample.length - before.length
-        jump = np.abs(change - before.rate * passed)
-        if jump.max() <= JUMP:
+        jump = change - before.rate * passed
+        if largest(jump) <= JUMP:
             return None
+        jump = np.abs(jump)
         if cycle.command is not None:
             jump = np.minimum(jump, np.abs(change - cycle.command.rate * passed))
         # a drum that is locked stops at once, and one whose drive gives all it can goes where the cable pulls it
@@ -92,11 +93,11 @@ class FollowingError(Fault):
     def found(self, cycle: Cycle) -> str | None:
         """The drum furthest away."""
         command, length = cycle.command, cycle.sample.length
-        if command is None or command.mode != Mode.FOLLOW:
+        if command is None or command.mode != _FOLLOW:
             self._sent.clear()
             return None
         self._sent.append(command)
-        if np.abs(command.length - length).max() <= FOLLOWING:
+        if largest(command.length - length) <= FOLLOWING:
             return None
         away = self._away(cycle)
         far = ~(away <= FOLLOWING) & ~self.seen.jumped  # that has been told
@@ -145,10 +146,10 @@ class ServoSaturated(Fault):
 
     def found(self, cycle: Cycle) -> str | None:
         """The drive that has been there longest."""
-        at_limit = cycle.sample.state == _AT_LIMIT
-        if not at_limit.any():
+        if _AT_LIMIT not in self.seen.states:
             self._for.fill(0)
             return None
+        at_limit = cycle.sample.state == _AT_LIMIT
         self._for = np.where(at_limit, self._for + 1, 0)
         winch = int(np.argmax(self._for))
         if self._for[winch] < self._samples:
@@ -170,10 +171,9 @@ class CorrectionAtLimit(Fault):
 
     def found(self, cycle: Cycle) -> str | None:
         """The length that is changed most."""
-        size = np.abs(cycle.correction)
-        if size.max() < self.seen.largest * (1.0 - 1e-9):
+        if largest(cycle.correction) < self.seen.largest * (1.0 - 1e-9):
             return None
-        winch = int(np.argmax(size))
+        winch = int(np.argmax(np.abs(cycle.correction)))
         return (
             f"the tension loop has changed length {winch} by {1e3 * cycle.correction[winch]:+.1f} mm; allowed: "
             f"{1e3 * self.seen.largest:g} mm. A length is in doubt: acknowledge, and home again."

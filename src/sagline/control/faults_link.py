@@ -21,7 +21,7 @@ ROUNDING: Final = 1e-6  # of an age
 
 # plain integers: an enumeration's member makes each operation on an array four times slower
 _LOCKED, _EMERGENCY, _PRESSED = int(GroupStatus.LOCKED), int(GroupStatus.EMERGENCY), int(GroupFault.EMERGENCY_STOP)
-_TRIPPED: Final = int(WinchState.FAULT)
+_TRIPPED, _LEAVE = int(WinchState.FAULT), int(Mode.LEAVE)
 
 _ACTS = {
     GroupFault.HEARTBEAT: "no command came for 100 ms",
@@ -40,12 +40,10 @@ class _Old(Fault):
 
     def found(self, cycle: Cycle) -> str | None:
         """The oldest group, and how old."""
-        age = cycle.sample.age
-        worst = float(age.max())
-        limit = self.cycles * self.seen.period
+        worst, limit = self.seen.oldest, self.cycles * self.seen.period
         if worst < limit * (1.0 - ROUNDING):
             return None
-        group = int(np.argmax(age))
+        group = int(np.argmax(cycle.sample.age))
         what = f"its newest sample is {1e3 * worst:.0f} ms old; allowed: below {1e3 * limit:.0f} ms"
         return f"group {group}: {what}. {self.step}"
 
@@ -89,15 +87,13 @@ class BlockDiscarded(Fault):
         """The group and how many of its blocks; it ends after a second without another."""
         sample, before = cycle.sample, cycle.before
         self._quiet += 1
-        if before is not None and sample.discarded is not before.discarded:
-            more = sample.discarded - before.discarded
-            if more.any():
-                group = int(np.argmax(more))
-                count = int(sample.discarded[group])
-                self._quiet = 0
-                self._line = (
-                    f"group {group}: a block was torn, foreign, repeated or late, {count} so far. Check the network."
-                )
+        if before is not None and sample.discarded.tolist() != before.discarded.tolist():
+            group = int(np.argmax(sample.discarded - before.discarded))
+            count = int(sample.discarded[group])
+            self._quiet = 0
+            self._line = (
+                f"group {group}: a block was torn, foreign, repeated or late, {count} so far. Check the network."
+            )
         return self._line if self._quiet < WINDOW else None
 
 
@@ -117,17 +113,16 @@ class OwnerLost(Fault):
     def found(self, cycle: Cycle) -> str | None:
         """The first group that is not ours."""
         command = cycle.command
-        if command is None or command.mode == Mode.LEAVE:
+        if command is None or command.mode == _LEAVE:
             self._held = False
             return None
-        other = cycle.sample.owner != command.owner
-        if not other.any():
+        owners = cycle.sample.owner.tolist()
+        if owners.count(command.owner) == len(owners):
             self._held = True
             return None
         if not self._held:
             return None
-        group = int(np.argmax(other))
-        owner = int(cycle.sample.owner[group])
+        group, owner = next((g, owner) for g, owner in enumerate(owners) if owner != command.owner)
         who = f"controller {owner} has its grant" if owner else "nobody has its grant"
         return f"group {group}: {who}, not this one, {command.owner}. Stop the other controller, then connect again."
 
@@ -149,16 +144,15 @@ class GroupActs(Fault):
 
     def found(self, cycle: Cycle) -> str | None:
         """The groups of which it is new, and why the first of them."""
-        sample = cycle.sample
-        locked = (sample.status & _LOCKED) != 0
-        tripped = (sample.winch_fault != 0) | (sample.state == _TRIPPED)
-        if not (sample.fault.any() or locked.any() or tripped.any()):
+        seen, sample = self.seen, cycle.sample
+        if not (seen.faulted or seen.tripped or seen.bits & _LOCKED):
             self._clean.fill(True)
             return None
         if cycle.command is not None and cycle.command.mode in (Mode.LOCK, Mode.LEAVE):
             return None
-        acting = (sample.fault != 0) | locked
-        acting[self.seen.group_of[tripped]] = True
+        tripped = (sample.winch_fault != 0) | (sample.state == _TRIPPED)
+        acting = (sample.fault != 0) | ((sample.status & _LOCKED) != 0)
+        acting[seen.group_of[tripped]] = True
         acting &= (sample.status & _EMERGENCY) == 0  # locked as it must be
         acting &= sample.fault != _PRESSED
         self._clean |= ~acting
@@ -191,6 +185,8 @@ class EmergencyStop(Fault):
 
     def found(self, cycle: Cycle) -> str | None:
         """The groups that report it."""
+        if not (self.seen.faulted or self.seen.bits & _EMERGENCY):
+            return None
         sample = cycle.sample
         pressed = ((sample.status & _EMERGENCY) != 0) | (sample.fault == _PRESSED)
         if not pressed.any():

@@ -32,7 +32,7 @@ class OverTension(Fault):
     def found(self, cycle: Cycle) -> str | None:
         """The tightest, by its limit."""
         seen, tension = self.seen, cycle.sample.tension
-        if not tension.max() > self._least:
+        if not seen.most > self._least:
             self._for.fill(0)
             return None
         near = (tension > self._near) & seen.believed

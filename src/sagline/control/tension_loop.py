@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -10,6 +9,7 @@ import numpy as np
 
 from sagline.arguments import instance, whole_number
 from sagline.arrays import Array, number
+from sagline.control.ends import finite, largest
 from sagline.control.link import PERIOD
 from sagline.control.null_space import NullSpace
 from sagline.errors import InvalidValueError
@@ -112,7 +112,7 @@ class TensionLoop:
                 self._correction[:] = self._change
             self._row = row
         np.subtract(tension, planned, out=self._error)
-        if not frozen and math.isfinite(self._error.sum()):  # NaN would stay in the filter for ever
+        if not frozen and finite(self._error):  # NaN would stay in the filter for ever
             self._learn(row)
         return self._correction.copy()
 
@@ -122,15 +122,12 @@ class TensionLoop:
         self._error -= self._filtered
         self._error *= self._share
         self._filtered += self._error
-        np.matmul(row.visible, self._filtered, out=change)
-        np.abs(change, out=change)
-        self.acting = bool(change.max() > (settings.rest_below if self.acting else settings.act_above))
+        row.visible.dot(self._filtered, change)
+        self.acting = bool(largest(change) > (settings.rest_below if self.acting else settings.act_above))
         if not self.acting:
             return
-        np.matmul(row.correction, self._filtered, out=change)
+        row.correction.dot(self._filtered, change)
         change *= settings.gain
         self._correction -= change
-        np.abs(self._correction, out=change)
-        largest = float(change.max())
-        if largest > settings.largest:  # a fault tells of it
-            self._correction *= settings.largest / largest  # as a whole: each for itself would move the platform
+        if (most := largest(self._correction)) > settings.largest:  # a fault tells of it
+            self._correction *= settings.largest / most  # as a whole: each for itself would move the platform

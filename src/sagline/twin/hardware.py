@@ -50,7 +50,9 @@ class Hardware:
         self._wrong: dict[int, tuple[float, float]] = {}  # load cells: what counts of a reading, and what is added
         self._powered, self._torque_of_force = [False] * m, np.zeros(m)
         self._share = period / (FILTER + period)
+        self._heavier = True  # whether the plant has not been told the weight
         self.read = np.zeros((5, m))
+        self._rows = tuple(self.read)
         self.read[FILTERED] = reading.load_cell
         self._take(reading)
         self.read[RATE] = 0.0
@@ -72,7 +74,8 @@ class Hardware:
             self._switch(powered)
         counts = np.rint(self._nominal.counts(np.array(length)))
         targets = self._true.lengths(counts - self._slip)
-        self._take(self._simulator.step(targets, self._period, tension=tension, wrench=self._weight))
+        weight, self._heavier = self._weight if self._heavier else None, False
+        self._take(self._simulator.step(targets, self._period, tension=tension, wrench=weight))
 
     def _switch(self, powered: list[bool]) -> None:
         """Give power to drives, or take it from them."""
@@ -85,17 +88,17 @@ class Hardware:
 
     def _take(self, reading: Reading) -> None:
         """Fill what encoders, drives and cells read."""
-        read = self.read
+        length, rate, torque, tension, filtered = self._rows
         self.counts = np.rint(self._true.counts(reading.length) + self._slip)
-        length = self._nominal.lengths(self.counts)
-        np.subtract(length, read[LENGTH], out=read[RATE])
-        read[RATE] /= self._period
-        read[LENGTH] = length
-        np.multiply(reading.force, self._torque_of_force, out=read[TORQUE])
-        read[CELL] = reading.load_cell
+        now = self._nominal.lengths(self.counts)
+        np.subtract(now, length, out=rate)
+        rate /= self._period
+        length[:] = now
+        np.multiply(reading.force, self._torque_of_force, out=torque)
+        tension[:] = reading.load_cell
         for cell, (kept, added) in self._wrong.items():
-            read[CELL, cell] = kept * read[CELL, cell] + added
-        read[FILTERED] += self._share * (read[CELL] - read[FILTERED])
+            tension[cell] = kept * tension[cell] + added
+        filtered += self._share * (tension - filtered)
 
     @property
     def saturated(self) -> Array:
@@ -129,3 +132,4 @@ class Hardware:
     def load(self, mass: float) -> None:
         """Hang a weight to the platform's center of mass [kg]."""
         self._weight[2] -= mass * self._gravity
+        self._heavier = True

@@ -48,7 +48,8 @@ class MachineLink:
         self._there = [Way(network) for _ in range(count)]
         self._back = [Way(network) for _ in range(count)]
         self._newest: list[Snapshot | None] = [None] * count
-        self._arrival = [0.0] * count
+        self._arrival = np.zeros(count)
+        self._parts = [slice(winches[0], winches[-1] + 1) for winches in self._groups]
         self._discarded = np.zeros(count, dtype=np.int64)
         self._owner = [0] * count
         self._held: list[Snapshot | None] = [None] * count
@@ -85,19 +86,20 @@ class MachineLink:
         self._closed = True
 
     def _send(self, command: Command, now: float) -> None:
-        numbers = (command.length.tolist(), command.rate.tolist(), command.tension.tolist(), command.enable.tolist())
-        for group, winches in enumerate(self._groups):
+        numbers = command.length.tolist(), command.rate.tolist(), command.tension.tolist(), command.enable.tolist()
+        lengths, rates, tensions, enable = numbers
+        head = command.counter, command.owner, command.mode, command.valid_for
+        ideal, deliver = self._network.ideal, self._machine.deliver
+        for group, part in enumerate(self._parts):
             what = sent_to(self._owner[group], command)
             if what is Sent.NOTHING:
                 continue
             if what is Sent.COMMAND:
-                part = slice(winches[0], winches[-1] + 1)
-                each = [row[part] for row in numbers]
-                message: Any = Order(command.counter, command.owner, command.mode, command.valid_for, *each)
+                message: Any = Order(*head, lengths[part], rates[part], tensions[part], enable[part])
             else:
                 message = command.owner
-            if self._network.ideal:
-                self._machine.deliver(group, message)
+            if ideal:
+                deliver(group, message)
             else:
                 self._there[group].send(now, message)
 
@@ -117,8 +119,8 @@ class MachineLink:
             spoiled: What happens to the blocks of some groups.
         """
         if self._network.ideal and not spoiled:
-            count = len(self._groups)
-            self._newest, self._arrival, self._owner = [snapshot] * count, [now] * count, list(snapshot.owners)
+            self._newest, self._owner = [snapshot] * len(self._groups), list(snapshot.owners)
+            self._arrival.fill(now)
         else:
             for group, back in enumerate(self._back):
                 for block in self._blocks(group, snapshot, spoiled.get(group)):
@@ -165,7 +167,7 @@ class MachineLink:
             if silent:
                 return Missing(now, silent, ("no block has come yet",) * len(silent))
             floats, whole, groups, clock = self._mixed([block for block in newest if block is not None])
-        age = now - np.array(self._arrival)
+        age = now - self._arrival
         counter, owner, echo, status, fault = groups
         length, rate, torque, tension, filtered = floats
         counts, state, winch_fault = whole
@@ -175,8 +177,7 @@ class MachineLink:
     def _mixed(self, newest: list[Snapshot]) -> tuple[Any, ...]:
         """Arrays of which each group's part is its newest."""
         found = tuple(array.copy() for array in newest[0].arrays)
-        for group, (winches, block) in enumerate(zip(self._groups, newest, strict=True)):
-            part = slice(winches[0], winches[-1] + 1)
+        for group, (part, block) in enumerate(zip(self._parts, newest, strict=True)):
             for k, (array, own) in enumerate(zip(found, block.arrays, strict=True)):
                 where = part if k < FIRST else group
                 array[..., where] = own[..., where]

@@ -117,7 +117,7 @@ class Machine:
         self._told = np.zeros((5, len(self.groups)), dtype=np.int64)
         self._whole = np.zeros((3, robot.cable_count), dtype=np.int64)
         self._news: Any = None  # what was told last but for counters
-        self._cycles = 0
+        self._cycles = self._counter = 0
         self._links: list[MachineLink] = []
         self._schedule, self._commands = Schedule(), ""
         self._spoiled: dict[int, str] = {}
@@ -245,7 +245,8 @@ class Machine:
     def _written(self, before: Snapshot | None) -> Snapshot:
         """The blocks of all groups; those of a PLC that stands stay as they were."""
         hardware, programs, groups = self._hardware, self._programs, self._told
-        groups[COUNTER] = groups[COUNTER] % COUNTERS + 1
+        self._counter = self._counter % COUNTERS + 1
+        groups[COUNTER] = self._counter
         groups[ECHO] = [program.echo for program in programs]
         saturated = hardware.saturated.tolist()
         news = [(program.owner, program.status, program.fault, *program.powered) for program in programs], saturated

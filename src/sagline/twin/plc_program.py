@@ -248,16 +248,18 @@ class Program:
         waited = max(waited, 0.0) + PERIOD  # one may have come late, and this one not
         for i in self.winches:
             length, fastest = lengths[i], speed[i]
-            if self.powered[i] and not (
-                least[i] <= length <= most[i]
-                and -fastest * waited - TINY <= length - asked[i] <= fastest * waited + TINY
-                and -fastest - TINY <= rates[i] <= fastest + TINY
-                and isfinite(tensions[i])
-            ):
-                self._stop(GroupFault.SET_POINT)
-                self._slow_down(cell)
-                return
-            if not isfinite(tensions[i]):  # of a drive that has no power
+            if self.powered[i]:
+                far = fastest * waited + TINY
+                if not (
+                    least[i] <= length <= most[i]
+                    and -far <= length - asked[i] <= far
+                    and -fastest - TINY <= rates[i] <= fastest + TINY
+                    and isfinite(tensions[i])
+                ):
+                    self._stop(GroupFault.SET_POINT)
+                    self._slow_down(cell)
+                    return
+            elif not isfinite(tensions[i]):
                 tensions = self._known(tensions)
         self.tension, self._asked, self._rate, self._left = tensions, lengths, rates, PERIOD
         self._drive(cell)
@@ -269,6 +271,7 @@ class Program:
         """
         limit, length, powered, asked, rate = self.limits.tension, self.length, self.powered, self._asked, self._rate
         left, period, moved = self._left, self.period, []
+        beyond = max(period - left, 0.0)
         for i in self.winches:
             at = length[i]
             if powered[i]:
@@ -277,7 +280,7 @@ class Program:
                 elif left > period + TINY:
                     at += (asked[i] - at) * period / left
                 else:
-                    at = asked[i] + rate[i] * max(period - left, 0.0)
+                    at = asked[i] + rate[i] * beyond
                 if cell[i] > limit[i] and at < length[i]:
                     self._stop(GroupFault.OVER_TENSION)
                     self._slow_down(cell)
