@@ -77,7 +77,7 @@ class TensionLoop:
         m = whole_number(cable_count, "cable_count", 1, MOST_CABLES)
         self.settings = TensionSettings() if settings is None else instance(settings, TensionSettings, "settings")
         cycle = number(period, "period", "s", above=0.0)
-        self._share = cycle / (self.settings.filter_time + cycle)
+        self._share = np.full(m, cycle / (self.settings.filter_time + cycle))  # numpy is slower with one number
         self._row: NullSpace | None = None
         self._filtered, self._correction = np.zeros(m), np.zeros(m)
         self._error, self._change = np.empty(m), np.empty(m)

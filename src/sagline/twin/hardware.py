@@ -49,7 +49,7 @@ class Hardware:
         self._weight, self._gravity, self._slip = np.zeros(6), robot.gravity, np.zeros(m)
         self._wrong: dict[int, tuple[float, float]] = {}  # load cells: what counts of a reading, and what is added
         self._powered, self._torque_of_force = [False] * m, np.zeros(m)
-        self._share = period / (FILTER + period)
+        self._periods, self._shares = np.full(m, period), np.full(m, period / (FILTER + period))
         self._heavier = True  # whether the plant has not been told the weight
         self.read = np.zeros((5, m))
         self._rows = tuple(self.read)
@@ -92,13 +92,13 @@ class Hardware:
         self.counts = np.rint(self._true.counts(reading.length) + self._slip)
         now = self._nominal.lengths(self.counts)
         np.subtract(now, length, out=rate)
-        rate /= self._period
+        rate /= self._periods
         length[:] = now
         np.multiply(reading.force, self._torque_of_force, out=torque)
         tension[:] = reading.load_cell
         for cell, (kept, added) in self._wrong.items():
             tension[cell] = kept * tension[cell] + added
-        filtered += self._share * (tension - filtered)
+        filtered += self._shares * (tension - filtered)
 
     @property
     def saturated(self) -> Array:

@@ -171,8 +171,10 @@ class MachineLink:
         counter, owner, echo, status, fault = groups
         length, rate, torque, tension, filtered = floats
         counts, state, winch_fault = whole
-        told = (counter, clock, owner, echo, status, fault, length, rate, torque, tension, filtered)
-        return Sample(now, age, *told, counts, state, winch_fault, self._discarded.copy())
+        return Sample(
+            now, age, counter, clock, owner, echo, status, fault,
+            length, rate, torque, tension, filtered, counts, state, winch_fault, self._discarded.copy(),
+        )  # fmt: skip
 
     def _mixed(self, newest: list[Snapshot]) -> tuple[Any, ...]:
         """Arrays of which each group's part is its newest."""

@@ -231,11 +231,10 @@ class Machine:
         length: list[float] = []
         tension: list[float] = []
         powered: list[bool] = []
-        for group, program in enumerate(self._programs):
-            if group in self._taken:
-                program.seize(RIVAL, now)
+        for group in self._taken:
+            self._programs[group].seize(RIVAL, now)
+        for group, (program, part) in enumerate(zip(self._programs, self._parts, strict=True)):
             if group not in self._stopped:
-                part = self._parts[group]
                 program.scan(now, encoder[part], cell[part])
             length += program.length
             tension += program.tension
@@ -256,8 +255,8 @@ class Machine:
             for program, part in zip(programs, self._parts, strict=True):
                 self._whole[STATE, part], self._whole[DRIVE_FAULT, part] = program.states(saturated[part])
         self._whole[COUNTS] = hardware.counts
-        new = Snapshot((hardware.read.copy(), self._whole.copy(), groups.copy(), self.time + self._clocks))
-        if before is not None:
+        new = Snapshot((hardware.read.copy(), self._whole.copy(), groups.copy(), self._clocks + self.time))
+        if before is not None and self._stopped:
             for group in self._stopped:
                 new.keep(group, self._parts[group], before)
         return new
