@@ -136,4 +136,5 @@ class CellOff(Fault):
         seen = self.seen
         if cycle.gains is None or not seen.compared or seen.any_low or not all(seen.believed.tolist()):
             return None
-        return cycle.gains.parity.dot(seen.quick)
+        error: Array = cycle.gains.parity.dot(seen.quick)
+        return error
