@@ -7,6 +7,7 @@ import pytest
 
 import sagline as sl
 from sagline.control.link import COUNTERS, Command, Mode, Sample, Sent, newer, sent_to
+from tests.control.rigs import rig, spy_of
 
 MINE, OTHER = 7, 8
 
@@ -40,3 +41,17 @@ def test_a_link_claims_nothing_where_the_command_does_not() -> None:
         owners.append(set(answer.owner.tolist()))
     assert owners[:2] == [{0}, {0}]
     assert owners[-1] == {MINE}
+
+
+def test_a_reading_below_zero_is_no_tension_that_a_motor_could_hold() -> None:
+    control, machine = rig(home=False)
+    machine.inject("cell 3 reads -4 N")
+    for _ in range(30):
+        control.cycle()
+    control.connect()
+    sample, command = control.sample, spy_of(control).commands[-1]
+    assert sample is not None
+    assert command is not None
+    assert sample.filtered[3] < -3.0
+    assert (command.tension > 100.0).tolist() == [True, True, True, False, True, True, True, True]
+    assert command.tension[3] == 0.0

@@ -126,7 +126,7 @@ def drive(bench: Bench, seed: int, scans: int) -> dict[str, int]:
     """Do this and that to both; how often what came about."""
     random, seen = np.random.default_rng(seed), dict[str, int]()
     last: dict[str, Any] = {}
-    counter, silent, asked = int(random.integers(1, 2**31 - 1)), 0, list(bench.encoder)
+    counter, silent, slips, asked = int(random.integers(1, 2**31 - 1)), 0, 0, list(bench.encoder)
     for _ in range(scans):
         program = bench.program
         owner = int(random.choice([1, 1, 1, 1, 1, 1, 1, 1, 1, 2]))
@@ -143,7 +143,8 @@ def drive(bench: Bench, seed: int, scans: int) -> dict[str, int]:
             values: dict[str, Any] = {"counter": counter, "mode": mode, "owner": owner, "valid_for": 100}
             for i, at in enumerate(asked):
                 broken = random.random() < 0.002
-                row = (at, speed, np.nan if broken else random.uniform(50, 200), random.random() < 0.995)
+                tension = random.choice([np.nan, -0.1, 300.1, 300.0, 0.0]) if broken else random.uniform(50, 200)
+                row = (at, speed, tension, random.random() < 0.995)
                 values |= {
                     f"winch[{i + 1}].{name}": value
                     for name, value in zip(("length", "rate", "tension", "enable"), row, strict=True)
@@ -155,8 +156,11 @@ def drive(bench: Bench, seed: int, scans: int) -> dict[str, int]:
         moved = zip(program.length, bench.encoder, strict=True)
         bench.encoder = [to if random.random() < 0.9 else there for to, there in moved]
         if random.random() < 0.002:
+            slips = 3
+        if slips:  # and again, though its set point follows it
+            slips -= 1
             bench.encoder = [there + 0.02 for there in bench.encoder]
-        program.emergency |= bool(random.random() < 0.001)
+        program.emergency |= bool(random.random() < (0.05 if slips else 0.001))
         if random.random() < 0.001:
             program.trip(int(random.integers(bench.count)), 7)
         stuck = program.emergency or program.locked or any(program.drive_fault)
@@ -164,6 +168,8 @@ def drive(bench: Bench, seed: int, scans: int) -> dict[str, int]:
             float(np.float32(each))
             for each in random.uniform(100.0, 301.0 if random.random() < 0.2 else 290.0, bench.count)
         ]
+        if slips or random.random() < 0.01:
+            cell[0] = float(random.choice([np.nan, -20.0, 310.0, 150.0]))
         saturated = (random.random(bench.count) < 0.1).tolist()
         bench.scan(cell, reset=bool(stuck and random.random() < 0.02), saturated=saturated)
         for what in (GroupFault(program.fault).name, f"status {program.status}", f"mode {Mode(program._mode).name}"):
@@ -173,7 +179,7 @@ def drive(bench: Bench, seed: int, scans: int) -> dict[str, int]:
 
 @pytest.mark.parametrize("count", [2, 1])
 def test_the_source_does_what_the_twins_program_does(count: int) -> None:
-    seen = drive(Bench(count), seed=count, scans=6_000)
+    seen = drive(Bench(count), seed=count, scans=8_000)
     assert set(seen) >= {each.name for each in GroupFault}
     assert set(seen) >= {f"status {code}" for code in (1, 2, 3, 5, 9, 17, 35, 98)}
 

@@ -252,3 +252,21 @@ def test_two_controllers_on_one_machine() -> None:
         second.send(Mode.HOLD)
     assert (sample.owner == 2).all()
     assert rig.time == pytest.approx(67 * PERIOD)
+
+
+@pytest.mark.parametrize(("expected", "fault", "most"), [(1e6, GroupFault.SET_POINT, 1e-4), (1999.0, None, 0.02)])
+def test_motors_that_are_told_to_expect_too_much_let_no_cable_run(
+    expected: float, fault: GroupFault | None, most: float
+) -> None:
+    """Beyond the limit it is refused; below, drives that lag hold what their cells read: 17 mm, then they stand."""
+    pilot = Pilot(sl.twin.Machine(ROBOT, seed=1).link(), PLAN)
+    pilot.hold(0.2)
+    begin = pilot.go(0.05)[-1]
+    pilot.tension = np.full_like(pilot.tension, expected)
+    followed = pilot.go(0.3)
+    if fault is not None:
+        assert set(followed[3].fault.tolist()) == {fault}
+    held = pilot.hold(0.7)
+    assert np.abs([sample.length - begin.length for sample in followed + held]).max() < most
+    assert np.abs(held[-1].rate).max() < 1e-3
+    assert held[-1].tension == pytest.approx(begin.tension, abs=40.0)

@@ -191,14 +191,14 @@ def test_a_command_to_hold_ramps_too() -> None:
     assert (program.fault, program.status) == (GroupFault.NONE, GroupStatus.READY)
 
 
-@pytest.mark.parametrize("broken", ["nan", "inf", "fast", "rate", "tension"])
+@pytest.mark.parametrize("broken", ["nan", "inf", "fast", "rate", "no tension", "pushed", "beyond its limit"])
 def test_set_points_that_are_refused(broken: str) -> None:
     group = Group()
     program = group.moving()
     length, rate, tension = list(program.length), [0.2, -0.1], [150.0, 160.0]
     index = 1
-    if broken == "tension":
-        tension[index] = math.nan
+    if broken in (tensions := {"no tension": math.nan, "pushed": -0.1, "beyond its limit": 2000.1}):
+        tension[index] = tensions[broken]
     elif broken == "rate":
         rate[index] = -0.51
     else:
@@ -206,6 +206,7 @@ def test_set_points_that_are_refused(broken: str) -> None:
     before = list(program.length)
     group.do(Mode.FOLLOW, length, rate, tension=tension)
     assert program.fault == GroupFault.SET_POINT
+    assert program.tension == [150.0, 160.0]
     for _ in range(30):
         group.scan()
     assert np.isfinite(program.length).all()
@@ -223,10 +224,11 @@ def test_set_points_at_the_ends_of_their_range(start: float, step: float) -> Non
     assert program.length[1] == start + 0.999 * step
 
 
-def test_too_much_tension_takes_in_no_more_cable() -> None:
+@pytest.mark.parametrize("reading", [2001.0, math.nan])
+def test_too_much_tension_takes_in_no_more_cable(reading: float) -> None:
     group = Group()
     program = group.moving()
-    group.cell = [900.0, 2001.0]
+    group.cell = [900.0, reading]
     before = list(program.length)
     for cycle in range(1, 30):
         group.do(Mode.FOLLOW, [before[0] + 0.002 * cycle, before[1] - 0.001 * cycle], [0.2, -0.1])
@@ -241,13 +243,64 @@ def test_too_much_tension_takes_in_no_more_cable() -> None:
     assert not program.fault
 
 
-def test_a_drive_that_does_not_follow() -> None:
+@pytest.mark.parametrize("reading", [2001.0, math.nan])
+def test_nor_while_it_slows_down(reading: float) -> None:
+    group = Group()
+    program = group.moving()
+    group.cell = [900.0, reading]
+    before = list(program.length)
+    group.do(Mode.HOLD)
+    for _ in range(25):
+        group.scan()
+    assert program.length[0] - before[0] == pytest.approx(0.2 * RAMP / 2)
+    assert program.length[1] == before[1]
+
+
+@pytest.mark.parametrize(("reading", "held"), [(120.0, 120.0), (-3.0, 0.0), (math.nan, 150.0), (1000.1, 150.0)])
+def test_a_drive_that_does_not_follow_stands_where_it_is_and_holds_what_its_cell_reads(
+    reading: float, held: float
+) -> None:
     group = Group()
     program = group.moving()
     group.encoder[0] = program.length[0] + 0.0101
+    group.cell[0] = reading
     group.do(Mode.FOLLOW, program.length, [0.2, -0.1])
     assert program.fault == GroupFault.FOLLOWING_ERROR
     assert program.length[0] == group.encoder[0]
+    assert program.tension == [held, 160.0]
+    for _ in range(30):  # what is expected of it may be what was wrong: a command to hold leaves it
+        group.do(Mode.HOLD, tension=[700.0, 160.0])
+    assert (program.fault, program.powered, program.tension) == (GroupFault.NONE, [True, True], [held, 160.0])
+
+
+def test_a_drive_that_lags_again_gets_its_brake_until_the_operator_lets_it_go() -> None:
+    """Whatever stopped its group before."""
+    group = Group()
+    program = group.moving()
+    while not program.fault:
+        group.scan()
+    assert program.fault == GroupFault.HEARTBEAT
+    for powered in ([True, True], [False, False]):
+        group.encoder[0] = program.length[0] + 0.0101
+        group.scan()
+        assert (program.fault, program.powered) == (GroupFault.FOLLOWING_ERROR, powered)
+    for _ in range(30):
+        group.do(Mode.HOLD)
+    assert program.status == GroupStatus.READY | GroupStatus.LOCKED | GroupStatus.BRAKED
+    program.reset()
+    group.do(Mode.HOLD)
+    assert group.do(Mode.HOLD).powered == [True, True]
+
+
+def test_a_command_to_hold_ends_no_ramp_that_a_fault_began() -> None:
+    group = Group()
+    program = group.moving()
+    before, since = list(program.length), group.now
+    group.do(Mode.FOLLOW, [math.nan, math.nan])
+    while program.fault:
+        assert group.do(Mode.HOLD).status & (GroupStatus.RAMPING | GroupStatus.HOLDING | GroupStatus.READY)
+    assert group.now - since == pytest.approx(RAMP + PERIOD, abs=1.1 * PERIOD)
+    assert np.subtract(program.length, before) == pytest.approx(np.array([0.2, -0.1]) * RAMP / 2)
 
 
 def test_locked_drums_are_the_operator_s() -> None:

@@ -314,7 +314,8 @@ class Loop:
 
     def _send(self, mode: Mode, length: Array, rate: Array, tension: Array, enable: Flags) -> None:
         self._counter = self._counter % COUNTERS + 1
-        self._command = Command(self._counter, self.owner, mode, VALID_FOR, length, rate, tension, enable)
+        pulls = np.maximum(tension, 0.0)  # of a reading below zero; a PLC refuses to push
+        self._command = Command(self._counter, self.owner, mode, VALID_FOR, length, rate, pulls, enable)
 
     def _send_hold(self, mode: Mode, enable: Flags) -> None:
         length, tension = self._hold

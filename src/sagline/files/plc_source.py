@@ -29,7 +29,6 @@ from sagline.twin.plc_program import FOLLOWING, TINY
 from sagline.twin.start import plc_limits
 
 ENDING: Final = ".scl"
-FINITE: Final = 3.4e38  # no greater number is a REAL
 STOP: Final = """\
    // slow down by itself, and hold
    IF #wanted <> 0 AND #fault = 0 THEN
@@ -105,7 +104,6 @@ def _words(robot: Robot) -> dict[str, str]:
         "layout": str(LAYOUT),
         "counters": str(COUNTERS),
         "half": str(COUNTERS // 2),
-        "finite": f"{FINITE:.1E}",
         "tiny": f"{TINY:.1E}",
         "following_error": str(FOLLOWING),
         "heartbeat": str(HEARTBEAT),

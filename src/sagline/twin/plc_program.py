@@ -52,7 +52,7 @@ class Limits(NamedTuple):
         least: Shortest set points [m].
         most: Longest [m].
         speed: Largest rates [m/s].
-        tension: Largest at which cable is taken in [N].
+        tension: Largest at which cable is taken in, and that may be expected [N].
     """
 
     least: list[float]
@@ -170,8 +170,13 @@ class Program:
             self._brake()
             return
         if self._lags(encoder):
-            self._let_lag(encoder)
+            if self.fault == GroupFault.FOLLOWING_ERROR:  # its set point was put where it stood: nothing holds it
+                self.locked = True
+                self._brake()
+                return
+            self._let_lag(encoder, cell)
             self._stop(GroupFault.FOLLOWING_ERROR)
+            self.fault = GroupFault.FOLLOWING_ERROR  # whatever came before
         if any(self.drive_fault):
             self.fault = self.fault or GroupFault.DRIVE
         elif fresh and order is not None and (not self.fault or (order.mode == _HOLD and self._was_told)):
@@ -198,11 +203,13 @@ class Program:
             return False
         return True
 
-    def _let_lag(self, encoder: list[float]) -> None:
-        """Set points of drives that are too far from theirs are where they are."""
-        rows = zip(self.powered, self.length, self._rate, encoder, strict=True)
-        parts = [(there, 0.0) if has and abs(at - there) > FOLLOWING else (at, rate) for has, at, rate, there in rows]
-        self.length, self._rate = [at for at, _ in parts], [rate for _, rate in parts]
+    def _let_lag(self, encoder: list[float], cell: list[float]) -> None:
+        """Set points of drives that are too far from theirs are where they are, and hold what their cells read."""
+        read = self._known([max(reading, 0.0) for reading in cell])
+        self.length, self._rate, self.tension = list(self.length), list(self._rate), list(self.tension)
+        for i in self.winches:
+            if self.powered[i] and abs(self.length[i] - encoder[i]) > FOLLOWING:
+                self.length[i], self._rate[i], self.tension[i] = encoder[i], 0.0, read[i]
 
     def _brake(self) -> None:
         """Take the power from all drives, whose brakes fall."""
@@ -230,19 +237,21 @@ class Program:
         if order.mode == _FOLLOW and any(self.powered):
             self._follow(order, waited, cell)
             return
-        self.tension = self._known(order.tension)
+        known = self._known(order.tension)  # a drive that holds goes on with what it has
+        self.tension = [old if has else new for has, old, new in zip(self.powered, self.tension, known, strict=True)]
         if self._mode == _FOLLOW and any(self._rate):
             self._ramp = RAMP
         self._mode = order.mode
         self._slow_down(cell)
 
     def _known(self, tension: list[float]) -> list[float]:
-        """Tensions that are expected; where none is told, that of before."""
-        return [new if isfinite(new) else old for new, old in zip(tension, self.tension, strict=True)]
+        """Tensions that are expected; where none is told that may be, that of before."""
+        rows = zip(tension, self.tension, self.limits.tension, strict=True)
+        return [new if 0.0 <= new <= most and isfinite(new) else old for new, old, most in rows]
 
     def _follow(self, order: Order, waited: float, cell: list[float]) -> None:
         """Take new set points, if they are within their limits and no faster than the winches since the last ones."""
-        least, most, speed, _ = self.limits
+        least, most, speed, tightest = self.limits
         lengths, rates, tensions, asked = order.length, order.rate, order.tension, self._asked
         self._mode, self._ramp = _FOLLOW, 0.0
         waited = max(waited, 0.0) + PERIOD  # one may have come late, and this one not
@@ -254,12 +263,13 @@ class Program:
                     least[i] <= length <= most[i]
                     and -far <= length - asked[i] <= far
                     and -fastest - TINY <= rates[i] <= fastest + TINY
+                    and 0.0 <= tensions[i] <= tightest[i]
                     and isfinite(tensions[i])
                 ):
                     self._stop(GroupFault.SET_POINT)
                     self._slow_down(cell)
                     return
-            elif not isfinite(tensions[i]):
+            elif not 0.0 <= tensions[i] <= tightest[i]:
                 tensions = self._known(tensions)
         self.tension, self._asked, self._rate, self._left = tensions, lengths, rates, PERIOD
         self._drive(cell)
@@ -281,7 +291,7 @@ class Program:
                     at += (asked[i] - at) * period / left
                 else:
                     at = asked[i] + rate[i] * beyond
-                if cell[i] > limit[i] and at < length[i]:
+                if not cell[i] <= limit[i] and at < length[i]:  # no number is too much
                     self._stop(GroupFault.OVER_TENSION)
                     self._slow_down(cell)
                     return
@@ -303,7 +313,7 @@ class Program:
         self._ramp = self._ramp - period if self._ramp - period > TINY else 0.0
         self.length = list(self.length)
         for i in self.winches:
-            if self.powered[i] and not (cell[i] > self.limits.tension[i] and self._rate[i] < 0.0):
+            if self.powered[i] and (cell[i] <= self.limits.tension[i] or self._rate[i] >= 0.0):
                 self.length[i] += self._rate[i] * mean
         self._asked = list(self.length)
         if not self._ramp:
