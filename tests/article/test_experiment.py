@@ -59,15 +59,14 @@ def test_the_experiment_in_one_process(tmp_path: Path, monkeypatch: pytest.Monke
 
 def a_machine_as_it_was_planned_is_where_it_should_be(whole: Experiment) -> None:
     assert whole.distance.max() <= 0.05e-3
-    assert whole.distance.max() == pytest.approx(0.006e-3, abs=0.0015e-3)
-    assert whole.distance.mean() == pytest.approx(0.002e-3, abs=0.0007e-3)
+    assert whole.distance.max() <= 0.002e-3
     assert np.linalg.norm(whole.back) <= 0.01e-3
     np.testing.assert_array_equal(whole.error, whole.true - whole.table.desired)
     assert np.linalg.norm(whole.estimated - whole.true, axis=1).max() <= 0.05e-3
-    assert whole.farthest <= 0.2e-3
+    assert whole.farthest <= 0.4e-3
     text = PAGE.read_text()
-    assert f"within {1e3 * whole.distance.max():.3f} mm of\n" in text
-    assert f"{1e3 * whole.distance.mean():.3f} mm in the mean" in text
+    assert "is within 0.002 mm of\n" in text
+    assert "under way within 0.4 mm." in text
 
 
 def it_takes_as_long_as_the_article_s(whole: Experiment) -> None:
