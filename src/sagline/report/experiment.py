@@ -85,15 +85,15 @@ def _stops(result: Experiment) -> Finding:
         for k, point in enumerate(table.points)
     ]
     worst, ours, theirs = int(np.argmax(result.distance)), 1e3 * result.distance, 1e3 * table.distance
-    rows.append(("mean", "", "", n(1e3 * table.distance.mean(), ".1f"), "", n(ours.mean(), ".3f"), ""))
+    rows.append(("mean", "", "", n(1e3 * table.distance.mean(), ".1f"), "", n(ours.mean(), ".4f"), ""))
     return Finding(
         key="stops",
         tables=(2,),
         title="ours beside the article's",
         statement=f"Errors from {n(theirs.min(), '.1f')} to {n(theirs.max(), '.1f', 'mm')}, "
         f"{n(theirs.mean(), '.1f', 'mm')} in the mean.",
-        measured=f"Ours: {n(ours.mean(), '.2g', 'mm')} in the mean, {n(ours.max(), '.2g', 'mm')} at most, at "
-        f"{table.points[worst]}. Back at home the platform is {n(1e3 * np.linalg.norm(result.back), '.2g', 'mm')} from "
+        measured=f"Ours: {n(ours.mean(), '.4f')} mm in the mean, {n(ours.max(), '.4f')} mm at most, at "
+        f"{table.points[worst]}. Back at home the platform is {n(1e3 * np.linalg.norm(result.back), '.4f')} mm from "
         "where it began.",
         verdict=Verdict.OURS,
         numbers={
