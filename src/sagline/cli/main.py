@@ -16,6 +16,7 @@ from typer.core import TyperCommand, TyperGroup
 from sagline.cli.commands.article import article, identify
 from sagline.cli.commands.control import control
 from sagline.cli.commands.experiment import experiment
+from sagline.cli.commands.log import log
 from sagline.cli.commands.motion import simulate, vibrate
 from sagline.cli.commands.poses import forward, tension
 from sagline.cli.commands.robots import convert, examples, export_c, export_scl, new, robots, show
@@ -45,6 +46,7 @@ Start here:
     sagline view cogiro                  drag a platform in the browser
     sagline twin article-prototype       a machine to drive, over S7
     sagline control article-prototype --plc ADDRESSES  drive it, line by line
+    sagline log run.mcap                 what it did, also after a crash
     sagline new my_robot.yaml            a robot of your own, by questions
 """
 
@@ -144,7 +146,7 @@ def sagline(
 
 for command in (
     track, lengths, encoder, run, article, identify, forward, tension, vibrate, simulate, robots, show, examples, new,
-    convert, export_c, export_scl, view, twin, control, experiment,
+    convert, export_c, export_scl, view, twin, control, experiment, log,
 ):  # fmt: skip
     text = _help(command.__doc__)
     app.command(cls=Command, help=text, short_help=text.partition("\n\n")[0])(command)

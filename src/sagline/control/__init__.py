@@ -3,6 +3,7 @@
 from sagline.control.checks import Motion
 from sagline.control.controller import Controller
 from sagline.control.cycle import Cycle
+from sagline.control.deviation import null_space_error, planned_position, position_error
 from sagline.control.events import Event, EventKind
 from sagline.control.execution import Execution, ExecutionStatus, Samples
 from sagline.control.fault import Fault, Reaction
@@ -47,5 +48,8 @@ __all__ = [
     "faults_of",
     "gains_along",
     "null_space",
+    "null_space_error",
     "parity",
+    "planned_position",
+    "position_error",
 ]

@@ -88,6 +88,9 @@ def execution_of_log(log: Log, plan: int | None = None) -> Execution:
         raise InvalidValueError("plan", plan, has, "Choose one of them, or None for all cycles.")
     number = (0 if count == 1 else None) if plan is None else plan % count
     blocks = [block for block in log.blocks if plan is None or block.get("plan") == number]
+    if log.truth and not log.blocks:
+        step = "Give it as: sagline view ROBOT RUN.mcap --truth FILE."
+        raise FileError(log.path, "is the log of a twin, where the platform really was: no execution", step)
     if log.robot is None or not blocks:
         raise FileError(log.path, "has no cycle", "Nothing was recorded in it, or it was cut off at once.")
     try:

@@ -1,0 +1,164 @@
+"""`sagline log`: what a log of the controller holds, in numbers, and as a data set for other tools."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from sagline.arrays import Array
+from sagline.cli.tables import Grid, show_table
+from sagline.cli.terminal import show, show_json, working
+from sagline.cli.values import whole_of
+from sagline.control.deviation import position_error
+from sagline.control.events import Event
+from sagline.control.execution import Execution
+from sagline.control.states import State
+from sagline.files.execution_file import load_execution, save
+from sagline.files.whole import check_file
+from sagline.numbers import n
+
+MOST_EVENTS: Final = 20  # that are listed
+MOST_PLANS: Final = 100_000
+# a cycle that began later than one and no later than the next [s]
+LATE: Final = (0.0, 1e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 1e-1, np.inf)
+BAR: Final = 30  # characters of the longest bar
+
+
+class Extreme(NamedTuple):
+    """The largest of something.
+
+    Attributes:
+        name: What it is.
+        value: How large.
+        unit: Its unit.
+        time: When, since the first cycle [s].
+        cable: Of which; None where it is the platform's, or the loop's.
+    """
+
+    name: str
+    value: float
+    unit: str
+    time: float
+    cable: int | None = None
+
+
+def log(file: Path, to: Path | None, plan: str | None, *, as_json: bool) -> int:
+    """Read a log and tell what is in it, or write it to another file; returns the exit code.
+
+    Raises:
+        SaglineError: If it cannot be read, has no such plan, or the other file cannot be written.
+    """
+    which = None if plan is None else whole_of(plan, "--plan", 0, MOST_PLANS)
+    if to is not None:
+        check_file(to)
+    with working(f"reading {file.name}"):
+        done = load_execution(file, which)
+    if to is not None:
+        with working(f"writing {to.name}"):
+            save(done, to)
+    if as_json:
+        show_json(_record(done, to))
+    elif to is not None:
+        show(f"{to}: {len(done):,} cycles of {done.robot.name}", whole=True)
+    else:
+        _tell(done)
+    return 0
+
+
+def _tell(done: Execution) -> None:
+    duration = _since(done, done.time[-1]) if len(done) else 0.0
+    silent = int(np.count_nonzero(~done.answered))
+    show(f"{done.robot.name}: {len(done):,} cycles in {n(duration, '.4g', 's')}, {silent:,} of them without an answer.")
+    show(f"{done.status.name}: {done.reason or done.status.text}")
+    show_table(Grid(["state", "time [s]", "cycles"], _states(done)))
+    largest = [
+        [one.name, n(one.value, ".3g", one.unit), "–" if one.cable is None else str(one.cable), f"{one.time:.2f}"]
+        for one in _extremes(done)
+    ]
+    show_table(Grid(["largest", "value", "cable", "at [s]"], largest))
+    show_table(Grid(["cycles that began late by", "cycles", ""], _histogram(done), left=frozenset({0, 2})))
+    if done.events:
+        rows = [_row(done, event) for event in done.events[:MOST_EVENTS]]
+        show_table(Grid(["at [s]", "what", "in words"], rows, left=frozenset({1, 2}), prose=frozenset({2})))
+    if len(done.events) > MOST_EVENTS:
+        show(f"… and {len(done.events) - MOST_EVENTS:,} events more: --to FILE.nc has them all.")
+
+
+def _since(done: Execution, time: float) -> float:
+    return float(time - done.time[0])
+
+
+def _row(done: Execution, event: Event) -> list[str]:
+    return [f"{_since(done, event.time):.2f}", f"{event.kind} {event.name}", event.text]
+
+
+def _states(done: Execution) -> list[list[str]]:
+    """How long the controller was in which state, in the order of the states."""
+    codes, counts = np.unique(done.state, return_counts=True)
+    return [
+        [State(code).name, f"{count * done.period:.2f}", f"{count:,}"]
+        for code, count in zip(codes.tolist(), counts.tolist(), strict=True)
+    ]
+
+
+def _extremes(done: Execution) -> list[Extreme]:
+    """The largest errors; those of which there is one."""
+    errors: list[tuple[str, Array, str]] = [
+        ("tension error", done.tension - done.planned_tension, "N"),
+        ("tension", done.tension, "N"),
+        ("length error", 1e3 * (done.set_length - done.length), "mm"),
+        ("correction of a length", 1e3 * done.correction, "mm"),
+        ("distance from the plan, estimated", 1e3 * np.linalg.norm(position_error(done), axis=1), "mm"),
+        ("age of a sample", 1e3 * done.samples.age, "ms"),
+        ("delay of a cycle", 1e3 * done.late, "ms"),
+    ]
+    found = []
+    for name, values, unit in errors:
+        size = np.abs(values)
+        if not np.isfinite(size).any():
+            continue
+        place = np.unravel_index(int(np.nanargmax(np.where(np.isfinite(size), size, -1.0))), size.shape)
+        cable = int(place[1]) if size.ndim == 2 and size.shape[1] == done.robot.cable_count else None
+        found.append(Extreme(name, float(size[place]), unit, _since(done, done.time[place[0]]), cable))
+    return found
+
+
+def _histogram(done: Execution) -> list[list[str]]:
+    """How many cycles began how late; empty ends are left out."""
+    counts = [int(np.count_nonzero(done.late <= 0.0))]
+    counts += [int(np.count_nonzero((done.late > low) & (done.late <= high))) for low, high in pairwise(LATE)]
+    names = [
+        "not at all",
+        *(f"up to {n(high, '.3g', 's')}" for high in LATE[1:-1]),
+        f"more than {n(LATE[-2], '.3g', 's')}",
+    ]
+    last = max((k for k, count in enumerate(counts) if count), default=0)
+    most = max(*counts, 1)
+    return [
+        [name, f"{count:,}", "█" * round(BAR * count / most) or "▏" * bool(count)]
+        for name, count in zip(names[: last + 1], counts, strict=False)
+    ]
+
+
+def _record(done: Execution, to: Path | None) -> dict[str, Any]:
+    counts = {row[0]: float(row[1]) for row in _states(done)}
+    return {
+        "robot": done.robot.name,
+        "cycles": len(done),
+        "cycles_without_answer": int(np.count_nonzero(~done.answered)),
+        "duration_s": _since(done, done.time[-1]) if len(done) else 0.0,
+        "status": done.status.name,
+        "reason": done.reason,
+        "states_s": counts,
+        "largest": [one._asdict() for one in _extremes(done)],
+        "late_s": {"p50": _quantile(done, 0.5), "p99.9": _quantile(done, 0.999)},
+        "events": [{**event._asdict(), "state": event.state.name} for event in done.events],
+        "file": to,
+    }
+
+
+def _quantile(done: Execution, share: float) -> float | None:
+    return float(np.quantile(done.late, share)) if len(done) else None
