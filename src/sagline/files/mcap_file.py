@@ -26,6 +26,7 @@ from sagline.files.mcap_layout import (
     EVENT,
     HEAD,
     JSON,
+    NANO,
     PACKED,
     PLAN,
     RECORD,
@@ -49,7 +50,6 @@ from sagline.files.robot_file import dump_robot
 from sagline.kinematics.plan import Plan
 from sagline.robot.robot import Robot
 
-NANO: Final = 1e9
 PACKAGES: Final = ("mcap", "mcap_protobuf", "foxglove_schemas_protobuf", "zstandard")
 _UNLIMITED: Final = 1 << 40  # bytes: no chunk ends by its size
 
@@ -142,7 +142,8 @@ class McapFile:
             zero: Of homing [m], shape (m,).
             rest: Called between two messages, for a thread that should let others go on.
         """
-        stamps, kept = self._stamps(columns["time"]), {**columns, "plan": np.array(plan), "zero": zero}
+        stamps = self._stamps(columns["time"])
+        kept = {**columns, "plan": np.array(plan), "zero": zero, "epoch": np.array(self.epoch)}
         for stamp, text in zip(stamps, cycle_texts(kept), strict=True):
             self._message(CYCLE, stamp, text)
             rest()

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sagline.control.events import Event, EventKind
 from sagline.control.states import State
 
+NANO: Final = 1e9  # of the log's own clock in a second
 FORMAT: Final = 1  # raised whenever an older sagline could misread a log
 SOURCE: Final = f"sagline {version('sagline')}"
 CYCLE, RECORD, EVENT, TF, SCENE, TRUTH = "/cycle", "/record", "/event", "/tf", "/scene", "/truth"

@@ -21,7 +21,8 @@ from sagline.control.link import PERIOD, groups_of
 from sagline.control.recording import Recorded, Tape
 from sagline.errors import FileError
 from sagline.files.execution_layout import DECIMALS, NONE, columns_of
-from sagline.files.mcap_file import NANO, McapFile, check_packages
+from sagline.files.mcap_file import McapFile, check_packages
+from sagline.files.mcap_layout import NANO
 from sagline.files.packed import rounded
 from sagline.files.whole import check_file, written_whole
 from sagline.kinematics.plan import Plan
@@ -111,11 +112,11 @@ class Recorder:
 
         Args:
             time: On the twin's clock [s].
-            position: Of the platform's origin [m], shape (3,); it is not written to again.
-            quaternion: Rotation platform -> world, scalar last, shape (4,); neither is this.
+            position: Of the platform's origin [m], shape (3,); a copy is taken.
+            quaternion: Rotation platform -> world, scalar last, shape (4,); so it is of this.
         """
         self._date(time)
-        self._put(partial(self._mcap.truth, time, position, quaternion))
+        self._put(partial(self._mcap.truth, time, position.copy(), quaternion.copy()))
 
     def close(self) -> None:
         """Write what waits, and the end; wait until that is done."""

@@ -7,6 +7,7 @@ Axes it is `ax.figure` that does. `save` writes either to a file.
 from sagline.plot.courses import lengths, overview, tensions
 from sagline.plot.energy import energy
 from sagline.plot.errors import error, errors
+from sagline.plot.execution import execution, measured_tensions, mendable_tensions, place_errors, states
 from sagline.plot.film import film
 from sagline.plot.frequencies import frequencies
 from sagline.plot.maps import frequency_map
@@ -20,16 +21,21 @@ __all__ = [
     "energy",
     "error",
     "errors",
+    "execution",
     "film",
     "frequencies",
     "frequency_map",
     "lengths",
+    "measured_tensions",
+    "mendable_tensions",
     "overview",
     "path",
+    "place_errors",
     "polygon",
     "response",
     "robot",
     "save",
+    "states",
     "tensions",
     "velocity",
 ]

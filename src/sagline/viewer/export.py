@@ -13,7 +13,7 @@ from trimesh.transformations import compose_matrix, quaternion_matrix
 
 from sagline.robot.several import pulleys_of
 from sagline.viewer import lines, solids
-from sagline.viewer.moment import Moment
+from sagline.viewer.drawn import Drawn
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.stage import DRUM, INFEASIBLE, PLATFORM, STEEL
 from sagline.viewer.tension_scale import TensionScale
@@ -25,7 +25,7 @@ _DEAD_RADIUS = 0.0006  # the same of what runs guided behind the pulleys
 _Z_UP_TO_Y_UP = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
 
 
-def scene_as_glb(snapshot: Snapshot | Moment, scale: TensionScale, sag_scale: float = 1.0) -> bytes:
+def scene_as_glb(snapshot: Snapshot | Drawn, scale: TensionScale, sag_scale: float = 1.0) -> bytes:
     """Frame, pulleys, winches, platform and cables, in meters, y up as glTF wants it."""
     robot = snapshot.robot
     scene = trimesh.Scene()

@@ -8,7 +8,7 @@ from sagline.arrays import Array
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.viewer.course_figure import CourseFigure
-from sagline.viewer.moment import Moment
+from sagline.viewer.drawn import Drawn
 from sagline.viewer.snapshot import Snapshot
 
 
@@ -35,7 +35,7 @@ class Played(Protocol):
     def still(self) -> str:
         """What to say in place of what would change the robot."""
 
-    def sight(self, time: float) -> Snapshot | Moment:
+    def sight(self, time: float) -> Snapshot | Drawn:
         """What there is to see at a time [s]."""
 
     def traces(self, most: int, error_scale: float) -> tuple[Array, Array]:

@@ -68,6 +68,11 @@ class RunPanel:
         self._play.label = "Pause" if timeline.playing else "Play"
         self._play.icon = viser.Icon.PLAYER_PAUSE if timeline.playing else viser.Icon.PLAYER_PLAY
 
+    def extend(self, played: Played) -> None:
+        """Have more of the same."""
+        self._figures, self._key = played.figures(), played.key()
+        self._time.max, self._time.step = played.duration, played.duration / _STEPS
+
     def remove(self) -> None:
         """Take the panel away."""
         self._folder.remove()

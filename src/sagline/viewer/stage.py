@@ -14,7 +14,7 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.robot.several import pulleys_of
 from sagline.viewer import lines, solids
-from sagline.viewer.moment import Moment
+from sagline.viewer.drawn import Drawn
 from sagline.viewer.readout import headline
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.tension_scale import TensionScale
@@ -22,6 +22,7 @@ from sagline.viewer.tension_scale import TensionScale
 # All stand out from the white and from the dark background, 3 : 1 or more but for the floor.
 STEEL, DRUM, FLOOR, SECTION = (120, 128, 138), (104, 112, 122), (172, 178, 186), (132, 138, 146)
 PLATFORM, INFEASIBLE, REST = (58, 134, 201), (220, 56, 48), (200, 118, 16)
+TRUTH = (150, 90, 190)
 WANTED, ACTUAL = PLATFORM, REST  # the paths of these two platforms
 GHOST = (128, 134, 142)
 CABLE_WIDTH, GHOST_WIDTH, TRACE_WIDTH, ARM_WIDTH = 3.5, 1.5, 2.5, 3.0  # px
@@ -54,6 +55,7 @@ class Stage:
         self._platform: Any = self._scene.add_mesh_simple("/platform/body", body.vertices, body.faces, color=PLATFORM)
         self._rest_frame = self._scene.add_frame("/rest", show_axes=False, visible=False)
         self._scene.add_mesh_simple("/rest/body", body.vertices, body.faces, color=REST, opacity=0.55)
+        self._truth: Any = None  # made when it is known for the first time
         self._over_pulleys = pulleys_of(robot).radius > 0.0
         self._wheels = self._build_pulleys(robot, home) if self._over_pulleys.any() else None
         blank = np.zeros((robot.cable_count * (lines.points_per_cable(robot) - 1), 2, 3))
@@ -103,7 +105,7 @@ class Stage:
         self._gizmo.wxyz = np.roll(pose.quaternion, 1)
 
     def show(
-        self, snapshot: Snapshot | Moment, scale: TensionScale, sag_scale: float, error_scale: float, *, ghost: bool
+        self, snapshot: Snapshot | Drawn, scale: TensionScale, sag_scale: float, error_scale: float, *, ghost: bool
     ) -> None:
         """Draw a snapshot, or a moment of a simulation; the platform itself follows the gizmo."""
         self._cables.points = snapshot.cable_segments(sag_scale).astype(np.float32)
@@ -115,6 +117,9 @@ class Stage:
         self._notice.visible = not snapshot.feasible
         if isinstance(snapshot, Snapshot) and not snapshot.feasible:
             self._notice.text = headline(snapshot)
+        elif isinstance(snapshot, Drawn):
+            self._notice.text = snapshot.notice
+            self._show_truth(snapshot, error_scale)
         self._ghost.visible = ghost
         if ghost:
             self._ghost.points = snapshot.ghost_segments(sag_scale, APART * self._size).astype(np.float32)
@@ -124,6 +129,16 @@ class Stage:
         if shown and rest is not None and snapshot.rest is not None:
             self._rest_frame.position = rest
             self._rest_frame.wxyz = np.roll(snapshot.rest.quaternion, 1)
+
+    def _show_truth(self, drawn: Drawn, error_scale: float) -> None:
+        truth, place = drawn.truth, drawn.drawn_truth(error_scale)
+        if self._truth is None and truth is not None:
+            self._truth = self._scene.add_frame("/truth", show_axes=False)
+            self._scene.add_mesh_simple("/truth/body", self._body.vertices, self._body.faces, color=TRUTH, opacity=0.55)
+        if self._truth is not None:
+            self._truth.visible = truth is not None
+        if truth is not None and place is not None:
+            self._truth.position, self._truth.wxyz = place, np.roll(truth.quaternion, 1)
 
     def swing(self, rest: Pose, pose: Pose, courses: Array) -> None:
         """Draw the platform elsewhere than its gizmo, which stays at its rest, and the cables (m, P, 3) with it."""

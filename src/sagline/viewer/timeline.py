@@ -26,6 +26,11 @@ class Timeline:
         time = self.time + max(elapsed, 0.0) * speed
         return Timeline(self.duration, min(time, self.duration), time < self.duration)
 
+    def extended(self, duration: float) -> Timeline:
+        """With an end that has moved on [s]; who stood at the end stands there again."""
+        time = duration if self.time >= self.duration and not self.playing else self.time
+        return Timeline(duration, time, self.playing)
+
     def toggled(self) -> Timeline:
         """Play, from the start again if at the end; or pause."""
         time = 0.0 if not self.playing and self.time >= self.duration else self.time

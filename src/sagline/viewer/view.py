@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sagline.viewer.moment import Moment
+from sagline.viewer.drawn import Drawn
 from sagline.viewer.settings import Settings
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.tension_scale import TensionScale
@@ -14,7 +14,7 @@ from sagline.viewer.tension_scale import TensionScale
 class View:
     """What is shown: a snapshot, and how it is drawn."""
 
-    snapshot: Snapshot | Moment
+    snapshot: Snapshot | Drawn
     settings: Settings
     scale: TensionScale
     ghost: bool

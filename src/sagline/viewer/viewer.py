@@ -19,9 +19,10 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.stiffness import modes
-from sagline.viewer import dynamics, moment_words, readout, solids
+from sagline.viewer import dynamics, moment_words, readout, session_words, solids
 from sagline.viewer.aside import Aside
 from sagline.viewer.cut_panel import CutPanel
+from sagline.viewer.drawn import Drawn
 from sagline.viewer.export_panel import ExportPanel
 from sagline.viewer.framing import Framing
 from sagline.viewer.mode_show import ModeShow
@@ -32,6 +33,7 @@ from sagline.viewer.playback import Playback
 from sagline.viewer.played import Played
 from sagline.viewer.polygon_figure import polygon_figure, polygon_later
 from sagline.viewer.run_panel import RunPanel
+from sagline.viewer.session import SessionMoment
 from sagline.viewer.settings import Settings
 from sagline.viewer.snapshot import Snapshot, taken_at
 from sagline.viewer.stage import TRACE_POINTS, Stage
@@ -142,6 +144,13 @@ class Viewer:
         """Say what the numbers wait for; from any thread."""
         self._panel.wait(what)
 
+    def extend(self, played: Played) -> None:
+        """Have what is played go on: it begins as what was played before, and is longer; from any thread.
+
+        Who looks at its end sees the new end; who looks at an earlier time goes on doing that.
+        """
+        self._soon(lambda: self._extend(played))
+
     def stop(self) -> None:
         """Let `serve` return; from any thread."""
         self._stopping.set()
@@ -179,6 +188,14 @@ class Viewer:
             self._stage.show_traces(np.empty((0, 3)), np.empty((0, 3)))
         self._export.offer_film(None if played is None else played.name)
         self._cut_panel.offer_back(self._given.name if self._given is not None and played is not self._given else "")
+
+    def _extend(self, played: Played) -> None:
+        if self._run_panel is None or self._played is not self._given:  # what a cut brought is looked at
+            self._given = played
+            return
+        self._played = self._given = played
+        self._clock, self._traced = self._clock.extended(played.duration), 0.0
+        self._run_panel.extend(played)
 
     def _back(self) -> None:
         self._play(self._given)
@@ -248,7 +265,7 @@ class Viewer:
         self._panel.show_what_if(self._played.still if following and self._played is not None else "")
         self._show(View(snapshot, settings, self._scale, self._panel.ghost), follow=following)
 
-    def _from_played(self) -> Snapshot | Moment:
+    def _from_played(self) -> Snapshot | Drawn:
         assert self._played is not None
         return self._played.sight(self._clock.time)
 
@@ -284,9 +301,16 @@ class Viewer:
         self.updates += 1
         self.shown.set()
 
-    def _words(self, snapshot: Snapshot | Moment) -> tuple[str, str, str]:
+    def _words(self, snapshot: Snapshot | Drawn) -> tuple[str, str, str]:
         """Verdict, numbers and polygon."""
-        if isinstance(snapshot, Moment):
+        if isinstance(snapshot, SessionMoment):
+            return (
+                session_words.verdict(snapshot),
+                session_words.numbers(snapshot, self._scale),
+                session_words.polygon(),
+            )
+        if isinstance(snapshot, Drawn):
+            assert isinstance(snapshot, Moment)
             return moment_words.verdict(snapshot), moment_words.numbers(snapshot, self._scale), moment_words.polygon()
         return (
             readout.verdict(snapshot, capacity=self._ready(Reading.MARGIN)),
@@ -294,9 +318,9 @@ class Viewer:
             polygon_figure(snapshot) if self._ready(Reading.POLYGON) else polygon_later(),
         )
 
-    def _vibrating(self, snapshot: Snapshot | Moment, settings: Settings) -> tuple[Equilibrium | None, Hashable]:
+    def _vibrating(self, snapshot: Snapshot | Drawn, settings: Settings) -> tuple[Equilibrium | None, Hashable]:
         """The state whose modes are asked for, if there is one, and what tells it from others."""
-        if isinstance(snapshot, Moment) or snapshot.plan is None or not snapshot.feasible:
+        if isinstance(snapshot, Drawn) or snapshot.plan is None or not snapshot.feasible:
             return None, None
         if self._clock.playing or not self._ready(Reading.MODES):
             return None, None

@@ -7,16 +7,30 @@ from typing import Annotated
 
 import typer
 
-from sagline.cli.options import PayloadOption, RobotArgument, WrenchOption
+from sagline.cli.choices import robot_completions
+from sagline.cli.options import PayloadOption, WrenchOption
 
 
 def view(
-    robot: RobotArgument,
+    robot: Annotated[
+        str,
+        typer.Argument(
+            metavar="ROBOT",
+            help="A preset (see sagline robots) or a robot file, robot.yaml; or a log of the controller, run.mcap.",
+            autocompletion=robot_completions,
+        ),
+    ],
     run: Annotated[
         Path | None,
         typer.Argument(
-            metavar="RUN.nc", help="A run of this robot, written by sagline track, or a simulation, to play."
+            metavar="RUN",
+            help="To play: a run of this robot, written by sagline track, a simulation, or a log of the controller.",
         ),
+    ] = None,
+    live: Annotated[bool, typer.Option("--live", help="Follow a log that is still written.")] = False,
+    truth: Annotated[
+        Path | None,
+        typer.Option(metavar="TWIN.mcap", help="Beside a log: the twin's own, where the platform truly was."),
     ] = None,
     pose: Annotated[
         str | None,
@@ -48,7 +62,9 @@ def view(
         sagline view own_robot.yaml --payload "5 kg" --port 9000
         sagline track article-mixed --model empirical
         sagline view article-mixed output/article-mixed-empirical.nc
+        sagline view run.mcap --live
+        sagline view run.mcap --truth twin.mcap
     """
     from sagline.cli.view import view as serve
 
-    return serve(robot, run, pose, mode, wrench, payload, host, port, browser=browser)
+    return serve(robot, run, live, truth, pose, mode, wrench, payload, host, port, browser=browser)

@@ -1,0 +1,101 @@
+"""`sagline view run.mcap`: a log of the controller in the browser, also while it grows."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from sagline.cli.hosting import check_viewer, hosted
+from sagline.cli.terminal import note, working
+from sagline.errors import FileError, SaglineError
+from sagline.files.robot_file import load_robot
+
+if TYPE_CHECKING:
+    from sagline.robot.robot import Robot
+    from sagline.viewer.session import Session
+    from sagline.viewer.session_log import Follower
+    from sagline.viewer.viewer import Viewer
+
+LOG: Final = ".mcap"
+LOOK: Final = 0.5  # s, between two looks at a file that grows
+
+
+def view_log(
+    file: Path, robot: str | None, live: bool, truth: Path | None, host: str, port: int, *, browser: bool
+) -> int:
+    """Serve a log until Ctrl-C; returns the exit code.
+
+    Args:
+        file: The log.
+        robot: Whose it should be; None for whosever it is.
+        live: Whether it still grows.
+        truth: The log of the twin that was driven.
+        host: Address to listen on.
+        port: Port to listen on.
+        browser: Whether to open one here.
+
+    Raises:
+        SaglineError: If a file cannot be read, or nothing can listen there.
+    """
+    check_viewer()
+    from sagline.viewer.session_log import Follower
+
+    follower = Follower(file, truth)
+    with working(f"waiting for {file.name}" if live else f"reading {file.name}"):
+        session = _first(follower, live)
+    if robot is not None:
+        _check_robot(file, load_robot(robot), session.robot)
+    if not live:
+        if not follower.log.complete:
+            note("Note: ", f"{file} was cut off: what was recorded in its last second is not there.", style="bold")
+        return hosted(session.robot, session, host, port, browser=browser)
+    return hosted(session.robot, session, host, port, browser=browser, beside=lambda viewer: _grown(follower, viewer))
+
+
+def _first(follower: Follower, live: bool) -> Session:
+    """What is there at first; of a log that grows, as soon as there is something."""
+    while True:
+        try:
+            session = follower.more()
+        except FileError:
+            if not live or follower.log.path.exists():
+                raise
+            session = None
+        if session is not None:
+            return session
+        if not live:
+            raise FileError(follower.log.path, "has no cycle", "Nothing was recorded in it, or it was cut off at once.")
+        time.sleep(LOOK)
+
+
+@contextmanager
+def _grown(follower: Follower, viewer: Viewer) -> Iterator[None]:
+    """While inside, what comes into the log comes onto the page."""
+    over = threading.Event()
+
+    def look() -> None:
+        try:
+            while not over.wait(LOOK):
+                session = follower.more()
+                if session is not None:
+                    viewer.extend(session)
+        except SaglineError as error:
+            note("Note: ", f"the log is followed no longer: {error}", style="bold")
+
+    thread = threading.Thread(target=look, name="sagline follows", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
+
+
+def _check_robot(file: Path, robot: Robot, made_for: Robot) -> None:
+    if made_for.name != robot.name:
+        step = f"View it as: sagline view {file}"
+        raise FileError(file, f"is a log of {made_for.name}, not of {robot.name}", step)

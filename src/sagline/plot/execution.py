@@ -1,0 +1,219 @@
+"""What a machine did: tensions, what they are off, where the platform is, states and events over time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from sagline.arguments import instance
+from sagline.control.deviation import null_space_error, position_error
+from sagline.control.events import EventKind
+from sagline.control.execution import Execution
+from sagline.control.states import State
+from sagline.plot.sheet import (
+    BLUE,
+    COLORS,
+    GAP_COLOR,
+    GREEN,
+    ORANGE,
+    PURPLE,
+    SKY,
+    TICK,
+    VERMILLION,
+    WIDTH,
+    axes_or_new,
+    draw_course,
+    dressed,
+    legend_outside,
+    runs,
+    sheet,
+)  # fmt: skip
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from sagline.arrays import Array
+
+MOST_POINTS: Final = 4000  # of a line: what lies closer is drawn as the range that it covers
+DASHED: Final = (0, (4.0, 1.6))
+PER_METER: Final = 1e3  # mm
+BESIDE: Final[dict[str, Any]] = {  # the axes, in two columns: the band of the states is low
+    "loc": "upper left", "bbox_to_anchor": (1.01, 1.6), "borderaxespad": 0.0, "fontsize": TICK, "frameon": False,
+}  # fmt: skip
+STATES: Final = {  # that have a color of their own
+    State.HOMING: ORANGE, State.MOVING: BLUE, State.JOGGING: SKY, State.PAUSING: GREEN, State.STOPPING: PURPLE,
+    State.FAULT: VERMILLION, State.EMERGENCY: "#8B0000",
+}  # fmt: skip
+
+
+def execution(done: Execution) -> Figure:
+    """An execution at a glance: states, tensions, their error, and the estimated place of the platform.
+
+    From top to bottom: the states, with a line at each fault; the measured tensions, and dashed the planned ones; the
+    part of their error that lengths can mend without moving the platform, filtered as the tension loop does; and the
+    estimated position less the planned one.
+
+    Args:
+        done: The execution.
+
+    Returns:
+        A figure of four panels.
+
+    Raises:
+        InvalidValueError: If the execution is none.
+    """
+    instance(done, Execution, "execution")
+    figure = sheet(height=7.6, width=WIDTH)
+    parts = figure.subplots(4, 1, sharex=True, height_ratios=(0.25, 1.6, 1.0, 1.0))
+    draw: tuple[Callable[[Execution, Axes], Axes], ...] = (states, measured_tensions, mendable_tensions, place_errors)
+    for part, panel in zip(draw, parts, strict=True):
+        part(done, panel)
+        if panel is not parts[-1]:
+            panel.set_xlabel("")
+            panel.tick_params(labelbottom=False)
+        _mark(panel, done)
+    return figure
+
+
+def states(done: Execution, ax: Axes | None = None) -> Axes:
+    """The states of the controller over time, as a band.
+
+    Args:
+        done: The execution.
+        ax: Axes to draw on; None for a new figure.
+
+    Returns:
+        The axes.
+    """
+    ax = axes_or_new(ax, height=0.9)
+    clock = _clock(done)
+    looks: dict[State | None, tuple[str, str]] = {code: (color, code.name) for code, color in STATES.items()}
+    looks[None] = GAP_COLOR, "standing"
+    for code, (color, name) in looks.items():
+        there = ~np.isin(done.state, list(STATES)) if code is None else done.state == code
+        spans = [(clock[first], clock[last] + done.period - clock[first]) for first, last in runs(there)]
+        if spans:
+            ax.broken_barh(spans, (0.0, 1.0), facecolors=color, label=name, linewidth=0.0)
+    dressed(ax, "time [s]", "")
+    ax.set_yticks([])
+    ax.grid(visible=False)
+    ax.spines["left"].set_visible(False)
+    _limit(ax, clock)
+    ax.legend(*ax.get_legend_handles_labels(), ncols=2, handlelength=1.0, columnspacing=1.0, **BESIDE)
+    return ax
+
+
+def measured_tensions(done: Execution, ax: Axes | None = None) -> Axes:
+    """Tensions at the frame ends as the load cells read them, and dashed as they were planned.
+
+    Args:
+        done: The execution.
+        ax: Axes to draw on; None for a new figure.
+
+    Returns:
+        The axes.
+    """
+    ax = axes_or_new(ax)
+    clock = _clock(done)
+    for i, read in enumerate(done.tension.T):
+        _line(ax, clock, read, color=_color(i), linewidth=0.8, alpha=0.8, label=f"cable {i}")
+    for i, planned in enumerate(done.planned_tension.T):
+        _line(ax, clock, planned, color="black", linewidth=0.7, linestyle=DASHED, label="planned" if i == 0 else "_")
+    dressed(ax, "time [s]", "tension at the frame [N]")
+    _limit(ax, clock)
+    legend_outside(ax)
+    return ax
+
+
+def mendable_tensions(done: Execution, ax: Axes | None = None) -> Axes:
+    """The part of the tension errors that lengths can mend without moving the platform, as the tension loop sees it.
+
+    Args:
+        done: The execution.
+        ax: Axes to draw on; None for a new figure.
+
+    Returns:
+        The axes; empty for a robot without redundancy.
+    """
+    ax = axes_or_new(ax, height=2.6)
+    clock = _clock(done)
+    for i, course in enumerate(null_space_error(done).T):
+        _line(ax, clock, course, color=_color(i), linestyle=_style(i), linewidth=1.0, label=f"cable {i}")
+    dressed(ax, "time [s]", "mendable tension\nerror [N]")
+    _limit(ax, clock)
+    legend_outside(ax)
+    return ax
+
+
+def place_errors(done: Execution, ax: Axes | None = None) -> Axes:
+    """The estimated position of the platform's origin less the planned one, along x, y and z.
+
+    Args:
+        done: The execution.
+        ax: Axes to draw on; None for a new figure.
+
+    Returns:
+        The axes.
+    """
+    ax = axes_or_new(ax, height=2.6)
+    clock = _clock(done)
+    for name, course, color, style in zip(
+        "xyz", PER_METER * position_error(done).T, COLORS[:3], ("-", "--", ":"), strict=True
+    ):
+        _line(ax, clock, course, color=color, linestyle=style, linewidth=1.1, label=f"${name}$")
+    dressed(ax, "time [s]", "estimated less\nplanned [mm]")
+    _limit(ax, clock)
+    legend_outside(ax)
+    return ax
+
+
+def _clock(done: Execution) -> Array:
+    """Time since the first cycle [s]."""
+    time = instance(done, Execution, "execution").time
+    return np.asarray(time - time[0]) if time.size else time
+
+
+def _color(cable: int) -> str:
+    """Neighbors, which most robots pair at a winch post, share a color."""
+    return COLORS[cable // 2 % len(COLORS)]
+
+
+def _style(cable: int) -> str | tuple[int, tuple[float, float]]:
+    return "-" if cable % 2 == 0 else DASHED
+
+
+def _line(ax: Axes, clock: Array, course: Array, **look: object) -> None:
+    """A line; one of more points than show is drawn through the lowest and the highest of each few."""
+    if clock.size > MOST_POINTS:
+        few = 2 * -(-clock.size // MOST_POINTS)
+        rows = np.arange(clock.size // few * few).reshape(-1, few)
+        values = course[rows]
+        low = np.where(np.isnan(values), np.inf, values).argmin(axis=1)
+        high = np.where(np.isnan(values), -np.inf, values).argmax(axis=1)
+        first = np.arange(len(rows))
+        chosen = np.sort(np.stack((rows[first, low], rows[first, high]), axis=1), axis=1).ravel()
+        chosen = np.append(chosen, np.arange(rows.size, clock.size))
+        clock, course = clock[chosen], course[chosen]
+    draw_course(ax, clock, course, **look)
+
+
+def _limit(ax: Axes, clock: Array) -> None:
+    if clock.size > 1:
+        ax.set_xlim(clock[0], clock[-1])
+
+
+def _mark(ax: Axes, done: Execution) -> None:
+    """A line at each fault, with its name over the states."""
+    for event in done.events:
+        if event.kind is EventKind.FAULT and len(done):
+            ax.axvline(event.time - done.time[0], color=VERMILLION, linewidth=1.0, zorder=4.0)
+            if not ax.get_yticks().size:
+                ax.annotate(
+                    event.name, (event.time - done.time[0], 1.0), xycoords=("data", "axes fraction"),
+                    xytext=(0.0, 2.0), textcoords="offset points", fontsize=TICK, ha="center", va="bottom",
+                    annotation_clip=False,
+                )  # fmt: skip

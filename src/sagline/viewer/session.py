@@ -1,0 +1,213 @@
+"""A log of the controller as a timeline plays it: what was set, what the encoders said, and what a twin knows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from sagline.arrays import Array, Codes
+from sagline.control.events import Event
+from sagline.control.states import State
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.viewer.course_figure import CourseFigure
+from sagline.viewer.drawn import Drawn
+from sagline.viewer.readout import block, force_unit
+from sagline.viewer.stage import ACTUAL, TRUTH, WANTED, stroke
+
+PER_METER = 1e3  # mm
+WRONG = (State.FAULT, State.EMERGENCY)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Session:
+    """N cycles of a controller, from time 0 on.
+
+    Attributes:
+        robot: The robot.
+        time: Of the cycles, from 0 on [s], shape (N,).
+        began: The first of them on the clock of the link [s].
+        state: Codes of `State`, shape (N,).
+        late: By how much each began too late [s], shape (N,).
+        position: Of the platform's origin, estimated [m], shape (N, 3); NaN where it is not known.
+        quaternion: Rotation, estimated, shape (N, 4).
+        planned: Position that was planned [m], shape (N, 3); NaN beside a plan.
+        planned_quaternion: Rotation that was planned, shape (N, 4).
+        true: Position in truth [m], shape (N, 3); None where nobody knows.
+        true_quaternion: Rotation in truth, shape (N, 4).
+        tension: At the frame ends, as read [N], shape (N, m).
+        planned_tension: As planned [N], shape (N, m).
+        length: From the encoders, with the zero of homing [m], shape (N, m).
+        set_length: That was asked for [m], shape (N, m).
+        events: What happened.
+    """
+
+    robot: Robot
+    time: Array
+    began: float
+    state: Codes
+    late: Array
+    position: Array
+    quaternion: Array
+    planned: Array
+    planned_quaternion: Array
+    true: Array | None
+    true_quaternion: Array | None
+    tension: Array
+    planned_tension: Array
+    length: Array
+    set_length: Array
+    events: tuple[Event, ...]
+    shown: Array = field(init=False)  # numbers of cycles: the last before each whose place is known
+
+    name = "log"
+    still = "A log is what it was recorded as; drag the platform to ask what if."
+
+    def __post_init__(self) -> None:
+        """Find what to show where nothing is known: what was known before, or first."""
+        known = np.flatnonzero(np.isfinite(self.position[:, 0]))
+        last = np.searchsorted(known, np.arange(len(self.time)), side="right") - 1
+        rows = known[np.maximum(last, 0)] if known.size else np.full(len(self.time), -1)
+        object.__setattr__(self, "shown", rows)
+
+    @property
+    def home(self) -> Pose:
+        """Where it begins."""
+        return self.pose_at(0)
+
+    @property
+    def duration(self) -> float:
+        """Time of the last cycle [s]."""
+        return float(self.time[-1])
+
+    def pose_at(self, index: int) -> Pose:
+        """Where the platform is to be at a cycle; beside a plan where it is estimated to be, or was before."""
+        if np.isfinite(self.planned[index]).all():
+            return Pose.from_quaternion(self.planned[index], self.planned_quaternion[index])
+        row = int(self.shown[index])
+        if row >= 0:
+            return Pose.from_quaternion(self.position[row], self.quaternion[row])
+        box, anchors = self.robot.test_box, self.robot.frame_anchors
+        return Pose(anchors.mean(axis=0) if box is None else 0.5 * (box.low + box.high), np.eye(3))
+
+    def sight(self, time: float) -> SessionMoment:
+        """The cycle at or before a time [s]."""
+        index = int(np.searchsorted(self.time, time, side="right")) - 1
+        return SessionMoment(self, min(max(index, 0), self.time.size - 1))
+
+    def traces(self, most: int, error_scale: float) -> tuple[Array, Array]:
+        """Planned and estimated positions (n, 3), n <= most."""
+        rows = np.unique(np.linspace(0, self.time.size - 1, most).astype(np.intp))
+        planned, actual = self.planned[rows], self.position[rows]
+        away = actual - planned
+        return planned, np.where(np.isfinite(away), planned + error_scale * away, actual)
+
+    def figures(self) -> tuple[CourseFigure, ...]:
+        """Tensions, what they are off, the lengths' error, and where the platform is less where it was to be."""
+        unit, count = force_unit(self.robot), self.robot.cable_count
+        off = self.tension - self.planned_tension
+        pairs = [
+            (f"Tension, measured [{unit.name}]", self.tension / unit.newtons),
+            ("Tension less the planned one [N]", off),
+            ("Length set less measured [mm]", PER_METER * (self.set_length - self.length)),
+            ("Estimated less planned x, y, z [mm]", PER_METER * (self.position - self.planned)),
+        ]
+        if self.true is not None:
+            pairs.append(("True less planned x, y, z [mm]", PER_METER * (self.true - self.planned)))
+        assert all(values.shape[1] in (3, count) for _, values in pairs)
+        return tuple(CourseFigure.of(title, self.time, values) for title, values in pairs)
+
+    def key(self) -> str:
+        """Which line is which cable, and which platform is which."""
+        marks = f"{stroke(WANTED)} planned {stroke(ACTUAL)} estimated"
+        marks += f" {stroke(TRUTH)} true" if self.true is not None else ""
+        keys = CourseFigure.key(range(self.robot.cable_count)) + CourseFigure.key("xyz", "along")
+        return keys + block(f"platform &nbsp;{marks}")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SessionMoment(Drawn):
+    """One cycle.
+
+    Attributes:
+        session: The log.
+        index: Number of the cycle.
+    """
+
+    session: Session
+    index: int
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+        return self.session.robot
+
+    @property
+    def pose(self) -> Pose:
+        """Where the platform is to be, or beside a plan is estimated to be."""
+        return self.session.pose_at(self.index)
+
+    @property
+    def tension(self) -> Array:
+        """As the load cells read it [N], shape (m,)."""
+        return np.asarray(self.session.tension[self.index])
+
+    @property
+    def length(self) -> Array:
+        """From the encoders [m], shape (m,)."""
+        return np.asarray(self.session.length[self.index])
+
+    @property
+    def time(self) -> float:
+        """Since the first cycle [s]."""
+        return float(self.session.time[self.index])
+
+    @property
+    def state(self) -> State:
+        """Of the controller."""
+        return State(int(self.session.state[self.index]))
+
+    @property
+    def past(self) -> tuple[Event, ...]:
+        """What has happened."""
+        now = self.session.began + self.time
+        return tuple(event for event in self.session.events if event.time <= now)
+
+    @property
+    def feasible(self) -> bool:
+        """Whether nothing is wrong."""
+        return self.state not in WRONG
+
+    @property
+    def notice(self) -> str:
+        """What is wrong."""
+        return "" if self.feasible else self.state.name
+
+    @property
+    def rest(self) -> Pose | None:
+        """Where the platform is estimated to be, beside where it is to be."""
+        return self._beside(self.session.position, self.session.quaternion)
+
+    def drawn_rest(self, error_scale: float) -> Array | None:
+        """Where that is drawn [m], shape (3,)."""
+        return self._drawn(self.rest, error_scale)
+
+    @property
+    def truth(self) -> Pose | None:
+        """Where the platform truly is."""
+        if self.session.true is None or self.session.true_quaternion is None:
+            return None
+        return self._beside(self.session.true, self.session.true_quaternion)
+
+    def drawn_truth(self, error_scale: float) -> Array | None:
+        """Where that is drawn [m], shape (3,)."""
+        return self._drawn(self.truth, error_scale)
+
+    def _beside(self, positions: Array, quaternions: Array) -> Pose | None:
+        place = positions[self.index]
+        return Pose.from_quaternion(place, quaternions[self.index]) if np.isfinite(place).all() else None
+
+    def _drawn(self, pose: Pose | None, error_scale: float) -> Array | None:
+        at = self.pose.position
+        return None if pose is None else np.asarray(at + error_scale * (pose.position - at))
