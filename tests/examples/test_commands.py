@@ -17,8 +17,11 @@ from typer.testing import CliRunner
 import sagline as sl
 from sagline.cli.examples import KINDS, example_files
 from sagline.cli.main import app
+from sagline.files.mcap_log import Recorder
+from sagline.files.mcap_reader import read_log
 from sagline.report.blocks import Chapter
 from tests.abuse.command_lines import commands
+from tests.files.executions import execution
 from tests.kinematics.winches import wound
 
 ROOT = Path(__file__).parents[2]
@@ -59,6 +62,15 @@ def with_winches(place: Path) -> None:
     np.savetxt(place / "counts.csv", sl.encoder_counts(plan), delimiter=",", header=header, comments="")
 
 
+def with_logs(place: Path) -> None:
+    """A log, one of a process that was killed, and that of a twin."""
+    execution().save(place / "run.mcap")
+    whole = (place / "run.mcap").read_bytes()
+    (place / "killed.mcap").write_bytes(whole[:-20_000])
+    with Recorder(place / "twin.mcap", execution().robot) as recorder:
+        recorder.truth(0.0, np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
+
+
 @pytest.mark.parametrize("words", printed(), ids=" ".join)
 def test_a_printed_command_runs(words: list[str], folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
@@ -68,12 +80,20 @@ def test_a_printed_command_runs(words: list[str], folder: Path, monkeypatch: pyt
         served.append((robot, None if run is None else sl.load_plan(run)))
         return 0
 
+    def serve_log(log: Path, robot: str | None, live: bool, truth: Path | None, *more: Any, **others: Any) -> int:
+        assert truth is None or read_log(truth).truth
+        served.append(sl.load_execution(log))
+        return 0
+
     monkeypatch.setattr("sagline.cli.view.serve", serve)
+    monkeypatch.setattr("sagline.cli.view.view_log", serve_log)
     monkeypatch.setattr("sagline.report.parts.Part.build", lambda part: Chapter(part.key, part.key, "", ()))
     monkeypatch.setattr("sagline.cli.run.FIGURES", ())
     monkeypatch.setattr("sagline.cli.run._figures", lambda *_: ())
     if words[0] == "new":
         (folder / words[1]).unlink(missing_ok=True)
+    if any(word.endswith(".mcap") for word in words):
+        with_logs(folder)
     if words[0] == "encoder" or "--counts" in words:
         with_winches(folder)
     result = CliRunner().invoke(app, words, input="\n" * 9)  # every question takes its default

@@ -142,6 +142,9 @@ def _column(quantity: Quantity, blocks: list[dict[str, NDArray[Any]]]) -> NDArra
     wanted = np.dtype(np.int8) if quantity.name in SMALL else quantity.type
     if whole.dtype != wanted:
         raise InvalidValueError(f"{quantity.name}: type", whole.dtype, str(wanted), AGAIN)
+    if quantity.codes is not None and (unknown := np.setdiff1d(whole, list(quantity.codes))).size:
+        known = ", ".join(code.name for code in quantity.codes)
+        raise InvalidValueError(quantity.name, int(unknown[0]), known, "Read it with a newer sagline.")
     return whole
 
 

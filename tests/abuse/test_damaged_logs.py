@@ -1,0 +1,181 @@
+"""Logs that are damaged, foreign or of another version: an error, or what was recorded, never other numbers."""
+
+import json
+import struct
+import time
+import warnings
+import zlib
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mcap.writer import CompressionType, Writer
+
+import sagline as sl
+from sagline.control import Execution
+from sagline.files.execution_layout import columns_of
+from sagline.files.mcap_layout import HEAD, JSON, RECORD, head_of
+from sagline.files.mcap_log import save_execution
+from sagline.files.packed import pack
+from tests.abuse.damage import DAMAGES, LONGEST, SLOWEST, Damage
+from tests.files.executions import execution
+from tests.files.test_mcap_log import assert_same
+
+CUT = 20_000  # bytes of the log's end that a killed process does not write
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    file = tmp_path_factory.mktemp("log") / "run.mcap"
+    save_execution(execution(), file)
+    return file.read_bytes()
+
+
+def read(file: Path) -> tuple[Execution | None, bool]:
+    """What is read, if it was not refused in a line, and whether it was said to be cut off."""
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        try:
+            done = sl.load_execution(file)
+        except sl.SaglineError as error:
+            line = str(error).replace(str(file), file.name)
+            assert line.isprintable(), line
+            assert len(line) < LONGEST, line
+            return None, False
+    assert all(issubclass(one.category, sl.SaglineWarning) for one in told), told
+    return done, bool(told)
+
+
+def assert_begins(done: Execution) -> None:
+    """Whether it is what was recorded, up to some cycle."""
+    whole = columns_of(execution())
+    for name, values in columns_of(done).items():
+        assert values.tobytes() == whole[name][: len(done)].tobytes(), name
+
+
+@pytest.mark.parametrize("count", [12, pytest.param(3000, marks=pytest.mark.soak)])
+@pytest.mark.parametrize("killed", [False, True])
+@pytest.mark.parametrize("damage", DAMAGES, ids=lambda damage: damage.__name__)
+def test_damage_gives_an_error_or_what_was_recorded(
+    whole: bytes, tmp_path: Path, damage: Damage, killed: bool, count: int
+) -> None:
+    rng = np.random.default_rng(21)
+    file = tmp_path / "run.mcap"
+    for k in range(count):
+        content = bytearray(whole[:-CUT] if killed else whole)
+        damage(content, rng)
+        file.write_bytes(content)
+        start = time.process_time()
+        done, was_cut = read(file)
+        assert time.process_time() - start < SLOWEST, k
+        if done is None:
+            continue
+        if was_cut:
+            assert_begins(done)
+        else:
+            assert not killed, k
+            assert_same(done, execution())
+
+
+def test_wherever_it_is_cut_what_is_whole_is_read(whole: bytes, tmp_path: Path) -> None:
+    lengths = []
+    for size in range(0, len(whole), 9001):
+        (tmp_path / "run.mcap").write_bytes(whole[:size])
+        done, was_cut = read(tmp_path / "run.mcap")
+        if done is not None:
+            assert_begins(done)
+            assert was_cut or len(done) == 201  # nothing but the index is missing
+        lengths.append(0 if done is None else len(done))
+    assert lengths == sorted(lengths)
+    assert set(lengths) >= {0, 100}
+
+
+def log_of(*attachments: tuple[str, bytes], topic: str = "", message: bytes = b"", **options: object) -> bytes:
+    """An MCAP file with what it should not have."""
+    stream = BytesIO()
+    writer: Any = Writer(stream, **options)  # type: ignore[arg-type]  # Any: it is only partly typed
+    writer.start()
+    for name, data in attachments:
+        writer.add_attachment(0, 0, name, JSON, data)
+    if topic:
+        channel = writer.register_channel(topic, "json", 0)
+        writer.add_message(channel, 0, message, 0)
+    writer.finish()
+    return stream.getvalue()
+
+
+def head(**changes: object) -> tuple[str, bytes]:
+    return HEAD, json.dumps(json.loads(head_of(sl.dump_robot(execution().robot), 0.01)) | changes).encode()
+
+
+def columns(**changes: object) -> bytes:
+    done = {**columns_of(execution()), "zero": np.zeros(8), "plan": np.array(-1), "epoch": np.array(0)} | changes
+    return pack({name: values for name, values in done.items() if values is not None})  # type: ignore[misc]
+
+
+FOREIGN: dict[str, tuple[bytes, str]] = {
+    "foreign": (log_of(topic="/imu", message=b"{}"), "is an MCAP file, but no log of sagline"),
+    "foreign, packed otherwise": (
+        log_of(topic="/imu", message=b"{}", compression=CompressionType.NONE), "no log of sagline",
+    ),
+    "empty": (log_of(), "no log of sagline"),
+    "no cycle": (log_of(head()), "has no cycle"),
+    "newer": (log_of(head(sagline_log_format=2, source="sagline 9.0")), "is of format 2, written by sagline 9.0"),
+    "no robot": (log_of((HEAD, b'{"sagline_log_format":1,"period":0.01}')), "is damaged"),
+    "no head": (log_of((HEAD, b"[1]")), "is damaged"),
+    "head that is no text": (log_of((HEAD, b"\xff\xfe")), "is damaged"),
+    "a robot that is none": (log_of(head(robot="name: x\n")), "robot"),
+    "a chunk of other numbers": (log_of(head(), topic=RECORD, message=b"no columns"), "is damaged"),
+    "a quantity is missing": (log_of(head(), topic=RECORD, message=columns(tension=None)), "does not hold what"),
+    "a quantity of another shape": (
+        log_of(head(), topic=RECORD, message=columns(tension=np.zeros((201, 7)))), "tension: shape",
+    ),
+    "a quantity of another type": (
+        log_of(head(), topic=RECORD, message=columns(counts=np.zeros((201, 8)))), "counts: type",
+    ),
+    "no such state": (
+        log_of(head(), topic=RECORD, message=columns(state=np.full(201, 99, dtype=np.int8))), "state",
+    ),
+    "text": (b"time,position\n0,1\n", "is another kind of file, no log in MCAP"),
+    "netcdf": (b"\x89HDF\r\n\x1a\n" + bytes(99), "is another kind of file"),
+    "nothing": (b"", "is empty"),
+    "half a beginning": (b"\x89MCA", "is empty"),
+    "cut at once": (log_of(head())[:30], "was cut off before it says of what robot"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FOREIGN)
+def test_what_is_no_log_is_one_line(tmp_path: Path, name: str) -> None:
+    content, said = FOREIGN[name]
+    (tmp_path / "run.mcap").write_bytes(content)
+    with pytest.raises(sl.FileError) as refused:
+        sl.load_execution(tmp_path / "run.mcap")
+    line = str(refused.value)
+    assert said in line
+    assert line.isprintable()
+    assert len(line) < LONGEST
+
+
+def test_a_missing_chunk_is_noticed(whole: bytes, tmp_path: Path) -> None:
+    """One taken out of a log without its end, whose digest is not there to tell."""
+    places, place = [], 8
+    while place < len(whole) - 8 and whole[place] != 0x0F:
+        size = 9 + int.from_bytes(whole[place + 1 : place + 9], "little")
+        places += [(place, place + size)] * (whole[place] == 0x06)
+        place += size
+    first, end = places[0]
+    (tmp_path / "run.mcap").write_bytes(whole[:first] + whole[end : places[-1][1]])
+    with pytest.raises(sl.FileError, match="is damaged at byte"):
+        sl.load_execution(tmp_path / "run.mcap")
+
+
+def test_a_chunk_that_says_to_be_endless_is_refused(whole: bytes, tmp_path: Path) -> None:
+    """Lies about sizes cost no memory."""
+    body = struct.pack("<QQQI", 0, 1, 1 << 50, zlib.crc32(b"")) + struct.pack("<I", 4) + b"zstd" + struct.pack("<Q", 3)
+    chunk = b"\x06" + struct.pack("<Q", len(body) + 3) + body + b"abc"
+    attachments = whole[: whole.index(b"plan-0.sagline") - 29]  # what stands before the plan's
+    (tmp_path / "run.mcap").write_bytes(attachments + chunk)
+    with pytest.raises(sl.FileError, match="is damaged"):
+        sl.load_execution(tmp_path / "run.mcap")

@@ -1,0 +1,168 @@
+"""`sagline log` and `sagline view run.mcap`: what they tell of a log, write of it, and refuse."""
+
+import json
+import re
+import threading
+import time
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from typer.testing import CliRunner
+
+import sagline as sl
+from sagline.cli import view_log
+from sagline.cli.main import app
+from sagline.files.mcap_log import Recorder
+from sagline.kinematics.plan import Plan
+from tests.files.executions import cycles_of, events_of, execution, plan_of
+from tests.files.test_mcap_log import assert_same
+
+ROBOT = sl.load_robot("article-prototype")
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> Path:
+    execution().save(tmp_path / "run.mcap")
+    return tmp_path / "run.mcap"
+
+
+def test_it_tells_states_largest_errors_lateness_and_events(log: Path) -> None:
+    result = CliRunner().invoke(app, ["log", str(log)])
+    assert result.exit_code == 0, result.output
+    done, text = execution(), " ".join(result.stdout.split())
+    assert "article-prototype: 201 cycles in 2 s, 4 of them without an answer." in text
+    assert "DONE: the end of the plan" in text
+    assert re.search(r"MOVING 2\.01 201", text)
+    off = np.abs(done.tension - done.planned_tension)
+    row, cable = np.unravel_index(int(np.nanargmax(off)), off.shape)
+    assert f"tension error {off[row, cable]:.3g} N {cable} {0.01 * row:.2f}" in text
+    late = int(np.count_nonzero(done.late <= 1e-4))
+    assert late == 201  # none of them is later than 0.1 ms
+    assert re.search(rf"up to 100 µs {late} █{{30}}", text)
+    for event in events_of():
+        assert event.text in text
+
+
+@pytest.mark.parametrize("width", [60, 80, 120])
+def test_it_fits_a_terminal(log: Path, width: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    from rich.console import Console
+
+    console = Console(highlight=False, markup=False, emoji=False, width=width, force_terminal=True, no_color=True)
+    monkeypatch.setattr("sagline.cli.terminal._out", console)
+    result = CliRunner().invoke(app, ["log", str(log)])
+    plain = re.sub(r"\x1b\[[0-9;]*m", "", result.stdout)
+    assert max(map(len, plain.splitlines())) <= width
+    assert "cell 3: 120.5 N" in " ".join(plain.split())
+
+
+def test_numbers_for_a_program(log: Path) -> None:
+    said = json.loads(CliRunner().invoke(app, ["log", str(log), "--json"]).stdout)
+    assert (said["cycles"], said["cycles_without_answer"], said["status"]) == (201, 4, "DONE")
+    assert said["states_s"] == {"MOVING": 2.01}
+    assert said["late_s"]["p99.9"] == pytest.approx(np.quantile(execution().late, 0.999), rel=1e-12)
+    assert [event["text"] for event in said["events"]] == [event.text for event in events_of()]
+
+
+def test_a_data_set_has_every_number_and_the_plan(log: Path, tmp_path: Path) -> None:
+    assert CliRunner().invoke(app, ["log", str(log), "--to", str(tmp_path / "run.nc")]).exit_code == 0
+    done = execution()
+    with xr.open_dataset(tmp_path / "run.nc", engine="h5netcdf", decode_times=False) as data:
+        assert np.array_equal(data.tension, done.tension, equal_nan=True)
+        assert np.array_equal(data.set_length, done.set_length, equal_nan=True)
+        assert (data.tension.units, data.late.units, data.torque.units) == ("N", "s", "N m")
+        assert data.state.flag_meanings.split()[data.state.values[0]] == "moving"
+        assert data.event_text.values.tolist() == [event.text for event in events_of()]
+        assert data.attrs["robot"] == sl.dump_robot(done.robot)
+    with xr.open_dataset(tmp_path / "run.nc", group="plan", engine="h5netcdf", decode_times=False) as data:
+        assert isinstance(done.plan, Plan)
+        assert np.array_equal(data.unstrained_length, done.plan.unstrained_length)
+        assert np.array_equal(data.horizontal_tension, done.plan.horizontal_tension)
+    with pytest.raises(sl.FileError, match="is an execution of sagline, no plan"):
+        sl.load_plan(tmp_path / "run.nc")
+
+
+def test_a_log_without_its_end_is_told_and_mended(log: Path, tmp_path: Path) -> None:
+    killed = tmp_path / "killed.mcap"
+    killed.write_bytes(log.read_bytes()[:-20_000])
+    result = CliRunner().invoke(app, ["log", str(killed), "--to", str(tmp_path / "mended.mcap")])
+    assert result.exit_code == 0, result.output
+    assert "was cut off: what was recorded in its last second is not there" in result.stderr
+    mended = sl.load_execution(tmp_path / "mended.mcap")  # no warning, which would be an error here
+    with pytest.warns(sl.SaglineWarning):
+        assert_same(mended, sl.load_execution(killed))
+    assert len(mended) == 100
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["log", "missing.mcap"], r"missing\.mcap: does not exist\."),
+        (["log", "run.mcap", "--plan", "1"], r"plan is 1; allowed: -1 to 0\."),
+        (["log", "run.mcap", "--plan", "x"], r"--plan is 'x'; allowed: a whole number"),
+        (["log", "run.mcap", "--to", "run.csv"], r"run\.csv: is no name for an execution\. Let it end in \.mcap"),
+        (["log", "plan.nc"], r"plan\.nc: is another kind of file, no log in MCAP\."),
+        (["log", "."], r"is a folder"),
+        (["log", "empty.mcap"], r"empty\.mcap: is empty\."),
+        (["view", "missing.mcap"], r"missing\.mcap: does not exist\."),
+        (["view", "cogiro", "--live"], r"--live is given without a log; allowed: a log in MCAP\."),
+        (["view", "cogiro", "--truth", "run.mcap"], r"--truth is given without a log"),
+        (["view", "cogiro", "run.mcap"], r"run\.mcap: is a log of article-prototype, not of cogiro\."),
+        (["view", "run.mcap", "--pose", "0,0,1"], r"--pose is given with a run"),
+        (["view", "twin.mcap"], r"twin\.mcap: has no cycle\."),
+    ],
+)
+def test_what_cannot_be_is_one_line(log: Path, words: list[str], said: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(log.parent)
+    Path("empty.mcap").touch()
+    if "plan.nc" in words:
+        plan_of().save("plan.nc")
+    if "twin.mcap" in words:
+        with Recorder("twin.mcap", ROBOT) as recorder:
+            recorder.truth(0.0, np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == 2
+    assert re.search(said, result.stderr), result.stderr
+    assert len(result.stderr.splitlines()) == 1
+
+
+def test_a_growing_log_is_followed_from_before_it_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In place of the page: what it would be given."""
+    monkeypatch.setattr("sagline.cli.view_log.LOOK", 0.05)
+    monkeypatch.setattr("sagline.files.mcap_log.CHUNK", 0.2)
+    lengths: list[int] = []
+    file = tmp_path / "run.mcap"
+
+    class Page:
+        def extend(self, session: Any) -> None:
+            lengths.append(len(session.time))
+
+    def hosted(robot: sl.Robot, session: Any, *more: Any, beside: Any, **others: Any) -> int:
+        lengths.append(len(session.time))
+        around: AbstractContextManager[None] = beside(Page())
+        with around:
+            end = time.monotonic() + 20.0
+            while lengths[-1] < 200 and time.monotonic() < end:
+                time.sleep(0.02)
+        return 0
+
+    def write() -> None:
+        time.sleep(0.2)
+        with Recorder(file, ROBOT, epoch=0) as recorder:
+            recorder.begins(plan_of())
+            for cycle in cycles_of(plan_of(), 200):
+                recorder.cycle(cycle)
+                time.sleep(0.003)
+
+    plan_of()
+    writer = threading.Thread(target=write)
+    monkeypatch.setattr("sagline.cli.view_log.hosted", hosted)
+    writer.start()
+    assert view_log.view_log(file, None, True, None, "", 0, browser=False) == 0
+    writer.join()
+    assert lengths == sorted(set(lengths))
+    assert lengths[-1] == 200
+    assert len(lengths) > 2
