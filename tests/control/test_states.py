@@ -15,8 +15,8 @@ def test_every_state_that_holds_a_grant_and_is_no_end_stops_on_a_fault() -> None
         assert State.STOPPING in EXITS[state]
 
 
-def test_every_state_but_off_leads_to_emergency_and_only_off_leads_away() -> None:
-    for state in set(State) - {State.OFF, State.EMERGENCY}:
+def test_every_state_with_a_grant_leads_to_emergency_and_only_off_leads_away() -> None:
+    for state in HOLDS_GRANT - {State.EMERGENCY}:  # while it connects the brakes are on: it is refused
         assert State.EMERGENCY in EXITS[state]
     assert EXITS[State.EMERGENCY] == (State.OFF,)
     assert EXITS[State.OFF] == (State.CONNECTING,)

@@ -24,6 +24,9 @@ from sagline.tension.method import TensionMethod
 
 START: Final = 2e-3  # m: so far may a path begin from where the platform is
 ON_TICK: Final = 1e-6  # of a period: so far may a sample be from it
+LARGEST_LEAD: Final = 5e-3  # m: no more than the tension loop may change
+ROUNDING: Final = 5e-6  # m: so well a plan's lengths fit its rates, but for accelerations
+LARGEST_STEP: Final = 1e-3  # m: what the rules for faults take for an encoder's jump
 AT_REST: Final = 1e-3  # m/s and rad/s: a path that begins or ends faster would strike the winches
 
 
@@ -32,6 +35,7 @@ class Motion:
     """A plan that was checked whole, one row a cycle: what set points are taken from.
 
     Attributes:
+        period: Of a cycle, and between two rows [s].
         plan: At the ticks, the last of them at or after the path's end; None for a jog.
         state: Robot, poses and cables at the rows.
         length: Unstrained lengths off the drums [m], shape (N, m).
@@ -42,6 +46,7 @@ class Motion:
         gains: Of the tension loop; None for a robot without redundancy.
     """
 
+    period: float
     plan: Plan | None
     state: Equilibrium
     length: Array
@@ -54,6 +59,11 @@ class Motion:
     def __len__(self) -> int:
         """Number of rows N."""
         return len(self.length)
+
+    @property
+    def robot(self) -> Robot:
+        """As it is planned for."""
+        return self.state.one_robot
 
 
 def motion_along(
@@ -85,13 +95,16 @@ def motion_along(
     _check_rest(path)
     ticked = _at_ticks(path, period)
     plan = inverse(robot, ticked, model, method, previous=previous)
-    _check_feasible(plan)
+    _check_feasible(plan, ticked)
     rate, drum = plan.length_rate, drum_tension(plan.state)
-    assert rate is not None
-    _check_winches(plan, rate, drum)
+    if rate is None:
+        raise RefusedError("the path", "its plan has no rates of the lengths", "Give one with times and twists.")
+    _check_winches(robot, ticked, plan.unstrained_length, rate, drum)
+    _check_steps(np.minimum(ticked.time, path.time[-1] - path.time[0]), plan.unstrained_length, rate)
     last = np.array(rate)
     last[-1] = 0.0
     return Motion(
+        period=period,
         plan=plan,
         state=plan.state,
         length=plan.unstrained_length,
@@ -101,6 +114,43 @@ def motion_along(
         wrench=plan.state.wrench,
         gains=gains_along(plan),
     )
+
+
+def check_motion(motion: Motion, robot: Robot, period: float) -> None:
+    """Refuse a motion that was planned for another controller.
+
+    Args:
+        motion: What is to be followed.
+        robot: The controller's.
+        period: Of its cycles [s].
+
+    Raises:
+        RefusedError: If its rows are not a cycle apart, or it is another robot's.
+    """
+    step = "Plan it with this controller: control.plan(path)."
+    if abs(motion.period - period) > ON_TICK * period:
+        reason = f"it was planned for cycles of {1e3 * motion.period:g} ms; they take {1e3 * period:g} ms"
+        raise RefusedError("the path", reason, step)
+    if motion.robot is not robot:
+        raise RefusedError("the path", f"it was planned for another robot, {motion.robot.name}", step)
+
+
+def check_lead(what: str, lead: Array) -> None:
+    """Refuse a way that begins with other lengths, where the tensions differ too much from its plan.
+
+    Args:
+        what: What was asked for.
+        lead: By how much the lengths that are held are off its first ones [m], shape (m,).
+
+    Raises:
+        RefusedError: If one is off by more than 5 mm.
+    """
+    i = int(np.argmax(np.abs(lead)))
+    if not abs(lead[i]) <= LARGEST_LEAD:
+        reason = (
+            f"winch {i} has {1e3 * lead[i]:+.3g} mm more cable off than its plan; allowed: {1e3 * LARGEST_LEAD:g} mm"
+        )
+        raise RefusedError(what, reason, "Jog the winches back that were jogged, or home again.")
 
 
 def check_start(robot: Robot, here: Pose, start: Pose) -> None:
@@ -153,35 +203,59 @@ def _check_rest(path: Path) -> None:
             raise RefusedError("the path", reason, "Make it from rest to rest, with quintic_path for instance.")
 
 
-def _check_feasible(plan: Plan) -> None:
+def _check_feasible(plan: Plan, path: Path) -> None:
     gaps = plan.gaps
     if not gaps:
         return
     gap = gaps[0]
-    assert plan.path is not None
     place = ", ".join(f"{x:.3f}" for x in plan.state.pose.position[gap.first])
     more = f" and {len(gaps) - 1} more stretches" if len(gaps) > 1 else ""
-    reason = f"at {plan.path.time[gap.first]:.2f} s, ({place}) m,{more} its status is {PoseStatus(gap.status).name}"
+    reason = f"at {path.time[gap.first]:.2f} s, ({place}) m,{more} its status is {PoseStatus(gap.status).name}"
     cables = f", cables {', '.join(map(str, gap.cables))} at their limits" if gap.cables else ""
     raise RefusedError("the path", reason + cables, "Lead it elsewhere, make it slower, or check it with inverse().")
 
 
-def _check_winches(plan: Plan, rate: Array, drum: Array) -> None:
+def _check_winches(robot: Robot, path: Path, length: Array, rate: Array, drum: Array) -> None:
     """Refuse what a winch cannot do, where its limits are known."""
-    robot, path = plan.state.one_robot, plan.path
     winches = robot.winches
-    assert winches is not None
-    assert path is not None
-    ratio = np.abs(winches.gear) / lever_of(robot, plan.unstrained_length)  # radians of the motor for a meter of cable
-    _refuse_beyond(path, "turn at", rate * ratio, winches.speed_limit, "rad/s")
+    lever = lever_of(robot, length)  # what is missing is told here
+    if winches is None:
+        return
+    ratio = np.abs(winches.gear) / lever  # radians of the motor for a meter of cable
+    speed, step = winches.speed_limit, np.diff(length, axis=0) / np.diff(path.time)[:, None]
+    _refuse_beyond(path, "turn at", rate * ratio, speed, "rad/s")
+    _refuse_beyond(path, "turn at", step * 0.5 * (ratio[1:] + ratio[:-1]), speed, "rad/s")
     if winches.inertia is not None:
         acceleration = np.gradient(rate, path.time, axis=0)
         force = winches.inertia * ratio**2 * acceleration + winches.friction * np.sign(rate) - drum
         _refuse_beyond(path, "give", force / ratio, winches.torque_limit, "N m")
 
 
+def _check_steps(time: Array, length: Array, rate: Array) -> None:
+    """Refuse lengths that jump against their rates: a path whose twist is not that of its poses.
+
+    Where a rate stays between those at the two ends of a step, wherever it changes or jumps within, the step is off
+    the mean rate by half of what they differ at most, times h; the largest difference of the steps beside it counts.
+    More than an encoder may jump is never allowed. Times are the path's own: its end may be before a tick.
+    """
+    h = np.diff(time)[:, None]
+    off = np.abs(np.diff(length, axis=0) - 0.5 * h * (rate[1:] + rate[:-1]))
+    change = np.abs(np.diff(rate, axis=0))
+    near = np.concatenate((change[:1], change, change[-1:]))
+    largest = np.maximum(np.maximum(near[:-2], near[1:-1]), near[2:])
+    allowed = np.minimum(ROUNDING + 0.5 * h * largest, LARGEST_STEP)
+    if not (off > allowed).any():
+        return
+    k, i = (int(index) for index in np.unravel_index(np.argmax(off / allowed), off.shape))
+    reason = (
+        f"from {time[k]:g} s to {time[k + 1]:g} s the length of cable {i} is off its rate by "
+        f"{1e3 * off[k, i]:.3g} mm; allowed: {1e3 * allowed[k, i]:.3g} mm"
+    )
+    raise RefusedError("the path", reason, "Its poses jump, or its twist is not theirs: use path_from_samples.")
+
+
 def _refuse_beyond(path: Path, verb: str, values: Array, limit: Array | None, unit: str) -> None:
-    if limit is None or not (np.abs(values) > limit).any():
+    if limit is None or (np.abs(values) <= limit).all():
         return
     k, i = (int(index) for index in np.unravel_index(np.argmax(np.abs(values) / limit), values.shape))
     reason = f"at {path.time[k]:.2f} s the motor of winch {i} would {verb} {abs(values[k, i]):.3g} {unit}"

@@ -1,12 +1,24 @@
-"""Claiming the groups: all of them, or none."""
+"""Whether all groups agree, and claiming them: all of them, or none."""
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from sagline.control.link import COUNTERS, OWNER_TIMEOUT, GroupStatus, Missing, Mode, Sample
+from sagline.arrays import Flags
+from sagline.control.link import (
+    COUNTERS,
+    OWNER_TIMEOUT,
+    PERIOD,
+    GroupFault,
+    GroupStatus,
+    Missing,
+    Mode,
+    Sample,
+    WinchState,
+)
+from sagline.control.states import RefusedError
 
 CLAIMING: Final = OWNER_TIMEOUT + 0.7  # s, at most, until all grants are there
 SILENT: Final = 7.0  # s, at most, until every group has answered once
@@ -15,7 +27,72 @@ LONGEST_WAIT: Final = 0.6  # s, at random, before the next claim
 TRIES: Final = 4
 FRESH: Final = 3  # cycles: so old may a sample be
 AGREEING: Final = 5  # cycles in a row
+SURE: Final = 20  # cycles, until what lasts is no more what was there before
 BEHIND: Final = 10  # commands: so far may an echo be
+_LOCKED, _PRESSED, _READY = int(GroupStatus.LOCKED), int(GroupStatus.EMERGENCY), int(GroupStatus.READY)
+_AGAIN: Final = "Try again; if it stays so, check the PLC's program."
+
+
+class Trouble(NamedTuple):
+    """Why groups do not agree.
+
+    Attributes:
+        reason: Which groups, and why, in words.
+        next_step: What to do about it.
+        lasting: Whether waiting does not mend it.
+    """
+
+    reason: str
+    next_step: str
+    lasting: bool = False
+
+    def refusal(self, what: str) -> RefusedError:
+        """Of what was asked for."""
+        return RefusedError(what, self.reason, self.next_step)
+
+
+def trouble(
+    sample: Sample, owner: int, counter: int, groups: tuple[tuple[int, ...], ...], period: float = PERIOD
+) -> Trouble | None:
+    """Why not all groups agree: the cause that explains most, and the groups that have it.
+
+    A group agrees where its sample is fresh, its grant is ours, its drives are ready, without fault and not locked, and
+    it has taken one of the last commands.
+
+    Args:
+        sample: What the machine said last.
+        owner: The controller's id.
+        counter: Of the last command that was sent.
+        groups: The winches of each group.
+        period: Of a cycle [s].
+
+    Returns:
+        None where all of them agree.
+    """
+    status, other = sample.status, sample.owner
+    faulty = (sample.winch_fault != 0) | (sample.state == int(WinchState.FAULT))
+    tripped = np.array([bool(faulty[list(winches)].any()) for winches in groups])
+    age, stranger = float(sample.age.max()), (other != owner) & (other != 0)
+    foreign = int(other[stranger][0]) if stranger.any() else 0
+    codes = sorted({int(code) for code in sample.fault} - {0})
+    named = ", ".join(GroupFault(code).name if code in set(GroupFault) else str(code) for code in codes)
+    stops = f"it stopped by itself ({named})"
+    causes: tuple[tuple[Flags, str, str, bool], ...] = (
+        (~(sample.age <= FRESH * period), f"silent for {age:.2g} s", "Check its PLC and the network.", False),
+        ((status & _PRESSED) != 0, "the emergency stop is pressed", "Make the machine safe and release it.", True),
+        ((status & _LOCKED) != 0, "the drums are locked", "Let the drums go at the machine, then connect again.", True),
+        (stranger, f"belongs to another controller, {foreign}", "Stop that one, then connect again.", False),
+        (other != owner, "nobody has the grant", "Connect again.", False),
+        (tripped, "a drive has tripped", "Mend and reset it at the machine.", False),
+        ((status & _READY) == 0, "a drive is not ready", "Mend and reset it at the machine.", False),
+        (sample.fault != 0, stops, "Mend the cause, and wait 0.3 s for the PLC.", False),
+        ((counter - sample.echo) % COUNTERS > BEHIND, "does not take commands", _AGAIN, False),
+    )
+    for there, reason, step, lasting in causes:
+        if there.any():
+            names = ", ".join(map(str, np.flatnonzero(there)))
+            return Trouble(f"group {names}: {reason}", step, lasting)
+    return None
 
 
 class Claim:
@@ -24,23 +101,27 @@ class Claim:
     Attributes:
         mode: Of the next command; None: nothing is sent.
         ready: Whether all groups agree.
-        refused: Why they do not, when it is given up.
+        refused: Why they do not, when it is given up; None before.
     """
 
-    def __init__(self, owner: int, period: float, random: np.random.Generator) -> None:
+    def __init__(
+        self, owner: int, groups: tuple[tuple[int, ...], ...], period: float, random: np.random.Generator
+    ) -> None:
         """Begin to claim.
 
         Args:
             owner: The controller's id.
+            groups: The winches of each group.
             period: Of a cycle [s].
             random: For waiting.
         """
-        self._owner, self._period, self._random = owner, period, random
+        self._owner, self._groups, self._period, self._random = owner, groups, period, random
         self._silent = self._cycles = self._agreed = 0
         self._waiting = 0
         self._tries = 1
         self.mode: Mode | None = Mode.HOLD
-        self.ready, self.refused = False, ""
+        self.ready = False
+        self.refused: Trouble | None = None
 
     def look(self, answer: Sample | Missing, counter: int) -> None:
         """Judge an answer, and decide what goes out next.
@@ -52,26 +133,25 @@ class Claim:
         if isinstance(answer, Missing):
             self._silent += 1
             if self._silent * self._period >= SILENT:
-                self._refuse("; ".join(f"group {g}: {why}" for g, why in zip(*answer[1:], strict=True)))
+                reason = "; ".join(f"group {g}: {why}" for g, why in zip(*answer[1:], strict=True))
+                self._refuse(Trouble(reason, "Check the PLCs and the network, then try again."))
             return
         self._cycles += 1
         if self._waiting:
             self._wait()
             return
-        self._agreed = self._agreed + 1 if self._agree(answer, counter) else 0
-        if self._agreed >= AGREEING:
-            self.ready = True
-        elif self._cycles * self._period >= CLAIMING:
-            if self._tries == TRIES:
-                self._refuse(self._reasons(answer))
-            else:
-                self._give_back()
+        why = trouble(answer, self._owner, counter, self._groups, self._period)
+        self._agreed = self._agreed + 1 if why is None else 0
+        if why is None:
+            self.ready = self._agreed >= AGREEING
+        elif (why.lasting and self._cycles >= SURE) or (self._late and self._tries == TRIES):
+            self._refuse(why)
+        elif self._late:
+            self._give_back()
 
-    def _agree(self, sample: Sample, counter: int) -> bool:
-        fresh = bool((sample.age <= FRESH * self._period).all())
-        behind = (counter - sample.echo) % COUNTERS
-        powered = bool(((sample.status & GroupStatus.READY) > 0).all())
-        return fresh and powered and bool((sample.owner == self._owner).all()) and bool((behind <= BEHIND).all())
+    @property
+    def _late(self) -> bool:
+        return self._cycles * self._period >= CLAIMING
 
     def _give_back(self) -> None:
         """Somebody else may have what is missing, and wait for what is here."""
@@ -88,22 +168,5 @@ class Claim:
         if not self._waiting:
             self.mode, self._cycles = Mode.HOLD, 0
 
-    def _refuse(self, reason: str) -> None:
-        self.refused, self.mode = reason, Mode.LEAVE
-
-    def _reasons(self, sample: Sample) -> str:
-        found = []
-        for g, owner in enumerate(sample.owner):
-            if sample.age[g] > FRESH * self._period:
-                found.append(f"group {g} is silent for {sample.age[g]:.2g} s")
-            elif owner not in (0, self._owner):
-                found.append(f"group {g} belongs to another controller, {owner}")
-            elif not owner:
-                found.append(f"group {g} gives its grant to nobody")
-            elif sample.status[g] & GroupStatus.EMERGENCY:
-                found.append(f"the emergency stop of group {g} is pressed")
-            elif not sample.status[g] & GroupStatus.READY:
-                found.append(f"a drive of group {g} is not ready")
-            else:
-                found.append(f"group {g} does not take commands")
-        return "; ".join(found)
+    def _refuse(self, why: Trouble) -> None:
+        self.refused, self.mode = why, Mode.LEAVE

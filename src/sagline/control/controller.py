@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future
 from typing import Final, TypeVar
 
 import numpy as np
@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike
 from sagline.arguments import instance
 from sagline.arrays import number
 from sagline.cables.model import CableModel
-from sagline.control.checks import Motion, check_start, motion_along
-from sagline.control.connecting import Claim
+from sagline.control.aside import aside
+from sagline.control.checks import Motion, check_lead, check_motion, check_start, motion_along
+from sagline.control.connecting import Claim, Trouble
 from sagline.control.courses import Along, SetPoint, Standing
 from sagline.control.events import EventKind
 from sagline.control.execution import Execution
@@ -128,7 +129,8 @@ class Controller(Loop):
             raise RefusedError("connecting", "this controller only reads", "Make one without shadow.")
         check_transition(self.state, State.CONNECTING, "connecting")
         self._enter(State.CONNECTING, "claims the groups")
-        self._claim = Claim(self.owner, self.period, self._random)
+        self._refused = None
+        self._claim = Claim(self.owner, self._link.groups, self.period, self._random)
 
     def connect(self) -> None:
         """Connect, and wait until all groups agree.
@@ -140,10 +142,10 @@ class Controller(Loop):
         with interrupt_calls(self.stop):
             while self.state is State.CONNECTING:
                 self.cycle()
+            self._let_go()
         if self.state is not State.READY:
-            raise RefusedError(
-                "connecting", self._reason, "Check the machine and who else controls it, then try again."
-            )
+            step = "Check the machine and who else controls it, then try again."
+            raise (self._refused or Trouble(self._reason, step)).refusal("connecting")
 
     def begin_homing(self, pose: Pose) -> None:
         """Say where the platform is held, and look whether the tensions agree.
@@ -216,9 +218,12 @@ class Controller(Loop):
         check_transition(self.state, State.MOVING, "the path")
         motion = path if isinstance(path, Motion) else self.plan(path)
         check_transition(self.state, State.MOVING, "the path")
+        self._check_agreement("the path")
+        check_motion(motion, self.robot, self.period)
         check_start(self.robot, self.estimate, motion.state.pose[0])
-        assert self._point is not None
-        course = Along(motion, self.period, self._point.length - motion.length[0])
+        lead = self._stood("the path").length - motion.length[0]
+        check_lead("the path", lead)
+        course = Along(motion, self.period, lead)
         self._begin(State.MOVING, course, motion, f"a path of {self.period * (len(motion) - 1):.2f} s")
 
     def execute(self, path: Path | Motion) -> Execution:
@@ -295,9 +300,8 @@ class Controller(Loop):
             self._jog_in_homing(chosen, far)
             return
         check_transition(self.state, State.JOGGING, "the jog")
-        here = self._here()
-        assert self._point is not None
-        length = self._point.length
+        self._check_agreement("the jog")
+        here, length = self._here(), self._stood("the jog").length
         motion = self._beside(lambda: winch_jog(self.robot, length, here, chosen, far, self.period, self._model))
         check_transition(self.state, State.JOGGING, "the jog")
         course = Along(motion, self.period, np.zeros(len(length)))
@@ -343,9 +347,8 @@ class Controller(Loop):
         """
         far = checked_displacement(by)
         check_transition(self.state, State.JOGGING, "the jog")
-        here = self._here()
-        point = self._point
-        assert point is not None
+        self._check_agreement("the jog")
+        here, point = self._here(), self._stood("the jog")
         course = self._beside(lambda: PlatformJog(self.robot, point, here, far, self.period, self._model, self._method))
         check_transition(self.state, State.JOGGING, "the jog")
         self._begin(State.JOGGING, course, None, "the platform")
@@ -393,9 +396,11 @@ class Controller(Loop):
             RefusedError: If no path is being followed.
         """
         check_transition(self.state, State.PAUSING, "pausing")
-        assert isinstance(self._course, Along)
-        self._course.pause()
-        self._enter(State.PAUSING, f"at {self._course.clock:.2f} s of the path")
+        course = self._course
+        if not isinstance(course, Along):
+            raise RefusedError("pausing", "no path is being followed", "Stop instead: stop().")
+        course.pause()
+        self._enter(State.PAUSING, f"at {course.clock:.2f} s of the path")
 
     def resume(self) -> None:
         """Go on where `pause` stopped.
@@ -406,20 +411,25 @@ class Controller(Loop):
         check_transition(self.state, State.MOVING, "resuming")
         if self._paused is None:
             raise RefusedError("resuming", "no path was paused here", "Begin one with start(path).")
+        self._check_agreement("resuming")
         check_start(self.robot, self.estimate, self._paused.pose)
-        self._course, self._paused = self._paused, None
-        self._course.resume()
-        self._go(State.MOVING, f"goes on at {self._course.clock:.2f} s of the path")
+        course, self._paused = self._paused, None
+        course.resume()
+        self._course = course
+        self._go(State.MOVING, f"goes on at {course.clock:.2f} s of the path")
 
     def _beside(self, work: Callable[[], T]) -> T:
         """Do what may take longer than a cycle; in real time the cycles go on beside it, or the PLCs would hold."""
         if self._pace is None or self.state is State.OFF:
             return work()
-        with interrupt_calls(self.stop), ThreadPoolExecutor(1, "sagline planning") as pool:
-            future = pool.submit(work)
-            while not future.done():
-                self.cycle()
-        return future.result()
+        with interrupt_calls(self.stop):
+            return self._wait_for(aside(work, threaded=True))
+
+    def _wait_for(self, begun: Future[T]) -> T:
+        """Go on until work is done."""
+        while not begun.done():
+            self.cycle()
+        return begun.result()
 
     def stop(self) -> None:
         """Lead all rates to zero, from the next cycle on; where nothing moves, nothing happens."""
@@ -428,16 +438,27 @@ class Controller(Loop):
     def acknowledge(self) -> None:
         """Say that what was wrong is mended: from FAULT to READY, and to IDLE where the place is still known.
 
+        Where the robot is idle and degraded, the load cells are believed again.
+
         Raises:
-            RefusedError: If the state is another one.
+            RefusedError: If the state is another one, or not all groups agree yet; it says which, and why.
         """
+        what = "acknowledging"
+        if self.state is State.IDLE and self.degraded:
+            self._clear_faults()
+            self._say(EventKind.NOTE, "acknowledged", "the load cells are believed again")
+            return
         if self.state is not State.FAULT:
-            raise RefusedError("acknowledging", f"the state is {self.state.name}", "There is nothing to acknowledge.")
+            raise RefusedError(what, f"the state is {self.state.name}", "There is nothing to acknowledge.")
+        sample = self._check_agreement(what)
+        begun = self._stand_at(sample.length + self.zero - self._correction) if self.homed else None
+        found = None if begun is None else self._wait_for(begun)
+        self._check_agreement(what)  # after the cycles beside it
+        check_transition(self.state, State.READY, what)
         self._clear_faults()
         self._enter(State.READY, "the operator acknowledged")
-        if self.homed and self.sample is not None:
-            length = self.sample.length + self.zero - self._correction
-            self.homed = self._stand_at(length)
+        if found is not None and self.homed:
+            self.homed = self._stands(found)
             if self.homed:
                 self._enter(State.IDLE, "the place is still known")
 
@@ -450,6 +471,10 @@ class Controller(Loop):
         if self.state is not State.OFF:
             check_transition(self.state, State.OFF, "switching off")
             self._leave("the operator")
-        self.cycle()
-        while self._command is not None:
+            self.cycle()
+        self._let_go()
+
+    def _let_go(self) -> None:
+        """While it is off, send what gives the grants back, until they are."""
+        while self.state is State.OFF and self._command is not None:
             self.cycle()

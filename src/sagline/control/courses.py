@@ -8,12 +8,16 @@ from typing import Final, NamedTuple, Protocol, TypeVar
 import numpy as np
 
 from sagline.arrays import Array, Flags
+from sagline.cables.model import CableModel
 from sagline.control.checks import Motion
 from sagline.control.link import RAMP
 from sagline.control.null_space import NullSpace, null_space
+from sagline.kinematics.forward import forward
+from sagline.kinematics.forward_status import STABLE, ForwardStatus
 from sagline.robot.drum import drum_tension
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
 
 LEAD_SPEED: Final = 0.01  # m/s: so fast at most goes what a plan's first lengths are off those that are held
 WHOLE: Final = 1e-9  # of a row
@@ -32,6 +36,7 @@ class SetPoint(NamedTuple):
         clock: On the plan [s]; NaN beside one.
         done: Whether the course ends here.
         enable: Which drives may move, shape (m,); None for all.
+        leading: Whether lengths that were held before fade into those of a plan: tensions are not the plan's yet.
     """
 
     length: Array
@@ -43,6 +48,7 @@ class SetPoint(NamedTuple):
     clock: float
     done: bool
     enable: Flags | None = None
+    leading: bool = False
 
 
 class Course(Protocol):
@@ -91,6 +97,51 @@ class Standing:
         return self._point
 
 
+def standing_at(robot: Robot, length: Array, start: Pose | None, model: CableModel) -> Standing | ForwardStatus:
+    """Stay at lengths, wherever the platform is with them.
+
+    Args:
+        robot: The robot.
+        length: Unstrained lengths off the drums [m], shape (m,).
+        start: Near where it is; None: not known.
+        model: Of the cables.
+
+    Returns:
+        A course; or why there is no such place.
+    """
+    found = forward(robot, length, start, model)
+    return Standing.at(found.state) if found.status in STABLE else ForwardStatus(int(found.status))
+
+
+class Fade:
+    """What lengths are off a plan at its beginning; it goes as smoothly as a winch that is jogged, and no faster."""
+
+    def __init__(self, lead: Array, period: float) -> None:
+        """Begin with all of it.
+
+        Args:
+            lead: By how much the lengths that are held are off the plan's first ones [m], shape (m,).
+            period: Of a cycle [s].
+        """
+        largest = float(np.abs(lead).max())
+        self._lead, self._period = lead, period
+        self._cycle, self._cycles = 0, ceil(max(RAMP, 1.5 * largest / LEAD_SPEED) / period) if largest > 0.0 else 0
+
+    @property
+    def done(self) -> bool:
+        """Whether nothing is left."""
+        return self._cycle >= self._cycles
+
+    def step(self) -> tuple[Array, Array] | None:
+        """What is left at the end of the next cycle [m], and its rate [m/s], both of shape (m,); None: nothing."""
+        self._cycle += 1
+        if self.done:
+            return None
+        share = self._cycle / self._cycles
+        fall = smooth_slope(share) / (self._cycles * self._period)
+        return (1.0 - smooth(share)) * self._lead, -fall * self._lead
+
+
 class Along:
     """Along a motion, on a clock of its own that can slow down and go on."""
 
@@ -107,10 +158,7 @@ class Along:
         self._row = 0.0
         self._speed = self._wanted = 1.0
         self._change = period / RAMP
-        self._lead = lead
-        largest = float(np.abs(lead).max())
-        self._lead_cycles = ceil(max(RAMP, 1.5 * largest / LEAD_SPEED) / period) if largest > 0.0 else 0
-        self._cycle = 0
+        self._fade = Fade(lead, period)
 
     @property
     def clock(self) -> float:
@@ -125,7 +173,7 @@ class Along:
     @property
     def at_end(self) -> bool:
         """Whether the end is reached."""
-        return self._row >= self._last and self._cycle >= self._lead_cycles
+        return self._row >= self._last and self._fade.done
 
     def pause(self) -> None:
         """Slow the clock down, in the time of a ramp."""
@@ -143,7 +191,7 @@ class Along:
             if abs(self._speed - self._wanted) < WHOLE:
                 self._speed = self._wanted
         self._row = row = min(self._row + 0.5 * (before + self._speed), float(self._last))
-        self._cycle += 1
+        left = self._fade.step()
         motion, k = self.motion, int(row)
         share = row - k
         if share < WHOLE:
@@ -153,13 +201,13 @@ class Along:
                 rate = self._speed * rate
         else:
             length, rate, tension, drum = self._between(k, share)
-        if self._cycle < self._lead_cycles:
-            length, rate = self._led(length, rate)
+        if left is not None:
+            length, rate = length + left[0], rate + left[1]
         done = self.at_end or (self._wanted == 0.0 and self._speed == 0.0)
         clock = row * self._period
         gains = motion.gains
         at = None if gains is None else gains.at(clock)
-        return SetPoint(length, rate, tension, drum, motion.wrench[k], at, clock, done)
+        return SetPoint(length, rate, tension, drum, motion.wrench[k], at, clock, done, None, left is not None)
 
     def _between(self, k: int, u: float) -> tuple[Array, Array, Array, Array]:
         """Between two rows: cubic in the lengths, as their rates are known; linear in tensions."""
@@ -171,12 +219,6 @@ class Along:
         tension = (1.0 - u) * motion.tension[k] + u * motion.tension[k + 1]
         drum = (1.0 - u) * motion.drum_tension[k] + u * motion.drum_tension[k + 1]
         return length, (self._speed / h) * slope, tension, drum
-
-    def _led(self, length: Array, rate: Array) -> tuple[Array, Array]:
-        """With what is left of the lead."""
-        done = self._cycle / self._lead_cycles
-        left, fall = 1.0 - smooth(done), smooth_slope(done) / (self._lead_cycles * self._period)
-        return length + left * self._lead, rate - fall * self._lead
 
 
 class Ramp:

@@ -17,7 +17,6 @@ class Reaction(IntEnum):
     DEGRADED = 1  # the tension loop keeps what it has added; the motion goes on
     STOPPING = 2  # the ramp, then FAULT
     EMERGENCY = 3  # drums locked, no motion offered
-    OFF = 4  # the grants are given back
 
 
 class Fault(ABC):

@@ -8,7 +8,7 @@ import numpy as np
 
 from sagline.arrays import Array
 from sagline.cables.model import CableModel
-from sagline.control.courses import SetPoint
+from sagline.control.courses import SetPoint, Standing
 from sagline.control.jogging import winch_lengths
 from sagline.control.link import Sample
 from sagline.control.states import RefusedError
@@ -31,6 +31,7 @@ class Homing:
     Attributes:
         plan: The robot at that pose.
         state: The same as an equilibrium.
+        standing: The course that stays there.
         tension: T_A there [N], shape (m,).
         sigma: Of the load cells [N], shape (m,).
         off: By how much the mean of the tensions was above these when looked at last [N], shape (m,).
@@ -56,12 +57,13 @@ class Homing:
             step = "Name another pose: every cable must pull there."
             raise RefusedError("homing", f"the pose has no tensions within the limits, {gap.status.name}", step)
         self.state = self.plan.state
+        self.standing = Standing.at(self.state)
         self.tension = self.state.cables.frame_end_tension
         self.sigma = cell_sigma(robot)
         self._pose, self._robot = pose, robot
         m = robot.cable_count
         self._lengths, self._tensions = np.zeros(m), np.zeros(m)
-        self._count = 0
+        self._count, self._counter = 0, np.zeros(0, dtype=np.int64)
         self.off, self.zero, self.agrees = np.full(m, np.nan), np.zeros(m), False
 
     def rest(self) -> None:
@@ -78,6 +80,9 @@ class Homing:
         Returns:
             Whether enough of them are there, and agree with the plan.
         """
+        if self._counter.size and bool((sample.counter == self._counter).any()):
+            return False  # a group says what it said before
+        self._counter = sample.counter
         self._count += 1
         self._lengths += sample.length
         self._tensions += sample.tension
@@ -140,9 +145,14 @@ class HomingJog:
 
 def cell_sigma(robot: Robot) -> Array:
     """Standard deviation of what the load cells read, bias included [N], shape (m,)."""
-    winches = robot.winches
-    own = np.full(robot.cable_count, OWN_DEVIATION) if winches is None else winches.load_cell_deviation
-    return np.hypot(np.where(own > 0.0, own, OWN_DEVIATION), BIAS)
+    return np.hypot(*cell_errors(robot))
+
+
+def cell_errors(robot: Robot) -> tuple[Array, Array]:
+    """Standard deviations of what good load cells read, and the biases they may have [N], both of shape (m,)."""
+    winches, none = robot.winches, np.zeros(robot.cable_count)
+    own, bias = (none, none) if winches is None else (winches.load_cell_deviation, np.abs(winches.load_cell_bias))
+    return np.where(own > 0.0, own, OWN_DEVIATION), np.maximum(bias, BIAS)
 
 
 def tension_limits(homing: Homing, sample: Sample) -> Array:

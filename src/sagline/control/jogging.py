@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from sagline.arguments import whole_number
 from sagline.arrays import Array, checked, number
 from sagline.cables.model import CableModel
-from sagline.control.checks import Motion
-from sagline.control.courses import SetPoint, smooth, smooth_slope
+from sagline.control.checks import Motion, check_lead
+from sagline.control.courses import Fade, SetPoint, smooth, smooth_slope
 from sagline.control.states import RefusedError
 from sagline.errors import InvalidValueError
 from sagline.kinematics.forward import forward
@@ -97,6 +97,7 @@ def winch_jog(
             reason = f"cable {i} would have {tension[k, i]:.3g} N; allowed: its {name}, {limit[i]:.3g} N"
             raise RefusedError(what, reason, step)
     return Motion(
+        period=period,
         plan=None,
         state=found.state,
         length=lengths,
@@ -133,7 +134,8 @@ class PlatformJog:
             method: How the load is shared.
 
         Raises:
-            RefusedError: If the pose at the end, or the first one, has no tensions within the limits.
+            RefusedError: If the pose at the end, or the first one, has no tensions within the limits; or the lengths
+                that are held are not those of this pose.
         """
         self._robot, self._pose, self._by, self._period = robot, pose, by, period
         self._solver = InverseSolver(robot, model, method)
@@ -149,7 +151,9 @@ class PlatformJog:
             raise RefusedError("the jog", reason, "Jog by less, or elsewhere.")
         self._solver.reset()
         first = self._solver.step(*self._at(0.0))
-        self._lead = begin.length - first.unstrained_length
+        lead = begin.length - first.unstrained_length
+        check_lead("the jog", lead)
+        self._fade = Fade(lead, period)
 
     def step(self) -> SetPoint:
         """The set point at the end of the next cycle; where the pose has no answer the last one, and `failed` why."""
@@ -160,13 +164,19 @@ class PlatformJog:
             self.failed = f"the jog ended {1e2 * share:.0f} % on its way: the pose there is {found.status.name}"
             self._point, self.stops_hard = self._point._replace(done=True), bool(self._point.rate.any())
             return self._point
-        length = found.unstrained_length + (1.0 - smooth(share)) * self._lead
+        left = self._fade.step()
+        length = found.unstrained_length if left is None else found.unstrained_length + left[0]
         rate = (length - self._point.length) / self._period
         hanging = found.vertical_force - self._weight * found.unstrained_length  # pulleys and dead cable left out
         tension = np.hypot(found.horizontal_tension, hanging)
-        done = self._cycle == self._count
+        done = self._cycle == self._count and left is None
         self._point = self._point._replace(
-            length=length, rate=np.zeros(len(rate)) if done else rate, tension=tension, drum_tension=tension, done=done
+            length=length,
+            rate=np.zeros(len(rate)) if done else rate,
+            tension=tension,
+            drum_tension=tension,
+            done=done,
+            leading=left is not None,
         )
         return self._point
 

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from concurrent.futures import Future
+from contextlib import suppress
+from functools import partial
 from math import nan
 from typing import Final
 
@@ -11,26 +15,26 @@ from sagline.arguments import brief, instance, optional, whole_number
 from sagline.arrays import Array, Flags, number
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
+from sagline.control.aside import aside
 from sagline.control.checks import Motion
-from sagline.control.connecting import Claim
-from sagline.control.courses import Along, Course, Ramp, SetPoint, Standing
+from sagline.control.connecting import FRESH, Claim, Trouble, trouble
+from sagline.control.courses import Along, Course, Ramp, SetPoint, Standing, standing_at
 from sagline.control.cycle import Cycle
 from sagline.control.events import Event, EventKind
 from sagline.control.execution import Execution, ExecutionStatus, execution_of
 from sagline.control.fault import Fault, Reaction
 from sagline.control.faults import faults_of
 from sagline.control.guard import Garbage
-from sagline.control.homing import Homing
+from sagline.control.homing import Homing, cell_errors
 from sagline.control.jogging import PlatformJog
 from sagline.control.link import COUNTERS, HEARTBEAT, PERIOD, Command, Link, Missing, Mode, Sample
 from sagline.control.pace import Pace
 from sagline.control.recording import Recorded, Recorder, Tape
-from sagline.control.states import MOTION, State, check_transition
+from sagline.control.states import HOLDS_GRANT, MOTION, RefusedError, State, check_transition
 from sagline.control.tension_loop import TensionLoop, TensionSettings
 from sagline.control.warm import load_all
 from sagline.dynamics.drives import lever_of
 from sagline.errors import InvalidValueError
-from sagline.kinematics.forward import forward
 from sagline.kinematics.forward_solver import ForwardSolver
 from sagline.kinematics.forward_status import STABLE, ForwardStatus
 from sagline.kinematics.plan import Plan
@@ -103,6 +107,8 @@ class Loop:
     def _begin_without_motion(self, m: int) -> None:
         """What there is before anything is sent."""
         self._claim: Claim | None = None
+        self._refused: Trouble | None = None  # why the last claim was
+        self._standing: Future[Standing | ForwardStatus] | None = None  # where it stands, while that is worked out
         self._homing: Homing | None = None
         self._most_tension: Array | None = None  # while a winch is jogged in homing
         self._course: Course | None = None
@@ -159,21 +165,33 @@ class Loop:
         return execution_of(self._tape, self.robot, plan, *how)
 
     def cycle(self) -> None:
-        """Do one cycle: send and take, estimate, look for faults, and prepare what goes out next."""
+        """Do one cycle: send and take, estimate, look for faults, and prepare what goes out next.
+
+        Whatever is raised within stops the winches: it is told, a command to hold is sent, and it is raised again.
+        """
+        try:
+            self._cycle()
+        except BaseException as error:
+            self._break_off(error)
+            raise
+
+    def _cycle(self) -> None:
+        """What `cycle` does."""
         late = 0.0 if self._pace is None else self._pace.wait()
         command, point, correction = self._command, self._point, self._correction
         answer = self._link.exchange(command)
         self._time = answer.time
-        if isinstance(answer, Sample):
-            before, self.sample = self.sample, answer
+        sample = answer if isinstance(answer, Sample) else _aged(self.sample, answer)
+        if sample is not None:
+            before, self.sample = self.sample, sample
             planned = self._unknown if point is None else point.tension
             if self.homed or self._shadow:
-                self._locate(answer, None if point is None else point.wrench)
+                self._locate(sample, None if point is None else point.wrench)
             elif self._estimate >= 0:
                 self._place, self._turn, self._estimate = np.full(3, nan), np.full(4, nan), -1
             if self._shadow or self.state not in UNWATCHED:
                 row = None if point is None else point.row
-                self._look(Cycle(answer, before, command, planned, row, correction, late, self._recording))
+                self._look(Cycle(sample, before, command, planned, row, correction, late, self._recording))
         if self._stop_asked:
             self._stop_now()
         self._prepare(answer)
@@ -181,9 +199,44 @@ class Loop:
             self._keep(command, answer, point, correction, late)
         self._number += 1
 
+    def _break_off(self, error: BaseException) -> None:
+        """Have the PLCs lead the rates to zero, whatever was raised: nobody may call the next cycle."""
+        self._garbage.go_on()
+        line = f"a cycle ended with {type(error).__name__}: {' '.join(str(error).split())[:160]}. The drives hold."
+        self._say(EventKind.FAULT, "cycle broken off", line)
+        if self.state is State.CONNECTING:
+            self._leave(line)
+            self._send_leave(None)
+        elif self.state in HOLDS_GRANT and self.state is not State.EMERGENCY:
+            self._end(ExecutionStatus.FAULT, line)
+            if self.sample is not None:
+                self._hold = self.sample.length, self.sample.filtered
+            self._course, self._paused, self._homing = None, None, None
+            if self.state is not State.FAULT:
+                if self.state is not State.STOPPING:
+                    self._enter(State.STOPPING, line)
+                self._enter(State.FAULT, line)
+            self._send_hold(Mode.HOLD, self._enabled)
+        with suppress(Exception):  # the link itself may be what raises
+            self._link.exchange(self._command)
+
     @property
     def _recording(self) -> str:
-        return "" if self._record is None else self._record.stopped
+        found: list[str] = []
+        self._tell(lambda record: found.append(record.stopped))
+        return found[0] if found else ""
+
+    def _tell(self, what: Callable[[Recorder], object]) -> None:
+        """Tell the one who looks on, and nobody any more once that raises."""
+        if self._record is None:
+            return
+        try:
+            what(self._record)
+        except Exception as error:
+            self._record = None
+            why = f"{type(error).__name__}: {' '.join(str(error).split())[:160]}"
+            line = f"recording has stopped, as the recorder raised {why}. The motion goes on without it."
+            self._say(EventKind.FAULT, "recording stopped", line)
 
     def _keep(
         self,
@@ -202,16 +255,14 @@ class Loop:
         if self._taping and self._tape is not None:
             self._tape.add(cycle)
             self._taping = self.state in MOTION
-        if self._record is not None:
-            self._record.cycle(cycle)
-            if self._told_of_plan and not self._taping and self._paused is None:
-                self._tell_end()
+        self._tell(lambda record: record.cycle(cycle))
+        if self._told_of_plan and not self._taping and self._paused is None:
+            self._tell_end()
 
     def _tell_end(self) -> None:
         """Tell the one who looks on how the plan ended."""
         self._told_of_plan = False
-        if self._record is not None:
-            self._record.ends(self._status, self._reason)
+        self._tell(lambda record: record.ends(self._status, self._reason))
 
     # what comes back
 
@@ -221,9 +272,13 @@ class Loop:
         length -= self._correction
         place, turn = np.empty(3), np.empty(4)
         status = self._solver.step_into(length, place, turn, wrench)
-        if status not in STABLE and self._estimate in STABLE:
-            self._say(EventKind.NOTE, "estimate", f"the platform's place is lost: {status.text}")
+        lost = status not in STABLE and self._estimate in STABLE
         self._place, self._turn, self._estimate = place, turn, int(status)
+        if lost:
+            line = f"the platform's place is lost: {status.text}. Look where it is, acknowledge, and home again."
+            self._say(EventKind.FAULT, "estimate", line)
+            if self.state in FOLLOWING:
+                self._react(Reaction.STOPPING, line)
 
     def _look(self, cycle: Cycle) -> None:
         """Let every rule look at the cycle, and do what follows."""
@@ -246,9 +301,7 @@ class Loop:
         """Do what a fault asks for."""
         if self._shadow or reaction <= Reaction.DEGRADED:
             return
-        if reaction is Reaction.OFF:
-            self._leave(line)
-        elif reaction is Reaction.EMERGENCY:
+        if reaction is Reaction.EMERGENCY:
             if self.state is not State.EMERGENCY:
                 self._end(ExecutionStatus.EMERGENCY, line)
                 self.homed = False
@@ -283,8 +336,8 @@ class Loop:
         if state in FOLLOWING:
             if state in MOTION and (self._point is None or self._point.done):
                 self._finish()
-            if self.state in FOLLOWING:
-                self._follow()
+            if self.state in FOLLOWING and self._course is not None:
+                self._follow(self._course)
                 return
         state, sample = self.state, self.sample
         if state is State.CONNECTING and self._claim is not None:
@@ -298,14 +351,14 @@ class Loop:
         else:
             self._send_hold(Mode.HOLD, self._enabled)
 
-    def _follow(self) -> None:
-        """The next set point of the course, with what the tension loop adds."""
-        assert self._course is not None
-        due, point = self._point, self._course.step()
+    def _follow(self, course: Course) -> None:
+        """The next set point of a course, with what the tension loop adds."""
+        due, point = self._point, course.step()
         row, sample = point.row, self.sample
         if self._loop is not None and row is not None and sample is not None and self.state in LOOP_ON:
             planned = point.tension if due is None else due.tension
-            self._correction = self._loop.step(sample.tension, planned, row, frozen=self.degraded)
+            leads = point.leading or (due is not None and due.leading)  # tensions differ because they are meant to
+            self._correction = self._loop.step(sample.tension, planned, row, frozen=self.degraded or leads)
         length = point.length + self._correction
         length -= self.zero
         self._point = point
@@ -315,7 +368,8 @@ class Loop:
     def _send(self, mode: Mode, length: Array, rate: Array, tension: Array, enable: Flags) -> None:
         self._counter = self._counter % COUNTERS + 1
         pulls = np.maximum(tension, 0.0)  # of a reading below zero; a PLC refuses to push
-        self._command = Command(self._counter, self.owner, mode, VALID_FOR, length, rate, pulls, enable)
+        claims = self.state is State.CONNECTING
+        self._command = Command(self._counter, self.owner, mode, VALID_FOR, length, rate, pulls, enable, claims)
 
     def _send_hold(self, mode: Mode, enable: Flags) -> None:
         length, tension = self._hold
@@ -339,8 +393,9 @@ class Loop:
             self._clear_faults()
             self._enter(State.READY, "all groups agree")
             self._send_hold(Mode.HOLD, self._enabled)
-        elif claim.refused:
-            self._leave(claim.refused)
+        elif claim.refused is not None:
+            self._refused = claim.refused
+            self._leave(claim.refused.reason)
             self._send_leave(self.sample)
         elif claim.mode is None:
             self._command = None
@@ -350,21 +405,34 @@ class Loop:
     def _go_on_homing(self, homing: Homing, sample: Sample) -> None:
         """Jog, or look whether the tensions agree."""
         if self._course is not None:
-            if self._most_tension is not None and (wrong := sample.tension > self._most_tension).any():
-                i = int(np.argmax(wrong))
-                line = f"the jog ended: cable {i} has {sample.tension[i]:.1f} N; allowed: {self._most_tension[i]:.1f} N"
-                self._say(EventKind.NOTE, "jog", line)
+            line = self._ends_jog(sample)
+            if line:
+                self._say(EventKind.NOTE, "jog", f"the jog ended: {line}")
                 self._end_jog(homing, sample)
             elif self._point is not None and self._point.done:
                 self._end_jog(homing, sample)
             else:
-                self._follow()
+                self._follow(self._course)
                 return
         elif homing.look(sample):
             self._accept(homing)
-            self._follow()
+            self._follow(homing.standing)
             return
         self._send_hold(Mode.HOLD, self._enabled)
+
+    def _ends_jog(self, sample: Sample) -> str:
+        """Why a jog in homing goes no further, as tensions alone are watched; "" where it does."""
+        stale = ~(sample.age <= FRESH * self.period)
+        if stale.any():
+            g = int(np.argmax(stale))
+            return f"group {g} is silent for {sample.age[g]:.2g} s. Check its PLC and the network"
+        if self.degraded:
+            return "a load cell is not to be believed. Check the cells, then home again"
+        most = self._most_tension
+        if most is None or (sample.tension <= most).all():
+            return ""
+        i = int(np.argmax(~(sample.tension <= most)))
+        return f"cable {i} has {sample.tension[i]:.1f} N; allowed: {most[i]:.1f} N"
 
     def _end_jog(self, homing: Homing, sample: Sample) -> None:
         self._course = None
@@ -377,21 +445,24 @@ class Loop:
         pose = homing.state.pose
         self._solver.reset(pose)
         self._place, self._turn, self._estimate = pose.position, pose.quaternion, int(ForwardStatus.SOLVED)
-        self._course = Standing.at(homing.state)
+        self._course = homing.standing
         self._held, self._homing = homing.plan, None
         largest = 1e3 * float(np.abs(self.zero).max())
         self._enter(State.IDLE, f"the tensions agree; lengths set to the plan's, by up to {largest:.2f} mm")
 
-    def _stand_at(self, length: Array) -> bool:
-        """Stay at lengths, wherever the platform is with them; whether that is known."""
+    def _stand_at(self, length: Array) -> Future[Standing | ForwardStatus]:
+        """Begin to work out where the platform stands with these lengths."""
         start = Pose.from_quaternion(self._place, self._turn) if self._estimate in STABLE else None
-        found = forward(self.robot, length, start, self._model)
+        return aside(partial(standing_at, self.robot, length, start, self._model), self._pace is not None)
+
+    def _stands(self, found: Standing | ForwardStatus) -> bool:
+        """Stay there from now on, if there is such a place."""
         self._held = None
-        if found.status in STABLE:
-            self._course = Standing.at(found.state)
-            self._point = self._course.step()
+        if isinstance(found, Standing):
+            self._course = found
+            self._point = found.step()
             return True
-        self._say(EventKind.NOTE, "estimate", f"no place for these lengths: {ForwardStatus(int(found.status)).text}")
+        self._say(EventKind.NOTE, "estimate", f"no place for these lengths: {found.text}")
         return False
 
     def _finish(self) -> None:
@@ -410,47 +481,56 @@ class Loop:
             self._course = Standing(point, course.pose)
             self._enter(State.IDLE, self._reason)
         elif point is not None:
-            self._end(ExecutionStatus.DONE, "the jog ended")
-            self._idle_or_fault(point.length)
+            self._idle_or_fault(point.length, ExecutionStatus.DONE, "the jog ended")
 
     def _stopped(self, point: SetPoint | None) -> None:
         """The ramp ended."""
-        self._end(self._status, self._reason)
         if self._after is State.IDLE and point is not None:
-            self._idle_or_fault(point.length)
+            self._idle_or_fault(point.length, self._status, self._reason)
             return
+        self._end(self._status, self._reason)
         if self.sample is not None:
             self._hold = self.sample.length, self.sample.filtered if point is None else point.drum_tension
         self._course = None
         self._enter(self._after, self._reason)
 
-    def _idle_or_fault(self, length: Array) -> None:
-        """Be idle at lengths, if it is known where the platform is with them."""
-        if self._stand_at(length):
-            self._enter(State.IDLE, self._reason)
+    def _idle_or_fault(self, length: Array, status: ExecutionStatus, reason: str) -> None:
+        """Be idle at lengths, once it is known where the platform is with them; set points stay until then."""
+        if self._standing is None:
+            self._standing = self._stand_at(length)
+        if not self._standing.done():
+            return
+        found = self._standing.result()
+        self._end(status, reason)
+        if self._stands(found):
+            self._enter(State.IDLE, reason)
+            return
+        self.homed = False
+        lost = "it is not known where the platform is; home again"
+        if self.state is State.STOPPING:
+            self._after, self._status, self._reason = State.FAULT, ExecutionStatus.FAULT, lost
+            self._stopped(self._point)
         else:
-            self.homed = False
-            self._begin_stop(State.FAULT, ExecutionStatus.FAULT, "it is not known where the platform is; home again")
+            self._begin_stop(State.FAULT, ExecutionStatus.FAULT, lost)
 
     # what the operator's methods use too
 
     def _begin(self, state: State, course: Course, motion: Motion | None, text: str) -> None:
         """Begin to follow a course."""
-        assert self._point is not None
         self._course, self._motion, self._paused = course, motion, None
         self._tape = Tape(self.robot.cable_count, len(self._link.groups), ROOM + (0 if motion is None else len(motion)))
         self._told = len(self._events)
         if self._told_of_plan:
             self._tell_end()  # of one that was paused
-        if self._record is not None and motion is not None and motion.plan is not None:
+        plan = None if motion is None else motion.plan
+        if self._record is not None and plan is not None:
             self._told_of_plan = True
-            self._record.begins(motion.plan)
+            self._tell(lambda record: record.begins(plan))
         self._go(state, text)
 
     def _go(self, state: State, text: str) -> None:
         """Set off, or go on."""
-        assert self._point is not None
-        self._point = self._point._replace(done=False)
+        self._point = self._stood(text)._replace(done=False)
         self._taping, self._status, self._reason = True, ExecutionStatus.RUNNING, ExecutionStatus.RUNNING.text
         self._garbage.stop()
         self._enter(state, text)
@@ -459,6 +539,21 @@ class Loop:
         """Nothing moves any more."""
         self._status, self._reason = status, reason
         self._garbage.go_on()
+
+    def _stood(self, what: str) -> SetPoint:
+        """Where it stands, which what moves begins from."""
+        if self._point is None:
+            raise RefusedError(what, "there is no set point to begin from", "Home first: home(pose).")
+        return self._point
+
+    def _check_agreement(self, what: str) -> Sample:
+        """The last sample; refuses what needs all groups, where one of them does not agree."""
+        if self.sample is None:
+            raise RefusedError(what, "no group has answered", "Connect first.")
+        why = trouble(self.sample, self.owner, self._counter, self._link.groups, self.period)
+        if why is not None:
+            raise why.refusal(what)
+        return self.sample
 
     def _leave(self, reason: str) -> None:
         """Give the grants back."""
@@ -472,18 +567,25 @@ class Loop:
     def _enter(self, state: State, text: str) -> None:
         """Change the state, as the table allows."""
         check_transition(self.state, state, state.name)
-        self.state = state
+        self.state, self._standing = state, None
         self._say(EventKind.STATE, state.name, text)
 
     def _say(self, kind: EventKind, name: str, text: str) -> None:
         event = Event(self._time, self._number, kind, name, self.state, text)
         self._events.append(event)
-        if self._record is not None:
-            self._record.event(event)
+        self._tell(lambda record: record.event(event))
 
     def _clear_faults(self) -> None:
         """Rules that remember nothing."""
-        self._faults: tuple[Fault, ...] = faults_of(self.robot, self.period, groups=self._link.groups)
+        deviation, bias = cell_errors(self.robot)
+        self._faults: tuple[Fault, ...] = faults_of(
+            self.robot,
+            self.period,
+            groups=self._link.groups,
+            cell_deviation=float(deviation.max()),
+            cell_bias=float(bias.max()),
+            largest_correction=self._settings.largest,
+        )
         self._is_degraded = False
         self._degrading = [fault for fault in self._faults if fault.reaction is Reaction.DEGRADED]
 
@@ -509,6 +611,13 @@ def _check_period(link: Link, period: float) -> None:
         step = f"Give the machine period={period:g}, or the controller pace=Pace({told:g})."
         allowed = f"{1e3 * period:g} ms, the controller's"
         raise InvalidValueError("link", f"of PLCs with a period of {1e3 * told:g} ms", allowed, step)
+
+
+def _aged(known: Sample | None, missing: Missing) -> Sample | None:
+    """What was said last, older by now, where a link that had samples has none."""
+    if known is None:
+        return None
+    return known._replace(time=missing.time, age=known.age + (missing.time - known.time))
 
 
 _DONE: Final = (ExecutionStatus.DONE, "the end of the plan")

@@ -60,7 +60,7 @@ TABLE: Final = (
     Row(
         State.CONNECTING,
         "brakes",
-        (Exit(State.READY, "layouts, counters and grants agree"), Exit(State.OFF, "they do not"), _EMERGENCY),
+        (Exit(State.READY, "layouts, counters and grants agree"), Exit(State.OFF, "they do not")),
     ),
     Row(
         State.READY,

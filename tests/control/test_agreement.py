@@ -1,0 +1,178 @@
+"""What needs all groups is refused while one of them does not agree, in one line that names it and the next step."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.control.connecting import trouble
+from sagline.control.controller import Controller
+from sagline.control.link import COUNTERS, GroupStatus, Mode, Sample, WinchState
+from sagline.control.states import RefusedError, State
+from sagline.twin.machine import Machine
+from tests.control.rigs import HOME, at, prototype, rig, spy_of, state_of
+
+OWN, COUNTER = 77, 1000
+GROUPS = ((0, 1), (2, 3), (4, 5), (6, 7))
+
+
+def agreeing() -> Sample:
+    """Of four groups that agree."""
+    four, eight = np.ones(4), np.ones(8)
+    whole, none = four.astype(np.int64), np.zeros(8, dtype=np.int64)
+    return Sample(
+        time=1.0, age=0.01 * four, counter=whole, plc_time=four, owner=OWN * whole, echo=(COUNTER - 2) * whole,
+        status=int(GroupStatus.READY | GroupStatus.FOLLOWING) * whole, fault=0 * whole, length=eight, rate=0 * eight,
+        torque=eight, tension=eight, filtered=eight, counts=none, state=none + int(WinchState.ENABLED),
+        winch_fault=none, discarded=0 * whole,
+    )  # fmt: skip
+
+
+LOCKED = int(GroupStatus.READY | GroupStatus.LOCKED)
+BAD: list[tuple[str, int, float, str, str]] = [
+    ("age", 2, 0.04, "group 2: silent for 0.04 s", "network"),
+    ("age", 2, np.nan, "group 2: silent", "network"),
+    ("owner", 1, 5, "group 1: belongs to another controller, 5", "Stop that one"),
+    ("owner", 1, 0, "group 1: nobody has the grant", "Connect again"),
+    ("status", 3, LOCKED, "group 3: the drums are locked", "Let the drums go at the machine"),
+    ("status", 3, int(GroupStatus.EMERGENCY), "group 3: the emergency stop is pressed", "release it"),
+    ("status", 0, int(GroupStatus.BRAKED), "group 0: a drive is not ready", "reset it at the machine"),
+    ("fault", 0, 3, r"group 0: it stopped by itself \(FOLLOWING_ERROR\)", "Mend the cause"),
+    ("winch_fault", 4, 1, "group 2: a drive has tripped", "reset it at the machine"),
+    ("state", 7, int(WinchState.FAULT), "group 3: a drive has tripped", "reset it at the machine"),
+    ("echo", 1, COUNTER - 11, "group 1: does not take commands", "PLC's program"),
+]
+
+
+@pytest.mark.parametrize(("field", "index", "value", "reason", "step"), BAD)
+def test_each_thing_that_is_wrong_is_named_with_its_group(
+    field: str, index: int, value: float, reason: str, step: str
+) -> None:
+    assert trouble(agreeing(), OWN, COUNTER, GROUPS) is None
+    wrong = getattr(agreeing(), field).copy()
+    wrong[index] = value
+    found = trouble(agreeing()._replace(**{field: wrong}), OWN, COUNTER, GROUPS)
+    assert found is not None
+    with pytest.raises(RefusedError, match=rf"^it is refused: {reason}.*{step}") as caught:
+        raise found.refusal("it")
+    assert len(str(caught.value)) < 300
+
+
+def test_an_echo_may_be_ten_commands_old_across_the_end_of_the_counters() -> None:
+    sample = agreeing()._replace(echo=np.full(4, COUNTERS - 4))
+    assert trouble(sample, OWN, 6, GROUPS) is None
+    assert trouble(sample, OWN, 7, GROUPS) is not None
+
+
+MISHAPS = [
+    ("servo 2 trips", "group 1: a drive has tripped"),
+    ("group 1 is taken", "group 1: belongs to another controller"),
+]
+
+
+@pytest.mark.parametrize(("mishap", "why"), MISHAPS)
+def test_what_is_not_mended_cannot_be_acknowledged(mishap: str, why: str) -> None:
+    """It could be, and the next path moved the platform by 94 mm with six winches of eight."""
+    control, machine = rig()
+    machine.inject(mishap)
+    for _ in range(60):
+        control.cycle()
+    assert state_of(control) is State.FAULT
+    with pytest.raises(RefusedError, match=why):
+        control.acknowledge()
+    assert state_of(control) is State.FAULT
+
+
+def test_a_drive_that_was_reset_can_be_acknowledged() -> None:
+    control, machine = rig()
+    machine.inject("servo 2 trips")
+    for _ in range(60):
+        control.cycle()
+    machine.reset()
+    for _ in range(30):
+        control.cycle()
+    control.acknowledge()
+    assert state_of(control) is State.IDLE
+    assert np.linalg.norm(control.go_to(at(0.02, 0.0, 1.5)).position[-1] - [0.02, 0.0, 1.5]) < 3e-4
+
+
+BEGINNINGS: list[Callable[[Controller], object]] = [
+    lambda control: control.start(sl.quintic_path([(0, 0, 1.5), (0, 0, 1.52)], speed=0.1)),
+    lambda control: control.start_jog(0, 1e-3),
+    lambda control: control.start_jog_platform([1e-3, 0.0, 0.0]),
+]
+
+
+@pytest.mark.parametrize("begin", BEGINNINGS)
+def test_nothing_moves_while_a_group_does_not_agree(begin: Callable[[Controller], object]) -> None:
+    control, _ = rig()
+    assert control.sample is not None
+    control.sample = control.sample._replace(age=np.array([0.01, 0.01, 0.05, 0.01]))
+    with pytest.raises(RefusedError, match=r"group 2: silent for 0\.05 s"):
+        begin(control)
+    assert state_of(control) is State.IDLE
+
+
+def test_drums_that_are_locked_are_let_go_before_it_connects() -> None:
+    control, machine = rig()
+    machine.inject("cable 1 breaks")
+    for _ in range(60):
+        control.cycle()
+    assert state_of(control) is State.EMERGENCY
+    control.off()
+    with pytest.raises(RefusedError, match=r"group 0, 1, 2, 3: the drums are locked.*Let the drums go at the machine"):
+        control.connect()
+    assert state_of(control) is State.OFF
+    machine.reset()
+    control.connect()
+    assert state_of(control) is State.READY
+
+
+def owners(machine: Machine) -> set[int]:
+    return {program.owner for program in machine._programs}
+
+
+def test_who_is_refused_has_given_back_what_he_had() -> None:
+    machine = Machine(prototype(), start=HOME, seed=1, faults=["group 2 is taken"])
+    control = Controller(prototype(), machine.link(), seed=2)
+    with pytest.raises(RefusedError, match="group 2: belongs to another controller"):
+        control.connect()
+    assert control.owner not in owners(machine)
+
+
+def test_ctrl_c_while_it_connects_gives_back_what_it_had(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        control, machine = rig(home=False)
+        cycles = []
+        look = control.cycle
+
+        def cycle() -> None:
+            cycles.append(control.owner in owners(machine))
+            if len(cycles) == 4:
+                signal.raise_signal(signal.SIGINT)
+            look()
+
+        monkeypatch.setattr(control, "cycle", cycle)
+        with pytest.raises(KeyboardInterrupt):
+            control.connect()
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert any(cycles)
+    assert control.state is State.OFF
+    assert control.owner not in owners(machine)
+
+
+def test_grants_are_claimed_only_while_it_connects() -> None:
+    control, _ = rig()
+    control.go_to(at(0.01, 0.0, 1.5))
+    control.off()
+    commands = [command for command in spy_of(control).commands if command is not None]
+    first = next(k for k, command in enumerate(commands) if command.mode is Mode.HOLD and not command.claims)
+    assert all(command.claims for command in commands[:first])
+    assert not any(command.claims for command in commands[first:])
+    assert first < 20

@@ -1,0 +1,135 @@
+"""What is checked of a path and a motion before the first set point goes out."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.arrays import Array
+from sagline.control.checks import motion_along
+from sagline.control.link import PERIOD
+from sagline.control.states import RefusedError
+from sagline.motion.path import Path
+from tests.control.rigs import HOME, at, prototype, rig, state_of
+
+RATE = 100.0
+
+
+def way(rate: float = RATE) -> Path:
+    return sl.septic_path([HOME, at(0.2, 0.0, 1.5)], speed=0.2, acceleration=0.4, rate=rate)
+
+
+def moved(path: Path, shift: Array) -> Path:
+    """The same with poses shifted [m], shape (N, 3), and twists left as they are."""
+    pose = sl.Pose.from_quaternion(path.pose.position + shift, path.pose.quaternion)
+    return Path(path.time, pose, path.twist, path.twist_rate, path.jerk)
+
+
+def planned(robot: sl.Robot, path: Path) -> object:
+    return motion_along(robot, path, PERIOD, sl.Catenary(), sl.Closest())
+
+
+@pytest.mark.parametrize("jump", [1e-3, 6e-3, None])
+def test_a_pose_that_jumps_while_its_twist_does_not_is_refused(jump: float | None) -> None:
+    """6 mm between two ticks were 3.4 mm of cable, which no winch can do, and the twist knew nothing of it."""
+    path = way()
+    half = len(path.time) // 2
+    shift = np.zeros((len(path.time), 3))
+    if jump is None:  # a slow drift that the twist does not know: 20 um a tick
+        shift[:, 2] = 2e-5 * np.arange(len(path.time))
+    else:
+        shift[half:, 2] = jump
+    control, _ = rig()
+    with pytest.raises(RefusedError) as caught:
+        control.execute(moved(path, shift))
+    line = str(caught.value)
+    found = re.search(r"from ([\d.]+) s to ([\d.]+) s the length of cable (\d) is off its rate by ([\d.]+) mm", line)
+    assert found is not None, line
+    assert "allowed: 0.0" in line
+    assert line.endswith("use path_from_samples.")
+    if jump is not None:
+        assert float(found[2]) == pytest.approx(path.time[half], abs=1e-9)
+        plan = sl.inverse(prototype(), sl.Pose.from_quaternion(path.pose.position[half], path.pose.quaternion[half]))
+        above = sl.inverse(prototype(), at(*(path.pose.position[half] + shift[half])))
+        step = np.abs(above.unstrained_length - plan.unstrained_length)
+        assert int(found[3]) == int(np.argmax(step))
+        assert 1e-3 * float(found[4]) == pytest.approx(step.max(), rel=0.1)
+    assert state_of(control).name == "IDLE"
+
+
+def test_winches_that_a_jump_would_make_too_fast_are_named() -> None:
+    robot = prototype()
+    assert robot.winches is not None
+    limit, winches = robot.winches.speed_limit, robot.winches
+    assert limit is not None
+    assert winches.drum_radius is not None
+    path = way()
+    shift = np.zeros((len(path.time), 3))
+    shift[len(path.time) // 2 :, 2] = 0.02
+    with pytest.raises(RefusedError, match=r"the motor of winch \d would turn at \d+ rad/s; allowed: 314 rad/s"):
+        planned(robot, moved(path, shift))
+    fastest = 0.9 * float((limit * winches.drum_radius / np.abs(winches.gear)).min()) * PERIOD
+    shift *= fastest / 0.02  # of the platform, slower than of a winch: refused by the other check
+    with pytest.raises(RefusedError, match="is off its rate"):
+        planned(robot, moved(path, shift))
+
+
+PATHS = [
+    lambda: way(),
+    lambda: sl.quintic_path([(0, 0, 1.5), (0.3, 0.2, 1.4), (0.1, -0.3, 1.2)], speed=0.3),  # its end is beside a tick
+]
+
+
+@pytest.mark.parametrize("path", PATHS)
+def test_paths_whose_twist_is_theirs_are_not_refused(path: object) -> None:
+    planned(prototype(), path())  # type: ignore[operator]
+
+
+def test_the_load_counts_on_the_side_on_which_it_pulls() -> None:
+    """A motor that takes cable in works against the cable: it needs force and tension together, not their difference.
+
+    The limit is put between the two, so that a load of the other sign would let the path through, or refuse a second.
+    """
+    robot = prototype()
+    assert robot.winches is not None
+    winches = robot.winches
+    assert winches.inertia is not None
+    assert winches.drum_radius is not None
+    plan = sl.inverse(robot, way())
+    assert plan.length_rate is not None
+    assert plan.path is not None
+    radius = float(winches.drum_radius.mean() / np.abs(winches.gear).mean())
+    acceleration = np.gradient(plan.length_rate, plan.path.time, axis=0)
+    own = winches.inertia / radius**2 * acceleration + winches.friction * np.sign(plan.length_rate)
+    tension = plan.state.cables.frame_end_tension
+    with_load, other_sign = (radius * float(np.abs(own + sign * tension).max()) for sign in (-1.0, 1.0))
+    low, high = sorted((with_load, other_sign))
+    assert high > 1.02 * low
+    between = robot.replace(winches=winches.replace(torque_limit=0.5 * (low + high)))
+    if with_load > other_sign:
+        with pytest.raises(RefusedError, match=rf"would give {with_load:.2g}\d* N m"):
+            planned(between, way())
+    else:
+        planned(between, way())
+    few = robot.replace(winches=winches.replace(torque_limit=0.99 * with_load))
+    with pytest.raises(RefusedError, match="would give"):
+        planned(few, way())
+    planned(robot.replace(winches=winches.replace(torque_limit=1.01 * with_load)), way())
+
+
+def test_a_motion_of_another_period_or_robot_is_refused() -> None:
+    """Of 100 ms a row, followed in cycles of 10 ms, it was ten times as fast."""
+    control, _ = rig()
+    slow = motion_along(prototype(), way(rate=10.0), 0.1, sl.Catenary(), sl.Closest())
+    with pytest.raises(RefusedError, match="planned for cycles of 100 ms; they take 10 ms"):
+        control.start(slow)
+    heavy = prototype().replace(mass=prototype().mass + 1.0)
+    with pytest.raises(RefusedError, match="planned for another robot"):
+        control.start(motion_along(heavy, way(), PERIOD, sl.Catenary(), sl.Closest()))
+    own = control.plan(way())
+    assert own.robot is control.robot
+    assert own.period == PERIOD
+    assert control.execute(own).status.name == "DONE"
