@@ -27,11 +27,12 @@ LINES = {
     "new": ["new", "my_robot.yaml"],
     "convert": ["convert", "robot.wcrfx"],
     "export-c": ["export-c", "cogiro"],
-    "experiment": ["experiment", "nothing"],
+    "experiment": ["experiment", "article", "--in-process"],
     "export-scl": ["export-scl", "article-prototype"],
     "twin": ["twin", "article-prototype", "--port", "0"],
     # nobody listens there
     "control": ["control", "article-prototype", "--plc", "127.0.0.1:1,127.0.0.1:2,127.0.0.1:3,127.0.0.1:4"],
+    "log": ["log", "run.mcap"],
     "view": ["view", "cogiro", "--no-browser"],
 }
 

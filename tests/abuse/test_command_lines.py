@@ -10,6 +10,7 @@ import sys
 import time
 from hashlib import sha256
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import pytest
@@ -22,6 +23,7 @@ from sagline.plc.addresses import addresses_of, groups_at
 from sagline.report.blocks import Chapter
 from tests.abuse.command_lines import LINES, Case, cases, commands
 from tests.effort import least_seconds
+from tests.files.executions import execution
 from tests.kinematics.winches import wound
 
 SHORT = "durations: 1\nrate: 4\nwaypoints: [{position: [0, 0, 1.5]}, {position: [1, 0, 1.5]}]\n"
@@ -43,6 +45,7 @@ def stocked(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "short.yaml").write_text(SHORT)
     sl.inverse(sl.load_robot("cogiro"), sl.load_path(folder / "short.yaml")).save(folder / "run.nc")
     sl.inverse(wound(), sl.load_path(folder / "short.yaml")).save(folder / "wound.nc")
+    execution().save(folder / "run.mcap")
     (folder / "broken.nc").write_bytes((folder / "run.nc").read_bytes()[:700])
     (folder / "broken.yaml").write_text("name: [\n")
     (folder / "empty.csv").write_text("")
@@ -75,6 +78,9 @@ def short_of_work(stocked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         groups_at(addresses_of(asked.plc, 102), robot)
         return sl.twin.Machine(robot).link()
 
+    for name in ("in_process", "apart_over_s7", "_tell", "experiment_chapter"):
+        monkeypatch.setattr(f"sagline.cli.experiment.{name}", lambda *_, **__: SimpleNamespace(findings=()))
+    monkeypatch.setattr("sagline.cli.experiment.write_experiment", lambda result, folder, how: folder)
     monkeypatch.setattr("sagline.twin.server.Server.run", served)
     monkeypatch.setattr("sagline.cli.control._link", linked)
     from sagline.viewer import server

@@ -49,7 +49,8 @@ def export_c(robot: Robot, file: str | os.PathLike[str], *, single_precision: bo
 
     Examples:
         >>> import sagline as sl
-        >>> source, header, scl = sl.export_c(sl.load_robot("article-prototype"), "sagline.c")
+        >>> robot = sl.load_robot("article-prototype")
+        >>> source, header, scl = sl.export_c(robot, "sagline.c")
     """
     instance(robot, Robot, "robot")
     real = np.float32 if instance(single_precision, bool, "single_precision") else np.float64
