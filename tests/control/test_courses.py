@@ -1,0 +1,61 @@
+"""Lengths that are off a plan fade into it no faster than a winch is jogged, and the tension loop waits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sagline.control.courses import LEAD_SPEED, Fade
+from sagline.control.states import RefusedError
+from tests.control.rigs import at, rig, spy_of
+
+PERIOD = 0.01
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-6, 1e-3, 5e-3, 0.03])
+def test_a_lead_fades_smoothly_and_no_faster_than_its_speed(size: float) -> None:
+    lead = size * np.array([1.0, -0.5, 0.0])
+    fade, lengths, rates = Fade(lead, PERIOD), [lead], [np.zeros(3)]
+    while (left := fade.step()) is not None:
+        lengths.append(left[0])
+        rates.append(left[1])
+    lengths.append(np.zeros(3))
+    rates.append(np.zeros(3))
+    assert fade.done
+    steps = np.diff(lengths, axis=0)
+    assert np.abs(rates).max() <= LEAD_SPEED * (1.0 + 1e-12)
+    assert np.abs(steps).max() <= LEAD_SPEED * PERIOD * (1.0 + 1e-9)
+    assert np.abs(steps - 0.5 * PERIOD * np.add(rates[1:], rates[:-1])).max() <= 1e-3 * size
+    assert np.abs(np.sum(steps, axis=0) + lead).max() < 1e-15
+    assert len(lengths) == (2 if size == 0.0 else 21 if size <= 1e-3 else round(1.5 * size / LEAD_SPEED / PERIOD) + 1)
+
+
+def test_a_jog_of_the_platform_after_one_of_a_winch_is_no_faster_and_the_loop_waits() -> None:
+    """The lead went within 0.4 s: 31 mm/s at a winch; and the loop took what it changed for an error."""
+    control, _ = rig()
+    control.jog(3, 8e-3)
+    control.start_jog_platform([2e-3, 0.0, 0.0])
+    rates = []
+    while control.moving:
+        control.cycle()
+        rates.append(np.abs(control._command.rate).max())  # type: ignore[union-attr]
+    assert max(rates) < LEAD_SPEED + 0.008  # 1.5 x 2 mm in 0.4 s beside it
+    lengths = np.array([command.length for command in spy_of(control).commands if command and command.mode == 2])
+    assert np.abs(np.diff(lengths, axis=0)).max() < (LEAD_SPEED + 0.008) * PERIOD
+    control, _ = rig()
+    control.jog(3, 8e-3)
+    x, y, z = control.estimate.position
+    done = control.go_to(at(x + 0.05, y, z))
+    assert done.status.name == "DONE"
+    assert np.abs(np.diff(done.correction, axis=0)).max() < 1e-5  # re-projected, nothing learned from the lead
+    assert np.abs(done.correction).max() < 2e-4
+
+
+def test_a_lead_of_more_than_five_millimeters_is_refused_and_the_way_back_goes() -> None:
+    control, _ = rig()
+    control.jog(3, 0.03)
+    for begin in (lambda: control.start_jog_platform([1e-3, 0, 0]), lambda: control.go_to(at(0.1, 0.0, 1.5))):
+        with pytest.raises(RefusedError, match=r"winch \d has [+-][\d.]+ mm more cable off than its plan; allowed: 5"):
+            begin()
+    control.jog(3, -0.03)
+    assert control.go_to(at(0.02, 0.0, 1.5)).status.name == "DONE"

@@ -1,0 +1,167 @@
+"""What is raised within a cycle, answers that cease, and a place that is lost: the winches come to rest."""
+
+from __future__ import annotations
+
+import gc
+from typing import Any
+
+import pytest
+
+from sagline.arrays import Array
+from sagline.control.events import EventKind
+from sagline.control.execution import ExecutionStatus
+from sagline.control.link import Missing, Mode, Sample
+from sagline.control.states import State
+from sagline.kinematics.forward_status import ForwardStatus
+from tests.control.rigs import Watcher, at, rig, spy_of, state_of
+
+
+class Bursting(Watcher):
+    """One who looks on, until it raises: in the cycle that moves with this number, or where its state is asked for."""
+
+    def __init__(self, where: str) -> None:
+        """Raise in this method."""
+        super().__init__(30, lambda: setattr(self, "_now", True))
+        self._where, self._now = where, False
+
+    def _burst(self, where: str) -> None:
+        if self._now and where == self._where:
+            raise OSError("the disk\nis gone")
+
+    @property
+    def stopped(self) -> str:  # type: ignore[override]
+        self._burst("stopped")
+        return ""
+
+    def cycle(self, cycle: Any) -> None:
+        super().cycle(cycle)
+        self._burst("cycle")
+
+    def ends(self, status: Any, reason: str) -> None:
+        self._burst("ends")
+
+    def event(self, event: Any) -> None:
+        super().event(event)
+        self._burst("event")
+
+
+@pytest.mark.parametrize("where", ["cycle", "stopped", "ends", "event"])
+def test_one_who_looks_on_and_raises_is_dropped_and_the_motion_goes_on(where: str) -> None:
+    control, _ = rig(record=Bursting(where))
+    done = control.go_to(at(0.05, 0.0, 1.5))
+    assert (done.status, control.state) == (ExecutionStatus.DONE, State.IDLE)
+    told = [event for event in control.events if event.name == "recording stopped"]
+    assert len(told) == 1
+    assert "the recorder raised OSError: the disk is gone. The motion goes on" in told[0].text
+    assert gc.isenabled()
+    assert control.go_to(at(0.0, 0.0, 1.5)).status is ExecutionStatus.DONE
+
+
+def burst(*_: Any) -> Any:
+    raise ArithmeticError("no")
+
+
+def link_that_bursts(control: Any, once: bool) -> None:
+    spy, good = control._link, control._link.exchange
+
+    def exchange(command: Any) -> Any:
+        if once:
+            spy.exchange = good
+        raise ArithmeticError("no")
+
+    spy.exchange = exchange
+
+
+BURSTS: list[tuple[Any, bool]] = [
+    (lambda control: setattr(control._solver, "step_into", burst), True),
+    (lambda control: setattr(control._course, "step", burst), True),
+    (lambda control: setattr(control._faults[0], "look", burst), True),
+    (lambda control: link_that_bursts(control, once=True), True),
+    (lambda control: link_that_bursts(control, once=False), False),
+]
+
+
+@pytest.mark.parametrize(("break_it", "sends"), BURSTS)
+def test_what_is_raised_in_a_cycle_holds_the_winches_and_is_raised_again(break_it: Any, sends: bool) -> None:
+    """The state stayed MOVING, a set point stood in the command, and garbage was never collected again."""
+    control, machine = rig()
+    control.start(control.path_to(at(0.2, 0.0, 1.5)))
+    for _ in range(50):
+        control.cycle()
+    break_it(control)
+    with pytest.raises(ArithmeticError, match="no"):
+        control.cycle()
+    assert state_of(control) is State.FAULT
+    assert gc.isenabled()
+    assert gc.get_freeze_count() == 0
+    assert control._command is not None
+    assert control._command.mode is Mode.HOLD
+    fault = next(event for event in control.events if event.name == "cycle broken off")
+    assert fault.kind is EventKind.FAULT
+    assert "ArithmeticError: no" in fault.text
+    assert control.execution is not None
+    assert control.execution.status is ExecutionStatus.FAULT
+    if sends:  # the PLCs have it already: they stand after a ramp, though nobody calls the next cycle
+        assert spy_of(control).commands[-1] is control._command
+        for _ in range(22):
+            machine.advance()
+        stood = [list(program.length) for program in machine._programs]
+        machine.advance()
+        assert [list(program.length) for program in machine._programs] == stood
+
+
+def test_what_is_raised_while_it_connects_gives_the_grants_back() -> None:
+    control, machine = rig(home=False)
+    control.claim()
+    for _ in range(4):
+        control.cycle()
+    assert {program.owner for program in machine._programs} == {control.owner}
+    link_that_bursts(control, once=True)
+    with pytest.raises(ArithmeticError):
+        control.cycle()
+    assert state_of(control) is State.OFF
+    for _ in range(3):
+        control.cycle()
+    assert {program.owner for program in machine._programs} == {0}
+
+
+def test_answers_that_cease_grow_old_and_it_stops() -> None:
+    """A link that has no sample any more, though it had some, let every rule sleep."""
+    control, _ = rig()
+    control.start(control.path_to(at(0.2, 0.0, 1.5)))
+    for _ in range(50):
+        control.cycle()
+    spy: Any = control._link
+    good = spy.exchange
+
+    def exchange(command: Any) -> Missing:
+        answer = good(command)
+        return Missing(answer.time, (1,), ("gone",))
+
+    spy.exchange = exchange
+    for _ in range(12):
+        control.cycle()
+    assert state_of(control) is State.STOPPING
+    assert any(event.name == "group silent" for event in control.events)
+    assert isinstance(control.sample, Sample)
+    assert control.sample.age.min() > 0.1
+
+
+def test_a_place_that_is_lost_on_the_way_stops_it() -> None:
+    control, _ = rig()
+    control.start(control.path_to(at(0.2, 0.0, 1.5)))
+    for _ in range(50):
+        control.cycle()
+    solver: Any = control._solver
+
+    class Lost:
+        def step_into(self, length: Array, place: Array, turn: Array, wrench: Array | None) -> ForwardStatus:
+            solver.step_into(length, place, turn, wrench)
+            return ForwardStatus.NOT_CONVERGED
+
+    control._solver = Lost()  # type: ignore[assignment]
+    control.cycle()
+    assert state_of(control) is State.STOPPING
+    done = control.wait()
+    assert (done.status, state_of(control)) == (ExecutionStatus.FAULT, State.FAULT)
+    assert "place is lost" in done.reason
