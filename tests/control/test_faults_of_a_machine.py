@@ -27,7 +27,10 @@ MORE = {
     "cell 6 is wrong by -25 N": ((("cell wrong", 500),), None),
     "load grows by 5 kg": ((), None),
     "load grows by -10 kg": ((), None),
-    "servo 3 is limited to 60 N": ((("following error", 200),), (State.STOPPING, 200)),
+    "servo 3 is limited to 60 N": (
+        (("following error", 200), ("group acts by itself", 600)),  # which is told when the others stand
+        (State.STOPPING, 200),
+    ),
     "servo 3 trips": ((("group acts by itself", 20),), (State.STOPPING, 20)),
     "group 1 repeats": (
         (("block discarded", 20), ("group stale", 30), ("group silent", 100)),
@@ -45,7 +48,7 @@ MORE = {
         (("block discarded", 20), ("group stale", 30), ("group silent", 100)),
         (State.STOPPING, 100),
     ),
-    "group 1 is taken": ((("owner lost", 20),), (State.STOPPING, 20)),
+    "group 1 is taken": ((("owner lost", 20), ("group acts by itself", 600)), (State.STOPPING, 20)),
     "commands repeat": ((("group acts by itself", 110),), (State.STOPPING, 110)),
     "commands are foreign": ((("group acts by itself", 110),), (State.STOPPING, 110)),
 }

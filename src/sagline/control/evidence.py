@@ -8,9 +8,9 @@ from typing import Final
 import numpy as np
 
 from sagline.arrays import Array, Flags
-from sagline.control.cycle import Cycle
+from sagline.control.cycle import MOVING, Cycle
 from sagline.control.ends import ends, finite, largest
-from sagline.control.link import WinchState, groups_of
+from sagline.control.link import RAMP, WinchState, groups_of
 from sagline.robot.robot import Robot
 
 SIGMAS: Final = 5.0  # by which a reading may be off before it means something
@@ -35,13 +35,17 @@ class Evidence:
         limit: Upper limits of T_A [N], shape (m,).
         full_scale: Of the cells [N], infinite where it is not known, shape (m,).
         believed: Which cells are, shape (m,).
-        stopped: Whether a fault has been told that stops the motion.
+        tension: T_A of those that are and read a number [N]; of the others what is planned, or something between
+            slack and tight where nothing is; shape (m,).
+        plain: Whether all are, and do.
+        stopped: Whether a fault has been told that stops the motion, which does not stand yet.
         broken: Which cables are known to be, shape (m,).
         jumped: Which encoders have, shape (m,).
-        least: Smallest reading of a cell in this cycle [N]; NaN where one is no number.
-        most: Largest [N]; likewise.
+        least: Smallest of these tensions [N].
+        most: Largest [N].
         oldest: Age of the oldest group's sample [s].
         bits: Of the status, those that any group has.
+        common: Those that every group has.
         faulted: Whether a PLC reports a fault.
         tripped: Whether a drive does.
         states: Of the winches, as plain numbers.
@@ -79,7 +83,7 @@ class Evidence:
         least = robot.tension_min
         self._slack = np.where(least > 0.0, SLACK_SHARE * least, SIGMAS * self.sigma)
         self._taut = np.where(least > 0.0, PLANNED_SHARE * least, 2.0 * SIGMAS * self.sigma)
-        self._most_slack = float(self._slack.max())
+        self._most_slack, self._neither = float(self._slack.max()), np.maximum(self._slack, self._taut)
         known = winch is not None and winch.load_cell_range is not None
         self.full_scale = np.broadcast_to(winch.load_cell_range if known else np.inf, (m,))  # type: ignore[union-attr, arg-type]
         self._set_up_motors(robot)
@@ -91,11 +95,15 @@ class Evidence:
         self._filtered, self._change = np.zeros((2, m)), np.empty((2, m))
         self.steady, self.quick = self._filtered
         self.compared = self.any_low = self.stopped = False
+        self.plain, self._all_believed = True, True
+        self._still, self._settled = 0, round(RAMP / period)
         # as wide as what they are multiplied by: numpy takes thrice as long with a number or a column
         self._shares = np.array([[period / (time + period)] * m for time in (STEADY_TIME, QUICK_TIME)])
         self.cycle: Cycle | None = None
+        self.tension = np.full(m, math.nan)
         self.least = self.most = self.oldest = math.nan
-        self.bits, self.states = 0, list[int]()
+        self.bits = self.common = 0
+        self.states = list[int]()
         self.faulted = self.tripped = False
 
     def _set_up_motors(self, robot: Robot) -> None:
@@ -110,15 +118,43 @@ class Evidence:
     def at(self, cycle: Cycle) -> None:
         """Look at a cycle that is a new one: first at what most rules need one comparison with."""
         self.cycle, sample = cycle, cycle.sample
-        self.least, self.most = ends(sample.tension)
+        self._read(cycle)
         self.oldest = ends(sample.age)[1]
-        self.bits, self.states = 0, sample.state.tolist()
+        self.bits, self.common, self.states = 0, -1, sample.state.tolist()
         for bits in sample.status.tolist():
             self.bits |= bits
+            self.common &= bits
+        if self.stopped:
+            self._wait(cycle)
         self.faulted = any(sample.fault.tolist())
         self.tripped = _TRIPPED in self.states or any(sample.winch_fault.tolist())
         self._look_for_slack(cycle)
         self._compare(cycle)
+
+    def disbelieve(self, cells: Flags) -> None:
+        """Go by some cells no more, shape (m,)."""
+        self.believed &= ~cells
+        self._all_believed = False
+
+    def stop(self) -> None:
+        """A fault stops the motion: what follows is mostly its consequence, until the winches stand."""
+        self.stopped, self._still = True, 0
+
+    def _wait(self, cycle: Cycle) -> None:
+        """See whether the winches stand, by their set points; those who send none see it by the rates that are new."""
+        moves = cycle.moving if cycle.command is not None else largest(cycle.sample.rate * self.fresh) > MOVING
+        self._still = 0 if moves else self._still + 1
+        self.stopped = self._still <= self._settled
+
+    def _read(self, cycle: Cycle) -> None:
+        """Take the readings, but of cells that are not to be believed."""
+        self.tension = tension = cycle.sample.tension
+        self.least, self.most = ends(tension)
+        self.plain = self._all_believed and math.isfinite(self.least) and math.isfinite(self.most)
+        if not self.plain:
+            planned = np.where(np.isfinite(cycle.tension), cycle.tension, self._neither)
+            self.tension = np.where(self.believed & np.isfinite(tension), tension, planned)
+            self.least, self.most = ends(self.tension)
 
     @property
     def fresh(self) -> Flags:
@@ -130,7 +166,7 @@ class Evidence:
         return found
 
     def _look_for_slack(self, cycle: Cycle) -> None:
-        tension = cycle.sample.tension
+        tension = self.tension
         self.any_low = False
         if self.least < self._most_slack:
             low = (tension < self._slack) & (cycle.tension >= self._taut) & self.believed
@@ -143,7 +179,7 @@ class Evidence:
         self.before_low = tension
 
     def _compare(self, cycle: Cycle) -> None:
-        error = cycle.sample.tension - cycle.tension
+        error = self.tension - cycle.tension
         if not finite(error):
             self.compared = False
             return

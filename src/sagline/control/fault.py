@@ -29,7 +29,8 @@ class Fault(ABC):
         within: How long it takes to be found, in words.
         homing: Whether it leaves a length in doubt, so that the robot must be homed again.
         lasting: Whether it stays until a fresh set is made, though its rule holds no longer; each item is told once.
-        present: Whether it is there now.
+        quiet: For how long after it was told nothing is said where it begins again, but how often it did [s].
+        present: Whether it is there now; one that stops a motion which another has stopped already, once that stands.
         seen: What the set of faults has seen.
     """
 
@@ -39,6 +40,7 @@ class Fault(ABC):
     within: ClassVar[str]
     homing: ClassVar[bool] = False
     lasting: ClassVar[bool] = False
+    quiet: ClassVar[float] = 0.0
 
     def __init__(self, seen: Evidence) -> None:
         """Begin with nothing found.
@@ -47,6 +49,7 @@ class Fault(ABC):
             seen: Shared by the whole set.
         """
         self.seen, self.present = seen, False
+        self._spoke, self._unsaid = 10**9, 0  # cycles since it was told, and how often it began meanwhile
 
     def look(self, cycle: Cycle) -> str | None:
         """Look at a cycle; every cycle once, in order.
@@ -56,22 +59,40 @@ class Fault(ABC):
 
         Returns:
             Where the fault begins a line for the operator: what, which item, value, limit, next step. None otherwise,
-            while it lasts, and where another has stopped the motion already.
+            while it lasts, and as long as another one stops the motion: what is left of it is told when that stands.
         """
         if cycle is not self.seen.cycle:  # what the first rule lets be worked out serves them all
             self.seen.at(cycle)
+        # what comes after a stop is mostly its consequence; what puts a length in doubt is told for all that
+        stops, waits = self.reaction >= Reaction.STOPPING, False
+        if self.seen.stopped and self.reaction is Reaction.STOPPING and not self.homing:
+            if self.lasting:  # it has each of its items once
+                return None
+            waits = not self.present
         line = self.found(cycle)
+        self._spoke += 1
         if line is None:
             if not self.lasting:
                 self.present = False
             return None
+        if waits:
+            return None
         begins = self.lasting or not self.present
         self.present = True
-        if self.reaction is Reaction.STOPPING:
-            # what comes after it is mostly its consequence; what puts a length in doubt is told for all that
-            begins &= not self.seen.stopped or self.homing
-            self.seen.stopped = True
-        return line if begins else None
+        if begins and stops:
+            self.seen.stop()
+        return self._said(line) if begins else None
+
+    def _said(self, line: str) -> str | None:
+        """The line, unless there was one a moment ago."""
+        if not self.quiet:
+            return line
+        if self._spoke * self.seen.period <= self.quiet:
+            self._unsaid += 1
+            return None
+        more = f" It was so {self._unsaid} times more since this was told last." if self._unsaid else ""
+        self._spoke, self._unsaid = 0, 0
+        return line + more
 
     @abstractmethod
     def found(self, cycle: Cycle) -> str | None:

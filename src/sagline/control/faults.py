@@ -9,7 +9,7 @@ from sagline.arrays import number
 from sagline.control.evidence import Evidence
 from sagline.control.fault import Fault
 from sagline.control.faults_cells import CellDead, CellOff, CellStuck
-from sagline.control.faults_drives import CorrectionAtLimit, EncoderJump, FollowingError, ServoSaturated
+from sagline.control.faults_drives import CorrectionAtLimit, EncoderJump, FollowingError, NotFollowing, ServoSaturated
 from sagline.control.faults_link import (
     BlockDiscarded,
     CycleLate,
@@ -46,6 +46,7 @@ FAULTS: Final[tuple[type[Fault], ...]] = (
     Slack,
     EncoderJump,
     FollowingError,
+    NotFollowing,
     ServoSaturated,
     CorrectionAtLimit,
     CycleLost,
@@ -121,7 +122,7 @@ def faults_of(
         >>> import sagline as sl
         >>> rules = sl.control.faults_of(sl.load_robot("article-prototype"))
         >>> print(len(rules), "rules,", rules[0].name, "first:", rules[0].reaction.name)
-        19 rules, emergency stop first: EMERGENCY
+        20 rules, emergency stop first: EMERGENCY
     """
     checked_robot = instance(robot, Robot, "robot")
     if groups is not None:

@@ -40,16 +40,16 @@ class CellDead(Fault):
     def found(self, cycle: Cycle) -> str | None:
         """The first cell that is newly found dead."""
         seen, tension = self.seen, cycle.sample.tension
-        if seen.least >= self._least and seen.most < self._most and not seen.any_low:
+        if seen.plain and seen.least >= self._least and seen.most < self._most and not seen.any_low:
             return None
         pull = seen.pull(cycle)
-        dead = ~(tension >= self._least)  # no number either
+        dead = ~((tension >= self._least) & np.isfinite(tension))
         dead |= (tension >= seen.full_scale) & (pull < DISPROVED * seen.full_scale)
         dead |= (seen.low >= SLACK_SAMPLES) & seen.pulling(cycle)
         dead &= seen.believed
         if not dead.any():
             return None
-        seen.believed &= ~dead
+        seen.disbelieve(dead)
         cell = int(np.argmax(dead))
         holds = f" while its motor holds {pull[cell]:.4g} N" if np.isfinite(pull[cell]) else ""
         return f"cell {cell} reads {tension[cell]:.4g} N{holds}; planned: {cycle.tension[cell]:.4g} N. {_STEP}"
@@ -85,7 +85,7 @@ class CellStuck(Fault):
         stuck = (self._for >= STUCK_SAMPLES - 1) & seen.believed  # so many after the first of them
         if not stuck.any():
             return None
-        seen.believed &= ~stuck
+        seen.disbelieve(stuck)
         cell = int(np.argmax(stuck))
         reading = cycle.sample.tension[cell]
         return f"cell {cell} has read {reading:.4g} N in {STUCK_SAMPLES} samples of a motion. {_STEP}"
@@ -123,7 +123,7 @@ class CellOff(Fault):
         cell = int(np.argmax(np.abs(error)))
         if self._for[cell] < self._samples:
             return None
-        seen.believed[cell] = False
+        seen.disbelieve(np.arange(error.size) == cell)
         seen_of_it = float(cycle.gains.parity[cell, cell]) if cycle.gains is not None else 1.0
         return (
             f"cell {cell} is off by about {error[cell] / seen_of_it:.0f} N by the platform's balance; "

@@ -8,15 +8,17 @@ from typing import Final
 import numpy as np
 
 from sagline.arrays import Array
+from sagline.control.connecting import BEHIND
 from sagline.control.cycle import Cycle
 from sagline.control.ends import finite, largest
 from sagline.control.evidence import Evidence
 from sagline.control.fault import Fault, Reaction
-from sagline.control.link import Command, GroupStatus, Mode, Sample, WinchState
+from sagline.control.link import COUNTERS, Command, GroupStatus, Mode, Sample, WinchState, newer
 
 JUMP: Final = 1e-3  # m a cycle
 FOLLOWING: Final = 5e-3  # m
 SATURATED: Final = 0.2  # s
+IDLE: Final = 3  # samples: so long may a group take to begin to follow
 _AT_LIMIT, _ENABLED = int(WinchState.SATURATED), int(WinchState.ENABLED)
 _FOLLOWING, _FOLLOW = int(GroupStatus.FOLLOWING), int(Mode.FOLLOW)
 REMEMBERED: Final = 32  # commands: more than may be on their way
@@ -28,8 +30,8 @@ class EncoderJump(Fault):
 
     name = "encoder jump"
     rule = (
-        f"|change of length - rate x time| > {1e3 * JUMP:g} mm from sample to sample, by the rate before it and by "
-        "that of the set points; or no number"
+        f"|change of length - rate x time| > {1e3 * JUMP:g} mm a cycle between two samples, by the rate in the first "
+        "and by that of the set points, of a drive that has power and is not at its limit; or no number"
     )
     reaction = Reaction.STOPPING
     within = "10 ms"
@@ -71,7 +73,8 @@ class EncoderJump(Fault):
         self.seen.jumped |= jumped
         winch = int(np.argmax(np.where(jumped, jump, 0.0)))
         return (
-            f"encoder {winch} jumped by {1e3 * jump[winch]:.4g} mm against its speed; allowed: {1e3 * JUMP:g} mm. "
+            f"encoder {winch} jumped by {1e3 * jump[winch]:.4g} mm against its speed; allowed: "
+            f"{1e3 * allowed[winch]:.3g} mm. "
             "Check its plug and coupling, acknowledge, and home again."
         )
 
@@ -128,6 +131,63 @@ class FollowingError(Fault):
             # a length that is no number is nowhere
             away[mine & last.enable] = np.where(np.isfinite(out), out, np.inf)[mine & last.enable]
         return away
+
+
+class NotFollowing(Fault):
+    """A group stays behind the others, and does not say so."""
+
+    name = "group does not follow"
+    rule = (
+        f"a group has taken none of the last {BEHIND} commands to follow, or does not report in {IDLE + 1} samples in "
+        "a row that it follows those it took"
+    )
+    reaction = Reaction.STOPPING
+    within = "40 or 100 ms"
+
+    def __init__(self, seen: Evidence) -> None:
+        """Begin with no command."""
+        super().__init__(seen)
+        self._first: int | None = None  # counter of the first command to follow
+        self._idle: dict[int, int] = {}  # samples in a row of a group that took one, and does not
+
+    def found(self, cycle: Cycle) -> str | None:
+        """The first group."""
+        command, sample = cycle.command, cycle.sample
+        if command is None or command.mode != _FOLLOW:
+            self._first = None
+            self._idle.clear()
+            return None
+        if self._first is None:
+            self._first = command.counter
+        behind = [(command.counter - echo) % COUNTERS for echo in sample.echo.tolist()]
+        if max(behind) <= BEHIND and self.seen.common & _FOLLOWING:
+            self._idle.clear()
+            return None
+        asked = {int(group) for group in self.seen.group_of[command.enable]}
+        for g in sorted(asked):
+            missed = behind[g] - round(float(sample.age[g]) / self.seen.period)  # but for those of which it cannot tell
+            if missed > BEHIND:
+                return (
+                    f"group {g} has taken no command for {missed} cycles; allowed: {BEHIND}. "
+                    "Check its PLC and the network, then acknowledge."
+                )
+            if self._idles(cycle, g) > IDLE:
+                return (
+                    f"group {g} does not follow its set points, and does not say why; allowed: in {IDLE} samples. "
+                    "See what its PLC does, then acknowledge."
+                )
+        return None
+
+    def _idles(self, cycle: Cycle, group: int) -> int:
+        """In how many samples in a row it has not followed what it took."""
+        sample, before = cycle.sample, cycle.before
+        assert self._first is not None
+        echo = int(sample.echo[group])
+        if sample.status[group] & _FOLLOWING or not (echo == self._first or newer(echo, self._first)):
+            self._idle[group] = 0
+        elif before is None or sample.counter[group] != before.counter[group]:
+            self._idle[group] = self._idle.get(group, 0) + 1
+        return self._idle.get(group, 0)
 
 
 class ServoSaturated(Fault):

@@ -23,11 +23,12 @@ ROUNDING: Final = 1e-6  # of an age
 _LOCKED, _EMERGENCY, _PRESSED = int(GroupStatus.LOCKED), int(GroupStatus.EMERGENCY), int(GroupFault.EMERGENCY_STOP)
 _TRIPPED, _LEAVE = int(WinchState.FAULT), int(Mode.LEAVE)
 
+_FREE: Final = "Free this computer of other work."
 _ACTS = {
     GroupFault.HEARTBEAT: "no command came for 100 ms",
-    GroupFault.OVER_TENSION: "a cable pulled too hard while it was wound in",
+    GroupFault.OVER_TENSION: "a cable pulled too hard, or its cell read no number, while it was wound in",
     GroupFault.FOLLOWING_ERROR: "a drive lagged too far behind its set points",
-    GroupFault.SET_POINT: "a set point was out of its range",
+    GroupFault.SET_POINT: "a set point, or a tension to be held, was out of its range",
     GroupFault.DRIVE: "a drive tripped",
 }
 
@@ -55,6 +56,7 @@ class GroupStale(_Old):
     rule = f"newest sample of a group {STALE} cycles old: it is silent, or what it sends is repeated, late, bad"
     reaction = Reaction.DEGRADED
     within = "30 ms"
+    quiet = 1.0
     cycles = STALE
     step = "The tension loop rests until it is back."
 
@@ -101,26 +103,17 @@ class OwnerLost(Fault):
     """Somebody else has a grant that was ours, or nobody."""
 
     name = "owner lost"
-    rule = "grant of a group differs after all were held"
+    rule = "grant of a group differs, once the connection had all of them"
     reaction = Reaction.STOPPING
     within = "1 cycle"
-
-    def __init__(self, seen: Evidence) -> None:
-        """Begin with nothing held."""
-        super().__init__(seen)
-        self._held = False
 
     def found(self, cycle: Cycle) -> str | None:
         """The first group that is not ours."""
         command = cycle.command
         if command is None or command.mode == _LEAVE:
-            self._held = False
             return None
         owners = cycle.sample.owner.tolist()
         if owners.count(command.owner) == len(owners):
-            self._held = True
-            return None
-        if not self._held:
             return None
         group, owner = next((g, owner) for g, owner in enumerate(owners) if owner != command.owner)
         who = f"controller {owner} has its grant" if owner else "nobody has its grant"
@@ -131,22 +124,20 @@ class GroupActs(Fault):
     """A PLC or a drive has stopped by itself."""
 
     name = "group acts by itself"
-    rule = "a PLC reports a fault or locked drums, or a drive a fault, after there was none"
+    rule = "a PLC reports a fault or locked drums, or a drive a fault; the connection ends with none"
     reaction = Reaction.STOPPING
     within = "1 cycle"
     lasting = True
 
     def __init__(self, seen: Evidence) -> None:
-        """Begin with no group seen without fault: what an earlier controller left is not this one's."""
+        """Begin with nothing told."""
         super().__init__(seen)
-        self._clean: Flags = np.zeros(int(seen.group_of.max()) + 1, dtype=bool)
-        self._told = self._clean.copy()
+        self._told: Flags = np.zeros(int(seen.group_of.max()) + 1, dtype=bool)
 
     def found(self, cycle: Cycle) -> str | None:
         """The groups of which it is new, and why the first of them."""
         seen, sample = self.seen, cycle.sample
         if not (seen.faulted or seen.tripped or seen.bits & _LOCKED):
-            self._clean.fill(True)
             return None
         if cycle.command is not None and cycle.command.mode in (Mode.LOCK, Mode.LEAVE):
             return None
@@ -155,8 +146,7 @@ class GroupActs(Fault):
         acting[seen.group_of[tripped]] = True
         acting &= (sample.status & _EMERGENCY) == 0  # locked as it must be
         acting &= sample.fault != _PRESSED
-        self._clean |= ~acting
-        new = acting & self._clean & ~self._told
+        new = acting & ~self._told
         if not new.any():
             return None
         self._told |= new
@@ -170,8 +160,9 @@ class GroupActs(Fault):
         mine = np.flatnonzero(tripped & (self.seen.group_of == group))
         if mine.size:
             return f"drive {mine[0]} tripped with code {cycle.sample.winch_fault[mine[0]]}"
-        code = int(cycle.sample.fault[group])
-        return _ACTS.get(GroupFault(code), "drums are locked") if code in set(GroupFault) else f"with code {code}"
+        code, locked = int(cycle.sample.fault[group]), cycle.sample.status[group] & _LOCKED
+        why = _ACTS.get(GroupFault(code), "") if code in set(GroupFault) else f"with code {code}"
+        return ", and ".join(filter(None, (why, "drums are locked" if locked else "")))
 
 
 class EmergencyStop(Fault):
@@ -199,7 +190,7 @@ class CycleLate(Fault):
     """This computer is too busy."""
 
     name = "cycle late"
-    rule = f"> {1e3 * LATE:g} ms late, or {OFTEN} of {WINDOW} cycles late by {1e3 * LATE_OFTEN:g} ms"
+    rule = f"> {1e3 * LATE:g} ms late, or {OFTEN} of {WINDOW} cycles > {1e3 * LATE_OFTEN:g} ms late"
     reaction = Reaction.EVENT
     within = "1 cycle"
 
@@ -220,11 +211,13 @@ class CycleLate(Fault):
         if not late:
             return None
         worst = max(by for _, by in late)
-        if len(late) < OFTEN and worst <= LATE:
+        if worst > LATE:
+            return f"a cycle was {1e3 * worst:.0f} ms late; allowed: {1e3 * LATE:g} ms. {_FREE}"
+        if len(late) < OFTEN:
             return None
         return (
-            f"{len(late)} of the last {WINDOW} cycles were late, by up to {1e3 * worst:.0f} ms; "
-            f"allowed: {1e3 * LATE:g} ms. Free this computer of other work."
+            f"{len(late)} of the last {WINDOW} cycles were more than {1e3 * LATE_OFTEN:g} ms late, by up to "
+            f"{1e3 * worst:.0f} ms; allowed: {OFTEN - 1}. {_FREE}"
         )
 
 
@@ -242,7 +235,7 @@ class CycleLost(Fault):
             return None
         return (
             f"a cycle began {1e3 * cycle.late:.0f} ms late, more than {1e3 * LOST:g} ms: the PLCs have stopped the "
-            "winches by themselves. Free this computer of other work, then acknowledge."
+            f"winches by themselves. {_FREE} Then acknowledge."
         )
 
 

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from sagline.control.cycle import Cycle
-from sagline.control.evidence import SIGMAS, SLACK_SHARE, Evidence
+from sagline.control.evidence import PLANNED_SHARE, SIGMAS, SLACK_SHARE, Evidence
 from sagline.control.fault import Fault, Reaction
 
 NEAR: Final = 0.9  # of the upper limit; a plan that goes beyond would stop here
@@ -31,7 +31,7 @@ class OverTension(Fault):
 
     def found(self, cycle: Cycle) -> str | None:
         """The tightest, by its limit."""
-        seen, tension = self.seen, cycle.sample.tension
+        seen, tension = self.seen, self.seen.tension
         if not seen.most > self._least:
             self._for.fill(0)
             return None
@@ -70,7 +70,7 @@ class CableBroken(Fault):
         new = sudden & ~seen.broken
         if not new.any():
             return None
-        left = np.abs(cycle.sample.tension - cycle.tension - seen.steady)
+        left = np.abs(seen.tension - cycle.tension - seen.steady)
         others = seen.believed & (seen.low == 0)
         furthest = float(left[others].max(initial=0.0))
         if furthest <= SIGMAS * seen.noise:
@@ -88,8 +88,9 @@ class Slack(Fault):
 
     name = "slack"
     rule = (
-        f"T_A < {SLACK_SHARE:g} of its lower limit ({SIGMAS:g} sigma where that is 0) where the plan keeps it, "
-        f"{SLACK_SAMPLES} samples, and its motor does not pull either"
+        f"T_A < {SLACK_SHARE:g} of its lower limit ({SIGMAS:g} sigma where that is 0) in {SLACK_SAMPLES} samples where "
+        f"the plan has {PLANNED_SHARE:g} of it or more (the limit may be one along the chord, which T_A is not; "
+        f"{2 * SIGMAS:g} sigma), and its motor does not pull either"
     )
     reaction = Reaction.STOPPING
     within = "30 ms"
