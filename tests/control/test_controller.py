@@ -335,14 +335,18 @@ def test_ctrl_c_stops_first_and_a_second_one_changes_nothing() -> None:
     watcher = Watcher(60, press)
     control, _ = rig(record=watcher)
     watcher.count = 0
-    with pytest.raises(KeyboardInterrupt):
-        control.go_to(at(0.1, 0.1, 1.5))
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell may start this with Ctrl-C ignored
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            control.go_to(at(0.1, 0.1, 1.5))
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert state_of(control) is State.IDLE
     assert control.execution is not None
     assert control.execution.status is ExecutionStatus.STOPPED
     assert control.execution.state[-1] == State.IDLE
     assert (control.execution.state == State.STOPPING).sum() in (20, 21)
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_no_garbage_is_collected_while_it_moves() -> None:

@@ -1,0 +1,95 @@
+"""Homing with cells and groups that are not to be believed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.control.controller import Controller
+from sagline.control.homing import WINDOW, Homing, cell_errors
+from sagline.control.link import Sample
+from sagline.control.states import State
+from tests.control.rigs import HOME, prototype, rig, spy_of, state_of
+
+
+def changed(control: Controller, change: Any) -> None:
+    """From now on samples are changed by a function."""
+    spy: Any = control._link
+    good = spy.exchange
+
+    def exchange(command: Any) -> Any:
+        answer = good(command)
+        return change(answer) if isinstance(answer, Sample) else answer
+
+    spy.exchange = exchange
+
+
+def moves(control: Controller) -> bool:
+    return control.moving
+
+
+def with_nan(sample: Sample) -> Sample:
+    tension = sample.tension.copy()
+    tension[5] = np.nan
+    return sample._replace(tension=tension)
+
+
+def with_age(sample: Sample) -> Sample:
+    return sample._replace(age=sample.age + np.array([0.0, 0.05, 0.0, 0.0]))
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [(with_nan, r"cable 5 has nan N|a load cell"), (with_age, "group 1 is silent for 0.06 s|group 1")],
+)
+def test_a_jog_ends_where_tensions_are_no_numbers_or_old(change: Any, why: str) -> None:
+    control, _ = rig(home=False)
+    control.connect()
+    control.begin_homing(HOME)
+    control.start_jog(0, -0.05)
+    for _ in range(20):
+        control.cycle()
+    assert moves(control)
+    changed(control, change)
+    for _ in range(2):
+        control.cycle()
+    assert not moves(control)
+    assert state_of(control) is State.HOMING
+    notes = [event.text for event in control.events if event.name == "jog"]
+    assert notes[-1].startswith("the jog ended: ")
+    assert any(part in notes[-1] for part in why.split("|"))
+    followed = [command for command in spy_of(control).commands if command is not None][-1]
+    assert followed.rate.max() == 0.0 or followed.mode.name == "HOLD"
+
+
+def test_repeated_samples_are_counted_once() -> None:
+    homing = Homing(prototype(), HOME, sl.Catenary(), sl.Closest())
+    control, _ = rig()
+    sample = control.sample
+    assert sample is not None
+    good = sample._replace(tension=homing.tension, length=homing.state.unstrained_length)
+    for k in range(WINDOW - 1):
+        assert not homing.look(good._replace(counter=good.counter + k))
+    counter = good.counter + WINDOW - 1
+    counter[2] -= 1  # of one group alone
+    for _ in range(3):
+        assert not homing.look(good._replace(counter=counter))
+    assert homing.look(good._replace(counter=good.counter + WINDOW))
+
+
+def test_cells_are_as_good_as_the_robot_says() -> None:
+    robot = prototype()
+    assert robot.winches is not None
+    deviation, bias = cell_errors(robot)
+    assert (deviation.tolist(), bias.tolist()) == ([1.0] * 8, [2.0] * 8)  # what it does not say
+    noisy = robot.replace(winches=robot.winches.replace(load_cell_deviation=3.0, load_cell_bias=-4.0))
+    deviation, bias = cell_errors(noisy)
+    assert (deviation.tolist(), bias.tolist()) == ([3.0] * 8, [4.0] * 8)
+    assert Homing(noisy, HOME, sl.Catenary(), sl.Closest()).sigma == pytest.approx(5.0, rel=1e-12)
+    link: Any = sl.twin.Machine(noisy, start=HOME, seed=1).link()
+    seen = Controller(noisy, link, seed=2)._faults[0].seen
+    assert seen.noise == 3.0
+    assert seen.sigma == pytest.approx(5.0, rel=1e-12)

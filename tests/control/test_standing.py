@@ -1,0 +1,150 @@
+"""Where the platform stands: what is worked out beside the cycles, and what the encoders say of it."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.control import warm
+from sagline.control.controller import Controller
+from sagline.control.courses import standing_at as found
+from sagline.control.execution import ExecutionStatus
+from sagline.control.link import Mode
+from sagline.control.pace import Pace
+from sagline.control.states import RefusedError, State
+from sagline.twin.injected import Injected
+from tests.control.rigs import HOME, at, prototype, rig, spy_of, state_of, with_zero_errors
+
+
+class Instant(Pace):
+    """Real time that passes at once: what takes long is worked out beside the cycles, and nobody sleeps."""
+
+    def wait(self) -> float:
+        return 0.0
+
+
+def is_degraded(control: Controller) -> bool:
+    return control.degraded
+
+
+def slow(monkeypatch: pytest.MonkeyPatch) -> tuple[threading.Event, list[bool]]:
+    """Let it take long to find out where the platform stands, until an event; whether that was in the main thread."""
+    go, where = threading.Event(), list[bool]()
+
+    def standing_at(*arguments: Any) -> Any:
+        where.append(threading.current_thread() is threading.main_thread())
+        assert go.wait(10.0)
+        return found(*arguments)
+
+    monkeypatch.setattr("sagline.control.loop.standing_at", standing_at)
+    return go, where
+
+
+def test_set_points_stay_until_it_is_known_where_it_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
+    """To work it out took 54 ms within one cycle of 10 ms."""
+    control, _ = rig(pace=Instant())
+    go, where = slow(monkeypatch)
+    control.start(control.path_to(at(0.1, 0.0, 1.5)))
+    for _ in range(80):
+        control.cycle()
+    control.stop()
+    for _ in range(50):
+        control.cycle()
+    assert state_of(control) is State.STOPPING
+    last = [command for command in spy_of(control).commands[-20:] if command is not None]
+    assert {command.mode for command in last} == {Mode.FOLLOW}
+    assert not any(command.rate.any() for command in last)
+    assert np.ptp([command.length for command in last], axis=0).max() == 0.0
+    go.set()
+    done = control.wait()
+    assert (done.status, state_of(control)) == (ExecutionStatus.STOPPED, State.IDLE)
+    assert where == [False]
+    assert control.go_to(HOME).status is ExecutionStatus.DONE
+
+
+def test_cycles_go_on_while_an_acknowledgement_is_worked_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    control, machine = rig(pace=Instant())
+    machine.inject(Injected("group is silent", 1, 0.0, machine.time, 0.3))
+    for _ in range(90):
+        control.cycle()
+    assert state_of(control) is State.FAULT
+    go, where = slow(monkeypatch)
+    began, good = control._number, control.cycle
+
+    def cycle() -> None:
+        good()
+        if control._number == began + 7:
+            go.set()
+
+    monkeypatch.setattr(control, "cycle", cycle)
+    control.acknowledge()
+    assert control._number >= began + 7
+    assert state_of(control) is State.IDLE
+    assert where == [False]
+
+
+def test_what_the_tension_loop_added_is_not_taken_for_a_way_of_the_platform() -> None:
+    """An encoder that reads a millimeter too much, made up for by the loop: the estimate is the truth."""
+    control, _ = rig()
+    off = np.zeros(8)
+    off[0] = 1e-3
+    control._correction = off
+    assert control.sample is not None
+    true = sl.inverse(prototype(), at(0.01, -0.02, 1.49))
+    control._locate(control.sample._replace(length=true.unstrained_length - control.zero + off), None)
+    assert np.abs(control.estimate.position - [0.01, -0.02, 1.49]).max() < 1e-8
+
+
+def test_a_cell_that_is_mended_is_believed_again() -> None:
+    """There was no way out: acknowledging was refused in IDLE, and only there it was told to do so."""
+    control, machine = rig()
+    machine.inject(Injected("cell sticks", 3, 0.0, machine.time + 0.2, 2.5))
+    control.go_to(at(0.1, 0.0, 1.5))
+    assert state_of(control) is State.IDLE
+    for _ in range(200):
+        control.cycle()
+    assert is_degraded(control)
+    control.acknowledge()
+    assert state_of(control) is State.IDLE
+    assert not is_degraded(control)
+    assert control.go_to(HOME).status is ExecutionStatus.DONE
+    assert not is_degraded(control)
+    with pytest.raises(RefusedError, match="There is nothing to acknowledge"):
+        control.acknowledge()
+
+
+def test_the_rule_for_the_correction_is_that_of_the_loop() -> None:
+    """With settings of 1 mm it was told at 5 mm: never."""
+    tight = 3e-3 * sl.stiffness(sl.inverse(prototype(), HOME).state).null_lengths[:, 0]
+    control, _ = rig(with_zero_errors(prototype(), tight), loop=sl.control.TensionSettings(largest=1e-3))
+    for _ in range(2000):
+        control.cycle()
+        if state_of(control) is State.FAULT:
+            break
+    told = [event.text for event in control.events if event.name == "correction at its limit"]
+    assert len(told) == 1
+    assert "allowed: 1 mm" in told[0]
+
+
+def test_one_part_that_is_refused_leaves_no_other_cold(monkeypatch: pytest.MonkeyPatch) -> None:
+    tried = list[str]()
+
+    def trying(name: str) -> Any:
+        good = getattr(warm, name)
+
+        def part(*arguments: Any) -> Any:
+            tried.append(name)
+            return good(*arguments)
+
+        return part
+
+    names = ["standing_at", "motion_along", "winch_jog", "PlatformJog"]
+    for name in names:
+        monkeypatch.setattr(warm, name, trying(name))
+    nowhere = prototype().replace(tension_min=2000.0, tension_max=2100.0)  # no pose has such tensions
+    warm.load_all(nowhere, 0.01, sl.Catenary(), sl.Closest())
+    assert tried == names
