@@ -129,6 +129,7 @@ FOREIGN: dict[str, tuple[bytes, str]] = {
     "a robot that is none": (log_of(head(robot="name: x\n")), "robot"),
     "a chunk of other numbers": (log_of(head(), topic=RECORD, message=b"no columns"), "is damaged"),
     "a quantity is missing": (log_of(head(), topic=RECORD, message=columns(tension=None)), "does not hold what"),
+    "no clock of its own": (log_of(head(), topic=RECORD, message=columns(epoch=None)), "what it says (no epoch)"),
     "a quantity of another shape": (
         log_of(head(), topic=RECORD, message=columns(tension=np.zeros((201, 7)))), "tension: shape",
     ),

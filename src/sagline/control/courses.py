@@ -69,7 +69,7 @@ class Standing:
             pose: Of the platform there, where it is known.
         """
         self.pose = pose
-        self._point = point._replace(rate=np.zeros(len(point.length)), done=True)
+        self._point = point._replace(rate=np.zeros(len(point.length)), clock=np.nan, done=True)
 
     @classmethod
     def at(cls, state: Equilibrium) -> Standing:
@@ -204,10 +204,10 @@ class Along:
         if left is not None:
             length, rate = length + left[0], rate + left[1]
         done = self.at_end or (self._wanted == 0.0 and self._speed == 0.0)
-        clock = row * self._period
-        gains = motion.gains
+        clock, gains = self.clock, motion.gains
         at = None if gains is None else gains.at(clock)
-        return SetPoint(length, rate, tension, drum, motion.wrench[k], at, clock, done, None, left is not None)
+        on_plan = clock if motion.plan is not None else np.nan  # a jog has none
+        return SetPoint(length, rate, tension, drum, motion.wrench[k], at, on_plan, done, None, left is not None)
 
     def _between(self, k: int, u: float) -> tuple[Array, Array, Array, Array]:
         """Between two rows: cubic in the lengths, as their rates are known; linear in tensions."""

@@ -55,7 +55,7 @@ def null_space_error(execution: Execution, filter_time: float | None = None) -> 
         robot without redundancy.
 
     Source:
-        docs/model.md, section 13.
+        docs/model.md, section 12.
     """
     done = instance(execution, Execution, "execution")
     plan, error = done.plan, np.full(done.tension.shape, np.nan)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from sagline.arguments import file_path
 from sagline.control.events import Event
 from sagline.errors import FileError, InvalidValueError
+from sagline.files.execution_layout import EVERY
 from sagline.files.kinds import kind_of
 from sagline.files.mcap_file import check_packages
 from sagline.files.mcap_layout import END, EVENT, FORMAT, HEAD, PLAN, RECORD, TRUTH, event_of
@@ -30,6 +31,7 @@ MAGIC: Final = bytes((137, 77, 67, 65, 80, 48, 13, 10))
 AGAIN: Final = "Take the file from where it came."
 _HEAD: Final = 9  # bytes of a record before its content: what it is, and how long
 _CHUNK, _ATTACHMENT, _DATA_END = 0x06, 0x09, 0x0F
+_NEEDED: Final = {quantity.name for quantity in EVERY} | {"plan", "zero", "epoch"}  # of every chunk
 _LARGEST: Final = 1 << 27  # bytes of a chunk: a second of ours has a thousandth of that
 _PLAN_NAME, _END_NAME = (re.compile(name.replace(".", r"\.").format(r"(\d+|none)")) for name in (PLAN, END))
 
@@ -243,7 +245,9 @@ class LogReader:
         if topic == RECORD:
             if number != len(log.blocks):
                 raise ValueError("a chunk is missing")
-            log.blocks.append(unpack(data))
+            log.blocks.append(block := unpack(data))
+            if lacking := _NEEDED - block.keys():
+                raise FileError(self.log.path, f"does not hold what it says (no {min(lacking)})", AGAIN)
         elif topic == EVENT:
             log.events.append(event_of(data))
         elif topic == TRUTH:
