@@ -314,3 +314,19 @@ def test_fourteen_minutes_with_the_plan_inside_are_twenty_megabytes(tmp_path: Pa
         recorder.ends(ExecutionStatus.DONE, "")
     assert (tmp_path / "run.mcap").stat().st_size <= 20e6
     assert len(sl.load_execution(tmp_path / "run.mcap")) == 84_000
+
+
+def test_times_of_day_are_those_of_cycles(tmp_path: Path) -> None:
+    """An event before the first of them has the time 0 of a link that was made long before."""
+    early = events_of(0.0)[0]
+    (first,) = cycles_of(plan_of(), 1)
+    with mcap_log.Recorder(tmp_path / "run.mcap", ROBOT) as log:
+        log.event(early)
+        time.sleep(0.3)
+        began = time.time_ns()
+        log.cycle(first)
+        ended = time.time_ns()
+    found = read_log(tmp_path / "run.mcap")
+    stamp = int(found.blocks[0]["epoch"]) + round(first.answer.time * 1e9)
+    assert began <= stamp <= ended
+    assert [event.text for event in found.events] == [early.text]

@@ -75,6 +75,7 @@ class Recorder:
         self._degraded: list[bool] = []
         self._tape = self._blank()
         self._why, self._epoch = "", epoch
+        self._early: list[Event] = []
         self._queue: Queue[Callable[[], None] | None] = Queue(ROOM)
         try:
             self._stream = FileIO(self.file, "wb") if stream is None else stream
@@ -103,9 +104,11 @@ class Recorder:
         self._put(partial(self._add, cycle))
 
     def event(self, event: Event) -> None:
-        """Take an event."""
-        self._date(event.time)
-        self._put(partial(self._mcap.event, event))
+        """Take an event; one before the first cycle, whose time nobody knew, waits for it to be dated."""
+        if self._epoch is None:
+            self._early.append(event)
+        else:
+            self._put(partial(self._mcap.event, event))
 
     def truth(self, time: float, position: Array, quaternion: Array) -> None:
         """Take where the platform really is, as only a twin knows.
@@ -120,6 +123,8 @@ class Recorder:
 
     def close(self) -> None:
         """Write what waits, and the end; wait until that is done."""
+        if self._early:
+            self._date(self._early[-1].time)
         while self._thread.is_alive():
             try:
                 self._queue.put(None, timeout=PATIENCE)
@@ -148,6 +153,8 @@ class Recorder:
         """Have the log's times be times of day."""
         if self._epoch is None:
             self._epoch = self._mcap.epoch = time.time_ns() - round(time_of_link * NANO)
+            for event in self._early:
+                self._put(partial(self._mcap.event, event))
 
     def _run(self) -> None:
         """All that the thread does."""
