@@ -124,9 +124,11 @@ def test_drums_that_are_locked_are_let_go_before_it_connects() -> None:
         control.cycle()
     assert state_of(control) is State.EMERGENCY
     control.off()
+    began = machine.time
     with pytest.raises(RefusedError, match=r"group 0, 1, 2, 3: the drums are locked.*Let the drums go at the machine"):
         control.connect()
     assert state_of(control) is State.OFF
+    assert machine.time - began < 0.3  # no use in waiting
     machine.reset()
     control.connect()
     assert state_of(control) is State.READY

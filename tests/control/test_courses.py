@@ -42,13 +42,16 @@ def test_a_jog_of_the_platform_after_one_of_a_winch_is_no_faster_and_the_loop_wa
     assert max(rates) < LEAD_SPEED + 0.008  # 1.5 x 2 mm in 0.4 s beside it
     lengths = np.array([command.length for command in spy_of(control).commands if command and command.mode == 2])
     assert np.abs(np.diff(lengths, axis=0)).max() < (LEAD_SPEED + 0.008) * PERIOD
+
+
+def test_the_tension_loop_learns_nothing_from_a_lead() -> None:
+    """It took what the lead changes for an error, and changed lengths by a millimeter for nothing."""
     control, _ = rig()
-    control.jog(3, 8e-3)
+    control.jog(3, 18e-3)
     x, y, z = control.estimate.position
     done = control.go_to(at(x + 0.05, y, z))
     assert done.status.name == "DONE"
-    assert np.abs(np.diff(done.correction, axis=0)).max() < 1e-5  # re-projected, nothing learned from the lead
-    assert np.abs(done.correction).max() < 2e-4
+    assert not done.correction.any()
 
 
 def test_a_lead_of_more_than_five_millimeters_is_refused_and_the_way_back_goes() -> None:
