@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
 
 from sagline.control.link import Mode, Sample
+from sagline.plc import group as plc_group
 from sagline.plc.block_link import BlockLink
-from sagline.plc.blocks import CLAIM, TO_PLC, Block, Refusal
+from sagline.plc.blocks import CLAIM, FROM_PLC, TO_PLC, Block, Refusal
 from sagline.plc.group import Group
+from sagline.plc.modbus_wire import ModbusWire
+from sagline.plc.s7_wire import S7Wire
+from sagline.plc.wire import WireError
 from tests.plc.samples import (
     a_command,
     a_sample,
@@ -155,3 +161,100 @@ def test_what_waited_too_long_for_a_connection_is_never_written(late: float, wri
     group.finish()
     group.join(PATIENCE)
     assert wire.written == written
+
+
+class Scripted:
+    """A wire that answers with what it is given, or raises it, and what its group made of that; in one thread."""
+
+    def __init__(self, *answers: bytes | Exception) -> None:
+        self.answers, self.time = list(answers), 0.0
+        self.group = Group(0, 2, self, self.clock)
+        self.counters, self.troubles = list[int | None](), list[str]()
+
+    def clock(self) -> float:
+        self.time += 0.01
+        return self.time
+
+    def open(self) -> None:
+        pass
+
+    def write(self, block: Block, data: bytes) -> None:
+        pass
+
+    def read(self, block: Block) -> bytes:
+        newest, trouble = self.group.newest, self.group.trouble
+        self.counters.append(None if newest is None else newest.values["counter"])
+        self.troubles.append("" if trouble is None else trouble.reason)
+        self.group.ask()
+        if not self.answers:
+            self.group.finish()
+            return b""
+        answer = self.answers.pop(0)
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+    def close(self) -> None:
+        pass
+
+    abort = close
+
+    def reached(self) -> bool:
+        return True
+
+
+def heard(*answers: bytes | Exception) -> tuple[list[int | None], list[str]]:
+    """Counters of the newest block of group 0 after each answer, and what is wrong then."""
+    wire = Scripted(*answers)
+    wire.group.run()
+    return wire.counters[1:], wire.troubles[1:]
+
+
+def block(counter: int) -> bytes:
+    return sample_blocks(status(counter))[0]
+
+
+@pytest.mark.parametrize("error", [struct.error("short"), AttributeError("recv"), AssertionError(), OSError("gone")])
+def test_whatever_a_wire_raises_a_group_goes_on_and_says_why(error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(plc_group, "RETRY", 0.0)
+    counters, troubles = heard(block(7), error, block(8))
+    assert counters == [7, 7, 8]
+    assert troubles == ["", f"the exchange failed with {type(error).__name__} ({error})", ""]
+
+
+def test_a_plc_that_begins_anew_with_a_connection_is_believed_at_once_and_on_the_same_one_it_is_not(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(plc_group, "RETRY", 0.0)
+    gone = WireError(Refusal("whoever is there hangs up", "Check it"))
+    assert heard(block(1000), gone, block(1), block(2))[0] == [1000, 1000, 1, 2]
+    assert heard(block(1000), block(1), block(2))[0] == [1000, 1000, 1000]
+
+
+class Broken:
+    """A client of a library that raises what no library should."""
+
+    def __init__(self, error: Exception) -> None:
+        self._error = error
+
+    def __getattr__(self, name: str) -> Any:
+        def fail(*_: Any, **__: Any) -> None:
+            raise self._error
+
+        return fail
+
+
+@pytest.mark.parametrize("error", [struct.error("short"), AttributeError("recv"), AssertionError()])
+def test_whatever_a_library_raises_is_told_as_the_connections(error: Exception) -> None:
+    for wire in (S7Wire("127.0.0.1", 102), ModbusWire("127.0.0.1", 502, 1)):
+        vars(wire)["_client"] = Broken(error)
+        with pytest.raises(WireError, match="speaks no"):
+            wire.read(FROM_PLC)
+        with pytest.raises(WireError, match="speaks no"):
+            wire.write(CLAIM, bytes(8))
+        wire.close()
+
+
+def test_who_has_no_connection_is_told_so() -> None:
+    with pytest.raises(WireError, match="the connection was closed"):
+        S7Wire("127.0.0.1", 102).read(FROM_PLC)

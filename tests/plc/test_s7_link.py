@@ -93,17 +93,17 @@ def error_of(addresses: str | list[str], winches: int = 8, timeout: float = PATI
         ("127.0.0.1:1,127.0.0.1:2,127.0.0.1:3", "number of PLC addresses is 3; allowed: 4"),
         ("127.0.0.1:1", "number of PLC addresses is 1; allowed: 4"),
         (["a", "b", "c", "d", "e"], "number of PLC addresses is 5; allowed: 4"),
-        ("a,b,a,d", "address of group 3 is a:102, as that of group 1"),
-        ("a,b,a:102,d", "address of group 3 is a:102, as that of group 1"),
-        ("a,,c,d", "address of group 2 is ''"),
-        ("a,b,c,d:", "address of group 4 is 'd:'"),
-        ("a,b,c,d:0", "address of group 4 is 'd:0'"),
-        ("a,b,c,d:65536", "address of group 4 is 'd:65536'"),
-        ("a,b,c,d:102x", "address of group 4 is 'd:102x'"),
-        ("a,b,http://c,d", "address of group 3 is 'http://c'"),
-        ("a,b,c d,e", "address of group 3 is 'c d'"),
-        ("a,b,c\x1b[2J,e", "address of group 3 is 'c\\x1b[2J'"),
-        ([1, 2, 3, 4], "address of group 1 is 1"),
+        ("a,b,a,d", "address of group 2 is a:102, as that of group 0"),
+        ("a,b,a:102,d", "address of group 2 is a:102, as that of group 0"),
+        ("a,,c,d", "address of group 1 is ''"),
+        ("a,b,c,d:", "address of group 3 is 'd:'"),
+        ("a,b,c,d:0", "address of group 3 is 'd:0'"),
+        ("a,b,c,d:65536", "address of group 3 is 'd:65536'"),
+        ("a,b,c,d:102x", "address of group 3 is 'd:102x'"),
+        ("a,b,http://c,d", "address of group 2 is 'http://c'"),
+        ("a,b,c d,e", "address of group 2 is 'c d'"),
+        ("a,b,c\x1b[2J,e", "address of group 2 is 'c\\x1b[2J'"),
+        ([1, 2, 3, 4], "address of group 0 is 1"),
     ],
 )
 def test_addresses_that_are_none_are_refused_before_anything_is_connected(addresses: Any, said: str) -> None:
@@ -114,7 +114,7 @@ def test_a_port_where_nothing_listens_is_named() -> None:
     with plcs() as mirrors:
         gone = nobody()
         text = error_of([*mirrors.addresses[:2], gone, mirrors.addresses[3]])
-    assert text.startswith(f"group 3 at {gone}: nothing listens there. ")
+    assert text.startswith(f"group 2 at {gone}: nothing listens there. ")
 
 
 def test_a_mute_port_is_named_within_the_time_given() -> None:
@@ -122,28 +122,28 @@ def test_a_mute_port_is_named_within_the_time_given() -> None:
         start = time.monotonic()
         text = error_of([mirrors.addresses[0], mute, *mirrors.addresses[2:]], timeout=0.5)
         assert time.monotonic() - start < 4.0  # the library alone waits 5 s
-    assert text.startswith(f"group 2 at {mute}: something listens there, but has answered nothing for 0.5 s. ")
+    assert text.startswith(f"group 1 at {mute}: something listens there, but has answered nothing for 0.5 s. ")
 
 
 @pytest.mark.parametrize("answer", [b"HTTP/1.1 400 Bad Request\r\n\r\n", b"SSH-2.0\r\n", b"\x03\x00\x00\x04"])
 def test_a_stranger_is_named(answer: bytes) -> None:
     with plcs() as mirrors, stranger(answer) as address:
         text = error_of([address, *mirrors.addresses[1:]])
-    assert text.startswith(f"group 1 at {address}: whoever is there speaks no S7 (")
+    assert text.startswith(f"group 0 at {address}: whoever is there speaks no S7 (")
 
 
 def test_groups_in_the_wrong_order_are_told() -> None:
     with plcs() as mirrors:
         first, second, *others = mirrors.addresses
         text = error_of([second, first, *others])
-    assert text.startswith(f"group 1 at {second}: the PLC there is group 2, not 1 (group 2 cannot")
+    assert text.startswith(f"group 0 at {second}: the PLC there is group 1, not 0 (group 1 cannot")
 
 
 def test_a_plc_of_another_layout_is_told_with_what_to_load() -> None:
     with plcs() as mirrors:
         mirrors.publish(bad(1, of_another_version))
         text = error_of(list(mirrors.addresses))
-    assert "group 3 at" in text
+    assert "group 2 at" in text
     assert "DB101 has layout 3; this sagline knows layout 1" in text
     assert "sagline export-scl ROBOT" in text
 
@@ -160,7 +160,7 @@ def test_a_plc_without_the_blocks_is_told_with_what_to_load() -> None:
 def test_a_robot_of_another_number_of_winches_is_told() -> None:
     with plcs() as mirrors:
         text = error_of(list(mirrors.addresses), winches=7)
-    assert "group 4 at" in text
+    assert "group 3 at" in text
     assert "the PLC there drives 2 winches, the robot has 1 in this group" in text
 
 

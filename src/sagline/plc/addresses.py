@@ -50,8 +50,8 @@ def addresses_of(given: str | Sequence[str], port: int) -> tuple[Address, ...]:
         address = _address(i, text, port)
         if address in addresses:
             raise InvalidValueError(
-                f"address of group {i + 1}",
-                f"{address}, as that of group {addresses.index(address) + 1}",
+                f"address of group {i}",
+                f"{address}, as that of group {addresses.index(address)}",
                 "one PLC a group",
                 "Give each group its own address.",
             )
@@ -87,7 +87,7 @@ def _address(index: int, text: object, port: int) -> Address:
     known = number.isascii() and number.isdecimal() and 0 < int(number[:6]) <= LAST_PORT if colon else True
     if not host or not known or any(c.isspace() or not c.isprintable() or c in "/@,;" for c in host):
         raise InvalidValueError(
-            f"address of group {index + 1}",
+            f"address of group {index}",
             brief(text),
             f"host or host:port, port 1 to {LAST_PORT}",
             "The twin prints its addresses; a PLC has its own in TIA Portal.",

@@ -45,7 +45,7 @@ class BlockLink:
         self._addresses = tuple(addresses)
         self._began = perf_counter()
         self._exchanges = [
-            Group(i + 1, len(group), wire, self._clock)
+            Group(i, len(group), wire, self._clock)
             for i, (group, wire) in enumerate(zip(self._groups, wires, strict=True))
         ]
         for group in self._exchanges:
@@ -135,8 +135,8 @@ class BlockLink:
         if not silent:
             return
         first = self._refusal(silent[0], timeout)
-        others = [str(i + 1) for i in silent[1:]]
+        others = [str(i) for i in silent[1:]]
         self.close()
         more = f" (group{'s' * (len(others) > 1)} {', '.join(others)} cannot be used either)" if others else ""
-        where = f"group {silent[0] + 1} at {self._addresses[silent[0]]}"
+        where = f"group {silent[0]} at {self._addresses[silent[0]]}"
         raise LinkError(where, first.reason + more, first.next_step)

@@ -155,7 +155,7 @@ FROM_PLC: Final = Block(
         Field("counter", "UDInt", 0, "of this block, one more each scan, 1 to 2147483647"),
         Field("magic", "DWord", 4, "SAGF"),
         Field("version", "UInt", 8, "of this layout"),
-        Field("group", "UInt", 10, "which group this PLC is, from 1"),
+        Field("group", "UInt", 10, "which group this PLC is, plus 1: 0 where it was not told"),
         Field("time", "LReal", 12, "of the PLC [us]"),
         Field("owner", "UDInt", 20, "who has the grant, 0 for nobody"),
         Field("echo", "UDInt", 24, "counter of the last command taken"),

@@ -46,7 +46,7 @@ class Group(Thread):
     """The exchange with one PLC.
 
     Attributes:
-        number: Of the group, from 1.
+        number: Of the group, from 0.
         newest: Its newest good block; None before the first.
         discarded: How many blocks were no good.
         trouble: What went wrong last; None while all is well.
@@ -57,7 +57,7 @@ class Group(Thread):
         """Prepare; `start` begins.
 
         Args:
-            number: Of the group, from 1.
+            number: Of the group, from 0.
             winches: How many it drives.
             wire: To its PLC.
             clock: Of the link [s].
@@ -117,8 +117,8 @@ class Group(Thread):
             try:
                 self._wire.open()
                 self._serve()
-            except WireError as error:
-                self.trouble = error.refusal
+            except Exception as error:  # whatever it is: nobody but this thread would connect anew
+                self.trouble = error.refusal if isinstance(error, WireError) else _mishap(error)
                 self.settled.set()
             finally:
                 self._wire.close()
@@ -151,11 +151,11 @@ class Group(Thread):
 
     def _strange(self, values: dict[str, Any]) -> Refusal | None:
         """Why a good block is not of the PLC that was expected here; None where it is."""
-        if values["group"] != self.number:
-            return Refusal(
-                f"the PLC there is group {values['group']}, not {self.number}",
-                "Give the addresses in the groups' order",
-            )
+        told = values["group"] - 1  # in a block it is one more
+        if told != self.number:
+            who = f"is group {told}" if told >= 0 else "was not told which group it is"
+            step = "Give the addresses in the groups' order, and each PLC its number"
+            return Refusal(f"the PLC there {who}, not {self.number}", step)
         if values["winches"] != self._winches:
             return Refusal(
                 f"the PLC there drives {values['winches']} winches, the robot has {self._winches} in this group",
@@ -171,3 +171,8 @@ class Group(Thread):
         known = newest.values["counter"]
         anew = newest.arrived < connected or arrived - newest.arrived > OWNER_TIMEOUT
         return newer(counter, known) or (anew and counter != known)
+
+
+def _mishap(error: Exception) -> Refusal:
+    text = " ".join(str(error).split())[:80]
+    return Refusal(f"the exchange failed with {type(error).__name__} ({text})", "Report it, if it happens again")

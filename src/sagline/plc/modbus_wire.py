@@ -7,7 +7,6 @@ import socket
 import struct
 from contextlib import suppress
 
-from pymodbus import ModbusException
 from pymodbus.client import ModbusTcpClient
 from pymodbus.pdu import ModbusPDU
 
@@ -34,7 +33,11 @@ class ModbusWire:
 
     def open(self) -> None:
         """Connect; waits at most ANSWER."""
-        if not self._client.connect():  # type: ignore[no-untyped-call]
+        try:
+            connected = self._client.connect()  # type: ignore[no-untyped-call]
+        except Exception as error:
+            raise WireError(refused(error, "Modbus")) from error
+        if not connected:
             try:  # the library keeps to itself why not
                 socket.create_connection(self._place, timeout=ANSWER).close()
             except OSError as error:
@@ -50,10 +53,10 @@ class ModbusWire:
         count = block.size // 2
         try:
             answer = self._client.read_holding_registers(block.register, count=count, device_id=self._device)
-        except (ModbusException, OSError) as error:
-            raise WireError(refused(error, "Modbus")) from error
-        registers = _good(answer, block).registers
-        return struct.pack(f">{len(registers)}H", *registers)
+            registers = _good(answer, block).registers
+            return struct.pack(f">{len(registers)}H", *registers)
+        except Exception as error:  # of a stranger's answer the library may make anything
+            raise _failed(error) from error
 
     def write(self, block: Block, data: bytes) -> None:
         """Replace the bytes of a block.
@@ -64,14 +67,14 @@ class ModbusWire:
         """
         registers = list(struct.unpack(f">{len(data) // 2}H", data))
         try:
-            answer = self._client.write_registers(block.register, registers, device_id=self._device)
-        except (ModbusException, OSError) as error:
-            raise WireError(refused(error, "Modbus")) from error
-        _good(answer, block)
+            _good(self._client.write_registers(block.register, registers, device_id=self._device), block)
+        except Exception as error:
+            raise _failed(error) from error
 
     def close(self) -> None:
         """Disconnect."""
-        self._client.close()  # type: ignore[no-untyped-call]
+        with suppress(Exception):  # of a connection that is given up nothing matters
+            self._client.close()  # type: ignore[no-untyped-call]
 
     def abort(self) -> None:
         """From another thread: end whatever waits."""
@@ -83,6 +86,10 @@ class ModbusWire:
     def reached(self) -> bool:
         """Whether somebody is at the other end."""
         return self._client.connected
+
+
+def _failed(error: Exception) -> WireError:
+    return error if isinstance(error, WireError) else WireError(refused(error, "Modbus"))
 
 
 def _good(answer: ModbusPDU, block: Block) -> ModbusPDU:

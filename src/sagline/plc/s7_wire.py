@@ -16,6 +16,7 @@ from sagline.plc.wire import ANSWER, WireError, refused
 PDU: Final = 240  # bytes, what an S7-1200 has: the blocks fit, one request each
 RACK: Final = 0
 FORBIDDEN: Final = 0x8104  # what a CPU says to PUT or GET that its settings do not permit
+_CLOSED: Final = Refusal("the connection was closed", "Connect again")
 SLOT: Final = 1  # of every S7-1200 and S7-1500
 
 logging.getLogger("snap7").addHandler(logging.NullHandler())  # what goes wrong is told by the link
@@ -37,9 +38,9 @@ class S7Wire:
 
     def open(self) -> None:
         """Connect; the library waits up to 5 s."""
-        self._client = client = Client()
-        client.set_param(Parameter.PDURequest, PDU)
         try:
+            self._client = client = Client()
+            client.set_param(Parameter.PDURequest, PDU)
             client.connect(self._host, RACK, SLOT, tcp_port=self._port)
             _socket(client).settimeout(ANSWER)
         except Exception as error:  # of a stranger's answer the library may make anything
@@ -51,9 +52,8 @@ class S7Wire:
         Args:
             block: Which.
         """
-        assert self._client is not None
         try:
-            return bytes(self._client.db_read(block.number, 0, block.size))
+            return bytes(self._open.db_read(block.number, 0, block.size))
         except Exception as error:
             raise WireError(_no_access(error, block)) from error
 
@@ -64,17 +64,23 @@ class S7Wire:
             block: Which.
             data: All of them.
         """
-        assert self._client is not None
         try:
-            self._client.db_write(block.number, 0, bytearray(data))
+            self._open.db_write(block.number, 0, bytearray(data))
         except Exception as error:
             raise WireError(_no_access(error, block)) from error
 
     def close(self) -> None:
         """Disconnect."""
         client, self._client = self._client, None
-        if client is not None:
-            client.disconnect()
+        with suppress(Exception):  # of a connection that is given up nothing matters
+            if client is not None:
+                client.disconnect()
+
+    @property
+    def _open(self) -> Client:
+        if self._client is None:
+            raise WireError(_CLOSED)
+        return self._client
 
     def abort(self) -> None:
         """From another thread: end whatever waits."""
@@ -97,12 +103,14 @@ def _socket(client: Client) -> socket.socket:
     """What the library speaks through; it has no setting for how long to wait."""
     connection = client.connection
     if connection is None or connection.socket is None:
-        raise WireError(Refusal("the connection was closed", "Connect again"))
+        raise WireError(_CLOSED)
     return connection.socket
 
 
 def _no_access(error: Exception, block: Block) -> Refusal:
     """Why a block was not read or written."""
+    if isinstance(error, WireError):
+        return error.refusal
     text = str(error)
     if "(0x0a)" in text or "(0x05)" in text:
         return Refusal(f"it has no DB{block.number} of {block.size} bytes", f"{LOAD}, without optimized access")

@@ -89,9 +89,8 @@ def needed() -> Iterator[None]:
     try:
         yield
     except ModuleNotFoundError as error:
-        raise FileError(
-            f"package {error.name}", "is not installed", 'PLCs need it: pip install "sagline[plc]"'
-        ) from None
+        package = f"package {str(error.name).partition('.')[0]}"
+        raise FileError(package, "is not installed", 'PLCs need it: pip install "sagline[plc]"') from None
 
 
 def refused(error: BaseException | None, speaks: str) -> Refusal:

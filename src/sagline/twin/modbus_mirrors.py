@@ -110,8 +110,13 @@ class ModbusMirrors:
         self._loop = asyncio.new_event_loop()
         self._thread = Thread(target=self._loop.run_forever, name="sagline modbus", daemon=True)
         self._thread.start()
-        self._servers = self._call(self._listen(numbers[0], ports))
-        self.addresses = tuple(f"{numbers[0]}:{_port(server)}" for server in self._servers)
+        self._servers: list[ModbusTcpServer] = []
+        try:
+            self._call(self._listen(numbers[0], ports))
+            self.addresses = tuple(f"{numbers[0]}:{_port(server)}" for server in self._servers)
+        except BaseException:
+            self.close()
+            raise
 
     def publish(self, blocks: Sequence[bytes | None]) -> None:
         """Replace each group's DB101, whole.
@@ -138,14 +143,12 @@ class ModbusMirrors:
     def _call(self, work: Coroutine[Any, Any, T]) -> T:
         return asyncio.run_coroutine_threadsafe(work, self._loop).result()
 
-    async def _listen(self, host: str, ports: Sequence[int]) -> list[ModbusTcpServer]:
-        servers = []
+    async def _listen(self, host: str, ports: Sequence[int]) -> None:
         for memory, port in zip(self._memory, ports, strict=True):
             data = [SimData(b.register, count=b.size // 2, datatype=DataType.REGISTERS) for b in BLOCKS]
             server = ModbusTcpServer(SimDevice(0, data, action=memory.serve), address=(host, port))
             await server.serve_forever(background=True)
-            servers.append(server)
-        return servers
+            self._servers.append(server)
 
 
 def _port(server: ModbusTcpServer) -> int:
