@@ -1,0 +1,174 @@
+"""Faults that stay, from a machine in one process to the state that follows; who acknowledges them has not mended them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.control.controller import Controller
+from sagline.control.link import Command, Missing, Sample
+from sagline.control.pace import Pace
+from sagline.control.states import RefusedError, State
+from sagline.control.tension_loop import TensionSettings
+from sagline.twin.machine import Machine
+from tests.control.lockstep import one
+from tests.control.rigs import HOME, Watcher, at, imperfect, prototype
+
+Edit = Callable[[Sample], Sample]
+
+
+class Edited:
+    """A link that changes what the machine says, from when it is told to."""
+
+    def __init__(self, link: Any) -> None:
+        self._link, self.groups, self.period = link, link.groups, link.period
+        self.edit: Edit | None = None
+
+    def exchange(self, command: Command | None) -> Sample | Missing:
+        answer: Sample | Missing = self._link.exchange(command)
+        return self.edit(answer) if self.edit is not None and isinstance(answer, Sample) else answer
+
+    def close(self) -> None:
+        """Nothing to do."""
+
+
+class Clock(Pace):
+    """A clock on which nobody waits, and every cycle is late by so much."""
+
+    late = 0.0
+
+    def wait(self) -> float:
+        return self.late
+
+
+class Stage(NamedTuple):
+    """What a case may lay hands on."""
+
+    control: Controller
+    machine: Machine
+    link: Edited
+    clock: Clock
+    watcher: Watcher
+
+
+class Case(NamedTuple):
+    """A fault that stays.
+
+    Attributes:
+        begin: What brings it about.
+        name: What is told first.
+        state: That follows within 60 cycles and stays.
+    """
+
+    begin: Callable[[Stage], None]
+    name: str
+    state: State
+
+
+def edits(edit: Edit) -> Callable[[Stage], None]:
+    return lambda stage: setattr(stage.link, "edit", edit)
+
+
+def injects(what: str) -> Callable[[Stage], None]:
+    return lambda stage: stage.machine.inject(f"{what} at {stage.machine.time:.3f} s")
+
+
+def reads(cable: int, tension: float, torque: float) -> Callable[[Stage], None]:
+    """A cable that pulls so much, as cell and motor agree."""
+    return edits(
+        lambda sample: sample._replace(
+            tension=one(sample.tension, cable, tension + 1e-3 * (sample.counter[0] % 7)),
+            torque=one(sample.torque, cable, torque),
+        )
+    )
+
+
+FAULT, EMERGENCY, MOVING = State.FAULT, State.EMERGENCY, State.MOVING
+STOPPING = {
+    "over-tension": Case(reads(3, 2100.0, -3.0), "over-tension", FAULT),
+    "slack": Case(reads(4, 2.0, 0.0), "slack", FAULT),
+    "cycles are lost": Case(lambda stage: setattr(stage.clock, "late", 0.15), "cycle lost", FAULT),
+    "group 1 is silent": Case(injects("group 1 is silent"), "group stale", FAULT),
+    "commands stop": Case(injects("commands stop"), "group acts by itself", FAULT),
+    "servo 3 trips": Case(injects("servo 3 trips"), "group acts by itself", FAULT),
+    "group 1 is taken": Case(injects("group 1 is taken"), "owner lost", FAULT),
+    "servo 3 is limited": Case(injects("servo 3 is limited to 60 N"), "following error", FAULT),
+}
+GOES_ON = {
+    "cycles are late": Case(lambda stage: setattr(stage.clock, "late", 0.03), "cycle late", MOVING),
+    "recording stops": Case(lambda stage: setattr(stage.watcher, "stopped", "disk full"), "recording stopped", MOVING),
+}
+
+
+def set_off(true: sl.Robot | None = None, moves: bool = True, **settings: Any) -> Stage:
+    """A controller that is homed, and under way."""
+    machine = Machine(true or prototype(), nominal=prototype(), start=HOME, seed=1)
+    link, clock, watcher = Edited(machine.link()), Clock(), Watcher()
+    control = Controller(prototype(), link, pace=clock, record=watcher, seed=2, **settings)
+    control.connect()
+    control.home(HOME)
+    if moves:
+        control.start(control.path_to(at(0.3, 0.0, 1.5)))
+        cycles(control, 100)
+    return Stage(control, machine, link, clock, watcher)
+
+
+def told_of(control: Controller, first: int) -> list[str]:
+    return [event.name for event in control.events_from(first) if event.kind.name == "FAULT"]
+
+
+def cycles(control: Controller, count: int) -> None:
+    for _ in range(count):
+        control.cycle()
+
+
+@pytest.mark.parametrize("name", [*STOPPING, *GOES_ON])
+def test_it_leads_to_its_state_and_is_not_acknowledged_away(name: str) -> None:
+    case, stage = (STOPPING | GOES_ON)[name], set_off()
+    control, first = stage.control, len(stage.control.events)
+    assert control.state is State.MOVING
+    case.begin(stage)
+    cycles(control, 60)
+    assert told_of(control, first)[0] == case.name
+    assert control.state is case.state
+    if case.state is not State.FAULT:
+        return
+    try:
+        control.acknowledge()
+    except RefusedError:
+        assert control.state is State.FAULT
+        return
+    cycles(control, 60)
+    assert control.state is State.FAULT
+    assert told_of(control, first).count(case.name) == 2
+
+
+def test_a_correction_at_its_limit_stops_and_asks_for_homing() -> None:
+    stage = set_off(imperfect(zero=2e-3), moves=False, loop=TensionSettings(largest=2e-4))
+    control = stage.control
+    cycles(control, 300)
+    assert "correction at its limit" in told_of(control, 0)
+    assert control.state is State.FAULT
+    assert not control.homed
+
+
+def test_a_second_controller_is_refused_and_the_first_goes_on() -> None:
+    stage = set_off()
+    beside = stage.machine.link(moves=False)
+
+    class Other(Edited):
+        def exchange(self, command: Command | None) -> Sample | Missing:
+            stage.control.cycle()
+            return super().exchange(command)
+
+    second, first = Controller(prototype(), Other(beside), seed=3), len(stage.control.events)
+    with pytest.raises(RefusedError, match=f"belongs to another controller, {stage.control.owner}"):
+        second.connect()
+    assert second.state is State.OFF
+    assert told_of(stage.control, first) == []
+    assert stage.control.state in (State.MOVING, State.IDLE)
+    assert stage.control.homed
