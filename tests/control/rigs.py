@@ -41,6 +41,25 @@ def with_zero_errors(robot: sl.Robot, errors: Array, **fields: Any) -> sl.Robot:
     return robot.replace(winches=robot.winches.replace(length_zero=robot.winches.length_zero + errors, **fields))
 
 
+class Busy:
+    """The link of a controller that stands for 20 to 50 ms now and then, as on a busy computer; the machine goes on."""
+
+    def __init__(self, link: Any, seed: int) -> None:
+        """Stand before a link."""
+        self._link, self.groups, self.period = link, link.groups, link.period
+        self._random = np.random.default_rng(seed)
+
+    def exchange(self, command: Command | None) -> Sample | Missing:
+        if self._random.random() < 0.02:
+            for _ in range(int(self._random.integers(2, 6))):
+                self._link.exchange(None)
+        answer: Sample | Missing = self._link.exchange(command)
+        return answer
+
+    def close(self) -> None:
+        """Nothing to do."""
+
+
 class Spy:
     """A link that keeps what goes through it."""
 

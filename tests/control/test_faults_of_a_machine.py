@@ -9,6 +9,7 @@ import sagline as sl
 from sagline.article.ten_poses import HOME
 from sagline.control.events import EventKind
 from sagline.control.states import State
+from tests.control.rigs import Busy, at
 from tests.control.stops import PROTOTYPE
 
 BIAS = np.array([2.0, -1.0, 1.5, -2.0, 0.5, 2.0, -2.0, 1.0])  # N
@@ -89,3 +90,14 @@ def test_it_is_told_once_and_leads_to_its_state_in_time(what: str) -> None:
     else:
         assert states[0][0] == state[0].name
         assert states[0][1] <= state[1] + 1e-6
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_busy_computer_is_no_encoder_that_jumps(seed: int) -> None:
+    """Drives catch up as fast as they can with what they were told late."""
+    machine = sl.twin.Machine(PROTOTYPE, seed=seed)
+    control = sl.control.Controller(PROTOTYPE, Busy(machine.link(), seed), seed=1)
+    control.connect()
+    control.home(at(*HOME))
+    done = control.go_to(at(0.2, -0.4, 1.4))
+    assert done.status is sl.control.ExecutionStatus.DONE

@@ -16,6 +16,8 @@ from sagline.control.fault import Fault, Reaction
 from sagline.control.link import COUNTERS, Command, GroupStatus, Mode, Sample, WinchState, newer
 
 JUMP: Final = 1e-3  # m a cycle
+OFF_BEAT: Final = 1.5  # cycles that a PLC's clock and the commands it took may differ by from sample to sample
+CATCHING_UP: Final = 10  # cycles, after they differed by more
 FOLLOWING: Final = 5e-3  # m
 SATURATED: Final = 0.2  # s
 IDLE: Final = 3  # samples: so long may a group take to begin to follow
@@ -31,7 +33,8 @@ class EncoderJump(Fault):
     name = "encoder jump"
     rule = (
         f"|change of length - rate x time| > {1e3 * JUMP:g} mm a cycle between two samples, by the rate in the first "
-        "and by that of the set points, of a drive that has power and is not at its limit; or no number"
+        "and by that of the set points, of a drive that has power and is not at its limit, whose PLC got "
+        f"its commands in time for the last {CATCHING_UP} cycles; or no number"
     )
     reaction = Reaction.STOPPING
     within = "10 ms"
@@ -41,11 +44,16 @@ class EncoderJump(Fault):
         """Begin with nothing read."""
         super().__init__(seen)
         self._numbers = False  # whether the sample before had numbers
+        self._regular = np.full(seen.group_of.max() + 1, CATCHING_UP)  # for how many cycles each group's commands were
 
     def found(self, cycle: Cycle) -> str | None:
         """The largest jump, or what is no number."""
         sample, before = cycle.sample, cycle.before
         known, self._numbers = self._numbers, finite(sample.length) and finite(sample.rate)
+        if before is not None:
+            self._regular += 1
+            cycles = (sample.plc_time - before.plc_time) / self.seen.period
+            self._regular[np.abs(cycles - (sample.echo - before.echo)) > OFF_BEAT] = 0
         if not self._numbers:
             wrong = ~(np.isfinite(sample.length) & np.isfinite(sample.rate))
             self.seen.jumped |= wrong
@@ -66,6 +74,8 @@ class EncoderJump(Fault):
         # a drum that is locked stops at once, and one whose drive gives all it can goes where the cable pulls it
         free = (sample.state == _ENABLED) & (before.state == _ENABLED)
         free &= (passed >= 0.0) & (passed < LONGEST)
+        # a drive that was told nothing for some cycles goes where it is told then as fast as it can
+        free &= (self._regular >= CATCHING_UP)[self.seen.group_of]
         allowed = JUMP * np.maximum(1.0, passed / self.seen.period)  # over a gap rates may have changed more
         jumped = free & ~(jump <= allowed)
         if not jumped.any():
