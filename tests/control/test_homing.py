@@ -9,8 +9,9 @@ import pytest
 
 import sagline as sl
 from sagline.control.controller import Controller
-from sagline.control.homing import WINDOW, Homing, cell_errors
+from sagline.control.homing import WINDOW, Homing
 from sagline.control.link import Sample
+from sagline.control.load_cells import cell_errors
 from sagline.control.states import State
 from tests.control.rigs import HOME, prototype, rig, spy_of, state_of
 

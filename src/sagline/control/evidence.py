@@ -11,9 +11,9 @@ from sagline.arrays import Array, Flags
 from sagline.control.cycle import MOVING, Cycle
 from sagline.control.ends import ends, finite, largest
 from sagline.control.link import RAMP, WinchState, groups_of
+from sagline.control.load_cells import SIGMAS
 from sagline.robot.robot import Robot
 
-SIGMAS: Final = 5.0  # by which a reading may be off before it means something
 SLACK_SHARE: Final = 0.3  # of the lower limit: a cable that pulls less is slack
 PLANNED_SHARE: Final = 0.9  # of the lower limit: from there on a plan wants the cable taut
 PULLING: Final = 0.5  # of the planned tension: a motor that holds more has a cable that pulls

@@ -23,12 +23,12 @@ from sagline.control.faults_link import (
 )
 from sagline.control.faults_tension import CableBroken, OverTension, Slack
 from sagline.control.link import PERIOD
+from sagline.control.load_cells import cell_errors
+from sagline.control.tension_loop import TensionSettings
 from sagline.errors import InvalidValueError
 from sagline.robot.robot import Robot
 
-CELL_DEVIATION: Final = 1.0  # N, of a reading
-CELL_BIAS: Final = 2.0  # N, that a good cell may have: 0.1 % of 2 kN
-LARGEST_CORRECTION: Final = 5e-3  # m
+LARGEST_CORRECTION: Final = TensionSettings().largest  # m
 
 # in the order in which they look: a cell that is found dead is not taken for a cable that is slack
 FAULTS: Final[tuple[type[Fault], ...]] = (
@@ -98,8 +98,8 @@ def faults_of(
     period: float = PERIOD,
     *,
     groups: tuple[tuple[int, ...], ...] | None = None,
-    cell_deviation: float = CELL_DEVIATION,
-    cell_bias: float = CELL_BIAS,
+    cell_deviation: float | None = None,
+    cell_bias: float | None = None,
     largest_correction: float = LARGEST_CORRECTION,
 ) -> tuple[Fault, ...]:
     """A fresh set of rules, which remember nothing: one for each time that a controller leaves OFF, FAULT or homing.
@@ -108,8 +108,9 @@ def faults_of(
         robot: As it is planned for.
         period: Of a cycle [s], > 0.
         groups: The winches of each group, as the link has them; None: two neighbors each.
-        cell_deviation: Standard deviation of a reading of a good load cell [N], > 0.
-        cell_bias: Bias that a good one may have [N], >= 0.
+        cell_deviation: Standard deviation of a reading of a good load cell [N], > 0; None: as the robot's winches have
+            it, 1 N where they do not say.
+        cell_bias: Bias that a good one may have [N], >= 0; None: as they have it, 2 N at least.
         largest_correction: Of a length by the tension loop [m], > 0.
 
     Returns:
@@ -127,11 +128,15 @@ def faults_of(
     checked_robot = instance(robot, Robot, "robot")
     if groups is not None:
         _check_groups(groups, checked_robot.cable_count)
+    known = [float(errors.max()) for errors in cell_errors(checked_robot)]
+    deviation, bias = (
+        own if given is None else given for given, own in zip((cell_deviation, cell_bias), known, strict=True)
+    )
     seen = Evidence(
         checked_robot,
         number(period, "period", "s", above=0.0),
         groups,
-        (number(cell_deviation, "cell_deviation", "N", above=0.0), number(cell_bias, "cell_bias", "N", low=0.0)),
+        (number(deviation, "cell_deviation", "N", above=0.0), number(bias, "cell_bias", "N", low=0.0)),
         number(largest_correction, "largest_correction", "m", above=0.0),
     )
     return tuple(kind(seen) for kind in FAULTS)

@@ -11,6 +11,7 @@ from sagline.cables.model import CableModel
 from sagline.control.courses import SetPoint, Standing
 from sagline.control.jogging import winch_lengths
 from sagline.control.link import Sample
+from sagline.control.load_cells import SIGMAS, cell_sigma
 from sagline.control.states import RefusedError
 from sagline.kinematics.inverse import inverse
 from sagline.robot.pose import Pose
@@ -20,9 +21,6 @@ from sagline.tension.method import TensionMethod
 
 WINDOW: Final = 50  # samples whose mean is judged, all of them taken at rest
 MOST: Final = 1.2  # times the plan's tension: more ends a jog
-SIGMAS: Final = 5.0
-OWN_DEVIATION: Final = 1.0  # N, of a cell that does not say
-BIAS: Final = 2.0  # N, 0.1 % of a cell of 2 kN
 
 
 class Homing:
@@ -141,18 +139,6 @@ class HomingJog:
             done=self._row == last,
             enable=self._enable,
         )
-
-
-def cell_sigma(robot: Robot) -> Array:
-    """Standard deviation of what the load cells read, bias included [N], shape (m,)."""
-    return np.hypot(*cell_errors(robot))
-
-
-def cell_errors(robot: Robot) -> tuple[Array, Array]:
-    """Standard deviations of what good load cells read, and the biases they may have [N], both of shape (m,)."""
-    winches, none = robot.winches, np.zeros(robot.cable_count)
-    own, bias = (none, none) if winches is None else (winches.load_cell_deviation, np.abs(winches.load_cell_bias))
-    return np.where(own > 0.0, own, OWN_DEVIATION), np.maximum(bias, BIAS)
 
 
 def tension_limits(homing: Homing, sample: Sample) -> Array:

@@ -9,12 +9,28 @@ import numpy as np
 from sagline.arguments import instance
 from sagline.arrays import Array, locked
 from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.robot import Robot
 from sagline.robot.several import first_of
 from sagline.statics.slopes import cable_slopes, on_platform
 from sagline.statics.tension_slopes import tension_slopes
 
+SIGMAS: Final = 5.0  # by which a reading may be off before it means something
+OWN_DEVIATION: Final = 1.0  # N, of a cell that does not say
+BIAS: Final = 2.0  # N, 0.1 % of a cell of 2 kN
 _LIFT: Final = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 _HIDDEN: Final = 1e-6  # of an error: what is less visible is not visible
+
+
+def cell_sigma(robot: Robot) -> Array:
+    """Standard deviation of what the load cells read, bias included [N], shape (m,)."""
+    return np.hypot(*cell_errors(robot))
+
+
+def cell_errors(robot: Robot) -> tuple[Array, Array]:
+    """Standard deviations of what good load cells read, and the biases they may have [N], both of shape (m,)."""
+    winches, none = robot.winches, np.zeros(robot.cable_count)
+    own, bias = (none, none) if winches is None else (winches.load_cell_deviation, np.abs(winches.load_cell_bias))
+    return np.where(own > 0.0, own, OWN_DEVIATION), np.maximum(bias, BIAS)
 
 
 def balance_slope(state: Equilibrium) -> Array:

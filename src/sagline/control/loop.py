@@ -25,7 +25,7 @@ from sagline.control.execution import Execution, ExecutionStatus, execution_of
 from sagline.control.fault import Fault, Reaction
 from sagline.control.faults import faults_of
 from sagline.control.guard import Garbage
-from sagline.control.homing import Homing, cell_errors
+from sagline.control.homing import Homing
 from sagline.control.jogging import PlatformJog
 from sagline.control.link import COUNTERS, HEARTBEAT, PERIOD, Command, Link, Missing, Mode, Sample
 from sagline.control.pace import Pace
@@ -577,13 +577,10 @@ class Loop:
 
     def _clear_faults(self) -> None:
         """Rules that remember nothing."""
-        deviation, bias = cell_errors(self.robot)
         self._faults: tuple[Fault, ...] = faults_of(
             self.robot,
             self.period,
             groups=self._link.groups,
-            cell_deviation=float(deviation.max()),
-            cell_bias=float(bias.max()),
             largest_correction=self._settings.largest,
         )
         self._is_degraded = False
