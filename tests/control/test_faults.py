@@ -713,6 +713,15 @@ def test_what_rules_cannot_be_made_of_is_refused(options: dict[str, Any], words:
         faults_of(None)  # type: ignore[arg-type]
 
 
+def test_what_cells_are_is_the_robots_word_unless_told() -> None:
+    noisy = sl.load_robot("article-prototype")
+    assert noisy.winches is not None
+    noisy = noisy.replace(winches=noisy.winches.replace(load_cell_deviation=3.0, load_cell_bias=-4.0))
+    assert faults_of(noisy)[0].seen.sigma == pytest.approx(5.0)
+    assert faults_of(ROBOT)[0].seen.sigma == pytest.approx(np.hypot(1.0, 2.0))
+    assert faults_of(noisy, cell_deviation=0.6, cell_bias=0.8)[0].seen.sigma == pytest.approx(1.0)
+
+
 def test_an_emergency_stop_that_a_plc_gives_as_its_fault_is_one_event() -> None:
     found = told(field("fault", 2, GroupFault.EMERGENCY_STOP), 100)
     assert [each.name for each in found] == ["emergency stop"]

@@ -129,9 +129,8 @@ def faults_of(
     if groups is not None:
         _check_groups(groups, checked_robot.cable_count)
     known = [float(errors.max()) for errors in cell_errors(checked_robot)]
-    deviation, bias = (
-        own if given is None else given for given, own in zip((cell_deviation, cell_bias), known, strict=True)
-    )
+    given = (cell_deviation, cell_bias)
+    deviation, bias = (own if told is None else told for told, own in zip(given, known, strict=True))
     seen = Evidence(
         checked_robot,
         number(period, "period", "s", above=0.0),
