@@ -10,7 +10,6 @@ import sys
 import time
 from hashlib import sha256
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import pytest
@@ -25,6 +24,7 @@ from tests.abuse.command_lines import LINES, Case, cases, commands
 from tests.effort import least_seconds
 from tests.files.executions import execution
 from tests.kinematics.winches import wound
+from tests.stand_ins import instead_of_machines
 
 SHORT = "durations: 1\nrate: 4\nwaypoints: [{position: [0, 0, 1.5]}, {position: [1, 0, 1.5]}]\n"
 SHARE = 250  # of all, in make test
@@ -71,17 +71,11 @@ def short_of_work(stocked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         server._check(host, port)
         raise SystemExit(0)
 
-    def served(server: Any, watch: Any) -> None:
-        raise SystemExit(0)
-
     def linked(robot: sl.Robot, asked: Any) -> Any:
         groups_at(addresses_of(asked.plc, 102), robot)
         return sl.twin.Machine(robot).link()
 
-    for name in ("in_process", "apart_over_s7", "_tell", "experiment_chapter"):
-        monkeypatch.setattr(f"sagline.cli.experiment.{name}", lambda *_, **__: SimpleNamespace(findings=()))
-    monkeypatch.setattr("sagline.cli.experiment.write_experiment", lambda result, folder, how: folder)
-    monkeypatch.setattr("sagline.twin.server.Server.run", served)
+    instead_of_machines(monkeypatch)
     monkeypatch.setattr("sagline.cli.control._link", linked)
     from sagline.viewer import server
 

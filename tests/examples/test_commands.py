@@ -23,6 +23,7 @@ from sagline.report.blocks import Chapter
 from tests.abuse.command_lines import commands
 from tests.files.executions import execution
 from tests.kinematics.winches import wound
+from tests.stand_ins import instead_of_machines
 
 ROOT = Path(__file__).parents[2]
 
@@ -90,6 +91,11 @@ def test_a_printed_command_runs(words: list[str], folder: Path, monkeypatch: pyt
     monkeypatch.setattr("sagline.report.parts.Part.build", lambda part: Chapter(part.key, part.key, "", ()))
     monkeypatch.setattr("sagline.cli.run.FIGURES", ())
     monkeypatch.setattr("sagline.cli.run._figures", lambda *_: ())
+    instead_of_machines(monkeypatch)
+    if words[0] == "twin":
+        words = [*words, "--port", "0"]  # another twin may have the usual ones
+    if "worn.yaml" in words:
+        (folder / "worn.yaml").write_text(sl.dump_robot(sl.load_robot("article-prototype").replace(mass=52.0)))
     if words[0] == "new":
         (folder / words[1]).unlink(missing_ok=True)
     if any(word.endswith(".mcap") for word in words):
