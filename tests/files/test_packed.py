@@ -61,6 +61,12 @@ def test_rounded_numbers_are_those_that_their_digits_are_read_as() -> None:
     assert not np.signbit(rounded(np.array([-1e-9, -0.0]), 3)).any()
 
 
+def test_what_has_no_such_digits_stays_what_it_is() -> None:
+    values = np.array([1e300, -1e17, np.inf, -np.inf, np.nan])
+    assert same(rounded(values, 8), values)
+    assert same(unpack(pack({"a": values}, {"a": 8}))["a"], values)
+
+
 def test_what_is_none_of_it_is_refused() -> None:
     good = pack({"a": np.arange(5.0)})
     for bad in (b"", b"abc", good[:-3], good + good[:4]):

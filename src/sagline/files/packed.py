@@ -54,7 +54,8 @@ def rounded(values: NDArray[np.float64], decimals: int) -> NDArray[np.float64]:
         decimals: How many.
     """
     scale = 10.0**decimals
-    return np.asarray(np.rint(values * scale) / scale + 0.0)  # + 0.0: no -0.0
+    whole = np.abs(values) < _EXACT / scale  # beyond it a float has no such decimals
+    return np.asarray(np.where(whole, np.rint(np.where(whole, values, 0.0) * scale) / scale, values) + 0.0)  # no -0.0
 
 
 def pack(columns: Mapping[str, NDArray[Any]], decimals: Mapping[str, int] | None = None) -> bytes:
@@ -143,7 +144,8 @@ def _whole(values: NDArray[Any], decimals: int) -> tuple[NDArray[np.int64], int]
     if decimals < 0:
         return bits, -1
     gaps = ~np.isfinite(values)
-    scaled = np.rint(np.where(gaps, 0.0, values) * 10.0**decimals)
+    with np.errstate(over="ignore"):  # what is infinite then is kept bit by bit
+        scaled = np.rint(np.where(gaps, 0.0, values) * 10.0**decimals)
     if not (np.abs(scaled) < _EXACT).all():
         return bits, -1
     whole = scaled.astype(np.int64)

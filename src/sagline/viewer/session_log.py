@@ -108,7 +108,7 @@ class Follower:
         whole = {name: np.concatenate([part[name] for part in self._parts]) for name in self._parts[0]}
         stamp, began = whole.pop("stamp"), float(whole["time"][0])
         true, turned = self._true(stamp)
-        whole["time"] = whole["time"] - began
+        whole["time"] = np.round(whole["time"] - began, 9)  # 0.3 and not less: who asks for 0.3 s means this cycle
         events = tuple(self.log.events)
         return Session(robot=robot, began=began, true=true, true_quaternion=turned, events=events, **whole)
 

@@ -1,0 +1,190 @@
+"""A log as the page shows it: platforms, words, and what is added while it grows."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import viser
+
+import sagline as sl
+from sagline.control import Event, EventKind, State
+from sagline.files.mcap_log import Recorder
+from sagline.viewer import session_words
+from sagline.viewer.readout import css_color
+from sagline.viewer.server import started, stop
+from sagline.viewer.session import Session, SessionMoment
+from sagline.viewer.session_log import Follower
+from sagline.viewer.stage import ACTUAL, INFEASIBLE, PLATFORM, TRUTH
+from sagline.viewer.tension_scale import TensionScale
+from sagline.viewer.timeline import Timeline
+from sagline.viewer.viewer import Viewer
+from tests.files.executions import cycles_of, events_of, execution, plan_of
+
+ROBOT = sl.load_robot("article-prototype")
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> Path:
+    execution().save(tmp_path / "run.mcap")
+    return tmp_path / "run.mcap"
+
+
+@pytest.fixture
+def truth(tmp_path: Path) -> Path:
+    """A twin that is 3 mm lower, from half a second on, on the same clock."""
+    plan = plan_of()
+    with Recorder(tmp_path / "twin.mcap", ROBOT, epoch=0) as recorder:
+        for k in range(50, 201):
+            below = plan.state.pose.position[k] - np.array([0.0, 0.0, 3e-3])
+            recorder.truth(1000.0 + 0.01 * k, below, plan.state.pose.quaternion[k])
+    return tmp_path / "twin.mcap"
+
+
+def session_of(log: Path, truth: Path | None = None) -> Session:
+    session = Follower(log, truth).more()
+    assert session is not None
+    return session
+
+
+def text_of(html: str) -> str:
+    return " ".join(re.sub(r"<[^>]+>", " ", html).split())
+
+
+def test_set_estimated_and_true_platforms_stand_where_they_were(log: Path, truth: Path) -> None:
+    session, done, plan = session_of(log, truth), execution(), plan_of()
+    assert session.duration == pytest.approx(2.0)
+    early, late, silent = session.sight(0.2), session.sight(1.204), session.sight(0.49)
+    assert late.index == 120
+    assert np.allclose(late.pose.position, plan.state.pose.position[120], rtol=0.0, atol=1e-12)
+    assert late.rest is not None
+    assert late.truth is not None
+    assert np.array_equal(late.rest.position, done.position[120])
+    assert np.allclose(late.truth.position - late.pose.position, [0.0, 0.0, -3e-3], rtol=0.0, atol=1e-9)
+    drawn = late.drawn_truth(10.0)
+    assert drawn is not None
+    assert np.allclose(drawn - late.pose.position, [0.0, 0.0, -3e-2], rtol=0.0, atol=1e-8)
+    assert early.truth is None  # the twin's log begins later
+    assert silent.rest is None  # there was no answer
+    assert np.array_equal(late.tension, done.tension[120])
+    assert np.array_equal(late.length, done.length[120])
+
+
+def test_the_panel_tells_state_errors_and_what_happened(log: Path, truth: Path) -> None:
+    session, done = session_of(log, truth), execution()
+    moment, scale = session.sight(1.2), TensionScale.of(ROBOT)
+    said = text_of(session_words.verdict(moment))
+    assert said.startswith("MOVING Time 1.20 s")
+    assert "True less planned 3 mm" in said
+    assert events_of()[1].text in said
+    assert events_of()[1].text not in text_of(session_words.verdict(session.sight(0.4)))
+    row = text_of(session_words.numbers(moment, scale))
+    off = done.tension[120] - done.planned_tension[120]
+    assert f"5 {done.tension[120, 5]:.1f} {off[5]:.1f}" in row
+    assert css_color(scale.colors(moment.tension)[5]) in session_words.numbers(moment, scale)
+
+
+def test_a_text_from_a_log_is_text_on_the_page(log: Path) -> None:
+    session = session_of(log)
+    evil = Event(1000.0, 0, EventKind.NOTE, "x", State.MOVING, "<script>alert(1)</script>")
+    parts = {name: getattr(session, name) for name in session.__slots__ if name != "shown"}
+    verdict = session_words.verdict(Session(**parts | {"events": (evil,)}).sight(1.0))
+    assert "<script>" not in verdict
+    assert "&lt;script&gt;" in verdict
+
+
+@pytest.mark.parametrize("state", [State.MOVING, State.FAULT, State.EMERGENCY])
+def test_a_fault_is_red_with_its_name(log: Path, state: State) -> None:
+    session = session_of(log)
+    parts = {name: getattr(session, name) for name in session.__slots__ if name != "shown"}
+    wrong = Session(**parts | {"state": np.full(201, state, dtype=np.int8)})
+    server = started(port=0)
+    try:
+        viewer = Viewer(server, ROBOT, wrong)
+        viewer._update()
+        body = handle(server, "/platform/body")
+        assert tuple(body.color) == (PLATFORM if state is State.MOVING else INFEASIBLE)
+        assert handle(server, "/platform/notice").text == ("" if state is State.MOVING else state.name)
+    finally:
+        stop(server)
+
+
+def handle(server: viser.ViserServer, name: str) -> Any:
+    return server.scene._handle_from_node_name[name]
+
+
+def test_the_page_shows_three_platforms_and_goes_on_with_the_log(tmp_path: Path, truth: Path) -> None:
+    file = tmp_path / "growing.mcap"
+    plan, follower = plan_of(), Follower(file, truth)
+    recorder = Recorder(file, ROBOT, epoch=0)
+    recorder.begins(plan)
+    cycles = list(cycles_of(plan))
+    for cycle in cycles[:100]:
+        recorder.cycle(cycle)
+    while (session := follower.more()) is None or len(session.time) < 100:
+        pass
+    server = started(port=0)
+    try:
+        viewer = Viewer(server, ROBOT, session)
+        viewer._clock = viewer._clock.scrubbed(session.duration)
+        viewer._update()
+        assert viewer.view is not None
+        assert isinstance(viewer.view.snapshot, SessionMoment)
+        assert viewer.view.snapshot.index == 99
+        assert handle(server, "/truth").visible
+        assert tuple(handle(server, "/truth/body").color) == TRUTH
+        for cycle in cycles[100:]:
+            recorder.cycle(cycle)
+        recorder.close()
+        grown = follower.more()
+        assert grown is not None
+        viewer.extend(grown)
+        viewer._work_off()
+        viewer._update()
+        assert viewer.view.snapshot.index == 200  # who looked at the end sees the new end
+        assert viewer._run_panel is not None
+        assert viewer._run_panel.time == pytest.approx(2.0)
+    finally:
+        stop(server)
+
+
+def test_a_timeline_that_grows_keeps_its_place_but_at_its_end() -> None:
+    assert Timeline(5.0, 5.0).extended(7.0) == Timeline(7.0, 7.0)
+    assert Timeline(5.0, 3.0).extended(7.0) == Timeline(7.0, 3.0)
+    assert Timeline(5.0, 3.0, True).extended(7.0) == Timeline(7.0, 3.0, True)
+
+
+def test_what_is_planned_estimated_and_true_has_a_color_of_its_own() -> None:
+    colors = np.array([PLATFORM, ACTUAL, TRUTH, INFEASIBLE], dtype=float)
+    apart = np.linalg.norm(colors[:, None] - colors[None], axis=2) + 1e3 * np.eye(4)
+    assert apart.min() > 60.0
+    for background in (np.full(3, 255.0), np.array([26.0, 27.0, 30.0])):
+        assert contrast(np.array(TRUTH, dtype=float), background) >= 3.0
+
+
+def contrast(one: np.ndarray, other: np.ndarray) -> float:
+    """Of two colors, 1 to 21 (WCAG 2.1)."""
+
+    def luminance(color: np.ndarray) -> float:
+        part = color / 255.0
+        linear = np.where(part <= 0.04045, part / 12.92, ((part + 0.055) / 1.055) ** 2.4)
+        return float(linear @ [0.2126, 0.7152, 0.0722])
+
+    low, high = sorted((luminance(one), luminance(other)))
+    return (high + 0.05) / (low + 0.05)
+
+
+def test_before_the_place_is_known_the_platform_is_shown_in_the_middle(log: Path) -> None:
+    session = session_of(log)
+    parts = {name: getattr(session, name) for name in session.__slots__ if name != "shown"}
+    unknown = np.full((201, 3), np.nan)
+    lost = Session(**parts | {"position": unknown, "planned": unknown})
+    assert ROBOT.test_box is not None
+    assert np.allclose(lost.home.position, 0.5 * (ROBOT.test_box.low + ROBOT.test_box.high))
+    later = unknown.copy()
+    later[100:120] = [0.1, 0.2, 1.4]
+    known = Session(**parts | {"position": later, "planned": unknown})
+    assert np.array_equal(known.sight(1.5).pose.position, [0.1, 0.2, 1.4])  # the last that was known
+    assert known.figures()
+    assert known.traces(50, 1.0)[1].shape == (50, 3)
