@@ -706,7 +706,8 @@ def _controls(given: _Given) -> dict[str, Call]:
     machine = sl.twin.Machine(robot)
     done = rig()[0].go_to(place)
     histogram, pose, number = sl.control.Histogram(), ("one", place), ("number", 0.1)
-    where = str(given.folder / "run.mcap")
+    where, kept, flat = str(given.folder / "run.mcap"), str(given.folder / "kept.mcap"), Figure().add_subplot()
+    done.save(kept)
     speeds = _all(pose=pose, speed=number, angular_speed=number)
 
     def ready(method: str, home: bool = True) -> Callable[..., Any]:
@@ -715,6 +716,13 @@ def _controls(given: _Given) -> dict[str, Call]:
             if not home:
                 control.connect()
             getattr(control, method)(**arguments)
+
+        return call
+
+    def drawn(name: str) -> Callable[..., Any]:
+        def call(**arguments: Any) -> None:
+            flat.clear()
+            getattr(sl.plot, name)(**arguments)
 
         return call
 
@@ -779,6 +787,17 @@ def _controls(given: _Given) -> dict[str, Call]:
         "control.Pace": Call(lambda period: (sl.control.Pace(period), None)[1], _all(period=("number", 0.01))),
         "control.Samples.at": Call(lambda index: (done.samples.at(index), None)[1], _all(index=("whole", 1))),
         "control.Execution.save": Call(done.save, _all(file=("file", where))),
+        "control.planned_position": Call(sl.control.planned_position, _all(execution=("one", done))),
+        "control.position_error": Call(sl.control.position_error, _all(execution=("one", done))),
+        "control.null_space_error": Call(
+            sl.control.null_space_error, _all(execution=("one", done), filter_time=("number", 0.5, True))
+        ),
+        "load_execution": Call(lambda **a: (sl.load_execution(**a), None)[1], _all(file=("file", kept))),
+        "plot.execution": Call(lambda done: (sl.plot.execution(done), None)[1], _all(done=("one", done))),
+        **{
+            f"plot.{name}": Call(drawn(name), _all(done=("one", done), ax=("ax", flat, True)))
+            for name in ("states", "measured_tensions", "mendable_tensions", "place_errors")
+        },
     }
 
 

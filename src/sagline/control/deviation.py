@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sagline.arguments import instance
-from sagline.arrays import Array, locked
+from sagline.arrays import Array, locked, number
 from sagline.control.execution import Execution
 from sagline.control.gains import gains_along
 from sagline.control.tension_loop import TensionSettings
@@ -40,7 +40,8 @@ def position_error(execution: Execution) -> Array:
     Returns:
         Along the world's axes [m], shape (N, 3); NaN beside the plan and where there is no estimate.
     """
-    return locked(execution.position - planned_position(execution))
+    planned = planned_position(execution)
+    return locked(execution.position - planned)
 
 
 def null_space_error(execution: Execution, filter_time: float | None = None) -> Array:
@@ -58,12 +59,13 @@ def null_space_error(execution: Execution, filter_time: float | None = None) -> 
         docs/model.md, section 12.
     """
     done = instance(execution, Execution, "execution")
+    default = TensionSettings().filter_time
+    time = default if filter_time is None else number(filter_time, "filter_time", "s", low=0.0)
     plan, error = done.plan, np.full(done.tension.shape, np.nan)
     gains = None if plan is None else gains_along(plan)
     if plan is None or gains is None:
         return locked(error)
     start = 0.0 if plan.path is None else float(plan.path.time[0])
-    time = TensionSettings().filter_time if filter_time is None else filter_time
     share = done.period / (time + done.period)
     filtered = np.zeros(done.tension.shape[1:])
     clock = (done.clock + start).tolist()

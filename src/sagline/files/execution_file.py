@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.arguments import file_path, instance
+from sagline.arguments import brief, file_path, instance, integer
 from sagline.arrays import locked
 from sagline.control.execution import Execution, ExecutionStatus, Samples
 from sagline.control.states import State
@@ -83,10 +83,11 @@ def execution_of_log(log: Log, plan: int | None = None) -> Execution:
         InvalidValueError: If it has no such plan.
     """
     count = len(log.plans)
-    if plan is not None and not -count <= plan < count:
+    chosen = None if plan is None else integer(plan)
+    if plan is not None and (chosen is None or not -count <= chosen < count):
         has = f"{-count} to {count - 1}" if count else "none: the log has no plan"
-        raise InvalidValueError("plan", plan, has, "Choose one of them, or None for all cycles.")
-    number = (0 if count == 1 else None) if plan is None else plan % count
+        raise InvalidValueError("plan", brief(plan), has, "Choose one of them, or None for all cycles.")
+    number = (0 if count == 1 else None) if chosen is None else chosen % count
     blocks = [block for block in log.blocks if plan is None or block.get("plan") == number]
     if log.truth and not log.blocks:
         step = "Give it as: sagline view ROBOT RUN.mcap --truth FILE."
