@@ -156,8 +156,7 @@ def test_angles_are_a_dimension(text: str, value: float) -> None:
 def test_plain_numbers_do_not_load_pint() -> None:
     code = """
 import sys
-from sagline.files.quantity import in_si, plain_number, within_reach
-from tests.effort import least_seconds
+from sagline.files.quantity import in_si
 
 in_si([1, "2e3"], "m", "x")
 print("pint" in sys.modules)
