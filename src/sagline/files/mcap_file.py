@@ -152,7 +152,7 @@ class McapFile:
         for stamp, row in self._known(columns, stamps, SHARE_SCENE):
             rest()
             self._message(SCENE, stamp, self._scene.at(stamp, **row).SerializeToString())
-        self._message(RECORD, stamps[-1] if stamps else self.epoch, pack(kept, DECIMALS), self._blocks)
+        self._message(RECORD, stamps[-1] if stamps else self.epoch, pack(kept, DECIMALS, rest), self._blocks)
         self._blocks += 1
 
     def event(self, event: Event) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from importlib.metadata import version
 from typing import Any, Final, NamedTuple
 
@@ -95,13 +96,13 @@ def head_of(robot: str, period: float) -> bytes:
     return json.dumps({"sagline_log_format": FORMAT, "source": SOURCE, "period": period, "robot": robot}).encode()
 
 
-def cycle_texts(columns: dict[str, NDArray[Any]]) -> list[bytes]:
+def cycle_texts(columns: dict[str, NDArray[Any]]) -> Iterator[bytes]:
     """Messages of cycles, for people.
 
     Args:
         columns: What there is of N cycles.
 
-    Returns:
+    Yields:
         N messages.
     """
     away = PER_METER * (columns["set_length"] - columns["length"] - columns["zero"])
@@ -110,7 +111,8 @@ def cycle_texts(columns: dict[str, NDArray[Any]]) -> list[bytes]:
     states = [State(code).name for code in columns["state"].tolist()]
     rows = zip(states, *kept.values(), strict=True)
     names = ("state", *kept)
-    return [_text({name: value for name, value in zip(names, row, strict=True) if value is not None}) for row in rows]
+    for row in rows:
+        yield _text({name: value for name, value in zip(names, row, strict=True) if value is not None})
 
 
 def event_text(event: Event) -> bytes:

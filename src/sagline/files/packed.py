@@ -9,7 +9,7 @@ stand together, and zstandard makes nothing of zeros.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import prod
 from typing import Any, Final
@@ -58,12 +58,17 @@ def rounded(values: NDArray[np.float64], decimals: int) -> NDArray[np.float64]:
     return np.asarray(np.where(whole, np.rint(np.where(whole, values, 0.0) * scale) / scale, values) + 0.0)  # no -0.0
 
 
-def pack(columns: Mapping[str, NDArray[Any]], decimals: Mapping[str, int] | None = None) -> bytes:
+def pack(
+    columns: Mapping[str, NDArray[Any]],
+    decimals: Mapping[str, int] | None = None,
+    rest: Callable[[], Any] = int,
+) -> bytes:
     """Columns in few bytes.
 
     Args:
         columns: Floats, whole numbers or flags of any shape; the first axis is the course.
         decimals: Of columns that may have no more than so many: one that has more is kept bit by bit.
+        rest: Called between two columns, for a thread that should let others go on.
 
     Returns:
         The bytes; `unpack` reads them.
@@ -77,6 +82,7 @@ def pack(columns: Mapping[str, NDArray[Any]], decimals: Mapping[str, int] | None
         order, small = _smallest(whole.reshape(len(whole) if whole.ndim else 1, -1) if whole.size else whole)
         heads.append((name, values.dtype.name, values.shape, places, order))
         parts.append(_planes(small))
+        rest()
     head = json.dumps(heads, separators=(",", ":")).encode()
     return compress(b"".join((len(head).to_bytes(4, "little"), head, *parts)), LEVEL)
 
