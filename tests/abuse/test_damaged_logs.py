@@ -3,8 +3,8 @@
 import json
 import struct
 import time
+import tracemalloc
 import warnings
-import zlib
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from mcap.writer import CompressionType, Writer
+from zstandard import compress
 
 import sagline as sl
 from sagline.control import Execution
@@ -159,24 +160,39 @@ def test_what_is_no_log_is_one_line(tmp_path: Path, name: str) -> None:
     assert len(line) < LONGEST
 
 
-def test_a_missing_chunk_is_noticed(whole: bytes, tmp_path: Path) -> None:
-    """One taken out of a log without its end, whose digest is not there to tell."""
+def chunks_of(content: bytes) -> list[tuple[int, int]]:
+    """Where its chunks begin and end."""
     places, place = [], 8
-    while place < len(whole) - 8 and whole[place] != 0x0F:
-        size = 9 + int.from_bytes(whole[place + 1 : place + 9], "little")
-        places += [(place, place + size)] * (whole[place] == 0x06)
-        place += size
-    first, end = places[0]
-    (tmp_path / "run.mcap").write_bytes(whole[:first] + whole[end : places[-1][1]])
+    while content[place] != 0x0F:  # the end of the data
+        end = place + 9 + int.from_bytes(content[place + 1 : place + 9], "little")
+        places += [(place, end)] * (content[place] == 0x06)
+        place = end
+    return places
+
+
+@pytest.mark.parametrize("which", [1, -1])
+def test_a_missing_chunk_is_noticed(whole: bytes, tmp_path: Path, which: int) -> None:
+    """By the digest of a log with its end, and where that is missing by the numbers of the chunks."""
+    places = chunks_of(whole)
+    first, end = places[which]
+    (tmp_path / "run.mcap").write_bytes(whole[:first] + whole[end:])
     with pytest.raises(sl.FileError, match="is damaged at byte"):
         sl.load_execution(tmp_path / "run.mcap")
+    if which == 1:
+        (tmp_path / "run.mcap").write_bytes(whole[:first] + whole[end : places[-1][1]])
+        with pytest.raises(sl.FileError, match="is damaged at byte"):
+            sl.load_execution(tmp_path / "run.mcap")
 
 
-def test_a_chunk_that_says_to_be_endless_is_refused(whole: bytes, tmp_path: Path) -> None:
-    """Lies about sizes cost no memory."""
-    body = struct.pack("<QQQI", 0, 1, 1 << 50, zlib.crc32(b"")) + struct.pack("<I", 4) + b"zstd" + struct.pack("<Q", 3)
-    chunk = b"\x06" + struct.pack("<Q", len(body) + 3) + body + b"abc"
-    attachments = whole[: whole.index(b"plan-0.sagline") - 29]  # what stands before the plan's
-    (tmp_path / "run.mcap").write_bytes(attachments + chunk)
+@pytest.mark.parametrize("said", [3, 1 << 28])
+def test_a_chunk_that_is_larger_than_any_takes_no_memory(whole: bytes, tmp_path: Path, said: int) -> None:
+    data = compress(bytes(1 << 28))
+    body = struct.pack("<QQQII", 0, 1, said, 0, 4) + b"zstd" + struct.pack("<Q", len(data)) + data
+    before = whole[: whole.index(b"plan-0.sagline") - 29]  # what stands before the plan's record
+    (tmp_path / "run.mcap").write_bytes(before + b"\x06" + struct.pack("<Q", len(body)) + body)
+    tracemalloc.start()
     with pytest.raises(sl.FileError, match="is damaged"):
         sl.load_execution(tmp_path / "run.mcap")
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 5e7
