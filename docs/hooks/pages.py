@@ -62,19 +62,29 @@ ways = np.meshgrid(*([-3, -1, 1, 3],) * 2, [1, 2, 3], indexing="ij")
 grid = sl.Pose(np.stack(ways, axis=-1).reshape(-1, 3), np.eye(3))
 found = sl.frequency_map(robot, grid, up_to=8.0)
 broken = sl.simulate(state, duration=2.0, events=sl.Break(cable=3, time=0.5))
+prototype, home = sl.load_robot("article-prototype"), sl.Pose([0, 0, 1.5], np.eye(3))
+controller = sl.control.Controller(prototype, sl.twin.Machine(prototype, seed=1).link(), seed=1)
+controller.connect()
+controller.home(home)
+done = controller.go_to(sl.Pose([0.2, -0.4, 1.4], np.eye(3)))
 """
 FIGURES = {  # function of `sl.plot` -> a call that draws
     "energy": "energy(broken)",
     "error": "error(proof)",
     "errors": "errors(proof, again)",
+    "execution": "execution(done)",
     "frequencies": "frequencies(along, path.time[::20])",
     "frequency_map": "frequency_map(found)",
     "lengths": "lengths(proof.plan)",
+    "measured_tensions": "measured_tensions(done)",
+    "mendable_tensions": "mendable_tensions(done)",
     "overview": "overview(proof.plan)",
     "path": "path(path)",
+    "place_errors": "place_errors(done)",
     "polygon": "polygon(shape, chosen)",
     "response": "response(swings)",
     "robot": "robot(robot, pose)",
+    "states": "states(done)",
     "tensions": "tensions(proof.plan)",
     "velocity": "velocity(path)",
 }
