@@ -163,6 +163,6 @@ def test_a_growing_log_is_followed_from_before_it_is_there(tmp_path: Path, monke
     writer.start()
     assert view_log.view_log(file, None, True, None, "", 0, browser=False) == 0
     writer.join()
-    assert lengths == sorted(set(lengths))
+    assert lengths == sorted(lengths)  # equal ones: what came then was an event, or a cycle was cut in two
     assert lengths[-1] == 200
-    assert len(lengths) > 2
+    assert len(set(lengths)) > 2
