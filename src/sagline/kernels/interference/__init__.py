@@ -1,0 +1,1 @@
+"""Least distances of hanging cables."""

@@ -1,0 +1,1 @@
+"""Margins over sets of loads, and proofs for boxes of poses."""

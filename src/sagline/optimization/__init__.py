@@ -1,0 +1,1 @@
+"""Better robots: what may change, what is wanted, and who searches."""
