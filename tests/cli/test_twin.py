@@ -90,7 +90,7 @@ def test_what_the_plcs_do_is_told_when_it_changes(capsys: pytest.CaptureFixture[
     assert [line.split(" s  ")[1] for line in said] == [
         f"groups 0, 1, 2, 3: brakes on, driven by {OWNER}",
         f"groups 0, 1, 2, 3: holding, driven by {OWNER}",
-        f"group 3: holding by itself (a drive has tripped), driven by {OWNER}",
+        f"group 3: holding by itself (a drive tripped), driven by {OWNER}",
     ]
     assert [float(line.split()[0]) for line in said] == pytest.approx([0.0, 0.1, 0.6], abs=0.11)
 

@@ -41,7 +41,7 @@ BAD: list[tuple[str, int, float, str, str]] = [
     ("status", 3, LOCKED, "group 3: the drums are locked", "Let the drums go at the machine"),
     ("status", 3, int(GroupStatus.EMERGENCY), "group 3: the emergency stop is pressed", "release it"),
     ("status", 0, int(GroupStatus.BRAKED), "group 0: a drive is not ready", "reset it at the machine"),
-    ("fault", 0, 3, r"group 0: it stopped by itself \(FOLLOWING_ERROR\)", "Mend the cause"),
+    ("fault", 0, 3, r"group 0: it stopped by itself: a drive lagged too far", "Mend the cause"),
     ("winch_fault", 4, 1, "group 2: a drive has tripped", "reset it at the machine"),
     ("state", 7, int(WinchState.FAULT), "group 3: a drive has tripped", "reset it at the machine"),
     ("echo", 1, COUNTER - 11, "group 1: does not take commands", "PLC's program"),

@@ -58,7 +58,7 @@ def the_plcs_stop_by_themselves_where_the_controller_is_killed(twin: Twin) -> No
             return bool((seen[-1].status & GroupStatus.HOLDING).all())
 
         until(stands)
-        twin.line("holding by itself .no command comes any more., driven by 11")
+        twin.line("holding by itself .no command came for 100 ms., driven by 11")
     last = seen[-1]
     assert (last.fault == GroupFault.HEARTBEAT).all()
     assert (last.owner == OWNER).all()

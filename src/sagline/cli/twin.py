@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from sagline.cli.entries import FORWARD, INVERSE, SIMULATION
 from sagline.cli.terminal import note, show, working
 from sagline.cli.values import port_of, whole_of
-from sagline.control.link import GroupFault, GroupStatus
+from sagline.control.link import GroupStatus, fault_text
 from sagline.files.robot_file import load_robot
 from sagline.twin.machine import MOST_SEED, Machine
 from sagline.twin.server import SCAN, Server
@@ -33,14 +33,6 @@ STATUS: Final = (  # the first that holds
     (GroupStatus.FOLLOWING, "following"),
     (GroupStatus.READY, "holding"),
 )
-FAULT: Final = {
-    GroupFault.HEARTBEAT: "no command comes any more",
-    GroupFault.OVER_TENSION: "too much tension",
-    GroupFault.FOLLOWING_ERROR: "a drive does not follow",
-    GroupFault.SET_POINT: "a set point out of range",
-    GroupFault.EMERGENCY_STOP: "emergency stop",
-    GroupFault.DRIVE: "a drive has tripped",
-}
 
 
 class Asked(NamedTuple):
@@ -144,7 +136,7 @@ class Watch:
 def _doing(report: Report) -> str:
     """What a PLC does, in a few words."""
     state = next((words for bit, words in STATUS if report.status & bit), "not ready")
-    why = f" ({FAULT[GroupFault(report.fault)]})" if report.fault else ""
+    why = f" ({fault_text(report.fault)})" if report.fault else ""
     return f"{state}{why}, {f'driven by {report.owner}' if report.owner else 'free'}"
 
 

@@ -11,12 +11,12 @@ from sagline.control.link import (
     COUNTERS,
     OWNER_TIMEOUT,
     PERIOD,
-    GroupFault,
     GroupStatus,
     Missing,
     Mode,
     Sample,
     WinchState,
+    fault_text,
 )
 from sagline.control.states import RefusedError
 
@@ -75,8 +75,7 @@ def trouble(
     age, stranger = float(sample.age.max()), (other != owner) & (other != 0)
     foreign = int(other[stranger][0]) if stranger.any() else 0
     codes = sorted({int(code) for code in sample.fault} - {0})
-    named = ", ".join(GroupFault(code).name if code in set(GroupFault) else str(code) for code in codes)
-    stops = f"it stopped by itself ({named})"
+    stops = f"it stopped by itself: {'; '.join(map(fault_text, codes))}"
     causes: tuple[tuple[Flags, str, str, bool], ...] = (
         (~(sample.age <= FRESH * period), f"silent for {age:.2g} s", "Check its PLC and the network.", False),
         ((status & _PRESSED) != 0, "the emergency stop is pressed", "Make the machine safe and release it.", True),

@@ -11,7 +11,7 @@ from sagline.arrays import Flags
 from sagline.control.cycle import Cycle
 from sagline.control.evidence import Evidence
 from sagline.control.fault import Fault, Reaction
-from sagline.control.link import GroupFault, GroupStatus, Mode, WinchState
+from sagline.control.link import GroupFault, GroupStatus, Mode, WinchState, fault_text
 
 STALE, SILENT = 3, 10  # cycles
 WINDOW: Final = 100  # cycles that are looked back on
@@ -24,13 +24,6 @@ _LOCKED, _EMERGENCY, _PRESSED = int(GroupStatus.LOCKED), int(GroupStatus.EMERGEN
 _TRIPPED, _LEAVE = int(WinchState.FAULT), int(Mode.LEAVE)
 
 _FREE: Final = "Free this computer of other work."
-_ACTS = {
-    GroupFault.HEARTBEAT: "no command came for 100 ms",
-    GroupFault.OVER_TENSION: "a cable pulled too hard, or its cell read no number, while it was wound in",
-    GroupFault.FOLLOWING_ERROR: "a drive lagged too far behind its set points",
-    GroupFault.SET_POINT: "a set point, or a tension to be held, was out of its range",
-    GroupFault.DRIVE: "a drive tripped",
-}
 
 
 class _Old(Fault):
@@ -161,8 +154,7 @@ class GroupActs(Fault):
         if mine.size:
             return f"drive {mine[0]} tripped with code {cycle.sample.winch_fault[mine[0]]}"
         code, locked = int(cycle.sample.fault[group]), cycle.sample.status[group] & _LOCKED
-        why = _ACTS.get(GroupFault(code), "") if code in set(GroupFault) else f"with code {code}"
-        return ", and ".join(filter(None, (why, "drums are locked" if locked else "")))
+        return ", and ".join(filter(None, (fault_text(code) if code else "", "drums are locked" if locked else "")))
 
 
 class EmergencyStop(Fault):

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sagline.arrays import Array, Flags
+from sagline.status import Status
 
 Whole: TypeAlias = NDArray[np.int64]
 
@@ -41,16 +42,21 @@ class GroupStatus(IntFlag):
     EMERGENCY = 64  # stop, of the hardware
 
 
-class GroupFault(IntEnum):
-    """Why a PLC acts by itself."""
+class GroupFault(Status):
+    """Why a PLC acts by itself; `text` says it."""
 
-    NONE = 0
-    HEARTBEAT = 1  # the command counter stood, or a command was valid no longer
-    OVER_TENSION = 2  # it lets no more cable in
-    FOLLOWING_ERROR = 3
-    SET_POINT = 4  # one that is out of range
-    EMERGENCY_STOP = 5
-    DRIVE = 6
+    NONE = 0, "no fault"
+    HEARTBEAT = 1, "no command came for 100 ms"  # the counter stood, or a command was valid no longer
+    OVER_TENSION = 2, "a cable pulled too hard, or its cell read no number, while it was wound in"  # pays out only
+    FOLLOWING_ERROR = 3, "a drive lagged too far behind its set points"
+    SET_POINT = 4, "a set point, or a tension to be held, was out of its range"
+    EMERGENCY_STOP = 5, "the emergency stop is pressed"
+    DRIVE = 6, "a drive tripped"
+
+
+def fault_text(code: int) -> str:
+    """What a PLC's fault means, also of one whose program knows more of them than we do."""
+    return GroupFault(code).text if code in set(GroupFault) else f"code {code}, which no table here has"
 
 
 class WinchState(IntEnum):
