@@ -14,7 +14,7 @@ import pytest
 
 import sagline as sl
 from sagline.arrays import Array
-from sagline.control.link import HEARTBEAT, RAMP, GroupFault, GroupStatus, Mode, Sample
+from sagline.control.link import HEARTBEAT, PERIOD, RAMP, GroupFault, GroupStatus, Mode, Sample
 from sagline.control.pace import Pace
 from sagline.control.states import State
 from sagline.twin import SCAN
@@ -67,10 +67,10 @@ def the_plcs_stop_by_themselves_where_the_controller_is_killed(twin: Twin) -> No
         gap = np.diff(times).max()  # between two looks
         began = times[np.argmax([sample.echo[group] == last.echo[group] for sample in seen])]
         assert times[-1] - began <= HEARTBEAT + RAMP + 3 * SCAN + gap
-    # as far as it goes in 100 ms, and then in the ramp
+    # as far as it goes in 100 ms, and then in the ramp; when a command comes its set point is still a cycle away
     target = RATE * (HEARTBEAT + RAMP / 2)
     moved = last.length - np.array([sample.length for sample in seen if (sample.echo == last.echo).all()])[0]
-    assert (moved <= target + RATE * 3 * SCAN).all()
+    assert (moved <= target + RATE * (PERIOD + 3 * SCAN)).all()
 
 
 def at_last(control: sl.control.Controller, ask: Callable[[], object], state: State) -> None:
