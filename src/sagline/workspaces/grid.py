@@ -1,0 +1,173 @@
+"""A function of positions sampled on a grid, and more finely where its sign changes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sagline.arrays import Array, locked
+from sagline.errors import InvalidValueError
+from sagline.results import Result
+
+Level = Callable[[Array], Array]
+"""A function of positions [m], shape (N, 3): >= 0 inside, shape (N,); it may be infinite, and may jump."""
+Mask = NDArray[np.bool_]
+
+_CELL = tuple(product((0, 1), repeat=3))  # the corners of a cell
+_HALVED = tuple(product((0, 1, 2), repeat=3))  # the nodes of a cell of which each edge is halved
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Grid(Result):
+    """Values of a function at the nodes of a grid.
+
+    Attributes:
+        x: Coordinates of the nodes [m], shape (nx,).
+        y: The same along y, shape (ny,).
+        z: The same along z, shape (nz,).
+        values: The function, >= 0 inside, shape (nx, ny, nz).
+        evaluated: Whether the function was evaluated there, shape (nx, ny, nz); elsewhere the sign alone holds, and
+            the value is that of a neighbor.
+    """
+
+    x: Array
+    y: Array
+    z: Array
+    values: Array
+    evaluated: Mask
+
+    @property
+    def axes(self) -> tuple[Array, Array, Array]:
+        """The coordinates along x, y and z [m]."""
+        return self.x, self.y, self.z
+
+    @property
+    def inside(self) -> Mask:
+        """Which nodes are inside, shape (nx, ny, nz)."""
+        inside: Mask = self.values >= 0.0
+        return inside
+
+    @property
+    def step(self) -> Array:
+        """Distance between neighboring nodes along each axis [m], shape (3,)."""
+        return np.array([(axis[-1] - axis[0]) / (len(axis) - 1) for axis in self.axes])
+
+    def positions(self, nodes: NDArray[np.int64]) -> Array:
+        """Where nodes are.
+
+        Args:
+            nodes: Their indices along x, y and z, shape (N, 3).
+
+        Returns:
+            Positions [m], shape (N, 3).
+        """
+        return np.stack([axis[nodes[:, k]] for k, axis in enumerate(self.axes)], axis=1)
+
+
+def evaluate(level: Level, positions: Array) -> Array:
+    """The values of a level function, as they have to be.
+
+    Args:
+        level: The function.
+        positions: Where [m], shape (N, 3).
+
+    Returns:
+        Its values, shape (N,).
+
+    Raises:
+        InvalidValueError: If they are of another shape, or one is NaN.
+    """
+    if not len(positions):
+        return np.zeros(0)
+    values = np.asarray(level(locked(np.ascontiguousarray(positions))), dtype=np.float64)
+    if values.shape != (len(positions),):
+        allowed = f"shape ({len(positions)},), a value a position"
+        raise InvalidValueError("level", f"of shape {values.shape}", allowed, "Correct the function.")
+    missing = np.isnan(values)
+    if missing.any():
+        where = ", ".join(f"{v:.6g}" for v in positions[missing.argmax()])
+        step = "Give -inf where a position is outside for a reason of its own."
+        raise InvalidValueError(f"level at ({where}) m", "nan", "a number, or infinite", step)
+    return values
+
+
+def sampled(level: Level, low: Array, high: Array, cells: tuple[int, int, int]) -> Grid:
+    """A function at all nodes of a grid.
+
+    Args:
+        level: The function.
+        low: Lower corner of the box that the grid fills [m], shape (3,).
+        high: Upper corner [m], shape (3,).
+        cells: Number of cells along each axis.
+
+    Returns:
+        Grid.
+    """
+    axes = [np.linspace(a, b, n + 1) for a, b, n in zip(low, high, cells, strict=True)]
+    positions = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    shape = tuple(n + 1 for n in cells)
+    return _grid(axes, evaluate(level, positions).reshape(shape), np.ones(shape, dtype=np.bool_))
+
+
+def refined(grid: Grid, level: Level) -> Grid:
+    """The grid of half the step, evaluated anew only in cells that the boundary passes through.
+
+    A cell that turns out to be passed through because a finer neighbor is, is evaluated too.
+
+    Args:
+        grid: The coarser grid.
+        level: The function.
+
+    Returns:
+        Grid.
+    """
+    axes = [np.interp(np.arange(2 * len(a) - 1) / 2.0, np.arange(len(a)), a) for a in grid.axes]
+    nearest = np.ix_(*(np.arange(len(axis)) // 2 for axis in axes))
+    fine = _grid(axes, grid.values[nearest], np.zeros([len(axis) for axis in axes], dtype=np.bool_), lock=False)
+    fine.evaluated[::2, ::2, ::2] = grid.evaluated
+    cells = mixed(grid.inside, _CELL, 1)
+    while True:
+        wanted = np.zeros_like(fine.evaluated)
+        for part in _views(wanted, _HALVED, 2):
+            part |= cells
+        nodes = np.argwhere(wanted & ~fine.evaluated)
+        if not len(nodes):
+            return _grid(axes, fine.values, fine.evaluated)
+        where = tuple(nodes.T)
+        fine.values[where] = evaluate(level, fine.positions(nodes))
+        fine.evaluated[where] = True
+        cells = mixed(fine.inside, _HALVED, 2)
+
+
+def mixed(inside: Mask, nodes: tuple[tuple[int, ...], ...] = _CELL, stride: int = 1) -> Mask:
+    """Which cells the boundary passes through: some of their nodes are inside, and some are not.
+
+    Args:
+        inside: Which nodes are, shape (nx, ny, nz).
+        nodes: Those of a cell, from its lowest on.
+        stride: Nodes from a cell to the next.
+
+    Returns:
+        Mask of cells.
+    """
+    parts = list(_views(inside, nodes, stride))
+    mask: Mask = np.logical_or.reduce(parts) & ~np.logical_and.reduce(parts)
+    return mask
+
+
+def _views(nodes: Mask, offsets: tuple[tuple[int, ...], ...], stride: int) -> list[Mask]:
+    """For each node of a cell, that node of all cells."""
+    count = [(n - 1) // stride for n in nodes.shape]
+    return [
+        nodes[tuple(slice(a, a + stride * (n - 1) + 1, stride) for a, n in zip(offset, count, strict=True))]
+        for offset in offsets
+    ]
+
+
+def _grid(axes: list[Array], values: Array, evaluated: Mask, *, lock: bool = True) -> Grid:
+    x, y, z = (locked(axis) for axis in axes)
+    return Grid(x, y, z, locked(values) if lock else values, locked(evaluated) if lock else evaluated)
