@@ -95,6 +95,9 @@ if TYPE_CHECKING:
     from sagline.tension.puncture import Puncture
     from sagline.tension.quadratic_program import QuadraticProgram
     from sagline.tension.singular import unresisted_motion
+    from sagline.workspaces.margin import Margin, margin
+    from sagline.workspaces.margin_status import MarginStatus
+    from sagline.workspaces.wrench_sets import Accelerations, WrenchBox, WrenchEllipsoid, WrenchPolytope, WrenchSet
 
 __version__: str
 
@@ -102,6 +105,7 @@ __all__ = [
     "EI",
     "ZV",
     "ZVD",
+    "Accelerations",
     "AnalyticCenter",
     "ArticleBalance",
     "Brake",
@@ -143,6 +147,8 @@ __all__ = [
     "Linearized",
     "LowestMaximum",
     "LowestSum",
+    "Margin",
+    "MarginStatus",
     "MeasuredTension",
     "MinimumNorm",
     "Modes",
@@ -177,6 +183,10 @@ __all__ = [
     "Winch",
     "WinchDrive",
     "WinchRates",
+    "WrenchBox",
+    "WrenchEllipsoid",
+    "WrenchPolytope",
+    "WrenchSet",
     "__version__",
     "article_balance",
     "article_path",
@@ -211,6 +221,7 @@ __all__ = [
     "load_robot",
     "load_simulation",
     "load_wirex",
+    "margin",
     "modes",
     "path_from_samples",
     "plc",
@@ -236,6 +247,7 @@ __all__ = [
 
 # Everything loads on first use: the command hears Ctrl-C before it loads anything, and only what it needs.
 _HOMES = {
+    "Accelerations": "sagline.workspaces.wrench_sets",
     "AnalyticCenter": "sagline.tension.analytic_center",
     "ArticleBalance": "sagline.statics.balance",
     "Brake": "sagline.dynamics.events",
@@ -278,6 +290,8 @@ _HOMES = {
     "Linearized": "sagline.dynamics.linearized",
     "LowestMaximum": "sagline.tension.lowest_maximum",
     "LowestSum": "sagline.tension.lowest_sum",
+    "Margin": "sagline.workspaces.margin",
+    "MarginStatus": "sagline.workspaces.margin_status",
     "MeasuredTension": "sagline.kinematics.measured",
     "MinimumNorm": "sagline.tension.minimum_norm",
     "Modes": "sagline.statics.stiffness",
@@ -312,6 +326,10 @@ _HOMES = {
     "Winch": "sagline.robot.winch",
     "WinchDrive": "sagline.robot.winch_drives",
     "WinchRates": "sagline.kinematics.winch_rates",
+    "WrenchBox": "sagline.workspaces.wrench_sets",
+    "WrenchEllipsoid": "sagline.workspaces.wrench_sets",
+    "WrenchPolytope": "sagline.workspaces.wrench_sets",
+    "WrenchSet": "sagline.workspaces.wrench_sets",
     "ZV": "sagline.dynamics.shapers",
     "ZVD": "sagline.dynamics.shapers",
     "article_balance": "sagline.statics.balance",
@@ -347,6 +365,7 @@ _HOMES = {
     "load_robot": "sagline.files.robot_file",
     "load_simulation": "sagline.files.simulation_file",
     "load_wirex": "sagline.files.wirex",
+    "margin": "sagline.workspaces.margin",
     "modes": "sagline.statics.stiffness",
     "path_from_samples": "sagline.motion.sampled",
     "plc": "sagline.plc",

@@ -84,6 +84,7 @@ RESULTS = frozenset(
     | {"FrequencySlopes", "WinchDrive"}
     | {"EnergyBalance", "Imported", "Linearized", "Modes", "Occurrence", "Plan", "Simulation", "Stiffness"}
     | {"control.Execution", "control.Gains", "control.Motion", "control.Samples", "twin.Injected"}
+    | {"Margin", "WrenchSet"}
     | {"FrequencyMap", "FrequencyResponse", "TensionPolygon", "Vibration", "WinchRates"}
 )
 # need a machine at the other end, or are one: tests/plc/test_bad_arguments.py
@@ -113,6 +114,7 @@ def calls(folder: Path) -> dict[str, Call]:
         _tensions,
         _statics,
         _vibrations,
+        _workspaces,
         _articles,
         _files,
         _in_time,
@@ -525,6 +527,29 @@ def _vibrations(given: _Given) -> dict[str, Call]:
         ),
         "frequency_response": Call(
             sl.frequency_response, _all(state=state, frequency=("array", [0.5, 2.0]), damping=damping)
+        ),
+    }
+
+
+def _workspaces(given: _Given) -> dict[str, Call]:
+    three, center = ("array", [3.0, 2.0, 4.0]), ("array", [1.0, 2.0, 3.0, 0.5, 0.25, 0.75], True)
+    box = {"force": three, "moment": three, "center": center}
+    return {
+        "WrenchBox": Call(sl.WrenchBox, _all(**box)),
+        "WrenchEllipsoid": Call(sl.WrenchEllipsoid, _all(**box)),
+        "WrenchEllipsoid: matrix": Call(sl.WrenchEllipsoid, _all(center=center, matrix=("array", np.eye(6), True))),
+        "WrenchPolytope": Call(sl.WrenchPolytope, _all(corners=("array", np.eye(6)))),
+        "Accelerations": Call(sl.Accelerations, _all(linear=("number", 2.0), angular=("number", 3.0))),
+        "margin": Call(
+            sl.margin,
+            _all(
+                robot=("one", given.robot),
+                pose=("one", given.poses),
+                wrenches=("one", sl.WrenchBox(force=2.0), True),
+                model=("one", sl.Catenary()),
+                moment_arm=("number", 0.25, True),
+                progress=("callback", lambda done, of: None, True),
+            ),
         ),
     }
 

@@ -112,6 +112,12 @@ def _margins() -> None:
     sl.capacity_margin(_unknown_state())
 
 
+def _signed_margins() -> None:
+    import sagline as sl
+
+    sl.margin(sl.load_robot(ROBOT), sl.Pose(PLACE, LEVEL))
+
+
 def _polygon() -> None:
     import sagline as sl
     from sagline.kinematics.polygon import polygon_at
@@ -215,6 +221,7 @@ def _unknown_state(name: str = ROBOT) -> Equilibrium:
 INVERSE, SHARING, VERDICTS = "inverse kinematics", "further ways of sharing", "verdicts of infeasible poses"
 FORWARD, FIT = "forward kinematics", "fit of straight cables"
 MARGINS, POLYGON, VIBRATION = "margins", "tension polygon", "stiffness and vibration"
+SIGNED_MARGINS = "signed margins"
 MODES, SIMULATION, CHAINS = "modes with cable mass", "motion in time", "motion of cables with mass"
 LOSSES, ANSWERS, PERIODS = "losses in the cables' stretch", "answers with losses", "motion from period to period"
 FORWARD_OVER_PULLEYS, VIBRATION_OVER_PULLEYS = f"{FORWARD} over pulleys", f"{VIBRATION} over pulleys"
@@ -230,6 +237,7 @@ ENTRIES = {
         Entry(FORWARD_OVER_PULLEYS, "forward.forward.forward_poses", 41, 14.0, _forward_over_pulleys, version=2),
         Entry(FIT, "forward.fit.fit_poses", 30, 5.0, lambda: _forward(straight=True)),
         Entry(MARGINS, "inverse.queries.margins_of_poses", 33, 9.0, _margins),
+        Entry(SIGNED_MARGINS, "workspaces.signed_margin.signed_margins", 30, 9.0, _signed_margins),
         Entry(POLYGON, "inverse.queries.polygon_of_pose", 38, 5.0, _polygon),
         Entry(VIBRATION, "forward.sensitivity.describe_states", 57, 6.0, _vibration),
         Entry(MODES, "dynamics.spectral.interpolate", 2, 9.0, _modes),

@@ -60,3 +60,11 @@ FORWARD_SINGULAR = 4  # an equilibrium that some motion leaves without resistanc
 FORWARD_NOT_CONVERGED = 5
 FORWARD_NO_LENGTHS = 6  # all lengths NaN: a pose without a plan
 FORWARD_FITTED = 7  # straight cables: the pose whose lengths fit best
+
+# What the bracket of a pose's margin says.
+MARGIN_FEASIBLE = 0
+MARGIN_INFEASIBLE = 1
+MARGIN_OPEN = 2
+MARGIN_SINGULAR = 3  # the structure matrix has lost rank
+MARGIN_NO_CHORD = 4
+MARGIN_TOO_SLACK = 5  # a cable's largest chord tension is too small for its weight

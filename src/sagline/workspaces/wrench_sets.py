@@ -6,12 +6,14 @@ here is a sum of four kinds, whose support functions add: segments, ellipsoids, 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array, checked, exactly, locked
+from sagline.arguments import brief
+from sagline.arrays import Array, Indices, checked, exactly, locked, number
 from sagline.errors import InvalidValueError
 
 
@@ -36,7 +38,7 @@ class WrenchSet:
     segments: Array
     ellipsoids: Array
     corners: Array
-    sizes: Array
+    sizes: Indices
     accelerations: Array
 
     def __add__(self, other: WrenchSet) -> WrenchSet:
@@ -52,44 +54,181 @@ class WrenchSet:
             locked(self.accelerations + other.accelerations),
         )
 
+    def __reduce__(self) -> tuple[Any, tuple[type[WrenchSet], dict[str, Any]]]:
+        """Pickle by fields, so that the arrays of a loaded set are locked too."""
+        return _again, (type(self), {field.name: getattr(self, field.name) for field in fields(WrenchSet)})
 
-def _set(**parts: Array) -> WrenchSet:
-    """A set of these parts and no others."""
-    none = {
-        "center": np.zeros(6),
-        "segments": np.zeros((0, 6)),
-        "ellipsoids": np.zeros((0, 6, 6)),
-        "corners": np.zeros((0, 6)),
-        "sizes": np.zeros(0, dtype=np.int64),
-        "accelerations": np.zeros(2),
-    }
-    return WrenchSet(**{name: locked(np.ascontiguousarray(value)) for name, value in {**none, **parts}.items()})
+    def _fill(self, **parts: Array) -> None:
+        """Let the set be these parts and no others."""
+        none = {
+            "center": np.zeros(6),
+            "segments": np.zeros((0, 6)),
+            "ellipsoids": np.zeros((0, 6, 6)),
+            "corners": np.zeros((0, 6)),
+            "sizes": np.zeros(0, dtype=np.int64),
+            "accelerations": np.zeros(2),
+        }
+        for name, value in {**none, **parts}.items():
+            object.__setattr__(self, name, locked(np.ascontiguousarray(value)))
 
 
-def WrenchBox(  # noqa: N802 - what it makes is a set, called by its shape
-    force: ArrayLike = 0.0, moment: ArrayLike = 0.0, center: ArrayLike | None = None
-) -> WrenchSet:
+class WrenchBox(WrenchSet):
     """All wrenches that differ from a center by no more than so much in each component.
-
-    Args:
-        force: Largest difference of each force component [N], a number or shape (3,), >= 0.
-        moment: Largest difference of each moment component [N m], a number or shape (3,), >= 0.
-        center: Force [N], then moment [N m], shape (6,); None for none.
-
-    Returns:
-        The set.
-
-    Raises:
-        InvalidValueError: If a number is not finite or negative, or a shape is another.
 
     Examples:
         >>> import sagline as sl
         >>> print(sl.WrenchBox(force=100.0, moment=20.0).segments.diagonal())
         [100. 100. 100.  20.  20.  20.]
     """
-    half = [_three(force, "force", "N"), _three(moment, "moment", "N m")]
-    middle = np.zeros(6) if center is None else exactly(center, "center", "N, N m", (6,))
-    return _set(center=middle, segments=np.diag(np.concatenate(half)))
+
+    __slots__ = ()
+
+    def __init__(self, force: ArrayLike = 0.0, moment: ArrayLike = 0.0, center: ArrayLike | None = None) -> None:
+        """Check the three.
+
+        Args:
+            force: Largest difference of each force component [N], a number or shape (3,), >= 0.
+            moment: Largest difference of each moment component [N m], a number or shape (3,), >= 0.
+            center: Force [N], then moment [N m], shape (6,); None for none.
+
+        Raises:
+            InvalidValueError: If a number is not finite or negative, or a shape is another.
+        """
+        self._fill(center=_center(center), segments=np.diag(_six(force, moment)))
+
+
+class WrenchEllipsoid(WrenchSet):
+    """All wrenches in an ellipsoid.
+
+    Examples:
+        >>> import sagline as sl
+        >>> forces = sl.WrenchEllipsoid(force=50.0)  # 50 N in any direction
+        >>> print(forces.ellipsoids[0].diagonal())
+        [50. 50. 50.  0.  0.  0.]
+    """
+
+    __slots__ = ()
+
+    def __init__(
+        self,
+        force: ArrayLike = 0.0,
+        moment: ArrayLike = 0.0,
+        center: ArrayLike | None = None,
+        *,
+        matrix: ArrayLike | None = None,
+    ) -> None:
+        """Check them.
+
+        Args:
+            force: Semi-axes along the force components [N], a number or shape (3,), >= 0.
+            moment: Semi-axes along the moment components [N m], a number or shape (3,), >= 0.
+            center: Force [N], then moment [N m], shape (6,); None for none.
+            matrix: Instead of the semi-axes: A of the wrenches A s with s no longer than 1, shape (6, 6).
+
+        Raises:
+            InvalidValueError: If a number is not finite or a semi-axis negative, a shape is another, or semi-axes and
+                matrix are both given.
+        """
+        axes = _six(force, moment)
+        if matrix is not None and axes.any():
+            raise InvalidValueError("matrix", "given beside semi-axes", "one of the two", "Leave out the others.")
+        own = np.diag(axes) if matrix is None else exactly(matrix, "matrix", "N, N m", (6, 6))
+        self._fill(center=_center(center), ellipsoids=own[None])
+
+
+class WrenchPolytope(WrenchSet):
+    """All wrenches between given ones: their convex hull.
+
+    Examples:
+        >>> import sagline as sl
+        >>> lifted = sl.WrenchPolytope([[0, 0, 0, 0, 0, 0], [0, 0, -300, 0, 0, 0]])  # nothing to 300 N downward
+        >>> print(lifted.corners[:, 2])
+        [   0. -300.]
+    """
+
+    __slots__ = ()
+
+    def __init__(self, corners: ArrayLike) -> None:
+        """Check them.
+
+        Args:
+            corners: Wrenches [N, N m], shape (C, 6), C >= 1; others between them do no harm.
+
+        Raises:
+            InvalidValueError: If a number is not finite, or there is none.
+        """
+        given = checked(corners, "corners", "N, N m", shape=(6,))
+        if given.ndim != 2 or not len(given):
+            step = "Give a wrench a row: force x, y, z, then moment x, y, z."
+            raise InvalidValueError("corners", f"of shape {given.shape}", "shape (C, 6), C >= 1", step)
+        self._fill(corners=given, sizes=np.array([len(given)], dtype=np.int64))
+
+
+class Accelerations(WrenchSet):
+    """The inertial loads of a platform that accelerates, by the robot's mass, inertia and orientation.
+
+    The loads are those of the center of mass's acceleration and of the angular acceleration; what turning adds without
+    accelerating (the gyroscopic moment) is left out.
+
+    Examples:
+        >>> import sagline as sl
+        >>> quick = sl.Accelerations(linear=2.0) + sl.WrenchBox(force=10.0)  # 2 m/s^2 along each axis, and +-10 N
+        >>> print(quick.accelerations)
+        [2. 0.]
+    """
+
+    __slots__ = ()
+
+    def __init__(self, linear: float = 0.0, angular: float = 0.0) -> None:
+        """Check both.
+
+        Args:
+            linear: Largest acceleration of the center of mass along each world axis [m/s^2], >= 0.
+            angular: Largest angular acceleration about each world axis [rad/s^2], >= 0.
+
+        Raises:
+            InvalidValueError: If one is not finite or negative.
+        """
+        both = [number(linear, "linear", "m/s^2", low=0.0), number(angular, "angular", "rad/s^2", low=0.0)]
+        self._fill(accelerations=np.array(both))
+
+
+NO_LOAD: Final[WrenchSet] = Accelerations()  # the one point 0: the weight alone
+
+
+def load_of(value: object) -> WrenchSet:
+    """An argument `wrenches`: a set, or None for the weight alone.
+
+    Args:
+        value: What was given.
+
+    Returns:
+        The set.
+
+    Raises:
+        InvalidValueError: If it is neither.
+    """
+    if value is None:
+        return NO_LOAD
+    if not isinstance(value, WrenchSet):
+        step = "Give WrenchBox(force=100.0, moment=20.0) for instance; a single wrench is WrenchPolytope([wrench])."
+        raise InvalidValueError("wrenches", brief(value), "a WrenchSet, or None", step)
+    return value
+
+
+def _again(kind: type[WrenchSet], values: dict[str, Any]) -> WrenchSet:
+    made = object.__new__(kind)
+    made._fill(**values)
+    return made
+
+
+def _center(center: ArrayLike | None) -> Array:
+    return np.zeros(6) if center is None else exactly(center, "center", "N, N m", (6,))
+
+
+def _six(force: ArrayLike, moment: ArrayLike) -> Array:
+    """Force and moment components, none negative."""
+    return np.concatenate([_three(force, "force", "N"), _three(moment, "moment", "N m")])
 
 
 def _three(value: ArrayLike, item: str, unit: str) -> Array:

@@ -1,0 +1,118 @@
+"""How much more load a pose can take than a whole set of loads, signed: above zero inside the workspace."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from sagline.arguments import callback, instance
+from sagline.arrays import Array, Codes, Flags, Indices, locked
+from sagline.blocks import Progress
+from sagline.cables.catenary import Catenary
+from sagline.cables.model import CableModel
+from sagline.memory import check_memory
+from sagline.results import Result
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.robot.several import Robots, one_a_pose
+from sagline.statics.tables import pose_rows
+from sagline.workspaces.margin_rows import MarginRows
+from sagline.workspaces.margin_status import MarginStatus
+from sagline.workspaces.wrench_sets import WrenchSet, load_of
+
+_CATENARY = Catenary()
+_POSE_BYTES = 200.0  # what a pose takes, its rows and answers
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Margin(Result):
+    """Result of `margin` at a single pose or N of them.
+
+    Attributes:
+        robot: The robot, or one a pose.
+        pose: The poses.
+        wrenches: The set of loads.
+        moment_arm: Lever arm by which moments count [m]; None for each robot's mean lever arm.
+        value: Largest load beyond the set that can still be balanced, whatever its direction, where a moment counts as
+            a force at the lever arm; below zero what the set is too large by [N], shape () or (N,). Continuous, and
+            never NaN: infinite where nothing limits, -infinite where the status has no margin.
+        low: Lower end of the bracket that the cables' sag leaves [N]; at zero and above every load of the set is
+            proved feasible, shape as of value. Both ends are the value where cables do not sag.
+        high: Upper end [N]; below zero a load of the set is proved infeasible.
+        direction: Normal of the facet that the value is the distance to, shape (..., 6): force part, and moment part
+            [1/m], world axes, of length 1 where the moment part is times the lever arm. Along it the cables give too
+            little first; a load against it fails first. A force part of zero: a moment alone does.
+        limiting_cable: The cable whose limit moves the value fastest, -1 where there is none, shape as of value.
+        status: Codes of `MarginStatus`, shape as of value.
+    """
+
+    robot: Robots
+    pose: Pose
+    wrenches: WrenchSet
+    moment_arm: float | None
+    value: Array
+    low: Array
+    high: Array
+    direction: Array
+    limiting_cable: Indices
+    status: Codes
+
+    @property
+    def feasible(self) -> Flags:
+        """Where every load of the set is proved feasible, shape () or (N,)."""
+        return locked(self.status == MarginStatus.FEASIBLE)
+
+
+def margin(
+    robot: Robot | Sequence[Robot],
+    pose: Pose,
+    wrenches: WrenchSet | None = None,
+    *,
+    model: CableModel = _CATENARY,
+    moment_arm: float | None = None,
+    progress: Progress | None = None,
+) -> Margin:
+    """How much more load than a set of loads each pose can take, signed, with a bracket for the cables' sag.
+
+    Works where no tensions balance the platform too. With sag the bracket is proved, whatever the tensions:
+    low >= 0 means that every load of the set can be balanced within the limits, high < 0 that one cannot.
+    Sagging cables are looked at up to where they hang in a curve fifteen times as long as their chord, and where they
+    have no upper limit up to twice their own length: a least tension of zero has no largest pull.
+
+    Args:
+        robot: The robot, or a sequence of N robots, one a pose.
+        pose: A single pose or N.
+        wrenches: The set of loads; None for the weight alone.
+        model: Cable model; with `Straight()` both ends of the bracket are the value.
+        moment_arm: Lever arm at which a moment counts like a force [m], >= 0. None: the mean distance of the platform
+            anchors from the center of mass. 0: forces alone, the capacity margin of `capacity_margin`; where a moment
+            alone fails the value is then -infinite.
+        progress: Called after every few thousand poses: how many are done, of how many.
+
+    Returns:
+        Margin.
+
+    Raises:
+        InvalidValueError: If an argument is none of its kind, or the robot has fewer cables than degrees of freedom.
+
+    Examples:
+        >>> import sagline as sl
+        >>> robot, pose = sl.load_robot("article-suspended"), sl.Pose([0, 0, 2], [[1, 0, 0], [0, 1, 0], [0, 0, 1]])
+        >>> found = sl.margin(robot, pose, sl.WrenchBox(force=100.0, moment=20.0))
+        >>> print(found.value.round(1), "N beyond the set;", sl.MarginStatus(int(found.status)).name)
+        91.1 N beyond the set; FEASIBLE
+
+    Source:
+        docs/model.md, section 13; Guay, Cardou, Cruz-Ruiz & Caro 2014.
+    """
+    shape = instance(pose, Pose, "pose").shape
+    robots = one_a_pose(robot, shape[0] if shape else None)
+    told = callback(progress, "progress")
+    load = load_of(wrenches)
+    prepared = MarginRows(robots, load, instance(model, CableModel, "model"), moment_arm)
+    rows = pose_rows(pose)
+    check_memory(f"margins at {len(rows):,} poses", _POSE_BYTES * len(rows), "Take them in parts.")
+    found = prepared.rows(rows, told)
+    value, low, high, cable, status = (locked(array.reshape(shape)) for array in found[:5])
+    direction = locked(found.direction.reshape(*shape, 6))
+    return Margin(robots, pose, load, moment_arm, value, low, high, direction, cable, status)

@@ -1,0 +1,182 @@
+"""Margins in rows: robots and poses as the kernels take them, prepared once for loops that ask again and again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sagline.arrays import Array, Codes, Indices, locked, number
+from sagline.blocks import Progress, blocks
+from sagline.cables.catenary import Catenary
+from sagline.cables.model import CableModel
+from sagline.errors import InvalidValueError
+from sagline.kernels import tables
+from sagline.kernels.memory import memory_for
+from sagline.kernels.workspaces.signed_margin import signed_margins
+from sagline.kernels.workspaces.wrench_set import SetTerms
+from sagline.robot.robot import Robot
+from sagline.robot.several import bodies_of, first_of, together
+from sagline.statics.tables import robot_terms
+from sagline.tension.options import LIMITS_OF
+from sagline.workspaces.wrench_sets import NO_LOAD, WrenchSet
+
+BLOCK = 1 << 13  # poses at once: a tenth of a second, after which an interrupt is heard
+_CATENARY = Catenary()
+
+
+class Bracket(NamedTuple):
+    """Margins of N poses; `Margin` has the same with robot and poses.
+
+    Attributes:
+        value: Continuous, between the other two [N], (N,).
+        low: Of what the cables' sag leaves open, the lower end [N], (N,).
+        high: The upper end [N], (N,).
+        cable: Whose limit moves the value fastest, -1 for none, (N,).
+        status: Codes of `MarginStatus`, (N,).
+        direction: Normal of the facet of the value, (N, 6).
+    """
+
+    value: Array
+    low: Array
+    high: Array
+    cable: Indices
+    status: Codes
+    direction: Array
+
+
+class MarginRows:
+    """Margins of rows of poses, for one robot or for many that share motion pattern, gravity and number of cables.
+
+    Everything but the poses is prepared once; `rows` then costs a few microseconds a call and a few a pose. It may be
+    called from several threads at once.
+    """
+
+    __slots__ = ("_given", "cable_count", "robot_count")
+
+    def __init__(
+        self,
+        robot: Robot | Sequence[Robot],
+        wrenches: WrenchSet = NO_LOAD,
+        model: CableModel = _CATENARY,
+        moment_arm: float | None = None,
+        cables: Array | None = None,
+    ) -> None:
+        """Prepare.
+
+        Args:
+            robot: A robot, or R of them.
+            wrenches: Set of loads.
+            model: Cable model.
+            moment_arm: Lever arm of the norm [m], >= 0; None for each robot's mean lever arm.
+            cables: Instead of the one robot's cables those of R robots that differ from it in nothing else, without R
+                objects: shape (R, m, CABLE_COLUMNS), columns as in `sagline.kernels.tables`; `cable_table(robot)` of
+                `sagline.statics.tables` is the robot's own, shape (1, m, CABLE_COLUMNS).
+
+        Raises:
+            InvalidValueError: If there are fewer cables than degrees of freedom, or an argument is out of range.
+        """
+        robots = together(robot)
+        shared = first_of(robots)
+        freedom, bodies, table = robot_terms(robots)
+        if cables is not None:
+            table = _locked(cables)
+        _check(shared, table, len(bodies))
+        self.cable_count = shared.cable_count
+        self.robot_count = len(table)
+        limits = (LIMITS_OF[shared.tension_limits_of], np.nan)
+        inertias = bodies_of(robots).inertia
+        terms = (freedom, bodies, table)
+        arms = _arms(table, bodies, moment_arm)
+        self._given = (
+            (model.code, *model.parameters),
+            limits,
+            terms,
+            _set_terms(wrenches, _locked(inertias.reshape(-1, 3, 3))),
+            arms,
+        )
+
+    def rows(self, poses: NDArray[np.float64], progress: Progress | None = None) -> Bracket:
+        """Margins at poses.
+
+        Args:
+            poses: Rows of position [m] and unit quaternion, scalar last, shape (N, 7), unchecked; a row with NaN is no
+                pose and has status NO_CHORD. With R robots N is a multiple of R: the first N/R poses are the first
+                robot's, the next N/R the second's, and so on.
+            progress: Called after every few thousand poses: how many are done, of how many.
+
+        Returns:
+            Bracket.
+
+        Raises:
+            InvalidValueError: If N is no multiple of R.
+        """
+        rows = np.ascontiguousarray(poses, dtype=np.float64).view()
+        count = len(rows)
+        if count % self.robot_count:
+            step = f"Give every one of the {self.robot_count} robots as many poses."
+            raise InvalidValueError("poses", f"{count} of them", f"a multiple of {self.robot_count}", step)
+        numbers, counters = memory_for(self.cable_count)
+        memory = numbers, counters, np.empty(self.cable_count, dtype=np.int8)
+        margins = (
+            np.empty((3, count)),
+            np.empty((count, 6)),
+            np.empty(count, dtype=np.int64),
+            np.empty(count, dtype=np.int8),
+        )
+        given = (*self._given, locked(rows), memory, margins)
+        if count <= BLOCK and progress is None:
+            signed_margins(*given, 0, count)
+        else:
+            for part in blocks(count, BLOCK, progress):
+                signed_margins(*given, part.start, part.stop)
+        values, directions, limiting, statuses = margins
+        return Bracket(values[0], values[1], values[2], limiting, statuses, directions)
+
+
+def mean_arms(table: Array, bodies: Array) -> Array:
+    """Mean distance of the platform anchors from the center of mass.
+
+    Args:
+        table: Of the cables, (R, m, CABLE_COLUMNS).
+        bodies: Of the platforms, (1 or R, BODY_COLUMNS).
+
+    Returns:
+        Lever arm [m], shape (R,).
+    """
+    anchors = table[:, :, tables.PLATFORM_X : tables.PLATFORM_Z + 1]
+    centers = bodies[:, None, tables.CENTER_X : tables.CENTER_Z + 1]
+    return np.asarray(np.linalg.norm(anchors - centers, axis=-1).mean(axis=-1))
+
+
+def _arms(table: Array, bodies: Array, moment_arm: float | None) -> tuple[Array, Array]:
+    """Lever arms of the norm, and those by which moments are divided, which are never zero [m]."""
+    means = mean_arms(table, bodies)
+    own = means if moment_arm is None else np.array([number(moment_arm, "moment_arm", "m", low=0.0)])
+    return locked(own), locked(np.where(means > 0.0, means, 1.0))
+
+
+def _set_terms(wrenches: WrenchSet, inertias: Array) -> SetTerms:
+    """A set of loads as the kernel takes it: of its segments those along one axis are a box."""
+    segments = np.abs(wrenches.segments)
+    straight = np.count_nonzero(segments, axis=1) <= 1
+    half = segments[straight].sum(axis=0)
+    others = _locked(wrenches.segments[~straight])
+    ellipsoids, corners, sizes = wrenches.ellipsoids, wrenches.corners, wrenches.sizes
+    return wrenches.center, locked(half), others, ellipsoids, corners, sizes, wrenches.accelerations, inertias
+
+
+def _locked(array: Array) -> Array:
+    return locked(np.ascontiguousarray(array, dtype=np.float64).view())
+
+
+def _check(robot: Robot, table: Array, bodies: int) -> None:
+    n, m = robot.degrees_of_freedom, robot.cable_count
+    if m < n:
+        step = "Add cables, or choose a motion pattern with fewer freedoms."
+        raise InvalidValueError(f"{robot.name}: number of cables", m, f">= {n} for {robot.motion_pattern}", step)
+    if table.shape[1:] != (m, tables.CABLE_COLUMNS) or not len(table) or bodies not in (1, len(table)):
+        wanted = f"shape (R, {m}, {tables.CABLE_COLUMNS})"
+        raise InvalidValueError("cables", f"of shape {table.shape}", wanted, "Make it from cable_table(robot).")
