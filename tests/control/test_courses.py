@@ -38,7 +38,7 @@ def test_a_jog_of_the_platform_after_one_of_a_winch_is_no_faster_and_the_loop_wa
     rates = []
     while control.moving:
         control.cycle()
-        rates.append(np.abs(control._command.rate).max())  # type: ignore[union-attr]
+        rates.append(np.abs(control._sender.command.rate).max())  # type: ignore[union-attr]
     assert max(rates) < LEAD_SPEED + 0.008  # 1.5 x 2 mm in 0.4 s beside it
     lengths = np.array([command.length for command in spy_of(control).commands if command and command.mode == 2])
     assert np.abs(np.diff(lengths, axis=0)).max() < (LEAD_SPEED + 0.008) * PERIOD

@@ -28,7 +28,6 @@ from sagline.control.recording import Recorder
 from sagline.control.states import MOTION, RefusedError, State, check_transition
 from sagline.control.tension_loop import TensionSettings
 from sagline.errors import InvalidValueError
-from sagline.kinematics.forward_status import STABLE
 from sagline.motion.path import Path
 from sagline.motion.rest_to_rest import septic_path
 from sagline.robot.pose import Pose
@@ -108,9 +107,10 @@ class Controller(Loop):
         Raises:
             RefusedError: If that is not known.
         """
-        if self._estimate not in STABLE:
+        pose = self._estimator.pose
+        if pose is None:
             raise RefusedError("the estimate", "the platform's place is not known", "Home first: home(pose).")
-        return Pose.from_quaternion(self._place, self._turn)
+        return pose
 
     @property
     def moving(self) -> bool:
@@ -313,7 +313,7 @@ class Controller(Loop):
             raise RefusedError("the jog", "another winch is being jogged", "Wait until it stands.")
         self._most_tension = tension_limits(self._homing, self.sample)
         begin = SetPoint(
-            self.sample.length, np.zeros(len(self.zero)), self._unknown, self._hold[1], None, None, np.nan, False
+            self.sample.length, np.zeros(len(self.zero)), self._unknown, self._sender.tension, None, None, np.nan, False
         )
         self._course = HomingJog(begin, winch, by, self.period)
         self._say(EventKind.NOTE, "jog", f"winch {winch} by {1e3 * by:+g} mm")
@@ -476,5 +476,5 @@ class Controller(Loop):
 
     def _let_go(self) -> None:
         """While it is off, send what gives the grants back, until they are."""
-        while self.state is State.OFF and self._command is not None:
+        while self.state is State.OFF and self._sender.command is not None:
             self.cycle()

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from sagline.arguments import brief, instance, optional, whole_number
-from sagline.arrays import Array, Flags, number
+from sagline.arrays import Array, number
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.control.aside import aside
@@ -20,6 +20,7 @@ from sagline.control.checks import Motion
 from sagline.control.connecting import FRESH, Claim, Trouble, trouble
 from sagline.control.courses import Along, Course, Ramp, SetPoint, Standing, standing_at
 from sagline.control.cycle import Cycle
+from sagline.control.estimator import Estimator
 from sagline.control.events import Event, EventKind
 from sagline.control.execution import Execution, ExecutionStatus, execution_of
 from sagline.control.fault import Fault, Reaction
@@ -27,25 +28,23 @@ from sagline.control.faults import faults_of
 from sagline.control.guard import Garbage
 from sagline.control.homing import Homing
 from sagline.control.jogging import PlatformJog
-from sagline.control.link import COUNTERS, HEARTBEAT, PERIOD, Command, Link, Missing, Mode, Sample
+from sagline.control.journal import Journal
+from sagline.control.link import PERIOD, Command, Link, Missing, Mode, Sample
 from sagline.control.pace import Pace
 from sagline.control.recording import Recorded, Recorder, Tape
+from sagline.control.sender import Sender
 from sagline.control.states import HOLDS_GRANT, MOTION, RefusedError, State, check_transition
 from sagline.control.tension_loop import TensionLoop, TensionSettings
 from sagline.control.warm import load_all
 from sagline.dynamics.drives import lever_of
 from sagline.errors import InvalidValueError
-from sagline.kinematics.forward_solver import ForwardSolver
-from sagline.kinematics.forward_status import STABLE, ForwardStatus
+from sagline.kinematics.forward_status import ForwardStatus
 from sagline.kinematics.plan import Plan
-from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.tension.closest import Closest
 from sagline.tension.method import TensionMethod
 
-VALID_FOR: Final = HEARTBEAT  # s: so long a PLC may go on with a command
 LEAVING: Final = 0.3  # s, at most, until all grants are given back
-MOST_OWNER: Final = 2**31
 MOST_SEED: Final = 2**128
 SAME: Final = 1e-9  # of a period
 ROOM: Final = 500  # cycles beside the plan's: ramps, pauses
@@ -84,27 +83,25 @@ class Loop:
         self._model = optional(model, CableModel, "model") or Catenary()
         self._method = optional(method, TensionMethod, "tension") or Closest()
         self._settings = optional(settings, TensionSettings, "loop") or TensionSettings()
-        self._record, self._shadow = record, shadow
+        self._shadow = shadow
         self._random = np.random.default_rng(None if seed is None else whole_number(seed, "seed", 0, MOST_SEED))
-        self.owner = int(self._random.integers(1, MOST_OWNER))
-        self._counter = int(self._random.integers(1, MOST_OWNER))
-        self._solver = ForwardSolver(robot, self._model)
+        self._sender = Sender(m, self._random)
+        self._estimator = Estimator(robot, self._model)
+        self._journal = Journal(record)
         self._garbage = Garbage()
         self.state = State.OFF
         self.sample: Sample | None = None
         self.zero, self.homed = np.zeros(m), False
-        self._unknown, self._enabled = np.full(m, nan), np.ones(m, dtype=np.bool_)
-        self._disabled = ~self._enabled
+        self._unknown = np.full(m, nan)
         self._number, self._time = 0, 0.0
-        self._events: list[Event] = []
-        self._begin_without_motion(m)
+        self._begin_without_motion()
         self._degrading: list[Fault] = []
         self._clear_faults()
         self._new_loop()
         if pace is not None:
             load_all(robot, self.period, self._model, self._method)
 
-    def _begin_without_motion(self, m: int) -> None:
+    def _begin_without_motion(self) -> None:
         """What there is before anything is sent."""
         self._claim: Claim | None = None
         self._refused: Trouble | None = None  # why the last claim was
@@ -119,10 +116,12 @@ class Loop:
         self._taping, self._told, self._told_of_plan = False, 0, False
         self._status, self._reason = ExecutionStatus.RUNNING, ""
         self._after, self._stop_asked, self._leaving = State.IDLE, False, 0
-        self._command: Command | None = None
-        self._point: SetPoint | None = None  # of that command, where it has one
-        self._hold = self._unknown, np.zeros(m)  # lengths as read, and tensions at the drums, where nothing is followed
-        self._place, self._turn, self._estimate = np.full(3, nan), np.full(4, nan), -1
+        self._point: SetPoint | None = None  # of the command that goes out next, where it has one
+
+    @property
+    def owner(self) -> int:
+        """The controller's id."""
+        return self._sender.owner
 
     @property
     def degraded(self) -> bool:
@@ -132,7 +131,7 @@ class Loop:
     @property
     def events(self) -> tuple[Event, ...]:
         """What happened so far."""
-        return tuple(self._events)
+        return tuple(self._journal.events)
 
     def events_from(self, first: int) -> list[Event]:
         """The events from one of them on.
@@ -140,7 +139,7 @@ class Loop:
         Args:
             first: How many there were when somebody looked last.
         """
-        return self._events[first:]
+        return self._journal.events[first:]
 
     @property
     def pace(self) -> Pace | None:
@@ -160,7 +159,7 @@ class Loop:
         """What became of the last motion, or has so far; None before the first."""
         if self._tape is None:
             return None
-        plan, events = None if self._motion is None else self._motion.plan, tuple(self._events[self._told :])
+        plan, events = None if self._motion is None else self._motion.plan, tuple(self.events_from(self._told))
         how = (self._status, self._reason, self.period, self.zero, events)
         return execution_of(self._tape, self.robot, plan, *how)
 
@@ -178,7 +177,7 @@ class Loop:
     def _cycle(self) -> None:
         """What `cycle` does."""
         late = 0.0 if self._pace is None else self._pace.wait()
-        command, point, correction = self._command, self._point, self._correction
+        command, point, correction = self._sender.command, self._point, self._correction
         answer = self._link.exchange(command)
         self._time = answer.time
         sample = answer if isinstance(answer, Sample) else _aged(self.sample, answer)
@@ -187,15 +186,15 @@ class Loop:
             planned = self._unknown if point is None else point.tension
             if self.homed or self._shadow:
                 self._locate(sample, None if point is None else point.wrench)
-            elif self._estimate >= 0:
-                self._place, self._turn, self._estimate = np.full(3, nan), np.full(4, nan), -1
+            elif self._estimator.status >= 0:
+                self._estimator.forget()
             if self._shadow or self.state not in UNWATCHED:
                 row = None if point is None else point.row
                 self._look(Cycle(sample, before, command, planned, row, correction, late, self._recording))
         if self._stop_asked:
             self._stop_now()
         self._prepare(answer)
-        if self._taping or self._record is not None:
+        if self._taping or self._journal.watched:
             self._keep(command, answer, point, correction, late)
         self._number += 1
 
@@ -209,16 +208,15 @@ class Loop:
             self._send_leave(None)
         elif self.state in HOLDS_GRANT and self.state is not State.EMERGENCY:
             self._end(ExecutionStatus.FAULT, line)
-            if self.sample is not None:
-                self._hold = self.sample.length, self.sample.filtered
+            self._sender.stand_at(self.sample)
             self._course, self._paused, self._homing = None, None, None
             if self.state is not State.FAULT:
                 if self.state is not State.STOPPING:
                     self._enter(State.STOPPING, line)
                 self._enter(State.FAULT, line)
-            self._send_hold(Mode.HOLD, self._enabled)
+            self._rest_now(Mode.HOLD, enabled=True)
         with suppress(Exception):  # the link itself may be what raises
-            self._link.exchange(self._command)
+            self._link.exchange(self._sender.command)
 
     @property
     def _recording(self) -> str:
@@ -227,15 +225,8 @@ class Loop:
         return found[0] if found else ""
 
     def _tell(self, what: Callable[[Recorder], object]) -> None:
-        """Tell the one who looks on, and nobody any more once that raises."""
-        if self._record is None:
-            return
-        try:
-            what(self._record)
-        except Exception as error:
-            self._record = None
-            why = f"{type(error).__name__}: {' '.join(str(error).split())[:160]}"
-            line = f"recording has stopped, as the recorder raised {why}. The motion goes on without it."
+        """Tell the one who looks on."""
+        if line := self._journal.tell(what):
             self._say(EventKind.FAULT, "recording stopped", line)
 
     def _keep(
@@ -249,8 +240,8 @@ class Loop:
         """Hand the cycle to those who keep it."""
         clock, planned = (nan, self._unknown) if point is None else (point.clock, point.tension)
         cycle = Recorded(
-            self._number, self.state, self.degraded, late, clock, command, answer, self._place, self._turn,
-            self._estimate, self.zero, planned, correction,
+            self._number, self.state, self.degraded, late, clock, command, answer, self._estimator.position,
+            self._estimator.quaternion, self._estimator.status, self.zero, planned, correction,
         )  # fmt: skip
         if self._taping and self._tape is not None:
             self._tape.add(cycle)
@@ -270,12 +261,9 @@ class Loop:
         """Where the platform is by the encoders; what the tension loop added is taken for an error of theirs."""
         length = sample.length + self.zero
         length -= self._correction
-        place, turn = np.empty(3), np.empty(4)
-        status = self._solver.step_into(length, place, turn, wrench)
-        lost = status not in STABLE and self._estimate in STABLE
-        self._place, self._turn, self._estimate = place, turn, int(status)
-        if lost:
-            line = f"the platform's place is lost: {status.text}. Look where it is, acknowledge, and home again."
+        lost = self._estimator.locate(length, wrench)
+        if lost is not None:
+            line = f"the platform's place is lost: {lost.text}. Look where it is, acknowledge, and home again."
             self._say(EventKind.FAULT, "estimate", line)
             if self.state in FOLLOWING:
                 self._react(Reaction.STOPPING, line)
@@ -347,9 +335,9 @@ class Loop:
         elif state is State.OFF:
             self._send_leave(sample)
         elif state is State.EMERGENCY:
-            self._send_hold(Mode.LOCK, self._disabled)
+            self._rest_now(Mode.LOCK, enabled=False)
         else:
-            self._send_hold(Mode.HOLD, self._enabled)
+            self._rest_now(Mode.HOLD, enabled=True)
 
     def _follow(self, course: Course) -> None:
         """The next set point of a course, with what the tension loop adds."""
@@ -362,45 +350,37 @@ class Loop:
         length = point.length + self._correction
         length -= self.zero
         self._point = point
-        enable = self._enabled if point.enable is None else point.enable
-        self._send(Mode.FOLLOW, length, point.rate, point.drum_tension, enable)
+        self._sender.follow(length, point.rate, point.drum_tension, point.enable)
 
-    def _send(self, mode: Mode, length: Array, rate: Array, tension: Array, enable: Flags) -> None:
-        self._counter = self._counter % COUNTERS + 1
-        pulls = np.maximum(tension, 0.0)  # of a reading below zero; a PLC refuses to push
-        claims = self.state is State.CONNECTING
-        self._command = Command(self._counter, self.owner, mode, VALID_FOR, length, rate, pulls, enable, claims)
-
-    def _send_hold(self, mode: Mode, enable: Flags) -> None:
-        length, tension = self._hold
+    def _rest_now(self, mode: Mode, *, enabled: bool) -> None:
         self._point = None
-        self._send(mode, length, np.zeros(len(length)), tension, enable)
+        self._sender.rest(mode, enabled=enabled, claims=self.state is State.CONNECTING)
 
     def _send_leave(self, sample: Sample | None) -> None:
         """Give the grants back, until they are."""
         self._leaving = max(self._leaving - 1, 0)
         if self._leaving and (sample is None or bool((sample.owner == self.owner).any())):
-            self._send_hold(Mode.LEAVE, self._disabled)
+            self._rest_now(Mode.LEAVE, enabled=False)
         else:
-            self._command = self._point = None
+            self._point = None
+            self._sender.nothing()
 
     def _connect(self, claim: Claim, answer: Sample | Missing) -> None:
         """Claim the groups, or give it up."""
-        claim.look(answer, self._counter)
-        if self.sample is not None:
-            self._hold = self.sample.length, self.sample.filtered
+        claim.look(answer, self._sender.counter)
+        self._sender.stand_at(self.sample)
         if claim.ready:
             self._clear_faults()
             self._enter(State.READY, "all groups agree")
-            self._send_hold(Mode.HOLD, self._enabled)
+            self._rest_now(Mode.HOLD, enabled=True)
         elif claim.refused is not None:
             self._refused = claim.refused
             self._leave(claim.refused.reason)
             self._send_leave(self.sample)
         elif claim.mode is None:
-            self._command = None
+            self._sender.nothing()
         else:
-            self._send_hold(claim.mode, self._disabled)
+            self._rest_now(claim.mode, enabled=False)
 
     def _go_on_homing(self, homing: Homing, sample: Sample) -> None:
         """Jog, or look whether the tensions agree."""
@@ -418,7 +398,7 @@ class Loop:
             self._accept(homing)
             self._follow(homing.standing)
             return
-        self._send_hold(Mode.HOLD, self._enabled)
+        self._rest_now(Mode.HOLD, enabled=True)
 
     def _ends_jog(self, sample: Sample) -> str:
         """Why a jog in homing goes no further, as tensions alone are watched; "" where it does."""
@@ -436,15 +416,13 @@ class Loop:
 
     def _end_jog(self, homing: Homing, sample: Sample) -> None:
         self._course = None
-        self._hold = sample.length, sample.filtered
+        self._sender.stand_at(sample)
         homing.rest()
 
     def _accept(self, homing: Homing) -> None:
         """Lengths are those of the plan from here on."""
         self.zero, self.homed = homing.zero, True
-        pose = homing.state.pose
-        self._solver.reset(pose)
-        self._place, self._turn, self._estimate = pose.position, pose.quaternion, int(ForwardStatus.SOLVED)
+        self._estimator.begin_at(homing.state.pose)
         self._course = homing.standing
         self._held, self._homing = homing.plan, None
         largest = 1e3 * float(np.abs(self.zero).max())
@@ -452,8 +430,9 @@ class Loop:
 
     def _stand_at(self, length: Array) -> Future[Standing | ForwardStatus]:
         """Begin to work out where the platform stands with these lengths."""
-        start = Pose.from_quaternion(self._place, self._turn) if self._estimate in STABLE else None
-        return aside(partial(standing_at, self.robot, length, start, self._model), self._pace is not None)
+        return aside(
+            partial(standing_at, self.robot, length, self._estimator.pose, self._model), self._pace is not None
+        )
 
     def _stands(self, found: Standing | ForwardStatus) -> bool:
         """Stay there from now on, if there is such a place."""
@@ -489,8 +468,7 @@ class Loop:
             self._idle_or_fault(point.length, self._status, self._reason)
             return
         self._end(self._status, self._reason)
-        if self.sample is not None:
-            self._hold = self.sample.length, self.sample.filtered if point is None else point.drum_tension
+        self._sender.stand_at(self.sample, None if point is None else point.drum_tension)
         self._course = None
         self._enter(self._after, self._reason)
 
@@ -519,11 +497,11 @@ class Loop:
         """Begin to follow a course."""
         self._course, self._motion, self._paused = course, motion, None
         self._tape = Tape(self.robot.cable_count, len(self._link.groups), ROOM + (0 if motion is None else len(motion)))
-        self._told = len(self._events)
+        self._told = len(self._journal.events)
         if self._told_of_plan:
             self._tell_end()  # of one that was paused
         plan = None if motion is None else motion.plan
-        if self._record is not None and plan is not None:
+        if self._journal.watched and plan is not None:
             self._told_of_plan = True
             self._tell(lambda record: record.begins(plan))
         self._go(state, text)
@@ -550,7 +528,7 @@ class Loop:
         """The last sample; refuses what needs all groups, where one of them does not agree."""
         if self.sample is None:
             raise RefusedError(what, "no group has answered", "Connect first.")
-        why = trouble(self.sample, self.owner, self._counter, self._link.groups, self.period)
+        why = trouble(self.sample, self.owner, self._sender.counter, self._link.groups, self.period)
         if why is not None:
             raise why.refusal(what)
         return self.sample
@@ -560,8 +538,7 @@ class Loop:
         self._end(ExecutionStatus.STOPPED, reason)
         self._course, self._paused, self._homing, self._claim = None, None, None, None
         self.homed, self._leaving = False, round(LEAVING / self.period)
-        if self.sample is not None:
-            self._hold = self.sample.length, self.sample.filtered
+        self._sender.stand_at(self.sample)
         self._enter(State.OFF, reason)
 
     def _enter(self, state: State, text: str) -> None:
@@ -571,9 +548,8 @@ class Loop:
         self._say(EventKind.STATE, state.name, text)
 
     def _say(self, kind: EventKind, name: str, text: str) -> None:
-        event = Event(self._time, self._number, kind, name, self.state, text)
-        self._events.append(event)
-        self._tell(lambda record: record.event(event))
+        if line := self._journal.add(Event(self._time, self._number, kind, name, self.state, text)):
+            self._say(EventKind.FAULT, "recording stopped", line)
 
     def _clear_faults(self) -> None:
         """Rules that remember nothing."""

@@ -1,0 +1,80 @@
+"""The commands of a controller: each bears its id and the next number."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from sagline.arrays import Array, Flags
+from sagline.control.link import COUNTERS, HEARTBEAT, Command, Mode, Sample
+
+VALID_FOR: Final = HEARTBEAT  # s: so long a PLC may go on with a command
+MOST_OWNER: Final = 2**31
+
+
+class Sender:
+    """Makes the command that goes out next.
+
+    Attributes:
+        owner: The controller's id.
+        counter: Of the last command.
+        command: The one that goes out next; None: nothing does.
+        length: As read where nothing is followed [m], shape (m,).
+        tension: At the drums there [N], shape (m,).
+    """
+
+    def __init__(self, cable_count: int, random: np.random.Generator) -> None:
+        """Nothing is sent.
+
+        Args:
+            cable_count: Number of winches m.
+            random: For the id, and the number to begin with.
+        """
+        self.owner = int(random.integers(1, MOST_OWNER))
+        self.counter = int(random.integers(1, MOST_OWNER))
+        self.command: Command | None = None
+        self.length, self.tension = np.full(cable_count, np.nan), np.zeros(cable_count)
+        self._enabled: Flags = np.ones(cable_count, dtype=np.bool_)
+        self._disabled: Flags = ~self._enabled
+
+    def follow(self, length: Array, rate: Array, tension: Array, enable: Flags | None) -> None:
+        """Ask the drives for set points.
+
+        Args:
+            length: Unstrained, as read [m], shape (m,).
+            rate: [m/s], shape (m,).
+            tension: At the drums [N], shape (m,).
+            enable: Which drives have power, shape (m,); None: all of them.
+        """
+        self._send(Mode.FOLLOW, length, rate, tension, self._enabled if enable is None else enable, claims=False)
+
+    def rest(self, mode: Mode, *, enabled: bool, claims: bool = False) -> None:
+        """Ask the drives to stand where they are.
+
+        Args:
+            mode: How: HOLD, LOCK or LEAVE.
+            enabled: Whether they have power.
+            claims: Whether the grants are asked for.
+        """
+        enable = self._enabled if enabled else self._disabled
+        self._send(mode, self.length, np.zeros(len(self.length)), self.tension, enable, claims)
+
+    def nothing(self) -> None:
+        """Send nothing."""
+        self.command = None
+
+    def stand_at(self, sample: Sample | None, tension: Array | None = None) -> None:
+        """Rest, from now on, where a sample says that the drums are.
+
+        Args:
+            sample: What the machine said last; None leaves everything.
+            tension: At the drums [N], shape (m,); None: what the sample says.
+        """
+        if sample is not None:
+            self.length, self.tension = sample.length, sample.filtered if tension is None else tension
+
+    def _send(self, mode: Mode, length: Array, rate: Array, tension: Array, enable: Flags, claims: bool) -> None:
+        self.counter = self.counter % COUNTERS + 1
+        pulls = np.maximum(tension, 0.0)  # of a reading below zero; a PLC refuses to push
+        self.command = Command(self.counter, self.owner, mode, VALID_FOR, length, rate, pulls, enable, claims)
