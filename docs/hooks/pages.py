@@ -25,6 +25,7 @@ RINGS = {  # package -> title and opening line of its page of reference
     "motion": ("Motion", "Paths of the platform."),
     "kinematics": ("Kinematics", "From motion to lengths, from lengths to the pose, and the proof of a plan."),
     "dynamics": ("Dynamics", "How the robot vibrates and moves."),
+    "workspaces": ("Workspaces", "Where a robot can work: loads, margins, criteria, the boundary, and proofs."),
     "tension": ("Tension", "How redundant cables share the load."),
     "statics": ("Statics", "Structure matrix, wrenches, stiffness."),
     "control": ("Controller", "`sl.control`: what drives a machine, cycle by cycle."),

@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from sagline.files.robot_file import dump_robot, load_robot
     from sagline.files.simulation_file import load_simulation
     from sagline.files.wirex import load_wirex
+    from sagline.files.workspace_file import load_workspace
     from sagline.kinematics.confirm import Confirmation, confirm
     from sagline.kinematics.encoder import encoder_counts, lengths_from_counts
     from sagline.kinematics.equilibria import Equilibria, equilibria
@@ -95,8 +96,18 @@ if TYPE_CHECKING:
     from sagline.tension.puncture import Puncture
     from sagline.tension.quadratic_program import QuadraticProgram
     from sagline.tension.singular import unresisted_motion
+    from sagline.workspaces.criteria.criterion import Criterion
+    from sagline.workspaces.criteria.frame import InFrame
+    from sagline.workspaces.criteria.frequency import LeastFrequency
+    from sagline.workspaces.criteria.margin import LeastMargin
+    from sagline.workspaces.criteria.position_error import PositionError
+    from sagline.workspaces.criteria.sag import MaximumSag
+    from sagline.workspaces.criteria.stiffness import LeastStiffness
     from sagline.workspaces.margin import Margin, margin
     from sagline.workspaces.margin_status import MarginStatus
+    from sagline.workspaces.orientations import Orientations, Tilts
+    from sagline.workspaces.space import Workspace
+    from sagline.workspaces.workspace import workspace
     from sagline.workspaces.wrench_sets import Accelerations, WrenchBox, WrenchEllipsoid, WrenchPolytope, WrenchSet
 
 __version__: str
@@ -122,6 +133,7 @@ __all__ = [
     "Closest",
     "Confirmation",
     "Creep",
+    "Criterion",
     "Damping",
     "Drop",
     "Elastic",
@@ -141,18 +153,24 @@ __all__ = [
     "Gap",
     "Imported",
     "ImprovedClosedForm",
+    "InFrame",
     "InvalidValueError",
     "InverseSolver",
     "InverseStep",
+    "LeastFrequency",
+    "LeastMargin",
+    "LeastStiffness",
     "Linearized",
     "LowestMaximum",
     "LowestSum",
     "Margin",
     "MarginStatus",
+    "MaximumSag",
     "MeasuredTension",
     "MinimumNorm",
     "Modes",
     "Occurrence",
+    "Orientations",
     "PNorm",
     "Parabolic",
     "Path",
@@ -162,6 +180,7 @@ __all__ = [
     "Pose",
     "PoseBox",
     "PoseStatus",
+    "PositionError",
     "Puncture",
     "QuadraticProgram",
     "Reading",
@@ -178,11 +197,13 @@ __all__ = [
     "Straight",
     "TensionMethod",
     "TensionPolygon",
+    "Tilts",
     "Vibration",
     "VibrationStatus",
     "Winch",
     "WinchDrive",
     "WinchRates",
+    "Workspace",
     "WrenchBox",
     "WrenchEllipsoid",
     "WrenchPolytope",
@@ -221,6 +242,7 @@ __all__ = [
     "load_robot",
     "load_simulation",
     "load_wirex",
+    "load_workspace",
     "margin",
     "modes",
     "path_from_samples",
@@ -243,6 +265,7 @@ __all__ = [
     "winch_drive_names",
     "winch_rates",
     "without_cables",
+    "workspace",
 ]
 
 # Everything loads on first use: the command hears Ctrl-C before it loads anything, and only what it needs.
@@ -264,6 +287,7 @@ _HOMES = {
     "Closest": "sagline.tension.closest",
     "Confirmation": "sagline.kinematics.confirm",
     "Creep": "sagline.cables.creep",
+    "Criterion": "sagline.workspaces.criteria.criterion",
     "Damping": "sagline.dynamics.damping",
     "Drop": "sagline.dynamics.events",
     "EI": "sagline.dynamics.shapers",
@@ -284,18 +308,24 @@ _HOMES = {
     "Gap": "sagline.kinematics.plan",
     "Imported": "sagline.files.imported",
     "ImprovedClosedForm": "sagline.tension.improved_closed_form",
+    "InFrame": "sagline.workspaces.criteria.frame",
     "InvalidValueError": "sagline.errors",
     "InverseSolver": "sagline.kinematics.inverse_solver",
     "InverseStep": "sagline.kinematics.inverse_solver",
+    "LeastFrequency": "sagline.workspaces.criteria.frequency",
+    "LeastMargin": "sagline.workspaces.criteria.margin",
+    "LeastStiffness": "sagline.workspaces.criteria.stiffness",
     "Linearized": "sagline.dynamics.linearized",
     "LowestMaximum": "sagline.tension.lowest_maximum",
     "LowestSum": "sagline.tension.lowest_sum",
     "Margin": "sagline.workspaces.margin",
     "MarginStatus": "sagline.workspaces.margin_status",
+    "MaximumSag": "sagline.workspaces.criteria.sag",
     "MeasuredTension": "sagline.kinematics.measured",
     "MinimumNorm": "sagline.tension.minimum_norm",
     "Modes": "sagline.statics.stiffness",
     "Occurrence": "sagline.dynamics.simulation",
+    "Orientations": "sagline.workspaces.orientations",
     "PNorm": "sagline.tension.p_norm",
     "Parabolic": "sagline.cables.parabolic",
     "Path": "sagline.motion.path",
@@ -305,6 +335,7 @@ _HOMES = {
     "Pose": "sagline.robot.pose",
     "PoseBox": "sagline.robot.pose_box",
     "PoseStatus": "sagline.kinematics.status",
+    "PositionError": "sagline.workspaces.criteria.position_error",
     "Puncture": "sagline.tension.puncture",
     "QuadraticProgram": "sagline.tension.quadratic_program",
     "Reading": "sagline.dynamics.simulator",
@@ -321,11 +352,13 @@ _HOMES = {
     "Straight": "sagline.cables.straight",
     "TensionMethod": "sagline.tension.method",
     "TensionPolygon": "sagline.tension.polygon",
+    "Tilts": "sagline.workspaces.orientations",
     "Vibration": "sagline.dynamics.vibration",
     "VibrationStatus": "sagline.dynamics.vibration_status",
     "Winch": "sagline.robot.winch",
     "WinchDrive": "sagline.robot.winch_drives",
     "WinchRates": "sagline.kinematics.winch_rates",
+    "Workspace": "sagline.workspaces.space",
     "WrenchBox": "sagline.workspaces.wrench_sets",
     "WrenchEllipsoid": "sagline.workspaces.wrench_sets",
     "WrenchPolytope": "sagline.workspaces.wrench_sets",
@@ -365,6 +398,7 @@ _HOMES = {
     "load_robot": "sagline.files.robot_file",
     "load_simulation": "sagline.files.simulation_file",
     "load_wirex": "sagline.files.wirex",
+    "load_workspace": "sagline.files.workspace_file",
     "margin": "sagline.workspaces.margin",
     "modes": "sagline.statics.stiffness",
     "path_from_samples": "sagline.motion.sampled",
@@ -387,6 +421,7 @@ _HOMES = {
     "winch_drive_names": "sagline.robot.winch_drives",
     "winch_rates": "sagline.kinematics.winch_rates",
     "without_cables": "sagline.tension.broken",
+    "workspace": "sagline.workspaces.workspace",
 }
 
 

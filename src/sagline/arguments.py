@@ -31,6 +31,7 @@ HOW_TO_GET: Final = MappingProxyType(
         "CableState": "Take that of a model: Catenary().from_tension(...).",
         "Confirmation": "Make one of a plan: confirm(plan).",
         "Creep": "Give Creep(axial_stiffness, time), or None.",
+        "Criterion": "Give one of the criteria, MaximumSag(0.05) for instance.",
         "Damping": "Give Damping(loss_time, air_damping, modal_damping), or None.",
         "Equilibrium": "Take that of a plan or a solution: plan.state.",
         "FrequencyMap": "Make one: frequency_map(robot, poses, up_to=20.0).",
@@ -45,6 +46,7 @@ HOW_TO_GET: Final = MappingProxyType(
         "TensionMethod": "Give one of the methods, MinimumNorm() for instance.",
         "TensionPolygon": "Make one: tension_polygon(robot, pose).",
         "Vibration": "Make one: vibration(state, up_to=20.0).",
+        "Workspace": "Make one: workspace(robot).",
         "Winch": "Give Winch(pulley_radius, dead_cable=...), or None.",
     }
 )

@@ -84,16 +84,19 @@ RESULTS = frozenset(
     | {"FrequencySlopes", "WinchDrive"}
     | {"EnergyBalance", "Imported", "Linearized", "Modes", "Occurrence", "Plan", "Simulation", "Stiffness"}
     | {"control.Execution", "control.Gains", "control.Motion", "control.Samples", "twin.Injected"}
-    | {"Margin", "WrenchSet"}
+    | {"Margin", "Workspace", "WrenchSet"}
     | {"FrequencyMap", "FrequencyResponse", "TensionPolygon", "Vibration", "WinchRates"}
 )
 # need a machine at the other end, or are one: tests/plc/test_bad_arguments.py
 LINKS = frozenset({"plc.ModbusLink", "plc.S7Link", "twin.Server", "twin.Server.run"})
+CRITERIA = ("Criterion", "InFrame", "LeastFrequency", "LeastMargin", "LeastStiffness", "MaximumSag", "PositionError")
 # asked by sagline itself, with numbers of its own
 INTERNAL = frozenset(
     {"TensionMethod.preference", "QuadraticProgram.preference", "twin.Machine.deliver"}
     | {"control.Fault", "control.Fault.look", "control.Fault.found", "control.Histogram.add"}
     | {"control.TensionLoop.step", "control.Gains.at", "control.Link", "control.Link.exchange", "control.Recorder"}
+    | {"Orientations.at", "Tilts.sampled"}
+    | {f"{name}.{method}" for name in CRITERIA for method in ("check", "judge", "scale", "values")}
     | {f"control.Recorder.{method}" for method in ("begins", "ends", "cycle", "event")}
 )
 
@@ -532,6 +535,10 @@ def _vibrations(given: _Given) -> dict[str, Call]:
 
 
 def _workspaces(given: _Given) -> dict[str, Call]:
+    limit, model = ("number", 0.5), ("one", sl.Straight())
+    turned = np.stack((np.eye(3), np.diag([1.0, -1.0, -1.0])))
+    space = sl.workspace(given.robot, cells=4)
+    space.save(given.folder / "workspace.nc")
     three, center = ("array", [3.0, 2.0, 4.0]), ("array", [1.0, 2.0, 3.0, 0.5, 0.25, 0.75], True)
     box = {"force": three, "moment": three, "center": center}
     return {
@@ -540,6 +547,32 @@ def _workspaces(given: _Given) -> dict[str, Call]:
         "WrenchEllipsoid: matrix": Call(sl.WrenchEllipsoid, _all(center=center, matrix=("array", np.eye(6), True))),
         "WrenchPolytope": Call(sl.WrenchPolytope, _all(corners=("array", np.eye(6)))),
         "Accelerations": Call(sl.Accelerations, _all(linear=("number", 2.0), angular=("number", 3.0))),
+        "Orientations": Call(sl.Orientations, _all(rotations=("array", turned), need=("word", "any"))),
+        "Tilts": Call(sl.Tilts, _all(angle=("number", 0.25))),
+        "LeastMargin": Call(sl.LeastMargin, _all(limit=limit)),
+        "MaximumSag": Call(sl.MaximumSag, _all(limit=limit)),
+        "PositionError": Call(sl.PositionError, _all(model=model, limit=limit)),
+        "LeastStiffness": Call(sl.LeastStiffness, _all(limit=limit)),
+        "LeastFrequency": Call(sl.LeastFrequency, _all(limit=limit)),
+        "InFrame": Call(sl.InFrame, _all(limit=limit)),
+        "workspace": Call(
+            sl.workspace,
+            _all(
+                robot=("one", given.robot),
+                box=("one", sl.PoseBox([-1.0, -1.0, 1.0], [1.0, 1.0, 2.0]), True),
+                wrenches=("one", sl.WrenchBox(force=2.0), True),
+                orientations=("one", sl.Tilts(0.25), True),
+                criteria=("object", [sl.MaximumSag(0.5)]),
+                model=("one", sl.Catenary()),
+                tension=("one", sl.MinimumNorm()),
+                cells=("whole", 4),
+                refine=("whole", 1),
+                moment_arm=("number", 0.25, True),
+                progress=("callback", lambda done, of: None, True),
+            ),
+        ),
+        "Workspace.save": Call(space.save, _all(file=("file", given.folder / "saved.nc"))),
+        "load_workspace": Call(sl.load_workspace, _all(file=("file", given.folder / "workspace.nc"))),
         "margin": Call(
             sl.margin,
             _all(

@@ -16,7 +16,7 @@ from sagline.arrays import locked
 from sagline.cables.catenary import Catenary
 from sagline.cables.elastic import Elastic
 from sagline.cables.empirical import Empirical
-from sagline.cables.model import CableModel, CableState
+from sagline.cables.model import CableState
 from sagline.cables.parabolic import Parabolic
 from sagline.cables.straight import Straight
 from sagline.errors import FileError, InvalidValueError, SaglineWarning
@@ -33,7 +33,6 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.robot.several import anything_behind
-from sagline.tension.method import TensionMethod
 from sagline.tension.methods import METHODS
 
 if TYPE_CHECKING:
@@ -52,7 +51,7 @@ RESTS = "rests"  # of a path whose rests are known
 FREE = {"unstrained_length": "free_length", "chord_tension": "free_chord_tension"}  # of cables over pulleys
 STATE_ARRAYS = ("span", "rise", "unstrained_length", "horizontal_tension", "vertical_force", "chord_tension")
 
-Choice = TypeVar("Choice", CableModel, TensionMethod)
+Choice = TypeVar("Choice")
 
 
 def save_plan(plan: Plan, file: os.PathLike[str] | str) -> None:
@@ -152,33 +151,59 @@ def plan_dataset(plan: Plan) -> Dataset:
 def _attributes(plan: Plan) -> dict[str, Any]:
     return {
         **CONTENT.attributes(f"Cable lengths and tensions of {plan.state.one_robot.name}"),
-        **_written("model", plan.state.cables.model, MODELS),
-        **_written("tension", plan.tension, METHODS),
+        **choice_attributes("model", plan.state.cables.model, MODELS),
+        **choice_attributes("tension", plan.tension, METHODS),
         "robot": dump_robot(plan.state.one_robot),
     }
 
 
-def _written(
-    key: str, choice: CableModel | TensionMethod, choices: Mapping[str, type[CableModel] | type[TensionMethod]]
-) -> dict[str, Any]:
-    """A model or method as attributes: its name, and each of its options that is set."""
+def choice_attributes(key: str, choice: Any, choices: Mapping[str, type[Any]]) -> dict[str, Any]:
+    """A model, method or the like as attributes: its name, and each of its options that is set.
+
+    Args:
+        key: What the attributes begin with.
+        choice: What was chosen.
+        choices: What can be read back, by name.
+
+    Returns:
+        Attributes.
+
+    Raises:
+        InvalidValueError: If it is none of these.
+    """
     if choices.get(type(choice).__name__) is not type(choice):
         raise InvalidValueError(key, type(choice).__name__, ", ".join(choices), "Only these can be read back.")
     options = {f"{key}_{field.name}": getattr(choice, field.name) for field in fields(choice)}
     return {key: type(choice).__name__, **{name: value for name, value in options.items() if value is not None}}
 
 
-def _read(path: FilePath, data: Dataset, key: str, choices: Mapping[str, type[Choice]]) -> Choice:
-    """The model or method that `_written` wrote."""
+def choice_of(path: FilePath, data: Dataset, key: str, choices: Mapping[str, type[Choice]], **known: Any) -> Choice:
+    """What `choice_attributes` wrote.
+
+    Args:
+        path: The file, for messages.
+        data: The data set.
+        key: What the attributes begin with.
+        choices: What it may be, by name.
+        **known: Options that are elsewhere in the file.
+
+    Returns:
+        What was chosen.
+
+    Raises:
+        FileError: If it is none of these, or an option is of another kind.
+    """
     name = data.attrs[key]
     if name not in choices:
         raise FileError(path, f"{key} is {name!r}; allowed: {', '.join(choices)}", "Read it with a newer sagline.")
-    choice = choices[name]
+    choice: Any = choices[name]
     given = {field.name: data.attrs.get(f"{key}_{field.name}") for field in fields(choice)}
     try:
-        return choice(**{option: _plain(value) for option, value in given.items() if value is not None})
+        options = {option: _plain(value) for option, value in given.items() if value is not None}
+        found: Choice = choice(**{**options, **known})
     except TypeError as error:  # a text where a number belongs
         raise FileError(path, f"{key}: {error}", "Write it again; it was edited.") from None
+    return found
 
 
 def _plain(value: Any) -> Any:
@@ -210,7 +235,7 @@ def plan_of(path: FilePath, data: Dataset, robot: Robot) -> Plan:
         raise FileError(path, f"{said} of cables over pulleys, but {has} robot's are", CONTENT.again)
     pose = Pose.from_quaternion(values("position"), values("quaternion"))
     cables = CableState(
-        model=_read(path, data, "model", MODELS),
+        model=choice_of(path, data, "model", MODELS),
         cable=robot.cables,
         gravity=robot.gravity,
         **{name: values(FREE.get(name, name) if behind else name) for name in STATE_ARRAYS},
@@ -227,7 +252,7 @@ def plan_of(path: FilePath, data: Dataset, robot: Robot) -> Plan:
     return Plan(
         state=Equilibrium(robot, pose, values("wrench"), cables, contact),
         path=motion,
-        tension=_read(path, data, "tension", METHODS),
+        tension=choice_of(path, data, "tension", METHODS),
         status=values("pose_status"),
         shortfall=values("shortfall"),
         wrench_residual=values("wrench_residual"),

@@ -12,6 +12,7 @@ from scipy.spatial import ConvexHull, QhullError
 from trimesh.creation import annulus
 
 from sagline.arrays import Array
+from sagline.robot.bounds import bounds as bounds
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.robot.several import pulleys_of
@@ -27,7 +28,6 @@ _THINNEST = 0.08  # thinnest platform, of its largest edge
 _SIDES = 20  # of a winch's drum
 _WHEEL: Final = ((0.8, 0.97), (0.1, 0.26))  # radii of rim and hub, of a pulley's: the cable lies on the rim
 _WHEEL_WIDTH, _SPOKE, _WHEEL_SIDES = 0.2, 0.055, 48
-_FLAT = 0.05  # anchors that differ in height by less than this, of the robot's size, all hang at the top
 _SIGNS: Final = np.array(list(product((-0.5, 0.5), repeat=3)))
 
 
@@ -41,23 +41,6 @@ class Solid(NamedTuple):
 
     vertices: Array
     faces: Faces
-
-
-def bounds(robot: Robot) -> tuple[Array, Array]:
-    """Lowest and highest corner of the box that the robot stands in [m]: its frame, or what its anchors span.
-
-    Frames stand: their top is where the highest anchors are. Where all anchors hang at the top and no frame is given,
-    the box reaches down to the floor, or to the lowest pose that the robot is meant for.
-    """
-    low, high = robot.frame_anchors.min(axis=0), robot.frame_anchors.max(axis=0)
-    if robot.frame_size is not None:
-        middle = 0.5 * (low + high)
-        low, up = middle - 0.5 * robot.frame_size, middle + 0.5 * robot.frame_size
-        return np.array([*low[:2], high[2] - robot.frame_size[2]]), np.array([*up[:2], high[2]])
-    if high[2] - low[2] < _FLAT * float(np.linalg.norm(high - low)):
-        floor = 0.0 if robot.test_box is None else min(0.0, float(robot.test_box.low[2]))
-        low = np.array([*low[:2], min(floor, low[2])])
-    return low, high
 
 
 def size_of(robot: Robot) -> float:

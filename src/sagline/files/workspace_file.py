@@ -1,0 +1,183 @@
+"""Workspaces in NetCDF: surface, grid, what limits them where, loads and criteria, and the robot inside."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path as FilePath
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from sagline.arguments import file_path, instance
+from sagline.arrays import locked
+from sagline.errors import FileError, InvalidValueError
+from sagline.files.content import Content
+from sagline.files.criteria_attributes import criteria_attributes, criteria_of
+from sagline.files.dataset import read_dataset, write_dataset
+from sagline.files.plan_file import MODELS, choice_attributes, choice_of
+from sagline.files.robot_file import dump_robot, parse_robot
+from sagline.files.variables import PARTS, Quantity
+from sagline.files.workspace_checks import check_workspace
+from sagline.files.workspace_layout import QUANTITIES, TYPES
+from sagline.robot.pose import Pose
+from sagline.robot.pose_box import PoseBox
+from sagline.robot.robot import Robot
+from sagline.tension.methods import METHODS
+from sagline.workspaces.components import Components
+from sagline.workspaces.nearest import Nearest
+from sagline.workspaces.orientations import Orientations
+from sagline.workspaces.space import Workspace
+from sagline.workspaces.surface import Surface
+from sagline.workspaces.wrench_sets import WrenchSet
+
+if TYPE_CHECKING:
+    from xarray import Dataset
+
+CONTENT: Final = Content(
+    name="workspace",
+    made="workspace of sagline",
+    give="Give the .nc file that sagline workspace wrote, or a workspace's save.",
+    again="Save the workspace again, or take the file from where it came.",
+    key="sagline_workspace_format",
+    format=1,
+)
+
+
+def save_workspace(space: Workspace, file: os.PathLike[str] | str) -> None:
+    """Write a workspace to a NetCDF file, whole or not at all, with a digest at its end.
+
+    Args:
+        space: The workspace.
+        file: The file, "workspace.nc" for instance; a regular file that exists is replaced, anything else is refused.
+
+    Raises:
+        InvalidValueError: If it is no workspace, or a criterion, model or method is none of sagline's.
+        FileError: If the file cannot be written; what was there before is untouched.
+    """
+    write_dataset(_dataset(instance(space, Workspace, "space")), file_path(file))
+
+
+def load_workspace(file: os.PathLike[str] | str) -> Workspace:
+    """Read a workspace that its `save` wrote: the same workspace to the last bit.
+
+    Args:
+        file: The NetCDF file.
+
+    Returns:
+        The workspace.
+
+    Raises:
+        FileError: If the file is missing, cut off, no NetCDF file, no workspace, of a newer format, or not as it was
+            written: its digest, shapes and units are checked.
+
+    Examples:
+        >>> import sagline as sl
+        >>> sl.workspace(sl.load_robot("ipanema-1"), cells=8).save("workspace.nc")
+        >>> print(sl.load_workspace("workspace.nc").robot.name)
+        ipanema-1
+    """
+    path = file_path(file)
+    data, found = read_dataset(path, CONTENT)
+    CONTENT.format_of(path, data.attrs)
+    CONTENT.check_sealed(path, found)
+    try:
+        return _workspace(path, data, parse_robot(str(data.attrs["robot"]), f"{path}, robot"))
+    except KeyError as error:
+        raise FileError(path, f"has no {error.args[0]}", "Write it again; it is incomplete or was edited.") from None
+    except InvalidValueError as error:
+        raise FileError.of(path, error) from None
+
+
+def _dataset(space: Workspace) -> Dataset:
+    from xarray import Coordinates, Dataset
+
+    variables: dict[str, Any] = {one.name: (one.parts, _wide(one, one.of(space)), one.attributes) for one in QUANTITIES}
+    attributes, obstacles = criteria_attributes(space.criteria)
+    used = {part for one in QUANTITIES for part in one.parts} & PARTS.keys()
+    labels = Coordinates({part: (part, list(PARTS[part])) for part in sorted(used)}, indexes={})
+    return Dataset(variables | obstacles, labels, _attributes(space) | attributes)
+
+
+def _wide(quantity: Quantity, values: Any) -> Any:
+    """Indices of any size as those of 64 bits."""
+    return np.asarray(values).astype(np.int64) if quantity.values is int else values
+
+
+def _attributes(space: Workspace) -> dict[str, Any]:
+    attributes = {
+        **CONTENT.attributes(f"Workspace of {space.robot.name}"),
+        "volume": space.volume,
+        "volume_error": space.volume_error,
+        "volume_units": space.unit,
+        "box_low": space.box.low,
+        "box_high": space.box.high,
+        "box_units": "m",
+        "box_tilt": space.box.tilt,
+        "box_tilt_units": "rad",
+        "need": space.orientations.need,
+        "open_faces": ", ".join(space.open_faces),
+        **choice_attributes("model", space.model, MODELS),
+        **choice_attributes("tension", space.tension, METHODS),
+        "robot": dump_robot(space.robot),
+    }
+    if space.moment_arm is not None:
+        attributes |= {"moment_arm": space.moment_arm, "moment_arm_units": "m"}
+    if space.nearest is not None:
+        near = space.nearest
+        attributes["nearest"] = json.dumps(
+            {
+                "position": near.pose.position.tolist(),
+                "quaternion": near.pose.quaternion.tolist(),
+                "level": near.level,
+                "margin": near.margin,
+                "criterion": near.criterion,
+                "cables": list(near.cables),
+                "reason": near.reason,
+            }
+        )
+    return attributes
+
+
+def _workspace(path: FilePath, data: Dataset, robot: Robot) -> Workspace:
+    check_workspace(data, robot.cable_count)
+
+    def values(name: str) -> Any:
+        found = np.asarray(data[name].values, order="C")
+        return locked(found.astype(TYPES[name]) if name in TYPES else found)
+
+    attributes = data.attrs
+    loads, components = (
+        [one.name for one in QUANTITIES if one.place.startswith(part)] for part in ("wrenches.", "components.")
+    )
+    arm = attributes.get("moment_arm")
+    return Workspace(
+        robot=robot,
+        box=PoseBox(attributes["box_low"], attributes["box_high"], float(attributes["box_tilt"])),
+        wrenches=WrenchSet(*map(values, loads)),
+        orientations=Orientations._of(values("rotation"), attributes["need"]),
+        criteria=criteria_of(path, data),
+        model=choice_of(path, data, "model", MODELS),
+        tension=choice_of(path, data, "tension", METHODS),
+        moment_arm=None if arm is None else float(arm),
+        unit=attributes["volume_units"],
+        volume=float(attributes["volume"]),
+        volume_error=float(attributes["volume_error"]),
+        components=Components(*map(values, components)),
+        surface=Surface(values("vertex_position"), values("face")),
+        limiting=values("limiting"),
+        limiting_cable=values("limiting_cable"),
+        margin=values("margin"),
+        open_faces=tuple(attributes["open_faces"].split(", ")) if attributes["open_faces"] else (),
+        x=values("x"),
+        y=values("y"),
+        z=values("z"),
+        level=values("level"),
+        nearest=_nearest(attributes["nearest"]) if "nearest" in attributes else None,
+    )
+
+
+def _nearest(text: str) -> Nearest:
+    found = json.loads(text)
+    pose = Pose._adopt(np.array(found.pop("position")), np.array(found.pop("quaternion")))
+    return Nearest(pose=pose, **{**found, "cables": tuple(found["cables"])})

@@ -1,0 +1,148 @@
+"""Of a robot that can work nowhere: the pose that comes nearest to it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from sagline.arrays import Array, locked
+from sagline.kinematics.inverse import inverse
+from sagline.kinematics.status import PoseStatus
+from sagline.numbers import n
+from sagline.results import Result
+from sagline.robot.pose import Pose
+from sagline.workspaces.grid import Grid
+from sagline.workspaces.levels import Details, Levels
+from sagline.workspaces.wrench_sets import NO_LOAD, WrenchSet
+
+_STARTS: Final = 3  # best points of the grid that the search begins from
+_STEP: Final = 0.1  # of the box, with which it begins
+_EVALUATIONS: Final = 300  # at most, from each start
+_PRECISION: Final = 1e-4  # m
+_FAR: Final = 1e6  # a level as low as minus infinity, to a search that needs numbers
+_UNHELD: Final = 1e3  # what levels are lowered by where the platform cannot be held at all
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Nearest(Result):
+    """The pose nearest to one where the robot can work.
+
+    Attributes:
+        pose: A single pose.
+        level: Of it: < 0, or not below where a region smaller than a cell of the grid was found.
+        margin: Of the loads there [N].
+        criterion: What fails most there, as an index of the criteria.
+        cables: Indices of the cables that stand against it.
+        reason: In a sentence.
+    """
+
+    pose: Pose
+    level: float
+    margin: float
+    criterion: int
+    cables: tuple[int, ...]
+    reason: str
+
+
+def nearest_to(levels: Levels, grid: Grid, low: Array, high: Array) -> Nearest:
+    """The position of greatest level: the best points of a grid, and up from there.
+
+    Args:
+        levels: The level.
+        grid: Of levels; none is inside.
+        low: Lowest corner of the box [m], shape (3,).
+        high: Highest corner; where it is as low along an axis, positions stay there.
+
+    Returns:
+        The pose, in the rotation that decides.
+    """
+    nodes = np.stack(np.unravel_index(np.arange(grid.values.size), grid.values.shape), axis=1)
+    positions = np.clip(grid.positions(nodes), low, high)
+    values = _preferred(levels, positions)
+    order = np.argsort(values)[::-1][:_STARTS]
+    best, found = positions[order[0]], float(values[order[0]])
+    for start in positions[order][values[order] > -_FAR]:
+        place, value = _climbed(levels, start, low, high)
+        if value > found:
+            best, found = place, value
+    details = levels.details(best[None])
+    rows = levels.orientations.at(best[None], int(details.rotation[0]))
+    pose = Pose._adopt(rows[0, :3].copy(), rows[0, 3:].copy())
+    cables, reason = _why(levels, pose, details)
+    margin, criterion = float(details.margin[0]), int(details.criterion[0])
+    return Nearest(pose, float(details.level[0]), margin, criterion, cables, reason)
+
+
+def _preferred(levels: Levels, positions: Array) -> Array:
+    """Levels, finite; where tensions can be looked at, what they make is nearer than where there are none."""
+    found = levels.details(positions)
+    tensions = any(one.needs_tensions for one in levels.criteria)
+    lower = _UNHELD if tensions else 0.0
+    return np.maximum(np.where(found.margin >= 0.0, found.level, found.level - lower), -_FAR)
+
+
+def _climbed(levels: Levels, start: Array, low: Array, high: Array) -> tuple[Array, float]:
+    """A position of a level that is a local maximum, as far as a simplex search finds it, and the level."""
+    from scipy.optimize import minimize  # a quarter of a second to load
+
+    free = np.flatnonzero(high > low)
+    step = _STEP * (high - low)[free]
+    step = np.where(start[free] + step > high[free], -step, step)
+    simplex = start[free] + np.vstack((np.zeros(len(free)), np.diag(step)))
+
+    def below(part: Array) -> float:
+        place = start.copy()
+        place[free] = part
+        return -float(_preferred(levels, place[None])[0])
+
+    options = {"maxfev": _EVALUATIONS, "initial_simplex": simplex, "xatol": _PRECISION, "fatol": 0.0}
+    bounds = list(zip(low[free], high[free], strict=True))
+    answer = minimize(below, start[free], method="Nelder-Mead", bounds=bounds, options=options)
+    place = start.copy()
+    place[free] = answer.x
+    return place, -float(answer.fun)
+
+
+def _why(levels: Levels, pose: Pose, details: Details) -> tuple[tuple[int, ...], str]:
+    """The cables that stand against a pose, and the reason in words."""
+    place = ", ".join(n(x, ".3f") for x in pose.position)
+    at = f"at ({place}) m"
+    if details.level[0] >= 0.0:
+        return (), f"it can work {at}, in a region smaller than a cell of the grid: look there in a smaller box"
+    index, cable, margin = int(details.criterion[0]), int(details.cable[0]), float(details.margin[0])
+    own = (cable,) if cable >= 0 else ()
+    criterion = levels.criteria[index]
+    if margin >= 0.0:
+        if np.isinf(details.level[0]):
+            how = PoseStatus(int(inverse(levels.robot, pose, levels.model, levels.tension, levels.middle).status))
+            return own, f"{at} {type(levels.tension).__name__} finds no tensions for {criterion.title}: {how.text}"
+        short = -float(details.level[0]) * criterion.scale(levels.robot)
+        return own, f"{at} the {criterion.title} fails by {n(short, '.3g', criterion.unit)}{_of(own)}"
+    if np.isinf(margin):
+        return own, f"{at}, as all over the box, the platform is singular, or a cable has no length"
+    if criterion.title != "margin":
+        return own, f"{at} the {criterion.title} fails, and the margin is {n(margin, '.3g', 'N')}"
+    plan = inverse(levels.robot, pose, levels.model, wrench=levels.middle)
+    cables = tuple(int(k) for k in np.flatnonzero(plan.blocking)) or own
+    text = f"{at} {n(-margin, '.3g', 'N')} are missing{_of(cables)}"
+    if levels.alone(NO_LOAD, pose) >= 0.0 > levels.alone(_moments_of(levels.wrenches), pose):
+        text += "; the moments of the set cannot be held there even without its forces"
+    return cables, text
+
+
+def _of(cables: tuple[int, ...]) -> str:
+    if not cables:
+        return ""
+    return f", by {'cable' if len(cables) == 1 else 'cables'} {', '.join(map(str, cables))}"
+
+
+def _moments_of(wrenches: WrenchSet) -> WrenchSet:
+    """The set without its forces."""
+    parts = (wrenches.center, wrenches.segments, wrenches.ellipsoids, wrenches.corners, wrenches.accelerations)
+    center, segments, ellipsoids, corners, accelerations = (part.copy() for part in parts)
+    center[:3] = segments[:, :3] = ellipsoids[:, :3] = corners[:, :3] = accelerations[0] = 0.0
+    for part in (center, segments, ellipsoids, corners, accelerations):
+        locked(part)
+    return WrenchSet(center, segments, ellipsoids, corners, wrenches.sizes, accelerations)

@@ -1,0 +1,198 @@
+"""Orientations that a platform has to be held in: level, or all of some rotations, or any of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sagline.arguments import brief, choice
+from sagline.arrays import Array, locked, number
+from sagline.errors import InvalidValueError
+from sagline.robot.pattern import PLANAR, ROTATING
+from sagline.robot.pose import Pose
+from sagline.robot.reach import LEVEL, ROUNDING, forbidden_turn, in_words
+from sagline.robot.robot import Robot
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
+
+Need = Literal["all", "any"]
+_NEEDS: Final = ("all", "any")
+_SHARES: Final = np.array([-1.0, -0.5, 0.5, 1.0])  # of the angle, by which a planar platform is turned
+_CORNERS: Final = np.array([one for one in product((-1.0, 0.0, 1.0), repeat=3) if any(one)])
+_AXES: Final = _CORNERS / np.linalg.norm(_CORNERS, axis=1, keepdims=True)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Orientations:
+    """Rotations of the platform, of which a position needs all, or any, to count.
+
+    A set of rotations that goes on between those listed is known at these alone: it is sampled.
+
+    Attributes:
+        quaternion: Rotations from platform to world as unit quaternions (x, y, z, w), shape (K, 4).
+        need: "all" where a position counts if the platform can be held there in each of them, "any" if in one.
+    """
+
+    quaternion: Array
+    need: Need
+
+    def __init__(self, rotations: Rotation | ArrayLike, need: Need = "all") -> None:
+        """Check both.
+
+        Args:
+            rotations: scipy Rotation, or rotation matrices of shape (3, 3) or (K, 3, 3).
+            need: "all" or "any".
+
+        Raises:
+            InvalidValueError: If a matrix is no rotation, there is none, or the need is another word.
+
+        Examples:
+            >>> import numpy as np
+            >>> import sagline as sl
+            >>> turned = sl.Pose.from_euler(np.zeros(3), np.radians([-20, 0, 20]), 0, 0)
+            >>> print(sl.Orientations(turned.matrix, need="any"))
+            any of 3 sampled rotations
+        """
+        quaternion = np.atleast_2d(Pose(np.zeros(3), rotations).quaternion)
+        if not len(quaternion):
+            raise InvalidValueError("rotations", "an empty set", "at least one rotation", "Give np.eye(3) for level.")
+        object.__setattr__(self, "quaternion", locked(quaternion))
+        object.__setattr__(self, "need", choice(need, "need", _NEEDS))
+
+    @classmethod
+    def _of(cls, quaternion: Array, need: Need) -> Orientations:
+        """Around quaternions of our own making."""
+        made = object.__new__(cls)
+        object.__setattr__(made, "quaternion", locked(quaternion))
+        object.__setattr__(made, "need", need)
+        return made
+
+    def __len__(self) -> int:
+        """How many rotations there are."""
+        return len(self.quaternion)
+
+    def __str__(self) -> str:
+        """In words."""
+        if len(self) > 1:
+            return f"{self.need} of {len(self)} sampled rotations"
+        turn = self.quaternion[0, :3]
+        if np.linalg.norm(turn) <= ROUNDING:
+            return "level"
+        return f"turned by {in_words(turn * np.copysign(1.0, self.quaternion[0, 3]))}"
+
+    def __reduce__(self) -> tuple[Any, tuple[Array, Need]]:
+        """Pickle bit for bit."""
+        return Orientations._of, (self.quaternion, self.need)
+
+    def at(self, positions: Array, index: int) -> Array:
+        """Pose rows of the platform at positions, in one of the rotations.
+
+        Args:
+            positions: Of the platform origin [m], shape (N, 3).
+            index: Which of the rotations.
+
+        Returns:
+            Positions and quaternions, shape (N, 7).
+        """
+        rows = np.empty((len(positions), 7))
+        rows[:, :3], rows[:, 3:] = positions, self.quaternion[index]
+        return locked(rows)
+
+
+@dataclass(frozen=True, slots=True)
+class Tilts:
+    """Rotations about any axis by up to an angle, all of which a position needs.
+
+    They are sampled: level, and the whole angle about 26 axes spread over all directions; of a planar robot the angle
+    and its half, both ways.
+
+    Attributes:
+        angle: Largest angle of rotation [rad], 0 to pi.
+    """
+
+    angle: float
+
+    def __post_init__(self) -> None:
+        """Check the angle."""
+        angle = number(self.angle, "angle", "rad", low=0.0)
+        if angle > np.pi:
+            step = "Give it in radians: no rotation turns by more than half a turn."
+            raise InvalidValueError("angle", f"{angle:.6g} rad", "0 to pi rad", step)
+        object.__setattr__(self, "angle", angle)
+
+    def sampled(self, robot: Robot) -> Orientations:
+        """The rotations that stand for all of them.
+
+        Args:
+            robot: The robot, whose pattern says about which axes its platform turns.
+
+        Returns:
+            Level first, then the others.
+
+        Raises:
+            InvalidValueError: If the platform does not turn.
+        """
+        if self.angle == 0.0:
+            return level()
+        if robot.motion_pattern not in ROTATING:
+            value, step = f"{np.degrees(self.angle):.4g} deg", "Leave the tilt out."
+            allowed = f"none, by motion_pattern {robot.motion_pattern}: its platform does not turn"
+            raise InvalidValueError("orientations: tilt", value, allowed, step)
+        if robot.motion_pattern in PLANAR and robot.plane_normal is not None:
+            axes, angles = np.repeat(robot.plane_normal[None], len(_SHARES), axis=0), self.angle * _SHARES
+        else:
+            axes, angles = _AXES, np.full(len(_AXES), self.angle)
+        turned = np.hstack((np.sin(0.5 * angles)[:, None] * axes, np.cos(0.5 * angles)[:, None]))
+        return Orientations._of(np.vstack((LEVEL, turned)), "all")
+
+
+def level() -> Orientations:
+    """The one rotation of a level platform."""
+    return Orientations._of(LEVEL[None].copy(), "all")
+
+
+def orientations_of(robot: Robot, given: Any, tilt: float) -> Orientations:
+    """The orientations that a caller wants of a robot.
+
+    Args:
+        robot: The robot.
+        given: What was given; None for level, or what the box says.
+        tilt: Of the box [rad].
+
+    Returns:
+        Rotations within the robot's motions.
+
+    Raises:
+        InvalidValueError: If box and caller both say, what was given is neither, or the platform does not turn so.
+    """
+    if given is not None and tilt > 0.0:
+        step = "Give the tilt of the box, or orientations."
+        value = f"given with a box of tilt {np.degrees(tilt):.4g} deg"
+        raise InvalidValueError("orientations", value, "one of the two", step)
+    if given is None:
+        given = Tilts(tilt)
+    if isinstance(given, Tilts):
+        return given.sampled(robot)
+    if not isinstance(given, Orientations):
+        step = "Give Tilts(np.radians(10)), or Orientations(rotations)."
+        raise InvalidValueError("orientations", brief(given), "Tilts, Orientations, or None for level", step)
+    _check_turns(robot, given)
+    return given
+
+
+def _check_turns(robot: Robot, given: Orientations) -> None:
+    """Refuse turns that the robot's motion pattern does not have; level is where they begin."""
+    turns = forbidden_turn(robot, Pose.from_quaternion(np.zeros(3), given.quaternion), LEVEL)
+    wrong = np.flatnonzero(np.linalg.norm(turns, axis=1) > ROUNDING)
+    if wrong.size:
+        k = int(wrong[0])
+        allowed = "a turn about plane_normal" if robot.motion_pattern in ROTATING else "no turn"
+        value, step = f"a turn by {in_words(turns[k])}", "Leave it out, or give the robot another motion_pattern."
+        raise InvalidValueError(
+            f"orientations[{k}]", value, f"{allowed}, by motion_pattern {robot.motion_pattern}", step
+        )

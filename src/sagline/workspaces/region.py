@@ -1,0 +1,117 @@
+"""The box of positions that is looked at: in space, or in a plane."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from sagline.arguments import optional
+from sagline.arrays import Array
+from sagline.errors import InvalidValueError
+from sagline.robot.bounds import bounds
+from sagline.robot.pose_box import PoseBox
+from sagline.robot.reach import ROUNDING
+from sagline.robot.robot import Robot
+
+AXES: Final = "xyz"
+
+
+class Region(NamedTuple):
+    """Where positions are looked at.
+
+    Attributes:
+        box: As given, or the robot's own.
+        low: Lowest corner of what is searched [m], shape (3,).
+        high: Highest corner, higher along every axis.
+        flat: The axis along which the box has no extent, None for none: positions are taken to lie in that plane, and
+            what is searched is so thick that what it holds a meter is an area.
+        thickness: Of what is searched along it [m]; 1 where there is none.
+        cells: How many there are along each axis.
+    """
+
+    box: PoseBox
+    low: Array
+    high: Array
+    flat: int | None
+    thickness: float
+    cells: tuple[int, int, int]
+
+    @property
+    def unit(self) -> str:
+        """Of what the region holds."""
+        return "m³" if self.flat is None else "m²"
+
+
+def region_of(robot: Robot, box: PoseBox | None, cells: int) -> Region:
+    """The region of a robot.
+
+    Args:
+        robot: The robot.
+        box: What a caller wants; None: where the robot stands, and of a planar robot the plane of its cables.
+        cells: How many the longest edge is divided into.
+
+    Returns:
+        The region.
+
+    Raises:
+        InvalidValueError: If the box is none, of no extent along two axes, or not in the plane of a planar robot.
+    """
+    plane = _plane_axis(robot)
+    optional(box, PoseBox, "box")
+    if box is None:
+        low, high = (corner.copy() for corner in bounds(robot))
+        if plane is not None:
+            low[plane] = high[plane] = _place_of_plane(robot, plane)
+        box = PoseBox(low, high)
+    extent = box.high - box.low
+    flat = np.flatnonzero(extent <= ROUNDING)
+    if flat.size > 1:
+        value = f"without extent along {' and '.join(AXES[axis] for axis in flat)}"
+        raise InvalidValueError("box", value, "extent along two axes at least", "Give a larger one.")
+    if plane is not None and plane not in flat:
+        where = _place_of_plane(robot, plane)
+        value = f"{extent[plane]:.4g} m thick along plane_normal, {AXES[plane]}"
+        step = f"Give low and high the same {AXES[plane]}, {where:g} m for instance."
+        raise InvalidValueError("box", value, "0 m for a planar robot", step)
+    x, y, z = (2 * max(1, round(0.5 * cells * part)) for part in (extent / extent.max()).tolist())
+    if not flat.size:
+        return Region(box, box.low, box.high, None, 1.0, (x, y, z))
+    axis, thickness = int(flat[0]), float(extent.max()) / cells
+    half = 0.5 * thickness * np.eye(3)[axis]
+    x, y, z = (1 if k == axis else count for k, count in enumerate((x, y, z)))
+    return Region(box, box.low - half, box.high + half, axis, thickness, (x, y, z))
+
+
+def flat_axis(box: PoseBox) -> tuple[int, float] | None:
+    """The axis along which a box has no extent, and where it is [m].
+
+    Args:
+        box: The box.
+
+    Returns:
+        The first such axis; None where there is none.
+    """
+    flat = np.flatnonzero(box.high - box.low <= ROUNDING)
+    return (int(flat[0]), float(box.low[flat[0]])) if flat.size else None
+
+
+def _plane_axis(robot: Robot) -> int | None:
+    """The axis along which a planar robot's plane has its normal.
+
+    Raises:
+        InvalidValueError: If it is along none.
+    """
+    if robot.plane_normal is None:
+        return None
+    axis = int(np.argmax(np.abs(robot.plane_normal)))
+    if abs(robot.plane_normal[axis]) < 1.0 - ROUNDING:
+        normal = ", ".join(f"{x:.4g}" for x in robot.plane_normal)
+        step = "Turn the robot's coordinates so that its plane is upright or level along the axes."
+        raise InvalidValueError("plane_normal", f"({normal})", "along x, y or z for a workspace", step)
+    return axis
+
+
+def _place_of_plane(robot: Robot, axis: int) -> float:
+    """Where along its normal a planar platform has to be for its cables to lie in the plane [m]."""
+    return float(robot.frame_anchors[:, axis].mean() - robot.platform_anchors[:, axis].mean())

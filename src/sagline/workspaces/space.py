@@ -1,0 +1,239 @@
+"""The workspace: where a robot can work, how much that is, and what limits it where."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from textwrap import wrap
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from sagline.arrays import Array, Codes, Indices
+from sagline.cables.model import CableModel
+from sagline.numbers import SPACE, n
+from sagline.results import Result
+from sagline.robot.pose_box import PoseBox
+from sagline.robot.robot import Robot
+from sagline.tension.method import TensionMethod
+from sagline.workspaces.components import Components
+from sagline.workspaces.criteria.criterion import Criterion
+from sagline.workspaces.levels import Levels
+from sagline.workspaces.nearest import Nearest
+from sagline.workspaces.orientations import Orientations
+from sagline.workspaces.region import flat_axis
+from sagline.workspaces.surface import Surface
+from sagline.workspaces.words import in_words
+from sagline.workspaces.wrench_sets import WrenchSet
+
+BY_BOX: Final = -1  # of `limiting`: the surface is the face of the box
+MOST_LIMITS: Final = 10  # shares that are told
+_MOST_PARTS: Final = 5  # whose volumes are told
+_WIDTH: Final = 80  # columns of what is printed
+_HEAD: Final = 12  # of them, before each line
+
+
+class Limit(NamedTuple):
+    """A share of the surface that has one reason.
+
+    Attributes:
+        criterion: Its title.
+        cable: Which cable decides, -1 where none does.
+        share: Of the surface without the faces of the box.
+    """
+
+    criterion: str
+    cable: int
+    share: float
+
+    def __str__(self) -> str:
+        """In words."""
+        return self.criterion if self.cable < 0 else f"{self.criterion}, cable {self.cable}"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Workspace(Result):
+    """Result of `workspace`.
+
+    Of a planar robot, and in a box without height, all is of the plane: the volume is an area [m2], and the surface
+    a slab around it.
+
+    Attributes:
+        robot: The robot.
+        box: Where was looked.
+        wrenches: Loads that it bears there besides its weight.
+        orientations: Of the platform.
+        criteria: What is met there, the margin first.
+        model: Cable model.
+        tension: How the load is shared where a criterion looks at tensions.
+        moment_arm: As of `margin`; None for the mean lever arm.
+        unit: Of the volume, "m³" or "m²".
+        volume: In that unit.
+        volume_error: How far the volume may be off, from two grids of which one is twice as fine; 0 where it is empty.
+        components: The parts that do not hang together.
+        surface: The boundary, closed, the faces of the box where it reaches them included.
+        limiting: At each vertex of the surface the criterion that decides, as an index; -1 where the box does,
+            shape (V,).
+        limiting_cable: And the cable, -1 where none does, shape (V,).
+        margin: And the margin of the loads there [N], shape (V,).
+        open_faces: Faces of the box through which the workspace goes on, "x low" for instance: the volume is what
+            there is of it in this box.
+        x: Coordinates of the nodes of the grid [m], shape (X,).
+        y: The same along y, shape (Y,).
+        z: The same along z, shape (Z,).
+        level: Least value of the criteria over their scales at these nodes, >= 0 inside, shape (X, Y, Z).
+        nearest: The pose nearest to feasible where the workspace is empty; None elsewhere.
+    """
+
+    robot: Robot
+    box: PoseBox
+    wrenches: WrenchSet
+    orientations: Orientations
+    criteria: tuple[Criterion, ...]
+    model: CableModel
+    tension: TensionMethod
+    moment_arm: float | None
+    unit: str
+    volume: float
+    volume_error: float
+    components: Components
+    surface: Surface
+    limiting: Codes
+    limiting_cable: Indices
+    margin: Array
+    open_faces: tuple[str, ...]
+    x: Array
+    y: Array
+    z: Array
+    level: Array
+    nearest: Nearest | None
+
+    @property
+    def axes(self) -> tuple[Array, Array, Array]:
+        """Coordinates of the nodes of the grid along x, y and z [m]."""
+        return self.x, self.y, self.z
+
+    @property
+    def limits(self) -> tuple[Limit, ...]:
+        """What limits the workspace, the largest share of its surface first."""
+        areas: dict[tuple[int, int], float] = {}
+        faces, vertices = self.surface.faces, self.surface.vertices
+        sides = np.cross(vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]])
+        own = np.zeros(len(vertices))
+        inner = (self.limiting[faces] != BY_BOX).any(axis=1)  # a face with all corners on the box is the box's
+        np.add.at(own, faces[inner], (np.linalg.norm(sides, axis=1) / 6.0)[inner, None])
+        for criterion, cable, area in zip(self.limiting, self.limiting_cable, own, strict=True):
+            if criterion != BY_BOX:
+                key = (int(criterion), int(cable))
+                areas[key] = areas.get(key, 0.0) + float(area)
+        whole = sum(areas.values())
+        order = sorted(areas, key=lambda key: -areas[key])
+        return tuple(Limit(self.criteria[key[0]].title, key[1], areas[key] / whole) for key in order if areas[key] > 0)
+
+    @property
+    def field(self) -> Any:
+        """Level, margin, deciding criterion and cable at the points of the grid, with their coordinates.
+
+        An xarray Dataset with dimensions x, y and z; worked out at each call.
+        """
+        from sagline.files.workspace_field import field_of  # xarray is of the outer ring
+
+        return field_of(self)
+
+    def levels(self) -> Levels:
+        """The function of the position whose sign says whether the robot can work there.
+
+        Returns:
+            A function of positions (N, 3) [m] that gives levels (N,), with `details`.
+        """
+        return Levels(
+            self.robot,
+            self.wrenches,
+            self.orientations,
+            self.criteria,
+            self.model,
+            self.tension,
+            self.moment_arm,
+            flat_axis(self.box),
+        )
+
+    def save(self, file: FilePath | str) -> None:
+        """Write the workspace to a NetCDF file, whole or not at all, with units and the robot inside.
+
+        Args:
+            file: The file, "workspace.nc" for instance; one that exists is replaced.
+
+        Raises:
+            InvalidValueError: If a criterion or a model is none of sagline's: it could not be read back.
+            FileError: If the file cannot be written; what was there before is untouched.
+        """
+        from sagline.files.workspace_file import save_workspace  # the one call outward
+
+        save_workspace(self, file)
+
+    def __str__(self) -> str:
+        """What a person wants to know of it, in lines of at most 80 columns."""
+        return "\n".join(lines_of(self)).replace(SPACE, " ")
+
+
+def lines_of(space: Workspace) -> list[str]:
+    """What a person wants to know of a workspace.
+
+    Args:
+        space: The workspace.
+
+    Returns:
+        Lines of at most 80 columns.
+    """
+    lines = [f"Workspace of {space.robot.name}: {amount_of(space)}"]
+    for head, text in facts_of(space):
+        lines += wrap(text, _WIDTH, initial_indent=f"  {head:<{_HEAD}}", subsequent_indent=" " * (_HEAD + 2))
+    limits = space.limits
+    if limits:
+        lines.append("  limited by, in shares of its surface:")
+        lines += [f"    {n(100.0 * limit.share, '.1f'):>5} %  {limit}" for limit in limits[:MOST_LIMITS]]
+        if len(limits) > MOST_LIMITS:
+            rest = sum(limit.share for limit in limits[MOST_LIMITS:])
+            lines.append(f"    {n(100.0 * rest, '.1f'):>5} %  {len(limits) - MOST_LIMITS} others")
+    return lines
+
+
+def amount_of(space: Workspace) -> str:
+    """Volume or area with its error bar, "789.4 ± 0.2 m³", and in how many parts.
+
+    Args:
+        space: The workspace.
+    """
+    if space.nearest is not None:
+        return f"empty, 0 {space.unit}"
+    places = max(0, 1 - int(np.floor(np.log10(max(space.volume_error, 1e-9 * space.volume)))))
+    size = f"{space.volume:.{places}f} ± {space.volume_error:.{places}f} {space.unit}"
+    count = space.components.count
+    return size if count == 1 else f"{size} in {count} parts"
+
+
+def facts_of(space: Workspace) -> list[tuple[str, str]]:
+    """What it is the workspace of, and what else is to be known.
+
+    Args:
+        space: The workspace.
+
+    Returns:
+        A word, and what is to be said of it.
+    """
+    spans = ", ".join(
+        f"{n(a)} to {n(b)}" if a < b else n(a) for a, b in zip(space.box.low, space.box.high, strict=True)
+    )
+    facts = [("box", f"{spans} m"), ("loads", in_words(space.wrenches)), ("platform", str(space.orientations))]
+    facts += [("cables", type(space.model).__name__)]
+    if asked := [str(one) for one in space.criteria if not one.always]:
+        facts.append(("criteria", ", ".join(asked)))
+    if space.components.count > 1:
+        sizes = [n(volume, ".3g", space.unit) for volume in space.components.volume[:_MOST_PARTS]]
+        facts.append(("parts", ", ".join(sizes) + ", …" * (space.components.count > _MOST_PARTS)))
+    if space.open_faces:
+        faces = ", ".join(space.open_faces)
+        facts.append(("open", f"it reaches the box at {faces}: this is what there is in this box"))
+    if space.nearest is not None:
+        facts.append(("nearest", space.nearest.reason))
+    return facts

@@ -1,0 +1,167 @@
+"""Where a robot can work: the boundary of the poses in which it meets what is asked of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from sagline.arguments import brief, callback, instance, whole_number
+from sagline.arrays import Array, Flags, locked
+from sagline.blocks import Progress
+from sagline.cables.catenary import Catenary
+from sagline.cables.model import CableModel
+from sagline.errors import InvalidValueError
+from sagline.robot.pose_box import PoseBox
+from sagline.robot.robot import Robot
+from sagline.tension.method import TensionMethod
+from sagline.tension.minimum_norm import MinimumNorm
+from sagline.workspaces.boundary import MOST_CELLS, boundary
+from sagline.workspaces.criteria.criterion import Criterion
+from sagline.workspaces.criteria.margin import LeastMargin
+from sagline.workspaces.criteria.sharing import check_sharing
+from sagline.workspaces.levels import Levels
+from sagline.workspaces.nearest import nearest_to
+from sagline.workspaces.orientations import Orientations, Tilts, orientations_of
+from sagline.workspaces.region import AXES, Region, flat_axis, region_of
+from sagline.workspaces.space import BY_BOX, Workspace
+from sagline.workspaces.wrench_sets import WrenchSet, load_of
+
+LEAST_CELLS: Final = 4
+_CROSSED: Final = 100  # poses at which a cell is evaluated that the boundary passes through, about
+ON_BOX: Final = 1e-9  # of the box: a vertex so near to its face is on it
+_CATENARY, _MINIMUM_NORM = Catenary(), MinimumNorm()
+
+
+def workspace(
+    robot: Robot,
+    box: PoseBox | None = None,
+    wrenches: WrenchSet | None = None,
+    *,
+    orientations: Orientations | Tilts | None = None,
+    criteria: Sequence[Criterion] = (),
+    model: CableModel = _CATENARY,
+    tension: TensionMethod = _MINIMUM_NORM,
+    cells: int = 32,
+    refine: bool | int = True,
+    moment_arm: float | None = None,
+    progress: Progress | None = None,
+) -> Workspace:
+    """Where a robot can work: the positions at which its cables bear every load of a set, and all criteria are met.
+
+    The boundary is found with cables that sag, by the sign of `margin`, whatever its shape and in however many parts.
+    Its vertices are exact; between them it is flat, and the error bar says what that makes. What is thinner than a
+    cell can be missed: `prove` alone is certain of a whole box.
+
+    Args:
+        robot: The robot. Of a planar one, whose plane_normal is along x, y or z, the workspace is an area.
+        box: Where to look; one of no height along an axis: in that plane. Its tilt stands for `Tilts`. None: all of the
+            frame that the robot stands in, or of the box that its anchors span down to the floor.
+        wrenches: Loads that the platform has to bear besides its weight; None for none.
+        orientations: In which it is held: `Tilts`, or `Orientations`; None for level.
+        criteria: What else has to be met, `MaximumSag(0.05)` for instance. Those that look at tensions see those of
+            the load in the middle of the set.
+        model: Cable model; the default is exact.
+        tension: How the load is shared where a criterion looks at tensions; continuous.
+        cells: How many the box's longest edge is divided into, 4 to 128.
+        refine: How many times cells that the boundary passes through are divided once more, up to 3; True for once.
+        moment_arm: Length at which a moment counts as a force in the margin [m]; None for the mean lever arm.
+        progress: Called between blocks: how many poses are done, of how many as far as is known.
+
+    Returns:
+        Workspace.
+
+    Raises:
+        InvalidValueError: If an argument is of the wrong kind, box and orientations both tilt, the platform does not
+            turn so, or a criterion needs tensions and the method's jump.
+        FileError: If a package of the extra "workspace" is not installed.
+
+    Examples:
+        >>> import sagline as sl
+        >>> space = sl.workspace(sl.load_robot("article-suspended"), cells=16)
+        >>> print(f"{space.volume:.0f} m3, limited by {space.limits[0]}")
+
+    Source:
+        docs/model.md, section 13; Bouchard, Gosselin & Moore 2010 (margin); Lorensen & Cline 1987 (marching cubes).
+    """
+    asked = _checked(robot, criteria, model, tension)
+    count = whole_number(cells, "cells", LEAST_CELLS, MOST_CELLS)
+    told = callback(progress, "progress")
+    region = region_of(robot, box, count)
+    turned = orientations_of(robot, orientations, region.box.tilt)
+    loads = load_of(wrenches)
+    levels = Levels(robot, loads, turned, asked, model, tension, moment_arm, flat_axis(region.box))
+    levels.told = None if told is None else _Told(told, region.cells)
+    found = boundary(levels, region.low, region.high, region.cells, refine)
+    surface, components = found.surface, found.components
+    decided = levels.details(surface.vertices)
+    on_box = _on_box(surface.vertices, region) & (decided.level > 1e-6)
+    return Workspace(
+        robot=robot,
+        box=region.box,
+        wrenches=loads,
+        orientations=turned,
+        criteria=asked,
+        model=model,
+        tension=tension,
+        moment_arm=moment_arm,
+        unit=region.unit,
+        volume=found.volume / region.thickness,
+        volume_error=found.volume_error / region.thickness,
+        components=replace(components, volume=locked(components.volume / region.thickness)),
+        surface=surface,
+        limiting=locked(np.where(on_box, BY_BOX, decided.criterion).astype(np.int8)),
+        limiting_cable=locked(np.where(on_box, -1, decided.cable)),
+        margin=decided.margin,
+        open_faces=_open_faces(found.open_faces, region),
+        x=found.grid.x,
+        y=found.grid.y,
+        z=found.grid.z,
+        level=found.grid.values,
+        nearest=None if len(surface.faces) else nearest_to(levels, found.grid, region.box.low, region.box.high),
+    )
+
+
+class _Told:
+    """Tells of poses as they are done; how many there will be is known only about."""
+
+    def __init__(self, progress: Progress, cells: tuple[int, int, int]) -> None:
+        """So many cells are evaluated at their nodes, and those that the boundary passes through again."""
+        x, y, z = cells
+        self._whole = (x + 1) * (y + 1) * (z + 1) + _CROSSED * (x * y + y * z + z * x)
+        self._done, self._progress = 0, progress
+
+    def __call__(self, count: int) -> None:
+        self._done += count
+        self._progress(self._done, max(self._whole, self._done))
+
+
+def _checked(
+    robot: Robot, criteria: Sequence[Criterion], model: CableModel, tension: TensionMethod
+) -> tuple[Criterion, ...]:
+    """The criteria with the margin first; all arguments are of their kinds, and fit together."""
+    instance(robot, Robot, "robot")
+    instance(model, CableModel, "model")
+    instance(tension, TensionMethod, "tension")
+    if not isinstance(criteria, list | tuple):
+        raise InvalidValueError("criteria", brief(criteria), "a list of criteria", "Give [MaximumSag(0.05)].")
+    for k, one in enumerate(criteria):
+        instance(one, Criterion, f"criteria[{k}]").check(robot)
+    check_sharing(tension, criteria)
+    if any(isinstance(one, LeastMargin) for one in criteria):
+        return tuple(sorted(criteria, key=lambda one: not isinstance(one, LeastMargin)))
+    return LeastMargin(), *criteria
+
+
+def _on_box(vertices: Array, region: Region) -> Flags:
+    """Which vertices are on a face of the region."""
+    near = ON_BOX * float((region.high - region.low).max())
+    return np.asarray(((vertices - region.low < near) | (region.high - vertices < near)).any(axis=1))
+
+
+def _open_faces(faces: Sequence[str], region: Region) -> tuple[str, ...]:
+    """Those of the box alone: the faces of the slab around a plane are none."""
+    flat = None if region.flat is None else AXES[region.flat]
+    return tuple(face for face in faces if face[0] != flat)
