@@ -4,6 +4,7 @@ import trimesh
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
+import sagline as sl
 from sagline.workspaces.boundary import Boundary, boundary
 from tests.workspaces.shapes import Counted, Level, any_of, ball, both, brick, outside, torus
 
@@ -59,3 +60,167 @@ def test_no_position_is_asked_for_twice() -> None:
     counted = Counted(SETS["turned brick"][0])
     boundary(counted, LOW, HIGH, cells=16)
     assert len(np.unique(counted.positions, axis=0)) == len(counted.positions)
+
+
+def test_evaluations_grow_with_the_square_of_the_cells_but_for_the_coarse_grid() -> None:
+    level, _ = SETS["ball"]
+    counts = [boundary(level, LOW, HIGH, cells=n).evaluations - (n + 1) ** 3 for n in (16, 32, 64)]
+    assert counts[1] < 4.2 * counts[0]
+    assert counts[2] < 4.2 * counts[1]
+    asked = Counted(level)
+    found = boundary(asked, LOW, HIGH, cells=32)
+    vertices, faces = len(found.surface.vertices), len(found.surface.faces)
+    nodes = sum(len(part) for part in asked.asked[1:2])
+    assert nodes < 4.5 * vertices
+    assert found.evaluations - 33**3 - nodes < 4.5 * vertices + 2.1 * faces
+
+
+@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("kind", ["turned brick", "upright brick", "ball", "ring", "wedge", "infinite"])
+def test_the_true_volume_is_within_the_error_bar(kind: str, seed: int) -> None:
+    rng = np.random.default_rng([seed, 7])
+    center, half, cells = rng.uniform(-0.1, 0.1, 3), rng.uniform(0.15, 0.5, 3), int(rng.integers(8, 20))
+    turn = None if kind in ("upright brick", "infinite") else Rotation.random(rng=rng)
+    volume = 8.0 * float(half.prod())
+    level = brick(center, half, turn)
+    if kind == "ball":
+        level, volume = ball(center, half[0]), BALL * half[0] ** 3
+    elif kind == "ring":
+        level, volume = torus(0.6, half[0] / 2.0 + 0.1), 2.0 * np.pi**2 * 0.6 * (half[0] / 2.0 + 0.1) ** 2
+    elif kind == "wedge":  # half of the brick, by a plane through opposite edges
+        assert turn is not None
+        normal = turn.apply([half[1], half[0], 0.0]) / np.hypot(half[0], half[1])
+        level, volume = both([level, lambda p: (p - center) @ normal]), volume / 2.0
+    elif kind == "infinite":
+        solid = brick(center, half)
+        level = lambda p: np.where(solid(p) >= 0.0, np.inf, -np.inf)  # noqa: E731 - of what stands above
+    found = boundary(level, LOW, HIGH, cells=cells, refine=bool(seed % 2))
+    assert abs(found.volume - volume) <= found.volume_error
+    assert found.volume_error < 0.5 * (2.0 / cells)  # and is of use
+    assert mesh_of(found).is_watertight
+
+
+def test_error_bar_holds_what_grids_that_agree_do_not_see() -> None:
+    # from the edges to the nodes inside it is as far at every halving: each chamfer is as wrong as the one before
+    third = 2.0 / 3.0 - 1e-9
+    level = brick([0.0, 0.0, 0.0], [third, third, third])
+    bars = [boundary(level, LOW, HIGH, cells=n, refine=False) for n in (8, 16)]
+    for found in bars:
+        assert abs(found.volume - 8.0 * third**3) <= found.volume_error
+
+
+def test_curved_surfaces_are_measured_to_the_fourth_order() -> None:
+    level, volumes = SETS["ball"]
+    off = [abs(boundary(level, LOW, HIGH, cells=n, refine=False).volume - volumes[0]) for n in (10, 20, 40)]
+    assert off[0] < 1e-3 * volumes[0]
+    assert off[2] < off[0] / 4.0**3
+
+
+def test_vertices_are_where_the_sign_changes_also_at_jumps() -> None:
+    def level(p: np.ndarray) -> np.ndarray:
+        length = np.linalg.norm(p - [0.1, 0.0, 0.0], axis=1)
+        outside = np.where(p[:, 2] > 0.3, -np.inf, -1e5)
+        return np.where(length < 0.6, np.where(p[:, 0] > 0.0, np.inf, 1.0 - length), outside)
+
+    found = boundary(level, LOW, HIGH, cells=16)
+    vertices = found.surface.vertices
+    length = np.linalg.norm(vertices - [0.1, 0.0, 0.0], axis=1)
+    assert_allclose(length, 0.6, rtol=0.0, atol=1e-11)
+    assert (level(vertices) >= 0.0).all()  # the last that is known to be inside
+    assert found.evaluations < 400_000
+    assert abs(found.volume - BALL * 0.6**3) <= found.volume_error
+
+
+def test_a_set_that_overruns_the_box_ends_in_its_faces_exactly() -> None:
+    found = boundary(ball([0.0, 0.0, 1.0], 0.7), LOW, HIGH, cells=20)
+    assert found.open_faces == ("z high",)
+    assert abs(found.volume - BALL * 0.7**3 / 2.0) <= found.volume_error
+    assert found.surface.vertices.max() == 1.0
+    corner = boundary(ball([1.0, -1.0, 1.0], 0.7), LOW, HIGH, cells=20)
+    assert corner.open_faces == ("x high", "y low", "z high")
+    assert abs(corner.volume - BALL * 0.7**3 / 8.0) <= corner.volume_error
+    for one in (found, corner):
+        assert mesh_of(one).is_watertight
+    everything = boundary(lambda p: np.ones(len(p)), LOW, [1.0, 2.0, 3.0], cells=8)
+    assert everything.volume == pytest.approx(24.0, rel=1e-14)
+    assert everything.volume_error == 0.0
+    assert len(everything.open_faces) == 6
+    assert everything.surface.area == pytest.approx(52.0, rel=1e-14)
+
+
+def test_an_empty_set_has_no_volume_and_no_pieces() -> None:
+    found = boundary(lambda p: -1.0 - p[:, 0] ** 2, LOW, HIGH, cells=8)
+    assert (found.volume, found.volume_error, found.components.count, found.open_faces) == (0.0, 0.0, 0, ())
+    assert len(found.surface.faces) == 0
+    assert found.surface.closed
+    assert found.components.label([0.0, 0.0, 0.0]) == -1
+    assert found.grid.values.max() == -1.0  # where the nearest is, the grid still says
+
+
+def test_a_box_that_is_not_a_cube_gets_cells_that_are_nearly_cubes() -> None:
+    found = boundary(ball([2.0, 0.5, 1.0], 0.4), [0.0, 0.0, 0.0], [4.0, 1.0, 2.0], cells=32)
+    assert found.grid.values.shape == (33, 9, 17)
+    assert_allclose(found.grid.step, 0.125)
+    assert abs(found.volume - BALL * 0.4**3) <= found.volume_error
+    flat = boundary(lambda p: 0.4 - np.hypot(p[:, 0], p[:, 2]), LOW, HIGH, cells=(32, 1, 32))  # the same all along y
+    assert abs(flat.volume - 2.0 * np.pi * 0.4**2) <= flat.volume_error
+    assert flat.open_faces == ("y low", "y high")
+
+
+def test_values_of_zero_at_nodes_leave_no_triangle_without_area() -> None:
+    found = boundary(SETS["brick on the nodes"][0], LOW, HIGH, cells=16)
+    assert mesh_of(found).area_faces.min() > 1e-6
+    sheet = boundary(lambda p: -np.abs(p[:, 0]), LOW, HIGH, cells=4, refine=False)  # inside on one plane of nodes
+    assert sheet.volume == pytest.approx(0.0, abs=1e-12)
+    assert sheet.surface.closed
+
+
+def test_mesh_is_closed_and_its_pieces_are_those_of_the_nodes_whatever_the_signs() -> None:
+    from scipy.ndimage import label
+
+    rng = np.random.default_rng(3)
+    for _ in range(60):
+        shape = rng.integers(2, 7, 3)
+        signs = np.where(rng.random(shape) < rng.choice([0.2, 0.5, 0.8]), 1.0, -1.0)
+
+        def level(p: np.ndarray, signs: np.ndarray = signs, shape: np.ndarray = shape) -> np.ndarray:
+            assert (np.abs(p) <= 1.0 + 1e-15).all()  # nothing outside the box is asked for
+            at = np.rint((p + 1.0) / 2.0 * (shape - 1)).astype(int)
+            return np.asarray(signs[tuple(at.T)])
+
+        x, y, z = (int(n) - 1 for n in shape)
+        found = boundary(level, LOW, HIGH, cells=(x, y, z), refine=False)
+        assert found.surface.closed
+        assert found.components.count == label(signs > 0.0)[1]
+        assert found.components.volume.sum() == pytest.approx(found.surface.volume, abs=1e-12)
+        pieces = found.components.vertices[found.surface.faces]
+        assert (pieces == pieces[:, :1]).all()
+
+
+def test_positions_are_told_by_piece() -> None:
+    found = boundary(SETS["two balls"][0], LOW, HIGH, cells=20)
+    assert_allclose(found.components.label([[-0.45, 0.0, 0.1], [0.5, 0.1, 0.0], [0.79, 0.1, 0.0]]), [0, 1, 1])
+    assert found.components.label([0.0, -0.9, 0.0]) == -1
+    assert found.components.label([9.0, 0.0, 0.0]) == -1
+    sides = found.components.vertices == (found.surface.vertices[:, 0] > 0.05)
+    assert sides.all()
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"low": [1.0, -1.0, -1.0]}, "box along x is 1 to 1 m"),
+        ({"high": [1.0, np.nan, 1.0]}, "high[1] is nan m"),
+        ({"cells": 1}, "cells is 1; allowed: 2 to 128"),
+        ({"cells": 1000}, "cells is 1000"),
+        ({"refine": 9}, "refine is 9"),
+        ({"refine": "twice"}, "refine is 'twice'"),
+        ({"level": lambda p: np.full(len(p), np.nan)}, "level at (-1, -1, -1) m is nan"),
+        ({"level": lambda p: np.zeros((len(p), 2))}, "level is of shape (729, 2)"),
+    ],
+)
+def test_what_cannot_be_worked_with_is_named(change: dict[str, object], words: str) -> None:
+    given: dict[str, object] = {"level": SETS["ball"][0], "low": LOW, "high": HIGH, "cells": 8, **change}
+    with pytest.raises(sl.SaglineError) as caught:
+        boundary(**given)  # type: ignore[arg-type]
+    assert str(caught.value).startswith(words)

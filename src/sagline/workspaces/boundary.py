@@ -143,9 +143,7 @@ def _volume(
     """The volume and its error bar."""
     curved = np.flatnonzero(~flat)
     faces = net.faces[curved]
-    between = bulge(
-        level, surface.vertices, faces, _slopes(surface.vertices, faces, net, slope), float(grid.step.max())
-    )
+    between = bulge(level, surface.vertices, faces, _slopes(surface.vertices, faces, net, slope), grid)
     return float(surface.volume + between.volume.sum()), float(between.error.sum())
 
 

@@ -2,16 +2,111 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from sagline.arrays import Array
 from sagline.workspaces.grid import Level, evaluate
+from sagline.workspaces.surface import Indices
 
 ROUNDS = 100  # a jump takes some 45, by halving; what is continuous ends after 5 to 8
 
 
+class Brackets(NamedTuple):
+    """Between which two positions on N rays a function changes its sign.
+
+    Attributes:
+        inner: The one inside [m], shape (N, 3).
+        outer: The other [m].
+        at_inner: The function there, shape (N,).
+        at_outer: The same at the other.
+        found: Whether it changes its sign within the limit at all, shape (N,).
+    """
+
+    inner: Array
+    outer: Array
+    at_inner: Array
+    at_outer: Array
+    found: NDArray[np.bool_]
+
+    @property
+    def k(self) -> Indices:
+        """The rays on which it does."""
+        return np.flatnonzero(self.found)
+
+
+def brackets(
+    level: Level, points: Array, outward: Array, at_points: Array, step: Array, outer_limit: Array, inner_limit: Array
+) -> Brackets:
+    """Look from points outward where they are inside, inward where not, in steps that triple, for a change of sign.
+
+    Args:
+        level: The function.
+        points: Where to begin [m], shape (N, 3).
+        outward: Direction of length 1, shape (N, 3).
+        at_points: The function there, shape (N,).
+        step: First step [m], > 0, shape (N,).
+        outer_limit: How far to look outward [m], shape (N,).
+        inner_limit: How far to look inward [m], shape (N,).
+
+    Returns:
+        Brackets.
+    """
+    is_inside = at_points >= 0.0
+    limit = np.where(is_inside, outer_limit, inner_limit)
+    away = np.where(is_inside, 1.0, -1.0)[:, None] * outward
+    near, at_near, at_far = points.copy(), at_points.copy(), np.full(len(points), np.nan)
+    distance, far = np.minimum(step, limit), points.copy()
+    k = np.flatnonzero(limit > 0.0)
+    found = np.zeros(len(points), dtype=np.bool_)
+    while len(k):
+        far[k] = points[k] + distance[k, None] * away[k]
+        at_far[k] = evaluate(level, far[k])
+        found[k] = (at_far[k] >= 0.0) != is_inside[k]
+        k = k[~found[k] & (distance[k] < limit[k])]
+        near[k], at_near[k] = far[k], at_far[k]
+        distance[k] = np.minimum(3.0 * distance[k], limit[k])
+    inner, outer = np.where(is_inside[:, None], (near, far), (far, near))
+    at_inner, at_outer = np.where(is_inside, (at_near, at_far), (at_far, at_near))
+    return Brackets(inner, outer, at_inner, at_outer, found)
+
+
 def crossings(
     level: Level,
+    inner: Array,
+    outer: Array,
+    at_inner: Array,
+    at_outer: Array,
+    *,
+    precision: float = 1e-11,
+    narrow: float = 1e-12,
+) -> Array:
+    """Where lines leave the inside of one function: `crossings_of` with the same function for all.
+
+    Args:
+        level: The function.
+        inner: One end of each line, inside [m], shape (V, 3).
+        outer: The other end, outside [m], shape (V, 3).
+        at_inner: The function there, >= 0, shape (V,).
+        at_outer: The same at the other ends, < 0.
+        precision: Largest value that is taken for zero, of the difference between the ends.
+        narrow: Share of a line to which a jump is found.
+
+    Returns:
+        Share of each line that is inside, from 0 to 1, shape (V,): at a jump, the last that is known to be.
+    """
+
+    def values(_: Indices, positions: Array) -> Array:
+        return evaluate(level, positions)
+
+    return crossings_of(values, inner, outer, at_inner, at_outer, precision=precision, narrow=narrow)
+
+
+def crossings_of(
+    values: Callable[[Indices, Array], Array],
     inner: Array,
     outer: Array,
     at_inner: Array,
@@ -26,7 +121,7 @@ def crossings(
     infinite, and where regula falsi has not kept up with halving, as at jumps.
 
     Args:
-        level: The function.
+        values: The functions of lines, by their indices, at as many positions.
         inner: One end of each line, inside [m], shape (V, 3).
         outer: The other end, outside [m], shape (V, 3).
         at_inner: The function there, >= 0, shape (V,).
@@ -47,7 +142,7 @@ def crossings(
             break
         k = open_lines
         share = low[k] + _step(at_low[k], at_high[k], high[k] - low[k], done) * (high[k] - low[k])
-        found = evaluate(level, inner[k] + share[:, None] * (outer[k] - inner[k]))
+        found = values(k, inner[k] + share[:, None] * (outer[k] - inner[k]))
         is_inside = found >= 0.0
         at_low[k] = np.where(is_inside, found, np.where(low_stays[k], 0.5 * at_low[k], at_low[k]))
         at_high[k] = np.where(~is_inside, found, np.where(high_stays[k], 0.5 * at_high[k], at_high[k]))
@@ -66,3 +161,21 @@ def _step(at_low: Array, at_high: Array, width: Array, done: int) -> Array:
     halve = np.isinf(at_low) | np.isinf(at_high) | (width > 4.0 * 0.5**done)
     steps: Array = np.where(halve, 0.5, share)
     return steps
+
+
+def way_to_box(points: Array, directions: Array, low: Array, high: Array) -> Array:
+    """How far it is from positions in a box to its surface.
+
+    Args:
+        points: Positions [m], shape (3,) or (N, 3).
+        directions: Directions of length 1, shape (N, 3).
+        low: Lower corner of the box [m], shape (3,).
+        high: Upper corner [m].
+
+    Returns:
+        Lengths [m], >= 0, shape (N,).
+    """
+    walls = np.where(directions > 0.0, high - points, low - points)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        lengths: Array = np.where(directions != 0.0, walls / directions, np.inf).min(axis=1)
+    return lengths.clip(0.0)

@@ -13,13 +13,13 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from sagline.arrays import Array
-from sagline.workspaces.crossing import crossings
-from sagline.workspaces.grid import Level, evaluate
+from sagline.workspaces.crossing import Brackets, brackets, crossings, way_to_box
+from sagline.workspaces.grid import Grid, Level, evaluate
 from sagline.workspaces.surface import Indices, normals_of
 
 MEAN: Final = 3.0 / 4.0  # of the distance at a curved triangle's middle
 MISSED: Final = 5.0 / 12.0  # of it at most
-FLAT: Final = 1e-6  # of a step: a distance that adds nothing
+FLAT: Final = 1e-6  # of the reach: a distance that adds nothing
 
 
 class Bulge(NamedTuple):
@@ -35,7 +35,7 @@ class Bulge(NamedTuple):
     error: Array
 
 
-def bulge(level: Level, vertices: Array, faces: Indices, slope: Array, reach: float) -> Bulge:
+def bulge(level: Level, vertices: Array, faces: Indices, slope: Array, grid: Grid) -> Bulge:
     """What lies between a net and the boundary.
 
     Args:
@@ -43,7 +43,7 @@ def bulge(level: Level, vertices: Array, faces: Indices, slope: Array, reach: fl
         vertices: Those of the net, on the boundary [m], shape (V, 3).
         faces: Its triangles, shape (F, 3).
         slope: How fast the function falls there along the normal, about [1/m], shape (F,); NaN where that is not known.
-        reach: How far from a triangle the boundary is looked for [m].
+        grid: The grid of the net: the boundary is looked for as far as a step from a triangle, within the grid's box.
 
     Returns:
         Bulge.
@@ -51,13 +51,16 @@ def bulge(level: Level, vertices: Array, faces: Indices, slope: Array, reach: fl
     normals = normals_of(vertices, faces)
     area = np.linalg.norm(normals, axis=1)
     normals = normals / np.maximum(area, np.finfo(np.float64).tiny)[:, None]
-    distance = distances(level, vertices[faces].mean(axis=1), normals, slope, reach)
+    points = vertices[faces].mean(axis=1)
+    low, high = (np.array([axis[end] for axis in grid.axes]) for end in (0, -1))
+    reach = [np.minimum(grid.step.max(), way_to_box(points, side * normals, low, high)) for side in (1.0, -1.0)]
+    distance = distances(level, points, normals, slope, reach[0], reach[1])
     found = ~np.isnan(distance)
     volume = np.where(found, MEAN * area * distance, 0.0)
-    return Bulge(volume, area * np.where(found, MISSED * np.abs(distance), reach))
+    return Bulge(volume, area * np.where(found, MISSED * np.abs(distance), np.maximum(*reach)))
 
 
-def distances(level: Level, points: Array, normals: Array, slope: Array, reach: float) -> Array:
+def distances(level: Level, points: Array, normals: Array, slope: Array, outward: Array, inward: Array) -> Array:
     """How far the boundary is from points along their normals, to some percent.
 
     Args:
@@ -65,48 +68,33 @@ def distances(level: Level, points: Array, normals: Array, slope: Array, reach: 
         points: Where [m], shape (N, 3).
         normals: Outward, of length 1, shape (N, 3).
         slope: How fast the function falls along them, about [1/m], shape (N,); NaN where that is not known.
-        reach: How far to look [m].
+        outward: How far to look outward [m], shape (N,).
+        inward: How far to look inward [m], shape (N,).
 
     Returns:
         Distances [m], negative inward, NaN beyond reach, shape (N,).
     """
     at_points = evaluate(level, points)
-    is_inside = at_points >= 0.0
-    away = np.where(is_inside, 1.0, -1.0)[:, None] * normals
+    reach = np.where(at_points >= 0.0, outward, inward)
     with np.errstate(divide="ignore", invalid="ignore"):
-        guess = 1.5 * np.abs(at_points) / slope
+        guess = np.abs(at_points) / slope
     guess = np.where(np.isfinite(guess) & (slope > 0.0), guess, 0.1 * reach)
     distance = np.where(guess <= FLAT * reach, 0.0, np.nan)
-    near, at_near = np.zeros(len(points)), at_points.copy()
-    far = np.clip(guess, 0.01 * reach, reach)
     k = np.flatnonzero(guess > FLAT * reach)
-    while len(k):
-        at_far = evaluate(level, points[k] + far[k, None] * away[k])
-        crossed = (at_far >= 0.0) != is_inside[k]
-        done = k[crossed]
-        distance[done] = _between(level, points, away, (near, at_near), (far, at_far[crossed]), done)
-        k, at_far = k[~crossed], at_far[~crossed]
-        near[k], at_near[k] = far[k], at_far
-        k = k[far[k] < reach]
-        far[k] = np.minimum(3.0 * far[k], reach)
-    signed: Array = np.where(is_inside, distance, -distance)
-    return signed
+    step = np.clip(1.5 * guess[k], 0.01 * reach[k], reach[k])
+    ends = brackets(level, points[k], normals[k], at_points[k], step, outward[k], inward[k])
+    crossed = np.full((len(k), 3), np.nan)
+    crossed[ends.k] = _between(level, ends)
+    distance[k] = np.einsum("ni,ni->n", crossed - points[k], normals[k])
+    return distance
 
 
-def _between(
-    level: Level, points: Array, away: Array, near: tuple[Array, Array], far: tuple[Array, Array], k: Indices
-) -> Array:
-    """Where the sign changes within brackets: by their chord, and by looking closer where an end is infinite."""
-    start, at_start, end, at_end = near[0][k], near[1][k], far[0][k], far[1]
+def _between(level: Level, ends: Brackets) -> Array:
+    """Where the sign changes, in brackets that have it: by their chord, or looking closer where an end is infinite."""
+    inner, outer, at_inner, at_outer = (part[ends.k] for part in ends[:4])
     with np.errstate(invalid="ignore"):
-        share = at_start / (at_start - at_end)
-    rough = np.flatnonzero(np.isinf(at_start) | np.isinf(at_end))
-    if len(rough):
-        outward = (at_start[rough] >= 0.0)[:, None]
-        ends = [points[k[rough]] + distance[rough, None] * away[k[rough]] for distance in (start, end)]
-        inner, outer = np.where(outward, ends, ends[::-1])
-        at_inner, at_outer = np.where(outward.T, (at_start[rough], at_end[rough]), (at_end[rough], at_start[rough]))
-        found = crossings(level, inner, outer, at_inner, at_outer, precision=0.01, narrow=0.05)
-        share[rough] = np.where(outward[:, 0], found, 1.0 - found)
-    between: Array = start + share * (end - start)
+        share = at_inner / (at_inner - at_outer)
+    k = np.flatnonzero(np.isinf(at_inner) | np.isinf(at_outer))
+    share[k] = crossings(level, inner[k], outer[k], at_inner[k], at_outer[k], precision=0.01, narrow=0.05)
+    between: Array = inner + share[:, None] * (outer - inner)
     return between
