@@ -68,7 +68,7 @@ def _by_trimesh(surface: Surface, kind: str, colors: NDArray[np.uint8] | None) -
         step = 'Surfaces need it: pip install "sagline[workspace]"'
         raise FileError("package trimesh", "is not installed", step) from None
     vertices, faces = surface.vertices, surface.faces
-    if kind == "stl":  # has no vertices of its own: those that are one in its 24 bits are one to who reads it
+    if kind == "stl":  # has triangles alone: corners that are one in its 24 bits are one to who reads it
         vertices, faces = _in_single_precision(vertices, faces)
     if kind == "glb":
         vertices = np.stack([vertices[:, 0], vertices[:, 2], -vertices[:, 1]], axis=1)
@@ -79,7 +79,7 @@ def _by_trimesh(surface: Surface, kind: str, colors: NDArray[np.uint8] | None) -
 
 def _in_single_precision(vertices: Array, faces: Indices) -> tuple[Array, Indices]:
     """Vertices rounded, the same ones as one, and no triangle that this flattens."""
-    rounded, place = np.unique(vertices.astype(np.float32), axis=0, return_inverse=True)
+    rounded, place = np.unique(np.round(vertices, 7).astype(np.float32), axis=0, return_inverse=True)
     faces = place.reshape(-1)[faces]
     return rounded.astype(np.float64), faces[(faces != faces[:, [1, 2, 0]]).all(axis=1)]
 
