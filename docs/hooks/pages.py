@@ -26,6 +26,7 @@ RINGS = {  # package -> title and opening line of its page of reference
     "kinematics": ("Kinematics", "From motion to lengths, from lengths to the pose, and the proof of a plan."),
     "dynamics": ("Dynamics", "How the robot vibrates and moves."),
     "workspaces": ("Workspaces", "Where a robot can work: loads, margins, criteria, the boundary, and proofs."),
+    "interference": ("Interference", "What comes too near to what."),
     "tension": ("Tension", "How redundant cables share the load."),
     "statics": ("Statics", "Structure matrix, wrenches, stiffness."),
     "control": ("Controller", "`sl.control`: what drives a machine, cycle by cycle."),

@@ -50,6 +50,8 @@ if TYPE_CHECKING:
     from sagline.files.simulation_file import load_simulation
     from sagline.files.wirex import load_wirex
     from sagline.files.workspace_file import load_workspace
+    from sagline.interference.clearance import Clearances, clearance
+    from sagline.interference.obstacles import Box, Capsule, Sphere
     from sagline.kinematics.confirm import Confirmation, confirm
     from sagline.kinematics.encoder import encoder_counts, lengths_from_counts
     from sagline.kinematics.equilibria import Equilibria, equilibria
@@ -119,6 +121,7 @@ __all__ = [
     "Accelerations",
     "AnalyticCenter",
     "ArticleBalance",
+    "Box",
     "Brake",
     "Break",
     "Cable",
@@ -127,8 +130,10 @@ __all__ = [
     "CableModel",
     "CableState",
     "CableStatus",
+    "Capsule",
     "Catenary",
     "Centroid",
+    "Clearances",
     "ClosedForm",
     "Closest",
     "Confirmation",
@@ -192,6 +197,7 @@ __all__ = [
     "Side",
     "Simulation",
     "Simulator",
+    "Sphere",
     "Stall",
     "Stiffness",
     "Straight",
@@ -212,6 +218,7 @@ __all__ = [
     "article_balance",
     "article_path",
     "capacity_margin",
+    "clearance",
     "confirm",
     "control",
     "dump_mjcf",
@@ -273,6 +280,7 @@ _HOMES = {
     "Accelerations": "sagline.workspaces.wrench_sets",
     "AnalyticCenter": "sagline.tension.analytic_center",
     "ArticleBalance": "sagline.statics.balance",
+    "Box": "sagline.interference.obstacles",
     "Brake": "sagline.dynamics.events",
     "Break": "sagline.dynamics.events",
     "Cable": "sagline.cables.cable",
@@ -281,8 +289,10 @@ _HOMES = {
     "CableModel": "sagline.cables.model",
     "CableState": "sagline.cables.model",
     "CableStatus": "sagline.cables.status",
+    "Capsule": "sagline.interference.obstacles",
     "Catenary": "sagline.cables.catenary",
     "Centroid": "sagline.tension.centroid",
+    "Clearances": "sagline.interference.clearance",
     "ClosedForm": "sagline.tension.closed_form",
     "Closest": "sagline.tension.closest",
     "Confirmation": "sagline.kinematics.confirm",
@@ -347,6 +357,7 @@ _HOMES = {
     "Side": "sagline.tension.polygon",
     "Simulation": "sagline.dynamics.simulation",
     "Simulator": "sagline.dynamics.simulator",
+    "Sphere": "sagline.interference.obstacles",
     "Stall": "sagline.dynamics.events",
     "Stiffness": "sagline.statics.stiffness",
     "Straight": "sagline.cables.straight",
@@ -368,6 +379,7 @@ _HOMES = {
     "article_balance": "sagline.statics.balance",
     "article_path": "sagline.motion.planar",
     "capacity_margin": "sagline.tension.margin",
+    "clearance": "sagline.interference.clearance",
     "confirm": "sagline.kinematics.confirm",
     "control": "sagline.control",
     "dump_mjcf": "sagline.files.mjcf",

@@ -26,6 +26,7 @@ HOW_TO_GET: Final = MappingProxyType(
     {
         "Axes": "Make them with matplotlib, or leave ax out.",
         "Axes3D": 'Make them with add_subplot(projection="3d"), or leave ax out.',
+        "Box": "Give Box(size, center), in meters.",
         "Cable": "Give Cable(linear_density, axial_stiffness).",
         "CableModel": "Give one of the models, Catenary() for instance.",
         "CableState": "Take that of a model: Catenary().from_tension(...).",

@@ -279,6 +279,11 @@ def _object(valid: Any) -> Iterator[Bad]:
             yield Bad(f"a {type(other).__name__}", other, REFUSED)
 
 
+def _objects(valid: Any) -> Iterator[Bad]:
+    """One object, several, or none."""
+    yield from (bad for bad in _object(valid) if bad.label != "an empty list")
+
+
 def _one(valid: Any) -> Iterator[Bad]:
     """An object where a sequence of them is none."""
     yield from _object(valid)
@@ -349,5 +354,5 @@ KINDS = {
     name.removeprefix("_"): function
     for name, function in globals().items()
     if function in (_array, _number, _whole, _cable, _seed, _index, _word, _words, _text, _file, _callback, _mapping,
-                    _object, _one, _place, _motion, _out, _ax, _points, _sample)
+                    _object, _objects, _one, _place, _motion, _out, _ax, _points, _sample)
 }  # fmt: skip

@@ -81,7 +81,7 @@ def _of_class(name: str, kind: type) -> set[str]:
 # made by sagline
 RESULTS = frozenset(
     {"CableFit", "CableState", "Confirmation", "EmpiricalFit", "Equilibria", "Equilibrium", "ForwardSolution"}
-    | {"FrequencySlopes", "WinchDrive"}
+    | {"Clearances", "FrequencySlopes", "WinchDrive"}
     | {"EnergyBalance", "Imported", "Linearized", "Modes", "Occurrence", "Plan", "Simulation", "Stiffness"}
     | {"control.Execution", "control.Gains", "control.Motion", "control.Samples", "twin.Injected"}
     | {"Margin", "Workspace", "WrenchSet"}
@@ -118,6 +118,7 @@ def calls(folder: Path) -> dict[str, Call]:
         _statics,
         _vibrations,
         _workspaces,
+        _distances,
         _articles,
         _files,
         _in_time,
@@ -582,6 +583,28 @@ def _workspaces(given: _Given) -> dict[str, Call]:
                 model=("one", sl.Catenary()),
                 moment_arm=("number", 0.25, True),
                 progress=("callback", lambda done, of: None, True),
+            ),
+        ),
+    }
+
+
+def _distances(given: _Given) -> dict[str, Call]:
+    place, edges = ("array", [1.0, 2.0, 3.0]), ("array", [0.5, 0.25, 2.0])
+    name, radius = ("text", "lamp"), ("number", 0.25)
+    turned = ("array", [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    return {
+        "Box": Call(sl.Box, _all(size=edges, center=place, orientation=turned, name=name)),
+        "Capsule": Call(sl.Capsule, _all(start=place, end=edges, radius=radius, name=name)),
+        "Sphere": Call(sl.Sphere, _all(center=place, radius=radius, name=name)),
+        "clearance": Call(
+            sl.clearance,
+            _all(
+                state=("one", given.run.state),
+                obstacles=("objects", sl.Sphere([3.0, 2.0, 2.0], 0.25)),
+                precision=("number", 1e-3),
+                cable_radius=("array", np.full(8, 0.125), True),
+                platform=("one", sl.Box([0.5, 0.5, 0.5]), True),
+                from_anchor=("number", 0.5, True),
             ),
         ),
     }

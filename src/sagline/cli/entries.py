@@ -218,6 +218,12 @@ def _unknown_state(name: str = ROBOT) -> Equilibrium:
     return sl.Equilibrium(robot, sl.Pose(PLACE, LEVEL), locked(np.zeros(6)), cables)
 
 
+def _clearances() -> None:
+    import sagline as sl
+
+    sl.clearance(_unknown_state())
+
+
 INVERSE, SHARING, VERDICTS = "inverse kinematics", "further ways of sharing", "verdicts of infeasible poses"
 FORWARD, FIT = "forward kinematics", "fit of straight cables"
 MARGINS, POLYGON, VIBRATION = "margins", "tension polygon", "stiffness and vibration"
@@ -226,6 +232,7 @@ MODES, SIMULATION, CHAINS = "modes with cable mass", "motion in time", "motion o
 LOSSES, ANSWERS, PERIODS = "losses in the cables' stretch", "answers with losses", "motion from period to period"
 FORWARD_OVER_PULLEYS, VIBRATION_OVER_PULLEYS = f"{FORWARD} over pulleys", f"{VIBRATION} over pulleys"
 SIMULATION_OVER_PULLEYS = f"{SIMULATION} over pulleys"
+CLEARANCES = "least distances"
 
 ENTRIES = {
     entry.words: entry
@@ -240,6 +247,7 @@ ENTRIES = {
         Entry(SIGNED_MARGINS, "workspaces.signed_margin.signed_margins", 30, 9.0, _signed_margins),
         Entry(POLYGON, "inverse.queries.polygon_of_pose", 38, 5.0, _polygon),
         Entry(VIBRATION, "forward.sensitivity.describe_states", 57, 6.0, _vibration),
+        Entry(CLEARANCES, "interference.hanging_distance.least_distances", 33, 5.0, _clearances),
         Entry(MODES, "dynamics.spectral.interpolate", 2, 9.0, _modes),
         Entry(LOSSES, "dynamics.spectral.stretch_matrices", 2, 1.0, _losses),
         Entry(ANSWERS, "dynamics.collocation.dynamic_stiffnesses", 3, 6.0, _answers, version=2),

@@ -1,0 +1,187 @@
+"""How near a robot's cables and platform come to each other and to what stands around."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import prod
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sagline.arguments import brief, instance
+from sagline.arrays import Array, checked, locked, number
+from sagline.errors import InvalidValueError
+from sagline.interference.clearance_rows import ClearanceRows
+from sagline.interference.mesh import Mesh
+from sagline.interference.obstacles import Box
+from sagline.interference.pairs import Obstacle
+from sagline.memory import check_memory
+from sagline.results import Result
+from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.several import first_of
+
+NO_TENSIONS = "no tensions are known, so nothing hangs: take a feasible pose"
+NOTHING = "nothing is measured"
+_SHOWN = 8  # pairs of a pose that are printed, and lines of what is left out
+_NUMBERS = 9  # kept of a pair and pose: distance, bound and two points
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Clearances(Result):
+    """Least distances at one pose or N, between cables as they hang, the platform and what stands around.
+
+    Attributes:
+        pairs: What is measured against what, P pairs of names.
+        pair_distance: Least distance of each [m], cable diameters taken off where they are known, shape (P,) or (N, P);
+            0 or less where they touch (how deep is not measured), NaN where a pose has no tensions.
+        pair_low: Proved: no distance is below it [m], of the same shape.
+        nearest: Points between which it is measured, on the middle lines of cables and rods [m], shape (P, 2, 3) or
+            (N, P, 2, 3).
+        left_out: What is not measured, and why.
+        precision: How far the proved bound may stay below the distance [m].
+    """
+
+    pairs: tuple[tuple[str, str], ...]
+    pair_distance: Array
+    pair_low: Array
+    nearest: Array
+    left_out: tuple[str, ...]
+    precision: float
+
+    @property
+    def distance(self) -> Array:
+        """Least distance of all pairs [m], shape () or (N,); infinite where nothing is measured."""
+        return self._least(self.pair_distance)
+
+    @property
+    def low(self) -> Array:
+        """Proved: nothing is nearer to anything [m], shape () or (N,)."""
+        return self._least(self.pair_low)
+
+    @property
+    def between(self) -> Any:
+        """What is nearest to what: two names, or N times two for N poses; a sentence where nothing is known."""
+        return self._between(self.pair_distance) if self._single else tuple(map(self._between, self.pair_distance))
+
+    def __str__(self) -> str:
+        """The nearest pairs, in a few lines."""
+        rows = np.atleast_2d(self.pair_distance)
+        lost = int(np.isnan(rows).any(axis=1).sum())
+        least = np.where(np.isnan(rows), np.inf, rows)
+        at = int(np.argmin(least.min(axis=1, initial=np.inf))) if len(rows) else 0
+        head = f"Clearance: {len(self.pairs)} pairs" + ("" if self._single else f", {len(rows)} poses")
+        lines = [head]
+        if lost:
+            lines.append(f"  {NO_TENSIONS}" if self._single else f"  {lost} poses: {NO_TENSIONS}")
+        if not self.pairs:
+            lines.append(f"  {NOTHING}")
+        elif lost < len(rows):
+            lines += [] if self._single else [f"  least, at pose {at}:"]
+            shown = np.argsort(least[at], kind="stable")[:_SHOWN]
+            width = max(len(" - ".join(self.pairs[k])) for k in shown)
+            lines += [f"  {' - '.join(self.pairs[k]):<{width}}  {1e3 * least[at, k]:10.1f} mm" for k in shown]
+            rest = len(self.pairs) - len(shown)
+            lines += [f"  and {rest} pairs farther apart"] if rest else []
+        if self.left_out:
+            lines.append("  left out:")
+            lines += [f"    {line}" for line in self.left_out[:_SHOWN]]
+            rest = len(self.left_out) - _SHOWN
+            lines += [f"    and {rest} more" if rest > 0 else ""] if rest > 0 else []
+        return "\n".join(lines)
+
+    @property
+    def _single(self) -> bool:
+        return self.pair_distance.ndim == 1
+
+    def _least(self, rows: Array) -> Array:
+        return locked(np.asarray(rows.min(axis=-1, initial=np.inf)))
+
+    def _between(self, row: Array) -> tuple[str, str] | str:
+        if not len(row):
+            return NOTHING
+        return NO_TENSIONS if np.isnan(row).any() else self.pairs[int(row.argmin())]
+
+
+def clearance(
+    state: Equilibrium,
+    obstacles: Obstacle | Sequence[Obstacle] = (),
+    *,
+    precision: float = 1e-4,
+    cable_radius: ArrayLike | None = None,
+    platform: Box | Mesh | None = None,
+    from_anchor: float | None = None,
+) -> Clearances:
+    """Least distances between cables as they hang, the platform and what stands around.
+
+    Cables are measured as their model draws them: catenaries as they hang, over pulleys from where they leave these.
+    Distances are those of the nearest points, found to about 1e-12 m (with meshes 1e-7 m); and it is proved that no
+    other points are nearer by more than the precision.
+
+    Args:
+        state: An equilibrium, single or N of them: of a plan, plan.state.
+        obstacles: What stands around: Box, Capsule, Sphere and Mesh, one or several. Solid: what is inside touches.
+        precision: How far the proved bound may stay below a distance [m], > 0.
+        cable_radius: Half the cables' diameters [m], one for all or one a cable, >= 0; None: as the robot's cables
+            know, else 0.
+        platform: The platform's form in its own frame; None: a box of the robot's platform_size around its anchors,
+            where that is known.
+        from_anchor: How much of a cable next to its anchor is left out [m], > 0: at the anchor that two cables share,
+            at the platform, and at the frame against what stands around. None: pairs that share an anchor, and
+            cables with the platform, are left out as a whole; `left_out` names them.
+
+    Returns:
+        Clearances.
+
+    Raises:
+        InvalidValueError: If an argument is none of its kind, or a mesh is 100 times as large as the robot.
+        SaglineError: If a mesh is among them and python-fcl is missing.
+
+    Examples:
+        >>> import numpy as np
+        >>> import sagline as sl
+        >>> plan = sl.inverse(sl.load_robot("cogiro"), sl.Pose((1.0, 0.5, 1.5), np.eye(3)))
+        >>> near = sl.clearance(plan.state, sl.Sphere([3, 2, 2], radius=0.2, name="lamp"))
+        >>> print(f"{near.distance:.3f} m between {' and '.join(near.between)}")
+        0.395 m between cable 2 and cable 3
+
+    Source:
+        docs/model.md, section 13.
+    """
+    robot = instance(state, Equilibrium, "state").robot
+    things = _obstacles(obstacles)
+    some = None if from_anchor is None else number(from_anchor, "from_anchor", "m", above=0.0)
+    radius = None if cable_radius is None else _radius(cable_radius, first_of(robot).cable_count)
+    form = platform if platform is None or isinstance(platform, Mesh) else instance(platform, Box, "platform")
+    near = number(precision, "precision", "m", above=0.0)
+    rows = ClearanceRows(
+        robot,
+        things,
+        precision=near,
+        cable_radius=radius,
+        platform=form,
+        from_anchor=some,
+    )
+    shape = state.pose.shape
+    check_memory("clearances", 8.0 * _NUMBERS * prod(shape) * len(rows.pairs.names), "Take the poses in parts.")
+    value, low, nearest = (locked(field.reshape(*shape, *field.shape[1:])) for field in rows.distances(state))
+    return Clearances(rows.pairs.names, value, low, nearest, rows.pairs.left_out, near)
+
+
+def _obstacles(given: Any) -> tuple[Obstacle, ...]:
+    some = (given,) if isinstance(given, Obstacle) else given
+    several = isinstance(some, Sequence) and not isinstance(some, str)
+    wrong = [one for one in some if not isinstance(one, Obstacle)] if several else [given]
+    if wrong:
+        step = 'Make them: Sphere(center, radius), Box(size, center), load_mesh("hall.stl").'
+        raise InvalidValueError("obstacles", brief(wrong[0]), "Box, Capsule, Sphere or Mesh, one or several", step)
+    return tuple(some)
+
+
+def _radius(given: ArrayLike, cables: int) -> Array:
+    radius = checked(given, "cable_radius", "m", low=0.0)
+    if radius.shape not in ((), (cables,)):
+        step = "Give one value a cable, or one for all."
+        raise InvalidValueError("cable_radius", f"of shape {radius.shape}", f"shape () or ({cables},)", step)
+    return radius

@@ -1,0 +1,162 @@
+"""What stands around a robot and has a simple form: boxes, capsules and spheres, at rest in the world."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sagline.arguments import label
+from sagline.arrays import Array, exactly, number
+from sagline.results import Result
+from sagline.robot.pose import Pose
+
+_LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Box(Result):
+    """A solid box.
+
+    Attributes:
+        size: Its edges [m], shape (3,), > 0.
+        center: Its middle in the world [m], shape (3,); as a platform, in the platform frame.
+        orientation: Rotation from its edges to the world, shape (3, 3).
+        name: What it is called.
+
+    Examples:
+        >>> import sagline as sl
+        >>> table = sl.Box([1.2, 0.8, 0.7], center=[2.0, 0.0, 0.35], name="table")
+    """
+
+    size: Array
+    center: Array
+    orientation: Array
+    name: str
+
+    def __init__(
+        self,
+        size: ArrayLike,
+        center: ArrayLike = (0.0, 0.0, 0.0),
+        orientation: ArrayLike = _LEVEL,
+        name: str = "box",
+    ) -> None:
+        """Check the fields.
+
+        Args:
+            size: Its edges [m], shape (3,), > 0.
+            center: Its middle [m], shape (3,).
+            orientation: Rotation matrix from its edges to the world, shape (3, 3).
+            name: What it is called.
+
+        Raises:
+            InvalidValueError: If an edge is not positive, or orientation is no rotation.
+        """
+        _fill(
+            self,
+            size=exactly(size, "size", "m", (3,), above=0.0),
+            center=exactly(center, "center", "m", (3,)),
+            orientation=Pose(np.zeros(3), exactly(orientation, "orientation", "", (3, 3))).matrix,
+            name=label(name, "name"),
+        )
+
+    @property
+    def bounds(self) -> Array:
+        """Lowest and highest corner of what it fills along the axes [m], shape (2, 3)."""
+        reach = 0.5 * np.abs(self.orientation) @ self.size
+        return np.stack((self.center - reach, self.center + reach))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Capsule(Result):
+    """A solid rod with round ends: a pole, a pipe, a lamp.
+
+    Attributes:
+        start: One end of its middle line in the world [m], shape (3,).
+        end: The other [m], shape (3,).
+        radius: [m], >= 0.
+        name: What it is called.
+
+    Examples:
+        >>> import sagline as sl
+        >>> pole = sl.Capsule([1.0, 0.0, 0.0], [1.0, 0.0, 3.0], radius=0.05, name="pole")
+    """
+
+    start: Array
+    end: Array
+    radius: float
+    name: str
+
+    def __init__(self, start: ArrayLike, end: ArrayLike, radius: float, name: str = "capsule") -> None:
+        """Check the fields.
+
+        Args:
+            start: One end of its middle line [m], shape (3,).
+            end: The other [m], shape (3,).
+            radius: [m], >= 0.
+            name: What it is called.
+
+        Raises:
+            InvalidValueError: If the radius is negative, or an end is no point.
+        """
+        _fill(
+            self,
+            start=exactly(start, "start", "m", (3,)),
+            end=exactly(end, "end", "m", (3,)),
+            radius=number(radius, "radius", "m", low=0.0),
+            name=label(name, "name"),
+        )
+
+    @property
+    def bounds(self) -> Array:
+        """Lowest and highest corner of what it fills along the axes [m], shape (2, 3)."""
+        low, high = np.minimum(self.start, self.end), np.maximum(self.start, self.end)
+        return np.stack((low - self.radius, high + self.radius))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sphere(Result):
+    """A solid ball.
+
+    Attributes:
+        center: Its middle in the world [m], shape (3,).
+        radius: [m], >= 0.
+        name: What it is called.
+
+    Examples:
+        >>> import sagline as sl
+        >>> lamp = sl.Sphere([0.0, 0.0, 2.8], radius=0.2, name="lamp")
+    """
+
+    center: Array
+    radius: float
+    name: str
+
+    def __init__(self, center: ArrayLike, radius: float, name: str = "sphere") -> None:
+        """Check the fields.
+
+        Args:
+            center: Its middle [m], shape (3,).
+            radius: [m], >= 0.
+            name: What it is called.
+
+        Raises:
+            InvalidValueError: If the radius is negative, or the center is no point.
+        """
+        _fill(
+            self,
+            center=exactly(center, "center", "m", (3,)),
+            radius=number(radius, "radius", "m", low=0.0),
+            name=label(name, "name"),
+        )
+
+    @property
+    def bounds(self) -> Array:
+        """Lowest and highest corner of what it fills along the axes [m], shape (2, 3)."""
+        return np.stack((self.center - self.radius, self.center + self.radius))
+
+
+def _fill(obstacle: object, **values: object) -> None:
+    for name, value in values.items():
+        object.__setattr__(obstacle, name, value)

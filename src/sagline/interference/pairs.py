@@ -1,0 +1,109 @@
+"""What is measured against what: cables against each other, and against what stands around; and what is left out."""
+
+from __future__ import annotations
+
+from itertools import combinations
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sagline.arrays import Array, Indices, locked
+from sagline.interference.mesh import Mesh
+from sagline.interference.obstacles import Box, Capsule, Sphere
+from sagline.interference.rows import Part
+from sagline.robot.several import Robots, anchors_of
+
+Obstacle = Box | Capsule | Sphere | Mesh
+
+PLATFORM: Final = "platform"
+_SAME = 1e-9  # of the robot's extent: anchors nearer to each other than this are one
+_NO_LENGTH = "cables and platform: give from_anchor, how much of a cable next to its anchor may be near"
+
+
+class Pairs(NamedTuple):
+    """What is measured. Bodies are numbered: parts of cables, the platform whether there is one or not, obstacles.
+
+    Attributes:
+        parts: Parts of cables that take part.
+        by_kernel: Numbers of the pairs that kernels measure, shape (P, 2).
+        with_mesh: Numbers of the pairs of which at least one is a mesh, shape (Q, 2).
+        names: Of all pairs, in this order.
+        left_out: What is not measured, and why.
+    """
+
+    parts: tuple[Part, ...]
+    by_kernel: Indices
+    with_mesh: Indices
+    names: tuple[tuple[str, str], ...]
+    left_out: tuple[str, ...]
+
+
+def pairs_of(
+    robot: Robots, obstacles: tuple[Obstacle, ...], platform: Box | Mesh | None, *, from_anchor: bool
+) -> Pairs:
+    """All pairs of a robot and what stands around.
+
+    Args:
+        robot: The robot or robots.
+        obstacles: What stands around.
+        platform: The platform's form, or None.
+        from_anchor: Whether pairs that share an anchor are measured from some way on; else they are left out.
+
+    Returns:
+        Pairs.
+    """
+    at_frame, at_platform = (_together(anchors) for anchors in anchors_of(robot))
+    cables = range(len(at_frame))
+    found: list[tuple[Part | int, Part | int]] = []  # a cable's part, -1 the platform, or the number of an obstacle
+    left_out: list[str] = []
+    for i, j in combinations(cables, 2):
+        shared = bool(at_frame[i, j]), bool(at_platform[i, j])
+        if all(shared) or (any(shared) and not from_anchor):
+            where = " and ".join(name for name, there in zip(("frame", PLATFORM), shared, strict=True) if there)
+            left_out.append(f"cable {i} and cable {j}: they share their anchor on the {where}")
+        else:
+            found.append((Part(i, *shared), Part(j, *shared)))
+    found += [(Part(i, off_frame=from_anchor), k) for k in range(len(obstacles)) for i in cables]
+    if platform is not None:
+        found += [(-1, k) for k in range(len(obstacles))]
+        found += [(Part(i, off_platform=True), -1) for i in cables if from_anchor]
+        left_out += [] if from_anchor else [_NO_LENGTH]
+    parts = tuple(dict.fromkeys(one for pair in found for one in pair if isinstance(one, Part)))
+    forms = (platform, *obstacles)
+    own = _names(obstacles)
+
+    def number(one: Part | int) -> int:
+        return parts.index(one) if isinstance(one, Part) else len(parts) + 1 + one
+
+    def name(one: Part | int) -> str:
+        return f"cable {one.cable}" if isinstance(one, Part) else PLATFORM if one < 0 else own[one]
+
+    def form(one: Part | int) -> object:
+        return one if isinstance(one, Part) else forms[1 + one]
+
+    def in_order(pair: tuple[Part | int, Part | int]) -> tuple[Part | int, Part | int]:
+        boxes = [isinstance(form(one), Box) for one in pair]
+        return pair[::-1] if boxes == [True, False] else pair  # kernels take a box behind what is none
+
+    other = [pair for pair in found if any(isinstance(form(one), Mesh) for one in pair)]
+    plain = [in_order(pair) for pair in found if pair not in other]
+    numbers = (np.array([[number(a), number(b)] for a, b in some], dtype=np.int64) for some in (plain, other))
+    by_kernel, with_mesh = (locked(array.reshape(-1, 2)) for array in numbers)
+    return Pairs(parts, by_kernel, with_mesh, tuple((name(a), name(b)) for a, b in plain + other), tuple(left_out))
+
+
+def _together(anchors: Array) -> NDArray[np.bool_]:
+    """Which cables share an anchor, of any of several robots, shape (m, m)."""
+    apart = np.linalg.norm(anchors[..., :, None, :] - anchors[..., None, :, :], axis=-1)
+    same: NDArray[np.bool_] = (apart <= _SAME * max(1.0, float(np.abs(anchors).max()))).reshape(-1, *apart.shape[-2:])
+    return np.asarray(same.any(axis=0))
+
+
+def _names(obstacles: tuple[Obstacle, ...]) -> list[str]:
+    """Names of the obstacles; of those that bear one name the second is called so, and 2."""
+    names: list[str] = []
+    for one in obstacles:
+        again = sum(other.name == one.name for other in obstacles[: len(names)])
+        names.append(one.name if not again else f"{one.name} {again + 1}")
+    return names
