@@ -34,6 +34,7 @@ RINGS = {  # package -> title and opening line of its page of reference
     "twin": ("Twin", "`sl.twin`: the machine behind a link, in this process or behind servers of its own."),
     "article": ("Identification", "Constants of cables and of the empirical model, from measurements."),
     "files": ("Files", "What is read and written."),
+    "sweep": ("Sweeps", "`sl.sweep`: every robot at every pose under every wrench, on many cores."),
     "plot": ("Figures", "`sl.plot`: figures for papers, on Matplotlib."),
     "errors": ("Errors", "What sagline raises."),
 }

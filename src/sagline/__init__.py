@@ -6,7 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from sagline import control, plc, plot, twin
+    from sagline import control, plc, plot, sweep, twin
     from sagline.article.identify import EmpiricalFit, identify_empirical
     from sagline.article.identify_cable import CableFit, identify_cable
     from sagline.cables.cable import Cable
@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from sagline.files.plc_source import export_scl
     from sagline.files.robot_file import dump_robot, load_robot
     from sagline.files.simulation_file import load_simulation
+    from sagline.files.sweep_file import load_sweep
     from sagline.files.wirex import load_wirex
     from sagline.files.workspace_file import load_workspace
     from sagline.interference.clearance import Clearances, clearance
@@ -248,6 +249,7 @@ __all__ = [
     "load_plan",
     "load_robot",
     "load_simulation",
+    "load_sweep",
     "load_wirex",
     "load_workspace",
     "margin",
@@ -263,6 +265,7 @@ __all__ = [
     "simulate",
     "stiffness",
     "structure_matrix",
+    "sweep",
     "tension_polygon",
     "to_shape",
     "twin",
@@ -409,6 +412,7 @@ _HOMES = {
     "load_plan": "sagline.files.plan_file",
     "load_robot": "sagline.files.robot_file",
     "load_simulation": "sagline.files.simulation_file",
+    "load_sweep": "sagline.files.sweep_file",
     "load_wirex": "sagline.files.wirex",
     "load_workspace": "sagline.files.workspace_file",
     "margin": "sagline.workspaces.margin",
@@ -424,6 +428,7 @@ _HOMES = {
     "simulate": "sagline.dynamics.simulate",
     "stiffness": "sagline.statics.stiffness",
     "structure_matrix": "sagline.statics.balance",
+    "sweep": "sagline.sweep",
     "tension_polygon": "sagline.kinematics.polygon",
     "to_shape": "sagline.dynamics.to_shape",
     "twin": "sagline.twin",

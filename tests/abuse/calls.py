@@ -84,7 +84,7 @@ RESULTS = frozenset(
     | {"Clearances", "FrequencySlopes", "WinchDrive"}
     | {"EnergyBalance", "Imported", "Linearized", "Modes", "Occurrence", "Plan", "Simulation", "Stiffness"}
     | {"control.Execution", "control.Gains", "control.Motion", "control.Samples", "twin.Injected"}
-    | {"Margin", "Workspace", "WrenchSet"}
+    | {"Margin", "Workspace", "WrenchSet", "sweep.Sweep"}
     | {"FrequencyMap", "FrequencyResponse", "TensionPolygon", "Vibration", "WinchRates"}
 )
 # need a machine at the other end, or are one: tests/plc/test_bad_arguments.py
@@ -125,6 +125,7 @@ def calls(folder: Path) -> dict[str, Call]:
         _figures,
         _twins,
         _controls,
+        _sweeps,
     ):
         table |= part(given)
     return table
@@ -747,6 +748,39 @@ def _figures(given: _Given) -> dict[str, Call]:
         "save": (sl.plot.save, {"drawing": ("one", flat), "file": ("file", str(given.folder / "figure.svg"))}),
     }
     return {f"plot.{name}": Call(draw(function), _all(**arguments)) for name, (function, arguments) in table.items()}
+
+
+def _sweeps(given: _Given) -> dict[str, Call]:
+    request, folder = sl.sweep.Request(given.robot, given.poses), given.folder / "sweep"
+    found = sl.sweep.run(request, folder, workers=1)
+    file = given.folder / "sweep.yaml"
+    file.write_text("robots: cogiro\nposes: {grid: {x: 1, y: 1, z: {low: 1, high: 2, count: 2}}}\n")
+    return {
+        "sweep.Request": Call(
+            sl.sweep.Request,
+            _all(
+                robots=("object", given.robot),
+                poses=("one", given.poses),
+                wrenches=("array", np.zeros((2, 6)), True),
+                quantities=("words", ["tension", "length"]),
+                model=("one", sl.Catenary()),
+                tension=("one", sl.MinimumNorm()),
+            ),
+        ),
+        "sweep.run": Call(
+            sl.sweep.run,
+            _all(
+                request=("one", request),
+                folder=("file", folder),
+                workers=("whole", 1, True),
+                progress=("callback", lambda done, of: None, True),
+                tell=("callback", lambda text: None, True),
+            ),
+        ),
+        "sweep.load": Call(sl.sweep.load, _all(folder=("file", folder))),
+        "sweep.Sweep.values": Call(found.values, _all(name=("word", "status"))),
+        "load_sweep": Call(sl.load_sweep, _all(file=("file", file))),
+    }
 
 
 def _twins(given: _Given) -> dict[str, Call]:

@@ -20,6 +20,7 @@ from sagline.cli.commands.log import log
 from sagline.cli.commands.motion import simulate, vibrate
 from sagline.cli.commands.poses import forward, tension
 from sagline.cli.commands.robots import convert, examples, export_c, export_scl, new, robots, show
+from sagline.cli.commands.sweep import sweep
 from sagline.cli.commands.track import encoder, lengths, run, track
 from sagline.cli.commands.twin import twin
 from sagline.cli.commands.view import view
@@ -42,6 +43,7 @@ Start here:
     sagline tension cogiro               ways of sharing a load compared
     sagline vibrate cogiro               how it swings, cables and all
     sagline simulate cogiro --break 3@1s what comes when a cable breaks
+    sagline sweep own_sweep.yaml         robots x poses x loads, on all cores
     sagline article                      the article redone, as one page
     sagline view cogiro                  drag a platform in the browser
     sagline twin article-prototype       a machine to drive, over S7
@@ -145,8 +147,8 @@ def sagline(
 
 
 for command in (
-    track, lengths, encoder, run, article, identify, forward, tension, vibrate, simulate, robots, show, examples, new,
-    convert, export_c, export_scl, view, twin, control, experiment, log,
+    track, lengths, encoder, run, article, identify, forward, tension, vibrate, simulate, sweep, robots, show, examples,
+    new, convert, export_c, export_scl, view, twin, control, experiment, log,
 ):  # fmt: skip
     text = _help(command.__doc__)
     app.command(cls=Command, help=text, short_help=text.partition("\n\n")[0])(command)

@@ -55,6 +55,6 @@ def criteria_of(path: Path, data: Dataset) -> tuple[Criterion, ...]:
     while (key := f"criterion_{len(found)}") in data.attrs:
         known: dict[str, Any] = {}
         if data.attrs[key] == PositionError.__name__:
-            known["model"] = choice_of(path, data, f"{key}_of_model", MODELS)
-        found.append(choice_of(path, data, key, CRITERIA, **known))
+            known["model"] = choice_of(path, data.attrs, f"{key}_of_model", MODELS)
+        found.append(choice_of(path, data.attrs, key, CRITERIA, **known))
     return tuple(found)

@@ -177,12 +177,14 @@ def choice_attributes(key: str, choice: Any, choices: Mapping[str, type[Any]]) -
     return {key: type(choice).__name__, **{name: value for name, value in options.items() if value is not None}}
 
 
-def choice_of(path: FilePath, data: Dataset, key: str, choices: Mapping[str, type[Choice]], **known: Any) -> Choice:
+def choice_of(
+    path: FilePath, attributes: Mapping[str, Any], key: str, choices: Mapping[str, type[Choice]], **known: Any
+) -> Choice:
     """What `choice_attributes` wrote.
 
     Args:
         path: The file, for messages.
-        data: The data set.
+        attributes: Of the file.
         key: What the attributes begin with.
         choices: What it may be, by name.
         **known: Options that are elsewhere in the file.
@@ -193,11 +195,11 @@ def choice_of(path: FilePath, data: Dataset, key: str, choices: Mapping[str, typ
     Raises:
         FileError: If it is none of these, or an option is of another kind.
     """
-    name = data.attrs[key]
+    name = attributes[key]
     if name not in choices:
         raise FileError(path, f"{key} is {name!r}; allowed: {', '.join(choices)}", "Read it with a newer sagline.")
     choice: Any = choices[name]
-    given = {field.name: data.attrs.get(f"{key}_{field.name}") for field in fields(choice)}
+    given = {field.name: attributes.get(f"{key}_{field.name}") for field in fields(choice)}
     try:
         options = {option: _plain(value) for option, value in given.items() if value is not None}
         found: Choice = choice(**{**options, **known})
@@ -235,7 +237,7 @@ def plan_of(path: FilePath, data: Dataset, robot: Robot) -> Plan:
         raise FileError(path, f"{said} of cables over pulleys, but {has} robot's are", CONTENT.again)
     pose = Pose.from_quaternion(values("position"), values("quaternion"))
     cables = CableState(
-        model=choice_of(path, data, "model", MODELS),
+        model=choice_of(path, data.attrs, "model", MODELS),
         cable=robot.cables,
         gravity=robot.gravity,
         **{name: values(FREE.get(name, name) if behind else name) for name in STATE_ARRAYS},
@@ -252,7 +254,7 @@ def plan_of(path: FilePath, data: Dataset, robot: Robot) -> Plan:
     return Plan(
         state=Equilibrium(robot, pose, values("wrench"), cables, contact),
         path=motion,
-        tension=choice_of(path, data, "tension", METHODS),
+        tension=choice_of(path, data.attrs, "tension", METHODS),
         status=values("pose_status"),
         shortfall=values("shortfall"),
         wrench_residual=values("wrench_residual"),

@@ -1,1 +1,9 @@
-"""Robots by poses by loads on as many processes as there are, kept on disk from the first minute."""
+"""Sweeps: every robot at every pose under every wrench, on the workers of Dask, into a folder that can be taken up."""
+
+from sagline.sweep.quantities import QUANTITIES
+from sagline.sweep.request import Request
+from sagline.sweep.result import Sweep, load
+from sagline.sweep.running import run
+from sagline.sweep.work import Counts
+
+__all__ = ["QUANTITIES", "Counts", "Request", "Sweep", "load", "run"]

@@ -1,0 +1,114 @@
+"""`sagline sweep`: a request from a file, run into a folder, and how its requests ended."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from shlex import quote
+from typing import TYPE_CHECKING
+
+from sagline.cli.ending import OUTSIDE
+from sagline.cli.entries import INVERSE, SHARING, VERDICTS
+from sagline.cli.tables import Grid, show_table, written
+from sagline.cli.terminal import note, show, show_json, working
+from sagline.cli.values import whole_of
+from sagline.errors import InvalidValueError, SaglineError
+from sagline.files.names import file_stem
+from sagline.files.sweep_file import load_sweep
+from sagline.files.whole import check_folder, made_folder
+from sagline.sweep.cluster import check_address
+from sagline.sweep.running import MOST_WORKERS, run
+from sagline.tension.options import takes_default_kernel
+
+if TYPE_CHECKING:
+    from sagline.sweep.request import Request
+    from sagline.sweep.result import Sweep
+
+ENDS = {
+    "feasible": "tensions within their limits",
+    "infeasible": "proved that there are none",
+    "unable": "no answer, the status says why",
+    "open": "so near the border that neither was found",
+    "lost": "no verdict",
+}
+
+
+def sweep(file: Path, out: Path | None, workers: str | None, scheduler: str | None, *, as_json: bool) -> int:
+    """Run or take up a sweep, and tell how its requests ended; returns the exit code.
+
+    Raises:
+        SaglineError: If an input is wrong, or something failed on the way; what was done is kept.
+    """
+    count = None if workers is None else whole_of(workers, "--workers", 1, MOST_WORKERS)
+    if scheduler is not None:
+        if count is not None:
+            raise InvalidValueError("--workers", "given with --scheduler", "one of both", "A cluster has its own.")
+        check_address(scheduler)
+    request = load_sweep(file)
+    folder = Path("output") / file_stem(file.stem) if out is None else out
+    check_folder(folder)
+    made_folder(folder.absolute().parent)
+    again = _again(file, folder, workers, scheduler)
+    what = f"{len(request):,} requests"
+    try:
+        with working(what, *_entries(request)) as line:
+            found = run(request, folder, count, scheduler=scheduler, progress=line.progress, tell=_tell)
+    except KeyboardInterrupt:
+        note("", f"To go on: {again}")
+        raise
+    except SaglineError as error:
+        if (folder / "done").exists():
+            error.add_note(f"What is done is kept. To go on: {again}")
+        raise
+    if as_json:
+        show_json(_record(found))
+    else:
+        _show(found)
+    left = found.counts.open + found.counts.lost
+    if left:
+        note(f"{left:,} of {len(request):,} requests: ", "without a verdict", style="bold red")
+    return OUTSIDE if left else 0
+
+
+def _entries(request: Request) -> tuple[str, ...]:
+    return (INVERSE, *[SHARING] * (not takes_default_kernel(request.tension)), VERDICTS)
+
+
+def _tell(text: str) -> None:
+    note("", text)
+
+
+def _again(file: Path, folder: Path, workers: str | None, scheduler: str | None) -> str:
+    """The command that goes on."""
+    words = ["sagline", "sweep", str(file), "--out", str(folder)]
+    words += ["--workers", workers] if workers is not None else []
+    words += ["--scheduler", scheduler] if scheduler is not None else []
+    return " ".join(map(quote, words))
+
+
+def _show(found: Sweep) -> None:
+    robots, poses, wrenches = found.request.shape
+    total = len(found.request)
+    counts = found.counts._asdict()
+    rows = [
+        [name, f"{count:,}", written(100.0 * count / total, ".3g"), ENDS[name]]
+        for name, count in counts.items()
+        if count
+    ]
+    title = f"{robots:,} robots x {poses:,} poses x {wrenches:,} wrenches"
+    show_table(Grid(["requests", "number", "[%]", ""], rows, title))
+    show(f"{found.tasks:,} tasks, {found.seconds:,.1f} s of work; variables: {', '.join(found.names)}")
+    show(f"In {found.folder.resolve()}: read with sl.sweep.load({str(found.folder)!r})", whole=True)
+
+
+def _record(found: Sweep) -> dict[str, object]:
+    robots, poses, wrenches = found.request.shape
+    return {
+        "folder": found.folder,
+        "robots": robots,
+        "poses": poses,
+        "wrenches": wrenches,
+        "quantities": found.request.quantities,
+        "tasks": found.tasks,
+        "seconds": found.seconds,
+        **found.counts._asdict(),
+    }

@@ -1,0 +1,206 @@
+"""Files that ask for a sweep: robots, poses, wrenches and quantities in YAML, with units."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final, cast
+
+import numpy as np
+
+from sagline.arguments import brief, file_path, whole_number
+from sagline.arrays import Array, checked
+from sagline.errors import FileError, InvalidValueError
+from sagline.files.path_file import load_path
+from sagline.files.plan_file import MODELS, Choice
+from sagline.files.quantity import in_si
+from sagline.files.robot_file import load_robot
+from sagline.files.schema import Entry, validated
+from sagline.files.text import read_text
+from sagline.files.yaml_text import YAML_LIMIT, parse_mapping
+from sagline.memory import check_memory
+from sagline.robot.catalogue import robot_names
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.sweep.request import Request
+from sagline.tension.methods import METHODS
+
+KEYS: Final = ("low", "high", "count")  # of an axis: its ends, and how many points there are between them
+ANGLES: Final = ("alpha", "beta", "gamma")
+MOST: Final = 1_000_000_000  # points of a grid; memory is asked about besides
+
+
+class _Grid(Entry):
+    """A grid of poses: each coordinate one value, or an axis."""
+
+    x: Any
+    y: Any
+    z: Any
+    alpha: Any = 0.0
+    beta: Any = 0.0
+    gamma: Any = 0.0
+
+
+class _Poses(Entry):
+    grid: _Grid | None = None
+    path: str | None = None
+
+
+class _Loads(Entry):
+    """A grid of forces and moments: each component one value, or an axis."""
+
+    force_x: Any = 0.0
+    force_y: Any = 0.0
+    force_z: Any = 0.0
+    moment_x: Any = 0.0
+    moment_y: Any = 0.0
+    moment_z: Any = 0.0
+
+
+class _Wrenches(Entry):
+    grid: _Loads | None = None
+    rows: list[Any] | None = None
+
+
+class _SweepEntry(Entry):
+    robots: Any
+    poses: _Poses
+    wrenches: _Wrenches | None = None
+    quantities: Any = "tension"
+    model: str = "catenary"
+    tension: str = "minimum-norm"
+
+
+def load_sweep(file: os.PathLike[str] | str) -> Request:
+    """Read what a file asks of a sweep.
+
+    A sweep file is YAML; a quantity is a number in SI or a text with its unit, and what varies is an axis with its ends
+    and how many points there are from one to the other:
+
+        robots: [cogiro, own_robot.yaml]       # presets, and files beside this one
+        poses:
+          grid:                                # or path: own_path.yaml, the poses of a path
+            x: {low: -3 m, high: 3 m, count: 25}
+            y: {low: -2 m, high: 2 m, count: 17}
+            z: 1500 mm
+            alpha: {low: -10 deg, high: 10 deg, count: 3}   # about z; beta about y, gamma about x
+        wrenches:                              # left out: the weight alone
+          grid:                                # or rows: [[fx, fy, fz, mx, my, mz], ...]
+            force_x: {low: -100 N, high: 100 N, count: 11}
+            moment_z: 5 N*m
+        quantities: [tension, shortfall]       # of sl.sweep.QUANTITIES
+        model: catenary                        # as of sagline track, and so is tension: minimum-norm
+
+    Args:
+        file: The file.
+
+    Returns:
+        The request.
+
+    Raises:
+        FileError: If the file cannot be read, or what it says is no request; the message names the key.
+    """
+    path = file_path(file)
+    if path.suffix.lower() not in (".yaml", ".yml"):
+        reason = f"the suffix is {path.suffix or 'missing'}; allowed: .yaml, .yml"
+        raise FileError(path, reason, "Give a sweep file: sagline examples writes one.")
+    entry = validated(parse_mapping(read_text(path, YAML_LIMIT), path), _SweepEntry, path)
+    try:
+        return Request(
+            _robots(entry.robots, path.parent),
+            _poses(entry.poses, path.parent),
+            _wrenches(entry.wrenches),
+            entry.quantities,
+            model=_named(entry.model, "model", MODELS)(),
+            tension=_named(entry.tension, "tension", METHODS)(),
+        )
+    except InvalidValueError as error:
+        raise FileError.of(path, error) from None
+
+
+def _robots(given: Any, folder: Path) -> list[Robot]:
+    names = given if isinstance(given, list) else [given]
+    for k, name in enumerate(names):
+        if not isinstance(name, str) or not name.strip():
+            step = f"Give a preset ({', '.join(robot_names()[:3])}, ...) or a robot file."
+            raise InvalidValueError(f"robots[{k}]", brief(name), "the name of a robot, or its file", step)
+    return [load_robot(name if name in robot_names() else _beside(name, folder)) for name in names]
+
+
+def _beside(name: str, folder: Path) -> str | Path:
+    """A file's name as seen from the folder of the sweep's file; what is no file's name stays what it is."""
+    return folder / name if Path(name).suffix.lower() in (".yaml", ".yml") else name
+
+
+def _poses(given: _Poses, folder: Path) -> Pose:
+    if (given.grid is None) == (given.path is None):
+        both = "given by grid and path" if given.grid is not None else "given by nothing"
+        raise InvalidValueError("poses", both, "a grid, or a path", "Give one of the two.")
+    if given.path is not None:
+        return load_path(folder / file_path(given.path, "poses.path")).pose
+    units = dict.fromkeys("xyz", "m") | dict.fromkeys(ANGLES, "rad")
+    points = _product({name: _axis(value, f"poses.grid.{name}", units[name]) for name, value in given.grid or ()})
+    return Pose.from_euler(points[:, :3], *points[:, 3:].T)
+
+
+def _wrenches(given: _Wrenches | None) -> Array | None:
+    if given is None:
+        return None
+    if (given.grid is None) == (given.rows is None):
+        both = "given by grid and rows" if given.grid is not None else "given by nothing"
+        raise InvalidValueError("wrenches", both, "a grid, or rows", "Give one of the two, or leave wrenches out.")
+    if given.grid is not None:
+        return _product({name: _axis(value, f"wrenches.grid.{name}", _unit(name)) for name, value in given.grid})
+    names = tuple(_Loads.model_fields)
+    rows = []
+    for k, row in enumerate(given.rows or ()):
+        if not isinstance(row, list) or len(row) != len(names):
+            step = "Give force x, y, z, then moment x, y, z."
+            raise InvalidValueError(f"wrenches.rows[{k}]", brief(row), "a list of six quantities", step)
+        pairs = zip(names, row, strict=True)
+        rows.append([_one(value, f"wrenches.rows[{k}]: {name}", _unit(name)) for name, value in pairs])
+    return np.array(rows).reshape(-1, len(names))
+
+
+def _unit(name: str) -> str:
+    return "N" if name.startswith("force") else "N*m"
+
+
+def _one(given: Any, item: str, unit: str) -> float:
+    return float(checked(cast(float, in_si(given, unit, item)), item, unit, shape=()))
+
+
+def _axis(given: Any, item: str, unit: str) -> Array:
+    """The points of an axis, or the one value."""
+    if not isinstance(given, dict):
+        return np.array([_one(given, item, unit)])
+    if set(given) != set(KEYS):
+        keys = ", ".join(map(str, given)) or "nothing"
+        raise InvalidValueError(item, f"given by {brief(keys)}", ", ".join(KEYS), "Give these three, or one value.")
+    low, high = (_one(given[key], f"{item}.{key}", unit) for key in KEYS[:2])
+    count = whole_number(given["count"], f"{item}.count", 1, MOST)
+    if high < low or (high > low) != (count > 1):
+        allowed = f"{count} points from low up to high" if count > 1 else "one value, where there is one point"
+        raise InvalidValueError(item, f"{low:g} to {high:g} {unit}", allowed, f"Correct {item}.")
+    check_memory(item, 8.0 * count, "Take fewer points.")
+    return np.linspace(low, high, count)
+
+
+def _product(axes: dict[str, Array]) -> Array:
+    """All points of a grid, the last axis fastest, shape (N, axes)."""
+    count = int(np.prod([float(len(axis)) for axis in axes.values()]))
+    check_memory(f"a grid of {count:,} points", 24.0 * count * len(axes), "Take fewer points.")
+    return np.stack(np.meshgrid(*axes.values(), indexing="ij"), axis=-1).reshape(-1, len(axes))
+
+
+def _named(word: str, item: str, kinds: Mapping[str, type[Choice]]) -> type[Choice]:
+    """A model or method by the word that the command has for it: minimum-norm."""
+    words = {_word(name): kind for name, kind in kinds.items()}
+    if word not in words:
+        raise InvalidValueError(item, brief(word), ", ".join(words), f"Choose one of them as {item}.")
+    return words[word]
+
+
+def _word(name: str) -> str:
+    return "".join(f"-{letter.lower()}" if letter.isupper() else letter for letter in name).lstrip("-")

@@ -1,0 +1,300 @@
+"""Folders of sweeps: a Zarr group with the request in it, one chunk of each variable a task.
+
+Whoever has the folder has the request, to the last bit; so a task is a number, on any machine that sees the folder.
+Chunks carry their checksum: one that is torn is told from one that is whole.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import os
+from collections.abc import Mapping
+from importlib.metadata import version
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sagline.errors import FileError, InvalidValueError
+from sagline.files.content import Content
+from sagline.files.plan_file import MODELS, choice_attributes, choice_of
+from sagline.files.robot_file import dump_robot, parse_robot
+from sagline.files.staging import staging
+from sagline.robot.pose import Pose
+from sagline.sweep.quantities import Variable, variables_of
+from sagline.sweep.request import Request
+from sagline.sweep.work import Part
+from sagline.tension.methods import METHODS
+
+if TYPE_CHECKING:
+    from zarr import Group
+
+CONTENT: Final = Content(
+    name="sweep",
+    made="folder of sagline sweep",
+    give="Give the folder that sagline sweep wrote.",
+    again="Sweep again, into another folder.",
+    key="sagline_sweep_format",
+    format=1,
+)
+DIMENSIONS: Final = ("robot", "pose", "wrench")
+GROUP: Final = "numbers.zarr"  # in the folder, beside what is no matter of Zarr
+UNASKED: Final = -1  # status of what has not been asked yet
+GIVEN: Final = {  # arrays of the request: their dimensions and units
+    "position": ("pose", "axis", "m"),
+    "quaternion": ("pose", "quaternion_part", "1"),
+    "wrench": ("wrench", "wrench_part", "N, N m"),
+}
+STEP: Final = "Free some space or correct the permissions, and run the same again: it goes on where it stopped."
+
+
+class TaskSize(NamedTuple):
+    """How many poses and wrenches of one robot a task has; fixed when the folder is made."""
+
+    poses: int
+    wrenches: int
+
+
+class SweepFolder(NamedTuple):
+    """A folder that is open.
+
+    Attributes:
+        path: Where it is.
+        group: Its Zarr group.
+        request: The request in it.
+        digest: Of the request.
+        size: Of a task.
+        made_by: The sagline that made it.
+    """
+
+    path: Path
+    group: Group
+    request: Request
+    digest: str
+    size: TaskSize
+    made_by: str
+
+    @property
+    def grid(self) -> tuple[int, int, int]:
+        """How many tasks there are along robots, poses and wrenches."""
+        robots, poses, wrenches = self.request.shape
+        return robots, math.ceil(poses / self.size.poses), math.ceil(wrenches / self.size.wrenches)
+
+    @property
+    def tasks(self) -> int:
+        """How many tasks there are."""
+        return math.prod(self.grid)
+
+    def part(self, number: int) -> Part:
+        """The box of requests of a task."""
+        _, poses, wrenches = self.request.shape
+        robot, row, column = (int(k) for k in np.unravel_index(number, self.grid))
+        first, left = row * self.size.poses, column * self.size.wrenches
+        rows = slice(first, min(first + self.size.poses, poses))
+        return Part(robot, rows, slice(left, min(left + self.size.wrenches, wrenches)))
+
+    def write(self, number: int, numbers: Mapping[str, NDArray[np.generic]]) -> None:
+        """Write the chunks of a task, each whole.
+
+        Raises:
+            FileError: If the disk is full, or the folder cannot be written.
+        """
+        robot, rows, columns = self.part(number)
+        try:
+            for name, values in numbers.items():
+                array: Any = self.group[name]
+                # a chunk of nothing but what stands where nothing was written is written too
+                array.with_config({"write_empty_chunks": True})[robot, rows, columns] = values
+        except OSError as error:
+            raise FileError(self.path, f"cannot be written ({error.strerror or error})", STEP) from None
+
+    def read(self, number: int) -> dict[str, NDArray[np.generic]] | None:
+        """The numbers of a task; None where a chunk is missing or torn."""
+        robot, rows, columns = self.part(number)
+        numbers = {}
+        for variable in variables_of(self.request.quantities):
+            array: Any = self.group[variable.name]
+            if not self._chunk(number, variable).is_file():
+                return None
+            try:
+                numbers[variable.name] = np.asarray(array[robot, rows, columns])
+            except (ValueError, RuntimeError, OSError):  # of the checksum, of what unpacks, of the disk
+                return None
+        return numbers
+
+    def _chunk(self, number: int, variable: Variable) -> Path:
+        """The file of a chunk, as Zarr names it."""
+        place: list[Any] = [*np.unravel_index(number, self.grid), *[0] * variable.a_cable]
+        return self.path.joinpath(GROUP, variable.name, "c", *map(str, place))
+
+
+def make_folder(path: Path, request: Request, size: TaskSize) -> None:
+    """Make the folder of a sweep, whole or not at all.
+
+    Args:
+        path: Where; nothing is there, or an empty folder.
+        request: The request.
+        size: Of a task.
+
+    Raises:
+        FileError: If it cannot be made.
+        InvalidValueError: If the model or the way of sharing is none of sagline's.
+    """
+    check_packages()
+    texts = [dump_robot(robot) for robot in request.robots]
+    options = _options(request)
+    attributes = {
+        **CONTENT.attributes(f"Sweep of {len(request):,} requests"),
+        "digest": _digest(texts, options, request),
+        "task_poses": size.poses,
+        "task_wrenches": size.wrenches,
+        "robots": texts,
+        **options,
+    }
+    try:
+        with staging(path.absolute().parent) as place:
+            _fill(place / path.name / GROUP, request, size, attributes)
+            os.replace(place / path.name, path)
+    except OSError as error:
+        reason = f"cannot be made ({error.strerror or error})"
+        raise FileError(path, reason, "Check its name, the permissions and the space on the disk.") from None
+
+
+def open_folder(path: Path) -> SweepFolder:
+    """Open the folder of a sweep.
+
+    Args:
+        path: Where.
+
+    Returns:
+        The folder, with the request.
+
+    Raises:
+        FileError: If there is none, or it is not as it was made.
+    """
+    import zarr
+
+    check_packages()
+    if not path.is_dir():
+        raise FileError(path, "is no folder", CONTENT.give)
+    try:
+        group = zarr.open_group(path / GROUP, mode="r+", zarr_format=3)
+        attributes: dict[str, Any] = dict(group.attrs)
+        given: dict[str, Any] = {name: group[name] for name in GIVEN}
+    except (OSError, ValueError, KeyError, TypeError):
+        raise FileError(path, "is no folder of a sweep", CONTENT.give) from None
+    CONTENT.format_of(path, attributes)
+    try:
+        texts = list(attributes["robots"])
+        request = Request(
+            [parse_robot(text, f"{path}, robot {k}") for k, text in enumerate(texts)],
+            Pose.from_quaternion(given["position"][:], given["quaternion"][:]),
+            given["wrench"][:],
+            attributes["quantities"],
+            model=choice_of(path, attributes, "model", MODELS),
+            tension=choice_of(path, attributes, "tension", METHODS),
+        )
+        size = TaskSize(int(attributes["task_poses"]), int(attributes["task_wrenches"]))
+        made_by, digest = str(attributes["source"]), str(attributes["digest"])
+    except (KeyError, ValueError, TypeError, RuntimeError, OSError) as error:
+        if isinstance(error, InvalidValueError):
+            raise FileError.of(path, error) from None
+        raise FileError(path, f"is damaged ({type(error).__name__}: {error})", CONTENT.again) from None
+    if digest != digest_of(request) or min(size) < 1:
+        raise FileError(path, "is not as it was made: its digest is another", CONTENT.again)
+    return SweepFolder(path, group, request, digest, size, made_by)
+
+
+def digest_of(request: Request) -> str:
+    """What tells a request from all others: the same robots, poses, wrenches, quantities and methods have the same."""
+    return _digest([dump_robot(robot) for robot in request.robots], _options(request), request)
+
+
+def check_made_here(folder: SweepFolder) -> None:
+    """Refuse to go on with what another sagline began: its numbers need not be the same.
+
+    Raises:
+        FileError: If it was another version.
+    """
+    here = f"sagline {version('sagline')}"
+    if folder.made_by != here:
+        step = f"Finish it with {folder.made_by}, or sweep into another folder."
+        raise FileError(folder.path, f"was begun by {folder.made_by}, and this is {here}", step)
+
+
+def check_packages() -> None:
+    """Say what to install where it is missing.
+
+    Raises:
+        InvalidValueError: If Zarr is not installed.
+    """
+    if find_spec("zarr") is None:
+        step = 'Install it: pip install "sagline[sweep]".'
+        raise InvalidValueError("the package zarr", "not installed", "installed, for sweeps", step)
+
+
+def _options(request: Request) -> dict[str, Any]:
+    """What of a request is neither robot nor array, as JSON has it."""
+    options = {
+        "quantities": list(request.quantities),
+        **choice_attributes("model", request.model, MODELS),
+        **choice_attributes("tension", request.tension, METHODS),
+    }
+    return {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in options.items()}
+
+
+def _digest(texts: list[str], options: Mapping[str, Any], request: Request) -> str:
+    found = hashlib.sha256(json.dumps([texts, options], sort_keys=True).encode())
+    for array in _arrays(request).values():
+        found.update(str(array.shape).encode() + np.ascontiguousarray(array).tobytes())
+    return found.hexdigest()
+
+
+def _arrays(request: Request) -> dict[str, NDArray[np.float64]]:
+    """In the order of GIVEN."""
+    return dict(zip(GIVEN, (request.poses.position, request.poses.quaternion, request.wrenches), strict=True))
+
+
+def _fill(place: Path, request: Request, size: TaskSize, attributes: dict[str, Any]) -> None:
+    import zarr
+    from zarr.codecs import Crc32cCodec, ZstdCodec
+
+    group = zarr.create_group(place, zarr_format=3, attributes=attributes)
+    codecs = [ZstdCodec(level=1), Crc32cCodec()]
+    for name, values in _arrays(request).items():
+        along, part, unit = GIVEN[name]
+        group.create_array(
+            name,
+            data=np.ascontiguousarray(values),
+            chunks=values.shape,
+            compressors=codecs,
+            dimension_names=(along, part),
+            attributes={"units": unit},
+        )
+    for variable in variables_of(request.quantities):
+        cables = (request.cable_count,) if variable.a_cable else ()
+        group.create_array(
+            variable.name,
+            shape=(*request.shape, *cables),
+            dtype=variable.type,
+            chunks=(1, *size, *cables),
+            compressors=codecs,
+            fill_value=UNASKED if variable.type == "int8" else math.nan,
+            dimension_names=(*DIMENSIONS, *["cable"] * variable.a_cable),
+            attributes=_attributes(variable),
+        )
+
+
+def _attributes(variable: Variable) -> dict[str, Any]:
+    """As the CF conventions want them."""
+    found: dict[str, Any] = {"long_name": variable.long_name}
+    if variable.unit:
+        found["units"] = variable.unit
+    if variable.codes is not None:
+        found["flag_values"] = [UNASKED, *(int(code) for code in variable.codes)]
+        found["flag_meanings"] = " ".join(["unasked", *(code.name.lower() for code in variable.codes)])
+    return found

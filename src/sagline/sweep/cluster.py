@@ -1,0 +1,227 @@
+"""Workers of Dask: processes of this machine, or those of a cluster whose address is given."""
+
+from __future__ import annotations
+
+import logging
+import os
+import socket
+import time
+import uuid
+import warnings
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from importlib.util import find_spec
+from itertools import islice
+from typing import Any, Final
+
+from sagline.errors import InvalidValueError, SaglineError
+from sagline.sweep.tasks import task
+
+HERE: Final = "127.0.0.1"  # nobody else is served
+DASHBOARD: Final = 8787
+PATIENCE: Final = 15.0  # s, for a scheduler to answer and a worker to be there
+AHEAD: Final = 2  # tasks a worker: it has the next when it has done one
+LOOK: Final = 5.0  # s between two looks at how many workers there are
+SCHEMES: Final = ("tcp://", "tls://", "ws://", "wss://")
+LOGGERS: Final = ("distributed", "tornado", "bokeh", "asyncio")
+SILENT: Final = logging.CRITICAL + 1
+
+Job = tuple[str, str]  # folder and digest
+Finish = Callable[[int, float, tuple[int, ...]], None]
+
+
+def cores() -> int:
+    """Processors that this process may use."""
+    with suppress(AttributeError):  # not on every system
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def has_dask() -> bool:
+    """Whether Dask's scheduler is installed."""
+    return find_spec("distributed") is not None
+
+
+@contextmanager
+def local_workers(workers: int, tell: Callable[[str], None]) -> Iterator[Any]:
+    """Processes of this machine, which listen to it alone.
+
+    Args:
+        workers: How many.
+        tell: Told where the dashboard is.
+
+    Yields:
+        The client.
+
+    Raises:
+        SaglineError: If they cannot be started.
+    """
+    with quiet():
+        import distributed as dask
+
+        api: Any = dask  # has types for a part of itself
+
+        free = _is_free(DASHBOARD)
+        try:
+            cluster = api.LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                processes=True,
+                host=HERE,
+                dashboard_address=f"{HERE}:{DASHBOARD if free else 0}",
+                memory_limit=0,
+                silence_logs=SILENT,
+                preload=["sagline.sweep.deaf"],
+            )
+        except (RuntimeError, OSError, TimeoutError) as error:
+            step = 'In a script, call it below: if __name__ == "__main__":'
+            raise SaglineError(f"The workers could not be started ({_first_line(error)}). {step}") from None
+        with cluster, api.Client(cluster, set_as_default=False) as client:
+            taken = "" if free else f"; port {DASHBOARD} is taken"
+            tell(f"Dashboard: {cluster.dashboard_link}{taken}")
+            yield client
+
+
+@contextmanager
+def remote_workers(address: str) -> Iterator[Any]:
+    """The workers of a scheduler.
+
+    Args:
+        address: Where it listens: "tcp://10.0.0.1:8786".
+
+    Yields:
+        The client.
+
+    Raises:
+        InvalidValueError: If it is no address.
+        SaglineError: If nobody answers there, or has workers.
+    """
+    check_address(address)
+    with quiet():
+        import distributed as dask
+
+        api: Any = dask
+
+        try:
+            client = api.Client(address, timeout=PATIENCE, set_as_default=False)
+        except (OSError, ValueError, RuntimeError) as error:
+            step = "Start one: dask scheduler; and workers: dask worker ADDRESS."
+            raise SaglineError(f"No scheduler answers at {address} ({_first_line(error)}). {step}") from None
+        with client:
+            try:
+                client.wait_for_workers(1, timeout=PATIENCE)
+            except (TimeoutError, OSError):
+                step = f"Start one: dask worker {address}"
+                raise SaglineError(f"The scheduler at {address} has no workers. {step}") from None
+            yield client
+
+
+def check_address(address: object) -> str:
+    """Refuse what is no address of a scheduler.
+
+    Raises:
+        InvalidValueError: If it is none.
+    """
+    if isinstance(address, str) and address.isprintable() and address.isascii():
+        scheme = next((each for each in SCHEMES if address.startswith(each)), None)
+        host, _, port = address.removeprefix(scheme or "").rpartition(":")
+        if scheme and host and " " not in host and port.isdecimal() and 0 < int(port) < 1 << 16:
+            return address
+    raise InvalidValueError("scheduler", repr(address), "an address, tcp://HOST:PORT", "Take the one it prints.")
+
+
+def spread(client: Any, job: Job, numbers: Iterable[int], finish: Finish) -> None:
+    """Have tasks done by the workers, a few of them at a time.
+
+    Where something fails, or Ctrl-C comes, the tasks that are with the workers are finished, and no others begun.
+
+    Args:
+        client: Of Dask.
+        job: Folder and digest.
+        numbers: The tasks.
+        finish: Told of each that is done.
+
+    Raises:
+        SaglineError: If the scheduler is gone, or a task ends its workers.
+    """
+    import distributed as dask
+
+    api: Any = dask
+
+    waiting = iter(numbers)
+    run = uuid.uuid4().hex[:8]
+    which: dict[Any, int] = {}
+    ahead = api.as_completed(loop=client.loop)
+    width, looked = 0, -LOOK
+
+    def send() -> None:
+        nonlocal width, looked
+        if time.monotonic() - looked > LOOK:
+            width, looked = AHEAD * max(1, sum(client.ncores().values())), time.monotonic()
+        for number in islice(waiting, max(0, width - len(which))):
+            future = client.submit(task, *job, number, key=f"sagline-{run}-{number}", pure=False)
+            which[future] = number
+            ahead.add(future)
+
+    def take(future: Any) -> None:
+        number = which.pop(future)
+        seconds, counts = _result(future)
+        future.release()
+        finish(number, seconds, counts)
+
+    try:
+        send()
+        for future in ahead:
+            take(future)
+            send()
+    except BaseException:
+        if client.status == "running":
+            for future in ahead:
+                with suppress(Exception):
+                    take(future)
+        raise
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """While inside, Dask and what it is made of say nothing on the terminal."""
+    loggers = [logging.getLogger(name) for name in LOGGERS]
+    levels = [logger.level for logger in loggers]
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", module=rf"({'|'.join((*LOGGERS, 'dask'))})(\.|$)")
+        try:
+            if has_dask():
+                import distributed  # noqa: F401 - sets its loggers up, and would undo what follows
+            for logger in loggers:
+                logger.setLevel(SILENT)
+            yield
+        finally:
+            for logger, level in zip(loggers, levels, strict=True):
+                logger.setLevel(level)
+
+
+def _result(future: Any) -> tuple[float, tuple[int, ...]]:
+    from distributed import KilledWorker
+
+    if future.status in ("cancelled", "lost"):
+        raise SaglineError("The scheduler is gone. What was done is kept: run the same again to go on.")
+    try:
+        found: tuple[float, tuple[int, ...]] = future.result()
+    except KilledWorker as error:
+        text = f"A task ended every worker that took it ({_first_line(error)[:80]})"
+        raise SaglineError(f"{text}. Look at the memory of the workers; then run the same again.") from None
+    return found
+
+
+def _is_free(port: int) -> bool:
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((HERE, port))
+        except OSError:
+            return False
+    return True
+
+
+def _first_line(error: BaseException) -> str:
+    return next(iter(str(error).splitlines()), type(error).__name__)

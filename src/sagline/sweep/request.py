@@ -1,0 +1,129 @@
+"""What a sweep is asked: robots x poses x wrenches, and which numbers of each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence, Sized
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sagline.arguments import brief, choice, instance
+from sagline.arrays import Array, checked, locked
+from sagline.cables.catenary import Catenary
+from sagline.cables.model import CableModel
+from sagline.errors import InvalidValueError
+from sagline.kinematics.winding import without_guides
+from sagline.results import Result
+from sagline.robot.pose import Pose
+from sagline.robot.reach import check_reach
+from sagline.robot.robot import Robot
+from sagline.sweep.quantities import QUANTITIES
+from sagline.tension.method import TensionMethod
+from sagline.tension.minimum_norm import MinimumNorm
+from sagline.tension.options import kernel_options
+
+MOST: Final = 1 << 40  # requests: a year on a hundred cores
+_CATENARY: Final = Catenary()
+_MINIMUM_NORM: Final = MinimumNorm()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Request(Result):
+    """Every robot at every pose under every wrench, and what is asked of each.
+
+    Attributes:
+        robots: R of them.
+        poses: A batch of P.
+        wrenches: External wrenches on the platform, about the center of mass in world axes [N, N m], shape (W, 6).
+        quantities: What is asked, in the order of `sl.sweep.QUANTITIES`: "tension", "length", "shortfall".
+        model: Cable model.
+        tension: How the load is shared among redundant cables; each request stands alone.
+    """
+
+    robots: tuple[Robot, ...]
+    poses: Pose
+    wrenches: Array
+    quantities: tuple[str, ...]
+    model: CableModel
+    tension: TensionMethod
+
+    def __init__(
+        self,
+        robots: Robot | Sequence[Robot],
+        poses: Pose,
+        wrenches: ArrayLike | None = None,
+        quantities: str | Sequence[str] = ("tension",),
+        *,
+        model: CableModel = _CATENARY,
+        tension: TensionMethod = _MINIMUM_NORM,
+    ) -> None:
+        """Check what is asked.
+
+        Args:
+            robots: A robot, or a sequence of them; they need not have equally many cables.
+            poses: A pose, or a batch.
+            wrenches: Force [N], then moment [N m], shape (6,) or (W, 6); None for the weight alone.
+            quantities: One of `sl.sweep.QUANTITIES`, or several.
+            model: Cable model.
+            tension: How the load is shared.
+
+        Raises:
+            InvalidValueError: If an argument is none of its kind, there is nothing of one, a robot cannot share its
+                load so, or a pose is outside its motions.
+        """
+        machines = (robots,) if isinstance(robots, Robot) else _sequence(robots, "robots", "a Robot, or a list of them")
+        machines = tuple(instance(one, Robot, f"robots[{k}]") for k, one in enumerate(machines))
+        batch = instance(poses, Pose, "poses")
+        if not batch.shape:
+            batch = Pose.from_quaternion(batch.position[None], batch.quaternion[None])
+        loads = np.atleast_2d(checked(np.zeros(6) if wrenches is None else wrenches, "wrenches", "N, N m", shape=(6,)))
+        if loads.ndim > 2:
+            raise InvalidValueError("wrenches", f"of shape {loads.shape}", "shape (6,) or (W, 6)", "Flatten the axes.")
+        words = (quantities,) if isinstance(quantities, str) else _sequence(quantities, "quantities", "a list of words")
+        asked = {choice(word, f"quantities[{k}]", QUANTITIES) for k, word in enumerate(words)}
+        if len(asked) < len(words):
+            raise InvalidValueError("quantities", brief(list(words)), "each once", "Leave out what is there twice.")
+        given: dict[str, Sized] = {"robots": machines, "poses": batch, "wrenches": loads, "quantities": asked}
+        for item, some in given.items():
+            if not len(some):
+                raise InvalidValueError(item, "empty", "one or more", f"Give {item}.")
+        if (count := len(machines) * len(batch) * len(loads)) > MOST:
+            raise InvalidValueError("the sweep", f"of {count:,} requests", f"<= {MOST:,}", "Ask for fewer at a time.")
+        instance(model, CableModel, "model")
+        method = instance(tension, TensionMethod, "tension").alone
+        for one in machines:
+            kernel_options(without_guides(one, "a sweep", "inverse"), model, method)
+            check_reach(one, batch, "poses")
+        values: dict[str, Any] = {
+            "robots": machines,
+            "poses": batch,
+            "wrenches": locked(np.ascontiguousarray(loads)),
+            "quantities": tuple(name for name in QUANTITIES if name in asked),
+            "model": model,
+            "tension": method,
+        }
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """How many robots, poses and wrenches."""
+        return len(self.robots), len(self.poses), len(self.wrenches)
+
+    @property
+    def cable_count(self) -> int:
+        """Number of cables of the robot that has most."""
+        return max(robot.cable_count for robot in self.robots)
+
+    def __len__(self) -> int:
+        """Number of requests."""
+        robots, poses, wrenches = self.shape
+        return robots * poses * wrenches
+
+
+def _sequence(value: Any, item: str, allowed: str) -> tuple[Any, ...]:
+    if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes):
+        return tuple(value)
+    raise InvalidValueError(item, brief(value), allowed, f"Give {item} as a list.")

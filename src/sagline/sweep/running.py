@@ -1,0 +1,186 @@
+"""Runs a sweep: on the workers of Dask, or task after task; and goes on with one that was stopped."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from sagline.arguments import callback, file_path, instance, whole_number
+from sagline.blocks import Progress
+from sagline.errors import FileError, InvalidValueError
+from sagline.sweep.cluster import check_address, cores, has_dask, local_workers, remote_workers, spread
+from sagline.sweep.request import Request
+from sagline.sweep.result import Sweep, load
+from sagline.sweep.tasks import found_counts, measured_size, task
+from sagline.sweep.work import Counts
+
+if TYPE_CHECKING:
+    from sagline.files.sweep_folder import SweepFolder
+    from sagline.files.sweep_marks import Marks
+
+MOST_WORKERS: Final = 1024
+FEW: Final = 4  # tasks that are done before workers would have started
+Tell = Callable[[str], None]
+
+
+def run(
+    request: Request,
+    folder: os.PathLike[str] | str,
+    workers: int | None = None,
+    *,
+    scheduler: str | None = None,
+    progress: Progress | None = None,
+    tell: Tell | None = None,
+) -> Sweep:
+    """Run a sweep into a folder, or go on with it where it stopped.
+
+    The folder has partial results from the first minute, and a file `done` with a line for each task that is done. It
+    is taken up again by the same call: what is done, and whole on the disk, is not done again. Ctrl-C stops when the
+    tasks that run are done. A worker that is killed is replaced, and its task done again.
+
+    Args:
+        request: What is asked.
+        folder: Where to; made if missing, in a folder that is there. It may hold the same sweep, and nothing else.
+        workers: Processes of this machine; None for one a processor. With 1, without Dask, and where four tasks or
+            fewer are left, these are done in this process, one after the other.
+        scheduler: Address of Dask's scheduler of a cluster, "tcp://10.0.0.1:8786", in place of workers; all its workers
+            must see the folder under the same name.
+        progress: Called after each task: how many are done, of how many.
+        tell: Called with what a person may want to know: where the dashboard is, why there is none.
+
+    Returns:
+        The sweep, as `load` reads it.
+
+    Raises:
+        InvalidValueError: If an argument is none of its kind, or Zarr is not installed.
+        FileError: If the folder holds something else or cannot be written; what was done is kept.
+        SaglineError: If the workers or the scheduler fail; what was done is kept.
+
+    Examples:
+        >>> import sagline as sl
+        >>> poses = sl.Pose.from_euler([[0, 0, 2], [3, 2, 2]], 0, 0, 0)
+        >>> request = sl.sweep.Request(sl.load_robot("cogiro"), poses)
+        >>> print(sl.sweep.run(request, "sweep", workers=1).values("status"))
+        [[[0]
+          [0]]]
+    """
+    from sagline.files.sweep_folder import check_packages
+    from sagline.files.sweep_marks import Mark, marking
+
+    instance(request, Request, "request")
+    path = file_path(folder, "folder", folder=True)
+    count = cores() if workers is None else whole_number(workers, "workers", 1, MOST_WORKERS)
+    if scheduler is not None:
+        check_address(scheduler)
+        if workers is not None:
+            step = "Leave one of them out."
+            raise InvalidValueError("workers", "given with scheduler", "one of the two", step)
+        _check_dask()
+    told, say = callback(progress, "progress"), callback(tell, "tell") or _nothing
+    check_packages()
+    opened = _made(path, request)
+    with marking(opened) as marks:
+        waiting = _waiting(opened, marks)
+        clock = _Clock(len(waiting))
+
+        def finish(number: int, seconds: float, counts: tuple[int, ...]) -> None:
+            marks.add(number, Mark(seconds, Counts(*counts)), clock.left())
+            if told is not None:
+                told(len(marks.marks), opened.tasks)
+
+        if told is not None:
+            told(len(marks.marks), opened.tasks)
+        job = (str(path.absolute()), opened.digest)
+        with _workers(count, scheduler, len(waiting), say) as client:
+            clock.begin()
+            if client is not None:
+                spread(client, job, waiting, finish)
+            else:
+                for number in waiting:
+                    finish(number, *task(*job, number))
+    return load(path)
+
+
+class _Clock:
+    """Tells how long the rest takes, from how long each task so far took all workers together."""
+
+    def __init__(self, tasks: int) -> None:
+        self._tasks, self._done, self._start = tasks, 0, 0.0
+
+    def begin(self) -> None:
+        self._start = time.monotonic()
+
+    def left(self) -> float:
+        """Another task is done; time for the rest [s]."""
+        self._done += 1
+        return (time.monotonic() - self._start) / self._done * (self._tasks - self._done)
+
+
+def _made(path: Path, request: Request) -> SweepFolder:
+    """The folder with this request in it, made where there is none."""
+    from sagline.files.sweep_folder import check_made_here, digest_of, make_folder, open_folder
+
+    try:
+        empty = not path.exists() or not any(path.iterdir())
+    except OSError as error:
+        raise FileError(path, f"cannot be used ({error.strerror or error})", "Name another folder.") from None
+    if empty:
+        make_folder(path, request, measured_size(request))
+    opened = open_folder(path)
+    if opened.digest != digest_of(request):
+        step = "Give this one another folder, or remove that one."
+        raise FileError(path, f"holds another sweep, of {len(opened.request):,} requests", step)
+    check_made_here(opened)
+    return opened
+
+
+def _waiting(folder: SweepFolder, marks: Marks) -> list[int]:
+    """Tasks that are still to be done: those whose chunks are whole on the disk are marked, and not done again."""
+    from sagline.files.sweep_marks import Mark
+
+    waiting = []
+    for number in range(folder.tasks):
+        counts = found_counts(folder, number)
+        if counts is None:
+            marks.marks.pop(number, None)
+            waiting.append(number)
+        elif number not in marks.marks:
+            marks.add(number, Mark(0.0, counts), None)
+    return waiting
+
+
+@contextmanager
+def _workers(count: int, scheduler: str | None, tasks: int, tell: Tell) -> Iterator[Any]:
+    """The client of Dask; None where tasks are done one after the other."""
+    if scheduler is not None and tasks:
+        with remote_workers(scheduler) as client:
+            yield client
+    elif count > 1 and tasks > FEW and has_dask():
+        _check_not_imported()
+        with local_workers(min(count, tasks), tell) as client:
+            yield client
+    else:
+        if count > 1 and tasks > FEW:
+            tell('Dask is not installed: one task after the other. For more, pip install "sagline[sweep]".')
+        yield None
+
+
+def _check_not_imported() -> None:
+    """End the worker that imports a script which runs a sweep as it is imported; whoever started it tells why."""
+    if getattr(multiprocessing.current_process(), "_inheriting", False):
+        raise SystemExit(1)
+
+
+def _check_dask() -> None:
+    if not has_dask():
+        step = 'Install it: pip install "sagline[sweep]".'
+        raise InvalidValueError("the package distributed", "not installed", "installed, for a scheduler", step)
+
+
+def _nothing(text: str) -> None:
+    """Nobody wants to know."""
