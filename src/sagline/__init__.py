@@ -99,6 +99,7 @@ if TYPE_CHECKING:
     from sagline.tension.puncture import Puncture
     from sagline.tension.quadratic_program import QuadraticProgram
     from sagline.tension.singular import unresisted_motion
+    from sagline.workspaces.components import Components
     from sagline.workspaces.criteria.criterion import Criterion
     from sagline.workspaces.criteria.frame import InFrame
     from sagline.workspaces.criteria.frequency import LeastFrequency
@@ -110,6 +111,7 @@ if TYPE_CHECKING:
     from sagline.workspaces.margin_status import MarginStatus
     from sagline.workspaces.orientations import Orientations, Tilts
     from sagline.workspaces.space import Workspace
+    from sagline.workspaces.surface import Surface
     from sagline.workspaces.workspace import workspace
     from sagline.workspaces.wrench_sets import Accelerations, WrenchBox, WrenchEllipsoid, WrenchPolytope, WrenchSet
 
@@ -137,6 +139,7 @@ __all__ = [
     "Clearances",
     "ClosedForm",
     "Closest",
+    "Components",
     "Confirmation",
     "Creep",
     "Criterion",
@@ -202,6 +205,7 @@ __all__ = [
     "Stall",
     "Stiffness",
     "Straight",
+    "Surface",
     "TensionMethod",
     "TensionPolygon",
     "Tilts",
@@ -298,6 +302,7 @@ _HOMES = {
     "Clearances": "sagline.interference.clearance",
     "ClosedForm": "sagline.tension.closed_form",
     "Closest": "sagline.tension.closest",
+    "Components": "sagline.workspaces.components",
     "Confirmation": "sagline.kinematics.confirm",
     "Creep": "sagline.cables.creep",
     "Criterion": "sagline.workspaces.criteria.criterion",
@@ -364,6 +369,7 @@ _HOMES = {
     "Stall": "sagline.dynamics.events",
     "Stiffness": "sagline.statics.stiffness",
     "Straight": "sagline.cables.straight",
+    "Surface": "sagline.workspaces.surface",
     "TensionMethod": "sagline.tension.method",
     "TensionPolygon": "sagline.tension.polygon",
     "Tilts": "sagline.workspaces.orientations",

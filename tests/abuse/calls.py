@@ -84,7 +84,7 @@ RESULTS = frozenset(
     | {"Clearances", "FrequencySlopes", "WinchDrive"}
     | {"EnergyBalance", "Imported", "Linearized", "Modes", "Occurrence", "Plan", "Simulation", "Stiffness"}
     | {"control.Execution", "control.Gains", "control.Motion", "control.Samples", "twin.Injected"}
-    | {"Margin", "Workspace", "WrenchSet", "sweep.Sweep"}
+    | {"Components", "Margin", "Surface", "Workspace", "WrenchSet", "sweep.Sweep"}
     | {"FrequencyMap", "FrequencyResponse", "TensionPolygon", "Vibration", "WinchRates"}
 )
 # need a machine at the other end, or are one: tests/plc/test_bad_arguments.py
@@ -573,6 +573,8 @@ def _workspaces(given: _Given) -> dict[str, Call]:
                 progress=("callback", lambda done, of: None, True),
             ),
         ),
+        "Components.label": Call(space.components.label, _all(position=("array", [0.0, 0.0, 1.5]))),
+        "Surface.export": Call(space.surface.export, _all(file=("file", given.folder / "hull.stl"))),
         "Workspace.save": Call(space.save, _all(file=("file", given.folder / "saved.nc"))),
         "load_workspace": Call(sl.load_workspace, _all(file=("file", given.folder / "workspace.nc"))),
         "margin": Call(
