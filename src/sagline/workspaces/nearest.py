@@ -138,13 +138,13 @@ def _why(levels: Levels, pose: Pose, details: Details) -> tuple[tuple[int, ...],
         return own, f"{at} the {criterion.title} fails, and the margin is {n(margin, '.3g', 'N')}"
     plan = inverse(levels.robot, pose, levels.model, wrench=levels.middle)
     cables = tuple(int(k) for k in np.flatnonzero(plan.blocking)) or own
-    place = pose.position[None]
-    bare = levels.margins_of(NO_LOAD, place, details.rotation)
+    here = pose.position[None]
+    bare = levels.margins_of(NO_LOAD, here, details.rotation)
     if not bare[0] > 0.0:
         return cables, f"{at} the weight alone is too much by {n(-margin, '.3g', 'N')}{_of(cables)}"
     share = 100.0 * float(_share(bare, details.margin)[0])
     text = f"{at} the cables bear {n(share, '.2g')} % of the loads, {n(-margin, '.3g', 'N')} are missing{_of(cables)}"
-    if levels.margins_of(_moments_of(levels.wrenches), place, details.rotation)[0] < 0.0:
+    if levels.margins_of(_moments_of(levels.wrenches), here, details.rotation)[0] < 0.0:
         text += "; their moments cannot be borne there even without their forces"
     return cables, text
 
