@@ -152,7 +152,7 @@ def _why(levels: Levels, pose: Pose, details: Details) -> tuple[tuple[int, ...],
 def _of(cables: tuple[int, ...]) -> str:
     if not cables:
         return ""
-    return f", by {'cable' if len(cables) == 1 else 'cables'} {', '.join(map(str, cables))}"
+    return f" ({'cable' if len(cables) == 1 else 'cables'} {', '.join(map(str, cables))})"
 
 
 def _moments_of(wrenches: WrenchSet) -> WrenchSet:
