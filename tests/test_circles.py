@@ -12,6 +12,7 @@ DECLARED = {  # each result's save, the one lazy call outward
     ("sagline.dynamics.frequency_map", "sagline.files.frequency_map_file"),
     ("sagline.dynamics.simulation", "sagline.files.simulation_file"),
     ("sagline.control.execution", "sagline.files.execution_file"),
+    ("sagline.optimization.front", "sagline.files.design_folder"),
     ("sagline.workspaces.surface", "sagline.files.surface_file"),
 }
 

@@ -29,6 +29,7 @@ RINGS = {  # package -> title and opening line of its page of reference
     "interference": ("Interference", "What comes too near to what."),
     "tension": ("Tension", "How redundant cables share the load."),
     "statics": ("Statics", "Structure matrix, wrenches, stiffness."),
+    "optimization": ("Better robots", "What may change, what is wanted, and who searches."),
     "control": ("Controller", "`sl.control`: what drives a machine, cycle by cycle."),
     "plc": ("Links", "`sl.plc`: the way to real controllers of drives, over S7 or Modbus."),
     "twin": ("Twin", "`sl.twin`: the machine behind a link, in this process or behind servers of its own."),

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from sagline.errors import CableGeometryError, FileError, InvalidValueError, SaglineError, SaglineWarning
     from sagline.files.c_source import export_c
     from sagline.files.caspr import load_caspr
+    from sagline.files.design_file import load_design
     from sagline.files.execution_file import load_execution
     from sagline.files.imported import Imported
     from sagline.files.measurements import load_measurements
@@ -72,6 +73,14 @@ if TYPE_CHECKING:
     from sagline.motion.planar import article_path
     from sagline.motion.rest_to_rest import quintic_path, septic_path
     from sagline.motion.sampled import path_from_samples
+    from sagline.optimization.design import design
+    from sagline.optimization.free_anchors import FreeAnchors
+    from sagline.optimization.free_cable import CableChoice, FreeCable
+    from sagline.optimization.free_limit import FreeLimit
+    from sagline.optimization.front import Front
+    from sagline.optimization.goals import Goal
+    from sagline.optimization.moving import MovingAnchors, moving_anchors
+    from sagline.optimization.robust import AnchorErrors
     from sagline.robot.catalogue import robot_names
     from sagline.robot.equilibrium import Equilibrium
     from sagline.robot.pose import Pose
@@ -100,7 +109,6 @@ if TYPE_CHECKING:
     from sagline.tension.quadratic_program import QuadraticProgram
     from sagline.tension.singular import unresisted_motion
     from sagline.workspaces.components import Components
-    from sagline.workspaces.criteria.clearance import Clearance
     from sagline.workspaces.criteria.criterion import Criterion
     from sagline.workspaces.criteria.frame import InFrame
     from sagline.workspaces.criteria.frequency import LeastFrequency
@@ -124,11 +132,13 @@ __all__ = [
     "ZVD",
     "Accelerations",
     "AnalyticCenter",
+    "AnchorErrors",
     "ArticleBalance",
     "Box",
     "Brake",
     "Break",
     "Cable",
+    "CableChoice",
     "CableFit",
     "CableGeometryError",
     "CableModel",
@@ -137,7 +147,6 @@ __all__ = [
     "Capsule",
     "Catenary",
     "Centroid",
-    "Clearance",
     "Clearances",
     "ClosedForm",
     "Closest",
@@ -158,10 +167,15 @@ __all__ = [
     "ForwardSolver",
     "ForwardStatus",
     "ForwardStep",
+    "FreeAnchors",
+    "FreeCable",
+    "FreeLimit",
     "FrequencyMap",
     "FrequencyResponse",
     "FrequencySlopes",
+    "Front",
     "Gap",
+    "Goal",
     "Imported",
     "ImprovedClosedForm",
     "InFrame",
@@ -180,6 +194,7 @@ __all__ = [
     "MeasuredTension",
     "MinimumNorm",
     "Modes",
+    "MovingAnchors",
     "Occurrence",
     "Orientations",
     "PNorm",
@@ -228,6 +243,7 @@ __all__ = [
     "clearance",
     "confirm",
     "control",
+    "design",
     "dump_mjcf",
     "dump_robot",
     "dynamic_stiffness",
@@ -249,6 +265,7 @@ __all__ = [
     "limit_margin",
     "linearized",
     "load_caspr",
+    "load_design",
     "load_execution",
     "load_measurements",
     "load_path",
@@ -260,6 +277,7 @@ __all__ = [
     "load_workspace",
     "margin",
     "modes",
+    "moving_anchors",
     "path_from_samples",
     "plc",
     "plot",
@@ -288,11 +306,13 @@ __all__ = [
 _HOMES = {
     "Accelerations": "sagline.workspaces.wrench_sets",
     "AnalyticCenter": "sagline.tension.analytic_center",
+    "AnchorErrors": "sagline.optimization.robust",
     "ArticleBalance": "sagline.statics.balance",
     "Box": "sagline.interference.obstacles",
     "Brake": "sagline.dynamics.events",
     "Break": "sagline.dynamics.events",
     "Cable": "sagline.cables.cable",
+    "CableChoice": "sagline.optimization.free_cable",
     "CableFit": "sagline.article.identify_cable",
     "CableGeometryError": "sagline.errors",
     "CableModel": "sagline.cables.model",
@@ -301,7 +321,6 @@ _HOMES = {
     "Capsule": "sagline.interference.obstacles",
     "Catenary": "sagline.cables.catenary",
     "Centroid": "sagline.tension.centroid",
-    "Clearance": "sagline.workspaces.criteria.clearance",
     "Clearances": "sagline.interference.clearance",
     "ClosedForm": "sagline.tension.closed_form",
     "Closest": "sagline.tension.closest",
@@ -323,10 +342,15 @@ _HOMES = {
     "ForwardSolver": "sagline.kinematics.forward_solver",
     "ForwardStatus": "sagline.kinematics.forward_status",
     "ForwardStep": "sagline.kinematics.forward_solver",
+    "FreeAnchors": "sagline.optimization.free_anchors",
+    "FreeCable": "sagline.optimization.free_cable",
+    "FreeLimit": "sagline.optimization.free_limit",
     "FrequencyMap": "sagline.dynamics.frequency_map",
     "FrequencyResponse": "sagline.dynamics.response",
     "FrequencySlopes": "sagline.dynamics.frequency_slopes",
+    "Front": "sagline.optimization.front",
     "Gap": "sagline.kinematics.plan",
+    "Goal": "sagline.optimization.goals",
     "Imported": "sagline.files.imported",
     "ImprovedClosedForm": "sagline.tension.improved_closed_form",
     "InFrame": "sagline.workspaces.criteria.frame",
@@ -345,6 +369,7 @@ _HOMES = {
     "MeasuredTension": "sagline.kinematics.measured",
     "MinimumNorm": "sagline.tension.minimum_norm",
     "Modes": "sagline.statics.stiffness",
+    "MovingAnchors": "sagline.optimization.moving",
     "Occurrence": "sagline.dynamics.simulation",
     "Orientations": "sagline.workspaces.orientations",
     "PNorm": "sagline.tension.p_norm",
@@ -394,6 +419,7 @@ _HOMES = {
     "clearance": "sagline.interference.clearance",
     "confirm": "sagline.kinematics.confirm",
     "control": "sagline.control",
+    "design": "sagline.optimization.design",
     "dump_mjcf": "sagline.files.mjcf",
     "dump_robot": "sagline.files.robot_file",
     "dynamic_stiffness": "sagline.dynamics.cable_dynamics",
@@ -415,6 +441,7 @@ _HOMES = {
     "limit_margin": "sagline.tension.margin",
     "linearized": "sagline.dynamics.linearized",
     "load_caspr": "sagline.files.caspr",
+    "load_design": "sagline.files.design_file",
     "load_execution": "sagline.files.execution_file",
     "load_measurements": "sagline.files.measurements",
     "load_path": "sagline.files.path_file",
@@ -426,6 +453,7 @@ _HOMES = {
     "load_workspace": "sagline.files.workspace_file",
     "margin": "sagline.workspaces.margin",
     "modes": "sagline.statics.stiffness",
+    "moving_anchors": "sagline.optimization.moving",
     "path_from_samples": "sagline.motion.sampled",
     "plc": "sagline.plc",
     "plot": "sagline.plot",

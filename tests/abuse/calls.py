@@ -84,19 +84,20 @@ RESULTS = frozenset(
     | {"Clearances", "FrequencySlopes", "WinchDrive"}
     | {"EnergyBalance", "Imported", "Linearized", "Modes", "Occurrence", "Plan", "Simulation", "Stiffness"}
     | {"control.Execution", "control.Gains", "control.Motion", "control.Samples", "twin.Injected"}
-    | {"Components", "Margin", "Surface", "Workspace", "WrenchSet", "sweep.Sweep"}
+    | {"Components", "Front", "Margin", "MovingAnchors", "Surface", "Workspace", "WrenchSet", "sweep.Sweep"}
     | {"FrequencyMap", "FrequencyResponse", "TensionPolygon", "Vibration", "WinchRates"}
 )
 # need a machine at the other end, or are one: tests/plc/test_bad_arguments.py
 LINKS = frozenset({"plc.ModbusLink", "plc.S7Link", "twin.Server", "twin.Server.run"})
-CRITERIA = ("Clearance", "Criterion", "InFrame", "LeastFrequency", "LeastMargin", "LeastStiffness", "MaximumSag")
+CRITERIA = ("Criterion", "InFrame", "LeastFrequency", "LeastMargin", "LeastStiffness", "MaximumSag", "PositionError")
 # asked by sagline itself, with numbers of its own
 INTERNAL = frozenset(
     {"TensionMethod.preference", "QuadraticProgram.preference", "twin.Machine.deliver"}
     | {"control.Fault", "control.Fault.look", "control.Fault.found", "control.Histogram.add"}
     | {"control.TensionLoop.step", "control.Gains.at", "control.Link", "control.Link.exchange", "control.Recorder"}
     | {"Orientations.at", "Tilts.sampled"}
-    | {f"{name}.{method}" for name in (*CRITERIA, "PositionError") for method in ("check", "judge", "scale", "values")}
+    | {f"{name}.{method}" for name in CRITERIA for method in ("check", "judge", "scale", "values")}
+    | {"AnchorErrors.added", "FreeAnchors.bound", "FreeCable.bound", "FreeLimit.bound", "Goal.values"}
     | {f"control.Recorder.{method}" for method in ("begins", "ends", "cycle", "event")}
 )
 
@@ -118,6 +119,7 @@ def calls(folder: Path) -> dict[str, Call]:
         _statics,
         _vibrations,
         _workspaces,
+        _designs,
         _distances,
         _articles,
         _files,
@@ -551,7 +553,6 @@ def _workspaces(given: _Given) -> dict[str, Call]:
         "Accelerations": Call(sl.Accelerations, _all(linear=("number", 2.0), angular=("number", 3.0))),
         "Orientations": Call(sl.Orientations, _all(rotations=("array", turned), need=("word", "any"))),
         "Tilts": Call(sl.Tilts, _all(angle=("number", 0.25))),
-        "Clearance": Call(sl.Clearance, _all(limit=limit, obstacles=("object", (sl.Sphere([3.0, 2.0, 4.0], 0.5),)))),
         "LeastMargin": Call(sl.LeastMargin, _all(limit=limit)),
         "MaximumSag": Call(sl.MaximumSag, _all(limit=limit)),
         "PositionError": Call(sl.PositionError, _all(model=model, limit=limit)),
@@ -589,6 +590,63 @@ def _workspaces(given: _Given) -> dict[str, Call]:
                 progress=("callback", lambda done, of: None, True),
             ),
         ),
+    }
+
+
+def _designs(given: _Given) -> dict[str, Call]:
+    posts, load = sl.FreeAnchors("frame", -0.5, 0.5, along=[0, 0, 1], symmetry="together"), sl.WrenchBox(20.0, 2.0)
+    names = {"progress": ("callback", lambda done, of: None, True), "model": ("one", sl.Catenary())}
+    common = {"robot": ("one", given.robot), "wrenches": ("one", load, True), "poses": ("one", given.poses, True)}
+    front = sl.design(given.robot, [posts], ["mean_margin"], poses=given.poses, evaluations=16)
+    thin, thick = (sl.CableChoice(name, sl.Cable(*of)) for name, of in (("a", (0.05, 3e5)), ("b", (0.1, 6e5))))
+    asked = given.folder / "design.yaml"
+    asked.write_text("free: [{tension_max: {low: 1 kN, high: 5 kN}}]\ngoals: [least_margin]\n")
+    shifts = ("array", [-0.5, -0.25, -0.125]), ("array", [0.5, 0.25, 0.125])
+    return {
+        "AnchorErrors": Call(
+            sl.AnchorErrors,
+            _all(deviation=("number", 0.25), samples=("whole", 4), take=("word", "mean"), seed=("seed", 3)),
+        ),
+        "CableChoice": Call(
+            sl.CableChoice,
+            _all(
+                name=("text", "4 mm"),
+                cable=("one", given.cable),
+                cost=("number", 2.5, True),
+                tension_max=("number", 2500.0, True),
+            ),
+        ),
+        "FreeAnchors": Call(
+            sl.FreeAnchors,
+            _all(
+                end=("word", "platform"),
+                low=shifts[0],
+                high=shifts[1],
+                along=("array", np.eye(3)[::-1], True),
+                symmetry=("word", "xy", True),
+            ),
+        ),
+        "FreeCable": Call(sl.FreeCable, _all(catalogue=("object", [thin, thick]))),
+        "FreeLimit": Call(
+            sl.FreeLimit, _all(which=("word", "tension_min"), low=("number", 8.0), high=("number", 1024.0))
+        ),
+        "Goal": Call(sl.Goal, _all(kind=("word", "cable_cost"), weight=("number", 2.0), scale=("number", 64.0, True))),
+        "Front.save": Call(partial(front.save, given.folder / "front"), {}),
+        "design": Call(
+            sl.design,
+            _all(
+                **common,
+                **names,
+                free=("object", [posts]),
+                goals=("object", [sl.Goal("mean_margin")]),
+                robust=("one", sl.AnchorErrors(0.25, samples=1), True),
+                optimizer=("word", "differential_evolution"),
+                evaluations=("whole", 32),
+                seed=("seed", 3),
+            ),
+        ),
+        "load_design": Call(sl.load_design, _all(file=("file", asked))),
+        "moving_anchors": Call(sl.moving_anchors, _all(**common, **names, moving=("object", [posts]))),
     }
 
 

@@ -15,6 +15,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from sagline.cli.commands.article import article, identify
 from sagline.cli.commands.control import control
+from sagline.cli.commands.design import design
 from sagline.cli.commands.experiment import experiment
 from sagline.cli.commands.log import log
 from sagline.cli.commands.motion import simulate, vibrate
@@ -50,6 +51,7 @@ Start here:
     sagline control article-prototype --plc ADDRESSES  drive it, line by line
     sagline log run.mcap                 what it did, also after a crash
     sagline new my_robot.yaml            a robot of your own, by questions
+    sagline design cogiro design.yaml    a better one, by search
 """
 
 
@@ -147,8 +149,8 @@ def sagline(
 
 
 for command in (
-    track, lengths, encoder, run, article, identify, forward, tension, vibrate, simulate, sweep, robots, show, examples,
-    new, convert, export_c, export_scl, view, twin, control, experiment, log,
+    track, lengths, encoder, run, article, identify, forward, tension, vibrate, simulate, sweep, design, robots, show,
+    examples, new, convert, export_c, export_scl, view, twin, control, experiment, log,
 ):  # fmt: skip
     text = _help(command.__doc__)
     app.command(cls=Command, help=text, short_help=text.partition("\n\n")[0])(command)

@@ -48,7 +48,7 @@ def _new_place(folder: Path) -> tuple[Path, int]:
             lock = _opened(place)
         except FileNotFoundError:
             continue
-        if _is_taken(lock, if_unknown=True) and os.fstat(lock).st_nlink:
+        if is_taken(lock, if_unknown=True) and os.fstat(lock).st_nlink:
             return place, lock
         os.close(lock)
     raise TimeoutError(f"other processes remove what is written in {folder}")
@@ -60,7 +60,7 @@ def _remove_if_left(place: Path) -> None:
         if place.is_symlink():
             return
         lock = _opened(place)
-        if _is_taken(lock, if_unknown=False):
+        if is_taken(lock, if_unknown=False):
             shutil.rmtree(place, ignore_errors=True)
         os.close(lock)
 
@@ -72,7 +72,7 @@ def _opened(place: Path) -> int:
     return os.open(place / LOCK, flags, 0o600)
 
 
-def _is_taken(lock: int, *, if_unknown: bool) -> bool:
+def is_taken(lock: int, *, if_unknown: bool) -> bool:
     """Whether a lock could be taken: False where another process holds it.
 
     Args:

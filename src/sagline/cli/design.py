@@ -1,0 +1,107 @@
+"""`sagline design`: a search for better robots, its table, its files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Final
+
+from sagline.cli.entries import INVERSE, SIGNED_MARGINS, VIBRATION
+from sagline.cli.results import listed
+from sagline.cli.tables import Grid, show_table, written
+from sagline.cli.terminal import note, show, show_json, working
+from sagline.cli.values import whole_of
+from sagline.files.design_file import load_design
+from sagline.files.design_folder import FRONT
+from sagline.files.robot_file import load_robot
+from sagline.files.whole import check_files
+from sagline.optimization.design import design as searched
+from sagline.optimization.front import Front
+from sagline.optimization.goals import AT_POSES, Goal
+from sagline.optimization.request import MOST_EVALUATIONS
+
+MOST_ROWS: Final = 12  # of the table; front.csv has all
+
+
+def design(robot: str, file: Path, out: Path, evaluations: str | None, *, as_json: bool) -> None:
+    """Search, tell and write.
+
+    Args:
+        robot: A preset or a robot file.
+        file: The design file.
+        out: Folder of the search.
+        evaluations: Robots that are tried, as the command line has it; None for what the file says.
+        as_json: Whether to print JSON.
+
+    Raises:
+        SaglineError: If robot or file say something wrong, or the folder holds another search or cannot be written.
+    """
+    first, asked = load_robot(robot), load_design(file)
+    if evaluations is not None:
+        asked["evaluations"] = whole_of(evaluations, "--evaluations", 1, MOST_EVALUATIONS)
+    check_files(out, [FRONT])
+    rated = [0]
+    with working(f"{first.name}: rating robots", *_needed(asked["goals"])) as line:
+
+        def tell(done: int, total: int) -> None:
+            rated[0] = done
+            line.progress(done, total)
+
+        try:
+            front = searched(first, **asked, folder=out, progress=tell)
+        except KeyboardInterrupt:
+            note("", f"{rated[0]:,} robots are rated, and kept in {out}: the same command goes on from there.")
+            raise
+        files = front.save(out)
+    if as_json:
+        show_json({**_record(front), "files": files})
+        return
+    show_table(_table(front))
+    show(front.text)
+    show(f"In {out.resolve()}: {listed(files)}", whole=True)
+
+
+def _needed(goals: list[Goal]) -> tuple[str, ...]:
+    """Entries of the kernels that the goals need."""
+    needs = {goal.needs for goal in goals}
+    found = [SIGNED_MARGINS] if "margin" in needs else []
+    found += [INVERSE] if needs & set(AT_POSES) else []
+    found += [VIBRATION] if "stiffness" in needs else []
+    return tuple(found)
+
+
+def _table(front: Front) -> Grid:
+    """The first robot and those found: goals, then what has changed."""
+    heads = ["", *(f"{goal.kind}\n[{goal.unit}]" if goal.unit else goal.kind for goal in front.goals)]
+    heads += [f"{part.name}\n[{part.unit}]" if part.unit else part.name for part in front.parts]
+    rows = [[front.start.name, *_cells(front.start_values), *_cells([part.start for part in front.parts])]]
+    if front.better:
+        found = zip(front.robots, front.values, front.changed, strict=True)
+        rows += [[robot.name, *_cells(values), *_cells(changed)] for robot, values, changed in found]
+    return Grid(heads, rows[:MOST_ROWS])
+
+
+def _cells(values: Any) -> list[str]:
+    return [written(float(value), ".4g") for value in values]
+
+
+def _record(front: Front) -> dict[str, object]:
+    robots = zip(front.robots, front.values, front.changed, strict=True) if front.better else ()
+    goals, parts = [goal.kind for goal in front.goals], [part.name for part in front.parts]
+    return {
+        "robot": front.start.name,
+        "better": front.better,
+        "evaluations": len(front.evaluated),
+        "goals": dict(zip(goals, front.start_values, strict=True)),
+        "units": {
+            **{goal.kind: goal.unit for goal in front.goals},
+            **{part.name: part.unit for part in front.parts},
+        },
+        "robots": [
+            {
+                "robot": robot.name,
+                "goals": dict(zip(goals, values, strict=True)),
+                "changed": dict(zip(parts, changed, strict=True)),
+            }
+            for robot, values, changed in robots
+        ],
+    }

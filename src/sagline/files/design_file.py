@@ -1,0 +1,269 @@
+"""Design files: what of a robot is free, and what it should be better at, in YAML."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from typing import Any, Final, TypeVar
+
+from pydantic import model_validator
+
+from sagline.arguments import choice, file_path
+from sagline.cables.cable import Cable
+from sagline.errors import FileError, InvalidValueError
+from sagline.files.quantity import in_si
+from sagline.files.schema import Entry, validated
+from sagline.files.text import read_text
+from sagline.files.yaml_text import YAML_LIMIT, parse_mapping
+from sagline.optimization.free import Free
+from sagline.optimization.free_anchors import FreeAnchors
+from sagline.optimization.free_cable import CableChoice, FreeCable
+from sagline.optimization.free_limit import FreeLimit
+from sagline.optimization.goals import KINDS, Goal
+from sagline.optimization.robust import AnchorErrors
+from sagline.robot.pose_box import PoseBox
+from sagline.workspaces.wrench_sets import Accelerations, WrenchBox, WrenchSet
+
+T = TypeVar("T")
+
+WAYS: Final = ("goal", "maximize", "minimize")
+
+
+def load_design(file: str | os.PathLike[str]) -> dict[str, Any]:
+    r"""Read a design file: the arguments of `design` but for the robot.
+
+    A quantity is a number in SI or a text with its unit:
+
+        free:
+          - frame_anchors: {low: [-1, -1, 0], high: [1, 1, 50 cm], symmetry: xy}
+          - frame_anchors: {along: [0, 0, 1], low: -1 m, high: 1 m, cables: [0, 1]}
+          - platform_anchors: {low: -5 cm, high: 5 cm}
+          - tension_max: {low: 500 N, high: 3 kN}
+          - cable:                    # the robot's own among them
+              - {name: 4 mm, linear_density: 10 g/m, axial_stiffness: 300 kN, cost: 2.5}
+              - {name: 6 mm, linear_density: 22 g/m, axial_stiffness: 700 kN, cost: 4, tension_max: 5 kN}
+        goals:
+          - workspace_share           # or mean_margin, least_margin, largest_tension, ... (see Goal)
+          - {minimize: cable_cost, weight: 0.5}
+        wrenches: {force: 50 N, moment: 5 N*m}             # or three of each, with center; or accelerations
+        box: {low: [-2, -1, 1], high: [2, 1, 2]}           # the robot's test box if left out
+        grid: [9, 7, 5]
+        inner:
+          - frame_anchors: {along: [0, 0, 1], low: -1, high: 1, symmetry: together}
+        robust: {deviation: 1 cm, samples: 8, take: worst}
+        optimizer: cma                # or differential_evolution, nsga2
+        evaluations: 600
+        seed: 0
+
+    Args:
+        file: The file.
+
+    Returns:
+        Names of arguments and their values; what the file leaves out is left out.
+
+    Raises:
+        FileError: If the file cannot be read, or says something wrong; the message names the key and the value.
+
+    Examples:
+        >>> from pathlib import Path
+        >>> import sagline as sl
+        >>> free = "free: [{tension_max: {low: 500 N, high: 3 kN}}]"
+        >>> text = free + "\ngoals: [least_margin]"
+        >>> Path("design.yaml").write_text(text) > 0
+        True
+        >>> asked = sl.load_design("design.yaml")  # sl.design(robot, **asked)
+        >>> print(asked["free"][0].high, "N;", asked["goals"][0].kind)
+        3000.0 N; least_margin
+    """
+    path = file_path(file)
+    entry = validated(parse_mapping(read_text(path, YAML_LIMIT), path), _Design, path)
+    try:
+        return entry.arguments()
+    except InvalidValueError as error:
+        raise FileError.of(path, error) from None
+
+
+class _Part(Entry):
+    """A mapping in a design file."""
+
+    def si(self, key: str, unit: str) -> Any:
+        """A key's quantity in SI."""
+        return in_si(getattr(self, key), unit, key)
+
+    def given(self, units: dict[str, str]) -> dict[str, Any]:
+        """Quantities of those keys that are given."""
+        return {key: self.si(key, unit) for key, unit in units.items() if key in self.model_fields_set}
+
+
+class _Anchors(_Part):
+    low: Any
+    high: Any
+    along: Any = None
+    cables: list[int] | None = None
+    symmetry: str | None = None
+
+    def free(self, end: str) -> Free:
+        along = None if self.along is None else self.si("along", "")
+        bounds = [self.si(key, "m") for key in ("low", "high")]
+        return FreeAnchors(end, *bounds, along=along, cables=self.cables, symmetry=self.symmetry)
+
+
+class _Limit(_Part):
+    low: Any
+    high: Any
+    cables: list[int] | None = None
+
+    def free(self, which: str) -> Free:
+        return FreeLimit(which, *(self.si(key, "N") for key in ("low", "high")), cables=self.cables)
+
+
+class _Choice(_Part):
+    name: str
+    linear_density: Any
+    axial_stiffness: Any
+    diameter: Any = None
+    cost: Any = None
+    tension_max: Any = None
+
+    def choice(self) -> CableChoice:
+        cable = Cable(**self.given({"linear_density": "kg/m", "axial_stiffness": "N", "diameter": "m"}))
+        return CableChoice(self.name, cable, **self.given({"cost": "", "tension_max": "N"}))
+
+
+class _Free(_Part):
+    frame_anchors: _Anchors | None = None
+    platform_anchors: _Anchors | None = None
+    tension_min: _Limit | None = None
+    tension_max: _Limit | None = None
+    cable: list[_Choice] = []  # noqa: RUF012 - pydantic copies it
+
+    def free(self, item: str) -> Free:
+        """The one thing that it names."""
+        keys = list(_Free.model_fields)
+        given = [key for key in keys if getattr(self, key)]
+        if len(given) != 1:
+            value = f"of {' and '.join(given)}" if given else "empty"
+            raise InvalidValueError(item, value, f"one of {', '.join(keys)}", "Begin another entry, with its own dash.")
+        key = given[0]
+        where = f"{item}.{key}"
+        if key == "cable":
+            return FreeCable([_made(f"{where}[{k}]", one.choice) for k, one in enumerate(self.cable)])
+        free: Callable[[str], Free] = getattr(self, key).free
+        return _made(where, lambda: free(key.removesuffix("_anchors")))
+
+
+class _Goal(_Part):
+    goal: str | None = None
+    maximize: str | None = None
+    minimize: str | None = None
+    weight: Any = 1.0
+    scale: Any = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _accept_name(cls, data: object) -> object:
+        """A word is the goal's name."""
+        return {"goal": data} if isinstance(data, str) else data
+
+    def wanted(self) -> Goal:
+        """The goal."""
+        given = [way for way in WAYS if getattr(self, way) is not None]
+        if len(given) != 1:
+            value = f"given by {' and '.join(given)}" if given else "missing"
+            raise InvalidValueError("name", value, f"one of {', '.join(WAYS)}", "Write - maximize: workspace_share.")
+        way = given[0]
+        kind = choice(getattr(self, way), way, KINDS)
+        scale = None if self.scale is None else self.si("scale", KINDS[kind].unit)
+        maximize = None if way == "goal" else way == "maximize"
+        return Goal(kind, maximize=maximize, weight=self.si("weight", ""), scale=scale)
+
+
+class _Accelerations(_Part):
+    linear: Any = 0.0
+    angular: Any = 0.0
+
+    def loads(self) -> WrenchSet:
+        """Their loads."""
+        return Accelerations(linear=self.si("linear", "m/s^2"), angular=self.si("angular", "rad/s^2"))
+
+
+class _Wrenches(_Part):
+    force: Any = 0.0
+    moment: Any = 0.0
+    center: Any = None
+    accelerations: _Accelerations | None = None
+
+    def wrenches(self) -> WrenchSet:
+        """A box, and loads of accelerations added to it."""
+        center = self.center
+        if isinstance(center, list) and len(center) == 6:
+            center = [in_si(one, "N" if k < 3 else "N*m", f"center[{k}]") for k, one in enumerate(center)]
+        found = WrenchBox(self.si("force", "N"), self.si("moment", "N*m"), center)
+        return found if self.accelerations is None else found + self.accelerations.loads()
+
+
+class _Box(_Part):
+    low: Any
+    high: Any
+
+    def box(self) -> PoseBox:
+        """The box."""
+        return PoseBox(self.si("low", "m"), self.si("high", "m"))
+
+
+class _Robust(_Part):
+    deviation: Any
+    samples: int = 8
+    take: str = "worst"
+    seed: int = 0
+
+    def errors(self) -> AnchorErrors:
+        """The sample."""
+        return AnchorErrors(self.si("deviation", "m"), samples=self.samples, take=self.take, seed=self.seed)
+
+
+class _Design(_Part):
+    free: list[_Free]
+    goals: list[_Goal]
+    wrenches: _Wrenches | None = None
+    box: _Box | None = None
+    grid: list[int] = []  # noqa: RUF012 - pydantic copies it
+    inner: list[_Free] = []  # noqa: RUF012 - pydantic copies it
+    robust: _Robust | None = None
+    optimizer: str = "cma"
+    evaluations: int = 600
+    seed: int = 0
+
+    def arguments(self) -> dict[str, Any]:
+        """Those of `design` that the file gives."""
+        found: dict[str, Any] = {
+            "free": [one.free(f"free[{k}]") for k, one in enumerate(self.free)],
+            "goals": [_made(f"goals[{k}]", one.wanted) for k, one in enumerate(self.goals)],
+            "optimizer": self.optimizer,
+            "evaluations": self.evaluations,
+            "seed": self.seed,
+        }
+        if self.inner:
+            found["inner"] = [one.free(f"inner[{k}]") for k, one in enumerate(self.inner)]
+        if self.wrenches is not None:
+            found["wrenches"] = _made("wrenches", self.wrenches.wrenches)
+        if self.box is not None:
+            found["box"] = _made("box", self.box.box)
+        if self.grid:
+            found["grid"] = tuple(self.grid)
+        if self.robust is not None:
+            found["robust"] = _made("robust", self.robust.errors)
+        return found
+
+
+def _made(item: str, make: Callable[[], T]) -> T:
+    """What a part of the file makes; its errors name the part.
+
+    Raises:
+        InvalidValueError: If it makes none.
+    """
+    try:
+        return make()
+    except InvalidValueError as error:
+        inside = error.item.removeprefix("test_box: ")
+        raise InvalidValueError(f"{item}: {inside}", error.value, error.allowed, error.next_step) from None

@@ -1,0 +1,230 @@
+"""The folder of a search for better robots: what was rated, to go on from there; and in the end the robots.
+
+`design.json` says which search it is, by a digest of all that was asked but for how many evaluations. `evaluations.csv`
+has a line a candidate, appended generation by generation, each with a checksum: a line that a crash or a full disk cut
+off is known as such, cut off for good, and worked out again. `front.csv` and the robot files are written at the end.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import fields, is_dataclass
+from hashlib import sha256
+from io import StringIO
+from pathlib import Path
+from typing import Any, Final
+from zlib import crc32
+
+import numpy as np
+
+from sagline.arguments import file_path
+from sagline.arrays import Array
+from sagline.errors import FileError
+from sagline.files.json_text import json_text
+from sagline.files.names import file_stem
+from sagline.files.quantity import plain_number
+from sagline.files.robot_file import dump_robot
+from sagline.files.staging import is_taken
+from sagline.files.text import exists, read_text
+from sagline.files.whole import check_file, check_files, made_folder, write_text, written_together
+from sagline.optimization.front import Front
+from sagline.optimization.request import Request
+
+REQUEST, EVALUATIONS, FRONT = "design.json", "evaluations.csv", "front.csv"
+LIMIT: Final = 1000.0  # MB of evaluations
+ANOTHER: Final = "Name another folder, or remove this one."
+
+
+class DesignFolder:
+    """What a search knows, and where it adds to it."""
+
+    def __init__(self, file: Path, handle: int, known: Array) -> None:
+        """Adopt an open file.
+
+        Args:
+            file: Its path, for messages.
+            handle: Open for appending.
+            known: Numbers and goals in it, shape (K, d + g).
+        """
+        self._file, self._handle, self.known = file, handle, known
+
+    def add(self, rows: Array) -> None:
+        """Append rows, down to the disk.
+
+        Args:
+            rows: Numbers and goals of candidates, shape (N, d + g).
+
+        Raises:
+            FileError: If the disk takes no more; what was there before stays.
+        """
+        data = "".join(_line([repr(float(x)) for x in row]) for row in rows).encode()
+        try:
+            while data:
+                data = data[os.write(self._handle, data) :]
+            os.fsync(self._handle)
+        except OSError as error:
+            step = "Free some space and begin again: it goes on from here."
+            raise FileError(self._file, f"cannot be written ({error.strerror})", step) from None
+
+
+@contextmanager
+def recorded(folder: Path | str, request: Request) -> Iterator[DesignFolder]:
+    """The record of a search in a folder, begun or gone on with.
+
+    Args:
+        folder: The folder; created if missing.
+        request: What is asked.
+
+    Yields:
+        The record.
+
+    Raises:
+        FileError: If the folder holds another search, is in use by another process, or cannot be written.
+    """
+    place = file_path(folder, "folder", folder=True)
+    check_files(place, [REQUEST, EVALUATIONS])
+    made_folder(place)
+    heads = [*(f"{part.name} [{part.unit}]" if part.unit else part.name for part in request.candidates.parts)]
+    heads += [f"{goal.kind} [{goal.unit}]" if goal.unit else goal.kind for goal in request.goals]
+    digest = digest_of(request)
+    file = place / EVALUATIONS
+    _check_request(place, digest, request)
+    handle = os.open(file, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
+    try:
+        if not is_taken(handle, if_unknown=True):
+            raise FileError(place, "is in use: another process searches there", "Wait for it, or name another folder.")
+        if not exists(place / REQUEST):
+            told = {"request": digest, "robot": request.robot.name, "optimizer": request.optimizer}
+            write_text(place / REQUEST, json_text({**told, "seed": request.seed}) + "\n")
+        known, whole = _read(file, heads)
+        os.ftruncate(handle, whole)
+        record = DesignFolder(file, handle, known)
+        if not whole:
+            os.write(handle, _line(heads).encode())
+        yield record
+    finally:
+        os.close(handle)
+
+
+def save_front(front: Front, folder: Path | str) -> list[Path]:
+    """Write the robots of a front and a table of them, all together.
+
+    Args:
+        front: The front.
+        folder: Where; created if missing.
+
+    Returns:
+        The files.
+
+    Raises:
+        FileError: If one cannot be written.
+    """
+    place = made_folder(file_path(folder, "folder", folder=True))
+    robots = front.robots if front.better else ()
+    names = [FRONT, *(f"{file_stem(robot.name)}.yaml" for robot in robots)]
+    heads = ["robot", *(f"{goal.kind} [{goal.unit}]" if goal.unit else goal.kind for goal in front.goals)]
+    heads += [f"{part.name} [{part.unit}]" if part.unit else part.name for part in front.parts]
+    rows = [[front.start.name, *front.start_values.tolist(), *(part.start for part in front.parts)]]
+    for robot, goals, values in zip(robots, front.values, front.changed, strict=False):
+        rows.append([robot.name, *goals.tolist(), *values.tolist()])
+    text = StringIO()
+    csv.writer(text, lineterminator="\n").writerows([heads, *rows])
+    texts = [text.getvalue(), *(dump_robot(robot) for robot in robots)]
+    with written_together(place, names) as parts:
+        for part, content in zip(parts, texts, strict=True):
+            part.write_bytes(content.encode())
+    return [place / name for name in names]
+
+
+def digest_of(request: Request) -> str:
+    """A digest of all that a search is asked, but for how many evaluations.
+
+    Args:
+        request: The request.
+
+    Returns:
+        64 hexadecimal digits.
+    """
+    return sha256(_canonical(request).encode()).hexdigest()
+
+
+def _canonical(value: Any) -> str:
+    """A text in which any two values that differ, differ."""
+    if isinstance(value, np.ndarray):
+        return f"array({value.dtype.str}, {value.shape}, {np.ascontiguousarray(value).tobytes().hex()})"
+    if is_dataclass(value):
+        inside = ", ".join(f"{field.name}={_canonical(getattr(value, field.name))}" for field in fields(value))
+        return f"{type(value).__name__}({inside})"
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{key!r}: {_canonical(value[key])}" for key in sorted(value)) + "}"
+    if isinstance(value, tuple):
+        return "(" + ", ".join(map(_canonical, value)) + ")"
+    return repr(value)
+
+
+def _check_request(place: Path, digest: str, request: Request) -> None:
+    """Refuse the folder of another search.
+
+    Raises:
+        FileError: If it is one.
+    """
+    file = place / REQUEST
+    if not exists(file):
+        if exists(place / EVALUATIONS):
+            raise FileError(place / EVALUATIONS, f"stands without its {REQUEST}: nobody knows of what", ANOTHER)
+        return
+    try:
+        told = json.loads(read_text(file, 1.0))
+        own = str(told["request"])
+    except (ValueError, TypeError, KeyError, RecursionError):
+        raise FileError(file, "is no request of a search", ANOTHER) from None
+    if own != digest:
+        asked = f"{request.robot.name} with {request.optimizer} and seed {request.seed}"
+        reason = f"holds another search, {own[:8]}, than is asked for, {digest[:8]}: {asked}"
+        raise FileError(place, reason, "Ask for the same, or name another folder.")
+
+
+def _read(file: Path, heads: list[str]) -> tuple[Array, int]:
+    """Rows of whole lines, and how many bytes these take; a cut off end is left out.
+
+    Raises:
+        FileError: If another line is damaged.
+    """
+    none = np.zeros((0, len(heads)))
+    lines = read_text(check_file(file), LIMIT).splitlines(keepends=True)
+    if not lines:
+        return none, 0
+    rows: list[list[float]] = []
+    whole = 0
+    for k, line in enumerate(lines):
+        cells = _cells(line)
+        expected = heads if k == 0 else None
+        numbers = [] if cells is None else [plain_number(cell) for cell in cells]
+        right = cells == expected if k == 0 else len(numbers) == len(heads) and None not in numbers
+        if not right:
+            if k == len(lines) - 1:
+                break  # torn
+            raise FileError(file, f"line {k + 1} is not as it was written", ANOTHER)
+        whole += len(line.encode())
+        if k:
+            rows.append([float(x) for x in numbers if x is not None])
+    return (np.array(rows) if rows else none), whole
+
+
+def _line(cells: list[str]) -> str:
+    """A line of CSV whose last cell is a checksum over those before."""
+    text = StringIO()
+    csv.writer(text, lineterminator="").writerow(cells)
+    return f"{text.getvalue()},{crc32(text.getvalue().encode()):08x}\n"
+
+
+def _cells(line: str) -> list[str] | None:
+    """Cells of a line without the checksum; None where that is wrong."""
+    text, _, check = line.rpartition(",")
+    if not line.endswith("\n") or check != f"{crc32(text.encode()):08x}\n":
+        return None
+    return next(csv.reader([text]))

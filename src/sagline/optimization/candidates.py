@@ -1,0 +1,198 @@
+"""Candidates: points of the unit cube, the numbers that these stand for, and the robots that have them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from sagline.arguments import brief
+from sagline.arrays import Array, Flags, Indices
+from sagline.errors import InvalidValueError
+from sagline.kernels import tables
+from sagline.optimization.free import Bound, Free, Part
+from sagline.optimization.free_cable import FreeCable
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.statics.tables import cable_table
+
+TWINS = 1e-9  # m: two cables whose ends are nearer than this are one
+
+
+class Candidates:
+    """All robots that differ from one in its free parts."""
+
+    def __init__(self, robot: Robot, free: Sequence[Free], item: str = "free") -> None:
+        """Bind the free parts to the robot.
+
+        Args:
+            robot: The robot that the search begins with.
+            free: What may change.
+            item: How messages call it.
+
+        Raises:
+            InvalidValueError: If the robot does not have a part, or two are the same.
+        """
+        self.robot = robot
+        self.free = free_parts(free, item)
+        self._bound: list[Bound] = [one.bound(robot, f"{item}[{k}]") for k, one in enumerate(self.free)]
+        self.parts: tuple[Part, ...] = tuple(part for bound in self._bound for part in bound.parts)
+        names = [part.name for part in self.parts]
+        for name in names:
+            if names.count(name) > 1:
+                raise InvalidValueError(item, f"free twice in {name}", "each part once", "Leave one of them out.")
+        self._table = cable_table(robot)[0]
+        self._low = np.array([part.low for part in self.parts])
+        self._high = np.array([part.high for part in self.parts])
+        self._choices = np.array([part.choices for part in self.parts])
+
+    @property
+    def start(self) -> Array:
+        """What the robot itself has, shape (d,)."""
+        return np.array([part.start for part in self.parts])
+
+    def units(self, values: Array) -> Array:
+        """Points of the unit cube that stand for numbers, both (N, d); a choice is the middle of its share."""
+        span = np.where(self._choices > 0, self._choices, self._high - self._low)
+        return np.asarray((values - self._low + 0.5 * (self._choices > 0)) / span)
+
+    def values(self, points: Array) -> Array:
+        """Numbers of points of the unit cube, both (N, d)."""
+        inside = np.minimum(self._low + points * (self._high - self._low), self._high)
+        chosen = np.minimum(np.floor(points * self._choices), self._choices - 1)
+        return np.asarray(np.where(self._choices > 0, chosen, inside))
+
+    def cables(self, values: Array) -> Array:
+        """Tables of cables of numbers (N, d), shape (N, m, CABLE_COLUMNS)."""
+        found = np.repeat(self._table[None], len(values), axis=0)
+        self.write(found, values)
+        return found
+
+    def write(self, cables: Array, values: Array) -> None:
+        """Change tables of cables (N, m, CABLE_COLUMNS) in place, by numbers (N, d)."""
+        first = 0
+        for bound in self._bound:
+            last = first + len(bound.parts)
+            bound.write(cables, values[:, first:last])
+            first = last
+
+    def costs(self, values: Array) -> Array | None:
+        """What a meter of cable costs, shape (N,); None where no catalogue says it.
+
+        Raises:
+            InvalidValueError: If a cable of the catalogue has no cost.
+        """
+        for k, one in enumerate(self.free):
+            if isinstance(one, FreeCable):
+                missing = [entry.name for entry in one.catalogue if entry.cost is None]
+                if missing:
+                    step = "The goal cable_cost asks for it: give the cost of a meter."
+                    raise InvalidValueError(f"free[{k}]: {missing[0]}", "without cost", "a number >= 0", step)
+                which = values[:, self._column(k)].astype(np.int64)
+                return np.array([entry.cost for entry in one.catalogue], dtype=np.float64)[which]
+        return None
+
+    def robots(self, values: Array, names: Sequence[str]) -> tuple[Robot, ...]:
+        """Candidates as robots, checked like any.
+
+        Args:
+            values: Their numbers, shape (N, d).
+            names: What they are called.
+
+        Raises:
+            InvalidValueError: If a robot is none.
+        """
+        return tuple(
+            self._robot(table, own, name) for table, own, name in zip(self.cables(values), values, names, strict=True)
+        )
+
+    def _robot(self, table: Array, values: Array, name: str) -> Robot:
+        columns = {
+            "frame_anchors": table[:, tables.FRAME_X : tables.FRAME_Z + 1],
+            "platform_anchors": table[:, tables.PLATFORM_X : tables.PLATFORM_Z + 1],
+            "tension_min": table[:, tables.TENSION_MIN],
+            "tension_max": table[:, tables.TENSION_MAX],
+        }
+        changed: dict[str, Any] = {
+            key: value for key, value in columns.items() if not np.array_equal(value, getattr(self.robot, key))
+        }
+        for k, one in enumerate(self.free):
+            if isinstance(one, FreeCable):
+                chosen = one.catalogue[int(values[self._column(k)])]
+                if not np.array_equal(self.robot.cables.linear_density, table[:, tables.DENSITY]) or not np.array_equal(
+                    self.robot.cables.axial_stiffness, table[:, tables.STIFFNESS]
+                ):
+                    changed["cables"] = chosen.cable
+        assumed = {key: why for key, why in self.robot.assumed.items() if key not in changed}
+        told = f"found by sagline from {self.robot.name}"
+        notes = f"{self.robot.notes}; {told}" if self.robot.notes else told
+        return self.robot.replace(**changed, name=name, assumed=assumed, notes=notes)
+
+    def _column(self, which: int) -> int:
+        return sum(len(bound.parts) for bound in self._bound[:which])
+
+
+def free_parts(free: object, item: str) -> tuple[Free, ...]:
+    """Free parts as a tuple.
+
+    Args:
+        free: One, or a sequence of them.
+        item: How messages call it.
+
+    Raises:
+        InvalidValueError: If there is something else among them.
+    """
+    given = [free] if isinstance(free, Free) else free
+    step = 'Give [FreeAnchors("frame", low, high), ...].'
+    allowed = "a sequence of FreeAnchors, FreeCable and FreeLimit"
+    if not isinstance(given, Sequence) or isinstance(given, str):
+        raise InvalidValueError(item, brief(free), allowed, step)
+    for k, one in enumerate(given):
+        if not isinstance(one, Free):
+            raise InvalidValueError(f"{item}[{k}]", brief(one), allowed, step)
+    return tuple(given)
+
+
+def impossible(cables: Array) -> Flags:
+    """Which tables of cables (N, m, CABLE_COLUMNS) are no robot's: two cables are one, or limits are crossed, (N,)."""
+    ends = cables[..., : tables.PLATFORM_Z + 1]
+    first, second = np.triu_indices(cables.shape[1], 1)
+    apart = np.abs(ends[:, first] - ends[:, second]).max(axis=-1, initial=0.0)
+    crossed = cables[..., tables.TENSION_MIN] > cables[..., tables.TENSION_MAX]
+    return np.asarray((apart < TWINS).any(axis=-1) | crossed.any(axis=-1))
+
+
+class Solid:
+    """The platform as a box, at poses: no frame anchor may be inside it."""
+
+    def __init__(self, robot: Robot, poses: Pose) -> None:
+        """Take the platform's size, or else what its anchors span.
+
+        Args:
+            robot: The robot.
+            poses: A batch of G.
+        """
+        low, high = robot.platform_anchors.min(axis=0), robot.platform_anchors.max(axis=0)
+        self._half = 0.5 * ((high - low) if robot.platform_size is None else robot.platform_size)
+        self._middle = 0.5 * (low + high)
+        self._position, self._matrix = poses.position, poses.matrix
+        self._reach = float(np.linalg.norm(np.abs(self._middle) + self._half))
+
+    def holds(self, points: Array) -> Indices:
+        """At which pose a point is inside the platform, -1 where at none.
+
+        Args:
+            points: World axes [m], shape (..., 3).
+
+        Returns:
+            Shape (...).
+        """
+        flat = points.reshape(-1, 3)
+        found = np.full(len(flat), -1)
+        low, high = self._position.min(axis=0) - self._reach, self._position.max(axis=0) + self._reach
+        for k in np.flatnonzero(((flat > low) & (flat < high)).all(axis=1)):
+            away = np.einsum("gi,gij->gj", flat[k] - self._position, self._matrix) - self._middle
+            inside = np.flatnonzero((np.abs(away) < self._half).all(axis=1))
+            found[k] = inside[0] if inside.size else -1
+        return found.reshape(points.shape[:-1])

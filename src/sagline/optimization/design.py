@@ -1,0 +1,117 @@
+"""A better robot: what is free of it is searched for what it should be better at."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
+from typing import Final
+
+from sagline.arguments import callback, instance, whole_number
+from sagline.blocks import Progress
+from sagline.cables.catenary import Catenary
+from sagline.cables.model import CableModel
+from sagline.errors import InvalidValueError
+from sagline.optimization.free import Free
+from sagline.optimization.front import Front
+from sagline.optimization.goals import Goal
+from sagline.optimization.ledger import Ledger, Record
+from sagline.optimization.poses import COUNTS, poses_of
+from sagline.optimization.request import MOST_EVALUATIONS, SEARCHES, Request, requested
+from sagline.optimization.robust import AnchorErrors
+from sagline.optimization.search import Task
+from sagline.robot.pose import Pose
+from sagline.robot.pose_box import PoseBox
+from sagline.robot.robot import Robot
+from sagline.workspaces.wrench_sets import WrenchSet
+
+_CATENARY: Final = Catenary()
+
+
+def design(
+    robot: Robot,
+    free: Sequence[Free],
+    goals: Sequence[Goal | str],
+    wrenches: WrenchSet | None = None,
+    poses: Pose | None = None,
+    *,
+    box: PoseBox | None = None,
+    grid: Sequence[int] = COUNTS,
+    inner: Sequence[Free] = (),
+    robust: AnchorErrors | None = None,
+    model: CableModel = _CATENARY,
+    optimizer: str = "cma",
+    evaluations: int = 600,
+    seed: int = 0,
+    folder: Path | str | None = None,
+    progress: Progress | None = None,
+) -> Front:
+    """Search for a robot that is better than one, or for a front of them.
+
+    The search begins with the robot itself and with a seeded sample; the same seed gives the same robots bit for bit.
+
+    Args:
+        robot: The robot to begin with.
+        free: What may change: `FreeAnchors`, `FreeCable`, `FreeLimit`.
+        goals: What it should be better at: `Goal`s, or their names. "cma" and "differential_evolution" add them up by
+            their weights; "nsga2" finds robots of which none is better than another in every goal.
+        wrenches: What it has to bear at every pose, a `WrenchBox` for instance; None for its weight alone.
+        poses: Where; None for a grid of level poses in a box.
+        box: The box of that grid; None for the robot's test box, level.
+        grid: Poses of it along x, y and z.
+        inner: Anchors that the machine itself moves from pose to pose: `FreeAnchors`, at each pose shifted to where
+            the margin is largest.
+        robust: Errors of the anchors that a robot is rated with.
+        model: Cable model.
+        optimizer: "cma", "differential_evolution" or "nsga2".
+        evaluations: How many robots are rated at most.
+        seed: Of all that is random.
+        folder: Where rated robots are kept: a search that was interrupted goes on from there, and one that is asked
+            for more evaluations too. None: nowhere.
+        progress: Called after each generation: how many robots are rated, of how many.
+
+    Returns:
+        Front; where no robot is better it says so, and holds the first one.
+
+    Raises:
+        InvalidValueError: If an argument is of the wrong kind, a part is free beyond what the robot has or allows, or
+            there are too few evaluations for two generations.
+        FileError: If the folder holds another search, or cannot be written.
+
+    Examples:
+        Posts that may be higher or lower, moved in pairs:
+
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("article-suspended")
+        >>> posts = sl.FreeAnchors("frame", -1.0, 1.0, along=[0, 0, 1], symmetry="together")
+        >>> goal, load = sl.Goal("mean_margin"), sl.WrenchBox(force=50.0, moment=5.0)
+        >>> front = sl.design(robot, [posts], [goal], load, grid=(3, 3, 3), evaluations=40)
+        >>> front.better
+        True
+
+    Source:
+        Hansen & Ostermeier 2001 (cma); Storn & Price 1997; Deb, Pratap, Agarwal & Meyarivan 2002 (nsga2).
+    """
+    callback(progress, "progress")
+    places = poses_of(instance(robot, Robot, "robot"), poses, box, grid)
+    request = requested(robot, free, goals, wrenches, places, model, inner, robust, optimizer, seed)
+    candidates = request.candidates
+    least = request.least_evaluations(len(candidates.parts))
+    count = whole_number(evaluations, "evaluations", 1, MOST_EVALUATIONS)
+    if count < least:
+        allowed = f">= {least:,}, two generations of {request.optimizer} for {len(candidates.parts)} free numbers"
+        raise InvalidValueError("evaluations", f"{count:,}", allowed, "Allow more, or free less.")
+    with _record(folder, request) as record:
+        ledger = Ledger(request, candidates, record, count, progress)
+        point = candidates.units(candidates.start[None])[0]
+        sample = request.sample(len(point))
+        SEARCHES[request.optimizer](Task(ledger.rate, point, sample, ledger.costs, request.seed, count))
+        return ledger.front()
+
+
+def _record(folder: Path | str | None, request: Request) -> AbstractContextManager[Record | None]:
+    if folder is None:
+        return nullcontext()
+    from sagline.files.design_folder import recorded
+
+    return recorded(folder, request)

@@ -1,0 +1,159 @@
+"""What a better robot is better at."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from sagline.arguments import brief, choice
+from sagline.arrays import Array, number
+from sagline.errors import InvalidValueError
+
+
+class Measured(NamedTuple):
+    """What is known of candidates, each with S samples of its anchors (one where these are exact) at G poses.
+
+    Attributes:
+        margin: Of the wrench set [N], shape (N, S, G); -inf where a pose is singular or a cable has no length.
+        tension: Largest of the cables [N], shape (N, S, G), with NaN where there are no tensions; None if nobody asks.
+        sag: Largest of the cables [m], of the same shape, or None.
+        stiffness: Against the force that meets the least [N/m], of the same shape, or None.
+        cost: Of the cables, shape (N, S), or None.
+    """
+
+    margin: Array
+    tension: Array | None = None
+    sag: Array | None = None
+    stiffness: Array | None = None
+    cost: Array | None = None
+
+
+class Kind(NamedTuple):
+    """A quantity that a robot may be better at.
+
+    Attributes:
+        unit: Its unit; "" for a share or a currency.
+        larger_is_better: Which way it is wanted where nobody says otherwise.
+        needs: The field of `Measured`.
+        over_poses: Its value from that field, over the last axis.
+        text: What it is.
+    """
+
+    unit: str
+    larger_is_better: bool
+    needs: str
+    over_poses: Callable[[Array], Array]
+    text: str
+
+
+def _share(margin: Array) -> Array:
+    return np.asarray((margin >= 0.0).mean(axis=-1))
+
+
+def _mean(margin: Array) -> Array:
+    return np.asarray(margin.mean(axis=-1))
+
+
+def _least(values: Array) -> Array:
+    return np.asarray(np.nanmin(values, axis=-1, initial=np.inf))
+
+
+def _largest(values: Array) -> Array:
+    return np.asarray(np.nanmax(values, axis=-1, initial=-np.inf))
+
+
+KINDS: Final = MappingProxyType(
+    {
+        "workspace_share": Kind("", True, "margin", _share, "share of the poses whose margin is not negative"),
+        "mean_margin": Kind("N", True, "margin", _mean, "mean margin of the poses"),
+        "least_margin": Kind("N", True, "margin", _least, "least margin of the poses"),
+        "largest_tension": Kind("N", False, "tension", _largest, "largest tension"),
+        "largest_sag": Kind("m", False, "sag", _largest, "largest sag"),
+        "least_stiffness": Kind("N/m", True, "stiffness", _least, "least stiffness against a force"),
+        "cable_cost": Kind("", False, "cost", lambda cost: cost, "cost of the cables"),
+    }
+)
+AT_POSES: Final = ("tension", "sag", "stiffness")  # which need the load shared
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """A quantity to be made larger or smaller.
+
+    Tensions, sag and stiffness are those of the platform's weight and the middle of the wrench set, shared by
+    `MinimumNorm`; they are taken over the poses that the robot one begins with holds, and a robot that does not hold
+    all of these is no candidate.
+
+    Attributes:
+        kind: "workspace_share" (of the poses, those whose margin is not negative), "mean_margin" or "least_margin"
+            [N], "largest_tension" [N], "largest_sag" [m], "least_stiffness" [N/m] (against a force, whatever its
+            direction) or "cable_cost" (each cable as long as the longest chord it spans, by the catalogue's costs).
+        maximize: Whether more of it is wanted.
+        weight: How much it counts beside other goals, > 0.
+        scale: What counts as one, in its unit; None: what the first robot has, or 1 where it has nothing.
+    """
+
+    kind: str
+    maximize: bool
+    weight: float
+    scale: float | None
+
+    def __init__(
+        self, kind: str, *, maximize: bool | None = None, weight: float = 1.0, scale: float | None = None
+    ) -> None:
+        """Check them.
+
+        Args:
+            kind: One of the seven.
+            maximize: Whether more of it is wanted; None: as its name says.
+            weight: How much it counts beside other goals, > 0.
+            scale: What counts as one, > 0, or None.
+
+        Raises:
+            InvalidValueError: If there is no such goal, or an argument is of the wrong kind.
+
+        Examples:
+            >>> import sagline as sl
+            >>> print(sl.Goal("workspace_share").maximize, sl.Goal("cable_cost").maximize)
+            True False
+        """
+        found = KINDS[choice(kind, "goal", KINDS)]
+        if maximize is not None and not isinstance(maximize, bool | np.bool_):
+            raise InvalidValueError("maximize", brief(maximize), "True, False or None", "Choose one of them.")
+        values: dict[str, Any] = {
+            "kind": str(kind),
+            "maximize": found.larger_is_better if maximize is None else bool(maximize),
+            "weight": number(weight, "weight", "", above=0.0),
+            "scale": None if scale is None else number(scale, "scale", found.unit, above=0.0),
+        }
+        for field, value in values.items():
+            object.__setattr__(self, field, value)
+
+    @property
+    def unit(self) -> str:
+        """Unit of its values."""
+        return KINDS[self.kind].unit
+
+    @property
+    def needs(self) -> str:
+        """The field of `Measured` that it is taken from."""
+        return KINDS[self.kind].needs
+
+    def values(self, measured: Measured, *, worst: bool) -> Array:
+        """Its value of each candidate.
+
+        Args:
+            measured: What is known of them.
+            worst: Whether of a sample of anchors the worst counts, and not the mean.
+
+        Returns:
+            In the goal's unit, shape (N,).
+        """
+        samples = KINDS[self.kind].over_poses(getattr(measured, self.needs))
+        if not worst:
+            return np.asarray(samples.mean(axis=-1))
+        return np.asarray(samples.min(axis=-1) if self.maximize else samples.max(axis=-1))

@@ -1,0 +1,119 @@
+"""One robot whose anchors move: at each pose to where its margin is largest."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from sagline.arguments import callback, instance, optional
+from sagline.arrays import Array, locked
+from sagline.blocks import Progress, blocks
+from sagline.cables.catenary import Catenary
+from sagline.cables.model import CableModel
+from sagline.errors import InvalidValueError
+from sagline.optimization.candidates import Candidates, free_parts
+from sagline.optimization.free import Free, Part
+from sagline.optimization.goals import Goal
+from sagline.optimization.inner import best_moved
+from sagline.optimization.poses import COUNTS, poses_of
+from sagline.optimization.rating import Rating
+from sagline.results import Result
+from sagline.robot.pose import Pose
+from sagline.robot.pose_box import PoseBox
+from sagline.robot.robot import Robot
+from sagline.workspaces.wrench_sets import WrenchSet
+
+BLOCK: Final = 1 << 11  # poses at once: a tenth of a second, after which an interrupt is heard
+_CATENARY: Final = Catenary()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MovingAnchors(Result):
+    """Result of `moving_anchors` at G poses.
+
+    Attributes:
+        robot: The robot with its anchors where it has them.
+        pose: The poses, a batch of G.
+        parts: What moves, q numbers.
+        moved: These numbers at each pose, shape (G, q).
+        margin: With moved anchors [N], shape (G,).
+        fixed_margin: Without [N], shape (G,).
+        moving: What moves, as it was given.
+    """
+
+    robot: Robot
+    pose: Pose
+    parts: tuple[Part, ...]
+    moved: Array
+    margin: Array
+    fixed_margin: Array
+    moving: tuple[Free, ...]
+
+    @property
+    def robots(self) -> tuple[Robot, ...]:
+        """The robot at each pose, for `inverse` and whatever else takes one robot a pose."""
+        names = [self.robot.name] * len(self.moved)
+        return Candidates(self.robot, self.moving, "moving").robots(self.moved, names)
+
+
+def moving_anchors(
+    robot: Robot,
+    moving: Sequence[Free],
+    wrenches: WrenchSet | None = None,
+    poses: Pose | None = None,
+    *,
+    box: PoseBox | None = None,
+    grid: Sequence[int] = COUNTS,
+    model: CableModel = _CATENARY,
+    progress: Progress | None = None,
+) -> MovingAnchors:
+    """Move anchors of a robot at each pose to where its margin is largest.
+
+    Largest among a sample and then in its surroundings, by steps along one number after another.
+
+    Args:
+        robot: The robot.
+        moving: What moves: `FreeAnchors`.
+        wrenches: What it has to bear, a `WrenchBox` for instance; None for its weight alone.
+        poses: Where; None for a grid of level poses in a box.
+        box: The box of that grid; None for the robot's test box, level.
+        grid: Poses of it along x, y and z.
+        model: Cable model.
+        progress: Called after some poses: how many are done, of how many.
+
+    Returns:
+        MovingAnchors.
+
+    Raises:
+        InvalidValueError: If an argument is of the wrong kind.
+
+    Examples:
+        Posts whose anchors go up and down, all by the same:
+
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("article-suspended")
+        >>> posts = sl.FreeAnchors("frame", -1.0, 1.0, along=[0, 0, 1], symmetry="together")
+        >>> load = sl.WrenchBox(force=50.0, moment=5.0)
+        >>> found = sl.moving_anchors(robot, [posts], load, grid=(3, 3, 3))
+        >>> bool((found.margin >= found.fixed_margin).all())
+        True
+    """
+    callback(progress, "progress")
+    optional(wrenches, WrenchSet, "wrenches")
+    places = poses_of(instance(robot, Robot, "robot"), poses, box, grid)
+    parts = free_parts(moving, "moving")
+    if not parts:
+        raise InvalidValueError("moving", "empty", "FreeAnchors", 'Give FreeAnchors("frame", low, high).')
+    inner = Candidates(robot, parts, "moving")
+    rating = Rating(inner, (Goal("mean_margin"),), wrenches, places, instance(model, CableModel, "model"), None, None)
+    count = len(rating.rows)
+    table = inner.cables(inner.start[None])
+    moved, margin = np.empty((count, len(inner.parts))), np.empty(count)
+    for part in blocks(count, BLOCK, progress):
+        own = np.repeat(table, part.stop - part.start, axis=0)
+        moved[part], margin[part] = best_moved(inner, rating.margins, own, rating.rows[part])
+    fixed = rating.margins(table, rating.rows)
+    return MovingAnchors(robot, places, inner.parts, locked(moved), locked(margin), locked(fixed), parts)

@@ -1,0 +1,169 @@
+"""What is asked of a search, checked: robot, free parts, goals, loads and poses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, Final
+
+import numpy as np
+
+from sagline.arguments import brief, choice, instance, optional, whole_number
+from sagline.cables.model import CableModel
+from sagline.errors import InvalidValueError
+from sagline.kernels import tables
+from sagline.optimization import cma, differential_evolution, nsga2
+from sagline.optimization.candidates import Candidates, Solid, free_parts
+from sagline.optimization.free import Free
+from sagline.optimization.free_anchors import FreeAnchors
+from sagline.optimization.goals import Goal
+from sagline.optimization.rating import Rating
+from sagline.optimization.robust import AnchorErrors
+from sagline.optimization.sample import latin_hypercube
+from sagline.optimization.search import Task
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.workspaces.wrench_sets import WrenchSet
+
+SEARCHES: Final[MappingProxyType[str, Callable[[Task], None]]] = MappingProxyType(
+    {"cma": cma.search, "differential_evolution": differential_evolution.search, "nsga2": nsga2.search}
+)
+MOST_EVALUATIONS: Final = 10_000_000
+LOOKED_AT: Final = 256  # candidates whose anchors are looked at before the search begins
+_SEED: Final = 2**31 - 1  # the largest that all optimizers take
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Request:
+    """A search, but for how long it goes on.
+
+    Attributes:
+        robot: The robot that it begins with.
+        free: What may change.
+        goals: What is wanted.
+        wrenches: What every candidate has to bear; None for its weight alone.
+        poses: Where, a batch.
+        model: Cable model.
+        inner: What moves at each pose.
+        robust: Errors of the anchors, or None.
+        optimizer: Who searches.
+        seed: Of all that is random.
+    """
+
+    robot: Robot
+    free: tuple[Free, ...]
+    goals: tuple[Goal, ...]
+    wrenches: WrenchSet | None
+    poses: Pose
+    model: CableModel
+    inner: tuple[Free, ...]
+    robust: AnchorErrors | None
+    optimizer: str
+    seed: int
+
+    @property
+    def candidates(self) -> Candidates:
+        """The robots that are searched."""
+        return Candidates(self.robot, self.free)
+
+    def rating(self, candidates: Candidates) -> Rating:
+        """Who rates them."""
+        moving = Candidates(self.robot, self.inner, "inner") if self.inner else None
+        return Rating(candidates, self.goals, self.wrenches, self.poses, self.model, self.robust, moving)
+
+    def sample(self, dimensions: int) -> Any:
+        """Points that are tried beside the robot itself; as many whatever the number of evaluations."""
+        return latin_hypercube(_population(self.optimizer, dimensions) - 1, dimensions, self.seed)
+
+    def least_evaluations(self, dimensions: int) -> int:
+        """Evaluations of two generations."""
+        return 2 * _population(self.optimizer, dimensions)
+
+
+def requested(
+    robot: Any, free: Any, goals: Any, wrenches: Any, poses: Pose, model: Any, inner: Any, robust: Any,
+    optimizer: Any, seed: Any,
+) -> Request:  # fmt: skip
+    """The arguments of `design`, checked.
+
+    Raises:
+        InvalidValueError: If one is of the wrong kind; the message names it.
+    """
+    optional(wrenches, WrenchSet, "wrenches")
+    request = Request(
+        instance(robot, Robot, "robot"),
+        free_parts(free, "free"),
+        _goals(goals),
+        wrenches,
+        poses,
+        instance(model, CableModel, "model"),
+        free_parts(inner, "inner"),
+        optional(robust, AnchorErrors, "robust"),
+        str(choice(optimizer, "optimizer", SEARCHES)),
+        whole_number(seed, "seed", 0, _SEED),
+    )
+    if not request.free:
+        step = "Give what may change; to see what moving anchors are good for, call moving_anchors."
+        raise InvalidValueError("free", "empty", "FreeAnchors, FreeCable or FreeLimit", step)
+    for k, one in enumerate(request.inner):
+        if not isinstance(one, FreeAnchors):
+            raise InvalidValueError(f"inner[{k}]", brief(one), "FreeAnchors", "Only anchors move from pose to pose.")
+    if request.inner and not any(goal.needs == "margin" for goal in request.goals):
+        step = "Add Goal('mean_margin'): anchors move to where the margin is largest."
+        raise InvalidValueError("inner", "given without a goal of margins", "with one", step)
+    if request.optimizer == "nsga2":
+        _refuse_weights(request.goals)
+    _check_platform(request)
+    return request
+
+
+def _goals(given: Any) -> tuple[Goal, ...]:
+    """Goals, also from their names."""
+    many = [given] if isinstance(given, Goal | str) else given
+    if not isinstance(many, Sequence) or not many:
+        step = 'Give [Goal("workspace_share")] for instance.'
+        raise InvalidValueError("goals", brief(given), "one goal or more", step)
+    goals = tuple(
+        Goal(one) if isinstance(one, str) else instance(one, Goal, f"goals[{k}]") for k, one in enumerate(many)
+    )
+    kinds = [goal.kind for goal in goals]
+    if twice := [kind for kind in kinds if kinds.count(kind) > 1]:
+        raise InvalidValueError("goals", f"with {twice[0]} twice", "each once", "Leave one of them out.")
+    return goals
+
+
+def _refuse_weights(goals: tuple[Goal, ...]) -> None:
+    for goal in goals:
+        if goal.weight != 1.0:
+            step = 'Leave it out, or choose the optimizer "cma".'
+            allowed = "1: a front of robots weighs no goals"
+            raise InvalidValueError(f"weight of {goal.kind}", f"{goal.weight:g}", allowed, step)
+
+
+def _check_platform(request: Request) -> None:
+    """Refuse frame anchors that are inside the platform, or can get there."""
+    for name, free in (("free", request.free), ("inner", request.inner)):
+        if not free:
+            continue
+        candidates = Candidates(request.robot, free, name)
+        points = latin_hypercube(LOOKED_AT, len(candidates.parts), 0)
+        values = np.concatenate((candidates.start[None], candidates.values(points)))
+        anchors = candidates.cables(values)[..., : tables.FRAME_Z + 1]
+        poses = Solid(request.robot, request.poses).holds(anchors)
+        hits = np.argwhere(poses >= 0)
+        if not hits.size:
+            continue
+        which, cable = (int(k) for k in hits[0])
+        where = ", ".join(f"{x:.3g}" for x in anchors[which, cable])
+        item = f"{'the frame anchor' if which == 0 else name + ': the frame anchor'} of cable {cable}, at {where} m"
+        value = f"inside the platform at pose {int(poses[which, cable])}"
+        step = "Narrow low and high, or leave the pose out." if which else "Leave the pose out, or correct the robot."
+        raise InvalidValueError(item, value, "outside of it at all poses", step)
+
+
+def _population(optimizer: str, dimensions: int) -> int:
+    """Candidates of the first generation, the robot itself among them."""
+    if optimizer == "cma":
+        return 2 * (4 + int(3.0 * np.log(dimensions)))
+    return max(16, 4 * dimensions) if optimizer == "differential_evolution" else max(24, 4 * dimensions)
