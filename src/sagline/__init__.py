@@ -109,6 +109,7 @@ if TYPE_CHECKING:
     from sagline.tension.quadratic_program import QuadraticProgram
     from sagline.tension.singular import unresisted_motion
     from sagline.workspaces.components import Components
+    from sagline.workspaces.criteria.clearance import Clearance
     from sagline.workspaces.criteria.criterion import Criterion
     from sagline.workspaces.criteria.frame import InFrame
     from sagline.workspaces.criteria.frequency import LeastFrequency
@@ -147,6 +148,7 @@ __all__ = [
     "Capsule",
     "Catenary",
     "Centroid",
+    "Clearance",
     "Clearances",
     "ClosedForm",
     "Closest",
@@ -321,6 +323,7 @@ _HOMES = {
     "Capsule": "sagline.interference.obstacles",
     "Catenary": "sagline.cables.catenary",
     "Centroid": "sagline.tension.centroid",
+    "Clearance": "sagline.workspaces.criteria.clearance",
     "Clearances": "sagline.interference.clearance",
     "ClosedForm": "sagline.tension.closed_form",
     "Closest": "sagline.tension.closest",

@@ -89,14 +89,14 @@ RESULTS = frozenset(
 )
 # need a machine at the other end, or are one: tests/plc/test_bad_arguments.py
 LINKS = frozenset({"plc.ModbusLink", "plc.S7Link", "twin.Server", "twin.Server.run"})
-CRITERIA = ("Criterion", "InFrame", "LeastFrequency", "LeastMargin", "LeastStiffness", "MaximumSag", "PositionError")
+CRITERIA = ("Clearance", "Criterion", "InFrame", "LeastFrequency", "LeastMargin", "LeastStiffness", "MaximumSag")
 # asked by sagline itself, with numbers of its own
 INTERNAL = frozenset(
     {"TensionMethod.preference", "QuadraticProgram.preference", "twin.Machine.deliver"}
     | {"control.Fault", "control.Fault.look", "control.Fault.found", "control.Histogram.add"}
     | {"control.TensionLoop.step", "control.Gains.at", "control.Link", "control.Link.exchange", "control.Recorder"}
     | {"Orientations.at", "Tilts.sampled"}
-    | {f"{name}.{method}" for name in CRITERIA for method in ("check", "judge", "scale", "values")}
+    | {f"{name}.{method}" for name in (*CRITERIA, "PositionError") for method in ("check", "judge", "scale", "values")}
     | {"AnchorErrors.added", "FreeAnchors.bound", "FreeCable.bound", "FreeLimit.bound", "Goal.values"}
     | {f"control.Recorder.{method}" for method in ("begins", "ends", "cycle", "event")}
 )
@@ -553,6 +553,7 @@ def _workspaces(given: _Given) -> dict[str, Call]:
         "Accelerations": Call(sl.Accelerations, _all(linear=("number", 2.0), angular=("number", 3.0))),
         "Orientations": Call(sl.Orientations, _all(rotations=("array", turned), need=("word", "any"))),
         "Tilts": Call(sl.Tilts, _all(angle=("number", 0.25))),
+        "Clearance": Call(sl.Clearance, _all(limit=limit, obstacles=("object", (sl.Sphere([3.0, 2.0, 4.0], 0.5),)))),
         "LeastMargin": Call(sl.LeastMargin, _all(limit=limit)),
         "MaximumSag": Call(sl.MaximumSag, _all(limit=limit)),
         "PositionError": Call(sl.PositionError, _all(model=model, limit=limit)),

@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
 
 from sagline.files.plan_file import MODELS, choice_attributes, choice_of
 from sagline.files.workspace_layout import CRITERIA
+from sagline.interference.mesh import Mesh
+from sagline.interference.obstacles import Box, Capsule, Sphere
+from sagline.workspaces.criteria.clearance import Clearance
 from sagline.workspaces.criteria.criterion import Criterion
 from sagline.workspaces.criteria.position_error import PositionError
 
 if TYPE_CHECKING:
     from xarray import Dataset
+
+KINDS: Final[dict[str, type[Any]]] = {kind.__name__: kind for kind in (Box, Capsule, Sphere, Mesh)}
 
 
 def criteria_attributes(criteria: Sequence[Criterion]) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -35,6 +43,13 @@ def criteria_attributes(criteria: Sequence[Criterion]) -> tuple[dict[str, Any], 
         if isinstance(one, PositionError):
             del attributes[f"{key}_model"]
             attributes |= choice_attributes(f"{key}_of_model", one.model, MODELS)
+        if isinstance(one, Clearance):
+            obstacles: Any = one.obstacles  # a tuple, once they are checked
+            attributes[f"{key}_obstacles"] = len(obstacles)
+            for j, obstacle in enumerate(obstacles):
+                own, parts = _obstacle(f"{key}_obstacle_{j}", obstacle)
+                attributes |= own
+                variables |= parts
     return attributes, variables
 
 
@@ -56,5 +71,31 @@ def criteria_of(path: Path, data: Dataset) -> tuple[Criterion, ...]:
         known: dict[str, Any] = {}
         if data.attrs[key] == PositionError.__name__:
             known["model"] = choice_of(path, data.attrs, f"{key}_of_model", MODELS)
+        if data.attrs[key] == Clearance.__name__:
+            count = int(data.attrs[f"{key}_obstacles"])
+            known["obstacles"] = tuple(_obstacle_of(data, f"{key}_obstacle_{j}") for j in range(count))
         found.append(choice_of(path, data.attrs, key, CRITERIA, **known))
     return tuple(found)
+
+
+def _obstacle(key: str, obstacle: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+    """One of them: texts and numbers as attributes, arrays as variables with dimensions of their own."""
+    attributes: dict[str, Any] = {key: type(obstacle).__name__}
+    variables: dict[str, Any] = {}
+    for field in fields(obstacle):
+        value = getattr(obstacle, field.name)
+        if isinstance(value, np.ndarray):
+            name = f"{key}_{field.name}"
+            variables[name] = (tuple(f"{name}_{axis}" for axis in range(value.ndim)), value)
+        else:
+            attributes[f"{key}_{field.name}"] = value
+    return attributes, variables
+
+
+def _obstacle_of(data: Dataset, key: str) -> Any:
+    kind = KINDS[data.attrs[key]]
+    values = {}
+    for field in fields(kind):
+        name = f"{key}_{field.name}"
+        values[field.name] = data[name].values if name in data.variables else data.attrs[name]
+    return kind(**values)

@@ -7,6 +7,7 @@ from typing import Any, Final
 import numpy as np
 
 from sagline.files.variables import Quantity
+from sagline.workspaces.criteria.clearance import Clearance
 from sagline.workspaces.criteria.criterion import Criterion
 from sagline.workspaces.criteria.frame import InFrame
 from sagline.workspaces.criteria.frequency import LeastFrequency
@@ -16,7 +17,8 @@ from sagline.workspaces.criteria.sag import MaximumSag
 from sagline.workspaces.criteria.stiffness import LeastStiffness
 
 CRITERIA: Final[dict[str, type[Criterion]]] = {
-    kind.__name__: kind for kind in (LeastMargin, MaximumSag, PositionError, LeastStiffness, LeastFrequency, InFrame)
+    kind.__name__: kind
+    for kind in (LeastMargin, MaximumSag, PositionError, LeastStiffness, LeastFrequency, Clearance, InFrame)
 }
 NODES: Final = ("x", "y", "z")  # of the grid
 FINE: Final = ("fine_x", "fine_y", "fine_z")  # of the grid that tells components apart

@@ -10,9 +10,7 @@ import numpy as np
 from sagline.arrays import Array, Indices, locked
 from sagline.blocks import blocks
 from sagline.cables.model import CableModel
-from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.statics.tables import pose_rows
 from sagline.tension.method import TensionMethod
 from sagline.workspaces.criteria.criterion import Criterion
 from sagline.workspaces.criteria.given import Given
@@ -110,38 +108,46 @@ class Levels:
         """
         found = self._empty(len(positions))
         for part in blocks(len(positions), BLOCK):
-            own = self._block(self._placed(positions[part]))
+            own = self._block(self.placed(positions[part]))
             for whole, piece in zip(found, own, strict=True):
                 whole[part] = piece
             if self.told is not None:
                 self.told(len(own.level))
         return Details(*map(locked, found))
 
-    def alone(self, wrenches: WrenchSet, pose: Pose) -> float:
-        """The margin of another wrench set at a pose.
+    def placed(self, positions: Array) -> Array:
+        """Positions as they count: of a plane, those in it.
 
         Args:
-            wrenches: The set.
-            pose: A single pose.
+            positions: [m], shape (N, 3).
 
         Returns:
-            Margin [N].
+            Of the same shape.
         """
-        margins = MarginRows(self.robot, wrenches, self.model, self._moment_arm)
-        return float(margins.rows(pose_rows(pose)).value[0])
-
-    def _empty(self, count: int) -> Details:
-        numbers, indices = np.empty((2, count)), np.full((3, count), -1)
-        return Details(*numbers, *indices)
-
-    def _placed(self, positions: Array) -> Array:
-        """Positions as they count: those of a plane are in it."""
         if self._held is None:
             return positions
         axis, where = self._held
         flat = positions.copy()
         flat[:, axis] = where
         return flat
+
+    def margins_of(self, wrenches: WrenchSet, positions: Array, rotation: Indices) -> Array:
+        """Margins of another wrench set.
+
+        Args:
+            wrenches: The set.
+            positions: Of the platform origin [m], shape (N, 3).
+            rotation: In which of the rotations each, shape (N,).
+
+        Returns:
+            Margins [N], shape (N,).
+        """
+        rows = np.hstack((self.placed(positions), self.orientations.quaternion[rotation]))
+        return MarginRows(self.robot, wrenches, self.model, self._moment_arm).rows(rows).value
+
+    def _empty(self, count: int) -> Details:
+        numbers, indices = np.empty((2, count)), np.full((3, count), -1)
+        return Details(*numbers, *indices)
 
     def _block(self, positions: Array) -> Details:
         found = self._turned(positions, 0)

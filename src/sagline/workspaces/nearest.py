@@ -76,11 +76,23 @@ def nearest_to(levels: Levels, grid: Grid, low: Array, high: Array) -> Nearest:
 
 
 def _preferred(levels: Levels, positions: Array) -> Array:
-    """Levels, finite; where tensions can be looked at, what they make is nearer than where there are none."""
+    """How near positions are, finite: levels, and where the platform cannot be held the share of the load that can.
+
+    Margins alone would lead to singular poses, at which all of them are small.
+    """
     found = levels.details(positions)
+    bare = levels.margins_of(NO_LOAD, positions, found.rotation)
+    weight = levels.criteria[0].scale(levels.robot)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        short = np.where(bare > 0.0, _share(bare, found.margin), bare / weight) - 1.0
     tensions = any(one.needs_tensions for one in levels.criteria)
-    lower = _UNHELD if tensions else 0.0
-    return np.maximum(np.where(found.margin >= 0.0, found.level, found.level - lower), -_FAR)
+    short -= _UNHELD if tensions else 0.0  # where tensions can be looked at, what they make is nearer
+    return np.maximum(np.where(found.margin >= 0.0, found.level, short), -_FAR)
+
+
+def _share(bare: Array, margin: Array) -> Array:
+    """Share of the load that is borne for certain, where the weight alone is: margins are concave in the load."""
+    return np.asarray(bare / (bare - margin))
 
 
 def _climbed(levels: Levels, start: Array, low: Array, high: Array) -> tuple[Array, float]:
@@ -126,16 +138,21 @@ def _why(levels: Levels, pose: Pose, details: Details) -> tuple[tuple[int, ...],
         return own, f"{at} the {criterion.title} fails, and the margin is {n(margin, '.3g', 'N')}"
     plan = inverse(levels.robot, pose, levels.model, wrench=levels.middle)
     cables = tuple(int(k) for k in np.flatnonzero(plan.blocking)) or own
-    text = f"{at} {n(-margin, '.3g', 'N')} are missing{_of(cables)}"
-    if levels.alone(NO_LOAD, pose) >= 0.0 > levels.alone(_moments_of(levels.wrenches), pose):
-        text += "; the moments of the set cannot be held there even without its forces"
+    here = pose.position[None]
+    bare = levels.margins_of(NO_LOAD, here, details.rotation)
+    if not bare[0] > 0.0:
+        return cables, f"{at} the weight alone is too much by {n(-margin, '.3g', 'N')}{_of(cables)}"
+    share = 100.0 * float(_share(bare, details.margin)[0])
+    text = f"{at} the cables bear {n(share, '.2g')} % of the loads, {n(-margin, '.3g', 'N')} are missing{_of(cables)}"
+    if levels.margins_of(_moments_of(levels.wrenches), here, details.rotation)[0] < 0.0:
+        text += "; their moments cannot be borne there even without their forces"
     return cables, text
 
 
 def _of(cables: tuple[int, ...]) -> str:
     if not cables:
         return ""
-    return f", by {'cable' if len(cables) == 1 else 'cables'} {', '.join(map(str, cables))}"
+    return f" ({'cable' if len(cables) == 1 else 'cables'} {', '.join(map(str, cables))})"
 
 
 def _moments_of(wrenches: WrenchSet) -> WrenchSet:

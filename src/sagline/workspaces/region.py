@@ -48,7 +48,8 @@ def region_of(robot: Robot, box: PoseBox | None, cells: int) -> Region:
 
     Args:
         robot: The robot.
-        box: What a caller wants; None: where the robot stands, and of a planar robot the plane of its cables.
+        box: What a caller wants; None: where the robot stands, with its test box if that reaches further, and of a
+            planar robot the plane of its cables.
         cells: How many the longest edge is divided into.
 
     Returns:
@@ -60,7 +61,7 @@ def region_of(robot: Robot, box: PoseBox | None, cells: int) -> Region:
     plane = _plane_axis(robot)
     optional(box, PoseBox, "box")
     if box is None:
-        low, high = (corner.copy() for corner in bounds(robot))
+        low, high = _own(robot)
         if plane is not None:
             low[plane] = high[plane] = _place_of_plane(robot, plane)
         box = PoseBox(low, high)
@@ -81,6 +82,14 @@ def region_of(robot: Robot, box: PoseBox | None, cells: int) -> Region:
     half = 0.5 * thickness * np.eye(3)[axis]
     x, y, z = (1 if k == axis else count for k, count in enumerate((x, y, z)))
     return Region(box, box.low - half, box.high + half, axis, thickness, (x, y, z))
+
+
+def _own(robot: Robot) -> tuple[Array, Array]:
+    """Where the robot stands, and the poses that it is meant for."""
+    low, high = bounds(robot)
+    if robot.test_box is None:
+        return low.copy(), high.copy()
+    return np.minimum(low, robot.test_box.low), np.maximum(high, robot.test_box.high)
 
 
 def flat_axis(box: PoseBox) -> tuple[int, float] | None:

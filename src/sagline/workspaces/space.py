@@ -40,11 +40,13 @@ class Limit(NamedTuple):
         criterion: Its title.
         cable: Which cable decides, -1 where none does.
         share: Of the surface without the faces of the box.
+        number: Of the criterion, counted from 0.
     """
 
     criterion: str
     cable: int
     share: float
+    number: int
 
     def __str__(self) -> str:
         """In words."""
@@ -128,7 +130,9 @@ class Workspace(Result):
                 areas[key] = areas.get(key, 0.0) + float(area)
         whole = sum(areas.values())
         order = sorted(areas, key=lambda key: -areas[key])
-        return tuple(Limit(self.criteria[key[0]].title, key[1], areas[key] / whole) for key in order if areas[key] > 0)
+        return tuple(
+            Limit(self.criteria[key[0]].title, key[1], areas[key] / whole, key[0]) for key in order if areas[key] > 0
+        )
 
     @property
     def field(self) -> Any:

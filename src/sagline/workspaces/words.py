@@ -20,15 +20,23 @@ def in_words(wrenches: WrenchSet) -> str:
     """
     parts = []
     if wrenches.center.any():
-        parts.append(f"about {_each(wrenches.center[:3], 'N')}, {_each(wrenches.center[3:], 'N m')}")
+        parts.append(_wrench(wrenches.center))
     parts += [_segments(wrenches.segments)] if wrenches.segments.any() else []
     parts += ["an ellipsoid"] * len(wrenches.ellipsoids)
-    parts += [f"a polytope of {size} corners" for size in wrenches.sizes]
+    ends = np.cumsum(wrenches.sizes)
+    for size, end in zip(wrenches.sizes, ends, strict=True):
+        parts.append(f"a polytope of {size} corners" if size > 1 else _wrench(wrenches.corners[end - 1]))
     linear, angular = wrenches.accelerations
     if linear > 0.0 or angular > 0.0:
         limits = ((linear, "m/s²"), (angular, "rad/s²"))
         parts.append("accelerations " + ", ".join(f"±{n(size, unit=unit)}" for size, unit in limits if size > 0.0))
     return " + ".join(parts) or "its weight alone"
+
+
+def _wrench(wrench: Array) -> str:
+    """One wrench, without what is zero of it."""
+    halves = ((wrench[:3], "N"), (wrench[3:], "N m"))
+    return ", ".join(f"({', '.join(n(value) for value in half)}) {unit}" for half, unit in halves if half.any())
 
 
 def _segments(segments: Array) -> str:
