@@ -13,7 +13,7 @@ import numpy as np
 from rich.console import Console
 
 import sagline as sl
-from benchmarks import c_source, controller, dynamics, experiment, machine
+from benchmarks import c_source, controller, dynamics, experiment, machine, workspaces
 from benchmarks.formula import algebraic, as_printed
 from benchmarks.links import links
 from benchmarks.measure import (
@@ -184,6 +184,7 @@ def main() -> None:
         *dynamics.PARTS,
         *c_source.PARTS,
         *experiment.PARTS,
+        *workspaces.PARTS,
     ):
         Console(stderr=True).print(f"[dim]{part.__doc__}[/dim]")
         rows.extend(part())
