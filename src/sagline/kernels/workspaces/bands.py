@@ -5,13 +5,20 @@ from __future__ import annotations
 import math
 
 from sagline.arrays import Array
+from sagline.kernels.cable.cables import Cables
 from sagline.kernels.cable.pulls import Curves, Section, pull_range, pulls_at
 from sagline.kernels.cable.turns import find_turns
 from sagline.kernels.codes import CATENARY
-from sagline.kernels.jit import glue
+from sagline.kernels.jit import formula, glue
 from sagline.kernels.memory import Memory
 
 LOOSEST = 5.0  # largest X = wD/(2 tau): a cable fifteen times as long as its chord, which no winch pulls on
+
+# What the formula of `range_between_ends` is good for, on two million random cables.
+SLACKEST, STRETCHED = 0.3, 0.15  # largest X and e
+BY_STRETCH, BY_SAG = 0.334, 0.023  # its remainder, of eX and of X^3
+FROM_MOST, BEFORE_MOST = 0.85, 1.8  # of X_M: the pull turns at 0.89 to 1.72 of it
+BEFORE_LEAST, AFTER_LEAST = 0.25, 1.05  # of |sin phi|/cos^2 phi: and turns again at 0.28 to 1.03 of that
 
 # Rows of the bands (BAND_ROWS, m).
 LOW, HIGH = 0, 1  # chord tensions [N]; the upper one may be infinite
@@ -44,12 +51,56 @@ def fill_bands(curves: Curves, bands: Array, memory: Memory) -> bool:
             pull = cables.pull[i]  # of first order, and the same at every tension
             bands[PULL_LOW, i] = bands[PULL_HIGH, i] = bands[LEAST, i] = bands[MOST, i] = pull
         return True
-    find_turns(curves, bands[LOW], bands[TAUT], memory)
     pulls_at(curves, bands[LOW], bands[PULL_LOW])
     pulls_at(curves, bands[TAUT], bands[PULL_HIGH])
     hang = True
+    sought = False
     for i in range(m):
-        section = Section(bands[LOW, i], bands[TAUT, i], bands[PULL_LOW, i], bands[PULL_HIGH, i])
-        bands[LEAST, i], bands[MOST, i] = pull_range(curves, i, section)
-        hang = hang and bands[LEAST, i] <= bands[MOST, i]
+        bands[LEAST, i], bands[MOST, i] = range_between_ends(cables, i, bands)
+        sought = sought or not bands[LEAST, i] <= bands[MOST, i]
+    if sought:
+        find_turns(curves, bands[LOW], bands[TAUT], memory)
+        for i in range(m):
+            if not bands[LEAST, i] <= bands[MOST, i]:
+                section = Section(bands[LOW, i], bands[TAUT, i], bands[PULL_LOW, i], bands[PULL_HIGH, i])
+                bands[LEAST, i], bands[MOST, i] = pull_range(curves, i, section)
+            hang = hang and bands[LEAST, i] <= bands[MOST, i]
     return hang
+
+
+@formula
+def range_between_ends(cables: Cables, i: int, bands: Array) -> tuple[float, float]:
+    """Least and largest pull of a cable from those at its ends, where first order tells; else NaN, to look for turns.
+
+    With X = wD/(2 tau) and e = tau/EA, pull/(wD/2) = 1/(1 + e) - X/3 |sin phi|/(1 + e)^2 + X^2/6 cos^2 phi to
+    0.334 eX + 0.023 X^3 for a cable below its frame end, e <= 0.15 and X <= 1. It turns twice at most: there is a
+    largest value near X_M, where e = X/3 |sin phi|, and at larger X a least one; docs/model.md, section 5.
+    """
+    half_weight = cables.half_weight[i]
+    at_low, at_high = bands[PULL_LOW, i], bands[PULL_HIGH, i]
+    least, most = min(at_low, at_high), max(at_low, at_high)
+    s, c2 = -cables.sine[i], cables.cosine[i] * cables.cosine[i]
+    x, tautest = half_weight / bands[LOW, i], half_weight / bands[TAUT, i]
+    product = half_weight / cables.stiffness[i]  # e X, whatever the tension
+    if s <= 0.0 or half_weight == 0.0:
+        return least, most
+    if x > SLACKEST or product > STRETCHED * tautest or cables.machine:
+        return math.nan, math.nan
+    peak = math.sqrt(3.0 * product / s)  # X_M
+    if x <= FROM_MOST * peak:
+        return least, most
+    if tautest < BEFORE_MOST * peak:
+        beyond = min(x, BEFORE_MOST * peak)
+        stretch = 1.0 + product / tautest
+        rise = s / (3.0 * stretch * stretch) - beyond * (c2 / 6.0 + BY_SAG * beyond)
+        if not rise > 0.0:
+            return math.nan, math.nan
+        most = max(most, half_weight * (1.0 - 2.0 * math.sqrt(product * rise / stretch) + BY_STRETCH * product))
+    if x * c2 > BEFORE_LEAST * s:
+        beyond = min(x, AFTER_LEAST * s / c2)
+        depth = c2 / 6.0 - BY_SAG * beyond
+        flat = s / (6.0 * depth) < beyond and depth > 0.0
+        fall = s * s / (36.0 * depth) if flat else beyond * (s / 3.0 - beyond * depth)
+        strain = product * c2 / (BEFORE_LEAST * s)
+        least = min(least, half_weight * (1.0 - strain - fall - BY_STRETCH * product))
+    return least, most

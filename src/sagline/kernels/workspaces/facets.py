@@ -1,58 +1,152 @@
 """The facets of the wrenches that cables can exert: normals to all (n - 1)-subsets of the structure matrix's columns.
 
-Sorted subsets are walked depth first, and each column takes one row out of a table, by a pivot among the rows. The
-last row is the normal y along the table's columns: y . J_i of all cables, y in world axes, and y . c of further columns
-come together. A normal's own component of 1 in that row keeps them consistent to the last digits whatever the pivots.
+Elimination with complete pivoting makes n columns unit vectors: a basis, whose rows are normals to all of it but one.
+A normal to k of the r = m - n other columns and to all of the basis but k + 1 is then a combination of k + 1 rows, by
+the k x k minors of the other columns there; these grow from those of one column less by Laplace's expansion. So the
+subsets of the other columns are walked depth first, and all normals of a subset come in a loop without branches.
+Whatever rounding does to a normal, it stays a direction along which to measure.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from itertools import combinations
+from typing import Final, NamedTuple
+
+import numpy as np
 
 from sagline.arrays import Array, Indices
 from sagline.kernels.jit import formula, glue
 from sagline.kernels.memory import Memory, block, counters
 
-DEPENDENT = 1e-10  # of the largest entry of a column: what is left of one that depends on those before it
+RANK = 1e-9  # of the largest entry, as in `kernels.algebra.householder`: a pivot below it says that rank is lost
+DEPENDENT = 1e-10  # a normal by minors no larger than this is one to columns that depend on each other
 LIMIT = 1 << 40  # of steps: more than there can be
+MOST_FREE = 6  # motions
+
+# Subsets of up to six rows, as bits: those of size k of n rows are ORDER[n, START[n, k] : START[n, k + 1]].
+_SUBSETS = [
+    [sum(1 << i for i in chosen) for k in range(n + 1) for chosen in combinations(range(n), k)]
+    for n in range(MOST_FREE + 1)
+]
+ORDER: Final = np.array([subsets + [0] * (64 - len(subsets)) for subsets in _SUBSETS])
+START: Final = np.array(
+    [[sum(bits.bit_count() < k for bits in subsets) for k in range(MOST_FREE + 2)] for subsets in _SUBSETS]
+)
+MEMBERS: Final = np.array([([i for i in range(6) if bits >> i & 1] + [0] * 6)[:6] for bits in range(64)])
 
 
 class Facets(NamedTuple):
-    """Where the walk is.
+    """Where the walk over the facets is.
 
     Attributes:
-        tables: One of n - d rows for each depth d, of m + 6 + others columns, (n, n, columns).
-        chosen: Cables of the present subset, (n - 1,).
+        table: A row for each column of the basis: along the m columns, and in world axes, (n, m + 6).
+        others: The columns that are not in the basis along its rows, each with a largest entry of 1, (r, n).
+        minors: Of the present subset and its beginnings, by sets of rows, (n, 2^n).
+        basis: The column of each row, (n,).
+        chosen: The present subset of the others, from place 1 on, (n + 1,).
     """
 
-    tables: Array
+    table: Array
+    others: Array
+    minors: Array
+    basis: Indices
     chosen: Indices
 
 
 @glue
-def new_facets(memory: Memory, n: int, columns: int) -> tuple[Facets, Memory]:
-    """Room for n free motions, and the memory that is left."""
-    rows, at = block(memory.numbers, 0, n * n, columns)
-    chosen, used = counters(memory, 0, n)
-    return Facets(rows.reshape((n, n, columns)), chosen), Memory(memory.numbers[at:], memory.counters[used:])
+def new_facets(memory: Memory, n: int, m: int) -> tuple[Facets, Memory]:
+    """Room for n free motions and m cables, and the memory that is left."""
+    table, at = block(memory.numbers, 0, n, m + 6)
+    others, at = block(memory.numbers, at, m - n, n)
+    minors, at = block(memory.numbers, at, n, 1 << n)
+    basis, used = counters(memory, 0, n)
+    chosen, used = counters(memory, used, n + 1)
+    return Facets(table, others, minors, basis, chosen), Memory(memory.numbers[at:], memory.counters[used:])
+
+
+@glue
+def choose_basis(facets: Facets, n: int, m: int) -> bool:
+    """Eliminate in place, and fill basis and others; False where rank is lost."""
+    table, basis = facets.table, facets.basis
+    first = 0.0
+    for k in range(n):
+        row = column = -1
+        largest = 0.0
+        for j in range(k, n):
+            for i in range(m):
+                if abs(table[j, i]) > largest:
+                    largest = abs(table[j, i])
+                    row, column = j, i
+        first = max(first, largest)
+        if not largest > RANK * first:
+            return False
+        exchange(table, k, row)
+        basis[k] = column
+        scale(table[k], 1.0 / table[k, column])
+        for j in range(n):
+            if j != k:
+                subtract(table[j], table[j, column], table[k])
+                table[j, column] = 0.0
+    count = 0
+    for i in range(m):
+        inside = False
+        for k in range(n):
+            inside = inside or basis[k] == i
+        if not inside:
+            largest = 0.0
+            for k in range(n):
+                largest = max(largest, abs(table[k, i]))
+            for k in range(n):
+                facets.others[count, k] = table[k, i] / largest if largest > 0.0 else 0.0
+            count += 1
+    return True
 
 
 @formula
-def eliminate(table: Array, rows: int, c: int, smallest: float, out: Array) -> bool:
-    """Take column c out of the first rows of a table, and one row with it; False where it depends on earlier ones."""
-    pivot = 0
-    largest = abs(table[0, c])
-    for k in range(1, rows):
-        if abs(table[k, c]) > largest:
-            largest = abs(table[k, c])
-            pivot = k
-    if not largest > smallest:
-        return False
-    inverse = 1.0 / table[pivot, c]
-    for k in range(rows - 1):
-        source = k if k < pivot else k + 1
-        factor = table[source, c] * inverse
-        for j in range(table.shape[1]):
-            out[k, j] = table[source, j] - factor * table[pivot, j]
-        out[k, c] = 0.0
-    return True
+def exchange(table: Array, k: int, row: int) -> None:
+    """Exchange two rows."""
+    for j in range(table.shape[1]):
+        table[k, j], table[row, j] = table[row, j], table[k, j]
+
+
+@formula
+def scale(row: Array, factor: float) -> None:
+    """Multiply a row."""
+    for j in range(row.size):
+        row[j] *= factor
+
+
+@formula
+def subtract(row: Array, factor: float, other: Array) -> None:
+    """Take a multiple of another row from a row."""
+    for j in range(row.size):
+        row[j] -= factor * other[j]
+
+
+@glue
+def next_subset(facets: Facets, n: int, depth: int) -> int:
+    """Go on to the next subset of the others, with the minors of its columns; returns its size, -1 after the last.
+
+    depth: size of the present one; the first is the empty one.
+    """
+    chosen, others, minors = facets.chosen, facets.others, facets.minors
+    r = others.shape[0]
+    if depth < n - 1 and (0 if depth == 0 else chosen[depth] + 1) < r:
+        chosen[depth + 1] = -1 if depth == 0 else chosen[depth]
+        depth += 1
+    while depth > 0 and chosen[depth] == r - 1:
+        depth -= 1
+    if depth == 0:
+        return -1
+    chosen[depth] += 1
+    column = others[chosen[depth]]
+    for s in range(START[n, depth], START[n, depth + 1]):
+        rows = ORDER[n, s]
+        total = 0.0
+        sign = 1.0
+        for j in range(depth):
+            k = MEMBERS[rows, j]
+            total += sign * column[k] * minors[depth - 1, rows ^ (1 << k)]
+            sign = -sign
+        minors[depth, rows] = total
+    return depth

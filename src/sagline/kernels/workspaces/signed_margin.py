@@ -34,7 +34,7 @@ from sagline.kernels.codes import (
     MARGIN_SINGULAR,
     MARGIN_TOO_SLACK,
 )
-from sagline.kernels.jit import entry, glue, kernel
+from sagline.kernels.jit import entry, formula, glue, kernel
 from sagline.kernels.memory import Memory, block
 from sagline.kernels.workspaces.bands import (
     BAND_ROWS,
@@ -46,22 +46,41 @@ from sagline.kernels.workspaces.bands import (
     PULL_LOW,
     fill_bands,
 )
-from sagline.kernels.workspaces.facets import DEPENDENT, LIMIT, Facets, eliminate, new_facets
-from sagline.kernels.workspaces.wrench_set import SetTerms, WrenchSet, has_rest, new_set, place_set, reach_of_rest
+from sagline.kernels.workspaces.facets import (
+    DEPENDENT,
+    LIMIT,
+    MEMBERS,
+    ORDER,
+    START,
+    Facets,
+    choose_basis,
+    new_facets,
+    next_subset,
+)
+from sagline.kernels.workspaces.wrench_set import SetTerms, WrenchSet, new_set, place_set, reach
 
-ALONG = 1e-12  # of a normal of length 1 and a column, moments over the lever arm: a column in the facet itself
-PURE = 1e-9  # force part of such a normal, below which it is one of moments alone
+ALONG = 1e-13  # of the rows that a normal is made of: what a column in the facet itself gives along it by rounding
+PURE = 1e-9  # force part of a normal of length 1, moments times the lever arm, below which it is one of moments alone
 
-# Further columns of the facets' tables, after those of the m cables and the six of the normal.
-ENDS, RANGES = 0, 1  # what the cables give in the middle of their ends, and of their pulls' ranges, less the demand
-OTHERS = 2
-
-# Rows of what counts at a facet (COUNT_ROWS, m).
+# Rows of what counts of the cables (COUNT_ROWS, m).
 WIDTH = 0  # half the range of the tensions
 SLOPE = 1  # half of how far the pull grows from end to end
 UNSURE = 2  # half the range of the pull
 LEVER_X, LEVER_Y = 3, 4
-COUNT_ROWS = 5
+COLUMN = 5  # of the structure matrix, six rows
+COUNT_ROWS = 11
+
+ENDS, RANGES = 0, 1  # rows of the points
+
+# Rows of facets that are measured together (FACET_ROWS, TOGETHER).
+NORMAL = 0  # six rows
+ROUNDING = 6
+BY_ENDS, BY_TENSIONS, BY_PULLS = 7, 8, 9  # what the cables give to either side of the points
+AGAINST, FOR = 10, 11  # how far the set reaches
+UP, DOWN = 12, 13  # the most that a cable without limit counts to either side
+WORK = 14  # two rows
+FACET_ROWS = 16
+TOGETHER = 32
 
 VALUE, BELOW, ABOVE = 0, 1, 2  # rows of the margins (3, N) [N]
 
@@ -76,18 +95,18 @@ class Count(NamedTuple):
     """What counts at the facets of one pose.
 
     Attributes:
-        rows: (COUNT_ROWS, m).
-        endless: Whether a cable has no upper limit.
-        unsure: Whether the pulls change with the tensions.
+        rows: Of the cables, (COUNT_ROWS, m).
+        points: What the cables give in the middle of their ends, and of their pulls' ranges, less the demand, (2, 6).
         high: Upper limits [N], (m,).
+        endless: Whether a cable has none.
         arm: Lever arm of the norm [m].
         lever: Mean lever arm [m], by which moments are divided while normals are looked for; 1 without any.
     """
 
     rows: Array
-    endless: bool
-    unsure: bool
+    points: Array
     high: Array
+    endless: bool
     arm: float
     lever: float
 
@@ -128,14 +147,16 @@ def signed_margins(
     inertias = set_terms[7]
     count, m, n = poses.shape[0], robots.shape[1], freedom.shape[0]
     cables, rest = new_cables(Memory(room[0], room[1]), m, robots_have_machine(robots))
-    facets, rest = new_facets(rest, n, m + 6 + OTHERS)
+    facets, rest = new_facets(rest, n, m)
     wrenches, rest = new_set(set_terms, rest)
     rotation, at = block(rest.numbers, 0, 3, 3)
     found, at = block(rest.numbers, at, 1, 3)
-    rows, at = block(rest.numbers, at, g.GEOMETRY_ROWS + 6 + BAND_ROWS + COUNT_ROWS, m)
+    points, at = block(rest.numbers, at, 2, 6)
+    measured, at = block(rest.numbers, at, FACET_ROWS, TOGETHER)
+    rows, at = block(rest.numbers, at, g.GEOMETRY_ROWS + BAND_ROWS + COUNT_ROWS, m)
     rest = Memory(rest.numbers[at:], rest.counters)
-    geometry, full = rows[: g.GEOMETRY_ROWS], rows[g.GEOMETRY_ROWS : g.GEOMETRY_ROWS + 6]
-    bands, counted = rows[g.GEOMETRY_ROWS + 6 :][:BAND_ROWS], rows[g.GEOMETRY_ROWS + 6 + BAND_ROWS :]
+    geometry, bands = rows[: g.GEOMETRY_ROWS], rows[g.GEOMETRY_ROWS : g.GEOMETRY_ROWS + BAND_ROWS]
+    counted = rows[g.GEOMETRY_ROWS + BAND_ROWS :]
     for p in range(first, last):
         values[VALUE, p] = values[BELOW, p] = values[ABOVE, p] = -math.inf
         limiting[p] = -1
@@ -147,175 +168,220 @@ def signed_margins(
         if not place_cables(model, limits, robot, geometry, cables):
             statuses[p] = MARGIN_NO_CHORD
             continue
-        fill_structure_matrix(geometry, full)
+        fill_structure_matrix(geometry, counted[COLUMN:])
+        lever = arms[1][p * arms[1].size // count]
+        first_table(freedom, counted[COLUMN:], lever, facets.table)
+        if not choose_basis(facets, n, m):
+            statuses[p] = MARGIN_SINGULAR
+            continue
         curves, left = new_curves(model, cables, room[2], rest)
         if not fill_bands(curves, bands, left):
             statuses[p] = MARGIN_TOO_SLACK
             continue
         place_set(set_terms, body, inertias[p * inertias.shape[0] // count], rotation, wrenches)
-        lever = arms[1][p * arms[1].size // count]
-        counts = count_of(bands, geometry, counted, arms[0][p * arms[0].size // count], lever)
-        rows_along_freedom(freedom, full, facets.tables[0])
-        first_table(freedom, body, set_terms[0], full, bands, counts, facets)
-        statuses[p] = walk(facets, n, m, counts, wrenches, found[0], directions[p], limiting[p : p + 1])
+        endless = fill_count(body, set_terms[0], geometry, bands, counted, points)
+        counts = Count(counted, points, bands[HIGH], endless, arms[0][p * arms[0].size // count], lever)
+        walk(facets, n, m, counts, wrenches, measured, found[0], directions[p])
         for k in range(3):
             values[k, p] = found[0, k]
+        limiting[p] = steepest(counts, directions[p]) if found[0, VALUE] < math.inf else -1
+        statuses[p] = status_of(found[0])
 
 
 @glue
-def count_of(bands: Array, geometry: Array, rows: Array, arm: float, lever: float) -> Count:
-    """Fill what counts at every facet."""
+def first_table(freedom: Array, full: Array, lever: float, table: Array) -> None:
+    """Fill the table to choose a basis from: a row for each free motion, moments over the mean lever arm."""
+    m = full.shape[1]
+    rows_along_freedom(freedom, full, table)
+    for k in range(freedom.shape[0]):
+        unit = 1.0 / lever if turns(freedom, k) else 1.0
+        for i in range(m):
+            table[k, i] *= unit
+        for a in range(6):
+            table[k, m + a] = freedom[k, a] * unit
+
+
+@glue
+def fill_count(body: Array, center: Array, geometry: Array, bands: Array, rows: Array, points: Array) -> bool:
+    """Fill what counts at every facet; returns whether a cable has no upper limit."""
     endless = False
-    unsure = False
+    for a in range(6):
+        points[ENDS, a] = points[RANGES, a] = center[a]
+    points[ENDS, 2] = points[RANGES, 2] = center[2] - body[tables.MASS] * body[tables.GRAVITY]
     for i in range(bands.shape[1]):
         limited = bands[HIGH, i] < math.inf
         endless = endless or not limited
         rows[WIDTH, i] = 0.5 * (bands[HIGH, i] - bands[LOW, i]) if limited else 0.0
         rows[SLOPE, i] = 0.5 * (bands[PULL_HIGH, i] - bands[PULL_LOW, i]) if limited else 0.0
         rows[UNSURE, i] = 0.5 * (bands[MOST, i] - bands[LEAST, i])
-        unsure = unsure or rows[UNSURE, i] > 0.0
-        rows[LEVER_X, i] = geometry[g.LEVER_X, i]
-        rows[LEVER_Y, i] = geometry[g.LEVER_Y, i]
-    return Count(rows, endless, unsure, bands[HIGH], arm, lever)
+        x, y = geometry[g.LEVER_X, i], geometry[g.LEVER_Y, i]
+        rows[LEVER_X, i] = x
+        rows[LEVER_Y, i] = y
+        for a in range(6):
+            given = rows[COLUMN + a, i] * (bands[LOW, i] + rows[WIDTH, i])
+            points[ENDS, a] += given
+            points[RANGES, a] += given
+        take_pull(points[ENDS], bands[PULL_LOW, i] + rows[SLOPE, i], x, y)
+        take_pull(points[RANGES], 0.5 * (bands[LEAST, i] + bands[MOST, i]), x, y)
+    return endless
 
 
 @glue
-def first_table(
-    freedom: Array, body: Array, center: Array, full: Array, bands: Array, counts: Count, facets: Facets
-) -> None:
-    """Fill the table of depth 0: a row for each free motion, moments over the mean lever arm."""
-    n, m = freedom.shape[0], bands.shape[1]
-    table, rows = facets.tables[0], counts.rows
-    weight = body[tables.MASS] * body[tables.GRAVITY]
-    for k in range(n):
-        unit = 1.0 / counts.lever if turns(freedom, k) else 1.0
-        ends = freedom[k, 2] * -weight
-        for a in range(6):
-            ends += freedom[k, a] * center[a]
-        ranges = ends
-        for i in range(m):
-            along = table[k, i]
-            hanging = freedom[k, 2] + freedom[k, 3] * rows[LEVER_Y, i] - freedom[k, 4] * rows[LEVER_X, i]
-            given = along * (bands[LOW, i] + rows[WIDTH, i])
-            ends += given - hanging * (bands[PULL_LOW, i] + rows[SLOPE, i])
-            ranges += given - hanging * 0.5 * (bands[LEAST, i] + bands[MOST, i])
-            table[k, i] = along * unit
-        for a in range(6):
-            table[k, m + a] = freedom[k, a] * unit
-        table[k, m + 6 + ENDS] = ends * unit
-        table[k, m + 6 + RANGES] = ranges * unit
+def take_pull(point: Array, pull: float, x: float, y: float) -> None:
+    """Take what a cable's pull hangs on the platform at a lever from what the cables give, (6,)."""
+    point[2] -= pull
+    point[3] -= pull * y
+    point[4] += pull * x
 
 
-@kernel
+@glue
 def walk(
     facets: Facets,
     n: int,
     m: int,
     counts: Count,
     wrenches: WrenchSet,
+    measured: Array,
     margin: Array,
     direction: Array,
-    cable: Indices,
-) -> int:
-    """Fill the margin over all facets (3,), the normal of the least (6,) and its cable (1,); returns the status."""
-    tables_, chosen = facets
-    rest = has_rest(wrenches)
+) -> None:
+    """Fill the margin over all facets (3,), and the normal of the least (6,)."""
     for k in range(3):
         margin[k] = math.inf
-    resists = False
+    facets.minors[0, 0] = 1.0
     depth = 0
-    chosen[0] = -1
+    held = 0
     for _ in range(LIMIT):
-        chosen[depth] += 1
-        c = chosen[depth]
-        if c > m - n + 1 + depth:
-            depth -= 1
-            if depth < 0:
-                break
-            continue
-        if not eliminate(tables_[depth], n - depth, c, DEPENDENT, tables_[depth + 1]):
-            continue
-        if depth < n - 2:
-            depth += 1
-            chosen[depth] = c
-            continue
-        resists = measure(tables_[depth + 1, 0], m, counts, wrenches, rest, margin, direction, cable) or resists
-    if not resists:
-        for k in range(3):
-            margin[k] = -math.inf
-        return MARGIN_SINGULAR
-    if margin[BELOW] >= 0.0:
-        return MARGIN_FEASIBLE
-    return MARGIN_INFEASIBLE if margin[ABOVE] < 0.0 else MARGIN_OPEN
+        for s in range(START[n, depth + 1], START[n, depth + 2]):
+            if add_normal(facets, depth, ORDER[n, s], m, counts.lever, measured, held):
+                held += 1
+            if held == TOGETHER:
+                measure(counts, wrenches, held, measured, margin, direction)
+                held = 0
+        depth = next_subset(facets, n, depth)
+        if depth < 0:
+            break
+    measure(counts, wrenches, held, measured, margin, direction)
+
+
+@formula
+def add_normal(facets: Facets, depth: int, rows: int, m: int, lever: float, measured: Array, b: int) -> bool:
+    """Fill the normal that a set of rows, one more than the present subset has columns, makes; False for none."""
+    table, minors = facets.table, facets.minors[depth]
+    x = y = z = u = v = w = 0.0
+    sign = 1.0
+    largest = 0.0
+    rounding = 0.0
+    for j in range(depth + 1):
+        k = MEMBERS[rows, j]
+        factor = sign * minors[rows ^ (1 << k)]
+        sign = -sign
+        row = table[k, m:]
+        largest = max(largest, abs(factor))
+        rounding += abs(factor) * (
+            abs(row[0]) + abs(row[1]) + abs(row[2]) + lever * (abs(row[3]) + abs(row[4]) + abs(row[5]))
+        )
+        x += factor * row[0]
+        y += factor * row[1]
+        z += factor * row[2]
+        u += factor * row[3]
+        v += factor * row[4]
+        w += factor * row[5]
+    measured[NORMAL, b] = x
+    measured[NORMAL + 1, b] = y
+    measured[NORMAL + 2, b] = z
+    measured[NORMAL + 3, b] = u
+    measured[NORMAL + 4, b] = v
+    measured[NORMAL + 5, b] = w
+    measured[ROUNDING, b] = rounding
+    return largest > DEPENDENT
+
+
+@kernel
+def measure(counts: Count, wrenches: WrenchSet, held: int, measured: Array, margin: Array, direction: Array) -> None:
+    """Let both sides of the facets held lower the margin (3,), and its normal (6,)."""
+    sum_cables(counts, held, measured)
+    reach(wrenches, measured[NORMAL : NORMAL + 6], held, measured[WORK:], measured[AGAINST], measured[FOR])
+    for b in range(held):
+        y = measured[:6, b]
+        force = y[0] * y[0] + y[1] * y[1] + y[2] * y[2]
+        moment = y[3] * y[3] + y[4] * y[4] + y[5] * y[5]
+        length = math.sqrt(force + counts.arm * counts.arm * moment)
+        pure = counts.arm == 0.0 and not force > PURE * PURE * (force + counts.lever * counts.lever * moment)
+        inverse = math.inf if pure else 1.0 / length
+        ends = ranges = 0.0
+        for k in range(6):
+            ends += counts.points[ENDS, k] * y[k]
+            ranges += counts.points[RANGES, k] * y[k]
+        small = ALONG * measured[ROUNDING, b]
+        for side in range(2):
+            sign = 1.0 if side == 0 else -1.0
+            if counts.endless and measured[UP if side == 0 else DOWN, b] > small:
+                continue
+            demand = measured[AGAINST if side == 0 else FOR, b]
+            value = over(measured[BY_ENDS, b] + sign * ends - demand, inverse)
+            middle = measured[BY_TENSIONS, b] + sign * ranges - demand
+            margin[BELOW] = min(margin[BELOW], over(middle - measured[BY_PULLS, b], inverse))
+            margin[ABOVE] = min(margin[ABOVE], over(middle + measured[BY_PULLS, b], inverse))
+            if value < margin[VALUE]:
+                margin[VALUE] = value
+                for k in range(6):
+                    direction[k] = sign * y[k] * (1.0 / math.sqrt(moment) if pure else inverse)
 
 
 @glue
-def measure(
-    row: Array,
-    m: int,
-    counts: Count,
-    wrenches: WrenchSet,
-    rest: bool,
-    margin: Array,
-    direction: Array,
-    cable: Indices,
-) -> bool:
-    """Let both sides of one facet lower the margin (3,); returns whether any cable pulls along its normal."""
+def sum_cables(counts: Count, held: int, measured: Array) -> None:
+    """Fill what the cables give to either side of the points along the normals held."""
     rows = counts.rows
-    y = row[m : m + 6]
-    force = y[0] * y[0] + y[1] * y[1] + y[2] * y[2]
-    moment = y[3] * y[3] + y[4] * y[4] + y[5] * y[5]
-    size = math.sqrt(force + counts.lever * counts.lever * moment)
-    length = math.sqrt(force + counts.arm * counts.arm * moment)
-    ends = 0.0
-    tensions = 0.0
-    pulls = 0.0
-    largest = 0.0
-    for i in range(m):
-        along = row[i]
-        hanging = y[2] + y[3] * rows[LEVER_Y, i] - y[4] * rows[LEVER_X, i]
-        ends += abs(along * rows[WIDTH, i] - hanging * rows[SLOPE, i])
-        tensions += abs(along) * rows[WIDTH, i]
-        pulls += abs(hanging) * rows[UNSURE, i]
-        largest = max(largest, abs(along))
-    small = ALONG * size
-    if not largest > small:
-        return False
-    forward = True
-    backward = True
-    if counts.endless:
-        for i in range(m):
-            if counts.high[i] == math.inf:
-                forward = forward and not row[i] > small
-                backward = backward and not row[i] < -small
-    against = 0.0
-    for k in range(6):
-        against += wrenches.half[k] * abs(y[k])
-    along_set = against
-    if rest:
-        further, other = reach_of_rest(wrenches, y)
-        against += further
-        along_set += other
-    inverse = 1.0 / length if force > PURE * PURE * size * size or counts.arm > 0.0 else math.inf
-    for side in range(2):
-        if not (forward if side == 0 else backward):
-            continue
-        sign = 1.0 if side == 0 else -1.0
-        demand = against if side == 0 else along_set
-        value = over(ends + sign * row[m + 6 + ENDS] - demand, inverse)
-        middle = tensions + sign * row[m + 6 + RANGES] - demand
-        margin[BELOW] = min(margin[BELOW], over(middle - pulls, inverse))
-        margin[ABOVE] = min(margin[ABOVE], over(middle + pulls, inverse))
-        if value < margin[VALUE]:
-            margin[VALUE] = value
-            most = 0.0
-            for k in range(6):
-                direction[k] = sign * y[k] * (inverse if inverse < math.inf else 1.0 / math.sqrt(moment))
-            for i in range(m):
-                if abs(row[i]) > most:
-                    most = abs(row[i])
-                    cable[0] = i
-    return True
+    for b in range(held):
+        measured[BY_ENDS, b] = measured[BY_TENSIONS, b] = measured[BY_PULLS, b] = 0.0
+        measured[UP, b] = measured[DOWN, b] = 0.0
+    for i in range(rows.shape[1]):
+        width, slope, unsure = rows[WIDTH, i], rows[SLOPE, i], rows[UNSURE, i]
+        x, y = rows[LEVER_X, i], rows[LEVER_Y, i]
+        j0, j1, j2 = rows[COLUMN, i], rows[COLUMN + 1, i], rows[COLUMN + 2, i]
+        j3, j4, j5 = rows[COLUMN + 3, i], rows[COLUMN + 4, i], rows[COLUMN + 5, i]
+        for b in range(held):
+            along = (
+                j0 * measured[NORMAL, b]
+                + j1 * measured[NORMAL + 1, b]
+                + j2 * measured[NORMAL + 2, b]
+                + j3 * measured[NORMAL + 3, b]
+                + j4 * measured[NORMAL + 4, b]
+                + j5 * measured[NORMAL + 5, b]
+            )
+            hanging = measured[NORMAL + 2, b] + y * measured[NORMAL + 3, b] - x * measured[NORMAL + 4, b]
+            measured[BY_ENDS, b] += abs(along * width - hanging * slope)
+            measured[BY_TENSIONS, b] += abs(along) * width
+            measured[BY_PULLS, b] += abs(hanging) * unsure
+            measured[WORK, b] = along
+        if counts.high[i] == math.inf:
+            for b in range(held):
+                measured[UP, b] = max(measured[UP, b], measured[WORK, b])
+                measured[DOWN, b] = max(measured[DOWN, b], -measured[WORK, b])
+
+
+@glue
+def steepest(counts: Count, direction: Array) -> int:
+    """The cable that counts most along a direction."""
+    cable = -1
+    most = 0.0
+    for i in range(counts.rows.shape[1]):
+        along = 0.0
+        for k in range(6):
+            along += counts.rows[COLUMN + k, i] * direction[k]
+        if abs(along) > most:
+            most = abs(along)
+            cable = i
+    return cable
+
+
+@glue
+def status_of(margin: Array) -> int:
+    """What a bracket (3,) says."""
+    if margin[BELOW] >= 0.0:
+        return MARGIN_FEASIBLE
+    return MARGIN_INFEASIBLE if margin[ABOVE] < 0.0 else MARGIN_OPEN
 
 
 @glue

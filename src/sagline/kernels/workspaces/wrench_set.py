@@ -61,46 +61,69 @@ def place_set(terms: SetTerms, body: Array, inertia: Array, rotation: Array, wre
                 wrenches.spin[j, k] = terms[6][1] * total
 
 
-@kernel
-def reach_of_rest(wrenches: WrenchSet, y: Array) -> tuple[float, float]:
-    """The largest -y . w and the largest y . w over the parts that are no box [N], y (6,)."""
-    both = 0.0
+@glue
+def reach(wrenches: WrenchSet, normals: Array, count: int, work: Array, against: Array, along: Array) -> None:
+    """Fill the largest -y . w and the largest y . w [N] of the first so many normals.
+
+    Args:
+        wrenches: The set.
+        normals: y, (6, B).
+        count: How many.
+        work: To work in, (2, B).
+        against: Filled, (B,).
+        along: Filled, (B,).
+    """
+    for b in range(count):
+        against[b] = 0.0
+    for k in range(6):
+        if wrenches.half[k] > 0.0:
+            for b in range(count):
+                against[b] += wrenches.half[k] * abs(normals[k, b])
     if wrenches.spins:
         for j in range(3):
-            both += abs(wrenches.spin[j, 0] * y[3] + wrenches.spin[j, 1] * y[4] + wrenches.spin[j, 2] * y[5])
+            x, y, z = wrenches.spin[j, 0], wrenches.spin[j, 1], wrenches.spin[j, 2]
+            for b in range(count):
+                against[b] += abs(x * normals[3, b] + y * normals[4, b] + z * normals[5, b])
     for s in range(wrenches.segments.shape[0]):
-        total = 0.0
-        for k in range(6):
-            total += wrenches.segments[s, k] * y[k]
-        both += abs(total)
+        products(wrenches.segments[s], normals, count, work[0])
+        for b in range(count):
+            against[b] += abs(work[0, b])
     for e in range(wrenches.ellipsoids.shape[0]):
-        square = 0.0
+        for b in range(count):
+            work[1, b] = 0.0
         for j in range(6):
-            total = 0.0
-            for k in range(6):
-                total += wrenches.ellipsoids[e, k, j] * y[k]
-            square += total * total
-        both += math.sqrt(square)
-    against = both
-    along = both
+            products(wrenches.ellipsoids[e, :, j], normals, count, work[0])
+            for b in range(count):
+                work[1, b] += work[0, b] * work[0, b]
+        for b in range(count):
+            against[b] += math.sqrt(work[1, b])
+    for b in range(count):
+        along[b] = against[b]
     first = 0
     for p in range(wrenches.sizes.size):
-        least = math.inf
-        most = -math.inf
+        for b in range(count):
+            work[1, b] = -math.inf
         for c in range(first, first + wrenches.sizes[p]):
-            total = 0.0
-            for k in range(6):
-                total += wrenches.corners[c, k] * y[k]
-            least = min(least, total)
-            most = max(most, total)
+            products(wrenches.corners[c], normals, count, work[0])
+            for b in range(count):
+                work[1, b] = max(work[1, b], -work[0, b])
+        for b in range(count):
+            against[b] += work[1, b]
+            work[1, b] = -math.inf
+        for c in range(first, first + wrenches.sizes[p]):
+            products(wrenches.corners[c], normals, count, work[0])
+            for b in range(count):
+                work[1, b] = max(work[1, b], work[0, b])
+        for b in range(count):
+            along[b] += work[1, b]
         first += wrenches.sizes[p]
-        against -= least
-        along += most
-    return against, along
 
 
-@glue
-def has_rest(wrenches: WrenchSet) -> bool:
-    """Whether a set has parts that are no box."""
-    others = wrenches.segments.shape[0] + wrenches.ellipsoids.shape[0] + wrenches.sizes.size
-    return others > 0 or wrenches.spins
+@kernel
+def products(wrench: Array, normals: Array, count: int, out: Array) -> None:
+    """Fill the scalar products of a wrench (6,) and normals (6, B)."""
+    for b in range(count):
+        out[b] = wrench[0] * normals[0, b]
+    for k in range(1, 6):
+        for b in range(count):
+            out[b] += wrench[k] * normals[k, b]
