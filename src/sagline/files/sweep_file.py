@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Final, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from sagline.arguments import brief, file_path, whole_number
 from sagline.arrays import Array, checked
@@ -25,6 +26,7 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.sweep.request import Request
 from sagline.tension.methods import METHODS
+from sagline.workspaces.wrench_sets import WrenchBox, WrenchSet
 
 KEYS: Final = ("low", "high", "count")  # of an axis: its ends, and how many points there are between them
 ANGLES: Final = ("alpha", "beta", "gamma")
@@ -63,10 +65,19 @@ class _Wrenches(Entry):
     rows: list[Any] | None = None
 
 
+class _Around(Entry):
+    """Loads around each wrench: largest components of force and moment, one number each or three."""
+
+    force: Any = 0.0
+    moment: Any = 0.0
+
+
 class _SweepEntry(Entry):
     robots: Any
     poses: _Poses
     wrenches: _Wrenches | None = None
+    around: _Around | None = None
+    moment_arm: Any = None
     quantities: Any = "tension"
     model: str = "catenary"
     tension: str = "minimum-norm"
@@ -89,7 +100,8 @@ def load_sweep(file: os.PathLike[str] | str) -> Request:
           grid:                                # or rows: [[fx, fy, fz, mx, my, mz], ...]
             force_x: {low: -100 N, high: 100 N, count: 11}
             moment_z: 5 N*m
-        quantities: [tension, shortfall]       # of sl.sweep.QUANTITIES
+        around: {force: 20 N, moment: 5 N*m}   # for the margin, of all loads up to that around each wrench
+        quantities: [tension, margin]          # of sl.sweep.QUANTITIES
         model: catenary                        # as of sagline track, and so is tension: minimum-norm
 
     Args:
@@ -114,6 +126,8 @@ def load_sweep(file: os.PathLike[str] | str) -> Request:
             entry.quantities,
             model=_named(entry.model, "model", MODELS)(),
             tension=_named(entry.tension, "tension", METHODS)(),
+            around=None if entry.around is None else _around(entry.around),
+            moment_arm=None if entry.moment_arm is None else _one(entry.moment_arm, "moment_arm", "m"),
         )
     except InvalidValueError as error:
         raise FileError.of(path, error) from None
@@ -161,6 +175,11 @@ def _wrenches(given: _Wrenches | None) -> Array | None:
         pairs = zip(names, row, strict=True)
         rows.append([_one(value, f"wrenches.rows[{k}]: {name}", _unit(name)) for name, value in pairs])
     return np.array(rows).reshape(-1, len(names))
+
+
+def _around(given: _Around) -> WrenchSet:
+    force, moment = in_si(given.force, "N", "around.force"), in_si(given.moment, "N*m", "around.moment")
+    return WrenchBox(cast(ArrayLike, force), cast(ArrayLike, moment))
 
 
 def _unit(name: str) -> str:

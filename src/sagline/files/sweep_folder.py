@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sagline.arrays import locked
 from sagline.errors import FileError, InvalidValueError
 from sagline.files.content import Content
 from sagline.files.plan_file import MODELS, choice_attributes, choice_of
@@ -29,6 +30,7 @@ from sagline.sweep.quantities import Variable, variables_of
 from sagline.sweep.request import Request
 from sagline.sweep.work import Part
 from sagline.tension.methods import METHODS
+from sagline.workspaces.wrench_sets import WrenchSet
 
 if TYPE_CHECKING:
     from zarr import Group
@@ -48,6 +50,14 @@ GIVEN: Final = {  # arrays of the request: their dimensions and units
     "position": ("pose", "axis", "m"),
     "quaternion": ("pose", "quaternion_part", "1"),
     "wrench": ("wrench", "wrench_part", "N, N m"),
+}
+SHAPES: Final = {  # of the parts of a set of loads
+    "center": (6,),
+    "segments": (-1, 6),
+    "ellipsoids": (-1, 6, 6),
+    "corners": (-1, 6),
+    "sizes": (-1,),
+    "accelerations": (2,),
 }
 STEP: Final = "Free some space or correct the permissions, and run the same again: it goes on where it stopped."
 
@@ -197,6 +207,8 @@ def open_folder(path: Path) -> SweepFolder:
             attributes["quantities"],
             model=choice_of(path, attributes, "model", MODELS),
             tension=choice_of(path, attributes, "tension", METHODS),
+            around=_set_of(attributes["around"]),
+            moment_arm=attributes["moment_arm"],
         )
         size = TaskSize(int(attributes["task_poses"]), int(attributes["task_wrenches"]))
         made_by, digest = str(attributes["source"]), str(attributes["digest"])
@@ -243,8 +255,16 @@ def _options(request: Request) -> dict[str, Any]:
         "quantities": list(request.quantities),
         **choice_attributes("model", request.model, MODELS),
         **choice_attributes("tension", request.tension, METHODS),
+        "around": {name: getattr(request.around, name).tolist() for name in SHAPES},
+        "moment_arm": request.moment_arm,
     }
     return {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in options.items()}
+
+
+def _set_of(written: Mapping[str, Any]) -> WrenchSet:
+    """The set of loads that `_options` wrote."""
+    kinds = {name: np.int64 if name == "sizes" else np.float64 for name in SHAPES}
+    return WrenchSet(*(locked(np.array(written[name], kinds[name]).reshape(SHAPES[name])) for name in SHAPES))
 
 
 def _digest(texts: list[str], options: Mapping[str, Any], request: Request) -> str:

@@ -184,20 +184,18 @@ def spread(client: Any, job: Job, numbers: Iterable[int], finish: Finish) -> Non
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """While inside, Dask and what it is made of say nothing on the terminal."""
+    """While inside, Dask and what it is made of say nothing; nor after a failure, of which their threads speak late."""
     loggers = [logging.getLogger(name) for name in LOGGERS]
     levels = [logger.level for logger in loggers]
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", module=rf"({'|'.join((*LOGGERS, 'dask'))})(\.|$)")
-        try:
-            if has_dask():
-                import distributed  # noqa: F401 - sets its loggers up, and would undo what follows
-            for logger in loggers:
-                logger.setLevel(SILENT)
-            yield
-        finally:
-            for logger, level in zip(loggers, levels, strict=True):
-                logger.setLevel(level)
+        if has_dask():
+            import distributed  # noqa: F401 - sets its loggers up, and would undo what follows
+        for logger in loggers:
+            logger.setLevel(SILENT)
+        yield
+    for logger, level in zip(loggers, levels, strict=True):
+        logger.setLevel(level)
 
 
 def _result(future: Any) -> tuple[float, tuple[int, ...]]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.arguments import brief, choice, instance
-from sagline.arrays import Array, checked, locked
+from sagline.arrays import Array, checked, locked, number
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
@@ -23,6 +23,7 @@ from sagline.sweep.quantities import QUANTITIES
 from sagline.tension.method import TensionMethod
 from sagline.tension.minimum_norm import MinimumNorm
 from sagline.tension.options import kernel_options
+from sagline.workspaces.wrench_sets import WrenchSet, load_of
 
 MOST: Final = 1 << 40  # requests: a year on a hundred cores
 _CATENARY: Final = Catenary()
@@ -37,9 +38,12 @@ class Request(Result):
         robots: R of them.
         poses: A batch of P.
         wrenches: External wrenches on the platform, about the center of mass in world axes [N, N m], shape (W, 6).
-        quantities: What is asked, in the order of `sl.sweep.QUANTITIES`: "tension", "length", "shortfall".
+        quantities: What is asked, in the order of `sl.sweep.QUANTITIES`: "tension", "length",
+            "shortfall", "margin".
         model: Cable model.
         tension: How the load is shared among redundant cables; each request stands alone.
+        around: Loads around each wrench, all of which the margin is for.
+        moment_arm: Of the margin's norm [m]; None for each robot's mean lever arm.
     """
 
     robots: tuple[Robot, ...]
@@ -48,6 +52,8 @@ class Request(Result):
     quantities: tuple[str, ...]
     model: CableModel
     tension: TensionMethod
+    around: WrenchSet
+    moment_arm: float | None
 
     def __init__(
         self,
@@ -58,6 +64,8 @@ class Request(Result):
         *,
         model: CableModel = _CATENARY,
         tension: TensionMethod = _MINIMUM_NORM,
+        around: WrenchSet | None = None,
+        moment_arm: float | None = None,
     ) -> None:
         """Check what is asked.
 
@@ -68,6 +76,8 @@ class Request(Result):
             quantities: One of `sl.sweep.QUANTITIES`, or several.
             model: Cable model.
             tension: How the load is shared.
+            around: Set of loads that is added to each wrench for the margin; None for each wrench alone.
+            moment_arm: Of the margin's norm [m], >= 0, as in `sl.margin`.
 
         Raises:
             InvalidValueError: If an argument is none of its kind, there is nothing of one, a robot cannot share its
@@ -103,6 +113,8 @@ class Request(Result):
             "quantities": tuple(name for name in QUANTITIES if name in asked),
             "model": model,
             "tension": method,
+            "around": load_of(around),
+            "moment_arm": None if moment_arm is None else number(moment_arm, "moment_arm", "m", low=0.0),
         }
         for name, value in values.items():
             object.__setattr__(self, name, value)

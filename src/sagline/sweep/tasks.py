@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 SECONDS: Final = 0.75  # of a task: what a scheduler does for it is a hundredth of that
 LONGEST: Final = 10.0  # s, of a task of a sweep that takes days
 TASKS: Final = 4000  # at most, until tasks are as long as that
-TALL: Final = 1024  # poses of a task, before it has more than one wrench
 LARGEST: Final = 1 << 26  # bytes that a task may write
 SAMPLES, SAMPLE = 16, 1024  # parts that are timed, and requests in each
 ENOUGH: Final = 0.5  # s: what has been timed for so long is known well enough
@@ -43,8 +42,10 @@ def task(folder: str, digest: str, number: int) -> tuple[float, tuple[int, ...]]
     """
     start = time.perf_counter()
     opened = _opened(folder, digest)
-    numbers = numbers_of(opened.request, opened.part(number))
-    opened.write(number, numbers)
+    numbers = opened.read(number)  # of a worker that ended before it told
+    if numbers is None:
+        numbers = numbers_of(opened.request, opened.part(number))
+        opened.write(number, numbers)
     return time.perf_counter() - start, tuple(counts_of(numbers))
 
 
@@ -95,11 +96,10 @@ def measured_size(request: Request) -> TaskSize:
 
 
 def _size(rows: int, poses: int, wrenches: int) -> TaskSize:
-    """So many requests as a task: rather poses than wrenches, which are worked out one after the other."""
+    """So many requests as a task: rather wrenches than poses, because the proof of one holds for others of its pose."""
     from sagline.files.sweep_folder import TaskSize
 
-    tall = min(poses, TALL, rows)
-    wide = min(wrenches, max(1, rows // tall))
+    wide = min(wrenches, rows)
     return TaskSize(min(poses, max(1, rows // wide)), wide)
 
 

@@ -3,21 +3,41 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.arrays import Array, locked
-from sagline.kernels import codes, tables
-from sagline.kinematics.inverse_rows import Found, Verdicts, decide_rows, solve_rows
+from sagline.arrays import locked
+from sagline.kernels import tables
+from sagline.kernels.inverse.verdicts import PROVED
+from sagline.kinematics.inverse_rows import decide_rows, solve_rows
 from sagline.kinematics.status import PoseStatus
 from sagline.robot.robot import Robot
 from sagline.statics.tables import pose_rows
-from sagline.sweep.quantities import ENOUGH, LENGTH, PROOF, STATUS, TENSION, Variable, variables_of
+from sagline.sweep.quantities import (
+    ENOUGH,
+    HIGH,
+    LENGTH,
+    LIMITING,
+    LOW,
+    MARGIN,
+    MARGIN_STATUS,
+    PROOF,
+    STATUS,
+    TENSION,
+    Variable,
+    variables_of,
+)
 from sagline.sweep.request import Request
+from sagline.sweep.shared_proofs import proofs_of
 from sagline.tension.options import kernel_options
+from sagline.workspaces.margin_rows import MarginRows
+from sagline.workspaces.margin_status import MarginStatus
 
+# statuses of what is feasible, infeasible, open and lost
+INVERSE_ENDS: Final = (PoseStatus.SOLVED, PoseStatus.INFEASIBLE, PoseStatus.BORDERLINE, PoseStatus.NOT_CONVERGED)
+MARGIN_ENDS: Final = (MarginStatus.FEASIBLE, MarginStatus.INFEASIBLE, MarginStatus.OPEN, -1)  # none is lost
 ROWS: Final = 1 << 14  # requests solved at once: what they take stays in the cache of the processor
 
 
@@ -41,8 +61,8 @@ class Part(NamedTuple):
 
     def pieces(self, most: int) -> Iterator[Part]:
         """The same box in boxes of at most so many requests."""
-        tall = min(self.shape[0], most)
-        wide = max(1, most // tall)
+        wide = min(self.shape[1], most)
+        tall = max(1, most // wide)
         for first in range(self.poses.start, self.poses.stop, tall):
             for left in range(self.wrenches.start, self.wrenches.stop, wide):
                 rows = slice(first, min(first + tall, self.poses.stop))
@@ -56,8 +76,8 @@ class Counts(NamedTuple):
         feasible: With tensions within their limits.
         infeasible: With a proof that there are none.
         unable: With another reason why there is no answer, as the status says.
-        open: With neither tensions nor proof: the bracket of the shortfall holds zero.
-        lost: Not at all.
+        open: With neither, so near the border are they.
+        lost: Without a verdict.
     """
 
     feasible: int
@@ -81,11 +101,12 @@ def numbers_of(request: Request, part: Part) -> dict[str, NDArray[np.generic]]:
     asked = variables_of(request.quantities)
     shape = part.shape
     filled: dict[str, NDArray[np.generic]] = {each.name: _room(each, shape, request.cable_count) for each in asked}
-    solver = _Solver(request, request.robots[part.robot])
+    robot = request.robots[part.robot]
+    solvers = [kind(request, robot) for kind, names in SOLVERS.items() if names.intersection(request.quantities)]
     for piece in part.pieces(ROWS):
         rows = slice(piece.poses.start - part.poses.start, piece.poses.stop - part.poses.start)
         columns = slice(piece.wrenches.start - part.wrenches.start, piece.wrenches.stop - part.wrenches.start)
-        answers = solver.answers(piece)
+        answers = {name: found for solver in solvers for name, found in solver.answers(piece).items()}
         for name, values in filled.items():
             found = answers[name]
             target = values[rows, columns]
@@ -105,47 +126,69 @@ def counts_of(numbers: dict[str, NDArray[np.generic]]) -> Counts:
     Returns:
         The counts.
     """
-    status, proof = numbers[STATUS.name], np.asarray(numbers[PROOF.name], dtype=np.float64)
-    infeasible = status == PoseStatus.INFEASIBLE
-    proved = int(np.count_nonzero(infeasible & (proof > 0.0)))
-    feasible, borderline, lost = (
-        int(np.count_nonzero(status == code))
-        for code in (PoseStatus.SOLVED, PoseStatus.BORDERLINE, PoseStatus.NOT_CONVERGED)
-    )
-    left = borderline + int(np.count_nonzero(infeasible)) - proved
-    return Counts(feasible, proved, status.size - feasible - proved - left - lost, left, lost)
+    name, ends = (STATUS.name, INVERSE_ENDS) if STATUS.name in numbers else (MARGIN_STATUS.name, MARGIN_ENDS)
+    status = numbers[name]
+    feasible, infeasible, left, lost = (int(np.count_nonzero(status == int(code))) for code in ends)
+    return Counts(feasible, infeasible, status.size - feasible - infeasible - left - lost, left, lost)
 
 
-class _Solver:
-    """One robot of a request, set up once."""
+class _Inverse:
+    """Statuses, tensions and lengths of one robot of a request, set up once."""
 
     def __init__(self, request: Request, robot: Robot) -> None:
         self._request, self._robot = request, robot
         self._options = kernel_options(robot, request.model, request.tension)
         self._poses = pose_rows(request.poses)
 
-    def answers(self, part: Part) -> dict[str, Array]:
-        """All variables of a few requests in rows, (N,) or (N, m), whether they are asked for or not."""
-        poses, wrenches = part.shape
-        rows = locked(np.repeat(self._poses[part.poses], wrenches, axis=0))
-        loads = locked(np.tile(self._request.wrenches[part.wrenches], (poses, 1)))
+    def answers(self, part: Part) -> dict[str, NDArray[Any]]:
+        """Variables of a few requests, (N,) or (N, m)."""
+        poses, loads = self._poses[part.poses], self._request.wrenches[part.wrenches]
+        rows = locked(np.repeat(poses, len(loads), axis=0))
+        wrenches = locked(np.tile(loads, (len(poses), 1)))
         none = np.full(self._robot.cable_count, np.nan)
-        found = solve_rows(self._robot, self._request.tension, self._options, rows, loads, none)
-        verdicts = decide_rows(self._robot, self._options, rows, loads, found)
-        return _named(found, verdicts)
+        found = solve_rows(self._robot, self._request.tension, self._options, rows, wrenches, none)
+        answers: dict[str, NDArray[Any]] = {}
+        if "shortfall" in self._request.quantities:
+            verdicts = decide_rows(self._robot, self._options, rows, wrenches, found)
+            answers[ENOUGH.name] = verdicts.shortfall
+            answers[PROOF.name] = verdicts.brackets[:, PROVED]
+        else:
+            answers[PROOF.name] = proofs_of(self._robot, self._options, poses, loads, found)
+        answers[STATUS.name] = found.pose_status
+        answers[TENSION.name] = found.results[tables.TENSION]
+        answers[LENGTH.name] = found.results[tables.LENGTH]
+        return answers
 
 
-def _named(found: Found, verdicts: Verdicts) -> dict[str, Array]:
-    lengths = found.results[tables.LENGTH]
-    return {
-        STATUS.name: found.pose_status,
-        PROOF.name: verdicts.brackets[:, 0],
-        ENOUGH.name: verdicts.shortfall,
-        TENSION.name: found.results[tables.TENSION],
-        LENGTH.name: lengths,
-    }
+class _Margins:
+    """Margins of one robot of a request."""
+
+    def __init__(self, request: Request, robot: Robot) -> None:
+        self._loads = request.wrenches
+        self._poses = pose_rows(request.poses)
+        self._rows = MarginRows(robot, request.around, request.model, request.moment_arm)
+
+    def answers(self, part: Part) -> dict[str, NDArray[Any]]:
+        """Variables of a few requests, (N,)."""
+        poses = locked(self._poses[part.poses])
+        found = [self._rows.about(load).rows(poses) for load in self._loads[part.wrenches]]
+        columns: dict[str, list[NDArray[Any]]] = {
+            MARGIN.name: [each.value for each in found],
+            LOW.name: [each.low for each in found],
+            HIGH.name: [each.high for each in found],
+            LIMITING.name: [each.cable for each in found],
+            MARGIN_STATUS.name: [each.status for each in found],
+        }
+        return {name: np.stack(values, axis=1).ravel() for name, values in columns.items()}
 
 
 def _room(variable: Variable, shape: tuple[int, int], cables: int) -> NDArray[np.generic]:
     whole = (*shape, cables) if variable.a_cable else shape
-    return np.full(whole, codes.POSE_NOT_CONVERGED if variable.type == "int8" else np.nan, dtype=variable.type)
+    return np.full(whole, -1 if variable.type == "int8" else np.nan, dtype=variable.type)
+
+
+# what each quantity is from
+SOLVERS: Final[dict[type[_Inverse | _Margins], frozenset[str]]] = {
+    _Inverse: frozenset({"tension", "length", "shortfall"}),
+    _Margins: frozenset({"margin"}),
+}

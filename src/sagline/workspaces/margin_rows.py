@@ -98,6 +98,23 @@ class MarginRows:
             arms,
         )
 
+    def about(self, wrench: Array) -> MarginRows:
+        """The same for the set of loads moved by a wrench.
+
+        Args:
+            wrench: What every load is more [N, N m], shape (6,), unchecked.
+
+        Returns:
+            Margins that share all else with these.
+        """
+        model, limits, terms, (center, half, others, ellipsoids, corners, sizes, rates, inertias), arms = self._given
+        there = _locked(center + wrench)
+        moved = object.__new__(MarginRows)
+        moved.cable_count, moved.robot_count = self.cable_count, self.robot_count
+        loads = (there, half, others, ellipsoids, corners, sizes, rates, inertias)
+        moved._given = (model, limits, terms, loads, arms)
+        return moved
+
     def rows(self, poses: NDArray[np.float64], progress: Progress | None = None) -> Bracket:
         """Margins at poses.
 

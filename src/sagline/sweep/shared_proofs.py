@@ -1,0 +1,102 @@
+"""Verdicts of many loads at each of some poses: the proof of one load holds for all that lie beyond it.
+
+What proves a load w infeasible is a direction y along which the cables give too little, by a gap. That does not depend
+on the load; for another load w' of the same pose the gap is that of w less y (w' - w). Where it is above zero it proves
+w' infeasible too, and it is a least change of the force as well. So one proof decides half a plane of loads.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from sagline.arrays import Array, Flags, Indices, locked
+from sagline.kernels import codes
+from sagline.kinematics.inverse_rows import UNDECIDED, Found, Verdicts, decide_rows
+from sagline.robot.robot import Robot
+from sagline.robot.several import anything_behind
+from sagline.tension.options import Options
+
+ROUNDS: Final = 32  # loads of each pose whose proofs are tried on the others
+TRUST: Final = 1e-8  # of the forces at hand: ten times of what a verdict takes for none; rounding is far below
+PROVED: Final = 0  # column of the brackets
+
+
+def proofs_of(robot: Robot, options: Options, poses: Array, loads: Array, found: Found) -> Array:
+    """Decide the requests that the rounds of sharing left open; fills the answers of those that are feasible.
+
+    Args:
+        robot: The robot.
+        options: Of `kernel_options`.
+        poses: Pose rows (P, POSE_COLUMNS).
+        loads: Wrenches (W, 6); the requests are all loads at the first pose, then all at the next.
+        found: The answers, (P W) requests.
+
+    Returns:
+        Proved least change of the force [N], (P W,): 0 where a request is feasible, NaN where the load is not the
+        reason that it is not.
+    """
+    proof = np.full(found.pose_status.size, np.nan)
+    proof[found.pose_status == codes.POSE_SOLVED] = 0.0
+    waiting = np.isin(found.pose_status, UNDECIDED).reshape(len(poses), len(loads))
+    along = loads @ robot.freedom.T
+    size = _forces_at_hand(robot, loads)
+    for _ in range(ROUNDS if _shares(robot, loads) else 0):
+        rows = np.flatnonzero(waiting.any(axis=1))
+        if not rows.size:
+            return proof
+        columns = waiting[rows].argmax(axis=1)
+        verdicts = _decide(robot, options, poses, loads, found, rows * len(loads) + columns, proof)
+        waiting[rows, columns] = False
+        gap = _gaps(verdicts, along, columns)
+        beyond = waiting[rows] & (gap > TRUST * size)
+        row, column = np.nonzero(beyond)
+        proof[rows[row] * len(loads) + column] = gap[beyond]
+        found.pose_status[rows[row] * len(loads) + column] = codes.POSE_INFEASIBLE
+        waiting[rows] &= ~beyond
+    _decide(robot, options, poses, loads, found, np.flatnonzero(waiting), proof)
+    return proof
+
+
+def _shares(robot: Robot, loads: Array) -> bool:
+    """Whether there are loads to share a proof; without upper limits what cables give is bounded by the load's size."""
+    return len(loads) > 1 and bool(np.isfinite(robot.tension_max).all())
+
+
+def _forces_at_hand(robot: Robot, loads: Array) -> Array:
+    """The forces at each load [N], moments over the least lever arm that there is, (W,): no less than in a verdict."""
+    arms = np.linalg.norm(robot.platform_anchors - robot.center_of_mass, axis=1)
+    arm = float(arms[arms > 0.0].min(initial=np.inf))
+    moments = np.abs(loads[:, 3:]).sum(axis=1) / arm
+    longest = float(np.linalg.norm(np.ptp(robot.frame_anchors, axis=0)))
+    weight = robot.gravity * (robot.mass + longest * float(robot.cables.linear_density.sum()))
+    return np.asarray(np.abs(loads[:, :3]).sum(axis=1) + moments + weight)
+
+
+def _gaps(verdicts: tuple[Array, Array, Flags], along: Array, columns: Indices) -> Array:
+    """By how much the cables give too little for each load (K, W), along the proof of one load a pose; or -inf."""
+    proved, direction, known = verdicts
+    own = proved + np.einsum("kn,kn->k", direction, along[columns])
+    gap = own[:, None] - direction @ along.T
+    return np.where(known[:, None], gap, -np.inf)
+
+
+def _decide(
+    robot: Robot, options: Options, poses: Array, loads: Array, found: Found, which: Indices, proof: Array
+) -> tuple[Array, Array, Flags]:
+    """Decide some requests; their proved least changes, proofs, and whether these are known."""
+    rows = locked(poses[which // len(loads)])
+    wrenches = locked(loads[which % len(loads)])
+    n, m = robot.degrees_of_freedom, robot.cable_count
+    some = Found.empty(len(which), m, n, anything_behind(robot))
+    some.pose_status[:] = codes.POSE_INFEASIBLE
+    some.results[:] = np.nan
+    verdicts: Verdicts = decide_rows(robot, options, rows, wrenches, some)
+    found.results[:, which] = some.results
+    found.pose_status[which] = some.pose_status
+    proved = verdicts.brackets[:, PROVED]
+    proof[which] = proved
+    known = (some.pose_status == codes.POSE_INFEASIBLE) & (proved > 0.0) & np.isfinite(proved)
+    known &= np.isfinite(verdicts.farkas).all(axis=1)
+    return np.where(known, proved, 0.0), np.where(known[:, None], verdicts.farkas, 0.0), known

@@ -1,0 +1,49 @@
+"""Small sweeps that several tests run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+import sagline as sl
+from sagline.files.sweep_folder import GROUP, TaskSize, make_folder
+from sagline.files.sweep_marks import NAME
+from sagline.sweep.quantities import variables_of
+
+PLANAR = Path(__file__).parents[2] / "examples" / "own_planar.yaml"
+
+
+def planar(poses: int = 40, wrenches: int = 25, quantities: tuple[str, ...] = ("tension",)) -> sl.sweep.Request:
+    """A planar robot of four cables all over its plane, under forces and moments: half of it is out of reach."""
+    rng = np.random.default_rng(5)
+    place = rng.uniform((0.4, 0.0, 0.4), (3.6, 0.0, 2.6), (poses, 3))
+    loads = rng.uniform(-80.0, 80.0, (wrenches, 6)) * [1, 0, 1, 0, 0.03, 0]
+    return sl.sweep.Request(sl.load_robot(PLANAR), sl.Pose(place, np.eye(3)), loads, quantities)
+
+
+def in_tasks(folder: Path, request: sl.sweep.Request, size: tuple[int, int]) -> Path:
+    """The folder of a sweep whose tasks have a size of their own."""
+    make_folder(folder, request, TaskSize(*size))
+    return folder
+
+
+def chunks(folder: Path, request: sl.sweep.Request) -> dict[str, tuple[int, int]]:
+    """When each chunk on the disk was written, and in which file: what is written anew is another."""
+    found = {}
+    for variable in variables_of(request.quantities):
+        for file in sorted((folder / GROUP / variable.name / "c").rglob("*")):
+            if file.is_file():
+                found[str(file.relative_to(folder))] = (file.stat().st_mtime_ns, file.stat().st_ino)
+    return found
+
+
+def marked(folder: Path) -> list[int]:
+    """Tasks of the file `done`, in its order."""
+    lines = (folder / NAME).read_text().splitlines()
+    return [int(line.split()[0]) for line in lines if line and not line.startswith("#")]
+
+
+def bits(found: sl.sweep.Sweep) -> dict[str, bytes]:
+    """All numbers of a sweep."""
+    return {name: found.values(name).tobytes() for name in found.names}

@@ -1,0 +1,164 @@
+"""Sweeps on workers of Dask: real processes, one of which is killed."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import psutil
+import pytest
+
+import sagline as sl
+from sagline.sweep import cluster
+from tests.sweep.requests import bits, chunks, in_tasks, marked, planar
+
+SIZE = (2, 5)  # 20 x 5 tasks of `planar()`
+TASKS = 100
+
+
+def worker_pids() -> list[int]:
+    """Processes that this one has started and that work."""
+    children = psutil.Process().children(recursive=True)
+    return [child.pid for child in children if "spawn_main" in " ".join(_command(child))]
+
+
+def _command(process: psutil.Process) -> list[str]:
+    with suppress(psutil.Error):
+        return list(process.cmdline())
+    return []
+
+
+def listening() -> set[str]:
+    """Addresses at which this process and its workers listen."""
+    processes = [psutil.Process(), *psutil.Process().children(recursive=True)]
+    found = [one for process in processes for one in process.net_connections("inet")]
+    return {one.laddr.ip for one in found if one.status == psutil.CONN_LISTEN}
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    folder = in_tasks(tmp_path_factory.mktemp("reference") / "sweep", planar(), SIZE)
+    return bits(sl.sweep.run(planar(), folder, workers=1))
+
+
+def test_a_killed_worker_and_a_stop_lose_nothing(
+    tmp_path: Path, reference: dict[str, bytes], capfd: pytest.CaptureFixture[str]
+) -> None:
+    """One of two workers is killed by its pid; the sweep goes on, is stopped, and is taken up again."""
+    folder, told, killed, heard = in_tasks(tmp_path / "sweep", planar(), SIZE), list[str](), list[int](), set[str]()
+
+    def disturb(done: int, total: int) -> None:
+        if done >= 10 and not killed:
+            heard.update(listening())
+            killed.extend(worker_pids()[:1])
+            os.kill(killed[0], signal.SIGKILL)
+        if done >= 40:
+            raise KeyboardInterrupt
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(KeyboardInterrupt):
+            sl.sweep.run(planar(), folder, workers=2, progress=disturb, tell=told.append)
+        assert len(killed) == 1
+        assert worker_pids() == []
+        part = sl.sweep.load(folder)
+        assert 40 <= part.done < 60  # those that were with the workers are finished
+        before = chunks(folder, planar())
+        found = sl.sweep.run(planar(), folder, workers=1)
+    assert found.complete
+    assert bits(found) == reference
+    assert {name: when for name, when in chunks(folder, planar()).items() if name in before} == before
+    assert sorted(marked(folder)) == list(range(TASKS))
+    assert sum(found.counts) == len(planar())
+    assert heard == {"127.0.0.1"}
+    assert len(told) == 1
+    assert told[0].startswith("Dashboard: http://127.0.0.1:")
+    assert capfd.readouterr() == ("", "")
+
+
+@contextmanager
+def scheduler(folder: Path, workers: int = 1) -> Iterator[tuple[str, Callable[[], None]]]:
+    """A scheduler of its own with workers, and how to kill it."""
+    file = folder / "scheduler.json"
+    file.unlink(missing_ok=True)
+    here = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0"]
+    there = [sys.executable, "-m", "distributed.cli.dask_worker", "--nthreads", "1", "--no-nanny", "--no-dashboard"]
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    processes = [subprocess.Popen([*here, "--no-dashboard", "--scheduler-file", str(file)], **quiet)]  # type: ignore[call-overload]
+    try:
+        deadline = time.monotonic() + 60.0
+        while not file.exists() and time.monotonic() < deadline:
+            time.sleep(0.05)
+        processes += [
+            subprocess.Popen([*there, "--scheduler-file", str(file)], cwd=folder, **quiet)  # type: ignore[call-overload]
+            for _ in range(workers)
+        ]
+        import json
+
+        yield json.loads(file.read_text())["address"], processes[0].kill
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()
+
+
+@pytest.mark.soak
+def test_a_scheduler_that_dies_loses_nothing(tmp_path: Path, reference: dict[str, bytes]) -> None:
+    folder = in_tasks(tmp_path / "sweep", planar(), SIZE)
+    with scheduler(tmp_path, workers=2) as (address, kill):
+        with pytest.raises(sl.SaglineError, match="What was done is kept: run the same again"):
+            sl.sweep.run(planar(), folder, scheduler=address, progress=lambda done, of: kill() if done == 20 else None)
+        assert 20 <= sl.sweep.load(folder).done < TASKS
+        with pytest.raises(sl.SaglineError, match="No scheduler answers at"):
+            sl.sweep.run(planar(), folder, scheduler=address)
+    with scheduler(tmp_path, workers=1) as (address, _):
+        assert bits(sl.sweep.run(planar(), folder, scheduler=address)) == reference
+
+
+@pytest.mark.soak
+def test_a_scheduler_without_workers_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cluster, "PATIENCE", 3.0)
+    with (
+        scheduler(tmp_path, workers=0) as (address, _),
+        pytest.raises(sl.SaglineError, match="Start one: dask worker tcp://"),
+    ):
+        sl.sweep.run(planar(), tmp_path / "sweep", scheduler=address)
+
+
+def test_where_nobody_listens_a_sentence_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cluster, "PATIENCE", 0.5)
+    with pytest.raises(sl.SaglineError, match="No scheduler answers at tcp://") as error:
+        sl.sweep.run(planar(3, 2), tmp_path / "sweep", scheduler="tcp://127.0.0.1:9")
+    assert len(str(error.value)) < 300
+
+
+@pytest.mark.parametrize(
+    "address",
+    ["", "127.0.0.1:8786", "tcp://", "tcp://a", "tcp://a:0", "tcp://a:65536", "tcp://:1", "tcp://a b:1", "http://a:1",
+     "tcp://a:1\n", "tcp://\x1b:1", "inproc://a:1", 3, None, b"tcp://a:1"],
+)  # fmt: skip
+def test_what_is_no_address_is_refused(address: object) -> None:
+    with pytest.raises(sl.InvalidValueError, match="allowed: an address, tcp://HOST:PORT"):
+        cluster.check_address(address)
+
+
+@pytest.mark.soak
+def test_a_script_without_a_guard_is_told_to_have_one(tmp_path: Path) -> None:
+    script = "import sagline as sl\nfrom tests.sweep.requests import in_tasks, planar\nfrom pathlib import Path\n"
+    script += "sl.sweep.run(planar(), Path('sweep'), workers=2)\n"
+    in_tasks(tmp_path / "sweep", planar(), SIZE)
+    (tmp_path / "script.py").write_text(script)
+    root, source = Path(__file__).parents[2], Path(sl.__file__).parents[1]
+    environment = {**os.environ, "PYTHONPATH": f"{source}{os.pathsep}{root}"}
+    done = subprocess.run(
+        [sys.executable, "script.py"], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 1
+    assert 'call it below: if __name__ == "__main__":' in done.stderr.splitlines()[-1]

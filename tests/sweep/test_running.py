@@ -1,0 +1,263 @@
+"""Sweeps in one process: what is stopped or damaged goes on, to the last bit, and nothing is done twice."""
+
+from __future__ import annotations
+
+import errno
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.files import sweep_folder
+from sagline.files.sweep_folder import GROUP, open_folder
+from sagline.files.sweep_marks import NAME, marking
+from sagline.sweep import running, tasks
+from tests.sweep.requests import bits, chunks, in_tasks, marked, planar
+
+SIZE = (8, 10)  # 5 x 3 tasks of `planar()`
+
+
+class Stop:
+    """Stands for somebody who presses Ctrl-C when so many tasks are done."""
+
+    def __init__(self, after: int) -> None:
+        self.after = after
+
+    def __call__(self, done: int, total: int) -> None:
+        if done >= self.after:
+            raise KeyboardInterrupt
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    """All numbers of the sweep, by one run without a stop."""
+    folder = in_tasks(tmp_path_factory.mktemp("reference") / "sweep", planar(), SIZE)
+    return bits(sl.sweep.run(planar(), folder, workers=1))
+
+
+def test_a_sweep_is_what_its_parts_are(tmp_path: Path, reference: dict[str, bytes]) -> None:
+    told: list[tuple[int, int]] = []
+    found = sl.sweep.run(planar(), tmp_path / "sweep", workers=1, progress=lambda *now: told.append(now))
+    assert bits(found)["status"] == reference["status"]
+    assert bits(found)["tension"] == reference["tension"]
+    assert (found.done, found.complete, found.folder) == (found.tasks, True, tmp_path / "sweep")
+    assert sum(found.counts) == len(planar())
+    assert found.counts.lost == found.counts.open == 0
+    assert told == [(k, found.tasks) for k in range(found.tasks + 1)]
+
+
+@pytest.mark.parametrize("after", [1, 14])
+def test_what_was_stopped_goes_on_to_the_last_bit(tmp_path: Path, reference: dict[str, bytes], after: int) -> None:
+    folder = in_tasks(tmp_path / "sweep", planar(), SIZE)
+    with pytest.raises(KeyboardInterrupt):
+        sl.sweep.run(planar(), folder, workers=1, progress=Stop(after))
+    part = sl.sweep.load(folder)
+    assert (part.done, part.complete, part.tasks) == (after, False, 15)
+    status = part.values("status")
+    assert np.count_nonzero(status == -1) == len(planar()) - sum(part.counts)
+    before = chunks(folder, planar())
+    found = sl.sweep.run(planar(), folder, workers=1)
+    assert found.complete
+    assert bits(found) == reference
+    assert {name: when for name, when in chunks(folder, planar()).items() if name in before} == before
+    assert sorted(marked(folder)) == list(range(15))
+    assert sum(found.counts) == len(planar())
+
+
+def test_what_is_done_is_not_done_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = in_tasks(tmp_path / "sweep", planar(), SIZE)
+    first = sl.sweep.run(planar(), folder, workers=1)
+    monkeypatch.setattr(running, "task", None)  # would fail
+    again = sl.sweep.run(planar(), folder, workers=1)
+    assert (again.counts, again.done, again.seconds) == (first.counts, first.done, first.seconds)
+
+
+DAMAGES: dict[str, Any] = {
+    "cut off": lambda data: data[: len(data) // 2],
+    "empty": lambda data: b"",
+    "zeros": lambda data: bytes(len(data)),
+    "a bit": lambda data: data[:9] + bytes([data[9] ^ 4]) + data[10:],
+    "the checksum": lambda data: data[:-1] + bytes([data[-1] ^ 1]),
+    "gone": lambda data: None,
+}
+
+
+@pytest.mark.parametrize(("damage", "variable"), zip(DAMAGES, 3 * ("status", "tension"), strict=True))
+def test_a_chunk_that_is_torn_is_done_again(
+    tmp_path: Path, reference: dict[str, bytes], damage: str, variable: str
+) -> None:
+    folder = in_tasks(tmp_path / "sweep", planar(), SIZE)
+    sl.sweep.run(planar(), folder, workers=1)
+    before = chunks(folder, planar())
+    chunk = sorted(file for file in (folder / GROUP / variable / "c").rglob("*") if file.is_file())[4]
+    data = DAMAGES[damage](chunk.read_bytes())
+    chunk.unlink() if data is None else chunk.write_bytes(data)
+    if data is not None:
+        with pytest.raises(sl.FileError, match="what is damaged is done again"):
+            sl.sweep.load(folder).values(variable)
+    found = sl.sweep.run(planar(), folder, workers=1)
+    assert bits(found) == reference
+    assert found.complete
+    after = chunks(folder, planar())
+    assert len([name for name in before if after[name] != before[name]]) <= len(sl.sweep.QUANTITIES["tension"])
+
+
+@pytest.mark.parametrize("text", ["", "nonsense\n\0\xff\n3 0.1 1 2", "99 0.1 1 2 3 4 5\n-1 0 0 0 0 0 0\n"])
+def test_what_the_marks_say_is_found_again_on_the_disk(tmp_path: Path, reference: dict[str, bytes], text: str) -> None:
+    folder = in_tasks(tmp_path / "sweep", planar(), SIZE)
+    first = sl.sweep.run(planar(), folder, workers=1)
+    before = chunks(folder, planar())
+    (folder / NAME).write_bytes(text.encode("latin-1"))
+    found = sl.sweep.run(planar(), folder, workers=1)
+    assert chunks(folder, planar()) == before
+    assert (found.counts, found.done) == (first.counts, first.done)
+    assert bits(found) == reference
+
+
+def test_the_folder_of_another_sweep_is_refused(tmp_path: Path) -> None:
+    folder, request = in_tasks(tmp_path / "sweep", planar(), SIZE), planar()
+    others = [
+        sl.sweep.Request(request.robots[0].replace(mass=10.5), request.poses, request.wrenches),
+        sl.sweep.Request(request.robots, request.poses[:-1], request.wrenches),
+        sl.sweep.Request(request.robots, request.poses, request.wrenches + 1e-13),
+        sl.sweep.Request(request.robots, request.poses, request.wrenches, "length"),
+        sl.sweep.Request(request.robots, request.poses, request.wrenches, model=sl.Straight()),
+        sl.sweep.Request(request.robots, request.poses, request.wrenches, tension=sl.Centroid()),
+        sl.sweep.Request(request.robots, request.poses, request.wrenches, around=sl.WrenchBox(1.0)),
+        sl.sweep.Request(request.robots, request.poses, request.wrenches, moment_arm=0.5),
+    ]
+    for other in others:
+        with pytest.raises(sl.FileError, match="holds another sweep, of"):
+            sl.sweep.run(other, folder, workers=1)
+    assert sl.sweep.load(folder).done == 0
+    assert sl.sweep.run(request, folder, workers=1).complete
+
+
+def test_a_request_is_read_back_as_it_was(tmp_path: Path) -> None:
+    given = planar()
+    request = sl.sweep.Request(
+        [given.robots[0], given.robots[0].replace(mass=11.0)],
+        given.poses,
+        given.wrenches,
+        ("shortfall", "margin"),
+        model=sl.Empirical(),
+        tension=sl.QuadraticProgram(weights=[1.0, 2.0, 3.0, 4.0], target=50.0),
+        around=sl.WrenchBox(5.0) + sl.WrenchEllipsoid([1, 2, 3], 0.5) + sl.WrenchPolytope(np.eye(6)),
+        moment_arm=0.3,
+    )
+    found = open_folder(in_tasks(tmp_path / "sweep", request, SIZE))
+    assert sweep_folder.digest_of(found.request) == sweep_folder.digest_of(request) == found.digest
+    for name in ("center", "segments", "ellipsoids", "corners", "sizes", "accelerations"):
+        np.testing.assert_array_equal(getattr(found.request.around, name), getattr(request.around, name))
+    assert [sl.dump_robot(one) for one in found.request.robots] == [sl.dump_robot(one) for one in request.robots]
+    assert (found.request.quantities, found.request.model) == (request.quantities, request.model)
+
+
+@pytest.mark.parametrize("what", ["a file", "a full folder", "no parent", "another sagline", "an edited request"])
+def test_what_is_no_folder_of_this_sweep_is_left_as_it_is(tmp_path: Path, what: str) -> None:
+    folder = tmp_path / "sweep"
+    if what == "a file":
+        folder.write_text("mine")
+    elif what == "a full folder":
+        folder.mkdir()
+        (folder / "mine").write_text("mine")
+    elif what == "no parent":
+        folder = tmp_path / "nowhere" / "sweep"
+    else:
+        attributes = in_tasks(folder, planar(), SIZE) / GROUP / "zarr.json"
+        old, new = ("sagline 0", "sagline 99.0") if what == "another sagline" else ("mass: 10", "mass: 11")
+        attributes.write_text(attributes.read_text().replace(old, new))
+    before = sorted(tmp_path.rglob("*"))
+    with pytest.raises(sl.FileError) as error:
+        sl.sweep.run(planar(), folder, workers=1)
+    assert len(str(error.value)) < 300
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_one_process_at_a_time_works_on_a_sweep(tmp_path: Path) -> None:
+    folder = in_tasks(tmp_path / "sweep", planar(), SIZE)
+    with marking(open_folder(folder)), pytest.raises(sl.FileError, match="is being worked on by another process"):
+        sl.sweep.run(planar(), folder, workers=1)
+
+
+def test_a_disk_that_is_full_loses_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, reference: dict[str, bytes]
+) -> None:
+    import zarr.storage._local as store
+
+    folder, put, count = in_tasks(tmp_path / "sweep", planar(), SIZE), store._put, 0
+
+    def full(*given: Any, **more: Any) -> Any:
+        nonlocal count
+        count += 1
+        if count > 10:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return put(*given, **more)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(store, "_put", full)
+        with pytest.raises(sl.FileError, match=r"cannot be written \(No space left on device\)"):
+            sl.sweep.run(planar(), folder, workers=1)
+    assert 0 < sl.sweep.load(folder).done < 15
+    assert bits(sl.sweep.run(planar(), folder, workers=1)) == reference
+
+
+def test_without_dask_tasks_are_done_one_after_the_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, reference: dict[str, bytes]
+) -> None:
+    monkeypatch.setattr(running, "has_dask", lambda: False)
+    folder, told = in_tasks(tmp_path / "sweep", planar(), SIZE), list[str]()
+    assert bits(sl.sweep.run(planar(), folder, workers=2, tell=told.append)) == reference
+    assert told == ['Dask is not installed: one task after the other. For more, pip install "sagline[sweep]".']
+    with pytest.raises(sl.InvalidValueError, match="the package distributed is not installed"):
+        sl.sweep.run(planar(), folder, scheduler="tcp://127.0.0.1:1")
+
+
+def test_without_zarr_a_sentence_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sweep_folder, "find_spec", lambda name: None)
+    with pytest.raises(sl.InvalidValueError, match=r'pip install "sagline\[sweep\]"'):
+        sl.sweep.run(planar(), tmp_path / "sweep")
+    with pytest.raises(sl.InvalidValueError, match="the package zarr"):
+        sl.sweep.load(tmp_path)
+
+
+def test_tasks_take_as_long_as_they_should(monkeypatch: pytest.MonkeyPatch) -> None:
+    times = iter(np.repeat(np.arange(0.0, 1e3, 0.01), 1))
+    monkeypatch.setattr(tasks, "numbers_of", lambda request, part: {})
+    monkeypatch.setattr("sagline.sweep.tasks.time.perf_counter", lambda: next(times))
+    request = planar(2000, 1000)
+    size = tasks.measured_size(request)  # 10 ms for 1,024 requests
+    assert size.wrenches == 1000
+    assert size.poses * size.wrenches * 0.01 / 1000 == pytest.approx(tasks.SECONDS, rel=0.05)
+
+
+def test_the_folder_opens_with_xarray_and_units(tmp_path: Path) -> None:
+    request = planar(quantities=("tension", "length", "margin"))
+    found = sl.sweep.run(request, tmp_path / "sweep", workers=1)
+    data = found.field
+    assert dict(data.sizes) == {
+        "robot": 1, "pose": 40, "wrench": 25, "cable": 4, "axis": 3, "quaternion_part": 4, "wrench_part": 6
+    }  # fmt: skip
+    assert {name: data[name].attrs["units"] for name in ("tension", "length", "margin", "proof", "position")} == {
+        "tension": "N", "length": "m", "margin": "N", "proof": "N", "position": "m"
+    }  # fmt: skip
+    np.testing.assert_array_equal(data["tension"].values, found.values("tension"))
+    np.testing.assert_array_equal(data["position"].values, request.poses.position)
+    np.testing.assert_array_equal(data["wrench"].values, request.wrenches)
+    assert data["status"].attrs["flag_meanings"].split()[:3] == ["unasked", "solved", "infeasible"]
+    np.testing.assert_array_equal(found.values("tension", (0, slice(3), 2, 1)), found.values("tension")[0, :3, 2, 1])
+
+
+def test_a_folder_can_be_moved(tmp_path: Path) -> None:
+    found = sl.sweep.run(planar(), tmp_path / "sweep", workers=1)
+    shutil.move(tmp_path / "sweep", tmp_path / "elsewhere")
+    assert bits(sl.sweep.load(tmp_path / "elsewhere"))["status"] == found_bits(tmp_path / "elsewhere")
+    assert found.complete
+
+
+def found_bits(folder: Path) -> bytes:
+    status: np.ndarray[Any, Any] = open_folder(folder).group["status"][...]  # type: ignore[index,assignment]
+    return status.tobytes()
