@@ -1,0 +1,299 @@
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import sagline as sl
+from sagline.arrays import Array
+from sagline.workspaces.criteria.criterion import Judged, no_cable
+from sagline.workspaces.criteria.given import Given
+from sagline.workspaces.space import BY_BOX
+
+SUSPENDED = sl.load_robot("article-suspended")
+ROOM = sl.PoseBox([-6.0, -4.0, 0.5], [6.0, 4.0, 5.0])  # all within the workspace
+WIDE = sl.PoseBox([-7.4, -5.4, 0.1], [7.4, 5.4, 5.9])
+
+
+def square(**changes: object) -> sl.Robot:
+    """Four cables to one point in an upright plane, from the corners of a square of 2 m."""
+    given = {
+        "name": "square",
+        "frame_anchors": [[0, 0.5, 0], [2, 0.5, 0], [2, 0.5, 2], [0, 0.5, 2]],
+        "platform_anchors": np.zeros((4, 3)),
+        "cables": sl.Cable(linear_density=0.01, axial_stiffness=1e5),
+        "mass": 1.0,
+        "gravity": 0.0,
+        "motion_pattern": "2T",
+        "plane_normal": [0, 1, 0],
+        "tension_min": 1.0,
+        "tension_max": 10.0,
+    }
+    return sl.Robot(**{**given, **changes})  # type: ignore[arg-type]
+
+
+def normals_of(space: sl.Workspace) -> Array:
+    """Of the surface at its vertices, outward, of length 1."""
+    corners = space.surface.vertices[space.surface.faces]
+    faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    found = np.zeros_like(space.surface.vertices)
+    for k in range(3):
+        np.add.at(found, space.surface.faces[:, k], faces)
+    normals: Array = found / np.linalg.norm(found, axis=1, keepdims=True)
+    return normals
+
+
+@pytest.fixture(scope="module")
+def suspended() -> sl.Workspace:
+    return sl.workspace(SUSPENDED)
+
+
+def test_the_articles_suspended_robot(suspended: sl.Workspace) -> None:
+    assert suspended.volume == pytest.approx(789.4, abs=1.0)
+    assert 0.0 < suspended.volume_error < 1.0
+    assert suspended.unit == "m³"
+    assert suspended.components.count == 1
+    assert suspended.surface.closed
+    assert suspended.open_faces == ("z low",)
+    assert suspended.nearest is None
+
+
+def test_every_vertex_is_on_the_boundary(suspended: sl.Workspace) -> None:
+    free = suspended.limiting != BY_BOX
+    weight = SUSPENDED.mass * SUSPENDED.gravity
+    assert np.count_nonzero(free) > 8_000
+    assert np.abs(suspended.margin[free]).max() <= 1e-6 * weight
+    found = sl.margin(SUSPENDED, sl.Pose(suspended.surface.vertices, np.eye(3)))
+    assert np.array_equal(found.value, suspended.margin)
+    assert np.array_equal(found.limiting_cable[free], suspended.limiting_cable[free])
+
+
+@pytest.mark.parametrize(("aside", "agreeing"), [(1e-3, 0.94), (3e-3, 1.0)])
+def test_a_millimeter_to_either_side_the_inverse_agrees(suspended: sl.Workspace, aside: float, agreeing: float) -> None:
+    """Where the bracket of the margin is open, the exact boundary is up to 2 mm within that of its middle."""
+    faces = suspended.surface.faces
+    by_box = np.unique(faces[(suspended.limiting[faces] == BY_BOX).any(axis=1)])
+    free = np.setdiff1d(np.arange(len(suspended.surface.vertices)), by_box)
+    some = np.random.default_rng(5).choice(free, 400, replace=False)
+    normals = normals_of(suspended)[some]
+    inside, outside = (sl.Pose(suspended.surface.vertices[some] + k * aside * normals, np.eye(3)) for k in (-1, 1))
+    assert not sl.inverse(SUSPENDED, outside).feasible.any()
+    found = sl.inverse(SUSPENDED, inside).feasible
+    assert found[sl.margin(SUSPENDED, inside).low >= 0.0].all()
+    assert found.mean() >= agreeing
+
+
+def test_two_mirrors_of_the_robot_are_mirrors_of_its_workspace(suspended: sl.Workspace) -> None:
+    # half a turn about z takes cable k to cable k + 4
+    level = suspended.level
+    finite = np.isfinite(level)
+    assert np.array_equal(finite, finite[::-1, ::-1])
+    assert_allclose(level[finite], level[::-1, ::-1][finite], rtol=0.0, atol=1e-9)
+    shares = {(limit.criterion, limit.cable): limit.share for limit in suspended.limits}
+    for cable in range(4):
+        assert shares["margin", cable] == pytest.approx(shares["margin", cable + 4], abs=2e-3)
+    assert sum(shares.values()) == pytest.approx(1.0, rel=1e-12)
+
+
+def test_smaller_loads_make_larger_workspaces() -> None:
+    sizes = (100.0, 50.0, 20.0, 0.0)
+    spaces = [sl.workspace(SUSPENDED, None, sl.WrenchBox(size, 0.1 * size), cells=8) for size in sizes]
+    for small, large in pairwise(spaces):
+        assert small.volume < large.volume
+        finite = np.isfinite(small.level)
+        assert (small.level[finite] <= large.level[finite] + 1e-12).all()
+        assert (large.levels()(small.surface.vertices) >= -1e-9).all()
+
+
+def test_more_rotations_make_smaller_workspaces_and_any_of_them_larger() -> None:
+    turns = sl.Pose.from_euler(np.zeros(3), np.radians([0.0, 25.0, -25.0]), 0.0, 0.0).matrix
+    level = sl.workspace(SUSPENDED, WIDE, cells=6)
+    every, some = (
+        sl.workspace(SUSPENDED, WIDE, orientations=sl.Orientations(turns, need), cells=6) for need in ("all", "any")
+    )
+    each = [sl.margin(SUSPENDED, sl.Pose(_nodes(level), turn)).value.reshape(level.level.shape) for turn in turns]
+    scale = SUSPENDED.mass * SUSPENDED.gravity
+    assert_allclose(every.level * scale, np.min(each, axis=0), rtol=1e-12, atol=1e-9)
+    assert_allclose(some.level * scale, np.max(each, axis=0), rtol=1e-12, atol=1e-9)
+    assert every.volume < level.volume < some.volume
+    tilted = sl.workspace(SUSPENDED, sl.PoseBox(ROOM.low, ROOM.high, tilt=0.2), cells=4)
+    assert "all of 27 sampled rotations" in str(tilted)
+    assert np.array_equal(tilted.level, sl.workspace(SUSPENDED, ROOM, orientations=sl.Tilts(0.2), cells=4).level)
+
+
+def _nodes(space: sl.Workspace) -> Array:
+    return np.stack(np.meshgrid(*space.axes, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+def test_light_cables_have_the_workspace_of_straight_ones() -> None:
+    straight = sl.workspace(SUSPENDED, WIDE, model=sl.Straight(), cells=8)
+    differences = []
+    for density in (0.067, 0.067e-2, 0.067e-4):
+        cable = sl.Cable(density, SUSPENDED.cables.axial_stiffness[0])
+        differences.append(sl.workspace(SUSPENDED.replace(cables=cable), WIDE, cells=8).volume - straight.volume)
+    assert differences[0] > 1.0  # sag adds to it: the cables' weight tightens
+    assert abs(differences[1]) < 0.02 * differences[0]
+    assert abs(differences[2]) < 0.0002 * differences[0]
+
+
+def test_a_wall_cuts_the_workspace_in_two() -> None:
+    wall = sl.Box([0.2, 12.0, 1.0], [1.0, 0.0, 0.5], name="wall")
+    box = sl.PoseBox([-3.0, -1.0, 0.3], [4.0, 1.0, 0.9])
+    space = sl.workspace(SUSPENDED, box, criteria=[sl.Clearance(0.05, wall)], cells=8)
+    assert space.components.count == 2
+    places = np.random.default_rng(3).uniform(box.low, box.high, (400, 3))
+    state = sl.inverse(SUSPENDED, sl.Pose(places, np.eye(3)), tension=sl.MinimumNorm()).state
+    free = sl.clearance(state, wall).distance >= 0.05
+    assert 50 < np.count_nonzero(free) < 350
+    assert np.array_equal(space.levels()(places) >= 0.0, free)
+    parts = space.components.label(places[free])
+    sides = places[free][:, 0] > 1.0
+    assert len(np.unique(np.stack((parts, sides))[:, parts >= 0], axis=1).T) == 2
+    assert space.limits[0].criterion == "clearance"
+
+
+def test_the_area_of_a_planar_robot() -> None:
+    # weightless and pulled by at least 1 N in four directions: everywhere inside the square, whatever the tensions
+    space = sl.workspace(square(tension_min=1e-6), cells=32)
+    assert space.unit == "m²"
+    assert space.volume == pytest.approx(4.0, rel=2e-3)
+    assert (space.box.low[1], space.box.high[1]) == (0.5, 0.5)
+    assert not any("y" in face for face in space.open_faces)
+    loaded = sl.workspace(square(), sl.PoseBox([0, 0.5, 0], [2, 0.5, 2]), sl.WrenchBox([4.0, 0.0, 4.0]), cells=32)
+    loads = [[fx, 0.0, fz, 0.0, 0.0, 0.0] for fx in (-4.0, 4.0) for fz in (-4.0, 4.0)]
+    places = [[x, 0.5, z] for x in loaded.x[4:-4:4] for z in loaded.z[4:-4:4]]
+    held = [
+        all(sl.inverse(square(), sl.Pose(place, np.eye(3)), sl.Straight(), wrench=load).feasible for load in loads)
+        for place in places
+    ]
+    assert 10 < sum(held) < len(held)
+    assert np.array_equal(loaded.levels()(np.array(places)) >= 0.0, held)
+
+
+def test_a_flat_box_is_a_slice() -> None:
+    flat = sl.workspace(SUSPENDED, sl.PoseBox([-6.0, -4.0, 2.0], [6.0, 4.0, 2.0]), cells=16)
+    slab = sl.workspace(SUSPENDED, sl.PoseBox([-6.0, -4.0, 1.99], [6.0, 4.0, 2.01]), cells=16)
+    assert flat.unit == "m²"
+    assert flat.volume == pytest.approx(slab.volume / 0.02, rel=2e-3)
+
+
+def test_an_empty_workspace_names_the_nearest_pose_and_its_cables() -> None:
+    space = sl.workspace(SUSPENDED, ROOM, sl.WrenchBox(5000.0), cells=6)
+    assert (space.volume, space.volume_error, space.components.count) == (0.0, 0.0, 0)
+    near = space.nearest
+    assert near is not None
+    assert near.margin < 0.0
+    assert near.cables
+    assert near.margin == pytest.approx(float(sl.margin(SUSPENDED, near.pose, sl.WrenchBox(5000.0)).value))
+    assert "empty" in str(space)
+    assert near.reason.replace("\N{NO-BREAK SPACE}", " ") in " ".join(line.strip() for line in str(space).splitlines())
+
+
+def test_moments_that_alone_are_too_much_are_told() -> None:
+    near = sl.workspace(SUSPENDED, ROOM, sl.WrenchBox(1.0, 1e5), cells=6).nearest
+    assert near is not None
+    assert "moments cannot be borne there even without their forces" in near.reason
+
+
+def test_a_region_smaller_than_a_cell_is_found_by_the_search() -> None:
+    middle, radius = np.array([0.3, 0.2, 2.1]), 0.05
+
+    class Near(sl.Criterion):
+        title, unit = "near", "m"
+
+        def judge(self, given: Given) -> Judged:
+            away = np.linalg.norm(given.pose.position - middle, axis=1)
+            return Judged(radius - away, no_cable(len(given)))
+
+        def scale(self, robot: sl.Robot) -> float:
+            return 1.0
+
+    near = sl.workspace(SUSPENDED, ROOM, criteria=[Near()], cells=6).nearest
+    assert near is not None
+    assert near.level >= 0.0
+    assert np.linalg.norm(near.pose.position - middle) <= radius
+    assert "smaller than a cell" in near.reason
+
+
+def test_nothing_limits_where_nothing_can_fail() -> None:
+    # a point pulled to all sides without upper limits, on weightless cables, bears any load inside the square
+    robot = square(tension_max=np.inf)
+    found = sl.margin(robot, sl.Pose([1.0, 0.5, 1.0], np.eye(3)))
+    assert np.isinf(found.value)
+    space = sl.workspace(robot, sl.PoseBox([0.5, 0.5, 0.5], [1.5, 0.5, 1.5]), sl.WrenchBox([1e6, 0, 1e6]), cells=4)
+    assert space.volume == pytest.approx(1.0, rel=1e-12)
+    assert space.open_faces == ("x low", "x high", "z low", "z high")
+    assert (space.limiting == BY_BOX).all()
+    assert space.limits == ()
+
+
+BAD = {
+    "tilt twice": (
+        {"box": sl.PoseBox(ROOM.low, ROOM.high, 0.1), "orientations": sl.Tilts(0.1)},
+        r"orientations is given with a box of tilt 5.73 deg",
+    ),
+    "jumping tensions": (
+        {"criteria": [sl.MaximumSag(0.05)], "tension": sl.LowestSum()},
+        "LowestSum, which has tensions that jump.*MinimumNorm, QuadraticProgram, PNorm",
+    ),
+    "a corner of the polygon": (
+        {"criteria": [sl.LeastStiffness(1.0)], "tension": sl.PolygonWalk(optimum="1-norm")},
+        "PolygonWalk, which has tensions that jump",
+    ),
+    "the pose before": ({"criteria": [sl.LeastFrequency(1.0)], "tension": sl.Closest()}, "depends on the pose before"),
+    "no criterion": ({"criteria": [3]}, r"criteria\[0\] is 3"),
+    "one criterion": ({"criteria": sl.MaximumSag(0.05)}, r"allowed: a list of criteria"),
+    "no extent": ({"box": sl.PoseBox([0, 0, 1], [0, 0, 2])}, "without extent along x and y"),
+    "few cells": ({"cells": 3}, "cells is 3; allowed: 4 to 128"),
+    "a wrench": ({"wrenches": [0, 0, 1, 0, 0, 0]}, "WrenchPolytope"),
+    "a rotation": ({"orientations": np.eye(3)}, r"Give Tilts\(np.radians\(10\)\), or Orientations"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_what_is_refused(case: str) -> None:
+    given, message = BAD[case]
+    with pytest.raises(sl.InvalidValueError, match=message):
+        sl.workspace(SUSPENDED, **given)  # type: ignore[arg-type]
+
+
+def test_what_planar_robots_refuse() -> None:
+    with pytest.raises(sl.InvalidValueError, match=r"0\.5 m thick along plane_normal, y.*the same y, 0\.5 m"):
+        sl.workspace(square(), sl.PoseBox([0, 0, 0], [2, 0.5, 2]))
+    with pytest.raises(sl.InvalidValueError, match="its platform does not turn"):
+        sl.workspace(square(), orientations=sl.Tilts(0.1))
+    with pytest.raises(sl.InvalidValueError, match="along x, y or z for a workspace"):
+        sl.workspace(square(plane_normal=[1, 1, 0], frame_anchors=[[0, 0, 0], [2, -2, 0], [2, -2, 2], [0, 0, 2]]))
+
+
+def test_any_method_will_do_where_no_criterion_looks_at_tensions() -> None:
+    usual = sl.workspace(SUSPENDED, ROOM, cells=4)
+    assert sl.workspace(SUSPENDED, ROOM, tension=sl.LowestSum(), cells=4).volume == usual.volume
+
+
+def test_progress_ends_with_all() -> None:
+    told: list[tuple[int, int]] = []
+    sl.workspace(SUSPENDED, ROOM, cells=8, progress=lambda done, of: told.append((done, of)))
+    done, of = np.array(told).T
+    assert (np.diff(done) > 0).all()
+    assert (done <= of).all()
+
+
+def test_the_field_is_that_of_single_poses() -> None:
+    space = sl.workspace(SUSPENDED, ROOM, sl.WrenchBox(20.0, 2.0), cells=4)
+    field = space.field
+    assert dict(field.sizes) == {"x": 5, "y": len(space.y), "z": len(space.z)}
+    place = {"x": space.x[3], "y": space.y[1], "z": space.z[1]}
+    alone = sl.margin(SUSPENDED, sl.Pose(list(place.values()), np.eye(3)), sl.WrenchBox(20.0, 2.0))
+    assert float(field.margin.sel(place)) == pytest.approx(float(alone.value), rel=1e-12)
+    assert int(field.cable.sel(place)) == int(alone.limiting_cable)
+    assert np.array_equal(field.level.values, space.level)
+    assert field.margin.attrs["units"] == "N"
+
+
+def test_it_reads_well_at_eighty_columns(suspended: sl.Workspace) -> None:
+    text = str(suspended)
+    assert max(map(len, text.splitlines())) <= 80
+    assert "789." in text
+    assert "m³" in text
+    assert "it reaches the box at z low" in text
