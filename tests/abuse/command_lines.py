@@ -21,6 +21,7 @@ LINES = {
     "tension": ["tension", "cogiro", "--no-figures"],
     "vibrate": ["vibrate", "cogiro", "--up-to", "4", "--no-figures"],
     "simulate": ["simulate", "cogiro", "--after", "0.1", "--no-figures"],
+    "workspace": ["workspace", "cogiro", "--cells", "4", "--no-figures"],
     "sweep": ["sweep", "own_sweep.yaml", "--workers", "1"],
     "robots": ["robots"],
     "show": ["show", "cogiro"],

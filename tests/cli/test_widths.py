@@ -43,6 +43,8 @@ COMMANDS = (
     ["tension", "many.yaml", "--pose", "0,0,2", "--no-figures"],
     ["vibrate", "cogiro", "--up-to", "6", "--no-figures"],
     ["simulate", "cogiro", "--break", "3@0.1s", "--after", "0.2", "--no-figures"],
+    ["workspace", "cogiro", "--cells", "6", "--no-figures"],
+    ["workspace", "cogiro", "--wrench", "±9 kN, ±20 N m", "--max-sag", "5 cm", "--cells", "4"],
     ["robots"],
     ["show", "cogiro"],
     ["show", "many.yaml"],

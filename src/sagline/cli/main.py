@@ -25,6 +25,7 @@ from sagline.cli.commands.sweep import sweep
 from sagline.cli.commands.track import encoder, lengths, run, track
 from sagline.cli.commands.twin import twin
 from sagline.cli.commands.view import view
+from sagline.cli.commands.workspace import workspace
 from sagline.cli.ending import ended
 from sagline.files.whole import finished_files
 
@@ -44,6 +45,7 @@ Start here:
     sagline tension cogiro               ways of sharing a load compared
     sagline vibrate cogiro               how it swings, cables and all
     sagline simulate cogiro --break 3@1s what comes when a cable breaks
+    sagline workspace cogiro             where it can work, and what limits it
     sagline sweep own_sweep.yaml         robots x poses x loads, on all cores
     sagline article                      the article redone, as one page
     sagline view cogiro                  drag a platform in the browser
@@ -149,8 +151,8 @@ def sagline(
 
 
 for command in (
-    track, lengths, encoder, run, article, identify, forward, tension, vibrate, simulate, sweep, design, robots, show,
-    examples, new, convert, export_c, export_scl, view, twin, control, experiment, log,
+    track, lengths, encoder, run, article, identify, forward, tension, vibrate, simulate, workspace, sweep, design,
+    robots, show, examples, new, convert, export_c, export_scl, view, twin, control, experiment, log,
 ):  # fmt: skip
     text = _help(command.__doc__)
     app.command(cls=Command, help=text, short_help=text.partition("\n\n")[0])(command)

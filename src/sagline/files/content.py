@@ -16,6 +16,7 @@ OTHERS: Final = {
     "sagline_format": ("a plan", "Read it with load_plan, or look at it: sagline view ROBOT FILE."),
     "sagline_simulation_format": ("a simulation", "Read it with load_simulation, or play it: sagline view ROBOT FILE."),
     "sagline_execution_format": ("an execution", "Open it with xarray.open_dataset; its plan is its group 'plan'."),
+    "sagline_workspace_format": ("a workspace", "Read it with load_workspace."),
     "sagline_frequency_map_format": ("a frequency map", "Open it with xarray.open_dataset."),
 }
 

@@ -1,0 +1,102 @@
+"""Loads and boxes as the command line gives them: "±100 N, ±20 N m" and "-2..2, -1..1, 1..3 m"."""
+
+from __future__ import annotations
+
+import re
+from typing import Final
+
+import numpy as np
+
+from sagline.cli.values import FARTHEST, quantity, wrench_of
+from sagline.errors import InvalidValueError
+from sagline.files.quantity import in_si
+from sagline.robot.pose_box import PoseBox
+from sagline.workspaces.wrench_sets import Accelerations, WrenchBox, WrenchPolytope, WrenchSet
+
+_KINDS: Final = {"force": "N", "moment": "N m", "linear": "m/s^2", "angular": "rad/s^2"}  # of loads, and their units
+_SIGN: Final = re.compile(r"\s*(?:±|\+/-|\+-)\s*")
+_SPAN: Final = re.compile(r"(.*?)(?:\.\.|\bto\b)(.*)", re.DOTALL)
+_UNIT: Final = re.compile(r"(?!e[-+]?[0-9])[a-zµ].*", re.IGNORECASE | re.DOTALL)  # and no exponent
+_STEP: Final = "Give forces, moments and accelerations with units: --wrench '±100 N, ±20 N m'."
+_LONGEST: Final = 200  # letters of either
+
+
+def wrenches_of(text: str | None) -> WrenchSet | None:
+    """A set of loads: "±100 N, ±20 N m", "±2 m/s^2", or one wrench from "fx,fy,fz[,mx,my,mz]"; None for none.
+
+    One number of a kind counts along all axes, three along x, y and z.
+
+    Args:
+        text: Of `--wrench`.
+
+    Raises:
+        InvalidValueError: If it is none of these.
+    """
+    if text is None:
+        return None
+    if len(text) > _LONGEST or not _SIGN.match(text):
+        if "±" in text or len(text) > _LONGEST:
+            raise InvalidValueError("--wrench", repr(text), "each with ±, or none", _STEP)
+        one = wrench_of(text)
+        return WrenchPolytope([one if one is not None else np.zeros(6)])
+    found: dict[str, list[float]] = {kind: [] for kind in _KINDS}
+    for part in text.split(","):
+        kind, size = _load_of(part)
+        found[kind].append(size)
+    for kind, sizes in found.items():
+        most = (0, 1, 3) if kind in ("force", "moment") else (0, 1)
+        if len(sizes) not in most:
+            allowed = f"{' or '.join(map(str, most[1:]))} of the unit {_KINDS[kind]}"
+            raise InvalidValueError("--wrench", f"{text!r} with {len(sizes)}", allowed, _STEP)
+    box = {kind: found[kind] if len(found[kind]) > 1 else sum(found[kind]) for kind in ("force", "moment")}
+    whole: WrenchSet = WrenchBox(box["force"], box["moment"])
+    if found["linear"] or found["angular"]:
+        whole = whole + Accelerations(sum(found["linear"]), sum(found["angular"]))
+    return whole
+
+
+def _load_of(part: str) -> tuple[str, float]:
+    """The kind of a load, and its size in SI."""
+    sign = _SIGN.match(part)
+    if sign is not None and _UNIT.search(part) is not None:
+        for kind, unit in _KINDS.items():
+            try:
+                size = in_si(part[sign.end() :], unit, "--wrench")
+            except InvalidValueError:
+                continue
+            if isinstance(size, float) and 0.0 <= size < np.inf:
+                return kind, size
+    units = ", ".join(_KINDS.values())
+    raise InvalidValueError("--wrench", repr(part.strip()), f"± and a number with one of the units {units}", _STEP)
+
+
+def box_of(text: str, item: str) -> PoseBox:
+    """A box of positions from "-2..2, -1..1, 1..3 m"; one number stands for a plane.
+
+    Args:
+        text: The text.
+        item: What it is, for messages.
+
+    Raises:
+        InvalidValueError: If it is none.
+    """
+    step = f'Give x, y and z, each from..to: {item} "-2..2, -1..1, 1..3 m".'
+    parts = text.replace("−", "-").split(",")
+    if len(parts) != 3 or len(text) > _LONGEST:
+        raise InvalidValueError(item, repr(text), "three spans between commas", step)
+    unit = _UNIT.search(_ends_of(parts[2])[1])
+    ends = []
+    for part in parts:
+        own = _ends_of(part)
+        last = _UNIT.search(own[1]) or unit
+        shared = " m" if last is None else f" {last[0]}"
+        ends.append([quantity(end if _UNIT.search(end) else end + shared, item, "m") for end in own])
+    low, high = np.array(ends).T
+    if (low > high).any() or np.abs(ends).max() > FARTHEST:
+        raise InvalidValueError(item, repr(text), f"from low to high, up to {FARTHEST:g} m", step)
+    return PoseBox(low, high)
+
+
+def _ends_of(part: str) -> tuple[str, str]:
+    span = _SPAN.fullmatch(part.strip())
+    return (span[1].strip(), span[2].strip()) if span else (part.strip(), part.strip())

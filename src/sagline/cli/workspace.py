@@ -1,0 +1,183 @@
+"""`sagline workspace`: where a robot can work, how much that is, and what limits it where."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from sagline.cli.ending import OUTSIDE
+from sagline.cli.entries import CLEARANCES, INVERSE, SIGNED_MARGINS, VIBRATION
+from sagline.cli.regions import box_of, wrenches_of
+from sagline.cli.results import figure_files, listed, write_figures
+from sagline.cli.tables import Grid, show_table, written
+from sagline.cli.terminal import note, show, show_json, working
+from sagline.cli.values import loaded, quantity
+from sagline.files.names import file_stem
+from sagline.files.robot_file import load_robot
+from sagline.files.whole import check_files, made_folder
+from sagline.workspaces.criteria.clearance import Clearance
+from sagline.workspaces.criteria.frame import InFrame
+from sagline.workspaces.criteria.frequency import LeastFrequency
+from sagline.workspaces.criteria.margin import LeastMargin
+from sagline.workspaces.criteria.sag import MaximumSag
+from sagline.workspaces.criteria.stiffness import LeastStiffness
+from sagline.workspaces.orientations import Tilts
+from sagline.workspaces.space import amount_of, facts_of
+from sagline.workspaces.workspace import workspace
+
+if TYPE_CHECKING:
+    from sagline.cables.model import CableModel
+    from sagline.workspaces.criteria.criterion import Criterion
+    from sagline.workspaces.space import Workspace
+
+MOST_LIMITS = 12  # shares that are told
+
+
+class Asked(NamedTuple):
+    """What has to be met, as texts of the command line; None for no such criterion."""
+
+    reserve: str | None
+    max_sag: str | None
+    min_stiffness: str | None
+    min_frequency: str | None
+    clearance: str | None
+    in_frame: bool
+
+    @property
+    def criteria(self) -> list[Criterion]:
+        """The criteria."""
+        found: list[Criterion] = []
+        if self.reserve is not None:
+            found.append(LeastMargin(quantity(self.reserve, "--reserve", "N", low=0.0)))
+        if self.max_sag is not None:
+            found.append(MaximumSag(quantity(self.max_sag, "--max-sag", "m", above=0.0)))
+        if self.min_stiffness is not None:
+            found.append(LeastStiffness(quantity(self.min_stiffness, "--min-stiffness", "N/m", above=0.0)))
+        if self.min_frequency is not None:
+            found.append(LeastFrequency(quantity(self.min_frequency, "--min-frequency", "Hz", above=0.0)))
+        if self.clearance is not None:
+            found.append(Clearance(quantity(self.clearance, "--clearance", "m", above=0.0)))
+        return found + [InFrame()] * self.in_frame
+
+
+def find(
+    name: str,
+    wrench: str | None,
+    payload: str | None,
+    tilt: str | None,
+    box: str | None,
+    asked: Asked,
+    cells: int,
+    model: CableModel,
+    folder: Path,
+    *,
+    figures: bool,
+    as_json: bool,
+) -> int:
+    """Find the workspace, tell, write and draw it; returns the exit code.
+
+    Raises:
+        SaglineError: If an input is wrong or the folder cannot be written.
+    """
+    loads, criteria = wrenches_of(wrench), asked.criteria
+    angle = None if tilt is None else Tilts(quantity(tilt, "--tilt", "rad", low=0.0))
+    region = None if box is None else box_of(box, "--box")
+    robot = loaded(load_robot(name), payload)
+    space_file, hull = f"{file_stem(robot.name, 'workspace')}.nc", f"{file_stem(robot.name, 'hull')}.glb"
+    drawn = [file_stem(robot.name, what) for what in ("workspace", "slice")] if figures else []
+    check_files(folder, [space_file, hull, *figure_files(drawn)])
+    with working(f"{robot.name}: workspace", *_needed(asked)) as line:
+        space = workspace(
+            robot,
+            region,
+            loads,
+            orientations=angle,
+            criteria=criteria,
+            model=model,
+            cells=cells,
+            progress=line.progress,
+        )
+        made_folder(folder)
+        files = [folder / space_file]
+        space.save(files[0])
+        if space.nearest is None:
+            files.append(folder / hull)
+            space.surface.export(files[-1])
+            if figures:
+                line.stage("drawing")
+                files += _drawn(space, drawn, folder)
+    if as_json:
+        show_json({**_record(space), "files": files})
+    else:
+        _tell(space)
+        show(f"In {folder.resolve()}: {listed(files)}", whole=True)
+    if space.nearest is not None:
+        note("Nowhere: ", space.nearest.reason, style="bold red")
+    return OUTSIDE if space.nearest is not None else 0
+
+
+def _drawn(space: Workspace, names: Sequence[str], folder: Path) -> list[Path]:
+    """The figures, by their files."""
+    from sagline import plot
+
+    pictures = [getattr(plot, kind)(space) for kind in ("workspace", "slice") if kind in plot.__all__]
+    return write_figures(dict(zip(names, pictures, strict=False)), folder)
+
+
+def _needed(asked: Asked) -> tuple[str, ...]:
+    """Entries of the kernels."""
+    shaken = asked.min_stiffness is not None or asked.min_frequency is not None
+    near = asked.clearance is not None
+    tensions = shaken or near or asked.max_sag is not None
+    return (SIGNED_MARGINS, *[INVERSE] * tensions, *[VIBRATION] * shaken, *[CLEARANCES] * near)
+
+
+def _tell(space: Workspace) -> None:
+    facts = [("area" if space.unit == "m²" else "volume", amount_of(space))]
+    facts += [(head, text) for head, text in facts_of(space) if head != "nearest"]
+    show_table(Grid(["robot", space.robot.name], facts, left=frozenset({0, 1}), prose=frozenset({1})))
+    limits = space.limits
+    if not limits:
+        return
+    rows = [
+        [written(100.0 * limit.share, ".1f"), limit.criterion, "–" if limit.cable < 0 else str(limit.cable)]
+        for limit in limits[:MOST_LIMITS]
+    ]
+    if len(limits) > MOST_LIMITS:
+        rest = sum(limit.share for limit in limits[MOST_LIMITS:])
+        rows.append([written(100.0 * rest, ".1f"), f"{len(limits) - MOST_LIMITS} others", ""])
+    show_table(Grid(["surface [%]", "limited by", "cable"], rows, left=frozenset({1})))
+
+
+def _record(space: Workspace) -> dict[str, Any]:
+    unit = "m3" if space.unit == "m³" else "m2"
+    near = space.nearest
+    return {
+        "robot": space.robot.name,
+        f"volume_{unit}": space.volume,
+        f"volume_error_{unit}": space.volume_error,
+        f"components_{unit}": space.components.volume.tolist(),
+        "box_low_m": space.box.low.tolist(),
+        "box_high_m": space.box.high.tolist(),
+        "open_faces": list(space.open_faces),
+        "orientations": str(space.orientations),
+        "model": type(space.model).__name__,
+        "criteria": [str(one) for one in space.criteria],
+        "limits": [
+            {
+                "criterion": limit.criterion,
+                "cable": None if limit.cable < 0 else limit.cable,
+                "share": limit.share,
+            }
+            for limit in space.limits
+        ],
+        "nearest": None
+        if near is None
+        else {
+            "position_m": near.pose.position.tolist(),
+            "margin_n": near.margin,
+            "cables": list(near.cables),
+            "reason": near.reason,
+        },
+    }
