@@ -120,6 +120,8 @@ if TYPE_CHECKING:
     from sagline.workspaces.margin import Margin, margin
     from sagline.workspaces.margin_status import MarginStatus
     from sagline.workspaces.orientations import Orientations, Tilts
+    from sagline.workspaces.proof import Proof, prove
+    from sagline.workspaces.proof_verdict import ProofVerdict
     from sagline.workspaces.space import Workspace
     from sagline.workspaces.surface import Surface
     from sagline.workspaces.workspace import workspace
@@ -209,6 +211,8 @@ __all__ = [
     "PoseBox",
     "PoseStatus",
     "PositionError",
+    "Proof",
+    "ProofVerdict",
     "Puncture",
     "QuadraticProgram",
     "Reading",
@@ -283,6 +287,7 @@ __all__ = [
     "path_from_samples",
     "plc",
     "plot",
+    "prove",
     "quintic_path",
     "robot_names",
     "save_plan",
@@ -385,6 +390,8 @@ _HOMES = {
     "PoseBox": "sagline.robot.pose_box",
     "PoseStatus": "sagline.kinematics.status",
     "PositionError": "sagline.workspaces.criteria.position_error",
+    "Proof": "sagline.workspaces.proof",
+    "ProofVerdict": "sagline.workspaces.proof_verdict",
     "Puncture": "sagline.tension.puncture",
     "QuadraticProgram": "sagline.tension.quadratic_program",
     "Reading": "sagline.dynamics.simulator",
@@ -460,6 +467,7 @@ _HOMES = {
     "path_from_samples": "sagline.motion.sampled",
     "plc": "sagline.plc",
     "plot": "sagline.plot",
+    "prove": "sagline.workspaces.proof",
     "quintic_path": "sagline.motion.rest_to_rest",
     "robot_names": "sagline.robot.catalogue",
     "save_plan": "sagline.files.plan_file",

@@ -580,6 +580,18 @@ def _workspaces(given: _Given) -> dict[str, Call]:
         "Surface.export": Call(space.surface.export, _all(file=("file", given.folder / "hull.stl"))),
         "Workspace.save": Call(space.save, _all(file=("file", given.folder / "saved.nc"))),
         "load_workspace": Call(sl.load_workspace, _all(file=("file", given.folder / "workspace.nc"))),
+        "prove": Call(
+            sl.prove,
+            _all(
+                robot=("one", given.robot),
+                box=("one", sl.PoseBox([0.0, 0.0, 2.0], [0.2, 0.1, 2.3])),
+                wrenches=("one", sl.WrenchBox(force=2.0), True),
+                budget=("number", 0.25),
+                model=("one", sl.Catenary()),
+                smallest=("number", 0.05, True),
+                progress=("callback", lambda done, of: None, True),
+            ),
+        ),
         "margin": Call(
             sl.margin,
             _all(

@@ -118,6 +118,12 @@ def _signed_margins() -> None:
     sl.margin(sl.load_robot(ROBOT), sl.Pose(PLACE, LEVEL))
 
 
+def _proofs() -> None:
+    import sagline as sl
+
+    sl.prove(sl.load_robot(ROBOT), sl.PoseBox(PLACE, PLACE))
+
+
 def _polygon() -> None:
     import sagline as sl
     from sagline.kinematics.polygon import polygon_at
@@ -227,7 +233,7 @@ def _clearances() -> None:
 INVERSE, SHARING, VERDICTS = "inverse kinematics", "further ways of sharing", "verdicts of infeasible poses"
 FORWARD, FIT = "forward kinematics", "fit of straight cables"
 MARGINS, POLYGON, VIBRATION = "margins", "tension polygon", "stiffness and vibration"
-SIGNED_MARGINS = "signed margins"
+SIGNED_MARGINS, PROOFS = "signed margins", "proofs for boxes of poses"
 MODES, SIMULATION, CHAINS = "modes with cable mass", "motion in time", "motion of cables with mass"
 LOSSES, ANSWERS, PERIODS = "losses in the cables' stretch", "answers with losses", "motion from period to period"
 FORWARD_OVER_PULLEYS, VIBRATION_OVER_PULLEYS = f"{FORWARD} over pulleys", f"{VIBRATION} over pulleys"
@@ -245,6 +251,7 @@ ENTRIES = {
         Entry(FIT, "forward.fit.fit_poses", 30, 5.0, lambda: _forward(straight=True)),
         Entry(MARGINS, "inverse.queries.margins_of_poses", 33, 9.0, _margins),
         Entry(SIGNED_MARGINS, "workspaces.signed_margin.signed_margins", 30, 9.0, _signed_margins),
+        Entry(PROOFS, "workspaces.pose_box_proof.prove_boxes", 45, 20.0, _proofs),
         Entry(POLYGON, "inverse.queries.polygon_of_pose", 38, 5.0, _polygon),
         Entry(VIBRATION, "forward.sensitivity.describe_states", 57, 6.0, _vibration),
         Entry(CLEARANCES, "interference.hanging_distance.least_distances", 33, 5.0, _clearances),

@@ -1,0 +1,200 @@
+"""Tensions for a box of poses: limits that hold all over it, and tensions well inside them at its middle."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from sagline.arrays import Array
+from sagline.kernels import tables
+from sagline.kernels.cable import geometry as g
+from sagline.kernels.cable.pulls import Curves, pulls_at
+from sagline.kernels.codes import CATENARY
+from sagline.kernels.jit import formula, glue, kernel
+from sagline.kernels.workspaces.centered import FARTHEST, Centered, find_center, leave
+from sagline.kernels.workspaces.pose_box import MOTIONS, Box, Place
+from sagline.kernels.workspaces.pull_bounds import LOOSEST, most_pull, pull_slope, sags
+
+SMOOTHNESS = 0.01  # of how far the demand goes over a box: so much of it the smoothing leaves
+LEAST_ROOM = 0.05  # share of their range that a set of wrenches leaves to the tensions in the search for a center
+ROUNDS = 2  # of tensions and their pulls
+LEAST_WAY = 1e-4  # of a chord: a smaller box is smoothed as one so large
+
+
+class Ranges(NamedTuple):
+    """Limits of the chord tensions that hold all over a box [N].
+
+    Attributes:
+        low: What no limit exceeds, (m,): for inside.
+        high: What no limit falls below, may be infinite.
+        lowest: What no limit falls below: for outside.
+        highest: What no limit exceeds, or no cable can carry.
+        pull: Pulls at the centered tensions.
+    """
+
+    low: Array
+    high: Array
+    lowest: Array
+    highest: Array
+    pull: Array
+
+
+@kernel
+def set_ranges(quantity: int, place: Place, curves: Curves, ranges: Ranges) -> None:
+    """Fill the limits that hold all over a box from those at its middle."""
+    cables = curves.cables
+    for i in range(place.way.size):
+        low, high = cables.low[i], cables.high[i]
+        ranges.low[i] = ranges.lowest[i] = low
+        ranges.high[i] = ranges.highest[i] = high
+        if sags(curves, i):
+            loosest = cables.half_weight[i] / LOOSEST
+            if quantity != 0:  # limits of the frame end move with the cable's weight
+                moves = place.way[i] * pull_slope(curves, i, place.way[i], max(low, loosest))
+                ranges.low[i], ranges.lowest[i] = low + moves, low - moves
+                moves = place.way[i] * pull_slope(curves, i, place.way[i], max(high, loosest))
+                if high < math.inf:
+                    ranges.high[i], ranges.highest[i] = high - moves, high + moves
+            ranges.lowest[i] = max(ranges.lowest[i], loosest)
+            ranges.low[i] = max(ranges.low[i], loosest)
+            ranges.highest[i] = min(ranges.highest[i], max(cables.stiffness[i], ranges.lowest[i]))
+            ranges.high[i] = min(ranges.high[i], cables.stiffness[i])
+
+
+@kernel
+def tighten(freedom: Array, place: Place, curves: Curves, upward: float, ranges: Ranges) -> None:
+    """Take from the largest tensions what no load on cables that all pull up could cause.
+
+    Along the vertical they balance weight, load and pulls, of which each is at most the rest.
+
+    Args:
+        freedom: Rows that pick the free motions, (n, 6).
+        place: Where the cables stand.
+        curves: They.
+        upward: Most vertical force that the cables have to give beside their pulls [N].
+        ranges: Theirs.
+    """
+    free = 0.0
+    for k in range(freedom.shape[0]):
+        free += freedom[k, 2] * freedom[k, 2]
+    total = upward
+    least = math.inf
+    for i in range(place.way.size):
+        up = place.full[2, i] - place.turned[i]
+        least = min(least, up)
+        moves = place.way[i] * pull_slope(curves, i, place.way[i], ranges.lowest[i])
+        total += most_pull(curves, i, ranges.lowest[i]) + moves - up * ranges.lowest[i]
+    if free > 1.0 - 1e-12 and least > 0.0:
+        for i in range(place.way.size):
+            most = ranges.lowest[i] + max(total, 0.0) / (place.full[2, i] - place.turned[i])
+            ranges.highest[i] = min(ranges.highest[i], most * (1.0 + 1e-9))
+
+
+@kernel
+def spread_of_slopes(place: Place, box: Box, centered: Centered, ranges: Ranges, slopes: Array) -> None:
+    """Fill how the wrench that the centered tensions and their pulls give goes with each motion, (MOTIONS, 6)."""
+    m = place.way.size
+    for motion in range(MOTIONS):
+        for a in range(6):
+            slopes[motion, a] = 0.0
+        if motion >= 3 and box.turn == 0.0:
+            continue
+        columns = place.slopes[motion].reshape((6, m))
+        for a in range(6):
+            for i in range(m):
+                slopes[motion, a] += centered.tau[i] * columns[a, i]
+        for i in range(m):  # a pull's lever goes with rotation
+            if motion == 3:
+                slopes[motion, 3] += ranges.pull[i] * place.lever[2, i]
+            elif motion == 4:
+                slopes[motion, 4] += ranges.pull[i] * place.lever[2, i]
+            elif motion == 5:
+                slopes[motion, 3] -= ranges.pull[i] * place.lever[0, i]
+                slopes[motion, 4] -= ranges.pull[i] * place.lever[1, i]
+
+
+@formula
+def lift(rows: Array, vector: Array, full: Array) -> None:
+    """Fill a direction in wrenches (6,) from one along the free motions (n,)."""
+    for a in range(6):
+        full[a] = 0.0
+        for k in range(vector.size):
+            full[a] += rows[k, a] * vector[k]
+
+
+@kernel
+def weigh(curves: Curves, place: Place, center: Array, load: Array, centered: Centered, ranges: Ranges) -> None:
+    """Fill what the chord tensions have to supply, with the pulls at the present ones.
+
+    Args:
+        curves: The cables.
+        place: Where they stand.
+        center: Row of the body_table.
+        load: Wrench, (6,).
+        centered: Tensions; filled.
+        ranges: Its pulls are filled.
+    """
+    n, m = place.matrix.shape
+    pulls_at(curves, centered.tau, ranges.pull)
+    z = center[tables.MASS] * center[tables.GRAVITY] - load[2]
+    x, y = -load[3], -load[4]
+    for i in range(m):
+        z += ranges.pull[i]
+        x += place.lever[1, i] * ranges.pull[i]
+        y -= place.lever[0, i] * ranges.pull[i]
+    for k in range(n):
+        row = place.rows[k]
+        centered.right[k] = (
+            row[2] * z + row[3] * x + row[4] * y - row[0] * load[0] - row[1] * load[1] - row[5] * load[5]
+        )
+
+
+@glue
+def smoothing_of(place: Place, geometry: Array, tau: Array) -> float:
+    """Smoothing for a box [N^2]: the square of a share of how far tensions' wrenches go in it."""
+    square = 0.0
+    for i in range(tau.size):
+        change = tau[i] * max(place.way[i] / geometry[g.CHORD, i], LEAST_WAY)
+        square += change * change
+    return SMOOTHNESS * SMOOTHNESS * max(square, 1e-24)
+
+
+@glue
+def search_limits(ranges: Ranges, taken: Array, size: float, centered: Centered) -> bool:
+    """Fill the limits between which tensions are sought: those of the box, less what is taken (m,).
+
+    Returns:
+        Whether there is room between them.
+    """
+    possible = True
+    for i in range(taken.size):
+        low = ranges.low[i]
+        high = min(ranges.high[i], ranges.highest[i], low + FARTHEST * (size + low))
+        possible = possible and low < high
+        share = min(taken[i], 0.5 * (1.0 - LEAST_ROOM) * (high - low))
+        centered.low[i] = low + share
+        centered.high[i] = high - share
+    return possible
+
+
+@kernel
+def center_tensions(
+    place: Place, curves: Curves, geometry: Array, body: Array, wrench: Array, centered: Centered, ranges: Ranges
+) -> tuple[float, float]:
+    """Let tensions between the limits of the search balance a wrench (6,), with their own pulls.
+
+    Returns:
+        The square of what they leave [N^2], and the smoothing.
+    """
+    rounds = ROUNDS if curves.model.code == CATENARY else 1
+    square, smoothing = 0.0, 0.0
+    for i in range(centered.tau.size):
+        if not centered.low[i] < centered.tau[i] < centered.high[i]:
+            centered.tau[i] = 0.5 * (centered.low[i] + centered.high[i])
+    for _ in range(rounds):
+        weigh(curves, place, body, wrench, centered, ranges)
+        smoothing = smoothing_of(place, geometry, centered.tau)
+        find_center(place.matrix, smoothing, centered)
+    weigh(curves, place, body, wrench, centered, ranges)
+    square = leave(place.matrix, centered)
+    return square, smoothing

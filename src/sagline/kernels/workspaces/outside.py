@@ -1,0 +1,244 @@
+"""Whether a direction separates what is asked of the cables from all that they give, all over a box of poses."""
+
+from __future__ import annotations
+
+import math
+
+from sagline.arrays import Array
+from sagline.kernels.algebra.cholesky import solve_lower, solve_upper
+from sagline.kernels.cable.pulls import Curves
+from sagline.kernels.jit import formula, kernel
+from sagline.kernels.memory import Memory, block
+from sagline.kernels.workspaces.box_tensions import Ranges, lift, spread_of_slopes
+from sagline.kernels.workspaces.centered import Centered, factor_normal
+from sagline.kernels.workspaces.inside import Precision
+from sagline.kernels.workspaces.loads import dot6
+from sagline.kernels.workspaces.pose_box import MOTIONS, Box, Place, most_of_linear, norm3
+from sagline.kernels.workspaces.pull_bounds import fall, fall_rate, pull_slope, rise, rise_rate
+
+BORNE = 0.3  # share of the gap that a free cable may take of it
+PIECES = 4  # of the tensions below a cable's own, each half as long as the one above
+
+# rows of what is measured along a direction
+VALUE, BENT, SPREAD, HANGING, HANGING_SPREAD, HANGING_BENT = 1, 2, 3, 4, 5, 6
+
+
+@kernel
+def is_outside(
+    place: Place, box: Box, curves: Curves, smoothing: float, centered: Centered, ranges: Ranges, precision: Precision,
+    memory: Memory,
+) -> bool:  # fmt: skip
+    """Whether a direction y, turning with the pose, separates the demand from what the cables give all over a box.
+
+    It is what the centered tensions leave, and how that turns; a small change of it keeps cables that are free from
+    giving more than nothing along it.
+    """
+    n, m = place.matrix.shape
+    wide, at = block(memory.numbers, 0, 7 + MOTIONS, m)
+    turns, at = block(memory.numbers, at, MOTIONS, n)
+    slopes, at = block(memory.numbers, at, 2 * MOTIONS + 2, 6)
+    vectors, at = block(memory.numbers, at, 2, n)
+    give, value, bend, spread = wide[0], wide[1], wide[2], wide[3]
+    each = wide[7:]
+    full, direction = slopes[2 * MOTIONS], slopes[2 * MOTIONS + 1]
+    tau, y = centered.tau, vectors[0]
+    motions = MOTIONS if box.turn > 0.0 else 3
+    length = 0.0
+    for k in range(n):
+        length += centered.left[k] * centered.left[k]
+    length = math.sqrt(length)
+    for k in range(n):
+        y[k] = centered.left[k] / length
+    for i in range(m):
+        along = 0.0
+        for k in range(n):
+            along += y[k] * place.matrix[k, i]
+        borne = abs(along) + BORNE * length / (centered.high[i] - centered.low[i])
+        give[i] = 1.0 / (borne * borne)
+    if not factor_normal(place.matrix, give, 1.0, centered.normal):
+        return False
+    spread_of_slopes(place, box, centered, ranges, slopes)
+    lift(place.rows, y, direction)
+    for motion in range(motions):
+        columns = place.slopes[motion].reshape((6, m))
+        for i in range(m):
+            each[motion, i] = 0.0
+            for a in range(6):
+                each[motion, i] += columns[a, i] * direction[a]
+        turn = turns[motion]
+        for k in range(n):
+            turn[k] = 0.0
+            for i in range(m):
+                turn[k] -= place.matrix[k, i] * give[i] * each[motion, i]
+        solve_lower(centered.normal, turn)
+        solve_upper(centered.normal, turn)
+        lift(place.rows, turn, slopes[MOTIONS + motion])
+    for attempt in range(2):
+        measure(place, box, direction, slopes[MOTIONS : 2 * MOTIONS], wide)
+        for i in range(m):
+            bend[i] *= precision.bends
+        if attempt == 1:
+            break
+        push = vectors[1]
+        for k in range(n):
+            push[k] = 0.0
+        for i in range(m):
+            if abs(value[i]) < spread[i] + bend[i]:
+                goal = -bend[i] - value[i]
+                room = ranges.highest[i] - ranges.lowest[i]
+                goal += (
+                    spread[i] * ((tau[i] - ranges.lowest[i]) - (ranges.highest[i] - tau[i])) / room
+                    if room < math.inf
+                    else -spread[i]
+                )
+                for k in range(n):
+                    push[k] += place.matrix[k, i] * give[i] * goal
+        solve_lower(centered.normal, push)
+        solve_upper(centered.normal, push)
+        for k in range(n):
+            y[k] += push[k]
+        lift(place.rows, y, direction)
+    gap = 0.0
+    size = 0.0
+    for k in range(n):
+        gap += y[k] * centered.left[k]
+        numbers = abs(centered.right[k])
+        for i in range(m):
+            numbers += abs(place.matrix[k, i]) * tau[i]
+        size += abs(y[k]) * numbers
+    for motion in range(MOTIONS):
+        full[motion] = 0.0
+        if motion < motions:
+            full[motion] = -dot6(direction, slopes[motion])
+            for k in range(n):
+                full[motion] += turns[motion, k] * centered.left[k]
+    gap -= most_of_linear(box, full)
+    for i in range(m):
+        gap -= most_of_cable(place, curves, ranges, tau[i], i, wide)
+        tension = ranges.highest[i] if ranges.highest[i] < math.inf else tau[i]
+        size += tension * (abs(value[i]) + spread[i] + bend[i])
+    return gap > precision.rounding * size
+
+
+@kernel
+def measure(place: Place, box: Box, direction: Array, turning: Array, rows: Array) -> None:
+    """Fill what a newton of each cable and of its pull count along a direction, and how that goes in a box.
+
+    Args:
+        place: Where the cables stand.
+        box: The box.
+        direction: y at the middle, (6,).
+        turning: Its slopes with each motion, (MOTIONS, 6).
+        rows: Filled: along a column the value at the middle, what is left of it by its slopes, and how far these lead;
+            the same along a pull.
+    """
+    m = place.way.size
+    motions = MOTIONS if box.turn > 0.0 else 3
+    arm = norm3(direction[3], direction[4], direction[5])
+    turned_arm = 0.0  # how far the moment part of y goes
+    square = 0.0
+    for motion in range(motions):
+        length = norm3(turning[motion, 3], turning[motion, 4], turning[motion, 5])
+        if motion < 3:
+            turned_arm += box.half[motion] * length
+        else:
+            square += length * length
+    turned_arm += box.turn * math.sqrt(square)
+    for i in range(m):
+        rx, ry, rz = place.lever[0, i], place.lever[1, i], place.lever[2, i]
+        value = 0.0
+        for a in range(6):
+            value += direction[a] * place.full[a, i]
+        x = direction[0] + direction[4] * rz - direction[5] * ry
+        y = direction[1] + direction[5] * rx - direction[3] * rz
+        z = direction[2] + direction[3] * ry - direction[4] * rx
+        leading, hanging_leading, going = 0.0, 0.0, 0.0
+        square, square_value, square_hanging = 0.0, 0.0, 0.0
+        for motion in range(motions):
+            turn = turning[motion]
+            vx = turn[0] + turn[4] * rz - turn[5] * ry
+            vy = turn[1] + turn[5] * rx - turn[3] * rz
+            vz = turn[2] + turn[3] * ry - turn[4] * rx
+            if motion == 3:
+                vx += direction[4] * ry + direction[5] * rz
+                vy -= direction[3] * ry
+                vz -= direction[3] * rz
+            elif motion == 4:
+                vx -= direction[4] * rx
+                vy += direction[5] * rz + direction[3] * rx
+                vz -= direction[4] * rz
+            elif motion == 5:
+                vx -= direction[5] * rx
+                vy -= direction[5] * ry
+                vz += direction[3] * rx + direction[4] * ry
+            slope = place.slopes[motion]
+            change = vx * place.full[0, i] + vy * place.full[1, i] + vz * place.full[2, i]
+            # of the unit vector alone
+            change += x * slope[i] + y * slope[m + i] + z * slope[2 * m + i]
+            if motion < 3:
+                half = box.half[motion]
+                leading += half * abs(change)
+                hanging_leading += half * abs(vz)
+                going += half * norm3(vx, vy, vz)
+            else:
+                square += vx * vx + vy * vy + vz * vz
+                square_value += change * change
+                square_hanging += vz * vz
+        leading += box.turn * math.sqrt(square_value)
+        hanging_leading += box.turn * math.sqrt(square_hanging)
+        going += box.turn * math.sqrt(square)
+        curled = arm * place.curled[i] + turned_arm * place.swung[i]
+        rows[VALUE, i] = value
+        rows[SPREAD, i] = leading
+        rows[BENT, i] = norm3(x, y, z) * place.bent[i] + going * place.turned[i] + curled
+        rows[HANGING, i] = z
+        rows[HANGING_SPREAD, i] = hanging_leading
+        rows[HANGING_BENT, i] = curled
+
+
+@formula
+def most_of_run(slope: float, rate: float, most: float, room: float) -> float:
+    """Largest t slope + min(t rate, most) for t from 0 to room; rate and most are >= 0."""
+    if slope >= 0.0 or room == 0.0:
+        return room * slope + min(rate * room, most) if room > 0.0 else 0.0
+    if rate + slope <= 0.0:
+        return 0.0
+    turn = min(most / rate, room)
+    return turn * (rate + slope)
+
+
+@kernel
+def most_of_cable(place: Place, curves: Curves, ranges: Ranges, tau: float, i: int, rows: Array) -> float:
+    """Most that a cable gives along y at any tension, anywhere in a box, beyond what one tension and its pull give."""
+    low, high = ranges.lowest[i], ranges.highest[i]
+    bend, spread, hanging = rows[BENT, i], rows[SPREAD, i], rows[HANGING, i]
+    weight = abs(hanging)
+    # above the tension: along a column that counts most there
+    slope = rows[VALUE, i] + spread + bend
+    if slope > 0.0 and high == math.inf:
+        return math.inf
+    most = fall(curves, i, tau, high) if hanging > 0.0 else rise(curves, i, tau, high)
+    rate = fall_rate(curves, i, tau) if hanging > 0.0 else rise_rate(curves, i, tau)
+    gain = most_of_run(slope, weight * rate, weight * most, max(high - tau, 0.0))
+    # below it: along one that counts least, piece by piece
+    slope = -(rows[VALUE, i] - spread + bend)
+    top = tau
+    largest = 0.0
+    for piece in range(PIECES):
+        if top <= low:
+            break
+        bottom = max(low, 0.5 * top) if piece < PIECES - 1 else low
+        most = rise(curves, i, bottom, tau) if hanging > 0.0 else fall(curves, i, bottom, tau)
+        largest = max(largest, most)
+        if piece == 0:
+            rate = rise_rate(curves, i, bottom) if hanging > 0.0 else fall_rate(curves, i, bottom)
+            gain = max(gain, most_of_run(slope, weight * rate, weight * most, tau - bottom))
+        else:
+            gain = max(gain, max((tau - top) * slope, (tau - bottom) * slope) + weight * most)
+        top = bottom
+    largest = max(largest, fall(curves, i, low, tau), rise(curves, i, low, tau), rise(curves, i, tau, high))
+    if high < math.inf:
+        largest = max(largest, fall(curves, i, tau, high))
+    moved = place.way[i] * pull_slope(curves, i, place.way[i], low)
+    gain += tau * bend + weight * moved + (rows[HANGING_SPREAD, i] + rows[HANGING_BENT, i]) * (largest + moved)
+    return gain + abs(ranges.pull[i]) * rows[HANGING_BENT, i]

@@ -1,0 +1,181 @@
+"""The cables over a box of poses: how they stand at its middle, and how far from that they get in it.
+
+A box holds the positions no farther than half an edge from its middle along each axis, at every orientation that one
+turn by no more than an angle, about any axis, makes of the one at the middle. Where the angle is zero all of them have
+the same orientation.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from sagline.arrays import Array
+from sagline.kernels.balance.freedom import turns
+from sagline.kernels.balance.wrench import fill_structure_matrix, rows_along_freedom
+from sagline.kernels.cable import geometry as g
+from sagline.kernels.jit import formula, glue, kernel
+from sagline.kernels.memory import Memory, block
+
+BEND = 0.57735027  # half of 2/sqrt(3), the largest second derivative of x/|x| times |x|^2, rounded up
+MOTIONS = 6  # three of translation, three of rotation
+
+
+class Box(NamedTuple):
+    """A box of poses.
+
+    Attributes:
+        half: Half edges [m], (3,).
+        turn: Largest turn away from the orientation at the middle [rad].
+    """
+
+    half: Array
+    turn: float
+
+
+class Place(NamedTuple):
+    """The cables of one pose, the middle of a box, and how far from there they get in the box.
+
+    Attributes:
+        rows: Free motions, those that turn per lever arm, so that all components are in newtons, (n, 6).
+        full: Structure matrix, (6, m).
+        matrix: Its components along the rows, (n, m).
+        lever: From center of mass to platform end, world axes [m], (3, m).
+        slopes: Of the structure matrix with each motion of the platform, (MOTIONS, 6 * m).
+        way: How far a platform end goes [m], (m,).
+        turned: How far a unit vector goes, (m,).
+        bent: How far it gets from where its slopes lead, (m,).
+        swung: How far a lever goes [m], (m,).
+        curled: How far it gets from where its slopes lead [m], (m,).
+    """
+
+    rows: Array
+    full: Array
+    matrix: Array
+    lever: Array
+    slopes: Array
+    way: Array
+    turned: Array
+    bent: Array
+    swung: Array
+    curled: Array
+
+
+@glue
+def new_place(memory: Memory, m: int, n: int) -> tuple[Place, Memory]:
+    """Room for m cables and n free motions, and the memory that is left."""
+    numbers = memory.numbers
+    rows, at = block(numbers, 0, n, 6)
+    wide, at = block(numbers, at, 6 + n + 3 + 5, m)
+    slopes, at = block(numbers, at, MOTIONS, 6 * m)
+    spans = wide[9 + n :]
+    place = Place(
+        rows, wide[:6], wide[6 : 6 + n], wide[6 + n : 9 + n], slopes, spans[0], spans[1], spans[2], spans[3], spans[4]
+    )
+    return place, Memory(numbers[at:], memory.counters)
+
+
+@kernel
+def set_place(freedom: Array, geometry: Array, rotation: Array, center: Array, box: Box, place: Place) -> bool:
+    """Fill a place from the geometry of its cables; False where a platform end may meet its frame end in the box.
+
+    Args:
+        freedom: Rows that pick the free motions, (n, 6).
+        geometry: Rows of `cable_geometry` at the middle, (GEOMETRY_ROWS, m).
+        rotation: Platform -> world at the middle, (3, 3).
+        center: Center of mass in the platform frame [m], (3,).
+        box: The box.
+        place: Filled.
+    """
+    n, m = place.matrix.shape
+    fill_structure_matrix(geometry, place.full)
+    mean = 0.0
+    for i in range(m):
+        for k in range(3):
+            place.lever[k, i] = geometry[g.LEVER_X + k, i]
+        mean += norm3(place.lever[0, i], place.lever[1, i], place.lever[2, i]) / m
+    for k in range(n):
+        unit = 1.0 / mean if turns(freedom, k) and mean > 0.0 else 1.0
+        for a in range(6):
+            place.rows[k, a] = freedom[k, a] * unit
+    rows_along_freedom(place.rows, place.full, place.matrix)
+    if n == 6:
+        for k in range(6):
+            for i in range(m):
+                place.matrix[k, i] = place.rows[k, k] * place.full[k, i]
+    straight = norm3(box.half[0], box.half[1], box.half[2])
+    possible = True
+    for i in range(m):
+        arm = 0.0
+        for k in range(3):
+            offset = place.lever[k, i]
+            for j in range(3):
+                offset += rotation[k, j] * center[j]
+            arm += offset * offset
+        lever = norm3(place.lever[0, i], place.lever[1, i], place.lever[2, i])
+        chord = geometry[g.CHORD, i]
+        way = straight + box.turn * math.sqrt(arm)
+        least = chord - way
+        possible = possible and least > 0.0
+        share = min(way / chord, 1.0)
+        place.way[i] = way
+        place.turned[i] = share / math.sqrt(0.5 + 0.5 * math.sqrt(1.0 - share * share))
+        place.bent[i] = BEND * way * way / (least * least) + 0.5 * box.turn * box.turn * math.sqrt(arm) / chord
+        place.swung[i] = box.turn * lever
+        place.curled[i] = 0.5 * box.turn * box.turn * lever
+    if possible:
+        set_slopes(geometry, rotation, center, box, place)
+    return possible
+
+
+@kernel
+def set_slopes(geometry: Array, rotation: Array, center: Array, box: Box, place: Place) -> None:
+    """Fill the slopes of the structure matrix."""
+    m = place.way.size
+    for motion in range(MOTIONS if box.turn > 0.0 else 3):
+        slopes = place.slopes[motion].reshape((6, m))
+        for i in range(m):
+            x, y, z = place.full[0, i], place.full[1, i], place.full[2, i]
+            rx, ry, rz = place.lever[0, i], place.lever[1, i], place.lever[2, i]
+            bx = by = bz = 0.0  # how the platform end moves
+            sx = sy = sz = 0.0  # and the lever
+            if motion == 0:
+                bx = 1.0
+            elif motion == 1:
+                by = 1.0
+            elif motion == 2:
+                bz = 1.0
+            else:
+                ax = rx + rotation[0, 0] * center[0] + rotation[0, 1] * center[1] + rotation[0, 2] * center[2]
+                ay = ry + rotation[1, 0] * center[0] + rotation[1, 1] * center[1] + rotation[1, 2] * center[2]
+                az = rz + rotation[2, 0] * center[0] + rotation[2, 1] * center[1] + rotation[2, 2] * center[2]
+                if motion == 3:
+                    by, bz, sy, sz = -az, ay, -rz, ry
+                elif motion == 4:
+                    bx, bz, sx, sz = az, -ax, rz, -rx
+                else:
+                    bx, by, sx, sy = -ay, ax, -ry, rx
+            along = x * bx + y * by + z * bz
+            chord = geometry[g.CHORD, i]
+            dx, dy, dz = (x * along - bx) / chord, (y * along - by) / chord, (z * along - bz) / chord
+            slopes[0, i] = dx
+            slopes[1, i] = dy
+            slopes[2, i] = dz
+            slopes[3, i] = ry * dz - rz * dy + sy * z - sz * y
+            slopes[4, i] = rz * dx - rx * dz + sz * x - sx * z
+            slopes[5, i] = rx * dy - ry * dx + sx * y - sy * x
+
+
+@formula
+def norm3(x: float, y: float, z: float) -> float:
+    """Length of a vector in space."""
+    return math.sqrt(x * x + y * y + z * z)
+
+
+@formula
+def most_of_linear(box: Box, slopes: Array) -> float:
+    """Largest value in a box of a function with these slopes along the motions, (MOTIONS,), zero at the middle."""
+    most = abs(slopes[0]) * box.half[0] + abs(slopes[1]) * box.half[1] + abs(slopes[2]) * box.half[2]
+    if box.turn > 0.0:
+        most += box.turn * norm3(slopes[3], slopes[4], slopes[5])
+    return most

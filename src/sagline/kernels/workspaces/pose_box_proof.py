@@ -1,0 +1,134 @@
+"""Whether a robot can work at every pose of a box, or at none: proofs of either; docs/model.md, section 13.
+
+Inside: a policy of tensions that balances every wrench at every pose stays within the limits. Outside: one wrench of
+the set, and a direction that turns with the pose, along which the cables together fall short of it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sagline.arrays import Array, Codes, Indices
+from sagline.kernels import tables
+from sagline.kernels.balance.setting import Limits, place_cables
+from sagline.kernels.cable import geometry as g
+from sagline.kernels.cable.cables import new_cables
+from sagline.kernels.cable.geometry import cable_geometry
+from sagline.kernels.cable.pulls import new_curves
+from sagline.kernels.cable.terms import Model
+from sagline.kernels.inverse.poses import LimitTerms, ModelTerms, Robots
+from sagline.kernels.jit import entry
+from sagline.kernels.memory import Memory, block
+from sagline.kernels.workspaces.box_tensions import Ranges, center_tensions, lift, search_limits, set_ranges, tighten
+from sagline.kernels.workspaces.centered import new_centered
+from sagline.kernels.workspaces.inside import Precision, is_inside
+from sagline.kernels.workspaces.loads import Loads, farthest, reach
+from sagline.kernels.workspaces.outside import is_outside
+from sagline.kernels.workspaces.pose_box import Box, new_place, set_place
+
+OPEN, INSIDE, OUTSIDE = 0, 1, 2  # verdicts
+BOX_COLUMNS = 11  # pose row, half edges, turn
+ROUNDS = 3  # of tensions, and what a set of wrenches takes of their limits
+BEYOND = 2.0  # of the smoothing, a cable: a demand that leaves more is out of reach
+
+LoadTerms = tuple[Array, Array, Array, Array, Indices]  # Loads
+PrecisionTerms = tuple[float, float]  # Precision
+
+
+def room_for(cables: int) -> tuple[Array, Indices]:
+    """Memory in which proofs work with so many cables."""
+    return np.empty(14 * cables * cables + 500 * cables + 800), np.empty(10 * cables + 40, dtype=np.int64)
+
+
+@entry
+def prove_boxes(
+    model_terms: ModelTerms,
+    limit_terms: LimitTerms,
+    robot_terms: Robots,
+    load_terms: LoadTerms,
+    boxes: Array,
+    precision_terms: PrecisionTerms,
+    room: tuple[Array, Indices],
+    answers: tuple[Codes, Codes],
+) -> None:
+    """Try to prove of each of N boxes of poses that a robot can work at all of its poses, or at none.
+
+    Args:
+        model_terms: Cable model: code, k_h, k_p.
+        limit_terms: What tensions must keep: `Limits`.
+        robot_terms: Rows of the structure matrix that count, (n, 6); body_table (1, BODY_COLUMNS); cable_table,
+            (1, m, CABLE_COLUMNS), without pulleys.
+        load_terms: The wrenches to bear: `Loads`.
+        boxes: Rows: pose at the middle, half edges [m], largest turn from there [rad], (N, BOX_COLUMNS).
+        precision_terms: `Precision`.
+        room: `room_for` as many cables.
+        answers: Filled: OPEN, INSIDE or OUTSIDE, (N,); and statuses to work in, (m,).
+    """
+    limits = Limits(*limit_terms)
+    loads = Loads(*load_terms)
+    precision = Precision(*precision_terms)
+    freedom, bodies, robots = robot_terms
+    verdicts, statuses = answers
+    body, robot = bodies[0], robots[0]
+    n, m = freedom.shape[0], robot.shape[0]
+    model = Model(model_terms[0], model_terms[1], model_terms[2], body[tables.GRAVITY], None)
+    cables, rest = new_cables(Memory(*room), m, False)
+    place, rest = new_place(rest, m, n)
+    centered, rest = new_centered(rest, m, n)
+    curves, rest = new_curves(model, cables, statuses, rest)
+    rows, at = block(rest.numbers, 0, g.GEOMETRY_ROWS + 6, m)
+    small, at = block(rest.numbers, at, 6, 6)
+    rest = Memory(rest.numbers[at:], rest.counters)
+    geometry, spans = rows[: g.GEOMETRY_ROWS], rows[g.GEOMETRY_ROWS :]
+    ranges, taken = Ranges(spans[0], spans[1], spans[2], spans[3], spans[4]), spans[5]
+    rotation, center, wrench, direction = small[:3, :3], small[3, :3], small[4], small[5]
+    several = loads.segments.shape[0] + loads.ellipsoids.shape[0] + loads.sizes.size > 0
+    for k in range(3):
+        center[k] = body[tables.CENTER_X + k]
+    for p in range(boxes.shape[0]):
+        verdicts[p] = OPEN
+        box = Box(boxes[p, 7:10], boxes[p, 10])
+        cable_geometry(robot, body, boxes[p], rotation, geometry)
+        if not place_cables(model, limits, robot, geometry, cables):
+            continue
+        if not set_place(freedom, geometry, rotation, center, box, place):
+            continue
+        set_ranges(limits.quantity, place, curves, ranges)
+        for a in range(6):
+            wrench[a] = loads.center[a]
+            direction[a] = 1.0 if a == 2 else 0.0
+        upward = body[tables.MASS] * body[tables.GRAVITY] - wrench[2] + reach(loads, direction)
+        tighten(freedom, place, curves, upward, ranges)
+        size = abs(upward)
+        for a in range(6):
+            size += abs(wrench[a])
+        for i in range(m):
+            size += ranges.low[i] + cables.half_weight[i]
+            taken[i] = 0.0
+        if not search_limits(ranges, taken, size, centered):
+            continue
+        square, smoothing = center_tensions(place, curves, geometry, body, wrench, centered, ranges)
+        outside = square > BEYOND * m * smoothing
+        for attempt in range(ROUNDS if several else 1):
+            if outside:
+                break
+            if is_inside(place, box, curves, loads, centered, ranges, precision, rest):
+                verdicts[p] = INSIDE
+                break
+            if attempt > 0 and square > BEYOND * m * smoothing:
+                break
+            if several:
+                for i in range(m):
+                    taken[i] = centered.give[i]
+                search_limits(ranges, taken, size, centered)
+                square, smoothing = center_tensions(place, curves, geometry, body, wrench, centered, ranges)
+        if several and verdicts[p] == OPEN:
+            lift(place.rows, centered.left, direction)
+            farthest(loads, direction, wrench)
+            for i in range(m):
+                taken[i] = 0.0
+            search_limits(ranges, taken, size, centered)
+            square, smoothing = center_tensions(place, curves, geometry, body, wrench, centered, ranges)
+            outside = square > BEYOND * m * smoothing
+        if outside and is_outside(place, box, curves, smoothing, centered, ranges, precision, rest):
+            verdicts[p] = OUTSIDE
