@@ -43,16 +43,20 @@ if TYPE_CHECKING:
     from sagline.files.execution_file import load_execution
     from sagline.files.imported import Imported
     from sagline.files.measurements import load_measurements
+    from sagline.files.mesh_file import load_mesh
     from sagline.files.mjcf import dump_mjcf
     from sagline.files.path_file import load_path
     from sagline.files.plan_file import load_plan, save_plan
     from sagline.files.plc_source import export_scl
     from sagline.files.robot_file import dump_robot, load_robot
+    from sagline.files.scene_file import load_scene
     from sagline.files.simulation_file import load_simulation
     from sagline.files.sweep_file import load_sweep
     from sagline.files.wirex import load_wirex
     from sagline.files.workspace_file import load_workspace
     from sagline.interference.clearance import Clearances, clearance
+    from sagline.interference.frame import frame_beams
+    from sagline.interference.mesh import Mesh
     from sagline.interference.obstacles import Box, Capsule, Sphere
     from sagline.kinematics.confirm import Confirmation, confirm
     from sagline.kinematics.encoder import encoder_counts, lengths_from_counts
@@ -196,6 +200,7 @@ __all__ = [
     "MarginStatus",
     "MaximumSag",
     "MeasuredTension",
+    "Mesh",
     "MinimumNorm",
     "Modes",
     "MovingAnchors",
@@ -259,6 +264,7 @@ __all__ = [
     "export_scl",
     "fastest",
     "forward",
+    "frame_beams",
     "frequency_map",
     "frequency_response",
     "frequency_slopes",
@@ -274,9 +280,11 @@ __all__ = [
     "load_design",
     "load_execution",
     "load_measurements",
+    "load_mesh",
     "load_path",
     "load_plan",
     "load_robot",
+    "load_scene",
     "load_simulation",
     "load_sweep",
     "load_wirex",
@@ -375,6 +383,7 @@ _HOMES = {
     "MarginStatus": "sagline.workspaces.margin_status",
     "MaximumSag": "sagline.workspaces.criteria.sag",
     "MeasuredTension": "sagline.kinematics.measured",
+    "Mesh": "sagline.interference.mesh",
     "MinimumNorm": "sagline.tension.minimum_norm",
     "Modes": "sagline.statics.stiffness",
     "MovingAnchors": "sagline.optimization.moving",
@@ -439,6 +448,7 @@ _HOMES = {
     "export_scl": "sagline.files.plc_source",
     "fastest": "sagline.dynamics.fastest",
     "forward": "sagline.kinematics.forward",
+    "frame_beams": "sagline.interference.frame",
     "frequency_map": "sagline.dynamics.frequency_map",
     "frequency_response": "sagline.dynamics.response",
     "frequency_slopes": "sagline.dynamics.frequency_slopes",
@@ -454,9 +464,11 @@ _HOMES = {
     "load_design": "sagline.files.design_file",
     "load_execution": "sagline.files.execution_file",
     "load_measurements": "sagline.files.measurements",
+    "load_mesh": "sagline.files.mesh_file",
     "load_path": "sagline.files.path_file",
     "load_plan": "sagline.files.plan_file",
     "load_robot": "sagline.files.robot_file",
+    "load_scene": "sagline.files.scene_file",
     "load_simulation": "sagline.files.simulation_file",
     "load_sweep": "sagline.files.sweep_file",
     "load_wirex": "sagline.files.wirex",

@@ -11,6 +11,7 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
+import trimesh
 from matplotlib.figure import Figure
 
 import sagline as sl
@@ -666,10 +667,21 @@ def _designs(given: _Given) -> dict[str, Call]:
 def _distances(given: _Given) -> dict[str, Call]:
     place, edges = ("array", [1.0, 2.0, 3.0]), ("array", [0.5, 0.25, 2.0])
     name, radius = ("text", "lamp"), ("number", 0.25)
+    faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
+    wedge = sl.Mesh([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], faces)
+    stl, yaml = str(given.folder / "wedge.stl"), str(given.folder / "scene.yaml")
+    trimesh.Trimesh(wedge.vertices, wedge.faces).export(stl)
+    Path(yaml).write_text(f"base: cogiro\nname: mine\nscene: [{{name: wedge, mesh: {stl}}}]\n", encoding="utf-8")
     turned = ("array", [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     return {
         "Box": Call(sl.Box, _all(size=edges, center=place, orientation=turned, name=name)),
         "Capsule": Call(sl.Capsule, _all(start=place, end=edges, radius=radius, name=name)),
+        "Mesh": Call(sl.Mesh, _all(vertices=("array", wedge.vertices), faces=("array", faces), name=name)),
+        "Mesh.placed": Call(wedge.placed, _all(pose=("one", given.pose))),
+        "Mesh.encloses": Call(wedge.encloses, _all(points=place)),
+        "frame_beams": Call(lambda **a: sl.frame_beams(**a)[0], _all(robot=("one", given.robot), radius=radius)),
+        "load_mesh": Call(sl.load_mesh, _all(file=("file", stl), unit=("text", "mm"), name=(*name, True))),
+        "load_scene": Call(lambda file: sl.load_scene(file)[0], _all(file=("file", yaml))),
         "Sphere": Call(sl.Sphere, _all(center=place, radius=radius, name=name)),
         "clearance": Call(
             sl.clearance,

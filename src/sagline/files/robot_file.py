@@ -35,6 +35,7 @@ def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
             # or cylinder_radius and cylinder_height (along z), Ixx ... Iyz, three numbers, or a 3 x 3 matrix
         tension_min: 20 N
         assumed: {tension_min: the winch's data sheet gives none}
+        scene: [{name: pole, capsule: [[1, 0, 0], [1, 0, 3]], radius: 5 cm}]      # what stands around: `load_scene`
 
     A file may begin with a preset and say what is other, `base: cogiro` beside its own name: what it does not say is
     the preset's, and so is what is assumed of that.
@@ -75,11 +76,27 @@ def parse_robot(text: str, origin: Path | str) -> Robot:
     Raises:
         FileError: If the text is no robot file; the message names the line, or the key and the value.
     """
-    entry = validated(_on_base(parse_mapping(text, origin), origin), RobotEntry, origin)
+    entry = robot_entry(text, origin)
     try:
         return entry.robot()
     except InvalidValueError as error:
         raise FileError.of(origin, error) from None
+
+
+def robot_entry(text: str, origin: Path | str) -> RobotEntry:
+    """What a robot file says, every key known and of its type; values are not checked.
+
+    Args:
+        text: The YAML text.
+        origin: The file or whatever else the text came from, for the messages.
+
+    Returns:
+        The entry.
+
+    Raises:
+        FileError: If the text is no robot file; the message names the line or the key.
+    """
+    return validated(_on_base(parse_mapping(text, origin), origin), RobotEntry, origin)
 
 
 def dump_robot(robot: Robot) -> str:

@@ -12,6 +12,7 @@ from sagline.arrays import Array, checked, exactly, number
 from sagline.cables.cable import Cable
 from sagline.errors import InvalidValueError
 from sagline.files.quantity import in_si, plain_number
+from sagline.files.scene_schema import Place, check_scene
 from sagline.files.schema import Entry
 from sagline.robot.inertia import box_inertia, cylinder_inertia
 from sagline.robot.pose_box import PoseBox
@@ -230,6 +231,7 @@ class RobotEntry(_RobotPart):
     source: str = ""
     assumed: dict[str, str] = Field(default_factory=dict)
     notes: str = ""
+    scene: list[Place] = Field(default_factory=list)  # the file's, not the robot's: sagline.files.scene_file
 
     def robot(self) -> Robot:
         """The robot the file describes.
@@ -240,7 +242,9 @@ class RobotEntry(_RobotPart):
         Raises:
             InvalidValueError: If a value has a wrong unit, or is none the robot accepts.
         """
-        fields = {key: self.given(key) if key in _UNITS else getattr(self, key) for key in self.model_fields_set}
+        keys = self.model_fields_set - {"scene"}
+        fields = {key: self.given(key) if key in _UNITS else getattr(self, key) for key in keys}
+        check_scene(self.scene)
         fields["cables"] = self.cables.cable()
         if self.winches is not None:
             fields["winches"] = self.winches.winches()

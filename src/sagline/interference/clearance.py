@@ -14,17 +14,20 @@ from sagline.arguments import brief, instance
 from sagline.arrays import Array, checked, locked, number
 from sagline.errors import InvalidValueError
 from sagline.interference.clearance_rows import ClearanceRows
-from sagline.interference.mesh import Mesh
+from sagline.interference.mesh import Mesh, extent_text
 from sagline.interference.obstacles import Box
 from sagline.interference.pairs import Obstacle
 from sagline.memory import check_memory
 from sagline.results import Result
+from sagline.robot.bounds import bounds
 from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.robot import Robot
 from sagline.robot.several import first_of
 
 NO_TENSIONS = "no tensions are known, so nothing hangs: take a feasible pose"
 NOTHING = "nothing is measured"
 _SHOWN = 8  # pairs of a pose that are printed, and lines of what is left out
+_TOO_LARGE = 100.0  # times the robot: a mesh in millimeters
 _NUMBERS = 9  # kept of a pair and pose: distance, bound and two points
 
 
@@ -151,6 +154,9 @@ def clearance(
     """
     robot = instance(state, Equilibrium, "state").robot
     things = _obstacles(obstacles)
+    for thing in (*things, platform):
+        if isinstance(thing, Mesh):
+            _check_size(thing, first_of(robot))
     some = None if from_anchor is None else number(from_anchor, "from_anchor", "m", above=0.0)
     radius = None if cable_radius is None else _radius(cable_radius, first_of(robot).cable_count)
     form = platform if platform is None or isinstance(platform, Mesh) else instance(platform, Box, "platform")
@@ -177,6 +183,15 @@ def _obstacles(given: Any) -> tuple[Obstacle, ...]:
         step = 'Make them: Sphere(center, radius), Box(size, center), load_mesh("hall.stl").'
         raise InvalidValueError("obstacles", brief(wrong[0]), "Box, Capsule, Sphere or Mesh, one or several", step)
     return tuple(some)
+
+
+def _check_size(mesh: Mesh, robot: Robot) -> None:
+    """Refuse a mesh so large that its unit must be another."""
+    own, size = np.ptp(mesh.bounds, axis=0).max(), np.subtract(*reversed(bounds(robot))).max()
+    if own > _TOO_LARGE * size:
+        value = f"{extent_text(mesh.bounds)} large, and the robot {size:.4g} m"
+        step = 'If its file is in millimeters: load_mesh(file, unit="mm").'
+        raise InvalidValueError(f"mesh {mesh.name}", value, f"up to {_TOO_LARGE:g} times the robot", step)
 
 
 def _radius(given: ArrayLike, cables: int) -> Array:

@@ -62,6 +62,11 @@ class ClearanceRows:
         still = [rod_row(one) if isinstance(one, Capsule | Sphere) else _box_row(one) for one in obstacles]
         self._still = locked(np.array(still).reshape(-1, shapes.COLUMNS))
         self._memory = memory_for_pieces()
+        self._meshed = None
+        if len(self.pairs.with_mesh):
+            from sagline.interference.meshed import Meshed  # which needs python-fcl
+
+            self._meshed = Meshed(self.pairs, (self._platform, *obstacles), precision)
 
     def distances(self, state: Equilibrium, *, together: bool = False) -> Distances:
         """Least distance of every pair at every pose.
@@ -84,6 +89,10 @@ class ClearanceRows:
             least_distances(moving, self._still, self.pairs.by_kernel, self._precision, together, *self._memory, *some)
             for whole, piece in zip(out, some, strict=True):
                 whole[part, :known] = piece
+            if self._meshed is not None:
+                rest = Distances(*(whole[part, known:] for whole in out))
+                least = out.value[part, :known].min(axis=1, initial=np.inf)
+                self._meshed.measure(own.pose, moving, least if together else None, rest)
             lost = np.isnan(np.atleast_2d(own.free_length)).any(axis=1)
             for whole in out:
                 whole[part][lost] = np.nan

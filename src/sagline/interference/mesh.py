@@ -3,23 +3,40 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import label
-from sagline.arrays import Array, Indices, checked, locked
+from sagline.arguments import instance, label
+from sagline.arrays import Array, Flags, Indices, checked, locked, numbers
+from sagline.errors import InvalidValueError
+from sagline.memory import check_memory
 from sagline.results import Result
+from sagline.robot.pose import Pose
+
+MOST: Final = 1_000_000  # triangles
+_AT_ONCE: Final = 1 << 19  # triangles times points
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mesh(Result):
     """A closed surface of triangles, at rest in the world; as a platform, in the platform frame.
 
+    What it encloses is solid. Where all triangles are turned to face inward it is a room instead, and what is within it
+    is free.
+
     Attributes:
         vertices: Corners [m], shape (V, 3).
         faces: Triangles as numbers of their corners, counter-clockwise seen from outside the solid, shape (F, 3).
         name: What it is called.
+
+    Examples:
+        >>> import sagline as sl
+        >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+        >>> wedge = sl.Mesh(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], name="wedge")
+        >>> print(f"{wedge.volume:.4f} m^3")
+        0.1667 m^3
     """
 
     vertices: Array
@@ -27,16 +44,121 @@ class Mesh(Result):
     name: str
 
     def __init__(self, vertices: ArrayLike, faces: ArrayLike, name: str = "mesh") -> None:
-        """Check the fields."""
-        values = {
-            "vertices": checked(vertices, "vertices", "m", shape=(None, 3)),
-            "faces": locked(np.array(faces, dtype=np.int64)),
-            "name": label(name, "name"),
-        }
-        for field, value in values.items():
-            object.__setattr__(self, field, value)
+        """Check the fields.
+
+        Args:
+            vertices: Corners [m], shape (V, 3).
+            faces: Triangles as numbers of their corners from 0, shape (F, 3): at least four, at most a million.
+            name: What it is called.
+
+        Raises:
+            InvalidValueError: If a face names no corner, or the surface is not closed; the message gives its extent.
+        """
+        corners = checked(vertices, "vertices", "m", shape=(None, 3))
+        if corners.ndim != 2:
+            step = "Give one mesh at a time."
+            raise InvalidValueError("vertices", f"of shape {corners.shape}", "shape (any, 3)", step)
+        triangles = _faces(faces, len(corners))
+        called = label(name, "name")
+        if wrong := open_edges(triangles):
+            value = f"not closed ({wrong} edges of {len(triangles)} triangles lack a neighbor that faces the same way)"
+            step = "Close its holes and turn its faces outward in the program that made it."
+            raise InvalidValueError(called, f"{value}, {extent_text(corners)}", "a closed surface", step)
+        object.__setattr__(self, "vertices", corners)
+        object.__setattr__(self, "faces", triangles)
+        object.__setattr__(self, "name", called)
 
     @property
     def bounds(self) -> Array:
         """Lowest and highest corner along the axes [m], shape (2, 3)."""
-        return np.stack((self.vertices.min(axis=0), self.vertices.max(axis=0)))
+        used = self.vertices[self.faces]
+        return np.stack((used.min(axis=(0, 1)), used.max(axis=(0, 1))))
+
+    @property
+    def volume(self) -> float:
+        """What it encloses [m^3]; negative for a room."""
+        a, b, c = np.moveaxis(self.vertices[self.faces] - self.bounds.mean(axis=0), 1, 0)
+        return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
+
+    def placed(self, pose: Pose) -> Mesh:
+        """The same mesh somewhere else.
+
+        Args:
+            pose: Where its frame's origin goes, and how it turns: a single pose.
+
+        Returns:
+            Mesh.
+
+        Raises:
+            InvalidValueError: If pose is no single Pose.
+        """
+        if instance(pose, Pose, "pose").shape:
+            raise InvalidValueError("pose", f"a batch of {len(pose)}", "a single pose", "Take one of them: pose[0].")
+        return Mesh(pose.transform(self.vertices), self.faces, self.name)
+
+    def encloses(self, points: ArrayLike) -> Flags:
+        """Whether points lie in the solid.
+
+        By how often the surface winds around them, which is right on edges and corners' shadows too.
+
+        Args:
+            points: In the frame of the mesh [m], shape (..., 3).
+
+        Returns:
+            Shape (...).
+
+        Raises:
+            InvalidValueError: If a coordinate is not finite.
+        """
+        given = checked(points, "points", "m", shape=(3,))
+        check_memory("points", 40.0 * given.size, "Ask for fewer points at once.")
+        flat, low, high = given.reshape(-1, 3), *self.bounds
+        near = np.flatnonzero(((flat >= low) & (flat <= high)).all(axis=1))
+        found = np.zeros(len(flat), dtype=np.bool_)
+        size = max(1, _AT_ONCE // len(self.faces))
+        for first in range(0, len(near), size):
+            some = near[first : first + size]
+            found[some] = _winding(self.vertices[self.faces], flat[some]) > 0.5
+        return locked(found.reshape(given.shape[:-1]))
+
+
+def _faces(given: Any, corners: int) -> Indices:
+    values = numbers(given, "faces", "")
+    if values.ndim != 2 or values.shape[1] != 3 or not 4 <= len(values) <= MOST:
+        allowed = f"shape (F, 3) with 4 to {MOST:,} triangles"
+        raise InvalidValueError("faces", f"of shape {values.shape}", allowed, "Give three corners a triangle.")
+    wrong = ~((values >= 0) & (values < corners) & (values == np.floor(values)))
+    if wrong.any():
+        i, k = (int(n) for n in np.argwhere(wrong)[0])
+        step = "Number the corners from 0."
+        raise InvalidValueError(f"faces[{i}, {k}]", f"{values[i, k]:g}", f"whole numbers from 0 to {corners - 1}", step)
+    return locked(np.ascontiguousarray(values, dtype=np.int64))
+
+
+def open_edges(faces: Indices) -> int:
+    """How many edges are not run along as often one way as the other."""
+    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    count = int(faces.max()) + 1
+    ways = np.concatenate((start * count + end, end * count + start))
+    sign = np.repeat((1, -1), len(start))
+    _, place = np.unique(ways, return_inverse=True)
+    return int(np.count_nonzero(np.bincount(place, weights=sign)) // 2)
+
+
+def extent_text(corners: Array) -> str:
+    """How large something is, for a message."""
+    edges = " x ".join(f"{edge:.4g}" for edge in np.ptp(corners, axis=0))
+    return f"{edges} m"
+
+
+def _winding(triangles: Array, points: Array) -> Array:
+    """How often a surface (F, 3, 3) winds around points (K, 3): solid angles over 4 pi (van Oosterom 1983)."""
+    a, b, c = np.moveaxis(triangles - points[:, None, None], 2, 0)
+    la, lb, lc = (np.linalg.norm(side, axis=-1) for side in (a, b, c))
+    volume = np.einsum("kfi,kfi->kf", a, np.cross(b, c))
+    below = la * lb * lc + _dot(a, b) * lc + _dot(b, c) * la + _dot(c, a) * lb
+    return np.asarray(np.arctan2(volume, below).sum(axis=1) / (2.0 * np.pi))
+
+
+def _dot(one: Array, other: Array) -> Array:
+    return np.asarray(np.einsum("kfi,kfi->kf", one, other))

@@ -286,3 +286,19 @@ def least_distances(
                 set_nearest(one, other, s, t, nearest)
             if distance_out[n, p] < least:
                 least = distance_out[n, p]
+
+
+@entry
+def cut(row: Array, ranges: Array, pieces_out: Array) -> None:
+    """Pieces of one cable or rod.
+
+    Args:
+        row: The cable, shape (COLUMNS,).
+        ranges: First and last shares of the pieces, shape (K, 2).
+        pieces_out: Chords and bulges, shape (K, PIECE_COLUMNS).
+    """
+    for k in range(ranges.shape[0]):
+        piece, first, last = pieces_out[k], ranges[k, 0], ranges[k, 1]
+        piece[0], piece[1], piece[2] = point(row, first)
+        piece[3], piece[4], piece[5] = point(row, last)
+        set_piece(piece, row, first, last)

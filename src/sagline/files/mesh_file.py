@@ -1,0 +1,146 @@
+"""Meshes from STL, PLY, OBJ and GLB files: closed surfaces of solids, checked."""
+
+from __future__ import annotations
+
+import os
+from io import BytesIO
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sagline.arguments import brief, file_path, label
+from sagline.arrays import Array, Indices
+from sagline.errors import FileError, InvalidValueError, SaglineError
+from sagline.files.quantity import in_si
+from sagline.files.text import read_bytes
+from sagline.interference.mesh import MOST, Mesh, extent_text
+
+LIMIT: Final = 200.0  # MB of a file
+CHECKED: Final = 20_000  # triangles up to which a mesh is searched for places where it crosses itself
+KINDS: Final = (".stl", ".ply", ".obj", ".glb")
+_CONTACTS: Final = 40  # of a triangle, most of them with its own neighbors
+_UPRIGHT: Final = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])  # of glTF, whose y points up
+
+
+def load_mesh(file: str | os.PathLike[str], unit: str = "m", name: str | None = None) -> Mesh:
+    """A solid from a file: what stands around a robot, or a platform.
+
+    Args:
+        file: STL, PLY, OBJ or GLB, at most 200 MB and a million triangles. z points up; of a GLB, whose y does by its
+            standard, z does after it is read.
+        unit: Unit of its coordinates, "mm" for instance; files of these kinds do not say it.
+        name: What it is called; None: as the file is.
+
+    Returns:
+        Mesh, in meters.
+
+    Raises:
+        FileError: If the file cannot be read, or the surface is not closed, or crosses itself (looked for
+            up to 20,000 triangles); the message gives its extent.
+        SaglineError: If trimesh or python-fcl is missing; the message says how to install it.
+
+    Examples:
+        >>> import sagline as sl
+        >>> hall = sl.load_mesh("hall.stl", unit="mm")  # doctest: +SKIP
+    """
+    path = file_path(file, "file")
+    factor = meters(unit, "unit")
+    called = path.stem[:100] if name is None else name
+    if path.suffix.lower() not in KINDS:
+        raise FileError(path, f"is no mesh file; allowed: {', '.join(KINDS)}", "Save it as one of these.")
+    data = read_bytes(path, LIMIT)
+    vertices, faces = _triangles(path, data)
+    if len(faces) > MOST:
+        raise FileError(
+            path, f"has {len(faces):,} triangles; allowed: {MOST:,}", "Simplify it in the program it is from."
+        )
+    try:
+        mesh = Mesh(vertices * factor, faces, called)
+    except InvalidValueError as error:
+        raise FileError.of(path, error) from None
+    if len(faces) <= CHECKED and (crossing := first_crossing(mesh)) is not None:
+        where = ", ".join(f"{value:.4g}" for value in crossing)
+        reason = f"crosses itself at ({where}) m, {extent_text(mesh.vertices)}; allowed: a simple surface"
+        raise FileError(path, reason, "Unite its parts in the program it is from, or load them one by one.")
+    return mesh
+
+
+def meters(unit: str, item: str) -> float:
+    """How many meters a unit is.
+
+    Args:
+        unit: Its name.
+        item: The name a message uses.
+
+    Returns:
+        The number.
+
+    Raises:
+        InvalidValueError: If it is no unit of length.
+    """
+    try:
+        factor = in_si(f"1 {label(unit, item)}", "m", item)
+    except InvalidValueError:
+        factor = 0.0
+    if not isinstance(factor, float) or not factor > 0.0:
+        raise InvalidValueError(item, brief(unit), "a unit of length: m, mm, cm, inch", "Name the file's unit.")
+    return factor
+
+
+def _triangles(path: Path, data: bytes) -> tuple[Array, Indices]:
+    """Corners, each of them once, and triangles of some area, as the file has them."""
+    try:
+        import trimesh
+    except ImportError:
+        step = 'Meshes need it: pip install "sagline[workspace]"'
+        raise FileError("package trimesh", "is not installed", step) from None
+    kind = path.suffix.lower()[1:]
+    try:
+        read: Any = trimesh.load(BytesIO(data), file_type=kind, force="mesh", process=False, skip_materials=True)
+        read.merge_vertices(merge_tex=True, merge_norm=True)
+        vertices, faces = np.array(read.vertices, dtype=np.float64), np.array(read.faces, dtype=np.int64)
+    except SaglineError:
+        raise
+    except Exception as error:  # whatever a file that is none makes a reader of five formats stumble over
+        reason = " ".join(str(error).split())[:80] or type(error).__name__
+        raise FileError(
+            path, f"cannot be read as {kind.upper()} ({reason})", "Check that it is the file you mean."
+        ) from None
+    if not len(faces) or not np.isfinite(vertices).all():
+        reason = "holds no triangles" if not len(faces) else "holds coordinates that are no numbers"
+        raise FileError(path, reason, "Check that it is the file you mean.")
+    distinct = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
+    return (vertices @ _UPRIGHT.T if kind == "glb" else vertices), faces[distinct]
+
+
+def first_crossing(mesh: Mesh) -> Array | None:
+    """A point where a surface meets itself other than along its edges and at its corners.
+
+    Args:
+        mesh: The surface.
+
+    Returns:
+        The point [m]; None if there is none.
+    """
+    from sagline.interference.meshed import package
+
+    fcl = package()
+    model = fcl.BVHModel()
+    model.beginModel(len(mesh.vertices), len(mesh.faces))
+    model.addSubModel(np.array(mesh.vertices), np.array(mesh.faces))
+    model.endModel()
+    one, other = (fcl.CollisionObject(model, fcl.Transform()) for _ in range(2))
+    request = fcl.CollisionRequest(num_max_contacts=_CONTACTS * len(mesh.faces), enable_contact=True)
+    result = fcl.CollisionResult()
+    fcl.collide(one, other, request, result)
+    pairs = np.array([(contact.b1, contact.b2) for contact in result.contacts], dtype=np.int64).reshape(-1, 2)
+    apart = _apart(mesh.faces, pairs)
+    return None if not apart.any() else np.array(result.contacts[int(np.argmax(apart))].pos)
+
+
+def _apart(faces: Indices, pairs: Indices) -> NDArray[np.bool_]:
+    """Which pairs of triangles have no corner in common."""
+    one, other = faces[pairs[:, 0]], faces[pairs[:, 1]]
+    return np.asarray(~(one[:, :, None] == other[:, None, :]).any(axis=(1, 2)))

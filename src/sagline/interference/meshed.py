@@ -1,0 +1,258 @@
+"""Least distances from meshes, through python-fcl: cables by branch and bound on the chords of their pieces.
+
+fcl knows the distance of a segment or of triangles from triangles to the last digits; a piece of a cable lies within
+its bulge of its chord. Boxes take part as twelve triangles, balls as segments without length: fcl's own boxes and
+capsules would be right to 1e-7 only.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable
+from itertools import product
+from math import inf, sqrt
+from types import ModuleType
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from sagline.arrays import Array, locked
+from sagline.errors import SaglineError
+from sagline.interference.mesh import Mesh
+from sagline.interference.obstacles import Box, Capsule, Sphere
+from sagline.interference.pairs import Pairs
+from sagline.kernels.interference import shapes
+from sagline.kernels.interference.hanging_distance import BEGIN, BULGE, END, PIECE_COLUMNS, cut
+from sagline.robot.pose import Pose
+
+Form = Box | Capsule | Sphere | Mesh
+MISSING: Final = 'Meshes need python-fcl, which is not installed. Run: pip install "sagline[workspace]"'
+ROUNDING: Final = 1e-12  # of the sizes at hand: what rounding may take off a lower bound
+_PIECES: Final = 4000  # of a cable that are looked at for one distance
+_SEARCHES: Final = 60  # of the nearest point of a cable, to the last digits
+_SIGNS: Final = np.array(list(product((-0.5, 0.5), repeat=3)))  # of a box's corners, and its triangles
+_FACES: Final = np.reshape([int(n) for n in "013032467475045051237276026064157173"], (12, 3))
+
+
+class Solid(NamedTuple):
+    """A body as fcl has it.
+
+    Attributes:
+        geometry: Its form.
+        radius: What is taken off distances from it [m].
+        mesh: Its triangles; None for rods and balls.
+        inner: A point of it [m].
+        place: Rotation and position, of what stands still.
+    """
+
+    geometry: Any
+    radius: float
+    mesh: Mesh | None
+    inner: Array
+    place: tuple[Array, Array]
+
+
+class Nearest(NamedTuple):
+    """A distance [m], what is proved of it, and the points between which it is."""
+
+    value: float
+    low: float
+    one: Array
+    other: Array
+
+
+class Meshed:
+    """The pairs of which at least one is a mesh, made ready once."""
+
+    def __init__(self, pairs: Pairs, forms: tuple[Form | None, ...], precision: float) -> None:
+        """Make ready.
+
+        Args:
+            pairs: What is measured.
+            forms: The platform, or None, and what stands around, in the order of their numbers.
+            precision: How far the lower bound may stay below a distance [m].
+
+        Raises:
+            SaglineError: If python-fcl is missing.
+        """
+        self._fcl = package()
+        self._pairs, self._precision, self._parts = pairs, precision, len(pairs.parts)
+        taking_part = {int(number) for number in pairs.with_mesh.ravel() if number >= self._parts}
+        self._solids = {number: self._solid(forms[number - self._parts]) for number in sorted(taking_part)}
+        self._known: dict[tuple[int, bytes], bool] = {}
+
+    def measure(self, pose: Pose, moving: Array, least: Array | None, out: tuple[Array, Array, Array]) -> None:
+        """Distances of all pairs at every pose.
+
+        Args:
+            pose: One pose or N of them.
+            moving: Rows of the parts of cables, shape (N, K, COLUMNS).
+            least: Least distances that are known already [m], shape (N,): what is farther need not be measured; None:
+                everything is.
+            out: Distances and lower bounds, shape (N, Q), and nearest points, (N, Q, 2, 3).
+        """
+        turns, places = pose.matrix.reshape(-1, 3, 3), np.atleast_2d(pose.position)
+        value, low, nearest = out
+        for n in range(len(moving)):
+            enough = inf if least is None else float(least[n])
+            for q, (i, j) in enumerate(self._pairs.with_mesh.tolist()):
+                if np.isnan(moving[n]).any():
+                    value[n, q] = low[n, q] = nearest[n, q] = np.nan
+                    continue
+                at = {self._parts: (turns[n], places[n])}
+                row = moving[n, i] if i < self._parts else None
+                found = self._of_cable(row, j, at, enough) if row is not None else self._of_solids(i, j, at)
+                value[n, q], low[n, q] = found.value, found.low
+                nearest[n, q] = found.one, found.other
+                if least is not None:
+                    enough = min(enough, found.value)
+
+    def _solid(self, form: Form | None) -> Solid:
+        still = np.eye(3), np.zeros(3)
+        if isinstance(form, Box):
+            form = Mesh(_SIGNS * form.size @ form.orientation.T + form.center, _FACES, form.name)
+        if isinstance(form, Mesh):
+            model = self._fcl.BVHModel()
+            model.beginModel(len(form.vertices), len(form.faces))
+            model.addSubModel(np.array(form.vertices), np.array(form.faces))
+            model.endModel()
+            return Solid(model, 0.0, form, form.vertices[form.faces[0, 0]], still)
+        if isinstance(form, Capsule):
+            place, length = _along(form.start, form.end)
+            return Solid(self._fcl.Capsule(0.0, length), form.radius, None, form.start, place)
+        assert isinstance(form, Sphere)
+        return Solid(self._fcl.Capsule(0.0, 0.0), form.radius, None, form.center, (np.eye(3), form.center))
+
+    def _object(self, number: int, at: dict[int, tuple[Array, Array]]) -> Any:
+        solid = self._solids[number]
+        return self._fcl.CollisionObject(solid.geometry, self._fcl.Transform(*at.get(number, solid.place)))
+
+    def _apart(self, one: Any, other: Any) -> tuple[float, Array, Array]:
+        """Distance of two bodies [m], 0 where they touch, and their nearest points: the mesh's before a segment's."""
+        request, result = self._fcl.DistanceRequest(True), self._fcl.DistanceResult()
+        distance = max(float(self._fcl.distance(one, other, request, result)), 0.0)
+        return distance, *result.nearest_points
+
+    def _of_solids(self, i: int, j: int, at: dict[int, tuple[Array, Array]]) -> Nearest:
+        one, other = self._solids[i], self._solids[j]
+        distance, a, b = self._apart(self._object(i, at), self._object(j, at))
+        if distance > 0.0 and (self._within(one.inner, i, j, at) or self._within(other.inner, j, i, at)):
+            distance = 0.0
+        radii = one.radius + other.radius
+        return Nearest(distance - radii, _proved(distance, distance, a) - radii, a, b)
+
+    def _within(self, point: Array, of: int, number: int, at: dict[int, tuple[Array, Array]]) -> bool:
+        """Whether a point of a body, in its own frame, lies in another's solid."""
+        mesh = self._solids[number].mesh
+        if mesh is None:
+            return False
+        if of in at:
+            point = at[of][0] @ point + at[of][1]
+        if number in at:
+            point = at[number][0].T @ (point - at[number][1])
+        key = number, point.tobytes()  # frame ends of cables are where they were
+        if key not in self._known:
+            if len(self._known) > 1000:
+                self._known.clear()
+            self._known[key] = bool(mesh.encloses(point))
+        return self._known[key]
+
+    def _of_cable(self, row: Array, number: int, at: dict[int, tuple[Array, Array]], enough: float) -> Nearest:
+        """A cable, by its pieces: those that may be nearer than what is known are split."""
+        body, radius = self._object(number, at), float(row[shapes.RADIUS])
+        enough += radius
+        nearest = (inf, 0.0, np.zeros(3), np.zeros(3))  # of the cable's own points
+        waiting: list[tuple[float, int, float, float, float]] = []
+        proved, looked = inf, 0
+
+        def at_share(share: float) -> tuple[float, float, Array, Array]:
+            point = _pieces(row, [(share, share)])[0, :3]
+            ball = self._fcl.CollisionObject(self._fcl.Capsule(0.0, 0.0), self._fcl.Transform(point))
+            distance, on_mesh, _ = self._apart(body, ball)
+            return distance, share, point, on_mesh
+
+        def look_at(ranges: list[tuple[float, float]]) -> None:
+            nonlocal nearest, looked
+            for piece in _pieces(row, ranges):
+                looked += 1
+                place, length = _along(piece[:3], piece[3:6])
+                chord = self._fcl.CollisionObject(self._fcl.Capsule(0.0, length), self._fcl.Transform(*place))
+                distance, _, on_chord = self._apart(body, chord)
+                begin, end, bulge = float(piece[BEGIN]), float(piece[END]), float(piece[BULGE])
+                if distance < nearest[0]:
+                    along = np.dot(on_chord - piece[:3], piece[3:6] - piece[:3]) / max(length * length, 1e-300)
+                    if distance == 0.0:
+                        along = 0.5
+                    share = begin + min(max(float(along), 0.0), 1.0) * (end - begin)
+                    nearest = min(nearest, at_share(share), key=lambda found: found[0])
+                heapq.heappush(waiting, (distance - bulge, looked, begin, end, bulge))
+
+        look_at([(float(row[shapes.FIRST]), float(row[shapes.LAST]))])
+        if self._within(_pieces(row, [(nearest[1], nearest[1])])[0, :3].copy(), -1, number, at):
+            return Nearest(-radius, -radius, nearest[2], nearest[2])
+        while waiting:
+            low, _, begin, end, bulge = heapq.heappop(waiting)
+            if low >= min(nearest[0], enough) - self._precision or bulge == 0.0 or looked > _PIECES:
+                proved = low
+                break
+            middle = 0.5 * (begin + end)
+            look_at([(begin, middle), (middle, end)])
+        if nearest[0] < enough + self._precision:
+            nearest = _polished(at_share, nearest, row)
+        return Nearest(nearest[0] - radius, _proved(proved, nearest[0], nearest[2]) - radius, nearest[2], nearest[3])
+
+
+def package() -> ModuleType:
+    """python-fcl, loaded on first use.
+
+    Raises:
+        SaglineError: If it is missing; the message says how to install it.
+    """
+    try:
+        import fcl
+    except ImportError:
+        raise SaglineError(MISSING) from None
+    found: ModuleType = fcl
+    return found
+
+
+def _pieces(row: Array, ranges: list[tuple[float, float]]) -> Array:
+    out = np.empty((len(ranges), PIECE_COLUMNS))
+    cut(locked(row.view()), locked(np.array(ranges)), out)
+    return out
+
+
+def _along(start: Array, end: Array) -> tuple[tuple[Array, Array], float]:
+    """Where a capsule of fcl, which lies along z around its middle, lies between two points, and how long it is."""
+    run = end - start
+    length = sqrt(float(run @ run))
+    x, y, z = (run / length).tolist() if length > 0.0 else (0.0, 0.0, 1.0)
+    half = np.array([1.0 + z, -y, x, 0.0]) if z > -1.0 + 1e-12 else np.array([0.0, 1.0, 0.0, 0.0])
+    return (half / sqrt(float(half @ half)), 0.5 * (start + end)), length
+
+
+def _proved(low: float, value: float, place: Array) -> float:
+    """A lower bound less what rounding may have done, and not below 0."""
+    return max(min(low, value) - ROUNDING * (1.0 + value + float(np.abs(place).max())), 0.0)
+
+
+def _polished(
+    at_share: Callable[[float], tuple[float, float, Array, Array]],
+    nearest: tuple[float, float, Array, Array],
+    row: Array,
+) -> tuple[float, float, Array, Array]:
+    """The nearest point around one that is near, by golden sections and parabolas (Brent)."""
+    from scipy.optimize import minimize_scalar
+
+    reach = 0.02 * float(row[shapes.LAST] - row[shapes.FIRST])
+    for _ in range(3):
+        limits = max(nearest[1] - reach, float(row[shapes.FIRST])), min(nearest[1] + reach, float(row[shapes.LAST]))
+        if nearest[0] == 0.0 or limits[0] >= limits[1]:
+            break
+        options = {"xatol": 1e-9 * (limits[1] - limits[0]), "maxiter": _SEARCHES}
+        best = minimize_scalar(lambda share: at_share(share)[0], bounds=limits, method="bounded", options=options)
+        found = min((at_share(float(share)) for share in (best.x, *limits)), key=lambda one: one[0])
+        nearest = min(nearest, found, key=lambda one: one[0])
+        if nearest[1] not in limits:
+            break
+    return nearest

@@ -1,0 +1,114 @@
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+import sagline as sl
+from sagline.files import mesh_file
+from sagline.files.mesh_file import first_crossing
+from tests.interference.scenes import box_mesh
+
+
+def written(folder: Path, mesh: trimesh.Trimesh, name: str) -> Path:
+    file = folder / name
+    mesh.export(file)
+    return file
+
+
+def overlapping() -> trimesh.Trimesh:
+    boxes = [trimesh.creation.box((1.0, 1.0, 1.0)) for _ in range(2)]
+    boxes[1].apply_translation([0.5, 0.25, 0.125])
+    whole = trimesh.util.concatenate(boxes)
+    assert isinstance(whole, trimesh.Trimesh)
+    return whole
+
+
+@pytest.mark.parametrize("kind", ["stl", "ply", "obj", "glb"])
+def test_meshes_of_every_kind_are_read_in_meters_with_z_up(tmp_path: Path, kind: str) -> None:
+    mesh = trimesh.creation.annulus(0.5, 1.0, 3.0)
+    file = written(tmp_path, mesh, f"ring.{kind}")
+    found = sl.load_mesh(file, unit="cm")
+    assert found.name == "ring"
+    assert found.volume == pytest.approx(mesh.volume * 1e-6, rel=1e-6)
+    tall = 1 if kind == "glb" else 2  # y is up in a GLB, which was not told so here
+    assert np.ptp(found.bounds, axis=0)[tall] == pytest.approx(0.03, abs=1e-8)
+    assert found.encloses([0.0, 0.0, 0.0]) == np.False_
+
+
+def test_what_the_viewer_exports_is_upright_again(tmp_path: Path) -> None:
+    file = tmp_path / "scene.glb"
+    upright = trimesh.creation.box((1.0, 2.0, 3.0))
+    turned = upright.copy()
+    turned.vertices = turned.vertices[:, [0, 2, 1]] * (1.0, 1.0, -1.0)  # z up to y up
+    turned.export(file)
+    assert np.ptp(sl.load_mesh(file).bounds, axis=0) == pytest.approx([1.0, 2.0, 3.0])
+
+
+def test_meshes_that_are_open_or_cross_themselves_are_refused_with_their_extent(tmp_path: Path) -> None:
+    ball = trimesh.creation.icosphere(2)
+    ball.update_faces(np.arange(len(ball.faces)) != 3)
+    with pytest.raises(sl.FileError, match=r"not closed \(3 edges of 319 triangles .* 2 x 2 x 2 m"):
+        sl.load_mesh(written(tmp_path, ball, "open.stl"))
+    with pytest.raises(sl.FileError, match=r"crosses itself at \(.*\) m, 1.5 x 1.25 x 1.125 m"):
+        sl.load_mesh(written(tmp_path, overlapping(), "crossing.stl"))
+
+
+def test_where_a_surface_crosses_itself_is_on_both_of_its_parts() -> None:
+    mesh = overlapping()
+    point = first_crossing(sl.Mesh(mesh.vertices, mesh.faces))
+    assert point is not None
+    for low in ((-0.5, -0.5, -0.5), (0.0, -0.25, -0.375)):  # of each box
+        assert (point >= np.array(low) - 1e-9).all()
+        assert (point <= np.array(low) + 1.0 + 1e-9).all()
+    assert first_crossing(box_mesh([1, 2, 3], [0, 0, 0])) is None
+
+
+def test_larger_meshes_are_not_searched_for_crossings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mesh_file, "CHECKED", 23)
+    assert len(sl.load_mesh(written(tmp_path, overlapping(), "crossing.stl")).faces) == 24
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("garbage.stl", b"garbage" * 40, "holds no triangles"),
+        ("garbage.glb", b"garbage" * 40, "cannot be read as GLB"),
+        ("empty.stl", b"", "holds no triangles"),
+        ("short.obj", b"v 1 2\nf 1 2 3\n", "cannot be read as OBJ"),
+        ("short.ply", b"ply\nformat ascii 1.0\nelement vertex 3\n", "cannot be read as PLY"),
+        ("part.step", b"", "is no mesh file; allowed: .stl, .ply, .obj, .glb"),
+    ],
+)
+def test_files_that_are_no_meshes_are_refused(tmp_path: Path, name: str, content: bytes, words: str) -> None:
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(sl.FileError) as error:
+        sl.load_mesh(tmp_path / name)
+    assert words in str(error.value)
+    assert len(str(error.value)) < 300
+
+
+@pytest.mark.parametrize("unit", ["kg", "", "5 mm", "parsnip"])
+def test_what_is_no_unit_of_length_is_refused(tmp_path: Path, unit: str) -> None:
+    file = written(tmp_path, trimesh.creation.box(), "box.stl")
+    with pytest.raises(sl.InvalidValueError, match="unit is"):
+        sl.load_mesh(file, unit)
+
+
+@pytest.mark.parametrize("cases", [40, pytest.param(2000, marks=pytest.mark.soak)])
+def test_damaged_mesh_files_are_refused_or_read(tmp_path: Path, cases: int) -> None:
+    rng = np.random.default_rng(2)
+    whole = {kind: trimesh.creation.icosphere(1).export(file_type=kind) for kind in ("stl", "ply", "obj", "glb")}
+    for case in range(cases):
+        kind = str(rng.choice(list(whole)))
+        data = whole[kind]
+        damaged = bytearray(data.encode() if isinstance(data, str) else data)
+        for _ in range(int(rng.integers(1, 6))):
+            damaged[int(rng.integers(len(damaged)))] = int(rng.integers(256))
+        if rng.random() < 0.3:
+            damaged = damaged[: int(rng.integers(len(damaged)))]
+        file = tmp_path / f"damaged{case}.{kind}"
+        file.write_bytes(bytes(damaged))
+        with suppress(sl.FileError):
+            assert np.isfinite(sl.load_mesh(file).vertices).all()

@@ -1,0 +1,83 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+import sagline as sl
+
+HEAD = "base: cogiro\nname: mine\n"
+SCENE = """scene:
+  - {name: table, box: [1.2, 0.8, 70 cm], center: [2, 0, 0.35], turned: 30 deg}
+  - {name: pole, capsule: [[1, 0, 0], [1, 0, 3]], radius: 5 cm}
+  - {name: lamp, sphere: [0, 0, 2.8], radius: 20 cm}
+  - {name: hall, mesh: meshes/hall.stl, unit: mm, position: [0, 0, -1], turned: 90 deg}
+"""
+
+
+def robot_file(folder: Path, scene: str) -> Path:
+    (folder / "meshes").mkdir(exist_ok=True)
+    trimesh.creation.box((1000.0, 2000.0, 3000.0)).export(folder / "meshes" / "hall.stl")
+    file = folder / "mine.yaml"
+    file.write_text(HEAD + scene, encoding="utf-8")
+    return file
+
+
+def test_a_scene_is_read_with_its_units_and_files_beside_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir("/")  # paths are those from the file
+    table, pole, lamp, hall = sl.load_scene(robot_file(tmp_path, SCENE))
+    assert isinstance(table, sl.Box)
+    assert table.size == pytest.approx([1.2, 0.8, 0.7])
+    assert table.orientation[:2, 0] == pytest.approx([np.cos(np.pi / 6), np.sin(np.pi / 6)])
+    assert isinstance(pole, sl.Capsule)
+    assert (pole.radius, pole.end.tolist(), pole.name) == (0.05, [1.0, 0.0, 3.0], "pole")
+    assert isinstance(lamp, sl.Sphere)
+    assert lamp.radius == 0.2
+    assert isinstance(hall, sl.Mesh)
+    assert hall.bounds == pytest.approx(np.array([[-1.0, -0.5, -2.5], [1.0, 0.5, 0.5]]))
+
+
+def test_a_robot_loads_with_its_scene_and_does_not_keep_it(tmp_path: Path) -> None:
+    file = robot_file(tmp_path, SCENE)
+    robot = sl.load_robot(file)
+    assert "scene" not in sl.dump_robot(robot)
+    assert sl.load_scene(robot_file(tmp_path, "")) == ()
+    state = sl.inverse(robot, sl.Pose([1.0, 0.5, 1.5], np.eye(3))).state
+    found = sl.clearance(state, sl.load_scene(robot_file(tmp_path, SCENE)))
+    assert {"table", "pole", "lamp", "hall"} < {name for pair in found.pairs for name in pair}
+
+
+@pytest.mark.parametrize(
+    ("scene", "words"),
+    [
+        ("3", "scene is 3; allowed: a valid list"),
+        ("[3]", "scene[0] is 3; allowed: keys name, box"),
+        ("[{name: a}]", "scene[0] is none of them; allowed: one of box, capsule, sphere, mesh"),
+        ("[{name: a, box: [1, 2, 3], sphere: [1, 2, 3]}]", "scene[0] is box and sphere"),
+        ("[{box: [1, 2, 3]}]", "scene[0].name is missing"),
+        ("[{name: '', box: [1, 2, 3]}]", "scene[0].name is empty"),
+        ("[{name: a, bx: [1, 2, 3]}]", "Did you mean box?"),
+        ("[{name: a, box: [1, 2]}]", "scene[0].box is of shape (2,)"),
+        ("[{name: a, box: [1, 2, 3 kg]}]", "scene[0].box[2] is '3 kg'"),
+        ("[{name: a, sphere: [1, 2, 3]}]", "scene[0].radius is missing"),
+        ("[{name: a, sphere: [1, 2, 3], radius: -1}]", "scene[0].radius is -1 m"),
+        ("[{name: a, sphere: [1, 2, 3], radius: 1, unit: mm}]", "scene[0].unit is given for a sphere"),
+        ("[{name: a, box: [1, 2, 3], turned: 1 m}]", "scene[0].turned is '1 m'"),
+        ("[{name: a, mesh: a.stl, unit: kg}]", "scene[0].unit is 'kg'"),
+        ("[{name: a, mesh: 3}]", "scene[0].mesh is 3"),
+    ],
+)
+def test_a_scene_that_is_wrong_is_refused_with_the_robot_and_by_itself(tmp_path: Path, scene: str, words: str) -> None:
+    file = robot_file(tmp_path, f"scene: {scene}\n")
+    for load in (sl.load_robot, sl.load_scene):
+        with pytest.raises(sl.FileError) as error:
+            load(file)
+        assert words in str(error.value)
+        assert len(str(error.value)) < 300
+
+
+def test_a_mesh_that_is_not_there_is_missed_by_the_scene_alone(tmp_path: Path) -> None:
+    file = robot_file(tmp_path, "scene: [{name: a, mesh: missing.stl}]\n")
+    assert sl.load_robot(file).cable_count == 8
+    with pytest.raises(sl.FileError, match=r"missing\.stl: cannot be read"):
+        sl.load_scene(file)
