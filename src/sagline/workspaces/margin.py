@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from sagline.arguments import callback, instance
 from sagline.arrays import Array, Codes, Flags, Indices, locked
 from sagline.blocks import Progress
@@ -60,7 +62,7 @@ class Margin(Result):
     @property
     def feasible(self) -> Flags:
         """Where every load of the set is proved feasible, shape () or (N,)."""
-        return locked(self.status == MarginStatus.FEASIBLE)
+        return locked(np.asarray(self.status == MarginStatus.FEASIBLE))
 
 
 def margin(

@@ -1,0 +1,130 @@
+"""Margins the slow way: normals by singular values, pulls on fine grids; and robots that are hard on the bracket."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+import sagline as sl
+from sagline.arrays import Array
+from sagline.kernels.workspaces.bands import LOOSEST
+
+GRID = 4000
+Support = Callable[[Array], Array]  # of normals (F, 6): the largest -y . w over a set, (F,)
+PATTERNS = {"2T": 2, "3T": 3, "1R2T": 3, "3R3T": 6}
+
+
+class Pulls(NamedTuple):
+    """Of the cables at one pose: chord tensions at their limits, pulls there, and the range between, (m,) each."""
+
+    low: Array
+    high: Array
+    at_low: Array
+    at_high: Array
+    least: Array
+    most: Array
+
+    def ends_only(self) -> Pulls:
+        """What somebody would take for the range who looks at the ends alone."""
+        ends = np.stack([self.at_low, self.at_high])
+        return self._replace(least=ends.min(axis=0), most=ends.max(axis=0))
+
+
+class Answer(NamedTuple):
+    """Margins over all facets [N], and for each of the three the facet's normal, (6,)."""
+
+    value: float
+    low: float
+    high: float
+    directions: Array
+
+
+def pulls_on_a_grid(robot: sl.Robot, pose: sl.Pose, model: sl.CableModel) -> Pulls:
+    """By looking at a few thousand tensions; limits are those of the chord tension."""
+    run = pose.transform(robot.platform_anchors) - robot.frame_anchors
+    span, rise = np.hypot(run[:, 0], run[:, 1]), run[:, 2]
+    low, high = robot.tension_min.copy(), robot.tension_max.copy()
+    if isinstance(model, sl.Catenary):
+        half_weight = 0.5 * robot.cables.linear_density * robot.gravity * np.hypot(span, rise)
+        low = np.minimum(np.maximum(low, half_weight / LOOSEST), high)
+    tension = np.geomspace(low, high, GRID, axis=-1)
+    tension[:, 0], tension[:, -1] = low, high
+    cable = sl.Cable(robot.cables.linear_density[:, None], robot.cables.axial_stiffness[:, None])
+    hung = model.from_tension(cable, span[:, None], rise[:, None], tension, robot.gravity)
+    pull = hung.vertical_force - tension * (rise / np.hypot(span, rise))[:, None]
+    return Pulls(low, high, pull[:, 0], pull[:, -1], pull.min(axis=1), pull.max(axis=1))
+
+
+def mean_arm(robot: sl.Robot) -> float:
+    """Mean distance of the platform anchors from the center of mass [m]."""
+    return float(np.linalg.norm(robot.platform_anchors - robot.center_of_mass, axis=1).mean())
+
+
+def all_facets(robot: sl.Robot, pose: sl.Pose, pulls: Pulls, support: Support, arm: float) -> Answer:
+    """The margin over the normals of all subsets of the columns, both sides, moments of all free motions kept."""
+    freedom = robot.freedom
+    n, m = len(freedom), robot.cable_count
+    run = pose.transform(robot.platform_anchors) - robot.frame_anchors
+    unit = -run / np.linalg.norm(run, axis=1, keepdims=True)
+    lever = (robot.platform_anchors - robot.center_of_mass) @ pose.matrix.T
+    full = np.hstack([unit, np.cross(lever, unit)]).T
+    up = np.tile([0.0, 0.0, 1.0], (m, 1))
+    hanging = np.hstack([up, np.cross(lever, up)]).T
+    units = np.where(np.abs(freedom[:, 3:]).sum(axis=1) > 0.5, 1.0 / (mean_arm(robot) or 1.0), 1.0)
+    scaled = units[:, None] * (freedom @ full)
+    chosen = np.array(list(combinations(range(m), n - 1)))
+    columns = scaled[:, chosen].transpose(1, 0, 2)  # (F, n, n - 1)
+    left, sizes, _ = np.linalg.svd(columns)
+    normals = (left[:, :, -1] * units) @ freedom
+    normals = normals[sizes[:, -1] > 1e-9]
+    normals = np.concatenate([normals, -normals])
+    length = np.sqrt((normals[:, :3] ** 2).sum(axis=1) + arm**2 * (normals[:, 3:] ** 2).sum(axis=1))
+    normals = normals[length > 1e-9] / length[length > 1e-9, None]
+    along, down = normals @ full, normals @ hanging
+    needed = normals[:, 2] * robot.mass * robot.gravity + support(normals)
+    ends = np.maximum(along * pulls.low - down * pulls.at_low, along * pulls.high - down * pulls.at_high)
+    taut = np.maximum(along * pulls.low, along * pulls.high)
+    least = (taut - np.maximum(down * pulls.least, down * pulls.most)).sum(axis=1) - needed
+    most = (taut - np.minimum(down * pulls.least, down * pulls.most)).sum(axis=1) - needed
+    value = ends.sum(axis=1) - needed
+    best = [int(np.argmin(one)) for one in (value, least, most)]
+    return Answer(float(value.min()), float(least.min()), float(most.min()), normals[best])
+
+
+def no_load(normals: Array) -> Array:
+    """The support of the weight alone."""
+    return np.zeros(len(normals))
+
+
+def crafted(rng: np.random.Generator, pattern: str, extra: int | None = None, *, deep: bool = True) -> sl.Robot:
+    """A robot with heavy, soft cables on all sides, whose least tensions let them sag deep."""
+    n = PATTERNS[pattern]
+    m = n + (int(rng.integers(1, 3)) if extra is None else extra)
+    planar = pattern in ("2T", "1R2T")
+    frame = rng.uniform(-1.0, 1.0, (m, 3))
+    frame *= np.array([12.0, 9.0, 6.0]) / np.linalg.norm(frame, axis=1, keepdims=True)
+    platform = rng.uniform(-0.6, 0.6, (m, 3))
+    if pattern in ("2T", "3T"):
+        platform[:] = 0.0
+    if planar:
+        frame[:, 1] = platform[:, 1] = 0.0
+    density = 10 ** rng.uniform(-1.5, 0.5, m) if deep else np.full(m, 0.05)
+    half_weight = 0.5 * density * 9.81 * np.linalg.norm(frame, axis=1)
+    low = half_weight / 10 ** rng.uniform(-1.5, 0.3, m)
+    high = low * 10 ** rng.uniform(0.5, 2.0, m)
+    stiffness = high / 10 ** rng.uniform(-4.0, -0.9, m)
+    return sl.Robot(
+        "crafted",
+        frame,
+        platform,
+        sl.Cable(density, stiffness),
+        float(rng.uniform(0.05, 1.0) * high.mean() / 9.81),
+        np.eye(3) * 0.1,
+        motion_pattern=pattern,  # type: ignore[arg-type]
+        plane_normal=[0.0, 1.0, 0.0] if planar else None,
+        tension_min=low,
+        tension_max=high,
+    )
