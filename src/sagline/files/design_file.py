@@ -147,7 +147,8 @@ class _Free(_Part):
         key = given[0]
         where = f"{item}.{key}"
         if key == "cable":
-            return FreeCable([_made(f"{where}[{k}]", one.choice) for k, one in enumerate(self.cable)])
+            catalogue = [_made(f"{where}[{k}]", one.choice) for k, one in enumerate(self.cable)]
+            return _made(where, lambda: FreeCable(catalogue))
         free: Callable[[str], Free] = getattr(self, key).free
         return _made(where, lambda: free(key.removesuffix("_anchors")))
 

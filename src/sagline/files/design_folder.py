@@ -10,7 +10,7 @@ from __future__ import annotations
 import csv
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from hashlib import sha256
@@ -61,7 +61,15 @@ class DesignFolder:
         Raises:
             FileError: If the disk takes no more; what was there before stays.
         """
-        data = "".join(_line([repr(float(x)) for x in row]) for row in rows).encode()
+        self.append(_line([repr(float(x)) for x in row]) for row in rows)
+
+    def append(self, lines: Iterable[str]) -> None:
+        """Append lines, down to the disk.
+
+        Raises:
+            FileError: If the disk takes no more.
+        """
+        data = "".join(lines).encode()
         try:
             while data:
                 data = data[os.write(self._handle, data) :]
@@ -104,7 +112,7 @@ def recorded(folder: Path | str, request: Request) -> Iterator[DesignFolder]:
         os.ftruncate(handle, whole)
         record = DesignFolder(file, handle, known)
         if not whole:
-            os.write(handle, _line(heads).encode())
+            record.append([_line(heads)])
         yield record
     finally:
         os.close(handle)

@@ -12,6 +12,7 @@ from sagline.optimization.search import Task
 
 SPREAD: Final = 0.2  # first standard deviation, of the bounds' distance: they lie within some three of it
 GROWTH: Final = 2  # of the population, from each beginning to the next
+LEAST: Final = 2  # numbers: with a single one the package fails; a second that means nothing goes along
 
 
 def search(task: Task) -> None:
@@ -36,13 +37,14 @@ def search(task: Task) -> None:
             return
         while left >= strategy.popsize and not strategy.stop():
             points = strategy.ask()
-            found = task.rate(np.clip(points, 0.0, 1.0))[:, 0]
+            found = task.rate(np.clip(points, 0.0, 1.0)[:, : len(task.start)])[:, 0]
             strategy.tell(points, found.tolist())
             left -= len(points)
 
 
 def _strategy(cma: Any, start: Array, random: np.random.Generator, population: int | None) -> Any:
     """One run; its random numbers are its own, so that numpy's global ones stay as the caller has them."""
+    padded = np.concatenate((start, np.full(max(LEAST - len(start), 0), 0.5)))
     options = {
         "bounds": [0.0, 1.0],
         "randn": lambda *shape: random.standard_normal(shape),
@@ -50,4 +52,4 @@ def _strategy(cma: Any, start: Array, random: np.random.Generator, population: i
         "verbose": -9,
         **({} if population is None else {"popsize": population}),
     }
-    return cma.CMAEvolutionStrategy(start, SPREAD, options)
+    return cma.CMAEvolutionStrategy(padded, SPREAD, options)

@@ -15,7 +15,7 @@ Margins: TypeAlias = Callable[[Array, Array], Array]  # of tables (R, m, CABLE_C
 
 SPREAD: Final = 4  # points a number that are tried first
 STEP: Final = 0.25  # of the bounds' distance, at first
-ROUNDS: Final = 9  # each halves the step
+ROUNDS: Final = 14  # each halves the step
 
 
 def best_moved(inner: Candidates, margins: Margins, cables: Array, poses: Array) -> tuple[Array, Array]:

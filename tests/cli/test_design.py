@@ -1,0 +1,124 @@
+"""`sagline design`: its table, its files, and that it goes on where it stopped."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import sagline as sl
+from sagline.cli.ending import BAD_INPUT
+from sagline.cli.main import app
+from sagline.files.design_folder import EVALUATIONS
+
+DESIGN = """\
+free:
+  - frame_anchors: {along: [0, 0, 1], low: -1, high: 1 m, symmetry: together}
+  - tension_max: {low: 1 kN, high: 3 kN}
+goals: [mean_margin, {minimize: largest_tension, weight: 0.1}]
+wrenches: {force: 50 N, moment: 5 N*m}
+grid: [3, 3, 2]
+evaluations: 60
+"""
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "80")
+    (tmp_path / "design.yaml").write_text(DESIGN)
+    return tmp_path
+
+
+def sagline(*words: str) -> Any:
+    return CliRunner().invoke(app, ["design", "article-suspended", "design.yaml", *words])
+
+
+def library(**changes: Any) -> sl.Front:
+    return sl.design(sl.load_robot("article-suspended"), **{**sl.load_design("design.yaml"), **changes})
+
+
+def test_the_robots_are_those_of_the_library(folder: Path) -> None:
+    result = sagline("--json")
+    assert result.exit_code == 0, result.stderr
+    told, front = json.loads(result.stdout), library()
+    assert told["better"] is front.better is True
+    assert told["evaluations"] == len(front.evaluated)
+    np.testing.assert_array_equal(list(told["goals"].values()), front.start_values)
+    (robot,) = told["robots"]
+    np.testing.assert_array_equal(list(robot["goals"].values()), front.values[0])
+    np.testing.assert_array_equal(list(robot["changed"].values()), front.changed[0])
+    assert told["units"] == {
+        "mean_margin": "N", "largest_tension": "N", "frame_anchors z": "m", "tension_max": "N",
+    }  # fmt: skip
+    found = sl.load_robot(folder / "front" / "article-suspended-better.yaml")
+    assert found.frame_anchors.tobytes() == front.best.frame_anchors.tobytes()
+    assert found.tension_max[0] == front.best.tension_max[0]
+    names = sorted(file.name for file in (folder / "front").iterdir())
+    assert names == ["article-suspended-better.yaml", "design.json", "evaluations.csv", "front.csv"]
+
+
+def test_the_table_has_both_robots_and_the_sentence_both_numbers() -> None:
+    result = sagline()
+    assert result.exit_code == 0, result.stderr
+    front = library()
+    rows = [line.split() for line in result.stdout.splitlines()]
+    assert any(row[:2] == ["article-suspended", f"{front.start_values[0]:.4g}"] for row in rows)
+    assert any(row[:2] == ["article-suspended-better", f"{front.values[0, 0]:.4g}"] for row in rows)
+    assert front.text in result.stdout.replace("\n", " ")
+
+
+def test_it_goes_on_from_where_it_was(folder: Path) -> None:
+    assert sagline("--evaluations", "30").exit_code == 0
+    before = (folder / "front" / EVALUATIONS).read_text()
+    result = sagline("--json")
+    assert result.exit_code == 0, result.stderr
+    assert (folder / "front" / EVALUATIONS).read_text().startswith(before)
+    assert json.loads(result.stdout)["evaluations"] == len(library().evaluated)
+
+
+def test_an_interrupt_says_how_to_go_on(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from sagline.optimization import rating
+
+    rate, calls = rating.Rating.__call__, [0]
+
+    def interrupted(self: Any, values: Any) -> Any:
+        calls[0] += 1
+        if calls[0] == 3:
+            raise KeyboardInterrupt
+        return rate(self, values)
+
+    monkeypatch.setattr(rating.Rating, "__call__", interrupted)
+    result = sagline()
+    assert result.exit_code == 130
+    kept = len((folder / "front" / EVALUATIONS).read_text().splitlines()) - 1
+    assert f"{kept} robots are rated, and kept in front: the same command goes on from there." in result.stderr
+    monkeypatch.undo()
+    monkeypatch.chdir(folder)
+    again = sagline("--json")
+    assert again.exit_code == 0, again.stderr
+    np.testing.assert_array_equal(list(json.loads(again.stdout)["robots"][0]["goals"].values()), library().values[0])
+
+
+@pytest.mark.parametrize(
+    ("text", "words", "expected"),
+    [
+        (DESIGN.replace("1 kN", "1 kg"), (), "free[1].tension_max: low is '1 kg'; allowed: a number in N"),
+        (DESIGN + "seed: 3\n", (), "front: holds another search, "),
+        (DESIGN, ("--evaluations", "3"), "evaluations is 3; allowed: >= 24, two generations of cma"),
+        (DESIGN, ("--evaluations", "many"), "--evaluations is 'many'; allowed: a whole number"),
+        (DESIGN.replace("mean_margin", "volume"), (), "goals[0]: goal is 'volume'; allowed: workspace_share"),
+    ],
+)
+def test_bad_input_is_one_line(folder: Path, text: str, words: tuple[str, ...], expected: str) -> None:
+    assert sagline("--evaluations", "30").exit_code == 0
+    (folder / "design.yaml").write_text(text)
+    result = sagline(*words)
+    assert result.exit_code == BAD_INPUT
+    (line,) = result.stderr.strip().splitlines()
+    assert expected in line
+    assert len(line) < 300

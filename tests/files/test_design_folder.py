@@ -1,0 +1,183 @@
+"""The folder of a search: gone on with bit for bit, whatever became of it, and never with another one."""
+
+from __future__ import annotations
+
+import csv
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.errors import FileError, InvalidValueError
+from sagline.files.design_folder import EVALUATIONS, REQUEST
+from tests.optimization.pair import UNDER, apart, pair
+
+UP = sl.FreeAnchors("frame", -1.0, 1.0, along=[0, 0, 1], symmetry="together")
+
+
+def search(folder: Path | None, robot: sl.Robot | None = None, **more: Any) -> sl.Front:
+    given: dict[str, Any] = {"poses": UNDER, "evaluations": 120, **more}
+    return sl.design(robot or pair(), [apart(), UP], ["least_margin", "largest_sag"], folder=folder, **given)
+
+
+class StoppedError(Exception):
+    """What an interrupt is here."""
+
+
+def stopped_after(count: int) -> Any:
+    def tell(done: int, total: int) -> None:
+        if done >= count:
+            raise StoppedError
+
+    return tell
+
+
+def same(one: sl.Front, other: sl.Front) -> bool:
+    return (
+        one.evaluated.tobytes() == other.evaluated.tobytes()
+        and one.evaluated_values.tobytes() == other.evaluated_values.tobytes()
+        and [sl.dump_robot(robot) for robot in one.robots] == [sl.dump_robot(robot) for robot in other.robots]
+    )
+
+
+@pytest.mark.parametrize("optimizer", ["cma", "differential_evolution", "nsga2"])
+def test_an_interrupted_search_ends_as_if_it_had_not_been(tmp_path: Path, optimizer: str) -> None:
+    whole = search(None, optimizer=optimizer)
+    kept = []
+    for count in (1, 40, 80):
+        with pytest.raises(StoppedError):
+            search(tmp_path, optimizer=optimizer, progress=stopped_after(count))
+        kept.append(len((tmp_path / EVALUATIONS).read_text().splitlines()))
+    assert kept[0] > 1  # nothing that was rated is lost
+    assert kept == sorted(set(kept))
+    assert same(search(tmp_path, optimizer=optimizer), whole)
+
+
+def test_what_is_known_is_not_rated_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = search(tmp_path)
+    size = (tmp_path / EVALUATIONS).stat().st_size
+    monkeypatch.setattr("sagline.optimization.rating.Rating._rated", lambda *_: pytest.fail("rated again"))
+    assert same(search(tmp_path), whole)
+    assert (tmp_path / EVALUATIONS).stat().st_size == size
+
+
+def test_more_evaluations_go_on_from_there(tmp_path: Path) -> None:
+    first = search(tmp_path, evaluations=60)
+    further = search(tmp_path, evaluations=180)
+    assert same(further, search(None, evaluations=180))
+    assert further.evaluated[: len(first.evaluated)].tobytes() == first.evaluated.tobytes()
+
+
+@pytest.mark.parametrize("lost", [1, 7, 30])
+def test_a_torn_end_is_cut_off_and_worked_out_again(tmp_path: Path, lost: int) -> None:
+    whole = search(tmp_path)
+    file = tmp_path / EVALUATIONS
+    file.write_bytes(file.read_bytes()[:-lost])
+    assert same(search(tmp_path), whole)
+
+
+def test_a_file_of_nothing_begins_anew(tmp_path: Path) -> None:
+    whole = search(tmp_path)
+    (tmp_path / EVALUATIONS).write_bytes(b"")
+    assert same(search(tmp_path), whole)
+
+
+def test_a_changed_line_is_told(tmp_path: Path) -> None:
+    search(tmp_path)
+    file = tmp_path / EVALUATIONS
+    lines = file.read_text().splitlines(keepends=True)
+    lines[5] = lines[5].replace("1", "2", 1)
+    file.write_text("".join(lines))
+    with pytest.raises(FileError, match=r"evaluations\.csv: line 6 is not as it was written\. Name another folder"):
+        search(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        {"seed": 1},
+        {"optimizer": "nsga2"},
+        {"robot": pair(1.5)},
+        {"wrenches": sl.WrenchBox(1.0)},
+        {"model": sl.Elastic()},
+    ],
+    ids=lambda other: next(iter(other)),
+)
+def test_another_search_is_refused(tmp_path: Path, other: dict[str, Any]) -> None:
+    search(tmp_path)
+    before = (tmp_path / EVALUATIONS).read_bytes()
+    with pytest.raises(FileError, match="holds another search") as refused:
+        search(tmp_path, **other)
+    assert len(str(refused.value)) < 300
+    assert (tmp_path / EVALUATIONS).read_bytes() == before
+
+
+def test_a_folder_that_is_in_use_is_refused(tmp_path: Path) -> None:
+    said = []
+
+    def again(done: int, total: int) -> None:
+        with pytest.raises(FileError, match="is in use: another process searches there"):
+            search(tmp_path)
+        said.append(done)
+
+    search(tmp_path, evaluations=60, progress=again)
+    assert said
+
+
+def test_evaluations_of_nobody_knows_what_are_refused(tmp_path: Path) -> None:
+    search(tmp_path)
+    (tmp_path / REQUEST).unlink()
+    with pytest.raises(FileError, match=r"stands without its design\.json"):
+        search(tmp_path)
+    (tmp_path / REQUEST).write_text("[1, 2]")
+    with pytest.raises(FileError, match="is no request of a search"):
+        search(tmp_path)
+
+
+def test_rows_that_this_search_would_not_ask_for_are_told(tmp_path: Path) -> None:
+    """As another version of an optimizer would: the same request, other robots."""
+    search(tmp_path, seed=1)
+    other = (tmp_path / EVALUATIONS).read_bytes()
+    search(tmp_path / "own")
+    (tmp_path / "own" / EVALUATIONS).write_bytes(other)
+    with pytest.raises(InvalidValueError, match="row 2 of the folder is another robot"):
+        search(tmp_path / "own")
+
+
+def test_a_full_disk_loses_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole, write = search(None), os.write
+    written = [0]
+
+    def full(handle: int, data: bytes) -> int:
+        if written[0] > 3000:
+            raise OSError(28, "No space left on device")
+        part = write(handle, data[: max(1, len(data) // 2)])
+        written[0] += part
+        return part
+
+    monkeypatch.setattr("os.write", full)
+    with pytest.raises(FileError, match=r"cannot be written \(No space left on device\)\. Free some space"):
+        search(tmp_path)
+    monkeypatch.undo()
+    assert len((tmp_path / EVALUATIONS).read_text()) > 3000
+    assert same(search(tmp_path), whole)
+
+
+def test_robots_and_table_are_saved(tmp_path: Path) -> None:
+    front = search(None, optimizer="nsga2", evaluations=240)
+    files = front.save(tmp_path / "new" / "front")
+    with files[0].open(newline="") as table:
+        heads, start, *rows = list(csv.reader(table))
+    assert heads == ["robot", "least_margin [N]", "largest_sag [m]", "frame_anchors x [m]", "frame_anchors z [m]"]
+    assert [float(x) for x in start[1:]] == [*front.start_values, 0.0, 0.0]
+    assert len(rows) == len(front.robots) == len(files) - 1
+    for row, values, changed, robot, file in zip(
+        rows, front.values, front.changed, front.robots, files[1:], strict=True
+    ):
+        assert row[0] == robot.name == file.stem
+        np.testing.assert_array_equal([float(x) for x in row[1:]], [*values, *changed])
+        again = sl.load_robot(file)
+        assert again.frame_anchors.tobytes() == robot.frame_anchors.tobytes()

@@ -1,0 +1,204 @@
+"""What may change: how anchors follow each other, where numbers lead, and what is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.errors import InvalidValueError
+from sagline.optimization.candidates import Candidates, impossible
+from sagline.statics.tables import cable_table
+from tests.optimization.pair import UNDER, apart, pair
+
+ROBOT = sl.load_robot("article-suspended")
+LIGHT = sl.CableChoice("light", sl.Cable(0.03, 2e4), cost=1.0)
+OWN = sl.CableChoice("own", sl.Cable(ROBOT.cables.linear_density[0], ROBOT.cables.axial_stiffness[0]), cost=2.0)
+
+UNLIMITED = sl.load_robot("ipanema-1").replace(tension_max=np.inf)
+POSTS = sl.FreeAnchors("frame", -0.1, 0.1, along=[0, 0, 1], symmetry="together")
+
+
+def moved(free: sl.FreeAnchors, *values: float, robot: sl.Robot = ROBOT) -> sl.Robot:
+    return Candidates(robot, [free]).robots(np.array([values]), ["moved"])[0]
+
+
+def test_mirrored_anchors_stay_mirrored() -> None:
+    found = moved(sl.FreeAnchors("frame", [-1, -1, -1], [1, 1, 1], symmetry="xy"), -0.5, -0.25, 0.125)
+    shift = found.frame_anchors - ROBOT.frame_anchors
+    np.testing.assert_allclose(np.abs(shift), np.tile([0.5, 0.25, 0.125], (8, 1)))
+    for axis in (0, 1):
+        mirror = np.array([-1.0 if k == axis else 1.0 for k in range(3)])
+        assert {tuple(row) for row in found.frame_anchors.round(9)} == {
+            tuple(row) for row in (found.frame_anchors * mirror).round(9)
+        }
+    assert (np.abs(found.frame_anchors[:, 0]) == 7.0).all()
+
+
+def test_turned_anchors_stay_on_a_regular_polygon() -> None:
+    angle = 2.0 * np.pi * np.arange(3) / 3.0 + 0.3
+    frame = np.column_stack((3.0 * np.cos(angle), 3.0 * np.sin(angle), np.full(3, 4.0)))
+    robot = sl.Robot("tripod", frame, np.zeros((3, 3)), sl.Cable(0.05, 5e4), 10.0, motion_pattern="3T")
+    found = moved(sl.FreeAnchors("frame", -1.0, 1.0, symmetry="turned"), 0.3, -0.4, 0.5, robot=robot).frame_anchors
+    edges = np.linalg.norm(found - np.roll(found, 1, axis=0), axis=1)
+    np.testing.assert_allclose(edges, edges[0])
+    np.testing.assert_allclose(found[0], frame[0] + [0.3, -0.4, 0.5])
+
+
+def test_platform_anchors_move_in_the_platform_frame_and_together() -> None:
+    found = moved(sl.FreeAnchors("platform", -0.1, 0.1, along=[0, 0, 2], symmetry="together", cables=[1, 3]), 0.05)
+    shift = found.platform_anchors - ROBOT.platform_anchors
+    np.testing.assert_allclose(shift[[1, 3]], [[0, 0, 0.05]] * 2)
+    assert not shift[[0, 2, 4, 5, 6, 7]].any()
+    assert found.frame_anchors is ROBOT.frame_anchors or np.array_equal(found.frame_anchors, ROBOT.frame_anchors)
+
+
+def test_anchors_without_symmetry_are_free_by_themselves() -> None:
+    candidates = Candidates(ROBOT, [sl.FreeAnchors("frame", [-1, 0, 0], [1, 0, 0.5], cables=[2, 5])])
+    names = ["frame_anchors[2] x", "frame_anchors[2] z", "frame_anchors[5] x", "frame_anchors[5] z"]
+    assert [part.name for part in candidates.parts] == names
+    found = candidates.cables(np.array([[0.1, 0.2, 0.3, 0.4]]))[0] - cable_table(ROBOT)[0]
+    np.testing.assert_allclose(found[2, :3], [0.1, 0.0, 0.2])
+    np.testing.assert_allclose(found[5, :3], [0.3, 0.0, 0.4])
+    assert np.count_nonzero(found) == 4
+
+
+def test_cables_and_limits_go_into_the_robot() -> None:
+    strong = sl.CableChoice("strong", sl.Cable(0.2, 9e5, diameter=0.01), tension_max=4000.0)
+    candidates = Candidates(ROBOT, [sl.FreeCable([LIGHT, OWN, strong]), sl.FreeLimit("tension_min", 10.0, 80.0)])
+    assert candidates.start.tolist() == [1.0, 25.0]
+    light, own, heavy = candidates.robots(np.array([[0.0, 40.0], [1.0, 25.0], [2.0, 80.0]]), ["a", "b", "c"])
+    assert light.cables.linear_density[3] == 0.03
+    assert light.tension_min[0] == 40.0
+    assert np.array_equal(own.cables.axial_stiffness, ROBOT.cables.axial_stiffness)
+    assert heavy.tension_max[7] == 4000.0
+    assert heavy.cables.diameter is not None
+    points = candidates.units(np.array([[0.0, 40.0], [1.0, 25.0], [2.0, 80.0]]))
+    np.testing.assert_allclose(candidates.values(points), [[0.0, 40.0], [1.0, 25.0], [2.0, 80.0]])
+    assert candidates.values(np.array([[1.0, 0.0], [0.0, 1.0]])).tolist() == [[2.0, 10.0], [0.0, 80.0]]
+
+
+def test_what_is_no_robot_is_known_without_making_one() -> None:
+    frame = sl.FreeAnchors("frame", [-1, 0, 0], [0, 0, 0], cables=[1])
+    platform = sl.FreeAnchors("platform", [-1, 0, -1], [1, 1, 1], cables=[1])
+    limit = sl.FreeLimit("tension_min", 0.0, 3000.0)
+    candidates = Candidates(ROBOT, [frame, platform, limit])
+    twin = [0.0, *(ROBOT.platform_anchors[0] - ROBOT.platform_anchors[1]), 25.0]
+    values = np.array([[0.0, 0.0, 0.0, 0.0, 25.0], twin, [0.0, 0.0, 0.0, 0.0, 2500.0], [-0.5, *twin[1:]]])
+    none = impossible(candidates.cables(values))
+    assert none.tolist() == [False, True, True, False]
+    for row, wrong in zip(values, none, strict=True):
+        if wrong:
+            with pytest.raises(InvalidValueError):
+                candidates.robots(row[None], ["none"])
+        else:
+            candidates.robots(row[None], ["one"])
+
+
+def asked(**changes: Any) -> sl.Front:
+    given: dict[str, Any] = {"free": [apart()], "goals": ["least_margin"], "poses": UNDER, "evaluations": 16}
+    return sl.design(pair(), **{**given, **changes})
+
+
+REFUSED: dict[str, tuple[Callable[[], object], str | None]] = {
+    "unknown goal": (
+        lambda: asked(goals=["workspace"]),
+        "goal is 'workspace'; allowed: workspace_share, mean_margin, least_margin, largest_tension, largest_sag, "
+        "least_stiffness, cable_cost. Choose one of them as goal.",
+    ),
+    "crossed bounds": (
+        lambda: sl.FreeAnchors("frame", 0.5, -0.5, along=[0, 0, 1]),
+        "low is 0.5 m; allowed: <= high, -0.5 m. Exchange low and high.",
+    ),
+    "crossed limits": (
+        lambda: sl.FreeLimit("tension_max", 50.0, 20.0),
+        "low is 50 N; allowed: < high, 20 N. Exchange low and high.",
+    ),
+    "a start outside": (
+        lambda: sl.FreeAnchors("frame", 0.5, 1.0, along=[0, 0, 1]),
+        "low[0] to high[0] is 0.5 to 1 m; allowed: 0 m inside. Shifts count from where the robot has its anchors: give "
+        "low <= 0 <= high.",
+    ),
+    "a limit outside": (
+        lambda: asked(free=[sl.FreeLimit("tension_max", 50.0, 80.0)]),
+        "free[0]: the robot's tension_max is 20 N; allowed: 50 to 80 N. Widen the bounds, or correct the robot.",
+    ),
+    "a cable not in the catalogue": (
+        lambda: asked(free=[sl.FreeCable([LIGHT, OWN])]),
+        "free[0]: the robot's cable 0 is 10 g/m, 1e+06 N, up to 20 N; allowed: all cables alike, in the catalogue. "
+        "Add the robot's own cable: the search begins with it.",
+    ),
+    "a budget too small": (
+        lambda: asked(evaluations=15),
+        "evaluations is 15; allowed: >= 16, two generations of cma for 1 free numbers. Allow more, or free less.",
+    ),
+    "past the mirror": (
+        lambda: asked(free=[sl.FreeAnchors("frame", -1.5, 1.0, along=[1, 0, 0], symmetry="x")]),
+        "free[0]: the shift along x is up to 1.5 m inward; allowed: < 1 m, where the plane x = 0 m is. Anchors would "
+        "pass through those that mirror them: narrow the bounds along x.",
+    ),
+    "twice the same": (
+        lambda: asked(free=[apart(), apart()]),
+        "free is free twice in frame_anchors x; allowed: each part once. Leave one of them out.",
+    ),
+    "a cost that nobody gave": (
+        lambda: asked(goals=["cable_cost"]),
+        "goals: cable_cost is without a catalogue; allowed: a FreeCable with costs. Free the cable: "
+        "FreeCable([CableChoice(name, cable, cost=1.5), ...]).",
+    ),
+    "no such cable": (
+        lambda: asked(free=[sl.FreeAnchors("frame", -1, 1, cables=[2])]),
+        "free[0]: cables is 2; allowed: 0 to 1. pair has 2 cables, numbered from 0.",
+    ),
+    "nothing limits": (
+        lambda: sl.design(UNLIMITED, [POSTS], ["least_margin"], evaluations=16, grid=(2, 2, 2)),
+        "least_margin of ipanema-1 is inf N; allowed: a finite number. Give it finite tension_max, or choose "
+        "workspace_share.",
+    ),
+    "a tilted box": (
+        lambda: sl.design(ROBOT, [apart()], ["least_margin"], box=ROBOT.test_box),
+        "box: tilt is 0.174533 rad; allowed: 0 rad: the grid is level. Give poses for other orientations.",
+    ),
+    "weights on a front": (
+        lambda: asked(goals=[sl.Goal("least_margin", weight=2.0)], optimizer="nsga2", evaluations=60),
+        'weight of least_margin is 2; allowed: 1: a front of robots weighs no goals. Leave it out, or choose the '
+        'optimizer "cma".',
+    ),
+    "through the platform": (
+        lambda: sl.design(
+            ROBOT,
+            [sl.FreeAnchors("frame", -4.0, 0.0, along=[0, 0, 1], symmetry="together")],
+            ["mean_margin"],
+            poses=sl.Pose([7.4, 5.4, 3.0], np.eye(3)),
+        ),
+        None,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_cannot_be_searched_is_refused_in_one_line(name: str) -> None:
+    make, expected = REFUSED[name]
+    with pytest.raises(InvalidValueError) as refused:
+        make()
+    text = str(refused.value)
+    assert len(text) < 300
+    assert "\n" not in text
+    if expected is not None:
+        assert text == expected
+
+
+def test_a_frame_anchor_in_the_platform_is_told_with_its_cable_and_pose() -> None:
+    with pytest.raises(
+        InvalidValueError, match=r"free: the frame anchor of cable 0, at .* m is inside the platform at"
+    ):
+        REFUSED["through the platform"][0]()
+
+
+def test_the_share_of_a_robot_that_nothing_limits_is_a_number() -> None:
+    front = sl.design(UNLIMITED, [POSTS], ["workspace_share"], evaluations=16, grid=(2, 2, 2))
+    assert front.start_values[0] == 1.0
+    assert not front.better
