@@ -61,7 +61,10 @@ def test_batches_with_meshes_are_their_poses_and_the_least_is_the_same_without_t
     found = sl.clearance(state, block)
     for n in range(3):
         assert found.pair_distance[n] == pytest.approx(sl.clearance(state[n], block).pair_distance, abs=1e-12)
-    assert ClearanceRows(robot, (block,)).least(state) == pytest.approx(found.distance, abs=1e-4)
+    rows = ClearanceRows(robot, (block,))
+    value, pair = rows.least(state)
+    assert value == pytest.approx(found.distance, abs=1e-4)
+    assert [rows.pairs.names[k] for k in pair] == list(found.between)
 
 
 def test_meshes_that_are_none_are_refused() -> None:

@@ -153,13 +153,12 @@ def clearance(
         docs/model.md, section 13.
     """
     robot = instance(state, Equilibrium, "state").robot
-    things = _obstacles(obstacles)
-    for thing in (*things, platform):
-        if isinstance(thing, Mesh):
-            _check_size(thing, first_of(robot))
+    things = check_obstacles(obstacles, first_of(robot))
     some = None if from_anchor is None else number(from_anchor, "from_anchor", "m", above=0.0)
     radius = None if cable_radius is None else _radius(cable_radius, first_of(robot).cable_count)
     form = platform if platform is None or isinstance(platform, Mesh) else instance(platform, Box, "platform")
+    if isinstance(form, Mesh):
+        _check_size(form, first_of(robot))
     near = number(precision, "precision", "m", above=0.0)
     rows = ClearanceRows(
         robot,
@@ -175,13 +174,28 @@ def clearance(
     return Clearances(rows.pairs.names, value, low, nearest, rows.pairs.left_out, near)
 
 
-def _obstacles(given: Any) -> tuple[Obstacle, ...]:
+def check_obstacles(given: Any, robot: Robot) -> tuple[Obstacle, ...]:
+    """What stands around a robot, one thing or several, checked.
+
+    Args:
+        given: As of `clearance`.
+        robot: The robot.
+
+    Returns:
+        All of them.
+
+    Raises:
+        InvalidValueError: If it is something else, or a mesh is 100 times as large as the robot.
+    """
     some = (given,) if isinstance(given, Obstacle) else given
     several = isinstance(some, Sequence) and not isinstance(some, str)
     wrong = [one for one in some if not isinstance(one, Obstacle)] if several else [given]
     if wrong:
         step = 'Make them: Sphere(center, radius), Box(size, center), load_mesh("hall.stl").'
         raise InvalidValueError("obstacles", brief(wrong[0]), "Box, Capsule, Sphere or Mesh, one or several", step)
+    for thing in some:
+        if isinstance(thing, Mesh):
+            _check_size(thing, robot)
     return tuple(some)
 
 

@@ -8,8 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import minimize
 
-from sagline.arrays import Array
+import sagline as sl
+from sagline.arrays import Array, Indices, locked
+from sagline.interference.rows import cable_rows
 from sagline.kernels.interference import shapes
+from sagline.kernels.interference.hanging_distance import least_distances, memory_for_pieces
 
 
 class Hung(NamedTuple):
@@ -67,10 +70,10 @@ def random_cable(rng: np.random.Generator, kind: str) -> Hung:
 KINDS = ("taut", "sagging", "deep", "upright", "folded", "nearly folded", "level")
 
 
-def random_pair(rng: np.random.Generator) -> tuple[Hung, Hung]:
-    """Two cables: anywhere, touching at points inside, meeting at an end, side by side, or one and the same."""
+def random_pair(rng: np.random.Generator) -> tuple[Hung, Hung, bool]:
+    """Two cables, and whether they run side by side; others cross, all but cross, share an end, or are anywhere."""
     one, other = (random_cable(rng, str(rng.choice(KINDS))) for _ in range(2))
-    match int(rng.integers(6)):
+    match kind := int(rng.integers(6)):
         case 0:  # they cross
             meet = one.points(rng.random()) - other.points(rng.random())
             other = other._replace(start=other.start + meet)
@@ -80,10 +83,11 @@ def random_pair(rng: np.random.Generator) -> tuple[Hung, Hung]:
         case 2:  # they share an end
             other = other._replace(start=one.points(1.0) - other.points(1.0) + other.start)
         case 3:  # side by side
-            other = one._replace(start=one.start + rng.normal(size=3) * 10.0 ** rng.uniform(-6, 0))
+            aside = 10.0 ** rng.uniform(-6, 0) if rng.random() < 0.9 else 0.0
+            other = one._replace(start=one.start + aside * rng.normal(size=3))
         case _:
             pass
-    return one, other
+    return one, other, kind == 3
 
 
 def sampled_distance(one: Hung, other: Hung, count: int = 1501) -> float:
@@ -111,6 +115,60 @@ def sampled_distance(one: Hung, other: Hung, count: int = 1501) -> float:
     return best
 
 
-def all_pairs(count: int) -> Array:
+def all_pairs(count: int) -> Indices:
     """Numbers of all pairs of so many."""
     return np.array(list(combinations(range(count), 2)), dtype=np.int64)
+
+
+def measured(
+    moving: Array,
+    pairs: Indices | None = None,
+    precision: float = 1e-4,
+    together: bool = False,
+    still: Array | None = None,
+) -> tuple[Array, Array, Array]:
+    """Distances, lower bounds and nearest points of rows (N, K, COLUMNS)."""
+    numbers = all_pairs(moving.shape[1]) if pairs is None else np.asarray(pairs, dtype=np.int64)
+    beside = np.zeros((0, shapes.COLUMNS)) if still is None else still
+    shape = (len(moving), len(numbers))
+    out = np.full(shape, np.nan), np.full(shape, np.nan), np.full((*shape, 2, 3), np.nan)
+    rows, others = locked(np.ascontiguousarray(moving)), locked(beside)
+    least_distances(rows, others, locked(numbers), precision, together, *memory_for_pieces(), *out)
+    return out
+
+
+def nearest_cable_pairs() -> list[tuple[Array, Array]]:
+    """The sixty nearest pairs of cables of four robots at random feasible poses, as rows; shared anchors left out."""
+    rng = np.random.default_rng(60)
+    found: list[tuple[float, Array, Array]] = []
+    for name in ("article-suspended", "cogiro", "ipanema-1", "expo2015-lucia-pulleys"):
+        robot = sl.load_robot(name)
+        assert robot.test_box is not None
+        places = rng.uniform(robot.test_box.low, robot.test_box.high, (25, 3))
+        state = sl.inverse(robot, sl.Pose.from_euler(places, 0.0, 0.0, 0.0)).state
+        rows = cable_rows(state, np.zeros(robot.cable_count))
+        rows = rows[~np.isnan(rows).any(axis=(1, 2))]
+        distance, _, _ = measured(rows)
+        for n, p in np.argwhere(distance > 1e-6):
+            i, j = all_pairs(robot.cable_count)[p]
+            found.append((float(distance[n, p]), rows[n, i], rows[n, j]))
+    return [(one, other) for _, one, other in sorted(found, key=lambda entry: entry[0])[:60]]
+
+
+def agreement(pairs: list[tuple[Array, Array]]) -> float:
+    """Largest difference from 1,501 x 1,501 points and simplex search."""
+    worst = 0.0
+    for rows in pairs:
+        cables = [
+            Hung(
+                row[shapes.PLACE : shapes.PLACE + 3],
+                float(np.arctan2(row[shapes.LEVEL + 1], row[shapes.LEVEL])),
+                *(float(value) for value in row[shapes.HORIZONTAL : shapes.STIFFNESS + 1]),
+            )
+            for row in rows
+        ]
+        found, low, _ = measured(np.array([rows]))
+        brute = sampled_distance(cables[0], cables[1])
+        assert low[0, 0] <= brute + 1e-12
+        worst = max(worst, abs(brute - float(found[0, 0])))
+    return worst

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, ClassVar, Final
 
 import numpy as np
@@ -12,12 +13,14 @@ import numpy as np
 from sagline.arguments import brief
 from sagline.arrays import number
 from sagline.errors import InvalidValueError
-from sagline.interference.clearance import clearance
+from sagline.interference.clearance import check_obstacles
+from sagline.interference.clearance_rows import ClearanceRows
 from sagline.interference.pairs import Obstacle
 from sagline.robot.robot import Robot
-from sagline.workspaces.criteria.criterion import Criterion, Judged, no_cable
+from sagline.workspaces.criteria.criterion import Criterion, Judged
 from sagline.workspaces.criteria.given import Given
 
+_PRECISION: Final = 1e-6  # m: by no more may the level jump from pose to pose
 _CABLE: Final = re.compile(r"cable (\d+)")
 
 
@@ -53,16 +56,21 @@ class Clearance(Criterion):
 
     def judge(self, given: Given) -> Judged:
         """Least distance above the limit [m], and the cable, or the first of two, that is nearest to something."""
-        found = clearance(given.state, self.obstacles)
-        value = given.spread(found.distance - self.limit)
-        if not found.pairs:
-            return Judged(value, no_cable(len(given)))
-        cables = np.array([_cable_of(pair) for pair in found.pairs])
-        return Judged(value, given.spread_cables(cables[np.nan_to_num(found.pair_distance).argmin(axis=1)]))
+        rows = _rows(given.robot, self.obstacles)
+        value, pair = rows.least(given.state)
+        cables = np.array([*map(_cable_of, rows.pairs.names), -1])
+        return Judged(given.spread(value - self.limit), given.spread_cables(cables[pair]))
 
     def scale(self, robot: Robot) -> float:
         """The limit [m]."""
         return self.limit
+
+
+@lru_cache(maxsize=4)
+def _rows(robot: Robot, obstacles: Obstacle | Sequence[Obstacle]) -> ClearanceRows:
+    """What is measured, made ready once for all poses of a robot, after the arguments are checked."""
+    checked = check_obstacles(obstacles, robot)
+    return ClearanceRows(robot, checked, precision=_PRECISION)
 
 
 def _cable_of(pair: tuple[str, str]) -> int:
