@@ -554,13 +554,20 @@ def _workspaces(given: _Given) -> dict[str, Call]:
         "Accelerations": Call(sl.Accelerations, _all(linear=("number", 2.0), angular=("number", 3.0))),
         "Orientations": Call(sl.Orientations, _all(rotations=("array", turned), need=("word", "any"))),
         "Tilts": Call(sl.Tilts, _all(angle=("number", 0.25))),
-        "Clearance": Call(sl.Clearance, _all(limit=limit, obstacles=("object", (sl.Sphere([3.0, 2.0, 4.0], 0.5),)))),
+        "Clearance": Call(
+            lambda limit, obstacle: sl.Clearance(limit, [obstacle]),
+            _all(limit=limit, obstacle=("one", sl.Sphere([3.0, 2.0, 4.0], 0.5))),
+        ),
         "LeastMargin": Call(sl.LeastMargin, _all(limit=limit)),
         "MaximumSag": Call(sl.MaximumSag, _all(limit=limit)),
         "PositionError": Call(sl.PositionError, _all(model=model, limit=limit)),
         "LeastStiffness": Call(sl.LeastStiffness, _all(limit=limit)),
         "LeastFrequency": Call(sl.LeastFrequency, _all(limit=limit)),
         "InFrame": Call(sl.InFrame, _all(limit=limit)),
+        "workspace: criteria": Call(
+            lambda criterion: sl.workspace(given.robot, criteria=[criterion], cells=4),
+            _all(criterion=("one", sl.MaximumSag(0.5))),
+        ),
         "workspace": Call(
             sl.workspace,
             _all(
@@ -568,11 +575,9 @@ def _workspaces(given: _Given) -> dict[str, Call]:
                 box=("one", sl.PoseBox([-1.0, -1.0, 1.0], [1.0, 1.0, 2.0]), True),
                 wrenches=("one", sl.WrenchBox(force=2.0), True),
                 orientations=("one", sl.Tilts(0.25), True),
-                criteria=("object", [sl.MaximumSag(0.5)]),
                 model=("one", sl.Catenary()),
                 tension=("one", sl.MinimumNorm()),
                 cells=("whole", 4),
-                refine=("whole", 1),
                 moment_arm=("number", 0.25, True),
                 progress=("callback", lambda done, of: None, True),
             ),

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from sagline.arguments import brief, callback, instance, whole_number
-from sagline.arrays import Array, Flags, locked
+from sagline.arrays import Array, Flags, locked, number
 from sagline.blocks import Progress
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
@@ -92,7 +92,8 @@ def workspace(
     region = region_of(robot, box, count)
     turned = orientations_of(robot, orientations, region.box.tilt)
     loads = load_of(wrenches)
-    levels = Levels(robot, loads, turned, asked, model, tension, moment_arm, flat_axis(region.box))
+    arm = None if moment_arm is None else number(moment_arm, "moment_arm", "m", low=0.0)
+    levels = Levels(robot, loads, turned, asked, model, tension, arm, flat_axis(region.box))
     levels.told = None if told is None else _Told(told, region.cells)
     found = boundary(levels, region.low, region.high, region.cells, refine)
     surface, components = found.surface, found.components
@@ -106,7 +107,7 @@ def workspace(
         criteria=asked,
         model=model,
         tension=tension,
-        moment_arm=moment_arm,
+        moment_arm=arm,
         unit=region.unit,
         volume=found.volume / region.thickness,
         volume_error=found.volume_error / region.thickness,
