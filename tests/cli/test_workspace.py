@@ -82,6 +82,35 @@ def test_what_is_told(folder: FilePath) -> None:
     assert f"{100.0 * first.share:.1f} margin {first.cable}" in lines
 
 
+def test_what_is_proved_and_what_is_not() -> None:
+    words = ["--cells", "4", "--no-figures", "--json", "--prove"]
+    inside = sagline("article-suspended", *words, "-1..1, -1..1, 2..2.5 m")
+    assert inside.exit_code == 0, inside.stderr
+    proof = json.loads(inside.stdout)["proof"]
+    assert (proof["verdict"], proof["share_inside"]) == ("PROVED_INSIDE", 1.0)
+    assert (proof["box_low_m"], proof["box_high_m"]) == ([-1.0, -1.0, 2.0], [1.0, 1.0, 2.5])
+    outside = sagline("article-suspended", *words, "8..9, 8..9, 7..8 m")
+    assert outside.exit_code == 1
+    assert json.loads(outside.stdout)["proof"]["share_inside"] == 0.0
+
+
+def test_what_stands_around(folder: FilePath) -> None:
+    (folder / "own.yaml").write_text(
+        sl.dump_robot(sl.load_robot("article-suspended"))
+        + "scene:\n  - {name: wall, box: [0.2, 12, 1.0], center: [1, 0, 0.5]}\n"
+    )
+    words = ["--box", "-3..4, -1..1, 0.3..0.9 m", "--cells", "8", "--no-figures", "--json", "--clearance", "5 cm"]
+    own, other, none = (
+        sagline(*robot, *words)
+        for robot in (["own.yaml"], ["article-suspended", "--scene", "own.yaml"], ["article-suspended"])
+    )
+    volumes = [len(json.loads(result.stdout)["components_m3"]) for result in (own, other, none)]
+    assert volumes == [2, 2, 1]
+    alone = sagline("cogiro", "--scene", "own.yaml")
+    assert alone.exit_code == 2
+    assert "without --clearance" in alone.stderr
+
+
 def test_nowhere_ends_with_the_nearest_pose(folder: FilePath) -> None:
     result = sagline("article-suspended", "--wrench", "±5 kN", "--cells", "4", "--json")
     assert result.exit_code == 1

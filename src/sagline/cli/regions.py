@@ -70,12 +70,13 @@ def _load_of(part: str) -> tuple[str, float]:
     raise InvalidValueError("--wrench", repr(part.strip()), f"± and a number with one of the units {units}", _STEP)
 
 
-def box_of(text: str, item: str) -> PoseBox:
+def box_of(text: str, item: str, tilt: float = 0.0) -> PoseBox:
     """A box of positions from "-2..2, -1..1, 1..3 m"; one number stands for a plane.
 
     Args:
         text: The text.
         item: What it is, for messages.
+        tilt: How far the platform is tilted there [rad].
 
     Raises:
         InvalidValueError: If it is none.
@@ -94,7 +95,7 @@ def box_of(text: str, item: str) -> PoseBox:
     low, high = np.array(ends).T
     if (low > high).any() or np.abs(ends).max() > FARTHEST:
         raise InvalidValueError(item, repr(text), f"from low to high, up to {FARTHEST:g} m", step)
-    return PoseBox(low, high)
+    return PoseBox(low, high, tilt)
 
 
 def _ends_of(part: str) -> tuple[str, str]:

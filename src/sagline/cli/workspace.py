@@ -7,14 +7,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from sagline.cli.ending import OUTSIDE
-from sagline.cli.entries import CLEARANCES, INVERSE, SIGNED_MARGINS, VIBRATION
+from sagline.cli.entries import CLEARANCES, INVERSE, PROOFS, SIGNED_MARGINS, VIBRATION
 from sagline.cli.regions import box_of, wrenches_of
 from sagline.cli.results import figure_files, listed, write_figures
 from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.cli.values import loaded, quantity
+from sagline.errors import InvalidValueError
+from sagline.files.mesh_file import load_mesh
 from sagline.files.names import file_stem
 from sagline.files.robot_file import load_robot
+from sagline.files.scene_file import load_scene
 from sagline.files.whole import check_files, made_folder
 from sagline.workspaces.criteria.clearance import Clearance
 from sagline.workspaces.criteria.frame import InFrame
@@ -23,12 +26,16 @@ from sagline.workspaces.criteria.margin import LeastMargin
 from sagline.workspaces.criteria.sag import MaximumSag
 from sagline.workspaces.criteria.stiffness import LeastStiffness
 from sagline.workspaces.orientations import Tilts
-from sagline.workspaces.space import amount_of, facts_of
+from sagline.workspaces.proof import prove
+from sagline.workspaces.proof_verdict import ProofVerdict
+from sagline.workspaces.space import amount_of, facts_of, span_of
 from sagline.workspaces.workspace import workspace
 
 if TYPE_CHECKING:
     from sagline.cables.model import CableModel
+    from sagline.interference.pairs import Obstacle
     from sagline.workspaces.criteria.criterion import Criterion
+    from sagline.workspaces.proof import Proof
     from sagline.workspaces.space import Workspace
 
 MOST_LIMITS = 12  # shares that are told
@@ -42,11 +49,18 @@ class Asked(NamedTuple):
     min_stiffness: str | None
     min_frequency: str | None
     clearance: str | None
+    scene: str | None
     in_frame: bool
 
-    @property
-    def criteria(self) -> list[Criterion]:
-        """The criteria."""
+    def criteria(self, robot: str) -> list[Criterion]:
+        """The criteria.
+
+        Args:
+            robot: Name or file of the robot, whose scene stands around it.
+
+        Raises:
+            SaglineError: If one is none, or the scene cannot be read.
+        """
         found: list[Criterion] = []
         if self.reserve is not None:
             found.append(LeastMargin(quantity(self.reserve, "--reserve", "N", low=0.0)))
@@ -57,47 +71,70 @@ class Asked(NamedTuple):
         if self.min_frequency is not None:
             found.append(LeastFrequency(quantity(self.min_frequency, "--min-frequency", "Hz", above=0.0)))
         if self.clearance is not None:
-            found.append(Clearance(quantity(self.clearance, "--clearance", "m", above=0.0)))
+            limit = quantity(self.clearance, "--clearance", "m", above=0.0)
+            found.append(Clearance(limit, around(robot if self.scene is None else self.scene)))
+        elif self.scene is not None:
+            step = 'Say how near things may come: --clearance "3 cm".'
+            raise InvalidValueError("--scene", f"{self.scene!r} without --clearance", "both", step)
         return found + [InFrame()] * self.in_frame
 
 
-def find(
-    name: str,
-    wrench: str | None,
-    payload: str | None,
-    tilt: str | None,
-    box: str | None,
-    asked: Asked,
-    cells: int,
-    model: CableModel,
-    folder: Path,
-    *,
-    figures: bool,
-    as_json: bool,
-) -> int:
+class Where(NamedTuple):
+    """Which poses and loads, as texts of the command line."""
+
+    wrench: str | None
+    payload: str | None
+    tilt: str | None
+    box: str | None
+    to_prove: str | None
+    budget: str
+
+
+class How(NamedTuple):
+    """How it is found."""
+
+    cells: int
+    model: CableModel
+
+
+def around(name: str) -> tuple[Obstacle, ...]:
+    """What stands around: the scene of a robot file, a mesh file, nothing for a preset's name."""
+    path = Path(name)
+    if path.suffix.lower() in (".yaml", ".yml"):
+        return load_scene(path)
+    return (load_mesh(path),) if path.suffix else ()
+
+
+def find(name: str, where: Where, asked: Asked, how: How, folder: Path, *, figures: bool, as_json: bool) -> int:
     """Find the workspace, tell, write and draw it; returns the exit code.
 
     Raises:
         SaglineError: If an input is wrong or the folder cannot be written.
     """
-    loads, criteria = wrenches_of(wrench), asked.criteria
-    angle = None if tilt is None else Tilts(quantity(tilt, "--tilt", "rad", low=0.0))
-    region = None if box is None else box_of(box, "--box")
-    robot = loaded(load_robot(name), payload)
+    loads, criteria = wrenches_of(where.wrench), asked.criteria(name)
+    angle = 0.0 if where.tilt is None else quantity(where.tilt, "--tilt", "rad", low=0.0)
+    region = None if where.box is None else box_of(where.box, "--box")
+    to_prove = None if where.to_prove is None else box_of(where.to_prove, "--prove", angle)
+    budget = quantity(where.budget, "--budget", "s", above=0.0)
+    robot = loaded(load_robot(name), where.payload)
     space_file, hull = f"{file_stem(robot.name, 'workspace')}.nc", f"{file_stem(robot.name, 'hull')}.glb"
     drawn = [file_stem(robot.name, what) for what in ("workspace", "slice")] if figures else []
     check_files(folder, [space_file, hull, *figure_files(drawn)])
-    with working(f"{robot.name}: workspace", *_needed(asked)) as line:
+    with working(f"{robot.name}: workspace", *_needed(asked), *[PROOFS] * (to_prove is not None)) as line:
         space = workspace(
             robot,
             region,
             loads,
-            orientations=angle,
+            orientations=Tilts(angle),
             criteria=criteria,
-            model=model,
-            cells=cells,
+            model=how.model,
+            cells=how.cells,
             progress=line.progress,
         )
+        proof = None
+        if to_prove is not None:
+            told = line.stage(f"{robot.name}: proof")
+            proof = prove(robot, to_prove, loads, budget=budget, model=how.model, progress=told)
         made_folder(folder)
         files = [folder / space_file]
         space.save(files[0])
@@ -108,13 +145,16 @@ def find(
                 line.stage("drawing")
                 files += _drawn(space, drawn, folder)
     if as_json:
-        show_json({**_record(space), "files": files})
+        show_json({**_record(space), "proof": None if proof is None else _record_of_proof(proof), "files": files})
     else:
         _tell(space)
+        if proof is not None:
+            _tell_proof(proof)
         show(f"In {folder.resolve()}: {listed(files)}", whole=True)
     if space.nearest is not None:
         note("Nowhere: ", space.nearest.reason, style="bold red")
-    return OUTSIDE if space.nearest is not None else 0
+    proved = proof is None or proof.verdict is ProofVerdict.PROVED_INSIDE
+    return 0 if space.nearest is None and proved else OUTSIDE
 
 
 def _drawn(space: Workspace, names: Sequence[str], folder: Path) -> list[Path]:
@@ -148,6 +188,29 @@ def _tell(space: Workspace) -> None:
         rest = sum(limit.share for limit in limits[MOST_LIMITS:])
         rows.append([written(100.0 * rest, ".1f"), f"{len(limits) - MOST_LIMITS} others", ""])
     show_table(Grid(["surface [%]", "limited by", "cable"], rows, left=frozenset({1})))
+
+
+def _tell_proof(proof: Proof) -> None:
+    spans = span_of(proof.box)
+    shares = ((f"proved {word}", getattr(proof, word)) for word in ("inside", "outside"))
+    rows = [
+        [word, written(100.0 * share, ".2f"), f"{share * proof.volume:.4g}"]
+        for word, share in (*shares, ("open", proof.open))
+    ]
+    show_table(Grid([f"{spans} m", "share [%]", "volume [m³]"], rows))
+    show(f"{proof.verdict.name}: {proof.verdict.text}.")
+
+
+def _record_of_proof(proof: Proof) -> dict[str, Any]:
+    return {
+        "verdict": proof.verdict.name,
+        "box_low_m": proof.box.low.tolist(),
+        "box_high_m": proof.box.high.tolist(),
+        "share_inside": proof.inside,
+        "share_outside": proof.outside,
+        "share_open": proof.open,
+        "boxes_tried": proof.tried,
+    }
 
 
 def _record(space: Workspace) -> dict[str, Any]:

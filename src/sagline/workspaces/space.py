@@ -225,11 +225,8 @@ def facts_of(space: Workspace) -> list[tuple[str, str]]:
     Returns:
         A word, and what is to be said of it.
     """
-    spans = ", ".join(
-        f"{n(a)} to {n(b)}" if a < b else n(a) for a, b in zip(space.box.low, space.box.high, strict=True)
-    )
-    facts = [("box", f"{spans} m"), ("loads", in_words(space.wrenches)), ("platform", str(space.orientations))]
-    facts += [("cables", type(space.model).__name__)]
+    facts = [("box", f"{span_of(space.box)} m"), ("loads", in_words(space.wrenches))]
+    facts += [("platform", str(space.orientations)), ("cables", type(space.model).__name__)]
     if asked := [str(one) for one in space.criteria if not one.always]:
         facts.append(("criteria", ", ".join(asked)))
     if space.components.count > 1:
@@ -241,3 +238,13 @@ def facts_of(space: Workspace) -> list[tuple[str, str]]:
     if space.nearest is not None:
         facts.append(("nearest", space.nearest.reason))
     return facts
+
+
+def span_of(box: PoseBox) -> str:
+    """From where to where a box of positions reaches along x, y and z [m].
+
+    Args:
+        box: The box.
+    """
+    ends = zip(box.low, box.high, strict=True)
+    return ", ".join(f"{n(low)} to {n(high)}" if low < high else n(low) for low, high in ends)

@@ -43,7 +43,16 @@ def workspace(
     ] = None,
     min_frequency: Annotated[str | None, _limit("HZ", "The platform swings no slower, cables without mass.")] = None,
     clearance: Annotated[str | None, _limit("LENGTH", "Cables, and what they pass, stay so far apart, '3 cm'.")] = None,
+    scene: Annotated[
+        str | None,
+        _limit("FILE", "With --clearance: a robot file with a scene, or a mesh in meters. Default: the robot's scene."),
+    ] = None,
     in_frame: Annotated[bool, typer.Option("--in-frame", help="The whole platform stays within the frame.")] = False,
+    to_prove: Annotated[
+        str | None,
+        typer.Option("--prove", metavar="BOX", help="Prove that it can work in all of this box.", show_default=False),
+    ] = None,
+    budget: Annotated[str, typer.Option(metavar="TIME", help="Of the proof [s].")] = "10",
     cells: Annotated[
         int, typer.Option(metavar="NUMBER", help="Cells of the grid along the longest edge of the box.")
     ] = 32,
@@ -57,15 +66,18 @@ def workspace(
     """Find where a robot can work: volume with its error bar, and what limits it where.
 
     The platform can be held wherever the cables, as they sag, bear all loads within their limits. DIR has the workspace
-    in NetCDF, its hull in GLB and figures. Exit code 1 where it is empty: the nearest pose is told.
+    in NetCDF, its hull in GLB and figures. Exit code 1 where it is empty, when the nearest pose is told, and where not
+    all of the box of --prove is proved.
 
     For example:
 
         sagline workspace article-suspended
         sagline workspace cogiro --wrench "±100 N, ±20 N m" --tilt 10deg
+        sagline workspace article-suspended --prove "-2..2, -1..1, 1..3 m"
         sagline workspace ipanema-1 --max-sag "5 cm" --box "-1..1, -1..1, 0..2 m"
     """
-    from sagline.cli.workspace import Asked, find
+    from sagline.cli.workspace import Asked, How, Where, find
 
-    asked = Asked(reserve, max_sag, min_stiffness, min_frequency, clearance, in_frame)
-    return find(robot, wrench, payload, tilt, box, asked, cells, model.build(), out, figures=figures, as_json=as_json)
+    asked = Asked(reserve, max_sag, min_stiffness, min_frequency, clearance, scene, in_frame)
+    where = Where(wrench, payload, tilt, box, to_prove, budget)
+    return find(robot, where, asked, How(cells, model.build()), out, figures=figures, as_json=as_json)
