@@ -75,6 +75,19 @@ def test_evaluations_grow_with_the_square_of_the_cells_but_for_the_coarse_grid()
     assert found.evaluations - 33**3 - nodes < 4.5 * vertices + 2.1 * faces
 
 
+def test_cells_that_a_finer_neighbor_finds_crossed_are_evaluated_too() -> None:
+    def rough(p: np.ndarray) -> np.ndarray:
+        bumps = np.sin(17.0 * p[:, 0]) * np.sin(19.0 * p[:, 1] + 1.0) * np.sin(18.0 * p[:, 2])
+        return np.asarray(0.6 - np.linalg.norm(p, axis=1) + 0.2 * bumps)
+
+    for cells in (8, 10, 12, 14):
+        counted = Counted(rough)
+        found = boundary(counted, LOW, HIGH, cells=cells)
+        assert len(counted.asked[2]) < len(counted.asked[1])  # the nodes of these cells; then come the vertices
+        assert np.abs(rough(found.surface.vertices)).max() < 1e-10
+        assert mesh_of(found).is_watertight
+
+
 @pytest.mark.parametrize("seed", range(12))
 @pytest.mark.parametrize("kind", ["turned brick", "upright brick", "ball", "ring", "wedge", "infinite"])
 def test_the_true_volume_is_within_the_error_bar(kind: str, seed: int) -> None:
@@ -125,7 +138,7 @@ def test_vertices_are_where_the_sign_changes_also_at_jumps() -> None:
     found = boundary(level, LOW, HIGH, cells=16)
     vertices = found.surface.vertices
     length = np.linalg.norm(vertices - [0.1, 0.0, 0.0], axis=1)
-    assert_allclose(length, 0.6, rtol=0.0, atol=1e-11)
+    assert_allclose(length, 0.6, rtol=0.0, atol=1e-10)
     assert (level(vertices) >= 0.0).all()  # the last that is known to be inside
     assert found.evaluations < 400_000
     assert abs(found.volume - BALL * 0.6**3) <= found.volume_error
@@ -214,6 +227,7 @@ def test_positions_are_told_by_piece() -> None:
         ({"cells": 1}, "cells is 1; allowed: 2 to 128"),
         ({"cells": 1000}, "cells is 1000"),
         ({"refine": 9}, "refine is 9"),
+        ({"cells": 100, "refine": 2}, "refine is 2; allowed: 0 to 1"),
         ({"refine": "twice"}, "refine is 'twice'"),
         ({"level": lambda p: np.full(len(p), np.nan)}, "level at (-1, -1, -1) m is nan"),
         ({"level": lambda p: np.zeros((len(p), 2))}, "level is of shape (729, 2)"),
@@ -224,3 +238,14 @@ def test_what_cannot_be_worked_with_is_named(change: dict[str, object], words: s
     with pytest.raises(sl.SaglineError) as caught:
         boundary(**given)  # type: ignore[arg-type]
     assert str(caught.value).startswith(words)
+
+
+def test_of_two_pieces_in_one_cell_the_nearer_one_is_meant() -> None:
+    def level(p: np.ndarray) -> np.ndarray:  # at two opposite corners of the one cell
+        return np.where(np.abs(p.sum(axis=1)) > 2.0, 1.0, -1.0)
+
+    found = boundary(level, LOW, HIGH, cells=(1, 1, 1), refine=False)
+    assert found.components.count == 2
+    near_low, near_high = found.components.label([[-0.8, -0.7, -0.9], [0.8, 0.7, 0.9]])
+    nodes = found.components.nodes
+    assert (near_low, near_high) == (nodes[0, 0, 0], nodes[1, 1, 1])

@@ -19,7 +19,10 @@ from sagline.workspaces.marching import Net, merged, net_of
 from sagline.workspaces.surface import Indices, Surface, normals_of, volumes_of
 from sagline.workspaces.volume import bulge
 
-MOST_CELLS: Final = 128  # along an axis; halved once, the grid has 17 million nodes
+MOST_CELLS: Final = 128  # along an axis
+MOST_HALVED: Final = 256  # along an axis: 17 million nodes, half a gigabyte
+MOST_HALVINGS: Final = 3
+AT_NODE: Final = 1e-10  # of an edge of the grid: a vertex so near to its node is at it
 _FACES: Final = ("x low", "x high", "y low", "y high", "z low", "z high")
 
 
@@ -29,7 +32,7 @@ class Boundary(Result):
 
     Attributes:
         surface: The boundary, closed along the faces of the box; its vertices that are not on those are on the
-            boundary to 1e-11 of a cell.
+            boundary to 1e-10 of a cell.
         volume: Of the set within the box [m^3]: that of the surface, and of what bulges between its vertices.
         volume_error: By how much the volume can be wrong [m^3], but for parts of the set, and gaps in it, that are
             thinner than a cell and lie between the nodes of the grid.
@@ -81,7 +84,8 @@ def boundary(
         high: Upper corner of the box [m], shape (3,).
         cells: How many cells along the longest side of the box, 2 to 128; the others have as many as keep cells near
             cubes. Or how many along each axis.
-        refine: How many times to halve the step in cells that the boundary passes through; True for once.
+        refine: How many times to halve the step in cells that the boundary passes through, as long as no more than 256
+            cells stand along an axis; True for once.
 
     Returns:
         Boundary.
@@ -94,9 +98,12 @@ def boundary(
     for name, a, b in zip("xyz", *corners, strict=True):
         if not a < b:
             raise InvalidValueError(f"box along {name}", f"{a:g} to {b:g} m", "low < high", "Correct low or high.")
+    numbers = _cells_of(cells, corners[1] - corners[0])
+    most = min(MOST_HALVINGS, (MOST_HALVED // max(numbers)).bit_length() - 1)
+    halvings = whole_number(int(refine) if isinstance(refine, bool) else refine, "refine", 0, most)
     counted = _Counted(level)
-    first = grid = sampled(counted, *corners, _cells_of(cells, corners[1] - corners[0]))
-    for _ in range(whole_number(int(refine) if isinstance(refine, bool) else refine, "refine", 0, 3)):
+    first = grid = sampled(counted, *corners, numbers)
+    for _ in range(halvings):
         grid = refined(grid, counted)
     net, vertices, slope = _placed(net_of(grid.inside), grid, counted)
     surface = Surface(locked(vertices), locked(net.faces))
@@ -109,12 +116,12 @@ def boundary(
 
 
 def _cells_of(cells: int | tuple[int, int, int], size: Array) -> tuple[int, int, int]:
-    """Numbers of cells along each axis; even ones where there are more than one."""
+    """Numbers of cells along each axis."""
     if isinstance(cells, tuple):
         x, y, z = (whole_number(n, "cells", 1, MOST_CELLS) for n in cells)
         return x, y, z
     most = whole_number(cells, "cells", 2, MOST_CELLS)
-    x, y, z = (2 * max(1, round(most * part / 2.0)) for part in (size / size.max()).tolist())
+    x, y, z = (max(1, round(most * part)) for part in (size / size.max()).tolist())
     return x, y, z
 
 
@@ -126,8 +133,8 @@ def _placed(net: Net, grid: Grid, level: Level) -> tuple[Net, Array, Array]:
     share, slope = np.zeros(len(inner)), np.full(len(inner), np.nan)
     share[k] = crossings(level, inner[k], outer[k], at_inner[k], at_outer[k])
     slope[k] = (at_inner[k] - at_outer[k]) / np.linalg.norm(outer[k] - inner[k], axis=1)
-    vertices = inner + share[:, None] * (outer - inner)
-    at_node = share == 0.0
+    at_node = share <= AT_NODE
+    vertices = inner + np.where(at_node, 0.0, share)[:, None] * (outer - inner)
     if not at_node[k].any():
         return net, vertices, slope
     one = merged(net.inner, np.where(at_node[:, None], net.inner, net.outer), net.faces, grid.values.shape)

@@ -12,6 +12,7 @@ from sagline.arrays import Array
 from sagline.workspaces.grid import Level, evaluate
 from sagline.workspaces.surface import Indices
 
+TRIAL = 3  # steps of regula falsi, after which a bracket is to be an eighth
 ROUNDS = 100  # a jump takes some 45, by halving; what is continuous ends after 5 to 8
 
 
@@ -81,7 +82,7 @@ def crossings(
     at_inner: Array,
     at_outer: Array,
     *,
-    precision: float = 1e-11,
+    precision: float = 1e-10,
     narrow: float = 1e-12,
 ) -> Array:
     """Where lines leave the inside of one function: `crossings_of` with the same function for all.
@@ -92,7 +93,7 @@ def crossings(
         outer: The other end, outside [m], shape (V, 3).
         at_inner: The function there, >= 0, shape (V,).
         at_outer: The same at the other ends, < 0.
-        precision: Largest value that is taken for zero, of the difference between the ends.
+        precision: Largest value that is taken for zero, of that at the end where it is smaller.
         narrow: Share of a line to which a jump is found.
 
     Returns:
@@ -112,13 +113,13 @@ def crossings_of(
     at_inner: Array,
     at_outer: Array,
     *,
-    precision: float = 1e-11,
+    precision: float = 1e-10,
     narrow: float = 1e-12,
 ) -> Array:
-    """Where each of V lines leaves the inside, by regula falsi that weighs an end less that stays (Illinois).
+    """Where each of V lines leaves the inside, by regula falsi that weighs an end less that stays.
 
     All lines that are not done are evaluated together, once a round. The bracket of a line is halved where an end is
-    infinite, and where regula falsi has not kept up with halving, as at jumps.
+    infinite, and some times where regula falsi has not kept up with halving, as at jumps.
 
     Args:
         values: The functions of lines, by their indices, at as many positions.
@@ -126,41 +127,69 @@ def crossings_of(
         outer: The other end, outside [m], shape (V, 3).
         at_inner: The function there, >= 0, shape (V,).
         at_outer: The same at the other ends, < 0.
-        precision: Largest value that is taken for zero, of the difference between the ends.
+        precision: Largest value that is taken for zero, of that at the end where it is smaller.
         narrow: Share of a line to which a jump is found.
 
     Returns:
         Share of each line that is inside, from 0 to 1, shape (V,): at a jump, the last that is known to be.
+
+    Source:
+        Anderson & Björck 1973, "A new high order method of regula falsi type" (the weights; the Illinois method's are
+        1/2).
     """
     low, high = np.zeros(len(inner)), np.ones(len(inner))
     at_low, at_high = at_inner.copy(), at_outer.copy()
-    small = precision * (np.where(np.isinf(at_low), 0.0, at_low) - np.where(np.isinf(at_high), 0.0, at_high))
+    small = np.minimum(at_low, -at_high)
+    small = np.where(np.isinf(small), 0.0, precision * small)
     low_stays, high_stays = np.zeros((2, len(inner)), dtype=np.bool_)
-    open_lines = np.flatnonzero(at_low > small)
-    for done in range(ROUNDS):
-        if not len(open_lines):
+    pace = _Pace(len(inner))
+    k = np.flatnonzero(at_low > small)
+    for _ in range(ROUNDS):
+        if not len(k):
             break
-        k = open_lines
-        share = low[k] + _step(at_low[k], at_high[k], high[k] - low[k], done) * (high[k] - low[k])
+        with np.errstate(invalid="ignore"):
+            share = at_low[k] / (at_low[k] - at_high[k])
+        halved = pace.halves(k) | np.isinf(at_low[k]) | np.isinf(at_high[k])
+        share = low[k] + np.where(halved, 0.5, share) * (high[k] - low[k])
         found = values(k, inner[k] + share[:, None] * (outer[k] - inner[k]))
         is_inside = found >= 0.0
-        at_low[k] = np.where(is_inside, found, np.where(low_stays[k], 0.5 * at_low[k], at_low[k]))
-        at_high[k] = np.where(~is_inside, found, np.where(high_stays[k], 0.5 * at_high[k], at_high[k]))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            weight = 1.0 - found / np.where(is_inside, at_low[k], at_high[k])
+        weight = np.where(weight > 0.0, weight, 0.5)
+        at_low[k] = np.where(is_inside, found, np.where(low_stays[k], weight * at_low[k], at_low[k]))
+        at_high[k] = np.where(~is_inside, found, np.where(high_stays[k], weight * at_high[k], at_high[k]))
         low[k], high[k] = np.where(is_inside, share, low[k]), np.where(is_inside, high[k], share)
-        low_stays[k], high_stays[k] = ~is_inside, is_inside
+        low_stays[k], high_stays[k] = ~is_inside & ~halved, is_inside & ~halved
+        pace.judge(k, halved, high[k] - low[k])
         hit = np.abs(found) <= small[k]
         low[k[hit]] = share[hit]
-        open_lines = k[~hit & (high[k] - low[k] > narrow)]
+        k = k[~hit & (high[k] - low[k] > narrow)]
     return low
 
 
-def _step(at_low: Array, at_high: Array, width: Array, done: int) -> Array:
-    """Share of each bracket at which to look next."""
-    with np.errstate(invalid="ignore"):
-        share = at_low / (at_low - at_high)
-    halve = np.isinf(at_low) | np.isinf(at_high) | (width > 4.0 * 0.5**done)
-    steps: Array = np.where(halve, 0.5, share)
-    return steps
+class _Pace:
+    """Which brackets to halve: those that a trial of regula falsi narrows less; each time twice as often."""
+
+    def __init__(self, count: int) -> None:
+        self._width = np.ones(count)  # at the beginning of a trial
+        self._steps, self._due = np.zeros((2, count), dtype=np.int64)
+        self._next = np.ones(count, dtype=np.int64)
+
+    def halves(self, k: Indices) -> NDArray[np.bool_]:
+        """Whether it is the turn of brackets k to be halved."""
+        turn: NDArray[np.bool_] = self._due[k] > 0
+        return turn
+
+    def judge(self, k: Indices, halved: NDArray[np.bool_], width: Array) -> None:
+        """Take note of what a step made of brackets k."""
+        self._due[k] = np.maximum(self._due[k] - halved, 0)
+        self._steps[k] = np.where(halved, 0, self._steps[k] + 1)
+        over = self._steps[k] == TRIAL
+        slow = k[over & (width > self._width[k] * 0.5**TRIAL)]
+        self._due[slow] = self._next[slow]
+        self._next[slow] *= 2
+        self._steps[k[over]] = 0
+        self._width[k] = np.where(over | halved, width, self._width[k])
 
 
 def way_to_box(points: Array, directions: Array, low: Array, high: Array) -> Array:

@@ -20,7 +20,7 @@ from sagline.workspaces.grid import Level, evaluate
 from sagline.workspaces.surface import Indices, Surface
 
 ROUNDS: Final = 100  # of facets that replace one another along a ray: three are usual
-SHARP: Final = 1e-5  # of what the level changes over a bracket, itself a hundredth of a ray and less
+SHARP: Final = 1e-5  # of the level at a bracket's ends, which are a hundredth of a ray apart and less
 CLOSE: Final = 1e-7  # a level that is taken for zero from below
 
 _POLES: Final = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], dtype=np.float64)
@@ -104,7 +104,7 @@ def ray_hull(level: Level, center: ArrayLike, low: ArrayLike, high: ArrayLike, d
         points = origin + start[:, None] * new
         ends = brackets(level, points, new, at_start, step, limit - start, start)
         reached = np.where(at_start >= 0.0, limit, 0.0)
-        reached[ends.k] = _ends(level, origin, new, ends)
+        reached[ends.k] = _ends(level, origin, new, ends, SHARP if len(parents) else SHARP**2)
         directions = np.concatenate([directions, new])
         length, slope = np.concatenate([length, reached]), np.concatenate([slope, _slope(ends)])
     return Surface(locked(origin + length[:, None] * directions), locked(faces))
@@ -166,10 +166,10 @@ def _chords(directions: Array, length: Array, parents: Indices, new: Array) -> A
     return _along(middle[:, None] * directions[parents[:, 0]], new)
 
 
-def _ends(level: Level, origin: Array, directions: Array, ends: Brackets) -> Array:
+def _ends(level: Level, origin: Array, directions: Array, ends: Brackets, precision: float) -> Array:
     """How far along its ray each change of sign is [m]."""
     inner, outer, at_inner, at_outer = (part[ends.k] for part in ends[:4])
-    share = crossings(level, inner, outer, at_inner, at_outer, precision=SHARP)
+    share = crossings(level, inner, outer, at_inner, at_outer, precision=precision)
     return _along(inner + share[:, None] * (outer - inner) - origin, directions[ends.k])
 
 
