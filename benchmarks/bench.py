@@ -13,7 +13,7 @@ import numpy as np
 from rich.console import Console
 
 import sagline as sl
-from benchmarks import c_source, controller, dynamics, experiment, interference, machine, workspaces
+from benchmarks import c_source, controller, design, dynamics, experiment, interference, machine, workspaces
 from benchmarks.formula import algebraic, as_printed
 from benchmarks.links import links
 from benchmarks.measure import (
@@ -185,6 +185,7 @@ def main() -> None:
         *c_source.PARTS,
         *experiment.PARTS,
         *workspaces.PARTS,
+        *design.PARTS,
         *interference.PARTS,
     ):
         Console(stderr=True).print(f"[dim]{part.__doc__}[/dim]")

@@ -24,6 +24,7 @@ T = TypeVar("T")
 # How a caller comes by an object of a kind; every message that misses one ends with it.
 HOW_TO_GET: Final = MappingProxyType(
     {
+        "AnchorErrors": "Give AnchorErrors(deviation), 0.01 m for instance, or None.",
         "Axes": "Make them with matplotlib, or leave ax out.",
         "Axes3D": 'Make them with add_subplot(projection="3d"), or leave ax out.',
         "Box": "Give Box(size, center), in meters.",
@@ -35,7 +36,9 @@ HOW_TO_GET: Final = MappingProxyType(
         "Criterion": "Give one of the criteria, MaximumSag(0.05) for instance.",
         "Damping": "Give Damping(loss_time, air_damping, modal_damping), or None.",
         "Equilibrium": "Take that of a plan or a solution: plan.state.",
+        "Front": 'Make one: design(robot, free, ["workspace_share"]).',
         "FrequencyMap": "Make one: frequency_map(robot, poses, up_to=20.0).",
+        "Goal": 'Give Goal("workspace_share") for instance.',
         "MeasuredTension": "Give MeasuredTension(frame_end_tension, tension_deviation, length_deviation).",
         "Path": "Make one, with quintic_path(waypoints, speed=1.0) for instance.",
         "Plan": "Make one: inverse(robot, motion).",

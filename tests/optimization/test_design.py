@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
+from benchmarks.design import inside, posts
 from tests.optimization.pair import BEST, MARGIN, UNDER, WEIGHT, apart, pair
 
 OPTIMIZERS = {"cma": 1e-6, "differential_evolution": 1e-6, "nsga2": 5e-3}  # and how near 600 robots lead [m]
@@ -144,15 +145,19 @@ def test_a_search_with_moving_anchors_knows_that_they_move() -> None:
     np.testing.assert_allclose(front.best.frame_anchors[0, 0], BEST, atol=1e-2)
 
 
+def test_a_package_that_is_missing_is_named_with_its_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    def gone(module: str) -> None:
+        raise ModuleNotFoundError(f"No module named {module!r}", name=module)
+
+    monkeypatch.setattr("sagline.optimization.extras.import_module", gone)
+    with pytest.raises(sl.InvalidValueError, match=r'the package cma is missing.*pip install "sagline\[design\]"'):
+        search(pair(), [apart()])
+    assert search(pair(), [apart()], optimizer="differential_evolution", evaluations=40).better
+
+
 @pytest.mark.soak
 def test_the_article_s_robot_gets_a_seventh_more_workspace() -> None:
     """Upper and lower cables of each post lower or higher, all posts alike: 600 robots at 315 poses."""
-    edge = 0.3  # m, from the frame
-    box = sl.PoseBox([-7.5 + edge, -5.5 + edge, edge], [7.5 - edge, 5.5 - edge, 6.0 - edge])
-    free = [
-        sl.FreeAnchors("frame", -3.0, 0.0, along=[0, 0, 1], symmetry="together", cables=cables)
-        for cables in ((0, 2, 4, 6), (1, 3, 5, 7))
-    ]
     robot, load = sl.load_robot("article-suspended"), sl.WrenchBox(force=50.0, moment=5.0)
-    front = sl.design(robot, free, ["workspace_share"], load, box=box, evaluations=600)
+    front = sl.design(robot, posts(), ["workspace_share"], load, box=inside(0.3), evaluations=600)
     assert front.values[0, 0] >= 1.07 * front.start_values[0]
