@@ -1,86 +1,152 @@
-"""Proofs for boxes of poses against the exact inverse, and what is refused."""
+"""Proofs for boxes of poses: against the exact inverse, against known volumes, and what is refused."""
 
 from __future__ import annotations
+
+import time
+from typing import Any
 
 import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.arrays import Array
-from sagline.workspaces.proof import PRECISION, Prover
-from sagline.workspaces.wrench_sets import NO_LOAD, load_of
+from tests.workspaces.proved_boxes import contradictions
 
-ROBOTS = ("ipanema-1", "article-suspended", "article-mixed", "cogiro", "falcon-7")
-CORNERS = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
-RANDOM = 8  # poses a box, beside its corners
+INFINITE = {"tension_max": np.inf}
+EXACT, STRAIGHT = sl.Catenary(), sl.Straight()
 
 
-def contradictions(
-    robot: sl.Robot,
-    model: sl.CableModel,
-    count: int,
-    rng: np.random.Generator,
-    *,
-    wrenches: sl.WrenchSet | None = None,
-    precision: tuple[float, float] = PRECISION,
-) -> tuple[int, int, int]:
-    """Random boxes of all sizes; poses looked at inside and outside, and at how many the inverse says otherwise."""
-    low, high = robot.frame_anchors.min(axis=0), robot.frame_anchors.max(axis=0)
-    low = np.minimum(low, [np.inf, np.inf, 0.0])
-    load = load_of(wrenches)
-    prover = Prover(robot, load, model, precision)
-    found: dict[int, list[Array]] = {1: [], 2: []}
-    for edge in np.geomspace(0.02, 0.15, 6) * (high - low).max():
-        half = 0.5 * edge * rng.uniform(0.4, 1.0, 3)
-        middle = rng.uniform(low, high, (count // 6, 3))
-        verdicts = prover.verdicts(middle, half)
-        for box in np.flatnonzero(verdicts):
-            places = np.concatenate([CORNERS, rng.uniform(-1.0, 1.0, (RANDOM, 3))])
-            found[int(verdicts[box])].append(middle[box] + places * half)
-    inside, outside = (np.concatenate(found[kind] or [np.zeros((0, 3))]) for kind in (1, 2))
-    wrong = 0
-    for positions, right in ((inside, sl.PoseStatus.SOLVED), (outside, sl.PoseStatus.INFEASIBLE)):
-        if len(positions):
-            wrench = _one_each(load, len(positions), rng)
-            if right == sl.PoseStatus.INFEASIBLE and load is not NO_LOAD:
-                margin = sl.margin(robot, sl.Pose(positions, np.eye(3)), load, model=model)
-                wrong += int((margin.low > 0.0).sum())
-                continue
-            status = sl.inverse(robot, sl.Pose(positions, np.eye(3)), wrench=wrench, model=model).status
-            wrong += int((status != right).sum())
-    return len(inside), len(outside), wrong
-
-
-def _one_each(load: sl.WrenchSet, count: int, rng: np.random.Generator) -> Array:
-    """Wrenches of a set, half of them at its corners."""
-    wrench = np.tile(load.center, (count, 1))
-    signs = rng.uniform(-1.0, 1.0, (count, len(load.segments)))
-    signs[::2] = np.sign(signs[::2])
-    wrench += signs @ load.segments
-    for matrix in load.ellipsoids:
-        direction = rng.normal(size=(count, 6))
-        wrench += direction / np.linalg.norm(direction, axis=1, keepdims=True) @ matrix.T
-    first = 0
-    for size in load.sizes:
-        wrench += load.corners[first + rng.integers(size, size=count)]
-        first += size
-    return wrench
-
-
-@pytest.mark.parametrize("name", ROBOTS)
-@pytest.mark.parametrize("model", [sl.Straight(), sl.Catenary()], ids=["straight", "catenary"])
+@pytest.mark.parametrize("model", [STRAIGHT, EXACT], ids=["straight", "catenary"])
+@pytest.mark.parametrize("name", ["ipanema-1", "article-suspended", "article-mixed", "falcon-7"])
 def test_no_pose_contradicts_a_proof(name: str, model: sl.CableModel) -> None:
-    rng = np.random.default_rng(14)
-    inside, outside, wrong = contradictions(sl.load_robot(name), model, 90, rng)
+    inside, outside, wrong = contradictions(sl.load_robot(name), 90, np.random.default_rng(14), model=model)
     assert wrong == 0
     assert min(inside, outside) > 50
 
 
-def test_pulleys_tilts_and_too_few_cables_are_refused() -> None:
-    robot, box = sl.load_robot("article-suspended"), sl.PoseBox([0, 0, 2], [1, 1, 3])
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        ("article-suspended", {"tension_limits_of": "frame_end"}),
+        ("article-suspended", INFINITE),
+        ("article-suspended", {"center_of_mass": [0.05, -0.1, 0.1]}),
+        ("article-mixed", {"tension_min": 0.0}),
+        ("cogiro", INFINITE),
+    ],
+)
+def test_nor_with_other_limits(name: str, changes: dict[str, Any]) -> None:
+    robot = sl.load_robot(name).replace(**changes)
+    inside, outside, wrong = contradictions(robot, 180, np.random.default_rng(15))
+    assert wrong == 0
+    assert inside > 50
+    assert outside > 20
+
+
+@pytest.mark.parametrize(
+    ("name", "wrenches"),
+    [
+        ("article-suspended", sl.WrenchBox(force=50.0, moment=5.0)),
+        ("ipanema-1", sl.WrenchEllipsoid(force=30.0, moment=2.0, center=[0, 0, -20, 0, 0, 0])),
+        ("cogiro", sl.WrenchPolytope([[0, 0, 0, 0, 0, 0], [0, 0, -300, 0, 0, 0], [50, 0, -100, 0, 0, 9]])),
+        ("article-suspended", sl.Accelerations(linear=2.0, angular=1.0)),
+    ],
+    ids=["box", "ellipsoid", "polytope", "accelerations"],
+)
+def test_nor_does_any_load_of_a_set(name: str, wrenches: sl.WrenchSet) -> None:
+    inside, outside, wrong = contradictions(sl.load_robot(name), 180, np.random.default_rng(16), wrenches=wrenches)
+    assert wrong == 0
+    assert min(inside, outside) > 50
+
+
+@pytest.mark.parametrize("name", ["article-suspended", "ipanema-3"])
+def test_nor_any_orientation(name: str) -> None:
+    inside, outside, wrong = contradictions(sl.load_robot(name), 300, np.random.default_rng(17), turns=(0.02, 0.1, 0.2))
+    assert wrong == 0
+    assert min(inside, outside) > 50
+
+
+@pytest.mark.parametrize("turns", [(0.0,), (0.1, 0.2)], ids=["level", "turned"])
+def test_without_what_slopes_leave_out_there_are_contradictions(turns: tuple[float, ...]) -> None:
+    rng = np.random.default_rng(5)
+    robot = sl.load_robot("article-suspended")
+    *_, wrong = contradictions(robot, 600, rng, turns=turns, precision=(0.0, 1e-12))
+    assert wrong > 5
+
+
+def test_the_published_workspace_between_its_bounds() -> None:
+    robot = sl.load_robot("ipanema-1").replace(gravity=0.0, tension_min=1.0, tension_max=10.0)
+    box = sl.PoseBox(robot.frame_anchors.min(axis=0), robot.frame_anchors.max(axis=0))
+    proof = sl.prove(robot, box, model=STRAIGHT, budget=60.0, smallest=0.06)
+    assert proof.verdict == sl.ProofVerdict.OPEN
+    assert 8.0 < proof.inside_volume < 9.774 < proof.volume - proof.outside_volume < 12.0
+    assert proof.inside + proof.outside + proof.open == pytest.approx(1.0, abs=1e-12)
+    sizes = (proof.cells.high - proof.cells.low).prod(axis=1)
+    assert sizes.sum() == pytest.approx(24.0, rel=1e-12)
+    assert proof.inside_volume == pytest.approx(sizes[proof.cells.verdict == 1].sum(), rel=1e-9)
+    assert "inside" in str(proof)
+    assert f"{proof.tried:,} boxes" in str(proof)
+
+
+def test_small_boxes_are_proved_at_once() -> None:
+    robot = sl.load_robot("article-suspended")
+    inside = sl.prove(robot, sl.PoseBox([-1, -1, 2], [1, 1, 3]), sl.WrenchBox(force=10.0, moment=1.0))
+    assert (inside.verdict, inside.inside) == (sl.ProofVerdict.PROVED_INSIDE, 1.0)
+    above = sl.prove(robot, sl.PoseBox([-1, -1, 6.5], [1, 1, 7.0]))
+    assert (above.verdict, above.outside) == (sl.ProofVerdict.PROVED_OUTSIDE, 1.0)
+    point = sl.prove(robot, sl.PoseBox([0, 0, 2], [0, 0, 2]))
+    assert (point.verdict, point.volume, point.tried) == (sl.ProofVerdict.PROVED_INSIDE, 0.0, 1)
+    flat = sl.prove(robot, sl.PoseBox([-1, -1, 2], [1, 1, 2]))
+    assert (flat.verdict, flat.volume) == (sl.ProofVerdict.PROVED_INSIDE, 0.0)
+    assert sl.prove(robot, sl.PoseBox([-1, -1, 2], [1, 1, 3], tilt=0.05)).verdict == sl.ProofVerdict.PROVED_INSIDE
+    tilted = sl.prove(sl.load_robot("cogiro"), sl.PoseBox([-0.1, -0.1, 2], [0.1, 0.1, 2.1], tilt=1.5))
+    assert tilted.verdict == sl.ProofVerdict.PROVED_OUTSIDE
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.1])
+def test_the_budget_ends_in_open_cells(tilt: float) -> None:
+    robot = sl.load_robot("cogiro")
+    began = time.monotonic()
+    proof = sl.prove(robot, sl.PoseBox([-8, -6, 0], [8, 6, 5], tilt=tilt), budget=0.2)
+    assert time.monotonic() - began < 1.5
+    assert proof.verdict == sl.ProofVerdict.OPEN
+    assert proof.open > 0.01
+
+
+def test_progress_is_told_and_may_interrupt() -> None:
+    robot, box = sl.load_robot("cogiro"), sl.PoseBox([-8, -6, 0], [8, 6, 5])
+    told: list[tuple[int, int]] = []
+
+    def progress(done: int, known: int) -> None:
+        told.append((done, known))
+        if done > 2000:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        sl.prove(robot, box, progress=progress)
+    assert told[-1][0] > 2000
+    assert all(done <= known for done, known in told)
+
+
+def test_what_proofs_do_not_know_is_refused() -> None:
+    robot, box = sl.load_robot("article-suspended"), sl.PoseBox([0, 0, 2], [1, 1, 3], tilt=0.1)
     with pytest.raises(sl.InvalidValueError, match="pulley_radius"):
         sl.prove(sl.load_robot("ipanema-2-pulleys"), box)
-    with pytest.raises(sl.InvalidValueError, match="tilt"):
-        sl.prove(robot, sl.PoseBox([0, 0, 2], [1, 1, 3], tilt=0.1))
     with pytest.raises(sl.InvalidValueError, match="number of cables"):
         sl.prove(sl.without_cables(robot, 0, 1, 2), box)
+    with pytest.raises(sl.InvalidValueError, match="angular"):
+        sl.prove(robot, box, sl.Accelerations(angular=1.0))
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("seed", range(4))
+def test_a_million_poses_contradict_no_proof(seed: int) -> None:
+    rng = np.random.default_rng(100 + seed)
+    total = 0
+    robots = [sl.load_robot(name) for name in sl.robot_names()]
+    for robot in robots:
+        bare = robot.replace(winches=None) if robot.winches is not None else robot
+        for model in (STRAIGHT, EXACT):
+            for wrenches in (None, sl.WrenchBox(force=0.05 * robot.mass * 9.81)):
+                inside, outside, wrong = contradictions(bare, 1200, rng, model=model, wrenches=wrenches)
+                assert wrong == 0, (robot.name, model)
+                total += inside + outside
+    assert total > 250_000

@@ -9,7 +9,6 @@ from sagline.status import Status
 class ProofVerdict(Status):
     """What is proved of a box of poses, or of a part of one."""
 
-    OPEN = OPEN, "not decided, or only in part: see the shares; a longer budget proves more"
+    OPEN = OPEN, "neither is proved of all of the box: see the shares; a longer budget decides more"
     PROVED_INSIDE = INSIDE, "at every pose every load is balanced by tensions within the limits"
-    PROVED_OUTSIDE = OUTSIDE, "at no pose is every load balanced by tensions within the limits"
-    PROVED_DIVIDED = 3, "decided everywhere: at some poses every load is balanced, at others not"
+    PROVED_OUTSIDE = OUTSIDE, "at no position is every load balanced by tensions within the limits"

@@ -1,0 +1,66 @@
+"""What bounds the change of a pull, against the pulls of random cables, one by one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from sagline.kernels.cable.terms import Chord, Material, Model
+from sagline.kernels.workspaces import pull_bounds
+from tests.kernels.cable.curves import GRAVITY, from_tension, random_curves
+from tests.kernels.compiled import from_python
+
+fall, rise = from_python(pull_bounds.fall), from_python(pull_bounds.rise)
+fall_rate, rise_rate = from_python(pull_bounds.fall_rate), from_python(pull_bounds.rise_rate)
+pull_slope, most_pull = from_python(pull_bounds.pull_slope), from_python(pull_bounds.most_pull)
+MODEL = Model(4, 0.0, 0.0, GRAVITY)
+
+
+def test_tensions() -> None:
+    rng = np.random.default_rng(1)
+    tightest = 0.0
+    for _ in range(100):
+        curves = random_curves(rng, 8)
+        cables: Any = curves.cables
+        for i in range(8):
+            low = max(cables.low[i], cables.half_weight[i] / pull_bounds.LOOSEST)
+            high = low * 10 ** rng.uniform(0.01, 2)
+            pulls = [_pull(cables, i, tau) for tau in (low, high, low * 1.0001)]
+            tiny = 1e-12 * low
+            assert -rise(curves, i, low, high) - tiny <= pulls[0] - pulls[1] <= fall(curves, i, low, high) + tiny
+            assert pulls[0] <= most_pull(curves, i, low) + tiny
+            change = (pulls[0] - pulls[2]) / (1e-4 * low)
+            assert -rise_rate(curves, i, low) - 1e-8 <= change <= fall_rate(curves, i, low) + 1e-8
+            tightest = max(tightest, (pulls[0] - pulls[1]) / fall(curves, i, low, high))
+    assert tightest > 0.99  # and not larger than need be
+
+
+def test_positions() -> None:
+    rng = np.random.default_rng(2)
+    tightest = 0.0
+    for _ in range(100):
+        curves = random_curves(rng, 8)
+        cables: Any = curves.cables
+        for i in range(8):
+            chord, sine, cosine = cables.chord[i], cables.sine[i], cables.cosine[i]
+            tau = max(cables.low[i], cables.half_weight[i] / pull_bounds.LOOSEST)
+            step = rng.normal(size=2)
+            step *= chord * 10 ** rng.uniform(-4, -0.5) / np.linalg.norm(step)
+            span, height = chord * cosine + step[0], chord * sine + step[1]
+            if span <= 0.0:
+                continue
+            way, there = float(np.hypot(*step)), float(np.hypot(span, height))
+            material = Material(float(cables.density[i]), float(cables.stiffness[i]))
+            moved = from_tension(MODEL, Chord(there, height / there, span / there), material, float(tau))[1]
+            change = abs(moved - _pull(cables, i, tau))
+            most = way * pull_slope(curves, i, way, tau)
+            assert change <= most + 1e-12 * tau
+            tightest = max(tightest, change / most)
+    assert tightest > 0.95
+
+
+def _pull(cables: Any, i: int, tau: float) -> float:
+    chord = Chord(float(cables.chord[i]), float(cables.sine[i]), float(cables.cosine[i]))
+    material = Material(float(cables.density[i]), float(cables.stiffness[i]))
+    return float(from_tension(MODEL, chord, material, float(tau))[1])
