@@ -35,7 +35,7 @@ class Boundary(Result):
             boundary to 1e-10 of a cell.
         volume: Of the set within the box [m^3]: that of the surface, and of what bulges between its vertices.
         volume_error: By how much the volume can be wrong [m^3], but for parts of the set, and gaps in it, that are
-            thinner than a cell and lie between the nodes of the grid.
+            thinner than two cells of the finest grid.
         grid: The function at the nodes of the grid, before cells were halved.
         components: The separate pieces of the set.
         open_faces: Faces of the box that the set reaches, "x low" for instance: it may go on beyond them.
