@@ -39,7 +39,8 @@ class Facets(NamedTuple):
     """Where the walk over the facets is.
 
     Attributes:
-        table: A row for each column of the basis: along the m columns, and in world axes, (n, m + 6).
+        table: A row for each column of the basis: along the m columns, in world axes, and the sum of the absolute
+            components, moments times the lever arm, (n, m + 7).
         others: The columns that are not in the basis along its rows, each with a largest entry of 1, (r, n).
         minors: Of the present subset and its beginnings, by sets of rows, (n, 2^n).
         basis: The column of each row, (n,).
@@ -56,7 +57,7 @@ class Facets(NamedTuple):
 @glue
 def new_facets(memory: Memory, n: int, m: int) -> tuple[Facets, Memory]:
     """Room for n free motions and m cables, and the memory that is left."""
-    table, at = block(memory.numbers, 0, n, m + 6)
+    table, at = block(memory.numbers, 0, n, m + 7)
     others, at = block(memory.numbers, at, m - n, n)
     minors, at = block(memory.numbers, at, n, 1 << n)
     basis, used = counters(memory, 0, n)
@@ -65,7 +66,7 @@ def new_facets(memory: Memory, n: int, m: int) -> tuple[Facets, Memory]:
 
 
 @glue
-def choose_basis(facets: Facets, n: int, m: int) -> bool:
+def choose_basis(facets: Facets, n: int, m: int, lever: float) -> bool:
     """Eliminate in place, and fill basis and others; False where rank is lost."""
     table, basis = facets.table, facets.basis
     first = 0.0
@@ -87,6 +88,9 @@ def choose_basis(facets: Facets, n: int, m: int) -> bool:
             if j != k:
                 subtract(table[j], table[j, column], table[k])
                 table[j, column] = 0.0
+    for k in range(n):
+        for a in range(6):
+            table[k, m + 6] += abs(table[k, m + a]) * (1.0 if a < 3 else lever)
     count = 0
     for i in range(m):
         inside = False

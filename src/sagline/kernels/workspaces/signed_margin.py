@@ -72,15 +72,20 @@ COUNT_ROWS = 11
 
 ENDS, RANGES = 0, 1  # rows of the points
 
-# Rows of facets that are measured together (FACET_ROWS, TOGETHER).
-NORMAL = 0  # six rows
-ROUNDING = 6
-BY_ENDS, BY_TENSIONS, BY_PULLS = 7, 8, 9  # what the cables give to either side of the points
-AGAINST, FOR = 10, 11  # how far the set reaches
-UP, DOWN = 12, 13  # the most that a cable without limit counts to either side
-WORK = 14  # two rows
-FACET_ROWS = 16
+# Facets that are measured together: rows in flat memory, whose places are known when it is compiled, so that loops
+# over facets vectorize.
 TOGETHER = 32
+NORMAL = 0  # six rows
+ROUNDING = 6 * TOGETHER
+BY_ENDS, BY_TENSIONS, BY_PULLS = 7 * TOGETHER, 8 * TOGETHER, 9 * TOGETHER  # what the cables give about the points
+AGAINST, FOR = 10 * TOGETHER, 11 * TOGETHER  # how far the set reaches to either side
+UP, DOWN = 12 * TOGETHER, 13 * TOGETHER  # the most that a cable without limit counts to either side
+WORK = 14 * TOGETHER  # two rows
+LENGTH = 16 * TOGETHER  # the inverse of the normal's
+MARGINS = 17 * TOGETHER  # three rows: VALUE, BELOW, ABOVE
+FACET_SIZE = 20 * TOGETHER
+AS_GOOD_AS_INFINITE = 1e250
+BEYOND = 1e300  # for the inverse of no length at all: what is multiplied by it is as good as infinite
 
 VALUE, BELOW, ABOVE = 0, 1, 2  # rows of the margins (3, N) [N]
 
@@ -152,7 +157,7 @@ def signed_margins(
     rotation, at = block(rest.numbers, 0, 3, 3)
     found, at = block(rest.numbers, at, 1, 3)
     points, at = block(rest.numbers, at, 2, 6)
-    measured, at = block(rest.numbers, at, FACET_ROWS, TOGETHER)
+    measured, at = block(rest.numbers, at, 1, FACET_SIZE)
     rows, at = block(rest.numbers, at, g.GEOMETRY_ROWS + BAND_ROWS + COUNT_ROWS, m)
     rest = Memory(rest.numbers[at:], rest.counters)
     geometry, bands = rows[: g.GEOMETRY_ROWS], rows[g.GEOMETRY_ROWS : g.GEOMETRY_ROWS + BAND_ROWS]
@@ -171,7 +176,7 @@ def signed_margins(
         fill_structure_matrix(geometry, counted[COLUMN:])
         lever = arms[1][p * arms[1].size // count]
         first_table(freedom, counted[COLUMN:], lever, facets.table)
-        if not choose_basis(facets, n, m):
+        if not choose_basis(facets, n, m, lever):
             statuses[p] = MARGIN_SINGULAR
             continue
         curves, left = new_curves(model, cables, room[2], rest)
@@ -181,7 +186,7 @@ def signed_margins(
         place_set(set_terms, body, inertias[p * inertias.shape[0] // count], rotation, wrenches)
         endless = fill_count(body, set_terms[0], geometry, bands, counted, points)
         counts = Count(counted, points, bands[HIGH], endless, arms[0][p * arms[0].size // count], lever)
-        walk(facets, n, m, counts, wrenches, measured, found[0], directions[p])
+        walk(facets, n, m, counts, wrenches, measured[0], found[0], directions[p])
         for k in range(3):
             values[k, p] = found[0, k]
         limiting[p] = steepest(counts, directions[p]) if found[0, VALUE] < math.inf else -1
@@ -199,6 +204,7 @@ def first_table(freedom: Array, full: Array, lever: float, table: Array) -> None
             table[k, i] *= unit
         for a in range(6):
             table[k, m + a] = freedom[k, a] * unit
+        table[k, m + 6] = 0.0
 
 
 @glue
@@ -253,7 +259,7 @@ def walk(
     held = 0
     for _ in range(LIMIT):
         for s in range(START[n, depth + 1], START[n, depth + 2]):
-            if add_normal(facets, depth, ORDER[n, s], m, counts.lever, measured, held):
+            if add_normal(facets, depth, ORDER[n, s], m, measured, held):
                 held += 1
             if held == TOGETHER:
                 measure(counts, wrenches, held, measured, margin, direction)
@@ -262,12 +268,17 @@ def walk(
         if depth < 0:
             break
     measure(counts, wrenches, held, measured, margin, direction)
+    margin[BELOW] = min(margin[BELOW], margin[VALUE])  # but for rounding they are
+    margin[ABOVE] = max(margin[ABOVE], margin[VALUE])
+    for k in range(3):
+        if abs(margin[k]) >= AS_GOOD_AS_INFINITE:
+            margin[k] = math.copysign(math.inf, margin[k])
 
 
 @formula
-def add_normal(facets: Facets, depth: int, rows: int, m: int, lever: float, measured: Array, b: int) -> bool:
+def add_normal(facets: Facets, depth: int, rows: int, m: int, measured: Array, b: int) -> bool:
     """Fill the normal that a set of rows, one more than the present subset has columns, makes; False for none."""
-    table, minors = facets.table, facets.minors[depth]
+    minors = facets.minors[depth]
     x = y = z = u = v = w = 0.0
     sign = 1.0
     largest = 0.0
@@ -276,24 +287,22 @@ def add_normal(facets: Facets, depth: int, rows: int, m: int, lever: float, meas
         k = MEMBERS[rows, j]
         factor = sign * minors[rows ^ (1 << k)]
         sign = -sign
-        row = table[k, m:]
-        largest = max(largest, abs(factor))
-        rounding += abs(factor) * (
-            abs(row[0]) + abs(row[1]) + abs(row[2]) + lever * (abs(row[3]) + abs(row[4]) + abs(row[5]))
-        )
+        row = facets.table[k, m:]
         x += factor * row[0]
         y += factor * row[1]
         z += factor * row[2]
         u += factor * row[3]
         v += factor * row[4]
         w += factor * row[5]
-    measured[NORMAL, b] = x
-    measured[NORMAL + 1, b] = y
-    measured[NORMAL + 2, b] = z
-    measured[NORMAL + 3, b] = u
-    measured[NORMAL + 4, b] = v
-    measured[NORMAL + 5, b] = w
-    measured[ROUNDING, b] = rounding
+        rounding += abs(factor) * row[6]
+        largest = max(largest, abs(factor))
+    measured[NORMAL + b] = x
+    measured[NORMAL + TOGETHER + b] = y
+    measured[NORMAL + 2 * TOGETHER + b] = z
+    measured[NORMAL + 3 * TOGETHER + b] = u
+    measured[NORMAL + 4 * TOGETHER + b] = v
+    measured[NORMAL + 5 * TOGETHER + b] = w
+    measured[ROUNDING + b] = rounding
     return largest > DEPENDENT
 
 
@@ -301,32 +310,25 @@ def add_normal(facets: Facets, depth: int, rows: int, m: int, lever: float, meas
 def measure(counts: Count, wrenches: WrenchSet, held: int, measured: Array, margin: Array, direction: Array) -> None:
     """Let both sides of the facets held lower the margin (3,), and its normal (6,)."""
     sum_cables(counts, held, measured)
-    reach(wrenches, measured[NORMAL : NORMAL + 6], held, measured[WORK:], measured[AGAINST], measured[FOR])
+    normals, work = measured[: 6 * TOGETHER].reshape((6, TOGETHER)), measured[WORK : WORK + 2 * TOGETHER]
+    reach(wrenches, normals, held, work.reshape((2, TOGETHER)), measured[AGAINST:], measured[FOR:])
+    if counts.endless:
+        for b in range(held):
+            if measured[UP + b] > ALONG * measured[ROUNDING + b]:
+                measured[AGAINST + b] = -math.inf
+            if measured[DOWN + b] > ALONG * measured[ROUNDING + b]:
+                measured[FOR + b] = -math.inf
+    measure_lengths(counts, held, measured)
+    measure_sides(counts.points, held, measured)
+    best = -1
     for b in range(held):
-        y = measured[:6, b]
-        force = y[0] * y[0] + y[1] * y[1] + y[2] * y[2]
-        moment = y[3] * y[3] + y[4] * y[4] + y[5] * y[5]
-        length = math.sqrt(force + counts.arm * counts.arm * moment)
-        pure = counts.arm == 0.0 and not force > PURE * PURE * (force + counts.lever * counts.lever * moment)
-        inverse = math.inf if pure else 1.0 / length
-        ends = ranges = 0.0
-        for k in range(6):
-            ends += counts.points[ENDS, k] * y[k]
-            ranges += counts.points[RANGES, k] * y[k]
-        small = ALONG * measured[ROUNDING, b]
-        for side in range(2):
-            sign = 1.0 if side == 0 else -1.0
-            if counts.endless and measured[UP if side == 0 else DOWN, b] > small:
-                continue
-            demand = measured[AGAINST if side == 0 else FOR, b]
-            value = over(measured[BY_ENDS, b] + sign * ends - demand, inverse)
-            middle = measured[BY_TENSIONS, b] + sign * ranges - demand
-            margin[BELOW] = min(margin[BELOW], over(middle - measured[BY_PULLS, b], inverse))
-            margin[ABOVE] = min(margin[ABOVE], over(middle + measured[BY_PULLS, b], inverse))
-            if value < margin[VALUE]:
-                margin[VALUE] = value
-                for k in range(6):
-                    direction[k] = sign * y[k] * (1.0 / math.sqrt(moment) if pure else inverse)
+        if measured[MARGINS + b] < margin[VALUE]:
+            margin[VALUE] = measured[MARGINS + b]
+            best = b
+        margin[BELOW] = min(margin[BELOW], measured[MARGINS + TOGETHER + b])
+        margin[ABOVE] = min(margin[ABOVE], measured[MARGINS + 2 * TOGETHER + b])
+    if best >= 0:
+        write_normal(counts, measured, normals, best, direction)
 
 
 @glue
@@ -334,31 +336,81 @@ def sum_cables(counts: Count, held: int, measured: Array) -> None:
     """Fill what the cables give to either side of the points along the normals held."""
     rows = counts.rows
     for b in range(held):
-        measured[BY_ENDS, b] = measured[BY_TENSIONS, b] = measured[BY_PULLS, b] = 0.0
-        measured[UP, b] = measured[DOWN, b] = 0.0
+        measured[BY_ENDS + b] = measured[BY_TENSIONS + b] = measured[BY_PULLS + b] = 0.0
+        measured[UP + b] = measured[DOWN + b] = 0.0
     for i in range(rows.shape[1]):
         width, slope, unsure = rows[WIDTH, i], rows[SLOPE, i], rows[UNSURE, i]
         x, y = rows[LEVER_X, i], rows[LEVER_Y, i]
         j0, j1, j2 = rows[COLUMN, i], rows[COLUMN + 1, i], rows[COLUMN + 2, i]
         j3, j4, j5 = rows[COLUMN + 3, i], rows[COLUMN + 4, i], rows[COLUMN + 5, i]
         for b in range(held):
+            vertical, about_x, about_y = (
+                measured[2 * TOGETHER + b], measured[3 * TOGETHER + b], measured[4 * TOGETHER + b]
+            )  # fmt: skip
             along = (
-                j0 * measured[NORMAL, b]
-                + j1 * measured[NORMAL + 1, b]
-                + j2 * measured[NORMAL + 2, b]
-                + j3 * measured[NORMAL + 3, b]
-                + j4 * measured[NORMAL + 4, b]
-                + j5 * measured[NORMAL + 5, b]
+                j0 * measured[b]
+                + j1 * measured[TOGETHER + b]
+                + j2 * vertical
+                + j3 * about_x
+                + j4 * about_y
+                + j5 * measured[5 * TOGETHER + b]
             )
-            hanging = measured[NORMAL + 2, b] + y * measured[NORMAL + 3, b] - x * measured[NORMAL + 4, b]
-            measured[BY_ENDS, b] += abs(along * width - hanging * slope)
-            measured[BY_TENSIONS, b] += abs(along) * width
-            measured[BY_PULLS, b] += abs(hanging) * unsure
-            measured[WORK, b] = along
+            hanging = vertical + y * about_x - x * about_y
+            measured[BY_ENDS + b] += abs(along * width - hanging * slope)
+            measured[BY_TENSIONS + b] += abs(along) * width
+            measured[BY_PULLS + b] += abs(hanging) * unsure
+            measured[WORK + b] = along
         if counts.high[i] == math.inf:
             for b in range(held):
-                measured[UP, b] = max(measured[UP, b], measured[WORK, b])
-                measured[DOWN, b] = max(measured[DOWN, b], -measured[WORK, b])
+                measured[UP + b] = max(measured[UP + b], measured[WORK + b])
+                measured[DOWN + b] = max(measured[DOWN + b], -measured[WORK + b])
+
+
+@glue
+def measure_lengths(counts: Count, held: int, measured: Array) -> None:
+    """Fill the inverse lengths of the normals held."""
+    arm, lever = counts.arm * counts.arm, counts.lever * counts.lever
+    for b in range(held):
+        x, y, z = measured[b], measured[TOGETHER + b], measured[2 * TOGETHER + b]
+        u, v, w = measured[3 * TOGETHER + b], measured[4 * TOGETHER + b], measured[5 * TOGETHER + b]
+        force, moment = x * x + y * y + z * z, u * u + v * v + w * w
+        pure = arm == 0.0 and not force > PURE * PURE * (force + lever * moment)
+        measured[LENGTH + b] = BEYOND if pure else 1.0 / math.sqrt(force + arm * moment)
+
+
+@glue
+def measure_sides(points: Array, held: int, measured: Array) -> None:
+    """Fill the margins to the nearer sides of the facets held."""
+    e0, e1, e2 = points[ENDS, 0], points[ENDS, 1], points[ENDS, 2]
+    e3, e4, e5 = points[ENDS, 3], points[ENDS, 4], points[ENDS, 5]
+    r0, r1, r2 = points[RANGES, 0], points[RANGES, 1], points[RANGES, 2]
+    r3, r4, r5 = points[RANGES, 3], points[RANGES, 4], points[RANGES, 5]
+    for b in range(held):
+        x, y, z = measured[b], measured[TOGETHER + b], measured[2 * TOGETHER + b]
+        u, v, w = measured[3 * TOGETHER + b], measured[4 * TOGETHER + b], measured[5 * TOGETHER + b]
+        ends = e0 * x + e1 * y + e2 * z + e3 * u + e4 * v + e5 * w
+        ranges = r0 * x + r1 * y + r2 * z + r3 * u + r4 * v + r5 * w
+        against, other = measured[AGAINST + b], measured[FOR + b]
+        inverse = measured[LENGTH + b]
+        spare = measured[BY_TENSIONS + b] + min(ranges - against, -ranges - other)
+        measured[MARGINS + b] = (measured[BY_ENDS + b] + min(ends - against, -ends - other)) * inverse
+        measured[MARGINS + TOGETHER + b] = (spare - measured[BY_PULLS + b]) * inverse
+        measured[MARGINS + 2 * TOGETHER + b] = (spare + measured[BY_PULLS + b]) * inverse
+
+
+@glue
+def write_normal(counts: Count, measured: Array, normals: Array, b: int, direction: Array) -> None:
+    """Fill the normal of one of the facets held, to its nearer side and of length 1, (6,)."""
+    along = 0.0
+    moment = 0.0
+    for k in range(6):
+        along += counts.points[ENDS, k] * normals[k, b]
+        moment += normals[k, b] * normals[k, b] if k >= 3 else 0.0
+    forward = along - measured[AGAINST + b] <= -along - measured[FOR + b]
+    pure = measured[LENGTH + b] == BEYOND
+    size = 1.0 / math.sqrt(moment) if pure else measured[LENGTH + b]
+    for k in range(6):
+        direction[k] = 0.0 if pure and k < 3 else normals[k, b] * (size if forward else -size)
 
 
 @glue
@@ -382,11 +434,3 @@ def status_of(margin: Array) -> int:
     if margin[BELOW] >= 0.0:
         return MARGIN_FEASIBLE
     return MARGIN_INFEASIBLE if margin[ABOVE] < 0.0 else MARGIN_OPEN
-
-
-@glue
-def over(spare: float, inverse: float) -> float:
-    """A distance from what is spare along a normal; infinite, or nothing at all, where it has no force part."""
-    if inverse < math.inf:
-        return spare * inverse
-    return -math.inf if spare < 0.0 else math.inf
