@@ -71,6 +71,11 @@ controller = sl.control.Controller(prototype, sl.twin.Machine(prototype, seed=1)
 controller.connect()
 controller.home(home)
 done = controller.go_to(sl.Pose([0.2, -0.4, 1.4], np.eye(3)))
+loads = sl.WrenchBox(force=50.0, moment=5.0)
+space = sl.workspace(robot, wrenches=loads, cells=24)
+posts = sl.FreeAnchors("frame", -1.0, 1.0, along=[0, 0, 1], symmetry="xy")
+goals = [sl.Goal("mean_margin"), sl.Goal("largest_tension")]
+better = sl.design(robot, [posts], goals, loads, grid=(3, 3, 3), evaluations=300, optimizer="nsga2")
 """
 FIGURES = {  # function of `sl.plot` -> a call that draws
     "energy": "energy(broken)",
@@ -79,6 +84,7 @@ FIGURES = {  # function of `sl.plot` -> a call that draws
     "execution": "execution(done)",
     "frequencies": "frequencies(along, path.time[::20])",
     "frequency_map": "frequency_map(found)",
+    "front": "front(better)",
     "lengths": "lengths(proof.plan)",
     "measured_tensions": "measured_tensions(done)",
     "mendable_tensions": "mendable_tensions(done)",
@@ -88,9 +94,11 @@ FIGURES = {  # function of `sl.plot` -> a call that draws
     "polygon": "polygon(shape, chosen)",
     "response": "response(swings)",
     "robot": "robot(robot, pose)",
+    "slice": 'slice(space, "z", at=2.0)',
     "states": "states(done)",
     "tensions": "tensions(proof.plan)",
     "velocity": "velocity(path)",
+    "workspace": "workspace(space)",
 }
 LOADED = re.compile(
     r"""<(?:script|img|iframe|source|video|audio)\b[^>]*\bsrc(?:set)?=["']?(?:https?:)?//|<link\b[^>]*\brel=["']?"""

@@ -585,6 +585,16 @@ def _workspaces(given: _Given) -> dict[str, Call]:
         "Components.label": Call(space.components.label, _all(position=("array", [0.0, 0.0, 1.5]))),
         "Surface.export": Call(space.surface.export, _all(file=("file", given.folder / "hull.stl"))),
         "Workspace.save": Call(space.save, _all(file=("file", given.folder / "saved.nc"))),
+        "plot.workspace": Call(lambda **a: (sl.plot.workspace(**a), None)[1], _all(space=("one", space))),
+        "plot.slice": Call(
+            lambda **a: (sl.plot.slice(**a), None)[1],
+            _all(
+                space=("one", space),
+                normal=("word", "z"),
+                at=("number", 2.0, True),
+                ax=("ax", Figure().add_subplot(), True),
+            ),
+        ),
         "load_workspace": Call(sl.load_workspace, _all(file=("file", given.folder / "workspace.nc"))),
         "prove": Call(
             sl.prove,
@@ -650,6 +660,7 @@ def _designs(given: _Given) -> dict[str, Call]:
             sl.FreeLimit, _all(which=("word", "tension_min"), low=("number", 8.0), high=("number", 1024.0))
         ),
         "Goal": Call(sl.Goal, _all(kind=("word", "cable_cost"), weight=("number", 2.0), scale=("number", 64.0, True))),
+        "plot.front": Call(lambda **a: (sl.plot.front(**a), None)[1], _all(front=("one", front))),
         "Front.save": Call(partial(front.save, given.folder / "front"), {}),
         "design": Call(
             sl.design,

@@ -73,9 +73,9 @@ def test_readings_come_one_after_the_other(side: type[FakeSide], monkeypatch: py
 
     monkeypatch.setattr(side, "said", said, raising=False)
     readings = Readings()
-    assert [readings.ready(each) for each in Reading] == [False, False, True, True, True, True]
+    assert [readings.ready(each) for each in Reading] == [False, False, *[True] * 5]
     with readings.compiled_beside(viewer):  # type: ignore[arg-type]
-        for count, expected in ((1, [True, False, *[True] * 4]), (2, [True] * 6)):
+        for count, expected in ((1, [True, False, *[True] * 5]), (2, [True] * 7)):
             steps.release()
             while viewer.refreshed < count:
                 threading.Event().wait(0.001)

@@ -8,7 +8,18 @@ from contextlib import contextmanager, suppress
 
 from sagline.cli.cold_start import Side, cold, cores
 from sagline.cli.compiling import Stage, first_run_text, heard
-from sagline.cli.entries import ANSWERS, ENTRIES, FORWARD, MARGINS, MODES, POLYGON, SIMULATION, VERDICTS, VIBRATION
+from sagline.cli.entries import (
+    ANSWERS,
+    ENTRIES,
+    FORWARD,
+    MARGINS,
+    MODES,
+    POLYGON,
+    SIGNED_MARGINS,
+    SIMULATION,
+    VERDICTS,
+    VIBRATION,
+)
 from sagline.viewer.viewer import Reading, Viewer
 
 ENTRY_OF = {
@@ -18,8 +29,19 @@ ENTRY_OF = {
     Reading.REST: FORWARD,
     Reading.MODES: ANSWERS,  # the modes, and the response
     Reading.SIMULATION: SIMULATION,
+    Reading.WORKSPACE: SIGNED_MARGINS,
 }
-ORDER = (MARGINS, POLYGON, VIBRATION, VERDICTS, MODES, ANSWERS, FORWARD, SIMULATION)  # as they are looked at
+ORDER = (
+    MARGINS,
+    POLYGON,
+    VIBRATION,
+    VERDICTS,
+    MODES,
+    ANSWERS,
+    FORWARD,
+    SIGNED_MARGINS,
+    SIMULATION,
+)  # as they are looked at
 PATIENCE = 5.0  # s: how long the end may wait for a compilation
 
 

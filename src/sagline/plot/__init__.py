@@ -10,12 +10,15 @@ from sagline.plot.errors import error, errors
 from sagline.plot.execution import execution, measured_tensions, mendable_tensions, place_errors, states
 from sagline.plot.film import film
 from sagline.plot.frequencies import frequencies
+from sagline.plot.front import front
 from sagline.plot.maps import frequency_map
 from sagline.plot.motion import path, velocity
 from sagline.plot.polygon import polygon
 from sagline.plot.response import response
 from sagline.plot.robot import robot
 from sagline.plot.sheet import save
+from sagline.plot.slice import slice
+from sagline.plot.workspace import workspace
 
 __all__ = [
     "energy",
@@ -25,6 +28,7 @@ __all__ = [
     "film",
     "frequencies",
     "frequency_map",
+    "front",
     "lengths",
     "measured_tensions",
     "mendable_tensions",
@@ -35,7 +39,9 @@ __all__ = [
     "response",
     "robot",
     "save",
+    "slice",
     "states",
     "tensions",
     "velocity",
+    "workspace",
 ]

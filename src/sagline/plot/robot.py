@@ -62,12 +62,33 @@ def robot(robot: Robot, pose: Pose | None = None, ax: Axes3D | None = None) -> A
     optional(ax, Axes3D, "ax")
     if ax is None:
         ax = sheet(height=4.0, width=5.6).add_subplot(projection="3d")
+    plan, points = draw_robot(ax, robot, where)
+    dress_space(
+        ax, points, robot.name if plan.feasible else f"{robot.name}: no tensions within the limits carry it here"
+    )
+    if plan.feasible:
+        _tension_bar(ax, TensionScale.of(robot), plan.chord_tension)
+    return ax
+
+
+def draw_robot(ax: Axes3D, robot: Robot, where: Pose, color: str | None = None) -> tuple[Plan, Array]:
+    """Frame, platform, cables and ground, without labels of the axes.
+
+    Args:
+        ax: Axes to draw on.
+        robot: The robot.
+        where: Where the platform is.
+        color: Of all cables; None for that of their tensions.
+
+    Returns:
+        What carries the platform, and points that stand for what is drawn [m], shape (n, 3).
+    """
     ax.computed_zorder = False  # by the middles of things, which puts the ground over what stands on it
     plan, courses = _cable_lines(robot, where)
-    scale = TensionScale.of(robot)
-    colors = scale.colors(plan.chord_tension) / 255.0  # gray where there is no tension
-    for line, color in zip(courses, colors, strict=True):
-        ax.plot(*line.T, color=color, linewidth=1.4, linestyle="-" if plan.feasible else (0, (3.0, 2.0)), zorder=2.0)
+    colors = TensionScale.of(robot).colors(plan.chord_tension) / 255.0  # gray where there is no tension
+    for line, own in zip(courses, colors, strict=True):
+        style = "-" if plan.feasible else (0, (3.0, 2.0))
+        ax.plot(*line.T, color=own if color is None else color, linewidth=1.4, linestyle=style, zorder=2.0)
     wheels = _draw_wheels(ax, robot, where)
     frame = _frame_box(robot)
     if frame is not None:
@@ -80,10 +101,7 @@ def robot(robot: Robot, pose: Pose | None = None, ax: Axes3D | None = None) -> A
     points = np.concatenate((courses.reshape(-1, 3), wheels, platform, *([] if frame is None else [frame])))
     _draw_ground(ax, points, platform)
     _number(ax, robot.frame_anchors, points)
-    _dress(ax, points, robot.name if plan.feasible else f"{robot.name}: no tensions within the limits carry it here")
-    if plan.feasible:
-        _tension_bar(ax, scale, plan.chord_tension)
-    return ax
+    return plan, points
 
 
 def _pose_of(robot: Robot, pose: Pose | None) -> Pose:
@@ -199,7 +217,7 @@ def _tension_bar(ax: Axes3D, scale: TensionScale, tension: Array) -> None:
     bar.ax.tick_params(labelsize=TICK)
 
 
-def _dress(ax: Axes3D, points: Array, title: str) -> None:
+def dress_space(ax: Axes3D, points: Array, title: str) -> None:
     """Labels, and ticks as far apart as their numbers are wide, none where two axes meet."""
     ax.set_title(title, fontsize=LABEL, y=0.97)
     low, high = points.min(axis=0), points.max(axis=0)

@@ -25,6 +25,7 @@ from sagline.viewer.cut_panel import CutPanel
 from sagline.viewer.drawn import Drawn
 from sagline.viewer.export_panel import ExportPanel
 from sagline.viewer.framing import Framing
+from sagline.viewer.hull import hull_of
 from sagline.viewer.mode_show import ModeShow
 from sagline.viewer.modes_panel import ModesPanel
 from sagline.viewer.moment import Moment
@@ -36,6 +37,9 @@ from sagline.viewer.run_panel import RunPanel
 from sagline.viewer.session import SessionMoment
 from sagline.viewer.settings import Settings
 from sagline.viewer.snapshot import Snapshot, taken_at
+from sagline.viewer.space_panel import SpacePanel
+from sagline.viewer.space_show import SpaceShow, planes_of
+from sagline.viewer.space_stage import SpaceStage
 from sagline.viewer.stage import TRACE_POINTS, Stage
 from sagline.viewer.tension_scale import TensionScale
 from sagline.viewer.timeline import Timeline
@@ -56,6 +60,7 @@ class Reading(Enum):
     REST = "where the platform rests if the model is approximate"
     MODES = "modes with cable mass"
     SIMULATION = "what follows when a cable is cut"
+    WORKSPACE = "margins over a set of loads"
 
 
 class Viewer:
@@ -101,6 +106,7 @@ class Viewer:
         self._stage = Stage(server.scene, robot, self._home)
         self._framing = Framing(server, *self._stage.extent(self._home))
         self._modes = self._mode_show(mode)
+        self._space = self._space_show()
         self._cuts = Aside(self._soon)
         self._cut_panel = CutPanel(server.gui, robot, lambda: self._soon(self._cut), lambda: self._soon(self._back))
         self._export = ExportPanel(server, lambda: self.view, lambda: self._played)
@@ -132,6 +138,7 @@ class Viewer:
                 self._work_off()
                 self._update()
             self._modes.tick()
+            self._space.tick()
             if self._cuts.waited:
                 self._cut_panel.say(f"Simulating: {self._cuts.waited:.0f} s so far")
             last = now
@@ -161,7 +168,7 @@ class Viewer:
         """How long nothing needs to be drawn [s]."""
         if self._clock.playing or self._modes.moving:
             return FRAME_TIME
-        return SOON if self._modes.waiting or self._cuts.busy else IDLE
+        return SOON if self._modes.waiting or self._space.waiting or self._cuts.busy else IDLE
 
     def _soon(self, task: Callable[[], None]) -> None:
         """Have the serving thread do something; from any thread."""
@@ -175,6 +182,11 @@ class Viewer:
     def _mode_show(self, mode: str) -> ModeShow:
         panel = ModesPanel(self._server.gui, self._panel.readings, self._wake.set, mode)
         return ModeShow(panel, self._stage, Aside(self._soon), dynamics.vibrating)
+
+    def _space_show(self) -> SpaceShow:
+        panel = SpacePanel(self._server.gui, self._panel.readings, planes_of(self._robot), self._wake.set)
+        stage = SpaceStage(self._server.scene, solids.size_of(self._robot))
+        return SpaceShow(panel, stage, Aside(self._soon), hull_of)
 
     def _play(self, played: Played | None, *, at_once: bool = False) -> None:
         """Put something on the timeline in place of what was there, or nothing."""
@@ -297,6 +309,10 @@ class Viewer:
                 self._stage.show_traces(*self._played.traces(TRACE_POINTS, settings.error_scale))
         self._panel.read_out(*self._words(snapshot))
         self._modes.follow(*self._vibrating(snapshot, settings))
+        if self._ready(Reading.WORKSPACE):
+            self._space.follow(snapshot.robot, snapshot.pose, settings.model, self._wrench)
+        else:
+            self._space.wait()
         self.view = view
         self.updates += 1
         self.shown.set()

@@ -1,0 +1,87 @@
+"""What a search for better robots has found: all candidates, and those that none is better than."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sagline.arguments import instance
+from sagline.optimization.front import Front
+from sagline.plot.sheet import BLUE, GAP_COLOR, LABEL, VERMILLION, dressed, legend_outside, sheet
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from sagline.arrays import Array
+    from sagline.optimization.goals import Goal
+
+EACH = 3.2  # in, the height of a panel
+
+
+def front(front: Front) -> Figure:
+    """What `design` has found, beside all candidates it has looked at.
+
+    Of one goal the course of the search: each candidate, and the best until then. Of several the first goal against
+    each of the others: better robots are joined, the start is marked.
+
+    Args:
+        front: From `design`.
+
+    Returns:
+        The figure.
+
+    Raises:
+        InvalidValueError: If it is no front.
+    """
+    goals = instance(front, Front, "front").goals
+    count = max(1, len(goals) - 1)
+    figure = sheet(height=0.4 + EACH * count)
+    panels = figure.subplots(count, 1, squeeze=False)[:, 0]
+    if len(goals) == 1:
+        _draw_course(panels[0], front)
+    else:
+        for k, ax in enumerate(panels, start=1):
+            _draw_pair(ax, front, k)
+    legend_outside(panels[0])
+    figure.suptitle(f"{front.start.name}, {len(front.evaluated):,} robots by {front.optimizer}", fontsize=LABEL)
+    return figure
+
+
+def _draw_course(ax: Axes, front: Front) -> None:
+    values = front.evaluated_values[:, 0]
+    number = np.arange(len(values))
+    ax.plot(number, values, ".", color=GAP_COLOR, markersize=3.0, label="candidates", linestyle="none")
+    ax.plot(number, best_until(values, highest=front.goals[0].maximize), color=BLUE, linewidth=1.4, label="best so far")
+    ax.axhline(front.start_values[0], color=VERMILLION, linewidth=1.0, linestyle="--", label="start")
+    dressed(ax, "candidate", label_of(front.goals[0]))
+    known = values[np.isfinite(values)]
+    if known.size:
+        low, high = np.quantile(known, [0.02, 0.98]).tolist()
+        ends = [low, high, float(front.values[0, 0]), float(front.start_values[0])]
+        spare = 0.08 * (max(ends) - min(ends)) or 1.0
+        ax.set_ylim(min(ends) - spare, max(ends) + spare)
+
+
+def _draw_pair(ax: Axes, front: Front, k: int) -> None:
+    every, better = front.evaluated_values[:, [0, k]], front.values[:, [0, k]]
+    order = np.argsort(better[:, 0])
+    ax.plot(*every.T, ".", color=GAP_COLOR, markersize=3.0, label="candidates", linestyle="none")
+    if front.better:
+        ax.plot(*better[order].T, "o-", color=BLUE, markersize=4.0, linewidth=1.0, label="none is better")
+    ax.plot(*front.start_values[[0, k]], "D", color=VERMILLION, markersize=6.0, label="start", linestyle="none")
+    dressed(ax, label_of(front.goals[0]), label_of(front.goals[k]))
+
+
+def label_of(goal: Goal) -> str:
+    """What a goal is, with its unit, and which way is better."""
+    unit = f" [{goal.unit}]" if goal.unit else ""
+    return f"{goal.kind.replace('_', ' ')}{unit}, {'higher' if goal.maximize else 'lower'} is better"
+
+
+def best_until(values: Array, *, highest: bool) -> Array:
+    """The best of all values up to each, NaN before the first that is one."""
+    sign = 1.0 if highest else -1.0
+    found = np.maximum.accumulate(np.where(np.isfinite(values), sign * values, -np.inf))
+    return np.asarray(np.where(np.isfinite(found), sign * found, np.nan))

@@ -1,0 +1,159 @@
+"""Figures of workspaces hold what they claim to show: boundaries, margins, limits and fronts."""
+
+import re
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from matplotlib.collections import QuadMesh
+from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+import sagline as sl
+from sagline import plot
+from sagline.optimization.front import Front
+from sagline.plot.front import best_until
+from sagline.plot.slice import limit_colors, round_levels
+from sagline.plot.workspace import FAR_SIDE, NEAR_SIDE
+from tests.kinematics.test_many_robots import planar
+
+ROBOT = sl.load_robot("article-suspended")
+LOADS = sl.WrenchBox(force=50.0, moment=5.0)
+
+
+@pytest.fixture(scope="module")
+def space() -> sl.Workspace:
+    return sl.workspace(ROBOT, wrenches=LOADS, cells=10, refine=False)
+
+
+def texts(figure: Figure) -> list[str]:
+    return [text.get_text() for ax in figure.axes for text in ax.texts]
+
+
+def test_the_bold_line_is_the_boundary_and_thin_ones_are_round_margins(space: sl.Workspace) -> None:
+    ax = plot.slice(space, "z", at=2.0)
+    drawn: list[Any] = list(ax.collections[-2:])
+    margins, bold = drawn
+    assert bold.get_linewidth()[0] > 2.0 * margins.get_linewidth()[0]
+    ends = np.concatenate([path.vertices for path in bold.get_paths()])[::10]
+    poses = sl.Pose.from_euler(np.column_stack((ends, np.full(len(ends), 2.0))), 0.0, 0.0, 0.0)
+    away = np.abs(sl.margin(ROBOT, poses, LOADS).value)
+    assert np.quantile(away, 0.9) < 0.5  # N, of 50 a meter, between points 75 mm apart
+    for level, path in zip(margins.levels, margins.get_paths(), strict=True):
+        points = path.vertices[::10]
+        poses = sl.Pose.from_euler(np.column_stack((points, np.full(len(points), 2.0))), 0.0, 0.0, 0.0)
+        assert np.median(np.abs(sl.margin(ROBOT, poses, LOADS).value - level)) < 0.5
+    assert "z = 2\xa0m; ±50\xa0N, ±5\xa0N\xa0m; level" in ax.get_title() or "±50" in ax.get_title()
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("$x$ [m]", "$y$ [m]")
+
+
+def test_regions_have_the_color_and_the_name_of_their_cable(space: sl.Workspace) -> None:
+    ax = plot.slice(space, "z", at=2.0)
+    mesh = next(each for each in ax.collections if isinstance(each, QuadMesh))
+    names = [text for text in ax.texts if text.get_text().startswith("cable")]
+    assert len(names) >= 4
+    colors = limit_colors(space)
+    for name in names:
+        x, y = name.get_position()
+        found = sl.margin(ROBOT, sl.Pose([x, y, 2.0], np.eye(3)), LOADS)
+        assert name.get_text() == f"cable {found.limiting_cable}"
+        corner = np.asarray(mesh.get_coordinates())
+        column = int(np.searchsorted(corner[0, :, 0], x)) - 1
+        row = int(np.searchsorted(corner[:, 0, 1], y)) - 1
+        shade = np.asarray(mesh.get_array())[row, column]
+        np.testing.assert_allclose(shade, 0.45 * np.array(colors[0, int(found.limiting_cable)]) + 0.55, atol=1e-12)
+
+
+def test_a_plane_of_symmetry_has_regions_rather_than_noise(space: sl.Workspace) -> None:
+    ax = plot.slice(space, "y", at=0.0)
+    mesh = next(each for each in ax.collections if isinstance(each, QuadMesh))
+    shades = np.asarray(mesh.get_array())
+    changes = (shades[:, 1:] != shades[:, :-1]).any(axis=-1)
+    assert changes.mean() < 0.08
+
+
+def test_a_slice_beside_the_workspace_says_that_nothing_is_there(space: sl.Workspace) -> None:
+    ax = plot.slice(space, "x", at=7.5)
+    assert "nothing of the workspace is here" in [text.get_text() for text in ax.texts]
+
+
+@pytest.mark.parametrize(
+    ("normal", "at", "message"),
+    [
+        ("z", 9.0, "at is 9 m; allowed: 0 to 6 m, the box"),
+        ("z", np.nan, "at"),
+        ("q", None, "normal"),
+    ],
+)
+def test_planes_that_are_none_are_refused(space: sl.Workspace, normal: str, at: float | None, message: str) -> None:
+    with pytest.raises(sl.InvalidValueError, match=re.escape(message)):
+        plot.slice(space, normal, at)
+
+
+def test_the_hull_is_all_there_and_its_bars_are_the_limits(space: sl.Workspace) -> None:
+    figure = plot.workspace(space)
+    assert isinstance(figure, Figure)
+    ax, bars = figure.axes
+    hulls: list[Any] = [
+        each for each in ax.collections if isinstance(each, Poly3DCollection) and each.get_alpha() is not None
+    ]
+    assert sorted(each.get_alpha() for each in hulls) == [FAR_SIDE, NEAR_SIDE]
+    drawn = np.concatenate([np.asarray(each._faces).reshape(-1, 3) for each in hulls])
+    vertices = space.surface.vertices
+    width = np.ptp(vertices, axis=0).max() / 90.0
+    np.testing.assert_allclose(drawn.min(axis=0), vertices.min(axis=0), atol=2.0 * width)
+    np.testing.assert_allclose(drawn.max(axis=0), vertices.max(axis=0), atol=2.0 * width)
+    shares = [patch.get_width() for patch in cast(list[Any], bars.patches)]
+    assert shares == pytest.approx([100.0 * limit.share for limit in space.limits])
+    assert [label.get_text() for label in bars.get_yticklabels()] == [f"cable {one.cable}" for one in space.limits]
+    assert f"{space.volume:.0f}" in figure.get_suptitle()
+
+
+def test_an_empty_workspace_is_a_figure_too(tmp_path_factory: pytest.TempPathFactory) -> None:
+    empty = sl.workspace(ROBOT, wrenches=sl.WrenchBox(1e5), cells=4)
+    figure = plot.workspace(empty)
+    assert "empty" in figure.get_suptitle()
+    plot.save(figure, tmp_path_factory.mktemp("figure") / "empty.png")
+    assert "nothing of the workspace is here" in [text.get_text() for text in plot.slice(empty).texts]
+
+
+def test_of_a_planar_robot_the_slice_is_drawn() -> None:
+    flat = sl.workspace(planar((0.0, 1.0, 0.0)), cells=12)
+    assert plot.workspace(flat).axes[0].get_ylabel() == "$z$ [m]"
+    with pytest.raises(sl.InvalidValueError, match="normal"):
+        plot.slice(flat, "z")
+
+
+def test_round_levels_are_few_and_round() -> None:
+    assert round_levels(233.0).tolist() == [50.0, 100.0, 150.0, 200.0]
+    assert round_levels(0.0).size == round_levels(np.inf).size == 0
+
+
+def front_of(*kinds: str, count: int = 30) -> Front:
+    """Candidates whose second goal is worse where the first is better; every fifth is no robot."""
+    first = np.linspace(1.0, 2.0, count)
+    values = np.column_stack([first, *(3.0 - (k + 1) * first for k in range(len(kinds) - 1))])
+    values[::5] = np.nan
+    goals = tuple(sl.Goal(kind, maximize=True) for kind in kinds)
+    free, none = np.zeros((2, 0)), np.zeros((count, 0))
+    return Front(ROBOT, (ROBOT, ROBOT), goals, values[[-1, 6]], values[1], (), free, True, none, values, "cma", 0)
+
+
+def test_a_front_joins_the_better_robots_and_marks_the_start() -> None:
+    found = front_of("mean_margin", "least_margin", "largest_sag")
+    figure = plot.front(found)
+    assert len(figure.axes) == 2
+    for k, ax in enumerate(figure.axes, start=1):
+        every, better, start = ax.get_lines()
+        np.testing.assert_array_equal(np.asarray(every.get_xydata()), found.evaluated_values[:, [0, k]])
+        np.testing.assert_array_equal(np.asarray(better.get_xydata()), found.values[::-1][:, [0, k]])
+        np.testing.assert_array_equal(np.asarray(start.get_xydata())[0], found.start_values[[0, k]])
+    assert figure.axes[1].get_ylabel() == "largest sag [m], higher is better"
+
+
+def test_of_one_goal_the_course_is_drawn() -> None:
+    found = front_of("mean_margin")
+    _, best, start = plot.front(found).axes[0].get_lines()
+    assert np.asarray(best.get_ydata())[-1] == np.nanmax(found.evaluated_values)
+    assert np.asarray(start.get_ydata())[0] == found.start_values[0]
+    np.testing.assert_array_equal(best_until(np.array([np.nan, 3.0, 1.0, 2.0]), highest=False), [np.nan, 3.0, 1.0, 1.0])

@@ -1,0 +1,45 @@
+"""Planes through a space, and what a function of positions is on them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from sagline.arrays import Array, Indices
+from sagline.workspaces.slice import Plane, slice_of
+
+
+class Told(NamedTuple):
+    level: Array
+    margin: Array
+    criterion: Indices
+    cable: Indices
+
+
+def places(positions: Array) -> Told:
+    """Numbers by which a position is known again."""
+    x, y, z = positions.T
+    return Told(x + 10.0 * y + 100.0 * z, x, np.rint(y).astype(np.int64), np.rint(z).astype(np.int64))
+
+
+@pytest.mark.parametrize("normal", [0, 1, 2])
+def test_every_point_of_a_slice_is_where_its_column_and_row_say(normal: int) -> None:
+    low, high = np.array([-1.0, -2.0, 0.0]), np.array([3.0, 2.0, 5.0])
+    cut = slice_of(places, Plane(normal, 1.25), low, high, (5, 7))
+    first, second = (axis for axis in range(3) if axis != normal)
+    assert (cut.across[0], cut.across[-1]) == (low[first], high[first])
+    assert (cut.up[0], cut.up[-1]) == (low[second], high[second])
+    for row in range(7):
+        for column in range(5):
+            place = np.full(3, 1.25)
+            place[first], place[second] = cut.across[column], cut.up[row]
+            own = places(place[None])
+            assert cut.level[row, column] == own.level[0]
+            assert cut.margin[row, column] == own.margin[0]
+            assert (cut.criterion[row, column], cut.cable[row, column]) == (own.criterion[0], own.cable[0])
+
+
+def test_a_plane_is_written_as_an_equation() -> None:
+    assert str(Plane(2, 1.5)) == "z = 1.5 m"
