@@ -78,8 +78,9 @@ def test_a_killed_worker_and_a_stop_lose_nothing(
     assert sorted(marked(folder)) == list(range(TASKS))
     assert sum(found.counts) == len(planar())
     assert heard == {"127.0.0.1"}
-    assert len(told) == 1
+    assert len(told) == 2
     assert told[0].startswith("Dashboard: http://127.0.0.1:")
+    assert told[1] == "Stopping when the tasks that run are done; Ctrl-C again leaves them."
     assert capfd.readouterr() == ("", "")
 
 

@@ -12,7 +12,6 @@ from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.cli.values import whole_of
 from sagline.errors import InvalidValueError, SaglineError
-from sagline.files.names import file_stem
 from sagline.files.sweep_file import load_sweep
 from sagline.files.whole import check_folder, made_folder
 from sagline.sweep.cluster import check_address
@@ -44,7 +43,7 @@ def sweep(file: Path, out: Path | None, workers: str | None, scheduler: str | No
             raise InvalidValueError("--workers", "given with --scheduler", "one of both", "A cluster has its own.")
         check_address(scheduler)
     request = load_sweep(file)
-    folder = Path("output") / file_stem(file.stem) if out is None else out
+    folder = Path("output") / file.stem if out is None else out
     check_folder(folder)
     made_folder(folder.absolute().parent)
     again = _again(file, folder, workers, scheduler)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.arguments import brief, file_path, whole_number
-from sagline.arrays import Array, checked
+from sagline.arrays import Array, number
 from sagline.errors import FileError, InvalidValueError
 from sagline.files.path_file import load_path
 from sagline.files.plan_file import MODELS, Choice
@@ -30,7 +30,8 @@ from sagline.workspaces.wrench_sets import WrenchBox, WrenchSet
 
 KEYS: Final = ("low", "high", "count")  # of an axis: its ends, and how many points there are between them
 ANGLES: Final = ("alpha", "beta", "gamma")
-MOST: Final = 1_000_000_000  # points of a grid; memory is asked about besides
+MOST: Final = 1_000_000  # points along an axis
+_POINT_BYTES: Final = 400.0  # of a point of a grid, while poses are made of them
 
 
 class _Grid(Entry):
@@ -187,7 +188,9 @@ def _unit(name: str) -> str:
 
 
 def _one(given: Any, item: str, unit: str) -> float:
-    return float(checked(cast(float, in_si(given, unit, item)), item, unit, shape=()))
+    if isinstance(given, list | dict):
+        raise InvalidValueError(item, brief(given), f"one number in {unit}, or text with a unit", f"Correct {item}.")
+    return number(in_si(given, unit, item), item, unit)
 
 
 def _axis(given: Any, item: str, unit: str) -> Array:
@@ -202,14 +205,13 @@ def _axis(given: Any, item: str, unit: str) -> Array:
     if high < low or (high > low) != (count > 1):
         allowed = f"{count} points from low up to high" if count > 1 else "one value, where there is one point"
         raise InvalidValueError(item, f"{low:g} to {high:g} {unit}", allowed, f"Correct {item}.")
-    check_memory(item, 8.0 * count, "Take fewer points.")
     return np.linspace(low, high, count)
 
 
 def _product(axes: dict[str, Array]) -> Array:
     """All points of a grid, the last axis fastest, shape (N, axes)."""
     count = int(np.prod([float(len(axis)) for axis in axes.values()]))
-    check_memory(f"a grid of {count:,} points", 24.0 * count * len(axes), "Take fewer points.")
+    check_memory(f"a grid of {count:,} points", _POINT_BYTES * count, "Take fewer points.")
     return np.stack(np.meshgrid(*axes.values(), indexing="ij"), axis=-1).reshape(-1, len(axes))
 
 

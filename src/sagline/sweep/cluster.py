@@ -130,7 +130,7 @@ def check_address(address: object) -> str:
     raise InvalidValueError("scheduler", repr(address), "an address, tcp://HOST:PORT", "Take the one it prints.")
 
 
-def spread(client: Any, job: Job, numbers: Iterable[int], finish: Finish) -> None:
+def spread(client: Any, job: Job, numbers: Iterable[int], finish: Finish, tell: Callable[[str], None]) -> None:
     """Have tasks done by the workers, a few of them at a time.
 
     Where something fails, or Ctrl-C comes, the tasks that are with the workers are finished, and no others begun.
@@ -140,6 +140,7 @@ def spread(client: Any, job: Job, numbers: Iterable[int], finish: Finish) -> Non
         job: Folder and digest.
         numbers: The tasks.
         finish: Told of each that is done.
+        tell: Told that it stops.
 
     Raises:
         SaglineError: If the scheduler is gone, or a task ends its workers.
@@ -174,7 +175,9 @@ def spread(client: Any, job: Job, numbers: Iterable[int], finish: Finish) -> Non
         for future in ahead:
             take(future)
             send()
-    except BaseException:
+    except BaseException as error:
+        if isinstance(error, KeyboardInterrupt):
+            tell("Stopping when the tasks that run are done; Ctrl-C again leaves them.")
         if client.status == "running":
             for future in ahead:
                 with suppress(Exception):

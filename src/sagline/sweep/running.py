@@ -99,7 +99,7 @@ def run(
         with _workers(count, scheduler, len(waiting), say) as client:
             clock.begin()
             if client is not None:
-                spread(client, job, waiting, finish)
+                spread(client, job, waiting, finish, say)
             else:
                 for number in waiting:
                     finish(number, *task(*job, number))

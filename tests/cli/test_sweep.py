@@ -1,0 +1,108 @@
+"""`sagline sweep`: what it tells, and how it goes on."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner, Result
+
+import sagline as sl
+from sagline.cli.main import app
+from tests.sweep.requests import marked
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    for name in ("own_sweep.yaml", "own_planar.yaml"):
+        shutil.copy(EXAMPLES / name, tmp_path)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def ended(*words: str) -> Result:
+    return CliRunner().invoke(app, ["sweep", *words])
+
+
+def test_a_sweep_tells_how_its_requests_ended_and_is_done_once(folder: Path) -> None:
+    first = ended("own_sweep.yaml", "--workers", "1")
+    assert (first.exit_code, first.stderr) == (0, "")
+    assert "1 robots x 609 poses x 9 wrenches" in first.stdout
+    assert "tensions within their limits" in first.stdout
+    found = sl.sweep.load("output/own_sweep")
+    assert found.complete
+    assert f"{found.counts.feasible:,}" in first.stdout
+    assert (found.counts.open, found.counts.lost, sum(found.counts)) == (0, 0, 609 * 9)
+    assert str(folder / "output" / "own_sweep") in first.stdout
+    before = marked(Path("output/own_sweep"))
+    again = ended("own_sweep.yaml", "--workers", "1", "--json")
+    assert (again.exit_code, again.stderr) == (0, "")
+    told = json.loads(again.stdout)
+    assert (told["feasible"], told["infeasible"]) == (found.counts.feasible, found.counts.infeasible)
+    assert (told["robots"], told["poses"], told["wrenches"], told["lost"]) == (1, 609, 9, 0)
+    assert marked(Path("output/own_sweep")) == before
+
+
+def test_the_folder_of_another_sweep_is_refused(folder: Path) -> None:
+    assert ended("own_sweep.yaml", "--out", "out", "--workers", "1").exit_code == 0
+    text = Path("own_sweep.yaml").read_text()
+    Path("own_sweep.yaml").write_text(text.replace("100 N", "101 N"))
+    result = ended("own_sweep.yaml", "--out", "out", "--workers", "1")
+    assert result.exit_code == 2
+    assert "Error: out: holds another sweep, of 5,481 requests. Give this one another folder" in result.stderr
+    assert result.stdout == ""
+
+
+def test_ctrl_c_prints_the_command_that_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    def stopped(*_: Any, **__: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("sagline.cli.sweep.run", stopped)
+    result = ended("own_sweep.yaml", "--out", "my sweep", "--workers", "3")
+    assert result.exit_code == 130
+    assert "To go on: sagline sweep own_sweep.yaml --out 'my sweep' --workers 3\n" in result.stderr
+    assert "Interrupted." in result.stderr
+
+
+def test_a_failure_on_the_way_prints_it_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    def failed(_: Any, folder: Path, *__: Any, **___: Any) -> None:
+        folder.mkdir()
+        (folder / "done").touch()
+        raise sl.SaglineError("The scheduler is gone.")
+
+    monkeypatch.setattr("sagline.cli.sweep.run", failed)
+    result = ended("own_sweep.yaml", "--out", "out", "--scheduler", "tcp://10.0.0.1:8786")
+    assert result.exit_code == 2
+    assert result.stderr.splitlines() == [
+        "Error: The scheduler is gone.",
+        "What is done is kept. To go on: sagline sweep own_sweep.yaml --out out --scheduler tcp://10.0.0.1:8786",
+    ]
+
+
+def test_requests_without_a_verdict_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = sl.sweep.run(sl.load_sweep("own_sweep.yaml"), "out", workers=1)
+    open_ones = sl.sweep.Sweep(found.folder, found.request, 1, 1, sl.sweep.Counts(5000, 479, 0, 2, 0), 1.0)
+    monkeypatch.setattr("sagline.cli.sweep.run", lambda *_, **__: open_ones)
+    result = ended("own_sweep.yaml")
+    assert result.exit_code == 1
+    assert result.stderr == "2 of 5,481 requests: without a verdict\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--workers", "0"], "--workers is '0'; allowed: a whole number from 1 to 1024"),
+        (["--workers", "2", "--scheduler", "tcp://a:1"], "--workers is given with --scheduler"),
+        (["--scheduler", "a:1"], "scheduler is 'a:1'; allowed: an address, tcp://HOST:PORT"),
+    ],
+)
+def test_bad_options_are_refused_before_anything_is_written(folder: Path, words: list[str], told: str) -> None:
+    result = ended("own_sweep.yaml", *words)
+    assert result.exit_code == 2
+    assert told in result.stderr
+    assert not (folder / "output").exists()
