@@ -25,6 +25,7 @@ from benchmarks.measure import (
     process_seconds,
     show,
 )
+from benchmarks.sweep import sweeps
 from sagline.arrays import Array, locked
 from sagline.kernels.cable.batch import BUFFERS, CHUNK, batch_from_length, batch_from_tension
 from tests.cables.reference import load_reference
@@ -172,7 +173,7 @@ def whole_processes() -> Iterator[Row]:
 def main() -> None:
     """Measure and print."""
     console = Console()
-    rows: list[Row] = [*two_threads(), *links()]
+    rows: list[Row] = [*two_threads(), *links(), *sweeps()]
     one_core()
     for part in (
         accuracy_of_cables,

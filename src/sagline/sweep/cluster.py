@@ -26,6 +26,12 @@ SCHEMES: Final = ("tcp://", "tls://", "ws://", "wss://")
 LOGGERS: Final = ("distributed", "tornado", "bokeh", "asyncio")
 SILENT: Final = logging.CRITICAL + 1
 
+SETTINGS: Final = {  # of workers, which else give memory back after each array, to get it again page by page
+    "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 1 << 28,
+    "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 1 << 28,
+    "distributed.worker.profile.enabled": False,
+}
+
 Job = tuple[str, str]  # folder and digest
 Finish = Callable[[int, float, tuple[int, ...]], None]
 
@@ -57,22 +63,25 @@ def local_workers(workers: int, tell: Callable[[str], None]) -> Iterator[Any]:
         SaglineError: If they cannot be started.
     """
     with quiet():
-        import distributed as dask
+        import dask.config
+        import distributed
 
-        api: Any = dask  # has types for a part of itself
-
+        api: Any = distributed  # has types for a part of itself
+        settings: Any = dask.config
         free = _is_free(DASHBOARD)
+        given: dict[str, Any] = {
+            "n_workers": workers,
+            "threads_per_worker": 1,
+            "processes": True,
+            "host": HERE,
+            "dashboard_address": f"{HERE}:{DASHBOARD if free else 0}",
+            "memory_limit": 0,
+            "silence_logs": SILENT,
+            "preload": ["sagline.sweep.deaf"],
+        }
         try:
-            cluster = api.LocalCluster(
-                n_workers=workers,
-                threads_per_worker=1,
-                processes=True,
-                host=HERE,
-                dashboard_address=f"{HERE}:{DASHBOARD if free else 0}",
-                memory_limit=0,
-                silence_logs=SILENT,
-                preload=["sagline.sweep.deaf"],
-            )
+            with settings.set(SETTINGS):
+                cluster = api.LocalCluster(**given)
         except (RuntimeError, OSError, TimeoutError) as error:
             step = 'In a script, call it below: if __name__ == "__main__":'
             raise SaglineError(f"The workers could not be started ({_first_line(error)}). {step}") from None
@@ -98,9 +107,9 @@ def remote_workers(address: str) -> Iterator[Any]:
     """
     check_address(address)
     with quiet():
-        import distributed as dask
+        import distributed
 
-        api: Any = dask
+        api: Any = distributed
 
         try:
             client = api.Client(address, timeout=PATIENCE, set_as_default=False)
@@ -145,9 +154,9 @@ def spread(client: Any, job: Job, numbers: Iterable[int], finish: Finish, tell: 
     Raises:
         SaglineError: If the scheduler is gone, or a task ends its workers.
     """
-    import distributed as dask
+    import distributed
 
-    api: Any = dask
+    api: Any = distributed
 
     waiting = iter(numbers)
     run = uuid.uuid4().hex[:8]

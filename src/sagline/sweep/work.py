@@ -8,13 +8,13 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.arrays import locked
+from sagline.arrays import Array, locked
 from sagline.kernels import tables
 from sagline.kernels.inverse.verdicts import PROVED
 from sagline.kinematics.inverse_rows import decide_rows, solve_rows
 from sagline.kinematics.status import PoseStatus
+from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.statics.tables import pose_rows
 from sagline.sweep.quantities import (
     ENOUGH,
     HIGH,
@@ -138,17 +138,17 @@ class _Inverse:
     def __init__(self, request: Request, robot: Robot) -> None:
         self._request, self._robot = request, robot
         self._options = kernel_options(robot, request.model, request.tension)
-        self._poses = pose_rows(request.poses)
 
     def answers(self, part: Part) -> dict[str, NDArray[Any]]:
         """Variables of a few requests, (N,) or (N, m)."""
-        poses, loads = self._poses[part.poses], self._request.wrenches[part.wrenches]
+        request = self._request
+        poses, loads = _rows(request.poses, part.poses), request.wrenches[part.wrenches]
         rows = locked(np.repeat(poses, len(loads), axis=0))
         wrenches = locked(np.tile(loads, (len(poses), 1)))
         none = np.full(self._robot.cable_count, np.nan)
-        found = solve_rows(self._robot, self._request.tension, self._options, rows, wrenches, none)
+        found = solve_rows(self._robot, request.tension, self._options, rows, wrenches, none)
         answers: dict[str, NDArray[Any]] = {}
-        if "shortfall" in self._request.quantities:
+        if "shortfall" in request.quantities:
             verdicts = decide_rows(self._robot, self._options, rows, wrenches, found)
             answers[ENOUGH.name] = verdicts.shortfall
             answers[PROOF.name] = verdicts.brackets[:, PROVED]
@@ -164,14 +164,13 @@ class _Margins:
     """Margins of one robot of a request."""
 
     def __init__(self, request: Request, robot: Robot) -> None:
-        self._loads = request.wrenches
-        self._poses = pose_rows(request.poses)
+        self._request = request
         self._rows = MarginRows(robot, request.around, request.model, request.moment_arm)
 
     def answers(self, part: Part) -> dict[str, NDArray[Any]]:
         """Variables of a few requests, (N,)."""
-        poses = locked(self._poses[part.poses])
-        found = [self._rows.about(load).rows(poses) for load in self._loads[part.wrenches]]
+        poses = _rows(self._request.poses, part.poses)
+        found = [self._rows.about(load).rows(poses) for load in self._request.wrenches[part.wrenches]]
         columns: dict[str, list[NDArray[Any]]] = {
             MARGIN.name: [each.value for each in found],
             LOW.name: [each.low for each in found],
@@ -180,6 +179,11 @@ class _Margins:
             MARGIN_STATUS.name: [each.status for each in found],
         }
         return {name: np.stack(values, axis=1).ravel() for name, values in columns.items()}
+
+
+def _rows(poses: Pose, part: slice) -> Array:
+    """Some of the poses as the kernels take them, to the bit: a Pose of them would be normalized once more."""
+    return locked(np.concatenate((poses.position[part], poses.quaternion[part]), axis=1))
 
 
 def _room(variable: Variable, shape: tuple[int, int], cables: int) -> NDArray[np.generic]:

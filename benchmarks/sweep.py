@@ -1,0 +1,113 @@
+"""Sweeps: workers against a plain loop, and 31 million tension requests of a planar robot of four cables; all cores."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+
+import sagline as sl
+from benchmarks.measure import Row, show
+from sagline.files.sweep_folder import make_folder
+from sagline.sweep.tasks import measured_size, task
+
+ROBOT = Path(__file__).parents[1] / "examples" / "own_planar.yaml"
+PUBLISHED = 5844.0  # s, of as many requests on eight workers, 57,952 of which were lost
+POSES, LOADS = 31_000, 1_000
+SHARE = 10  # of them, for a loop and workers side by side
+
+
+def asked(poses: int, loads: int) -> sl.sweep.Request:
+    """Level poses all over the plane but for its edges, under forces of up to 100 N and moments of up to 3 N m."""
+    rng = np.random.default_rng(31)
+    place = rng.uniform((0.6, 0.0, 0.5), (3.4, 0.0, 2.5), (poses, 3))
+    wrenches = rng.uniform(-1.0, 1.0, (loads, 6)) * [100.0, 0.0, 100.0, 0.0, 3.0, 0.0]
+    return sl.sweep.Request(sl.load_robot(ROBOT), sl.Pose(place, np.eye(3)), wrenches)
+
+
+def in_a_loop_and_on_workers() -> Iterator[Row]:
+    """The same tasks one after the other, and on two workers."""
+    request = asked(POSES // SHARE, LOADS)
+    size, times = measured_size(request), []
+    with tempfile.TemporaryDirectory() as place:
+        for workers in (1, 2):
+            folder = Path(place) / f"{workers}"
+            make_folder(folder, request, size)
+            start = time.perf_counter()
+            found = sl.sweep.run(request, folder, workers=workers)
+            times.append(time.perf_counter() - start)
+    each = found.seconds / found.tasks
+    yield Row(
+        f"sweep of {len(request):,} requests, {found.tasks} tasks of {each:.2f} s, two workers and their start",
+        ">= 1.8 x a plain loop, without the start",
+        f"{times[0] / times[1]:.2f} x with it ({times[0]:.1f} s, {times[1]:.1f} s)",
+    )
+
+
+def without_the_start() -> Iterator[Row]:
+    """Tasks a second of one worker and of two, once they run: what a long sweep goes by."""
+    from sagline.sweep.cluster import local_workers, spread
+
+    request = asked(POSES // SHARE, LOADS)
+    size, rates = measured_size(request), []
+    with tempfile.TemporaryDirectory() as place:
+        make_folder(alone := Path(place) / "alone", request, size)
+        digest = _digest(alone)
+        count = min(16, sl.sweep.load(alone).tasks)
+        task(str(alone), digest, 0)
+        start = time.perf_counter()
+        for number in range(1, count):
+            task(str(alone), digest, number)
+        rates.append((count - 1) / (time.perf_counter() - start))
+        make_folder(together := Path(place) / "together", request, size)
+        done: list[float] = []
+        with local_workers(2, lambda text: None) as client:
+            job = (str(together), _digest(together))
+            spread(client, job, range(count), lambda *_: done.append(time.perf_counter()), lambda text: None)
+        # between the fourth task and the last but one: both workers are at work
+        rates.append((len(done) - 6) / (done[-2] - done[4]))
+    text = f"{rates[1] / rates[0]:.2f} x ({rates[0]:.2f} tasks a second, {rates[1]:.2f})"
+    yield Row("two workers at work against a plain loop", ">= 1.8 x", text)
+
+
+def tension_requests() -> Iterator[Row]:
+    """31 million tension requests; each failure is proved."""
+    request = asked(POSES, LOADS)
+    with tempfile.TemporaryDirectory() as place:
+        start = time.perf_counter()
+        found = sl.sweep.run(request, Path(place) / "sweep", workers=min(2, len(os.sched_getaffinity(0))))
+        seconds = time.perf_counter() - start
+        gigabytes = sum(file.stat().st_size for file in Path(place).rglob("*") if file.is_file()) / 1e9
+    counts = found.counts
+    yield Row(
+        f"{len(request):,} tension requests of a planar robot of four cables, two workers",
+        "<= 90 s, 0 lost",
+        f"{seconds:.0f} s ({PUBLISHED / seconds:.0f} x the published run); {counts.feasible:,} feasible, "
+        f"{counts.infeasible:,} proved not to be, {counts.open + counts.unable} open, {counts.lost} lost; "
+        f"{gigabytes:.1f} GB",
+    )
+
+
+def _digest(folder: Path) -> str:
+    from sagline.files.sweep_folder import open_folder
+
+    return open_folder(folder).digest
+
+
+PARTS = (in_a_loop_and_on_workers, without_the_start, tension_requests)
+
+
+def sweeps() -> Iterator[Row]:
+    """All of it; before the process keeps to one core."""
+    if len(os.sched_getaffinity(0)) > 1:
+        for part in PARTS:
+            yield from part()
+
+
+if __name__ == "__main__":
+    show("Sweeps", list(sweeps()), Console())
