@@ -83,7 +83,7 @@ class Sweep(Result):
         """All variables with units and labels, as a Dataset of xarray; nothing is read before it is used."""
         from sagline.files.sweep_dataset import dataset_of
 
-        return dataset_of(self)
+        return dataset_of(self.folder, self.request)
 
 
 def load(folder: os.PathLike[str] | str) -> Sweep:
