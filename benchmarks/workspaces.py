@@ -15,7 +15,7 @@ from tests.workspaces.levels import ipanema, level_of
 CENTER = (0.0, 0.0, 1.0)
 MODELS = (sl.Straight(), sl.Catenary())
 FRAME = (-7.5, -5.5, 0.0), (7.5, 5.5, 6.0)
-SETTINGS = ((24, 1.0), (48, 2.0))  # cells, and seconds they may take
+SETTINGS = ((24, 0.5), (64, 2.0))  # cells, and seconds they may take
 
 
 def hulls() -> Iterator[Row]:

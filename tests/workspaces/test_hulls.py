@@ -1,9 +1,12 @@
+from functools import partial
+
 import numpy as np
 import pytest
 
 import sagline as sl
 from sagline.workspaces.boundary import boundary
 from sagline.workspaces.rays import ray_hull
+from tests.effort import least_seconds
 from tests.workspaces.levels import ipanema, level_of
 
 TRUE = 9.774  # m^3, by rays extrapolated (9.7742) and by marching cubes extrapolated (9.7740)
@@ -16,6 +19,9 @@ def test_rays_find_the_hull_of_wirex_with_exact_feasibility() -> None:
     assert hull.volume == pytest.approx(9.7452, abs=5e-5)  # WireX itself, with closed form and 1e-3: 9.734
     exact = ray_hull(level_of(robot, sl.Catenary()), [0.0, 0.0, 1.0], low, high)
     assert exact.volume == pytest.approx(hull.volume, abs=1e-6)  # no gravity, no sag
+    for model, limit in ((sl.Straight(), 0.13), (sl.Catenary(), 0.2)):
+        level = level_of(robot, model)
+        assert least_seconds(partial(ray_hull, level, [0.0, 0.0, 1.0], low, high), limit) <= limit
 
 
 def test_true_volume_of_that_hull() -> None:
@@ -28,6 +34,14 @@ def test_true_volume_of_that_hull() -> None:
     assert found.open_faces == ()
     assert np.abs(level(found.surface.vertices)).max() < 1e-9
     assert found.surface.closed
+
+
+@pytest.mark.soak
+def test_that_volume_and_its_error_bar_take_two_seconds() -> None:
+    robot, low, high = ipanema()
+    level = level_of(robot, sl.Straight())
+    assert boundary(level, low, high, cells=64).volume_error < 0.002
+    assert least_seconds(partial(boundary, level, low, high, cells=64), 2.0) <= 2.0
 
 
 def test_suspended_robot_of_the_article_in_its_frame_with_sag_and_without() -> None:
