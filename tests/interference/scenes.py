@@ -16,8 +16,19 @@ _FACES = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1]]
 _FACES += [[2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]
 
 
+DEEP = sl.Robot(
+    "deep",
+    frame_anchors=[[6, 1, 5], [-4, 5, 5], [-4, -5, 4]],
+    platform_anchors=[[0.1, 0, 0], [-0.1, 0.1, 0], [-0.1, -0.1, 0]],
+    cables=sl.Cable(linear_density=2.0, axial_stiffness=1e5),
+    mass=0.5,
+    motion_pattern="3T",
+)
+
+
 def at_rest(name: str = "cogiro", place: tuple[float, float, float] = (1.0, 0.5, 1.5)) -> sl.Equilibrium:
-    return sl.inverse(sl.load_robot(name), sl.Pose(place, LEVEL)).state
+    robot = DEEP if name == "deep" else sl.load_robot(name)
+    return sl.inverse(robot, sl.Pose(place, LEVEL)).state
 
 
 def box_mesh(size: ArrayLike, center: ArrayLike, orientation: Array = LEVEL, name: str = "block") -> Mesh:

@@ -23,6 +23,19 @@ def test_a_mesh_of_a_box_is_as_near_as_the_box(robot: str) -> None:
             assert low >= value - meshed.precision
 
 
+@pytest.mark.parametrize("angle", [0.0, 0.4])
+def test_a_mesh_below_cables_that_sag_deeply_is_as_near_as_its_box(angle: float) -> None:
+    state = at_rest("deep", (1.0, 0.5, 1.5))
+    assert state.cables.sag.max() > 1.0
+    turn = sl.Pose.from_euler([0, 0, 0], angle, angle, 0.0).matrix
+    for center in ([3.0, 0.0, -3.0], [-2.0, 3.0, -4.0], [0.0, 0.0, -8.0]):
+        solid = sl.clearance(state, sl.Box([9.0, 9.0, 1.0], center, turn, name="block"))
+        meshed = sl.clearance(state, box_mesh([9.0, 9.0, 1.0], center, turn))
+        right = dict(zip(solid.pairs, solid.pair_distance, strict=True))
+        for pair, value in zip(meshed.pairs, meshed.pair_distance, strict=True):
+            assert value == pytest.approx(right[pair], abs=1e-9 if right[pair] > 0.0 else 1e-7)
+
+
 def test_what_is_inside_a_mesh_touches_it_and_a_room_is_free_inside() -> None:
     state = at_rest()
     block = box_mesh(np.full(3, 100.0), np.zeros(3))

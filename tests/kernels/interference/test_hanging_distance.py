@@ -1,8 +1,12 @@
 import numpy as np
 import pytest
 
+from sagline.arrays import locked
 from sagline.kernels.interference import shapes
+from sagline.kernels.interference.hanging_distance import BULGE, PIECE_COLUMNS, cut
+from tests.interference.scenes import from_segment
 from tests.kernels.interference.hanging import (
+    KINDS,
     agreement,
     measured,
     nearest_cable_pairs,
@@ -64,3 +68,32 @@ def test_radii_are_taken_off_and_missing_tensions_are_nan() -> None:
     assert low[0, 0] >= distance[0, 0] - 1e-4
     assert np.isnan(distance[1]).all()
     assert np.isnan(low[1]).all()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_pieces_lie_within_their_bulge_of_their_chord_and_not_much_nearer(kind: str) -> None:
+    rng = np.random.default_rng(8)
+    for _ in range(60):
+        cable = random_cable(rng, kind)
+        begin, end = np.sort(rng.random(2)) if rng.random() < 0.8 else (0.0, 1.0)
+        piece = np.empty((1, PIECE_COLUMNS))
+        cut(locked(cable.row), locked(np.array([[begin, end]])), piece)
+        points = cable.points(np.linspace(begin, end, 801))
+        size = 1e-11 * (1.0 + np.abs(points).max())
+        assert piece[0, :3] == pytest.approx(points[0], abs=size)
+        assert piece[0, 3:6] == pytest.approx(points[-1], abs=size)
+        beyond = float(from_segment(points, piece[0, :3], piece[0, 3:6]).max())
+        assert beyond <= piece[0, BULGE] + size
+        if kind == "taut":  # where the curvature hardly changes, the bound is nearly reached
+            give = cable.weight / cable.stiffness * ((end - begin) * cable.length) ** 2 / 8.0
+            assert piece[0, BULGE] <= 1.2 * beyond + give + size
+
+
+def test_a_parabola_s_pieces_touch_their_bulge() -> None:
+    row = np.zeros(shapes.COLUMNS)
+    row[shapes.KIND], row[shapes.LAST], row[shapes.LEVEL] = shapes.PARABOLA, 1.0, 1.0
+    row[shapes.SPAN], row[shapes.RISE], row[shapes.DROP] = 10.0, 0.0, 2.0
+    piece = np.empty((1, PIECE_COLUMNS))
+    cut(locked(row), locked(np.array([[0.25, 0.75]])), piece)
+    assert piece[0, BULGE] == pytest.approx(2.0 * 0.25**2)  # 4 drops (1/4 - 1/16), from 4 drops 3/16
+    assert piece[0, 2] == pytest.approx(-2.0 * 0.1875)
