@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 
 import sagline as sl
+from sagline.arrays import Array
 from sagline.errors import FileError, InvalidValueError
 from sagline.files.design_folder import EVALUATIONS, REQUEST
+from sagline.optimization.rating import Rating
 from tests.optimization.pair import UNDER, apart, pair
 
 UP = sl.FreeAnchors("frame", -1.0, 1.0, along=[0, 0, 1], symmetry="together")
@@ -59,8 +61,15 @@ def test_an_interrupted_search_ends_as_if_it_had_not_been(tmp_path: Path, optimi
 def test_what_is_known_is_not_rated_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = search(tmp_path)
     size = (tmp_path / EVALUATIONS).stat().st_size
-    monkeypatch.setattr("sagline.optimization.rating.Rating._rated", lambda *_: pytest.fail("rated again"))
+    rate, rated = Rating.__call__, [0]
+
+    def counted(self: Rating, values: Array) -> Array:
+        rated[0] += len(values)
+        return rate(self, values)
+
+    monkeypatch.setattr(Rating, "__call__", counted)
     assert same(search(tmp_path), whole)
+    assert rated[0] == 1  # the first robot, before the folder is opened
     assert (tmp_path / EVALUATIONS).stat().st_size == size
 
 
@@ -181,3 +190,14 @@ def test_robots_and_table_are_saved(tmp_path: Path) -> None:
         np.testing.assert_array_equal([float(x) for x in row[1:]], [*values, *changed])
         again = sl.load_robot(file)
         assert again.frame_anchors.tobytes() == robot.frame_anchors.tobytes()
+
+
+def test_what_is_refused_leaves_no_folder(tmp_path: Path) -> None:
+    endless = sl.load_robot("ipanema-1").replace(tension_max=np.inf)
+    posts = sl.FreeAnchors("frame", -0.1, 0.1, along=[0, 0, 1], symmetry="together")
+    for goal in ("cable_cost", "least_margin"):
+        with pytest.raises(InvalidValueError):
+            sl.design(endless, [posts], [goal], grid=(2, 2, 2), evaluations=16, folder=tmp_path / "front")
+    with pytest.raises(InvalidValueError):
+        search(tmp_path / "front", evaluations=3)
+    assert not (tmp_path / "front").exists()

@@ -101,10 +101,10 @@ def design(
     if count < least:
         allowed = f">= {least:,}, two generations of {request.optimizer} for {len(candidates.parts)} free numbers"
         raise InvalidValueError("evaluations", f"{count:,}", allowed, "Allow more, or free less.")
-    with _record(folder, request) as record:
-        ledger = Ledger(request, candidates, record, count, progress)
-        point = candidates.units(candidates.start[None])[0]
-        sample = request.sample(len(point))
+    ledger = Ledger(request, candidates, count, progress)  # refuses before anything is written
+    point = candidates.units(candidates.start[None])[0]
+    sample = request.sample(len(point))
+    with _record(folder, request) as ledger.record:
         SEARCHES[request.optimizer](Task(ledger.rate, point, sample, ledger.costs, request.seed, count))
         return ledger.front()
 

@@ -38,7 +38,6 @@ class Ledger:
         self,
         request: Request,
         candidates: Candidates,
-        record: Record | None,
         evaluations: int,
         progress: Progress | None,
     ) -> None:
@@ -47,17 +46,22 @@ class Ledger:
         Args:
             request: What is asked.
             candidates: Its candidates.
-            record: What is known, or None.
             evaluations: How many there will be.
             progress: Told after each generation.
+
+        Raises:
+            InvalidValueError: If a goal says nothing of the first robot.
         """
-        self._request, self._candidates, self._record = request, candidates, record
+        self._request, self._candidates = request, candidates
+        self.record: Record | None = None
         self._evaluations, self._progress = evaluations, progress
         self._rating = request.rating(candidates)
         self._start = candidates.units(candidates.start[None])[0]
         width = len(candidates.parts)
         self._rows: Array = np.zeros((0, width + len(request.goals)))
         self._width = width
+        self._first = self._rating(candidates.start[None])[0]
+        self._check_first()
 
     @property
     def costs(self) -> int:
@@ -72,11 +76,10 @@ class Ledger:
         fresh = values[len(known) :]
         if len(fresh):
             rows = np.concatenate((fresh, self._rating(fresh)), axis=1)
-            if self._record is not None:
-                self._record.add(rows)
+            if self.record is not None:
+                self.record.add(rows)
             known = np.concatenate((known, rows))
         self._rows = np.concatenate((self._rows, known))
-        self._check_start()
         if self._progress is not None:
             self._progress(len(self._rows), self._evaluations)
         costs = self._costs(known)
@@ -116,15 +119,14 @@ class Ledger:
         )
 
     def _costs(self, rows: Array) -> Array:
-        goals = self._rows[0, self._width :]
-        return costs_of(rows[:, self._width :], self._request.goals, goals)
+        return costs_of(rows[:, self._width :], self._request.goals, self._first)
 
     def _recalled(self, values: Array) -> Array:
         """Rows of the record for the first of these candidates, as far as it goes."""
-        if self._record is None:
+        if self.record is None:
             return np.zeros((0, self._rows.shape[1]))
         first = len(self._rows)
-        known = self._record.known[first : first + len(values)]
+        known = self.record.known[first : first + len(values)]
         if not np.array_equal(known[:, : self._width], values[: len(known)]):
             wrong = int(np.argmax((known[:, : self._width] != values[: len(known)]).any(axis=1)))
             allowed = "what this search asks for: packages or machine are others than when it began"
@@ -133,9 +135,9 @@ class Ledger:
             )
         return known
 
-    def _check_start(self) -> None:
-        """Refuse goals that say nothing, once the first robot is rated."""
-        for goal, value in zip(self._request.goals, self._rows[0, self._width :], strict=True):
+    def _check_first(self) -> None:
+        """Refuse goals that say nothing of the first robot."""
+        for goal, value in zip(self._request.goals, self._first, strict=True):
             if np.isinf(value):
                 item = f"{goal.kind} of {self._request.robot.name}"
                 step = "Give it finite tension_max, or choose workspace_share."
