@@ -35,7 +35,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def sagline(*words: str) -> Any:
-    return CliRunner().invoke(app, ["design", "article-suspended", "design.yaml", *words])
+    return CliRunner().invoke(app, ["design", "article-suspended", "design.yaml", "--no-figures", *words])
 
 
 def library(**changes: Any) -> sl.Front:
@@ -122,3 +122,10 @@ def test_bad_input_is_one_line(folder: Path, text: str, words: tuple[str, ...], 
     (line,) = result.stderr.strip().splitlines()
     assert expected in line
     assert len(line) < 300
+
+
+def test_a_figure_is_drawn_of_what_was_tried(folder: Path) -> None:
+    result = CliRunner().invoke(app, ["design", "article-suspended", "design.yaml", "--evaluations", "30"])
+    assert result.exit_code == 0, result.stderr
+    assert (folder / "front" / "front.png").read_bytes().startswith(b"\x89PNG")
+    assert "front.csv/.png/.svg" in result.stdout.replace("\n", "")

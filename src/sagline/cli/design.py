@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from sagline.cli.entries import INVERSE, SIGNED_MARGINS, VIBRATION
-from sagline.cli.results import listed
+from sagline.cli.results import figure_files, listed, write_figures
 from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.cli.values import whole_of
@@ -19,17 +19,19 @@ from sagline.optimization.front import Front
 from sagline.optimization.goals import AT_POSES, Goal
 from sagline.optimization.request import MOST_EVALUATIONS
 
+FIGURE: Final = "front"
 MOST_ROWS: Final = 12  # of the table; front.csv has all
 
 
-def design(robot: str, file: Path, out: Path, evaluations: str | None, *, as_json: bool) -> None:
-    """Search, tell and write.
+def design(robot: str, file: Path, out: Path, evaluations: str | None, *, figures: bool, as_json: bool) -> None:
+    """Search, tell, write and draw.
 
     Args:
         robot: A preset or a robot file.
         file: The design file.
         out: Folder of the search.
         evaluations: Robots that are tried, as the command line has it; None for what the file says.
+        figures: Whether to draw.
         as_json: Whether to print JSON.
 
     Raises:
@@ -38,7 +40,8 @@ def design(robot: str, file: Path, out: Path, evaluations: str | None, *, as_jso
     first, asked = load_robot(robot), load_design(file)
     if evaluations is not None:
         asked["evaluations"] = whole_of(evaluations, "--evaluations", 1, MOST_EVALUATIONS)
-    check_files(out, [FRONT])
+    drawn = figure_files([FIGURE]) if figures else []
+    check_files(out, [FRONT, *drawn])
     rated = [0]
     with working(f"{first.name}: rating robots", *_needed(asked["goals"])) as line:
 
@@ -52,6 +55,11 @@ def design(robot: str, file: Path, out: Path, evaluations: str | None, *, as_jso
             note("", f"{rated[0]:,} robots are rated, and kept in {out}: the same command goes on from there.")
             raise
         files = front.save(out)
+        if figures:
+            from sagline import plot
+
+            line.stage("drawing")
+            files += write_figures({FIGURE: plot.front(front)}, out)
     if as_json:
         show_json({**_record(front), "files": files})
         return

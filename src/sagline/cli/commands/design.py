@@ -22,6 +22,9 @@ def design(
         str | None,
         typer.Option(metavar="NUMBER", help="Robots that are tried. Default: as the file says.", show_default=False),
     ] = None,
+    figures: Annotated[
+        bool, typer.Option("--figures/--no-figures", help="Draw what was tried and found, as PNG and SVG.")
+    ] = True,
     as_json: JsonOption = False,
 ) -> None:
     r"""Search for a better robot: anchors, cables and limits that may change, and goals, stand in a file.
@@ -37,4 +40,4 @@ def design(
     """
     from sagline.cli.design import design as run
 
-    run(robot, file, out, evaluations, as_json=as_json)
+    run(robot, file, out, evaluations, figures=figures, as_json=as_json)
