@@ -69,8 +69,9 @@ def _not_inside(
     if not len(poses):
         return 0
     load = _one_each(robot, wrenches, len(poses), rng)
-    # with no lower limit the tensions of least norm may leave a cable slack: others do not
-    sharing = sl.AnalyticCenter() if (robot.tension_min == 0.0).any() else sl.MinimumNorm()
+    # with no lower chord limit the tensions of least norm may leave a cable slack: others do not
+    may_be_slack = (robot.tension_min == 0.0).any() or robot.tension_limits_of == "frame_end"
+    sharing = sl.AnalyticCenter() if may_be_slack else sl.MinimumNorm()
     status = sl.inverse(robot, poses, wrench=load, model=model, tension=sharing).status
     return int((status != sl.PoseStatus.SOLVED).sum())
 

@@ -27,6 +27,7 @@ def test_no_pose_contradicts_a_proof(name: str, model: sl.CableModel) -> None:
     ("name", "changes"),
     [
         ("article-suspended", {"tension_limits_of": "frame_end"}),
+        ("article-suspended", {"tension_limits_of": "frame_end", "tension_min": 3.0}),
         ("article-suspended", INFINITE),
         ("article-suspended", {"center_of_mass": [0.05, -0.1, 0.1]}),
         ("article-mixed", {"tension_min": 0.0}),
@@ -38,7 +39,7 @@ def test_nor_with_other_limits(name: str, changes: dict[str, Any]) -> None:
     inside, outside, wrong = contradictions(robot, 180, np.random.default_rng(15))
     assert wrong == 0
     assert inside > 50
-    assert outside > 20
+    assert outside > 10
 
 
 @pytest.mark.parametrize(

@@ -6,14 +6,19 @@ from typing import Any
 
 import numpy as np
 
+from sagline.arrays import Array
+from sagline.kernels.cable import hanging
+from sagline.kernels.cable.pulley import Pulley
 from sagline.kernels.cable.terms import Chord, Material, Model
 from sagline.kernels.workspaces import pull_bounds
+from sagline.kernels.workspaces.box_tensions import SLACK
 from tests.kernels.cable.curves import GRAVITY, from_tension, random_curves
 from tests.kernels.compiled import from_python
 
 fall, rise = from_python(pull_bounds.fall), from_python(pull_bounds.rise)
 fall_rate, rise_rate = from_python(pull_bounds.fall_rate), from_python(pull_bounds.rise_rate)
 pull_slope, most_pull = from_python(pull_bounds.pull_slope), from_python(pull_bounds.most_pull)
+chord_tension_at_frame_end = from_python(hanging.chord_tension_at_frame_end)
 MODEL = Model(4, 0.0, 0.0, GRAVITY)
 
 
@@ -58,6 +63,37 @@ def test_positions() -> None:
             assert change <= most + 1e-12 * tau
             tightest = max(tightest, change / most)
     assert tightest > 0.95
+
+
+def test_limits_of_the_frame_end_move_no_faster() -> None:
+    rng = np.random.default_rng(3)
+    tightest = 0.0
+    for _ in range(100):
+        curves = random_curves(rng, 8)
+        cables: Any = curves.cables
+        for i in range(8):
+            half, material = cables.half_weight[i], Material(float(cables.density[i]), float(cables.stiffness[i]))
+            place = np.array([cables.chord[i] * cables.cosine[i], cables.chord[i] * cables.sine[i]])
+            step = rng.normal(size=2)
+            way = float(cables.chord[i] * 10 ** rng.uniform(-4, -1))
+            there = place + step * way / np.linalg.norm(step)
+            tight = half * (1.0 + way / cables.chord[i]) / SLACK
+            limit = tight * 10 ** rng.uniform(0.2, 1.0)
+            if there[0] <= 0.0 or limit > 0.1 * material.stiffness:
+                continue
+            limits = [_chord_limit(at, material, float(limit)) for at in (place, there)]
+            if min(limits) < tight:
+                continue
+            change, most = abs(limits[1] - limits[0]), way * pull_slope(curves, i, way, tight)
+            assert change <= most + 1e-10 * limit
+            tightest = max(tightest, change / most)
+    assert tightest > 0.6
+
+
+def _chord_limit(place: Array, material: Material, tension: float) -> float:
+    length = float(np.linalg.norm(place))
+    chord = Chord(length, float(place[1]) / length, float(place[0]) / length)
+    return float(chord_tension_at_frame_end(MODEL, chord, material, Pulley(0.0, 1.0, 0.0, 0.0), tension))
 
 
 def _pull(cables: Any, i: int, tau: float) -> float:

@@ -9,13 +9,14 @@ from sagline.arrays import Array
 from sagline.kernels import tables
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.pulls import Curves, pulls_at
-from sagline.kernels.codes import CATENARY
+from sagline.kernels.codes import CATENARY, LIMITS_OF_CHORD
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.workspaces.centered import FARTHEST, Centered, find_center, leave
 from sagline.kernels.workspaces.pose_box import MOTIONS, Box, Place
 from sagline.kernels.workspaces.pull_bounds import LOOSEST, most_pull, pull_slope, sags
 
 SMOOTHNESS = 0.01  # of how far the demand goes over a box: so much of it the smoothing leaves
+SLACK = 0.45  # X at a limit of the frame end beyond which it may move faster than the pull
 LEAST_ROOM = 0.05  # share of their range that a set of wrenches leaves to the tensions in the search for a center
 ROUNDS = 2  # of tensions and their pulls
 LEAST_WAY = 1e-4  # of a chord: a smaller box is smoothed as one so large
@@ -49,16 +50,31 @@ def set_ranges(quantity: int, place: Place, curves: Curves, ranges: Ranges) -> N
         ranges.high[i] = ranges.highest[i] = high
         if sags(curves, i):
             loosest = cables.half_weight[i] / LOOSEST
-            if quantity != 0:  # limits of the frame end move with the cable's weight
-                moves = place.way[i] * pull_slope(curves, i, place.way[i], max(low, loosest))
-                ranges.low[i], ranges.lowest[i] = low + moves, low - moves
-                moves = place.way[i] * pull_slope(curves, i, place.way[i], max(high, loosest))
-                if high < math.inf:
-                    ranges.high[i], ranges.highest[i] = high - moves, high + moves
+            if quantity != LIMITS_OF_CHORD:
+                move_limits(place, curves, i, ranges)
             ranges.lowest[i] = max(ranges.lowest[i], loosest)
             ranges.low[i] = max(ranges.low[i], loosest)
             ranges.highest[i] = min(ranges.highest[i], max(cables.stiffness[i], ranges.lowest[i]))
             ranges.high[i] = min(ranges.high[i], cables.stiffness[i])
+
+
+@kernel
+def move_limits(place: Place, curves: Curves, i: int, ranges: Ranges) -> None:
+    """Take the limits of a cable's frame end, as chord limits at the middle, apart by how far they move in a box.
+
+    They move as its pull does where it is not slack. A limit that is, anywhere in the box, is the least of those that
+    are not for what has to keep it, and none at all for the proof that nothing does.
+    """
+    cables = curves.cables
+    way = place.way[i]
+    tight = cables.half_weight[i] * (1.0 + way / cables.chord[i]) / SLACK
+    low, high = max(cables.low[i], tight), max(cables.high[i], tight)
+    moves = way * pull_slope(curves, i, way, tight)
+    ranges.low[i] = low + moves
+    ranges.lowest[i] = low - moves if cables.low[i] - moves > tight else 0.0
+    if high < math.inf:
+        ranges.high[i] = high - moves if cables.high[i] - moves > tight else 0.0
+        ranges.highest[i] = high + moves
 
 
 @kernel
