@@ -81,8 +81,10 @@ def workspace(
     Examples:
         >>> import sagline as sl
         >>> space = sl.workspace(sl.load_robot("article-suspended"), cells=16)
-        >>> print(f"{space.volume:.0f} m3 down to {space.open_faces[0]}, limited by the {space.limits[0].criterion}")
-        789 m3 down to z low, limited by the margin
+        >>> print(f"{space.volume:.0f} m3, open at {space.open_faces[0]}")
+        789 m3, open at z low
+        >>> print(f"limited by the {space.limits[0].criterion}")
+        limited by the margin
 
     Source:
         docs/model.md, section 13; Bouchard, Gosselin & Moore 2010 (margin); Lorensen & Cline 1987 (marching cubes).
