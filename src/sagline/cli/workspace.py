@@ -161,7 +161,9 @@ def _drawn(space: Workspace, names: Sequence[str], folder: Path) -> list[Path]:
     """The figures, by their files."""
     from sagline import plot
 
-    pictures = [getattr(plot, kind)(space) for kind in ("workspace", "slice") if kind in plot.__all__]
+    pictures: list[Any] = [plot.workspace(space)]
+    if space.unit == "m³":  # of a plane the first is the slice
+        pictures.append(plot.slice(space))
     return write_figures(dict(zip(names, pictures, strict=False)), folder)
 
 
