@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from sagline.cables.catenary import Catenary
 from sagline.cables.empirical import Empirical
-from sagline.cli.entries import FORWARD, INVERSE
+from sagline.cli.entries import FORWARD, INVERSE, SIGNED_MARGINS
 from sagline.cli.results import figure_files, tell, write_figures, write_plans
 from sagline.cli.study import Run, run_along, run_name
 from sagline.cli.terminal import show, working
@@ -15,14 +15,22 @@ from sagline.files.robot_file import load_robot
 from sagline.files.whole import check_files
 from sagline.motion.planar import article_path
 from sagline.tension.minimum_norm import MinimumNorm
+from sagline.workspaces.space import amount_of
+from sagline.workspaces.workspace import workspace
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from sagline.cli.line import Line
+    from sagline.robot.robot import Robot
+    from sagline.workspaces.space import Workspace
+
 ROBOTS = ("article-suspended", "article-mixed")
 MODELS = (Empirical(), Catenary())
 FIGURES = ("figure-18-path", "figure-19-velocity", "figure-20-suspended", "figure-21-mixed", "figure-22-error")
+HULLS = ("hull-suspended", "hull-mixed")  # the article's future work: where its robots can work, with sag
+CELLS = 20  # along the longest edge of the frame: half a second a robot, volumes to 0.2 %
 
 # The article describes (55), closest to the tensions before, but shows lower cables near their minimum wherever they
 # are not needed and curves that return to where they began: that is the least norm, in its variable T_x.
@@ -37,18 +45,41 @@ def run_article(folder: Path, *, as_json: bool) -> int:
     """
     robots = [load_robot(name) for name in ROBOTS]
     plans = [f"{run_name(robot, model)}.nc" for robot in robots for model in MODELS]
-    check_files(folder, [*plans, *figure_files(FIGURES)])
+    hulls = [f"{name}.glb" for name in HULLS]
+    check_files(folder, [*plans, *figure_files([*FIGURES, *HULLS]), *hulls])
     path, runs = article_path(), []
     with working("planning and confirming the article's path", INVERSE, FORWARD) as line:
         for robot in robots:
             runs += [run_along(robot, path, model, TENSION, line) for model in MODELS]
-    with working("writing runs and figures"):
+    with working("where both robots can work", SIGNED_MARGINS) as line:
+        spaces = _workspaces(robots, line)
+    with working("writing runs, hulls and figures"):
         files = write_plans(runs, folder)
         figures = _figures(*(run for run in runs if _is_empirical(run)))
         files += write_figures(dict(zip(FIGURES, figures, strict=True)), folder)
+        files += _write_hulls(spaces, folder)
     if not as_json:
         show(f"The article's path, {len(path):,} poses in {path.duration:g} s; least norm of the horizontal tensions.")
+        for space in spaces:
+            name, mass = space.robot.name, space.robot.mass
+            show(f"{name} can work in {amount_of(space)} of its frame, level, bearing its {mass:g} kg.")
     return tell(runs, files, folder, as_json=as_json)
+
+
+def _workspaces(robots: list[Robot], line: Line) -> list[Workspace]:
+    """Where the robots can work within their frames, level, bearing their own weight."""
+    return [workspace(robot, cells=CELLS, progress=line.progress) for robot in robots]
+
+
+def _write_hulls(spaces: list[Workspace], folder: Path) -> list[Path]:
+    """A figure and the surface of each; returns the files."""
+    from sagline import plot
+
+    files = write_figures({name: plot.workspace(space) for name, space in zip(HULLS, spaces, strict=True)}, folder)
+    for name, space in zip(HULLS, spaces, strict=True):
+        files.append(folder / f"{name}.glb")
+        space.surface.export(files[-1])
+    return files
 
 
 def _is_empirical(run: Run) -> bool:

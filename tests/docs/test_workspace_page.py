@@ -1,0 +1,36 @@
+"""The numbers of docs/workspace.md and of the README's first run that no block of code prints."""
+
+import re
+from pathlib import Path
+
+import sagline as sl
+from sagline.cli.run import CELLS, ROBOTS
+from sagline.workspaces.boundary import boundary
+from sagline.workspaces.rays import ray_hull
+from tests.workspaces.levels import ipanema, level_of
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs" / "workspace.md").read_text(encoding="utf-8")
+MODEL = " ".join((ROOT / "docs" / "model.md").read_text(encoding="utf-8").split())
+README = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+
+
+def row(name: str) -> str:
+    found = re.search(rf"^\| {name}.*?\| (.*?) \|$", PAGE, re.MULTILINE)
+    assert found is not None
+    return found[1]
+
+
+def test_what_rays_lose() -> None:
+    robot, low, high = ipanema()
+    level = level_of(robot, sl.Straight())
+    rays = ray_hull(level, [0.0, 0.0, 1.0], low, high).volume
+    whole = boundary(level, low, high, cells=32)
+    assert row("the same rays") == f"{rays:.3f}"
+    assert row("the boundary") == f"{whole.volume:.3f} ± {whole.volume_error:.3f}"
+    assert f"give {rays:.3f} m³; the whole is {whole.volume:.3f} m³" in MODEL
+
+
+def test_where_both_robots_of_the_first_run_can_work() -> None:
+    volumes = [sl.workspace(sl.load_robot(name), cells=CELLS).volume for name in ROBOTS]
+    assert f"{volumes[0]:.0f} m³ and {volumes[1]:.0f} m³ of their frames" in README
