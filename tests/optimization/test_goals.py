@@ -74,3 +74,16 @@ def test_a_robot_that_loses_a_pose_is_no_candidate() -> None:
             np.testing.assert_allclose(value, plan.chord_tension.max(), rtol=1e-12)
     assert np.isnan(values).any()
     assert front.best.tension_max[0] == limits[np.nanargmin(values)]
+
+
+def test_poses_that_the_first_robot_does_not_hold_do_not_count() -> None:
+    robot = sl.load_robot("cogiro")
+    inside = random_poses(robot, 6, np.random.default_rng(2))
+    far = np.concatenate((inside.position, [[60.0, 0.0, 2.0]]))
+    poses = sl.Pose.from_quaternion(far, np.concatenate((inside.quaternion, [[0.0, 0.0, 0.0, 1.0]])))
+    free = sl.FreeAnchors("frame", -0.5, 0.5, along=[0, 0, 1], symmetry="together")
+    with_it, without = (
+        sl.design(robot, [free], ["largest_tension"], poses=some, evaluations=16) for some in (poses, inside)
+    )
+    assert np.isfinite(with_it.start_values).all()
+    assert with_it.evaluated_values.tobytes() == without.evaluated_values.tobytes()
