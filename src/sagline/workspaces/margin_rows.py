@@ -15,7 +15,7 @@ from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
 from sagline.kernels import tables
 from sagline.kernels.memory import memory_for
-from sagline.kernels.workspaces.signed_margin import signed_margins
+from sagline.kernels.workspaces.signed_margin import FACET_SIZE, signed_margins
 from sagline.kernels.workspaces.wrench_set import SetTerms
 from sagline.robot.robot import Robot
 from sagline.robot.several import bodies_of, first_of, together
@@ -136,7 +136,7 @@ class MarginRows:
             step = f"Give every one of the {self.robot_count} robots as many poses."
             raise InvalidValueError("poses", f"{count} of them", f"a multiple of {self.robot_count}", step)
         numbers, counters = memory_for(self.cable_count)
-        memory = numbers, counters, np.empty(self.cable_count, dtype=np.int8)
+        memory = np.empty(numbers.size + FACET_SIZE), counters, np.empty(self.cable_count, dtype=np.int8)
         margins = (
             np.empty((3, count)),
             np.empty((count, 6)),
@@ -181,7 +181,7 @@ def _set_terms(wrenches: WrenchSet, inertias: Array) -> SetTerms:
     straight = np.count_nonzero(segments, axis=1) <= 1
     half = segments[straight].sum(axis=0)
     others = _locked(wrenches.segments[~straight])
-    ellipsoids, corners, sizes = wrenches.ellipsoids, wrenches.corners, wrenches.sizes
+    ellipsoids, corners, sizes = _locked(wrenches.ellipsoids.transpose(0, 2, 1)), wrenches.corners, wrenches.sizes
     return wrenches.center, locked(half), others, ellipsoids, corners, sizes, wrenches.accelerations, inertias
 
 

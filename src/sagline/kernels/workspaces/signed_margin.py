@@ -74,7 +74,8 @@ ENDS, RANGES = 0, 1  # rows of the points
 
 # Facets that are measured together: rows in flat memory, whose places are known when it is compiled, so that loops
 # over facets vectorize.
-TOGETHER = 32
+TOGETHER = 64
+OF_A_SUBSET = 20  # of the other columns: so many normals at most, 6 over 3
 NORMAL = 0  # six rows
 ROUNDING = 6 * TOGETHER
 BY_ENDS, BY_TENSIONS, BY_PULLS = 7 * TOGETHER, 8 * TOGETHER, 9 * TOGETHER  # what the cables give about the points
@@ -92,7 +93,7 @@ VALUE, BELOW, ABOVE = 0, 1, 2  # rows of the margins (3, N) [N]
 ModelTerms = tuple[int, float, float]  # code, k_h, k_p
 LimitTerms = tuple[int, float]  # Limits
 Robots = tuple[Array, Array, Array]  # freedom, bodies, robots
-Room = tuple[Array, Indices, Codes]  # `memory_for` as many cables, and codes (m,)
+Room = tuple[Array, Indices, Codes]
 Margins = tuple[Array, Array, Indices, Codes]  # margins (3, N), directions (N, 6), cables (N,), statuses (N,)
 
 
@@ -139,7 +140,7 @@ def signed_margins(
         set_terms: The set of loads.
         arms: Lever arm of the norm, and mean lever arm [m], (1 or R,) each.
         poses: Rows (N, POSE_COLUMNS).
-        room: Memory.
+        room: `memory_for` as many cables and FACET_SIZE numbers more, and codes of the cables (m,).
         margins: Filled: value, lower and upper end [N], (3, N); normal of the facet of the value, along which the
             cables give too little first, in world axes, of length 1 where moments are divided by the lever arm, (N, 6);
             the cable whose limit moves it fastest, -1 for none, (N,); what the bracket says, (N,).
@@ -261,13 +262,12 @@ def walk(
         for s in range(START[n, depth + 1], START[n, depth + 2]):
             if add_normal(facets, depth, ORDER[n, s], m, measured, held):
                 held += 1
-            if held == TOGETHER:
-                measure(counts, wrenches, held, measured, margin, direction)
-                held = 0
         depth = next_subset(facets, n, depth)
+        if depth < 0 or held > TOGETHER - OF_A_SUBSET:
+            measure(counts, wrenches, held, measured, margin, direction)
+            held = 0
         if depth < 0:
             break
-    measure(counts, wrenches, held, measured, margin, direction)
     margin[BELOW] = min(margin[BELOW], margin[VALUE])  # but for rounding they are
     margin[ABOVE] = max(margin[ABOVE], margin[VALUE])
     for k in range(3):

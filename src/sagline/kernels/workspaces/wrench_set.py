@@ -19,18 +19,14 @@ class WrenchSet(NamedTuple):
     """A set of loads at one pose, in world axes about the center of mass.
 
     Attributes:
-        half: Largest difference in each component [N, N m], (6,).
-        spin: Rows whose scalar products with the moment part of a direction count by their size [N m], (3, 3).
-        spins: Whether there are any.
+        own: Segments of the pose: a box, those of linear acceleration within it, and of angular ones, (9, 6).
         segments: Each adds all between minus and plus itself, (S, 6).
-        ellipsoids: Each A adds A s for all s no longer than 1, (E, 6, 6).
+        ellipsoids: Each A adds A^T s for all s no longer than 1, (E, 6, 6).
         corners: Of polytopes, those of one after those of the other, (C, 6).
         sizes: How many corners each polytope has, (P,).
     """
 
-    half: Array
-    spin: Array
-    spins: bool
+    own: Array
     segments: Array
     ellipsoids: Array
     corners: Array
@@ -40,25 +36,28 @@ class WrenchSet(NamedTuple):
 @glue
 def new_set(terms: SetTerms, memory: Memory) -> tuple[WrenchSet, Memory]:
     """Room for what differs from pose to pose, and the memory that is left."""
-    half, at = block(memory.numbers, 0, 1, 6)
-    spin, at = block(memory.numbers, at, 3, 3)
-    wrenches = WrenchSet(half[0], spin, terms[6][1] > 0.0, terms[2], terms[3], terms[4], terms[5])
+    own, at = block(memory.numbers, 0, 9, 6)
+    wrenches = WrenchSet(own, terms[2], terms[3], terms[4], terms[5])
     return wrenches, Memory(memory.numbers[at:], memory.counters)
 
 
 @glue
 def place_set(terms: SetTerms, body: Array, inertia: Array, rotation: Array, wrenches: WrenchSet) -> None:
-    """Fill the loads of accelerations, w = -M a and -Q I Q^T alpha, of a platform in its rotation (3, 3)."""
+    """Fill the box and the loads of accelerations, w = -M a and -Q I Q^T alpha, of a platform in its rotation."""
+    own = wrenches.own
+    for s in range(9):
+        for k in range(6):
+            own[s, k] = 0.0
     for k in range(6):
-        wrenches.half[k] = terms[1][k] + (body[tables.MASS] * terms[6][0] if k < 3 else 0.0)
-    if wrenches.spins:
+        own[k, k] = terms[1][k] + (body[tables.MASS] * terms[6][0] if k < 3 else 0.0)
+    if terms[6][1] > 0.0:
         for j in range(3):
             for k in range(3):
                 total = 0.0
                 for a in range(3):
                     for b in range(3):
                         total += rotation[j, a] * inertia[a, b] * rotation[k, b]
-                wrenches.spin[j, k] = terms[6][1] * total
+                own[6 + j, 3 + k] = terms[6][1] * total
 
 
 @glue
@@ -75,55 +74,72 @@ def reach(wrenches: WrenchSet, normals: Array, count: int, work: Array, against:
     """
     for b in range(count):
         against[b] = 0.0
-    for k in range(6):
-        if wrenches.half[k] > 0.0:
-            for b in range(count):
-                against[b] += wrenches.half[k] * abs(normals[k, b])
-    if wrenches.spins:
-        for j in range(3):
-            x, y, z = wrenches.spin[j, 0], wrenches.spin[j, 1], wrenches.spin[j, 2]
-            for b in range(count):
-                against[b] += abs(x * normals[3, b] + y * normals[4, b] + z * normals[5, b])
-    for s in range(wrenches.segments.shape[0]):
-        products(wrenches.segments[s], normals, count, work[0])
-        for b in range(count):
-            against[b] += abs(work[0, b])
-    for e in range(wrenches.ellipsoids.shape[0]):
-        for b in range(count):
-            work[1, b] = 0.0
-        for j in range(6):
-            products(wrenches.ellipsoids[e, :, j], normals, count, work[0])
-            for b in range(count):
-                work[1, b] += work[0, b] * work[0, b]
-        for b in range(count):
-            against[b] += math.sqrt(work[1, b])
+    add_segments(wrenches.own, normals, count, work[0], against)
+    add_segments(wrenches.segments, normals, count, work[0], against)
+    if wrenches.ellipsoids.shape[0] > 0:
+        add_ellipsoids(wrenches.ellipsoids, normals, count, work, against)
     for b in range(count):
         along[b] = against[b]
-    first = 0
-    for p in range(wrenches.sizes.size):
-        for b in range(count):
-            work[1, b] = -math.inf
-        for c in range(first, first + wrenches.sizes[p]):
-            products(wrenches.corners[c], normals, count, work[0])
-            for b in range(count):
-                work[1, b] = max(work[1, b], -work[0, b])
-        for b in range(count):
-            against[b] += work[1, b]
-            work[1, b] = -math.inf
-        for c in range(first, first + wrenches.sizes[p]):
-            products(wrenches.corners[c], normals, count, work[0])
-            for b in range(count):
-                work[1, b] = max(work[1, b], work[0, b])
-        for b in range(count):
-            along[b] += work[1, b]
-        first += wrenches.sizes[p]
+    if wrenches.sizes.size > 0:
+        add_polytopes(wrenches.corners, wrenches.sizes, 1.0, normals, count, work, along)
+        add_polytopes(wrenches.corners, wrenches.sizes, -1.0, normals, count, work, against)
 
 
 @kernel
-def products(wrench: Array, normals: Array, count: int, out: Array) -> None:
-    """Fill the scalar products of a wrench (6,) and normals (6, B)."""
-    for b in range(count):
-        out[b] = wrench[0] * normals[0, b]
-    for k in range(1, 6):
+def add_segments(segments: Array, normals: Array, count: int, work: Array, total: Array) -> None:
+    """Add how far segments (S, 6) reach to either side; those of no length cost nothing."""
+    for s in range(segments.shape[0]):
+        if multiply(segments[s], normals, count, work):
+            for b in range(count):
+                total[b] += abs(work[b])
+
+
+@kernel
+def add_ellipsoids(ellipsoids: Array, normals: Array, count: int, work: Array, total: Array) -> None:
+    """Add how far ellipsoids (E, 6, 6) reach to either side."""
+    for e in range(ellipsoids.shape[0]):
         for b in range(count):
-            out[b] += wrench[k] * normals[k, b]
+            work[1, b] = 0.0
+        for j in range(6):
+            if multiply(ellipsoids[e, j], normals, count, work[0]):
+                for b in range(count):
+                    work[1, b] += work[0, b] * work[0, b]
+        for b in range(count):
+            total[b] += math.sqrt(work[1, b])
+
+
+@kernel
+def add_polytopes(
+    corners: Array, sizes: Indices, sign: float, normals: Array, count: int, work: Array, total: Array
+) -> None:
+    """Add how far polytopes reach along the normals, or against them."""
+    first = 0
+    for p in range(sizes.size):
+        for b in range(count):
+            work[1, b] = -math.inf
+        for c in range(first, first + sizes[p]):
+            if not multiply(corners[c], normals, count, work[0]):
+                for b in range(count):
+                    work[0, b] = 0.0
+            for b in range(count):
+                work[1, b] = max(work[1, b], sign * work[0, b])
+        for b in range(count):
+            total[b] += work[1, b]
+        first += sizes[p]
+
+
+@kernel
+def multiply(wrench: Array, normals: Array, count: int, out: Array) -> bool:
+    """Fill the scalar products of a wrench (6,) and normals (6, B); False, and nothing filled, for no wrench."""
+    some = False
+    for k in range(6):
+        part = wrench[k]
+        if part != 0.0:
+            if some:
+                for b in range(count):
+                    out[b] += part * normals[k, b]
+            else:
+                for b in range(count):
+                    out[b] = part * normals[k, b]
+            some = True
+    return some
