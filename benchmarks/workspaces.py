@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
 import sagline as sl
-from benchmarks.measure import Row, best_seconds, print_table
+from benchmarks.measure import Row, best_of_calls, best_seconds, print_table
+from sagline.statics.tables import cable_table, pose_rows
 from sagline.workspaces.boundary import boundary
+from sagline.workspaces.margin_rows import MarginRows
 from sagline.workspaces.rays import ray_hull
+from sagline.workspaces.wrench_sets import NO_LOAD
 from tests.workspaces.levels import ipanema, level_of
 
 CENTER = (0.0, 0.0, 1.0)
 MODELS = (sl.Straight(), sl.Catenary())
 FRAME = (-7.5, -5.5, 0.0), (7.5, 5.5, 6.0)
+POSES = 4_000
 SETTINGS = ((24, 0.5), (64, 2.0))  # cells, and seconds they may take
 
 
@@ -91,7 +96,52 @@ def proofs() -> Iterator[Row]:
         )
 
 
-PARTS = (hulls, volumes, frames, proofs)
+def margins() -> Iterator[Row]:
+    """The signed margin with its bracket over poses of the test boxes, and the capacity margin in the same run."""
+    for name in ("ipanema-1", "article-suspended", "cogiro"):
+        robot = sl.load_robot(name)
+        assert robot.test_box is not None
+        rng = np.random.default_rng(1)
+        position = rng.uniform(robot.test_box.low, robot.test_box.high, (POSES, 3))
+        poses = sl.Pose.from_euler(position, *rng.uniform(-0.1, 0.1, (3, POSES)))
+        rows = pose_rows(poses)
+        each = []
+        for model in MODELS:
+            for wrenches in (NO_LOAD, sl.WrenchBox(1.0, 0.1)):
+                prepared = MarginRows(robot, wrenches, model)
+                each.append(best_seconds(partial(prepared.rows, rows)) * 1e6 / POSES)
+        straight, _, sagging, box = each
+        state = sl.inverse(robot, poses).state
+        known = best_seconds(partial(sl.capacity_margin, state)) * 1e6 / int(np.isfinite(state.pull).all(axis=-1).sum())
+        yield Row(
+            f"signed margin with bracket, 8 cables, {name}",
+            "<= 4 us a pose",
+            f"{sagging:.2f} us ({sagging / known:.2f} of the capacity margin); of a wrench box {box:.2f}; "
+            f"straight {straight:.2f}",
+        )
+
+
+def calls() -> Iterator[Row]:
+    """One pose a call, and many robots in one call."""
+    robot = sl.load_robot("article-suspended")
+    assert robot.test_box is not None
+    prepared = MarginRows(robot, sl.WrenchBox(50.0, 5.0))
+    rng = np.random.default_rng(2)
+    poses = sl.Pose(rng.uniform(robot.test_box.low, robot.test_box.high, (315, 3)), np.eye(3))
+    one = pose_rows(poses[0])
+    own = best_of_calls(lambda: prepared.rows(one)) * 1e6
+    yield Row("margin of one pose a call, prepared", "<= 20 us beside the margin itself", f"{own:.1f} us in all")
+    table = np.repeat(cable_table(robot), 600, axis=0)
+    table[:, :, :3] += rng.uniform(-0.5, 0.5, (600, 8, 3))
+    tiled = np.tile(pose_rows(poses), (600, 1))
+
+    def run() -> None:
+        MarginRows(robot, sl.WrenchBox(50.0, 5.0), cables=table).rows(tiled)
+
+    yield Row("600 robots at 315 poses, in one call", "no object a robot", f"{best_seconds(run, 3):.2f} s")
+
+
+PARTS = (margins, calls, hulls, volumes, frames, proofs)
 
 if __name__ == "__main__":
     print_table("Where a robot can work", PARTS)
