@@ -128,6 +128,14 @@ def test_the_numbers_are_in_the_json_file(report: ArticleReport) -> None:
     assert (best["rms_mm"], best["left_out_rms_mm"]) == pytest.approx((3.92, 4.53), abs=0.01)
     assert poses["explanations"]["models"] == 175
     assert poses["ten-points"]["pulley_imitated_by_zero_and_anchor_height"] == pytest.approx(0.990, abs=1e-3)
+    where = numbers["workspace"]["volume"]
+    assert where["article-suspended"]["volume_m3"] == pytest.approx(789.4, abs=1.0)  # by a study's own program
+    assert where["article-suspended"]["change_percent"] == pytest.approx(0.8, abs=0.1)
+    for model, key in ((sl.Catenary(), "volume_m3"), (sl.Straight(), "straight_volume_m3")):
+        coarse = sl.workspace(sl.load_robot("article-mixed"), model=model, cells=12)
+        assert where["article-mixed"][key] == pytest.approx(coarse.volume, abs=coarse.volume_error)
+    apart = numbers["workspace"]["boundary"]["farthest_apart_m"]
+    assert all(0.01 < value < 0.1 for value in apart.values())
     assert len(numbers["errata"]) == 11
     classes = poses["classes"]
     left = {"anchor height": 9.0, "pulley radius": 10.6, "zero of the lengths": 11.2, "Young's modulus E": 12.7}

@@ -47,6 +47,7 @@ PARTS = (
     Part("models", (), (), "models", "models_chapter"),
     Part("simulation", tuple(range(17, 23)), (), "simulation", "simulation_chapter"),
     Part("poses", (25, 26, 27), (2,), "poses", "poses_chapter"),
+    Part("workspace", (), (), "workspace", "workspace_chapter"),
     Part("errata", (), (), "errata", "errata_chapter"),
 )
 REDONE = "3-15, 17-22 and 25-27; the others are drawings and photographs without data"
