@@ -148,6 +148,14 @@ def test_the_numbers_are_in_the_json_file(report: ArticleReport) -> None:
     assert classes["two_left_mm"] < classes["measured_rms_mm"] / 3.0
 
 
+def test_the_documentation_tells_the_same_volumes(report: ArticleReport) -> None:
+    page = " ".join((Path(__file__).parents[2] / "docs" / "article.md").read_text(encoding="utf-8").split())
+    suspended, mixed = report.numbers["workspace"]["volume"].values()
+    told = f"reaches {suspended['volume_m3']:.1f} m³ of its frame and the mixed one {mixed['volume_m3']:.1f} m³, "
+    change = f"{suspended['change_percent']:+.2f} % and −{-mixed['change_percent']:.2f} % against straight cables"
+    assert told + change in page
+
+
 NUMBER = re.compile(r"(?<![\w.])([-−]?\d[\d,]*(?:\.\d+)?)(?:\u00a0([fpnµmkMG](?=[mNgs](?![\w²]))))?")
 PREFIX = {"f": -15, "p": -12, "n": -9, "µ": -6, "m": -3, "k": 3, "M": 6, "G": 9}
 NAMES = re.compile(r"\(\d+\)|errat(?:um|a) \d+|[Ff]igures? \d+|[Tt]ables? \d+|/24?\b|\(24 ")  # and parts of formulas

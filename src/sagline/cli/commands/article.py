@@ -17,7 +17,7 @@ def article(
         typer.Argument(
             metavar="PART",
             help="figures N-M, table 2, or a chapter: feasible-sets, intercept, sag, constants, identify, models, "
-            "simulation, poses, errata. Default: everything.",
+            "simulation, poses, workspace, errata. Default: everything.",
         ),
     ] = None,
     out: OutOption = Path("output"),
