@@ -13,6 +13,7 @@ DECLARED = {  # each result's save, the one lazy call outward
     ("sagline.dynamics.simulation", "sagline.files.simulation_file"),
     ("sagline.control.execution", "sagline.files.execution_file"),
     ("sagline.optimization.front", "sagline.files.design_folder"),
+    ("sagline.workspaces.space", "sagline.files.workspace_file"),
     ("sagline.workspaces.surface", "sagline.files.surface_file"),
 }
 

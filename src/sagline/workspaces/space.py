@@ -140,7 +140,7 @@ class Workspace(Result):
 
         An xarray Dataset with dimensions x, y and z; worked out at each call.
         """
-        from sagline.files.workspace_field import field_of  # xarray is of the outer ring
+        from sagline.files.workspace_file import field_of  # xarray is of the outer ring
 
         return field_of(self)
 
