@@ -42,7 +42,7 @@ SPACES: dict[str, dict[str, Any]] = {
 
 
 def space_of(name: str) -> sl.Workspace:
-    return sl.workspace(ROBOT, **SPACES[name], cells=4)
+    return sl.workspace(ROBOT, **SPACES[name], cells=4, refine=False)
 
 
 def assert_same(space: sl.Workspace, other: sl.Workspace) -> None:
