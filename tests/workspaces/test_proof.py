@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import time
 from typing import Any
 
@@ -93,6 +94,7 @@ def test_small_boxes_are_proved_at_once() -> None:
     assert (inside.verdict, inside.inside) == (sl.ProofVerdict.PROVED_INSIDE, 1.0)
     above = sl.prove(robot, sl.PoseBox([-1, -1, 6.5], [1, 1, 7.0]))
     assert (above.verdict, above.outside) == (sl.ProofVerdict.PROVED_OUTSIDE, 1.0)
+    assert not pickle.loads(pickle.dumps(above)).cells.low.flags.writeable
     point = sl.prove(robot, sl.PoseBox([0, 0, 2], [0, 0, 2]))
     assert (point.verdict, point.volume, point.tried) == (sl.ProofVerdict.PROVED_INSIDE, 0.0, 1)
     flat = sl.prove(robot, sl.PoseBox([-1, -1, 2], [1, 1, 2]))

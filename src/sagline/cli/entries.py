@@ -251,7 +251,7 @@ ENTRIES = {
         Entry(FIT, "forward.fit.fit_poses", 30, 5.0, lambda: _forward(straight=True)),
         Entry(MARGINS, "inverse.queries.margins_of_poses", 33, 9.0, _margins),
         Entry(SIGNED_MARGINS, "workspaces.signed_margin.signed_margins", 48, 16.0, _signed_margins),
-        Entry(PROOFS, "workspaces.pose_box_proof.prove_boxes", 45, 20.0, _proofs),
+        Entry(PROOFS, "workspaces.pose_box_proof.prove_boxes", 66, 17.0, _proofs),
         Entry(POLYGON, "inverse.queries.polygon_of_pose", 38, 5.0, _polygon),
         Entry(VIBRATION, "forward.sensitivity.describe_states", 57, 6.0, _vibration),
         Entry(CLEARANCES, "interference.hanging_distance.least_distances", 33, 5.0, _clearances),

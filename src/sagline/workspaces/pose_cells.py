@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from typing import Any, Final, NamedTuple
+from dataclasses import dataclass
+from typing import Any, Final
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -12,6 +13,7 @@ from sagline.arrays import Array, Codes, Indices, locked
 from sagline.blocks import Progress
 from sagline.cables.model import CableModel
 from sagline.kernels.workspaces.pose_box_proof import BOX_COLUMNS, prove_boxes, room_for
+from sagline.results import Result
 from sagline.robot.pose_box import PoseBox
 from sagline.robot.robot import Robot
 from sagline.statics.tables import robot_terms
@@ -26,7 +28,8 @@ PARTS: Final = (1, 4, 8, 16)  # cubes of rotation vectors along an edge, one aft
 PRECISION: Final = (1.0, 1e-12)  # all that slopes leave out counts; a sum of a thousand parts errs by 1e-13 of them
 
 
-class Cells(NamedTuple):
+@dataclass(frozen=True, slots=True, eq=False)
+class Cells(Result):
     """Boxes that together are the whole one, K of them.
 
     Attributes:
@@ -141,7 +144,7 @@ def halve(search: Search, box: PoseBox, smallest: float) -> tuple[Cells, int]:
     """
     half = 0.5 * (box.high - box.low)
     waiting = (box.low + half)[None]
-    done: list[Cells] = []
+    done: list[tuple[Array, Array, Codes]] = []
     while True:
         verdict = _decide(search, waiting, half, box.tilt)
         offsets, halved = _children(half)
@@ -153,7 +156,8 @@ def halve(search: Search, box: PoseBox, smallest: float) -> tuple[Cells, int]:
         done.append(_cells(waiting[~is_open], half, verdict[~is_open]))
         waiting = (waiting[is_open][:, None] + offsets).reshape(-1, 3)
         half = halved
-    return Cells(*(np.concatenate(arrays) for arrays in zip(*done, strict=True))), search.tried
+    low, high, verdicts = (np.concatenate(arrays) for arrays in zip(*done, strict=True))
+    return Cells(locked(low), locked(high), locked(verdicts)), search.tried
 
 
 def _decide(search: Search, middle: Array, half: Array, tilt: float) -> Codes:
@@ -207,8 +211,8 @@ def _children(half: Array) -> tuple[Array, Array]:
     return np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 3), halved
 
 
-def _cells(middle: Array, half: Array, verdict: Codes) -> Cells:
-    return Cells(middle - half, middle + half, verdict)
+def _cells(middle: Array, half: Array, verdict: Codes) -> tuple[Array, Array, Codes]:
+    return middle - half, middle + half, verdict
 
 
 def _load_terms(wrenches: WrenchSet, robot: Robot) -> tuple[Any, ...]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sagline.arguments import callback, instance
-from sagline.arrays import locked, number
+from sagline.arrays import number
 from sagline.blocks import Progress
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
@@ -164,5 +164,4 @@ def _proof(robot: Robot, box: PoseBox, load: WrenchSet, model: CableModel, cells
     kinds = set(cells.verdict.tolist())
     verdict = ProofVerdict(kinds.pop()) if len(kinds) == 1 else ProofVerdict.OPEN
     undecided = float(share[cells.verdict == ProofVerdict.OPEN].sum())
-    locked_cells = Cells(*(locked(array) for array in cells))
-    return Proof(robot, box, load, model, verdict, inside, outside, undecided, locked_cells, tried)
+    return Proof(robot, box, load, model, verdict, inside, outside, undecided, cells, tried)
