@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path as FilePath
 from typing import Literal
 
@@ -318,4 +319,23 @@ def test_a_cable_is_cut_and_the_break_is_played(browser: Browser) -> None:
         await_that(page, lambda: viewer._clock.time == viewer._played.duration)  # type: ignore[union-attr]
         page.get_by_role("button", name="Play").wait_for()
         least_contrast(page)
+        assert page.evaluate(OVERFLOWING) == []
+
+
+@pytest.mark.parametrize(("width", "theme"), [(1400, "light"), pytest.param(420, "dark", marks=pytest.mark.soak)])
+def test_hull_slice_and_ways_are_drawn_and_told(browser: Browser, width: int, theme: Literal["light", "dark"]) -> None:
+    with opened(browser, sl.load_robot("article-suspended"), width=width, theme=theme) as (page, viewer):
+        page.get_by_role("tab", name="Workspace").click()
+        page.get_by_text("Nothing is computed until something is asked for.").wait_for()
+        before = Image.open(BytesIO(page.screenshot()))
+        for name in ("Hull", "Slice", "Where can I go"):
+            page.get_by_label(name, exact=True).click()
+        page.get_by_text("m³").wait_for()
+        page.get_by_text("Boundary", exact=True).wait_for()
+        page.get_by_text("Margin [N]").wait_for()
+        await_that(page, lambda: viewer._space._drawn is not None)
+        page.wait_for_timeout(1500)
+        after = Image.open(BytesIO(page.screenshot()))
+        scene = np.array(after.convert("RGB"), dtype=int) - np.array(before.convert("RGB"), dtype=int)
+        assert np.mean(np.abs(scene[:350]).max(axis=2) > 8) > 0.04  # of the upper half: what is drawn is seen
         assert page.evaluate(OVERFLOWING) == []
