@@ -9,6 +9,8 @@ import mujoco
 import numpy as np
 import pytest
 
+import sagline as sl
+
 EXAMPLES = Path(__file__).parents[2] / "examples"
 Run = Callable[[str], dict[str, Any]]
 
@@ -40,6 +42,17 @@ def test_feasible_region(run: Run) -> None:
     assert names["share"] == pytest.approx(0.754, abs=0.002)
     assert names["plan"].shortfall[0] == pytest.approx(357.0, abs=1.0)
     assert Path("feasible_region.png").is_file()
+
+
+def test_where_it_works(run: Run) -> None:
+    names = run("where_it_works")
+    box, volumes = names["space"].box, list(names["volumes"].values())
+    places = np.random.default_rng(3).uniform(box.low, box.high, (4000, 3))
+    held = sl.inverse(names["robot"], sl.Pose.from_euler(places, 0.0, 0.0, 0.0)).feasible.mean()
+    assert volumes[0] == pytest.approx(held * np.prod(box.high - box.low), rel=0.03)  # of 4,000 points
+    assert volumes == sorted(volumes, reverse=True)
+    for name in ("where_it_works_hull.png", "where_it_works_slice.png", "hull.glb"):
+        assert Path(name).stat().st_size > 10_000
 
 
 def test_how_fast(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
