@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,6 +14,7 @@ from sagline.results import Result
 from sagline.robot.pose import Pose
 
 _LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+ROUNDING: Final = 1e-14  # of products of unit vectors
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,7 +59,7 @@ class Box(Result):
             self,
             size=exactly(size, "size", "m", (3,), above=0.0),
             center=exactly(center, "center", "m", (3,)),
-            orientation=Pose(np.zeros(3), exactly(orientation, "orientation", "", (3, 3))).matrix,
+            orientation=_rotation(exactly(orientation, "orientation", "", (3, 3))),
             name=label(name, "name"),
         )
 
@@ -66,6 +68,12 @@ class Box(Result):
         """Lowest and highest corner of what it fills along the axes [m], shape (2, 3)."""
         reach = 0.5 * np.abs(self.orientation) @ self.size
         return np.stack((self.center - reach, self.center + reach))
+
+
+def _rotation(matrix: Array) -> Array:
+    """A rotation as it is, or the nearest one of what is a rotation but for rounding; then it is the same again."""
+    nearest = Pose(np.zeros(3), matrix).matrix
+    return matrix if np.abs(matrix.T @ matrix - np.eye(3)).max() < ROUNDING else nearest
 
 
 @dataclass(frozen=True, slots=True, eq=False)
