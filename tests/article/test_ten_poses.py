@@ -1,3 +1,4 @@
+import math
 from pathlib import Path
 
 import numpy as np
@@ -254,7 +255,7 @@ def test_a_fit_that_does_not_settle_says_so(study: TenPoses, monkeypatch: pytest
 
 def test_information_counts_parameters_and_scatter() -> None:
     assert information(1e-3, 30, 0) == pytest.approx(2.0 + 4.0 / 28.0)  # ln 1 = 0, one unknown: the scatter
-    assert information(np.e * 1e-3, 30, 2) == pytest.approx(60.0 + 6.0 + 24.0 / 26.0)
+    assert information(math.e * 1e-3, 30, 2) == pytest.approx(60.0 + 6.0 + 24.0 / 26.0)
 
 
 def test_what_ten_poses_cannot_tell(study: TenPoses) -> None:

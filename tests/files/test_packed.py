@@ -1,5 +1,6 @@
 """Columns in few bytes: back to the last bit, whatever they hold."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -49,7 +50,7 @@ def test_a_smooth_course_takes_a_fraction_of_its_bytes() -> None:
     column = np.sin(time)[:, None] * np.arange(1.0, 9.0)
     assert len(pack({"a": column})) < 0.25 * column.nbytes  # zstandard alone: 0.9
     noise = rounded(np.random.default_rng(0).normal(size=(2000, 8)), 2)
-    entropy = np.log2(100.0 * np.sqrt(2.0 * np.pi * np.e)) / 8.0  # bytes of a number of such noise
+    entropy = np.log2(100.0 * np.sqrt(2.0 * np.pi * math.e)) / 8.0  # bytes of a number of such noise
     assert len(pack({"a": noise}, {"a": 2})) < 1.15 * entropy * noise.size
 
 
