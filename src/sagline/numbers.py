@@ -64,6 +64,16 @@ def n(
     return f"{digits}{'' if symbol in TIGHT else SPACE}{symbol}".replace(" ", SPACE)
 
 
+def counted(count: int, noun: str) -> str:
+    """A number of things, "1 pose" or "1,200 poses".
+
+    Args:
+        count: How many.
+        noun: One of them; several have an s, or es.
+    """
+    return f"{count:,} {noun}{'' if count == 1 else 'es' if noun.endswith(('ch', 'x')) else 's'}"
+
+
 def _prefixed(number: float, form: str, unit: str) -> tuple[int, str]:
     """The power of ten that takes a number into the unit it reads best in, and that unit."""
     found = _scaled.match(unit)

@@ -15,6 +15,10 @@ class Result:
 
     __slots__ = ()
 
+    def __repr__(self) -> str:
+        """The first line of the text, for results whose arrays are too long to be read: `dataclass(repr=False)`."""
+        return f"<{type(self).__name__}: {str(self).splitlines()[0]}>"
+
     def __reduce__(self) -> tuple[Any, tuple[type[Result], dict[str, Any]]]:
         """Pickle by fields, so that the arrays of a loaded result are locked too."""
         return _again, (type(self), {field.name: getattr(self, field.name) for field in fields(self)})  # type: ignore[arg-type]

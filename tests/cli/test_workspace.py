@@ -68,7 +68,7 @@ def test_options_are_arguments() -> None:
     found = json.loads(result.stdout)
     assert found["volume_m3"] == pytest.approx(space.volume, rel=1e-9)
     assert found["criteria"] == [str(one) for one in space.criteria]
-    assert found["orientations"] == "all of 27 sampled rotations"
+    assert found["orientations"] == "all of 27 sampled rotations, by up to 5°"
 
 
 def test_what_is_told(folder: FilePath) -> None:

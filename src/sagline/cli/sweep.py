@@ -14,6 +14,7 @@ from sagline.cli.values import whole_of
 from sagline.errors import InvalidValueError, SaglineError
 from sagline.files.sweep_file import load_sweep
 from sagline.files.whole import check_folder, made_folder
+from sagline.numbers import counted
 from sagline.sweep.cluster import check_address
 from sagline.sweep.running import MOST_WORKERS, run
 from sagline.tension.options import takes_default_kernel
@@ -85,7 +86,6 @@ def _again(file: Path, folder: Path, workers: str | None, scheduler: str | None)
 
 
 def _show(found: Sweep) -> None:
-    robots, poses, wrenches = found.request.shape
     total = len(found.request)
     counts = found.counts._asdict()
     rows = [
@@ -93,9 +93,8 @@ def _show(found: Sweep) -> None:
         for name, count in counts.items()
         if count
     ]
-    title = f"{robots:,} robots x {poses:,} poses x {wrenches:,} wrenches"
-    show_table(Grid(["requests", "number", "[%]", ""], rows, title))
-    show(f"{found.tasks:,} tasks, {found.seconds:,.1f} s of work; variables: {', '.join(found.names)}")
+    show_table(Grid(["requests", "number", "[%]", ""], rows, str(found.request)))
+    show(f"{counted(found.tasks, 'task')}, {found.seconds:,.1f} s of work; variables: {', '.join(found.names)}")
     show(f"In {found.folder.resolve()}: read with sl.sweep.load({str(found.folder)!r})", whole=True)
 
 

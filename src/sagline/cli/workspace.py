@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from sagline.cli.ending import OUTSIDE
 from sagline.cli.entries import CLEARANCES, INVERSE, PROOFS, SIGNED_MARGINS, VIBRATION
 from sagline.cli.regions import box_of, wrenches_of
@@ -19,6 +21,7 @@ from sagline.files.names import file_stem
 from sagline.files.robot_file import load_robot
 from sagline.files.scene_file import load_scene
 from sagline.files.whole import check_files, made_folder
+from sagline.numbers import counted
 from sagline.workspaces.criteria.clearance import Clearance
 from sagline.workspaces.criteria.frame import InFrame
 from sagline.workspaces.criteria.frequency import LeastFrequency
@@ -113,6 +116,9 @@ def find(name: str, where: Where, asked: Asked, how: How, folder: Path, *, figur
     """
     loads, criteria = wrenches_of(where.wrench), asked.criteria(name)
     angle = 0.0 if where.tilt is None else quantity(where.tilt, "--tilt", "rad", low=0.0)
+    if angle > np.pi:  # a number alone counts in radians
+        step = "Give its unit, --tilt 10deg: no rotation turns by more than half a turn."
+        raise InvalidValueError("--tilt", repr(where.tilt), "0 to 180deg", step)
     region = None if where.box is None else box_of(where.box, "--box")
     to_prove = None if where.to_prove is None else box_of(where.to_prove, "--prove", angle)
     budget = quantity(where.budget, "--budget", "s", above=0.0)
@@ -188,7 +194,7 @@ def _tell(space: Workspace) -> None:
     ]
     if len(limits) > MOST_LIMITS:
         rest = sum(limit.share for limit in limits[MOST_LIMITS:])
-        rows.append([written(100.0 * rest, ".1f"), f"{len(limits) - MOST_LIMITS} others", ""])
+        rows.append([written(100.0 * rest, ".1f"), counted(len(limits) - MOST_LIMITS, "other"), ""])
     show_table(Grid(["surface [%]", "limited by", "cable"], rows, left=frozenset({1})))
 
 

@@ -31,7 +31,7 @@ _TOO_LARGE = 100.0  # times the robot: a mesh in millimeters
 _NUMBERS = 9  # kept of a pair and pose: distance, bound and two points
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Clearances(Result):
     """Least distances at one pose or N, between cables as they hang, the platform and what stands around.
 

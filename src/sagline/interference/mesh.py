@@ -12,6 +12,7 @@ from sagline.arguments import instance, label
 from sagline.arrays import Array, Flags, Indices, checked, locked, numbers
 from sagline.errors import InvalidValueError
 from sagline.memory import check_memory
+from sagline.numbers import counted
 from sagline.results import Result
 from sagline.robot.pose import Pose
 
@@ -19,7 +20,7 @@ MOST: Final = 1_000_000  # triangles
 _AT_ONCE: Final = 1 << 19  # triangles times points
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Mesh(Result):
     """A closed surface of triangles, at rest in the world; as a platform, in the platform frame.
 
@@ -67,6 +68,10 @@ class Mesh(Result):
         object.__setattr__(self, "vertices", corners)
         object.__setattr__(self, "faces", triangles)
         object.__setattr__(self, "name", called)
+
+    def __str__(self) -> str:
+        """Its name, its triangles and its extent."""
+        return f"{self.name}: {counted(len(self.faces), 'triangle')}, {extent_text(self.vertices)}"
 
     @property
     def bounds(self) -> Array:

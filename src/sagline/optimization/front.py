@@ -14,7 +14,7 @@ from sagline.results import Result
 from sagline.robot.robot import Robot
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Front(Result):
     """Result of `design`: better robots, none of which is better than another in every goal.
 

@@ -14,6 +14,7 @@ from sagline.blocks import Progress, blocks
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
+from sagline.numbers import counted, n
 from sagline.optimization.candidates import Candidates, free_parts
 from sagline.optimization.free import Free, Part
 from sagline.optimization.goals import Goal
@@ -30,7 +31,7 @@ BLOCK: Final = 1 << 11  # poses at once: a tenth of a second, after which an int
 _CATENARY: Final = Catenary()
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class MovingAnchors(Result):
     """Result of `moving_anchors` at G poses.
 
@@ -51,6 +52,11 @@ class MovingAnchors(Result):
     margin: Array
     fixed_margin: Array
     moving: tuple[Free, ...]
+
+    def __str__(self) -> str:
+        """What moving is worth."""
+        gain = n(np.mean(self.margin - self.fixed_margin), unit="N") if len(self.moved) else "–"
+        return f"{self.robot.name}, {counted(len(self.moved), 'pose')}: the margin is {gain} larger on average"
 
     @property
     def robots(self) -> tuple[Robot, ...]:

@@ -19,7 +19,6 @@ from sagline.viewer.cable_colors import CABLES, cable_color
 from sagline.workspaces.region import flat_axis
 from sagline.workspaces.slice import AXES, Plane, Slice, slice_of
 from sagline.workspaces.space import Workspace
-from sagline.workspaces.words import in_words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -77,7 +76,7 @@ def slice(space: Workspace, normal: str = "z", at: float | None = None, ax: Axes
         beside = plane._replace(at=plane.at + BESIDE * float(space.box.high[plane.normal] - plane.at))
         _draw_regions(ax, cut, slice_of(find, beside, low, high, (shape[0], shape[1])), space, levels)
         _draw_lines(ax, cut, levels)
-    held = f"{in_words(space.wrenches)}; {space.orientations}"
+    held = f"{space.wrenches}; {space.orientations}"
     ax.set_title(f"{space.robot.name}, {AXES[plane.normal]} = {n(plane.at, unit='m')}; {held}", fontsize=LABEL)
     return ax
 

@@ -16,7 +16,6 @@ from sagline.robot.pose import Pose
 from sagline.workspaces.region import flat_axis
 from sagline.workspaces.slice import AXES
 from sagline.workspaces.space import BY_BOX, Workspace, amount_of
-from sagline.workspaces.words import in_words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -64,9 +63,7 @@ def workspace(space: Workspace) -> Figure:
     ax.set_box_aspect([np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim()), np.ptp(ax.get_zlim())], zoom=ZOOM)
     for each in ax.get_children():
         each.set_clip_on(False)
-    figure.suptitle(
-        f"{space.robot.name}: {amount_of(space)}; {in_words(space.wrenches)}; {space.orientations}", fontsize=LABEL
-    )
+    figure.suptitle(f"{space.robot.name}: {amount_of(space)}; {space.wrenches}; {space.orientations}", fontsize=LABEL)
     if limits:
         _draw_bars(figure.add_axes(BARS), space, colors)
     return figure

@@ -15,6 +15,7 @@ from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
 from sagline.kinematics.winding import without_guides
+from sagline.numbers import counted
 from sagline.results import Result
 from sagline.robot.pose import Pose
 from sagline.robot.reach import check_reach
@@ -30,7 +31,7 @@ _CATENARY: Final = Catenary()
 _MINIMUM_NORM: Final = MinimumNorm()
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Request(Result):
     """Every robot at every pose under every wrench, and what is asked of each.
 
@@ -123,6 +124,10 @@ class Request(Result):
     def shape(self) -> tuple[int, int, int]:
         """How many robots, poses and wrenches."""
         return len(self.robots), len(self.poses), len(self.wrenches)
+
+    def __str__(self) -> str:
+        """How many robots, poses and wrenches."""
+        return " x ".join(map(counted, self.shape, ("robot", "pose", "wrench")))
 
     @property
     def cable_count(self) -> int:

@@ -14,13 +14,14 @@ from sagline.arguments import choice, file_path
 from sagline.arrays import locked
 from sagline.errors import FileError
 from sagline.memory import check_memory
+from sagline.numbers import counted
 from sagline.results import Result
 from sagline.sweep.quantities import variables_of
 from sagline.sweep.request import Request
 from sagline.sweep.work import Counts
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Sweep(Result):
     """A sweep as its folder has it; numbers are read when they are asked for.
 
@@ -44,6 +45,11 @@ class Sweep(Result):
     def complete(self) -> bool:
         """Whether all is done."""
         return self.done == self.tasks
+
+    def __str__(self) -> str:
+        """What was asked, how far it is, and how the requests ended."""
+        ends = ", ".join(f"{count:,} {name}" for name, count in self.counts._asdict().items() if count)
+        return f"{self.request}; {self.done:,} of {counted(self.tasks, 'task')} done" + f": {ends}" * bool(ends)
 
     @property
     def names(self) -> tuple[str, ...]:

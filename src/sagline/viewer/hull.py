@@ -22,7 +22,6 @@ from sagline.workspaces.criteria.margin import LeastMargin
 from sagline.workspaces.levels import Levels
 from sagline.workspaces.orientations import Orientations
 from sagline.workspaces.space import BY_BOX, Workspace, amount_of
-from sagline.workspaces.words import in_words
 from sagline.workspaces.workspace import workspace
 from sagline.workspaces.wrench_sets import WrenchSet
 
@@ -118,7 +117,7 @@ def hull_of(asked: Asked, told: Callable[[int, int], None]) -> Hull:
 
 def _told(space: Workspace) -> str:
     """HTML: how large it is, what limits it most, and where it goes on."""
-    text = f"<b>Hull</b> {escape(amount_of(space))}, {escape(in_words(space.wrenches))}"
+    text = f"<b>Hull</b> {escape(amount_of(space))}, {escape(str(space.wrenches))}"
     if space.nearest is not None:
         return f"{text}<br>{escape(space.nearest.reason)}"
     most = [f"{n(100.0 * one.share, '.0f')} % by cable {one.cable}" for one in space.limits[:MOST]]

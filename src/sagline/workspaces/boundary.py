@@ -109,8 +109,12 @@ def boundary(
     surface = Surface(locked(vertices), locked(net.faces))
     on_box = _on_box(surface, grid)
     open_faces = tuple(name for name, flat in zip(_FACES, on_box, strict=True) if flat.any())
-    volume, error = _volume(surface, grid, net, counted, slope, np.logical_or.reduce(on_box))
+    curved = np.flatnonzero(~np.logical_or.reduce(on_box))
+    faces = net.faces[curved]
+    between = bulge(counted, surface.vertices, faces, _slopes(surface.vertices, faces, net, slope), grid)
     volumes = volumes_of(surface.vertices, surface.faces)
+    volumes[curved] += between.volume
+    volume, error = float(volumes.sum()), float(between.error.sum())
     components = components_of(grid, net.inner, net.faces, volumes)
     return Boundary(surface, volume, error, first, components, open_faces, counted.count)
 
@@ -142,16 +146,6 @@ def _placed(net: Net, grid: Grid, level: Level) -> tuple[Net, Array, Array]:
     if not kept.closed:  # a sheet without thickness: its two sides stay apart
         return net, vertices, slope
     return one, kept.vertices, np.where(at_node, np.nan, slope)[one.first]
-
-
-def _volume(
-    surface: Surface, grid: Grid, net: Net, level: Level, slope: Array, flat: NDArray[np.bool_]
-) -> tuple[float, float]:
-    """The volume and its error bar."""
-    curved = np.flatnonzero(~flat)
-    faces = net.faces[curved]
-    between = bulge(level, surface.vertices, faces, _slopes(surface.vertices, faces, net, slope), grid)
-    return float(surface.volume + between.volume.sum()), float(between.error.sum())
 
 
 def _slopes(vertices: Array, faces: Indices, net: Net, slope: Array) -> Array:

@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sagline.arrays import Array, checked, locked
+from sagline.numbers import counted, n
 from sagline.results import Result
 from sagline.workspaces.grid import Grid
 from sagline.workspaces.surface import Indices
 
+_TOLD: Final = 8  # volumes that are printed
 
-@dataclass(frozen=True, slots=True, eq=False)
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Components(Result):
     """The separate pieces of a set, the largest first; a cavity belongs to the piece around it.
 
     Attributes:
-        volume: Of each piece [m^3], shape (K,).
+        volume: Of each piece, as of the whole [m^3], shape (K,).
         vertices: The piece of each vertex of the surface, shape (V,).
         x: Coordinates of the nodes of the grid that tells pieces apart [m], shape (nx,).
         y: The same along y, shape (ny,).
@@ -37,6 +41,12 @@ class Components(Result):
     def count(self) -> int:
         """How many there are."""
         return len(self.volume)
+
+    def __str__(self) -> str:
+        """How many there are, and how large."""
+        sizes = ", ".join(n(volume) for volume in self.volume[:_TOLD])
+        more = ", …" * (self.count > _TOLD)
+        return f"{counted(self.count, 'piece')}" + f", volume {sizes}{more}" * (self.count > 0)
 
     def label(self, position: ArrayLike) -> NDArray[np.int32]:
         """Which piece positions belong to, to within a cell of the grid.
@@ -74,7 +84,7 @@ def components_of(grid: Grid, inner: Indices, faces: Indices, volumes: Array) ->
         grid: Its grid.
         inner: The node inside next to each vertex of its surface, shape (V, 3).
         faces: The triangles of the surface, shape (F, 3).
-        volumes: What each triangle adds to the volume [m^3], shape (F,).
+        volumes: What each triangle adds to the volume, with what bulges over it [m^3], shape (F,).
 
     Returns:
         Components.

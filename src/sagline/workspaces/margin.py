@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from sagline.arguments import callback, instance
 from sagline.arrays import Array, Codes, Flags, Indices, locked
@@ -13,6 +14,7 @@ from sagline.blocks import Progress
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.memory import check_memory
+from sagline.numbers import counted, n
 from sagline.results import Result
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
@@ -26,7 +28,7 @@ _CATENARY = Catenary()
 _POSE_BYTES = 200.0  # what a pose takes, its rows and answers
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Margin(Result):
     """Result of `margin` at a single pose or N of them.
 
@@ -63,6 +65,30 @@ class Margin(Result):
     def feasible(self) -> Flags:
         """Where every load of the set is proved feasible, shape () or (N,)."""
         return locked(np.asarray(self.status == MarginStatus.FEASIBLE))
+
+    def __str__(self) -> str:
+        """The margin of a pose in words; of many how many there are of each status, and the least and largest."""
+        if self.value.ndim == 0:
+            cable = f", cable {int(self.limiting_cable)}" * (int(self.limiting_cable) >= 0)
+            status = MarginStatus(int(self.status))
+            alone = -np.inf < float(self.value) < 0.0 and not self.direction[:3].any()
+            return (
+                f"{_newtons(self.value)}{cable}: {status.name}, {status.text}"
+                + "; the moments alone are too much" * alone
+            )
+        kinds, counts = np.unique(self.status, return_counts=True)
+        each = ", ".join(f"{count:,} {MarginStatus(int(kind)).name}" for kind, count in zip(kinds, counts, strict=True))
+        if not len(self.value):
+            return counted(0, "pose")
+        return (
+            f"{counted(len(self.value), 'pose')}, {_newtons(self.value.min())} to {_newtons(self.value.max())}: {each}"
+        )
+
+
+def _newtons(value: ArrayLike) -> str:
+    """A margin, also an infinite one."""
+    number = float(np.asarray(value))
+    return n(number, unit="N") if np.isfinite(number) else f"{number:g} N".replace("-", "−")
 
 
 def margin(

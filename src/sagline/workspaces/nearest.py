@@ -25,7 +25,7 @@ _FAR: Final = 1e6  # a level as low as minus infinity, to a search that needs nu
 _UNHELD: Final = 1e3  # what levels are lowered by where the platform cannot be held at all
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Nearest(Result):
     """The pose nearest to one where the robot can work.
 
@@ -44,6 +44,10 @@ class Nearest(Result):
     criterion: int
     cables: tuple[int, ...]
     reason: str
+
+    def __str__(self) -> str:
+        """The reason."""
+        return self.reason
 
 
 def nearest_to(levels: Levels, grid: Grid, low: Array, high: Array) -> Nearest:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from sagline.arguments import brief, choice
 from sagline.arrays import Array, locked, number
 from sagline.errors import InvalidValueError
+from sagline.numbers import n
 from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.pose import Pose
 from sagline.robot.reach import LEVEL, ROUNDING, forbidden_turn, in_words
@@ -56,7 +57,7 @@ class Orientations:
             >>> import sagline as sl
             >>> turned = sl.Pose.from_euler(np.zeros(3), np.radians([-20, 0, 20]), 0, 0)
             >>> print(sl.Orientations(turned.matrix, need="any"))
-            any of 3 sampled rotations
+            any of 3 sampled rotations, by up to 20°
         """
         quaternion = np.atleast_2d(Pose(np.zeros(3), rotations).quaternion)
         if not len(quaternion):
@@ -79,7 +80,8 @@ class Orientations:
     def __str__(self) -> str:
         """In words."""
         if len(self) > 1:
-            return f"{self.need} of {len(self)} sampled rotations"
+            most = 2.0 * np.arctan2(np.linalg.norm(self.quaternion[:, :3], axis=1), np.abs(self.quaternion[:, 3])).max()
+            return f"{self.need} of {len(self)} sampled rotations, by up to {n(np.degrees(most), unit='°')}"
         turn = self.quaternion[0, :3]
         if np.linalg.norm(turn) <= ROUNDING:
             return "level"

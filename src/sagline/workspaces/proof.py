@@ -13,6 +13,7 @@ from sagline.blocks import Progress
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
+from sagline.numbers import counted
 from sagline.results import Result
 from sagline.robot.pose_box import PoseBox
 from sagline.robot.robot import Robot
@@ -23,7 +24,7 @@ from sagline.workspaces.wrench_sets import WrenchSet, load_of
 _CATENARY = Catenary()
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Proof(Result):
     """Result of `prove`: a box of poses taken apart into cells, each proved inside, proved outside, or open.
 
@@ -75,7 +76,7 @@ class Proof(Result):
         """The verdict, and the share and volume of each kind of cell."""
         rows = (("inside", self.inside), ("outside", self.outside), ("open", self.open))
         shares = "\n".join(f"  {word:<8}{share:>8.2%}{share * self.volume:>12.5g} m3" for word, share in rows)
-        return f"{self.verdict.name}: {self.verdict.text}\n{shares}\n  {self.tried:,} boxes tried"
+        return f"{self.verdict.name}: {self.verdict.text}\n{shares}\n  {counted(self.tried, 'box')} tried"
 
 
 def prove(
@@ -129,7 +130,9 @@ def prove(
     seconds = number(budget, "budget", "s", above=0.0)
     least = 0.0 if smallest is None else number(smallest, "smallest", "m", above=0.0)
     told = callback(progress, "progress")
-    search = Search(Prover(robot, load, instance(model, CableModel, "model")), time.monotonic() + seconds, told)
+    prover = Prover(robot, load, instance(model, CableModel, "model"))
+    prover.verdicts(box.low[None], np.zeros(3))  # what loading or compiling the kernel takes is not of the budget
+    search = Search(prover, time.monotonic() + seconds, told)
     cells, tried = halve(search, box, least)
     return _proof(robot, box, load, model, cells, tried)
 

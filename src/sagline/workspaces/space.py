@@ -11,7 +11,7 @@ import numpy as np
 
 from sagline.arrays import Array, Codes, Indices
 from sagline.cables.model import CableModel
-from sagline.numbers import SPACE, n
+from sagline.numbers import SPACE, counted, n
 from sagline.results import Result
 from sagline.robot.pose_box import PoseBox
 from sagline.robot.robot import Robot
@@ -23,7 +23,6 @@ from sagline.workspaces.nearest import Nearest
 from sagline.workspaces.orientations import Orientations
 from sagline.workspaces.region import flat_axis
 from sagline.workspaces.surface import Surface
-from sagline.workspaces.words import in_words
 from sagline.workspaces.wrench_sets import WrenchSet
 
 BY_BOX: Final = -1  # of `limiting`: the surface is the face of the box
@@ -53,7 +52,7 @@ class Limit(NamedTuple):
         return self.criterion if self.cable < 0 else f"{self.criterion}, cable {self.cable}"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Workspace(Result):
     """Result of `workspace`.
 
@@ -198,7 +197,7 @@ def lines_of(space: Workspace) -> list[str]:
         lines += [f"    {n(100.0 * limit.share, '.1f'):>5} %  {limit}" for limit in limits[:MOST_LIMITS]]
         if len(limits) > MOST_LIMITS:
             rest = sum(limit.share for limit in limits[MOST_LIMITS:])
-            lines.append(f"    {n(100.0 * rest, '.1f'):>5} %  {len(limits) - MOST_LIMITS} others")
+            lines.append(f"    {n(100.0 * rest, '.1f'):>5} %  {counted(len(limits) - MOST_LIMITS, 'other')}")
     return lines
 
 
@@ -210,7 +209,9 @@ def amount_of(space: Workspace) -> str:
     """
     if space.nearest is not None:
         return f"empty, 0 {space.unit}"
-    places = max(0, 1 - int(np.floor(np.log10(max(space.volume_error, 1e-9 * space.volume)))))
+    if space.volume_error <= 1e-9 * space.volume:  # all of the box
+        return f"{space.volume:.6g} ± 0 {space.unit}"
+    places = max(0, 1 - int(np.floor(np.log10(space.volume_error))))
     size = f"{space.volume:.{places}f} ± {space.volume_error:.{places}f} {space.unit}"
     count = space.components.count
     return size if count == 1 else f"{size} in {count} parts"
@@ -225,7 +226,7 @@ def facts_of(space: Workspace) -> list[tuple[str, str]]:
     Returns:
         A word, and what is to be said of it.
     """
-    facts = [("box", f"{span_of(space.box)} m"), ("loads", in_words(space.wrenches))]
+    facts = [("box", f"{span_of(space.box)} m"), ("loads", str(space.wrenches))]
     facts += [("platform", str(space.orientations)), ("cables", type(space.model).__name__)]
     if asked := [str(one) for one in space.criteria if not one.always]:
         facts.append(("criteria", ", ".join(asked)))

@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sagline.arrays import Array
+from sagline.numbers import counted, n
 from sagline.results import Result
 
 Indices = NDArray[np.int64]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Surface(Result):
     """A surface of triangles, the corners of each counterclockwise as seen from outside.
 
@@ -43,6 +44,15 @@ class Surface(Result):
         count = len(self.vertices)
         there, back = edges @ [count, 1], edges @ [1, count]
         return len(np.unique(there)) == len(there) and bool(np.array_equal(np.sort(there), np.sort(back)))
+
+    def __str__(self) -> str:
+        """How many corners and triangles, and how large."""
+        counts = f"{counted(len(self.faces), 'triangle')} with {len(self.vertices):,} vertices"
+        if not len(self.vertices):
+            return counts
+        sides = zip(self.vertices.min(axis=0), self.vertices.max(axis=0), strict=True)
+        spans = ", ".join(f"{n(low)} to {n(high)}" for low, high in sides)
+        return f"{counts}, {'closed' if self.closed else 'open'}, {spans} m"
 
     def export(self, file: Path | str) -> None:
         """Write it to a file, whole or not at all, in meters and z up (GLB: y up, as that format wants it).

@@ -2,31 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from sagline.arrays import Array
 from sagline.numbers import n
-from sagline.workspaces.wrench_sets import WrenchSet
 
 
-def in_words(wrenches: WrenchSet) -> str:
+def in_words(center: Array, segments: Array, ellipsoids: int, polytopes: Sequence[Array], accelerations: Array) -> str:
     """A wrench set in a line.
 
     Args:
-        wrenches: The set.
+        center: A wrench, shape (6,).
+        segments: Shape (S, 6).
+        ellipsoids: How many.
+        polytopes: Corners of each, shape (c, 6).
+        accelerations: Largest linear and angular one, shape (2,).
 
     Returns:
         What it consists of, "±100 N, ±20 N m" for instance.
     """
     parts = []
-    if wrenches.center.any():
-        parts.append(_wrench(wrenches.center))
-    parts += [_segments(wrenches.segments)] if wrenches.segments.any() else []
-    parts += ["an ellipsoid"] * len(wrenches.ellipsoids)
-    ends = np.cumsum(wrenches.sizes)
-    for size, end in zip(wrenches.sizes, ends, strict=True):
-        parts.append(f"a polytope of {size} corners" if size > 1 else _wrench(wrenches.corners[end - 1]))
-    linear, angular = wrenches.accelerations
+    if center.any():
+        parts.append(_wrench(center))
+    parts += [_segments(segments)] if segments.any() else []
+    parts += ["an ellipsoid"] * ellipsoids
+    for corners in polytopes:
+        parts.append(f"a polytope of {len(corners)} corners" if len(corners) > 1 else _wrench(corners[0]))
+    linear, angular = accelerations
     if linear > 0.0 or angular > 0.0:
         limits = ((linear, "m/s²"), (angular, "rad/s²"))
         parts.append("accelerations " + ", ".join(f"±{n(size, unit=unit)}" for size, unit in limits if size > 0.0))

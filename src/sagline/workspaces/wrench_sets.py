@@ -15,9 +15,10 @@ from numpy.typing import ArrayLike
 from sagline.arguments import brief
 from sagline.arrays import Array, Indices, checked, exactly, locked, number
 from sagline.errors import InvalidValueError
+from sagline.workspaces.words import in_words
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class WrenchSet:
     """A set of wrenches on the platform: force and moment about the center of mass in world axes, without gravity.
 
@@ -53,6 +54,15 @@ class WrenchSet:
             locked(np.concatenate([self.sizes, other.sizes])),
             locked(self.accelerations + other.accelerations),
         )
+
+    def __str__(self) -> str:
+        """What it consists of, in a line."""
+        polytopes = np.split(self.corners, np.cumsum(self.sizes)[:-1]) if len(self.sizes) else ()
+        return in_words(self.center, self.segments, len(self.ellipsoids), polytopes, self.accelerations)
+
+    def __repr__(self) -> str:
+        """Its kind, and the line."""
+        return f"<{type(self).__name__}: {self}>"
 
     def __reduce__(self) -> tuple[Any, tuple[type[WrenchSet], dict[str, Any]]]:
         """Pickle by fields, so that the arrays of a loaded set are locked too."""
