@@ -75,6 +75,13 @@ def test_what_is_done_is_not_done_again(tmp_path: Path, monkeypatch: pytest.Monk
     assert (again.counts, again.done, again.seconds) == (first.counts, first.done, first.seconds)
 
 
+@pytest.mark.parametrize("index", [(0, 99), (0, 0, 0, 0, 0), 0.5, None, "x"])
+def test_an_index_that_is_none_is_told(tmp_path: Path, index: Any) -> None:
+    found = sl.sweep.run(planar(2, 2), tmp_path / "sweep", workers=1)
+    with pytest.raises(sl.InvalidValueError, match="1, 2, 2"):
+        found.values("status", index)
+
+
 DAMAGES: dict[str, Any] = {
     "cut off": lambda data: data[: len(data) // 2],
     "empty": lambda data: b"",

@@ -233,6 +233,12 @@ def test_a_normal_of_moments_alone_is_without_force_and_infinite_without_a_lever
     assert np.linalg.norm(forces.direction[3:]) == pytest.approx(1.0)
 
 
+def test_poses_that_a_motion_pattern_does_not_join_are_refused() -> None:
+    robot = crafted(np.random.default_rng(3), "1R2T")
+    with pytest.raises(sl.InvalidValueError, match="along plane_normal from pose"):
+        sl.margin(robot, sl.Pose([[0, 0, 0], [0, 1, 0]], np.eye(3)))
+
+
 def test_cables_without_limit() -> None:
     hanging = SUSPENDED.replace(tension_max=np.inf)
     poses = poses_of(SUSPENDED, 300, np.random.default_rng(14))

@@ -104,6 +104,31 @@ def test_small_boxes_are_proved_at_once() -> None:
     assert tilted.verdict == sl.ProofVerdict.PROVED_OUTSIDE
 
 
+def test_a_planar_platform_turns_in_its_plane_alone() -> None:
+    corners = [[-0.3, 0, 0.2], [0.3, 0, 0.2], [0.3, 0, -0.2], [-0.3, 0, -0.2]]
+    robot = sl.Robot(
+        "plane",
+        [[-2, 0, 0], [2, 0, 0], [2, 0, 3], [-2, 0, 3]],
+        corners,
+        sl.Cable(0.01, 1e5),
+        5.0,
+        0.1 * np.eye(3),
+        motion_pattern="1R2T",
+        plane_normal=[0, 1, 0],
+        tension_min=5.0,
+        tension_max=500.0,
+    )
+    middle, angles = np.array([0.0, 0.0, 1.5]), np.linspace(-0.8, 0.8, 33)
+    assert (sl.margin(robot, sl.Pose.from_euler(np.tile(middle, (33, 1)), 0, angles, 0)).low > 100.0).all()
+    proof = sl.prove(robot, sl.PoseBox([-0.1, 0, 1.4], [0.1, 0, 1.6], tilt=0.8))
+    assert proof.verdict == sl.ProofVerdict.PROVED_INSIDE
+    assert proof.tried <= 1 + 1 + 4  # the whole angle, and its quarters
+    turned = sl.prove(robot, sl.PoseBox(middle, middle, tilt=1.57))
+    assert turned.verdict == sl.ProofVerdict.PROVED_OUTSIDE
+    with pytest.raises(sl.InvalidValueError, match="does not turn"):
+        sl.prove(robot.replace(motion_pattern="2T"), sl.PoseBox(middle, middle, tilt=0.1))
+
+
 @pytest.mark.parametrize("tilt", [0.0, 0.1])
 def test_the_budget_ends_in_open_cells(tilt: float) -> None:
     robot = sl.load_robot("cogiro")

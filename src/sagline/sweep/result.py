@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.arguments import choice, file_path
+from sagline.arguments import brief, choice, file_path
 from sagline.arrays import locked
-from sagline.errors import FileError
+from sagline.errors import FileError, InvalidValueError
 from sagline.memory import check_memory
 from sagline.numbers import counted
 from sagline.results import Result
@@ -69,17 +69,22 @@ class Sweep(Result):
             there is no answer or not yet one; a status not yet known is -1.
 
         Raises:
-            InvalidValueError: If there is no such variable, or it needs more memory than there is.
+            InvalidValueError: If there is no such variable, the index is none of its own, or it needs more memory than
+                there is.
             FileError: If a chunk is damaged.
         """
         from sagline.files.sweep_folder import open_folder
 
         choice(name, "name", self.names)
         array: Any = open_folder(self.folder).group[name]
-        if index == ():
+        if isinstance(index, tuple) and not index:
             check_memory(f"all of {name}", 2.0 * array.nbytes, "Read a part, by an index.")
         try:
             return locked(np.asarray(array[index]))
+        except IndexError as error:
+            allowed = f"within {', '.join(map(str, array.shape))}"
+            step = f"Give whole numbers and slices ({error})."
+            raise InvalidValueError("index", brief(index), allowed, step) from None
         except (ValueError, RuntimeError, OSError) as error:
             step = "Run the sweep again: what is damaged is done again."
             raise FileError(self.folder, f"{name} cannot be read ({error})", step) from None

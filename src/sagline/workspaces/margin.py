@@ -17,8 +17,9 @@ from sagline.memory import check_memory
 from sagline.numbers import counted, n
 from sagline.results import Result
 from sagline.robot.pose import Pose
+from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot
-from sagline.robot.several import Robots, one_a_pose
+from sagline.robot.several import Robots, first_of, one_a_pose
 from sagline.statics.tables import pose_rows
 from sagline.workspaces.margin_rows import MarginRows
 from sagline.workspaces.margin_status import MarginStatus
@@ -121,7 +122,8 @@ def margin(
         Margin.
 
     Raises:
-        InvalidValueError: If an argument is none of its kind, or the robot has fewer cables than degrees of freedom.
+        InvalidValueError: If an argument is none of its kind, the robot has fewer cables than degrees of freedom, or
+            its motion pattern does not lead from the first pose to another.
 
     Examples:
         >>> import sagline as sl
@@ -135,6 +137,7 @@ def margin(
     """
     shape = instance(pose, Pose, "pose").shape
     robots = one_a_pose(robot, shape[0] if shape else None)
+    check_reach(first_of(robots), pose, "pose")
     told = callback(progress, "progress")
     load = load_of(wrenches)
     prepared = MarginRows(robots, load, instance(model, CableModel, "model"), moment_arm)

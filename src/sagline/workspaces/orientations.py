@@ -141,10 +141,7 @@ class Tilts:
         """
         if self.angle == 0.0:
             return level()
-        if robot.motion_pattern not in ROTATING:
-            value, step = f"{np.degrees(self.angle):.4g} deg", "Leave the tilt out."
-            allowed = f"none, by motion_pattern {robot.motion_pattern}: its platform does not turn"
-            raise InvalidValueError("orientations: tilt", value, allowed, step)
+        check_tilt(robot, self.angle, "orientations: tilt")
         if robot.motion_pattern in PLANAR and robot.plane_normal is not None:
             axes, angles = np.repeat(robot.plane_normal[None], len(_SHARES), axis=0), self.angle * _SHARES
         else:
@@ -156,6 +153,23 @@ class Tilts:
 def level() -> Orientations:
     """The one rotation of a level platform."""
     return Orientations._of(LEVEL[None].copy(), "all")
+
+
+def check_tilt(robot: Robot, angle: float, item: str) -> None:
+    """Refuse to tilt a platform that does not turn.
+
+    Args:
+        robot: The robot.
+        angle: By how much [rad], 0 for none.
+        item: The name a message uses.
+
+    Raises:
+        InvalidValueError: If its motion pattern has no rotation.
+    """
+    if angle > 0.0 and robot.motion_pattern not in ROTATING:
+        value, step = f"{np.degrees(angle):.4g} deg", "Leave the tilt out."
+        allowed = f"none, by motion_pattern {robot.motion_pattern}: its platform does not turn"
+        raise InvalidValueError(item, value, allowed, step)
 
 
 def orientations_of(robot: Robot, given: Any, tilt: float) -> Orientations:

@@ -46,7 +46,7 @@ class Cells(Result):
 class Prover:
     """Proofs for rows of boxes, prepared once."""
 
-    __slots__ = ("_given", "_room", "_statuses", "size")
+    __slots__ = ("_given", "_room", "_statuses", "axes", "size")
 
     def __init__(
         self, robot: Robot, wrenches: WrenchSet, model: CableModel, precision: tuple[float, float] = PRECISION
@@ -64,6 +64,7 @@ class Prover:
             (model.code, *model.parameters), limits, robot_terms(robot), _load_terms(wrenches, robot), precision,
         )  # fmt: skip
         self.size = 0.5 * float(np.linalg.norm(np.ptp(robot.frame_anchors, axis=0)))  # about a chord [m]
+        self.axes = np.eye(3) if robot.plane_normal is None else robot.plane_normal[None]  # about which it may turn
         self._room = room_for(robot.cable_count)
         self._statuses = np.zeros(robot.cable_count, dtype=np.int8)
 
@@ -163,17 +164,17 @@ def halve(search: Search, box: PoseBox, smallest: float) -> tuple[Cells, int]:
 def _decide(search: Search, middle: Array, half: Array, tilt: float) -> Codes:
     """What is proved of cells of positions, level or at all tilts up to one.
 
-    Tilts are rotation vectors in a ball, which cubes cover. A turn from one cube's middle to any vector in it is no
-    longer than their difference. Outside needs one orientation, inside all. Cubes stay larger than the cells, which
-    turn the cables by their size over a chord.
+    Tilts are rotation vectors in a ball, which cubes cover, or of a planar robot along its normal, which pieces do. A
+    turn from one cube's middle to any vector in it is no longer than their difference. Outside needs one orientation,
+    inside all. Cubes stay larger than the cells, which turn the cables by their size over a chord.
     """
     if tilt == 0.0:
         return search.verdicts(middle, half)
     verdict = np.full(len(middle), ProofVerdict.PROVED_INSIDE, dtype=np.int8)
     cells, vectors = np.arange(len(middle)), np.zeros((len(middle), 3))  # a row for each cube that is open
-    finest = float(np.linalg.norm(half)) / search.prover.size
+    finest, axes = float(np.linalg.norm(half)) / search.prover.size, search.prover.axes
     for place, parts in enumerate(PARTS):
-        turn = tilt if parts == 1 else tilt * np.sqrt(3.0) / parts
+        turn = tilt if parts == 1 else tilt * np.sqrt(len(axes)) / parts
         found = search.verdicts(middle[cells], half, vectors, turn)
         outermost = vectors * np.minimum(tilt / np.maximum(np.linalg.norm(vectors, axis=1), 1e-300), 1.0)[:, None]
         undecided = found == ProofVerdict.OPEN
@@ -185,22 +186,25 @@ def _decide(search: Search, middle: Array, half: Array, tilt: float) -> Codes:
         cells, vectors = cells[kept], vectors[kept]
         if place + 1 == len(PARTS) or turn < finest or search.late:
             break
-        cells, vectors = _smaller_cubes(cells, vectors, tilt, parts, PARTS[place + 1])
+        cells, vectors = _smaller_cubes(cells, vectors, tilt * axes, parts, PARTS[place + 1])
         if len(cells) > MOST_CELLS:
             break
     verdict[cells[verdict[cells] != ProofVerdict.PROVED_OUTSIDE]] = ProofVerdict.OPEN
     return verdict
 
 
-def _smaller_cubes(cells: Indices, vectors: Array, tilt: float, parts: int, more: int) -> tuple[Indices, Array]:
-    """The cubes of each cube that meet the ball of tilts, with the cell that each belongs to."""
+def _smaller_cubes(cells: Indices, vectors: Array, edges: Array, parts: int, more: int) -> tuple[Indices, Array]:
+    """The cubes of each cube that meet the ball of tilts, with the cell that each belongs to.
+
+    Half the edges of the cube around the whole ball are given, one a row.
+    """
     count = more // parts
-    steps = (2.0 * np.arange(count) + 1.0 - count) * tilt / more
-    offsets = np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3)
-    smaller = (vectors[:, None] + offsets).reshape(-1, 3)
-    nearest = np.maximum(np.abs(smaller) - tilt / more, 0.0)
-    meets = np.linalg.norm(nearest, axis=1) <= tilt
-    return np.repeat(cells, len(offsets))[meets], smaller[meets]
+    steps = (2.0 * np.arange(count) + 1.0 - count) / more
+    places = np.stack(np.meshgrid(*[steps] * len(edges), indexing="ij"), axis=-1).reshape(-1, len(edges))
+    smaller = (vectors[:, None] + places @ edges).reshape(-1, 3)
+    shares = smaller @ np.linalg.pinv(edges)
+    meets = np.linalg.norm(np.maximum(np.abs(shares) - 1.0 / more, 0.0), axis=1) <= 1.0
+    return np.repeat(cells, len(places))[meets], smaller[meets]
 
 
 def _children(half: Array) -> tuple[Array, Array]:

@@ -17,6 +17,7 @@ from sagline.numbers import counted
 from sagline.results import Result
 from sagline.robot.pose_box import PoseBox
 from sagline.robot.robot import Robot
+from sagline.workspaces.orientations import check_tilt
 from sagline.workspaces.pose_cells import Cells, Prover, Search, halve
 from sagline.workspaces.proof_verdict import ProofVerdict
 from sagline.workspaces.wrench_sets import WrenchSet, load_of
@@ -92,9 +93,10 @@ def prove(
     """Prove that a robot can work at every pose of a box, or at none of them, or where in it which holds.
 
     Poses are level; with a tilt of the box a position is inside where every orientation tilted by no more is, about any
-    axis, and outside where one of them is. The box is halved along its edges, again and
-    again, and each cell that can be decided is; what remains when the budget ends is open, never a guess. With
-    `Catenary()` the proofs hold for the exact cables, at tensions of the same range as in `margin`.
+    axis, and outside where one of them is; a planar platform turns about the normal of its plane alone. The box is
+    halved along its edges, again and again, and each cell that can be decided is; what remains when the budget ends is
+    open, never a guess. With `Catenary()` the proofs hold for the exact cables, at tensions of the same range as in
+    `margin`.
 
     Args:
         robot: The robot, without pulleys.
@@ -110,7 +112,7 @@ def prove(
 
     Raises:
         InvalidValueError: If an argument is none of its kind, the robot has pulleys, or fewer cables
-            than degrees of freedom.
+            than degrees of freedom, or the box tilts a platform that does not turn.
 
     Examples:
         >>> import sagline as sl
@@ -124,7 +126,8 @@ def prove(
     """
     load = load_of(wrenches)
     check_robot(instance(robot, Robot, "robot"))
-    if instance(box, PoseBox, "box").tilt > 0.0 and load.accelerations[1] > 0.0:
+    check_tilt(robot, instance(box, PoseBox, "box").tilt, "box: tilt")
+    if box.tilt > 0.0 and load.accelerations[1] > 0.0:
         step = "Give their moments as WrenchBox(moment=...), or prove the level poses."
         raise InvalidValueError("wrenches: angular accelerations", "given", "none where the box is tilted", step)
     seconds = number(budget, "budget", "s", above=0.0)

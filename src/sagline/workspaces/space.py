@@ -70,7 +70,8 @@ class Workspace(Result):
         moment_arm: As of `margin`; None for the mean lever arm.
         unit: Of the volume, "m³" or "m²".
         volume: In that unit.
-        volume_error: How far the volume may be off, from two grids of which one is twice as fine; 0 where it is empty.
+        volume_error: By how much the volume can be wrong, but for parts and gaps that are thinner than two cells of the
+            finest grid; 0 where it is empty.
         components: The parts that do not hang together.
         surface: The boundary, closed, the faces of the box where it reaches them included.
         limiting: At each vertex of the surface the criterion that decides, as an index; -1 where the box does,
