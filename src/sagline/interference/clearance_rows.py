@@ -122,7 +122,8 @@ class ClearanceRows:
         lengths = np.atleast_2d(state.free_length)
         parts = parts_of(cables.reshape(*lengths.shape, -1), lengths, self.pairs.parts, self._from_anchor)
         box = self._platform if isinstance(self._platform, Box) else Box(np.ones(3))
-        return locked(np.concatenate((parts, box_rows(box, state.pose).reshape(-1, 1, shapes.COLUMNS)), axis=1))
+        rows = np.concatenate((parts, box_rows(box, state.pose).reshape(-1, 1, shapes.COLUMNS)), axis=1)
+        return locked(np.ascontiguousarray(rows))  # a batch's are not, and the kernel would be compiled again
 
 
 def _box_row(one: Box | Mesh) -> Array:

@@ -11,7 +11,7 @@ from sagline.arrays import Array, Flags, Indices, locked
 from sagline.workspaces.slice import Find
 
 _STEPS: Final = 20  # along each way at first: a gap that is narrower than a step may be passed over
-_HALVINGS: Final = 12  # then: a way is known to some 1e-4 of its step
+_HALVINGS: Final = 14  # then: a way is known to some 1e-4 of its step
 WAYS: Final = np.vstack((np.eye(3), -np.eye(3)))  # +x, +y, +z, -x, -y, -z
 NAMES: Final = ("+x", "+y", "+z", "−x", "−y", "−z")
 
