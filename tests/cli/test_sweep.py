@@ -32,7 +32,7 @@ def ended(*words: str) -> Result:
 def test_a_sweep_tells_how_its_requests_ended_and_is_done_once(folder: Path) -> None:
     first = ended("own_sweep.yaml", "--workers", "1")
     assert (first.exit_code, first.stderr) == (0, "")
-    assert "1 robots x 609 poses x 9 wrenches" in first.stdout
+    assert "1 robot x 609 poses x 9 wrenches" in first.stdout
     assert "tensions within their limits" in first.stdout
     found = sl.sweep.load("output/own_sweep")
     assert found.complete
@@ -55,6 +55,7 @@ def test_the_folder_of_another_sweep_is_refused(folder: Path) -> None:
     result = ended("own_sweep.yaml", "--out", "out", "--workers", "1")
     assert result.exit_code == 2
     assert "Error: out: holds another sweep, of 5,481 requests. Give this one another folder" in result.stderr
+    assert "To go on" not in result.stderr
     assert result.stdout == ""
 
 

@@ -180,3 +180,9 @@ def test_what_is_refused(words: list[str], folder: FilePath) -> None:
     assert len(result.stderr.splitlines()) == 1
     assert len(result.stderr) < MOST + 10
     assert not (folder / "output").exists()
+
+
+def test_an_angle_without_a_unit_is_told_how_to_write_it() -> None:
+    result = sagline("cogiro", "--tilt", "10", "--no-figures")
+    assert result.exit_code == 2
+    assert "--tilt is '10'; allowed: 0 to 180deg. Give its unit, --tilt 10deg" in result.stderr

@@ -16,7 +16,7 @@ from sagline.files.sweep_file import load_sweep
 from sagline.files.whole import check_folder, made_folder
 from sagline.numbers import counted
 from sagline.sweep.cluster import check_address
-from sagline.sweep.running import MOST_WORKERS, run
+from sagline.sweep.running import MOST_WORKERS, opened_for, run
 from sagline.tension.options import takes_default_kernel
 
 if TYPE_CHECKING:
@@ -47,6 +47,8 @@ def sweep(file: Path, out: Path | None, workers: str | None, scheduler: str | No
     folder = Path("output") / file.stem if out is None else out
     check_folder(folder)
     made_folder(folder.absolute().parent)
+    if (folder / "done").exists():  # another's is refused here, where nobody is told that it could be gone on with
+        opened_for(folder, request)
     again = _again(file, folder, workers, scheduler)
     what = f"{len(request):,} requests"
     try:

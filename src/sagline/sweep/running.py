@@ -121,9 +121,31 @@ class _Clock:
         return (time.monotonic() - self._start) / self._done * (self._tasks - self._done)
 
 
+def opened_for(path: Path, request: Request) -> SweepFolder:
+    """Open the folder of a request.
+
+    Args:
+        path: The folder.
+        request: What it has to be of.
+
+    Returns:
+        The folder.
+
+    Raises:
+        FileError: If it is no folder of a sweep, damaged, or of another request.
+    """
+    from sagline.files.sweep_folder import digest_of, open_folder
+
+    opened = open_folder(path)
+    if opened.digest != digest_of(request):
+        step = "Give this one another folder, or remove that one."
+        raise FileError(path, f"holds another sweep, of {len(opened.request):,} requests", step)
+    return opened
+
+
 def _made(path: Path, request: Request) -> SweepFolder:
     """The folder with this request in it, made where there is none."""
-    from sagline.files.sweep_folder import check_made_here, digest_of, make_folder, open_folder
+    from sagline.files.sweep_folder import check_made_here, make_folder
 
     try:
         empty = not path.exists() or not any(path.iterdir())
@@ -131,10 +153,7 @@ def _made(path: Path, request: Request) -> SweepFolder:
         raise FileError(path, f"cannot be used ({error.strerror or error})", "Name another folder.") from None
     if empty:
         make_folder(path, request, measured_size(request))
-    opened = open_folder(path)
-    if opened.digest != digest_of(request):
-        step = "Give this one another folder, or remove that one."
-        raise FileError(path, f"holds another sweep, of {len(opened.request):,} requests", step)
+    opened = opened_for(path, request)
     check_made_here(opened)
     return opened
 
