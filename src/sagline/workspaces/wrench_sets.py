@@ -151,7 +151,8 @@ class WrenchPolytope(WrenchSet):
 
     Examples:
         >>> import sagline as sl
-        >>> lifted = sl.WrenchPolytope([[0, 0, 0, 0, 0, 0], [0, 0, -300, 0, 0, 0]])  # nothing to 300 N downward
+        >>> full = [0, 0, -300, 0, 0, 0]  # N downward
+        >>> lifted = sl.WrenchPolytope([[0, 0, 0, 0, 0, 0], full])
         >>> print(lifted.corners[:, 2])
         [   0. -300.]
     """
