@@ -42,6 +42,7 @@ def test_the_volume_of_the_article(folder: FilePath) -> None:
 
 def test_options_are_arguments() -> None:
     words = ["--wrench", "±50 N, ±5 N m, ±0.5 m/s^2", "--tilt", "5deg", "--max-sag", "30 cm", "--clearance", "1 mm"]
+    words.append("--no-figures")  # of 27 rotations and all criteria: most of a minute
     result = sagline(
         "cogiro", *words, "--box", "-4..4, -3..3, 1..4 m", "--cells", "4", "--payload", "10 kg", "--model", "elastic",
         "--reserve", "10", "--min-stiffness", "1000", "--min-frequency", "0.5 Hz", "--in-frame", "--json",
