@@ -35,7 +35,8 @@ class Mesh(Result):
     Examples:
         >>> import sagline as sl
         >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
-        >>> wedge = sl.Mesh(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], name="wedge")
+        >>> faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
+        >>> wedge = sl.Mesh(corners, faces, name="wedge")
         >>> print(f"{wedge.volume:.4f} m^3")
         0.1667 m^3
     """

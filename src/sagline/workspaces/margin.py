@@ -127,10 +127,11 @@ def margin(
 
     Examples:
         >>> import sagline as sl
-        >>> robot, pose = sl.load_robot("article-suspended"), sl.Pose([0, 0, 2], [[1, 0, 0], [0, 1, 0], [0, 0, 1]])
+        >>> robot = sl.load_robot("article-suspended")
+        >>> pose = sl.Pose.from_euler([0, 0, 2], 0, 0, 0)
         >>> found = sl.margin(robot, pose, sl.WrenchBox(force=100.0, moment=20.0))
-        >>> print(found.value.round(1), "N beyond the set;", sl.MarginStatus(int(found.status)).name)
-        91.1 N beyond the set; FEASIBLE
+        >>> print(found.value.round(1), "N beyond the set;", bool(found.feasible))
+        91.1 N beyond the set; True
 
     Source:
         docs/model.md, section 13; Guay, Cardou, Cruz-Ruiz & Caro 2014.

@@ -118,7 +118,8 @@ def prove(
         >>> import sagline as sl
         >>> robot = sl.load_robot("article-suspended")
         >>> box = sl.PoseBox([-2, -1, 1], [2, 1, 3])
-        >>> print(sl.prove(robot, box, sl.WrenchPolytope([[0, 0, -100, 0, 0, 0]])).verdict.name)
+        >>> load = sl.WrenchPolytope([[0, 0, -100, 0, 0, 0]])
+        >>> print(sl.prove(robot, box, load).verdict.name)
         PROVED_INSIDE
 
     Source:

@@ -183,7 +183,8 @@ class Accelerations(WrenchSet):
 
     Examples:
         >>> import sagline as sl
-        >>> quick = sl.Accelerations(linear=2.0) + sl.WrenchBox(force=10.0)  # 2 m/s^2 along each axis, and +-10 N
+        >>> tool = sl.WrenchBox(force=10.0)  # N, either way along each axis
+        >>> quick = sl.Accelerations(linear=2.0) + tool  # and 2 m/s^2
         >>> print(quick.accelerations)
         [2. 0.]
     """
