@@ -85,7 +85,7 @@ RESULTS = frozenset(
     | {"Clearances", "FrequencySlopes", "WinchDrive"}
     | {"EnergyBalance", "Imported", "Linearized", "Modes", "Occurrence", "Plan", "Simulation", "Stiffness"}
     | {"control.Execution", "control.Gains", "control.Motion", "control.Samples", "twin.Injected"}
-    | {"Components", "Front", "Margin", "MovingAnchors", "Surface", "Workspace", "WrenchSet", "sweep.Sweep"}
+    | {"Components", "Front", "Margin", "MovingAnchors", "Proof", "Surface", "Workspace", "WrenchSet", "sweep.Sweep"}
     | {"FrequencyMap", "FrequencyResponse", "TensionPolygon", "Vibration", "WinchRates"}
 )
 # need a machine at the other end, or are one: tests/plc/test_bad_arguments.py

@@ -62,6 +62,7 @@ def short_of_work(stocked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for module in ("run", "track"):
         monkeypatch.setattr(f"sagline.cli.{module}.article_path", lambda: short)
     monkeypatch.setattr("sagline.cli.run.FIGURES", ())
+    monkeypatch.setattr("sagline.cli.run.CELLS", 4)
     monkeypatch.setattr("sagline.cli.run._figures", lambda *_: ())
     monkeypatch.setattr("sagline.report.parts.Part.build", lambda part: Chapter(part.key, part.key, "", ()))
     monkeypatch.setattr("sagline.cli.tension.write_figures", lambda figures, folder: [])

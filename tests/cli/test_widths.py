@@ -84,6 +84,7 @@ def place(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
     monkeypatch.setattr("sagline.cli.run.article_path", lambda: sl.load_path("short.yaml"))
     monkeypatch.setattr("sagline.cli.run.FIGURES", ())
+    monkeypatch.setattr("sagline.cli.run.CELLS", 4)
     monkeypatch.setattr("sagline.cli.run._figures", lambda *_: ())
     monkeypatch.setattr("sagline.cli.study.perf_counter", iter(range(1000)).__next__)  # every run takes a second
 

@@ -90,6 +90,7 @@ def test_a_printed_command_runs(words: list[str], folder: Path, monkeypatch: pyt
     monkeypatch.setattr("sagline.cli.view.view_log", serve_log)
     monkeypatch.setattr("sagline.report.parts.Part.build", lambda part: Chapter(part.key, part.key, "", ()))
     monkeypatch.setattr("sagline.cli.run.FIGURES", ())
+    monkeypatch.setattr("sagline.cli.run.CELLS", 4)
     monkeypatch.setattr("sagline.cli.run._figures", lambda *_: ())
     instead_of_machines(monkeypatch)
     if words[0] == "twin":

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.arguments import callback, instance
-from sagline.arrays import Array, Codes, Flags, Indices, locked
+from sagline.arrays import Array, Codes, Flags, Indices, locked, number
 from sagline.blocks import Progress
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
@@ -141,10 +141,11 @@ def margin(
     check_reach(first_of(robots), pose, "pose")
     told = callback(progress, "progress")
     load = load_of(wrenches)
-    prepared = MarginRows(robots, load, instance(model, CableModel, "model"), moment_arm)
+    arm = None if moment_arm is None else number(moment_arm, "moment_arm", "m", low=0.0)
+    prepared = MarginRows(robots, load, instance(model, CableModel, "model"), arm)
     rows = pose_rows(pose)
     check_memory(f"margins at {len(rows):,} poses", _POSE_BYTES * len(rows), "Take them in parts.")
     found = prepared.rows(rows, told)
     value, low, high, cable, status = (locked(array.reshape(shape)) for array in found[:5])
     direction = locked(found.direction.reshape(*shape, 6))
-    return Margin(robots, pose, load, moment_arm, value, low, high, direction, cable, status)
+    return Margin(robots, pose, load, arm, value, low, high, direction, cable, status)
