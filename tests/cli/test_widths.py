@@ -29,9 +29,8 @@ from tests.kinematics.winches import wound
 
 WIDTHS = (60, 80, 120)
 SHORT = "durations: 1\nrate: 4\nwaypoints: [{position: [0, 0, 1.5]}, {position: [1, 0, 1.5]}]\n"
-WHOLE = (
-    r"In |Try: |Written: |Look at it: |Every value: |Advice: |[\w-]+: the path|The file keeps"  # paths, or on stderr
-)
+# paths, or on stderr
+WHOLE = r"In |Try: |Written: |Look at it: |Every value: |Advice: |[\w-]+: the path|The file keeps|Nowhere: "
 COMMANDS = (
     ["track", "cogiro", "short.yaml", "--no-figures"],
     ["track", "article-suspended", "far.yaml", "--no-figures"],
