@@ -55,7 +55,7 @@ def without_the_start() -> Iterator[Row]:
     """Tasks a second of one worker and of two, once they run: what a long sweep goes by."""
     from sagline.sweep.cluster import local_workers, spread
 
-    request = asked(POSES // SHARE, LOADS)
+    request = asked(POSES // 4, LOADS)  # of some twenty tasks; with a few only the first and the last would count
     size, rates = measured_size(request), []
     with tempfile.TemporaryDirectory() as place:
         make_folder(alone := Path(place) / "alone", request, size)
