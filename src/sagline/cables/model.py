@@ -50,8 +50,8 @@ class CableModel:
             InvalidValueError: If there are no equations.
         """
         if type(self) is CableModel:
-            models = "Straight, Elastic, Empirical, Parabolic, Catenary"
-            raise InvalidValueError("CableModel()", "the interface alone", models, "Choose one of them.")
+            step = "Choose one of the models, Catenary() for instance."
+            raise InvalidValueError("CableModel()", "the interface alone", "a cable model", step)
 
     @property
     def parameters(self) -> tuple[float, float]:

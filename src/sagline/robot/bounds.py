@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from sagline.arrays import Array
+from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
 _FLAT: Final = 0.05  # anchors that differ in height by less than this, of the robot's size, all hang at the top
@@ -33,3 +34,13 @@ def bounds(robot: Robot) -> tuple[Array, Array]:
         floor = 0.0 if robot.test_box is None else min(0.0, float(robot.test_box.low[2]))
         low = np.array([*low[:2], min(floor, low[2])])
     return low, high
+
+
+def home_pose(robot: Robot) -> Pose:
+    """The middle of the poses that a robot is meant for, or of its box.
+
+    Args:
+        robot: The robot.
+    """
+    low, high = bounds(robot) if robot.test_box is None else (robot.test_box.low, robot.test_box.high)
+    return Pose(0.5 * (low + high), np.eye(3))

@@ -17,13 +17,16 @@ from sagline.errors import InvalidValueError
 from sagline.robot import checks
 from sagline.robot.pattern import MOTION_PATTERNS, MotionPattern, freedom_matrix
 from sagline.robot.pose_box import PoseBox
+from sagline.robot.provenance import Provenance
+from sagline.robot.tolerances import deviations, value_of
 from sagline.robot.winch import Winch
+from sagline.shown import Shown
 
 TensionLimitsOf = Literal["chord", "frame_end"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Robot:
+class Robot(Shown):
     """A cable-driven parallel robot. Cable i runs from frame_anchors[i] to platform_anchors[i].
 
     Attributes:
@@ -50,6 +53,11 @@ class Robot:
         source: Where the numbers were read.
         assumed: Field name -> why; the fields whose values the source does not give.
         notes: What else a user should know.
+        tolerances: Name of a number -> standard deviation of it [SI], in the shape of its field: how far what is given
+            here may be off, as a drawing or a data sheet says. Names: frame_anchors, platform_anchors, center_of_mass
+            (with three components each), mass, and of every cable length_zero, drum_radius, linear_density,
+            axial_stiffness, pulley_radius, dead_cable, load_cell_gain, load_cell_bias.
+        calibration: The calibration that found some of the numbers, with their standard errors; None for none.
     """
 
     name: str
@@ -72,6 +80,8 @@ class Robot:
     source: str
     assumed: Mapping[str, str]
     notes: str
+    tolerances: Mapping[str, Array]
+    calibration: Provenance | None
 
     def __init__(
         self,
@@ -96,6 +106,8 @@ class Robot:
         source: str = "",
         assumed: Mapping[str, str] = MappingProxyType({}),
         notes: str = "",
+        tolerances: Mapping[str, ArrayLike] = MappingProxyType({}),
+        calibration: Provenance | None = None,
     ) -> None:
         """Check every field once; values for all cables at once are spread over the cables.
 
@@ -121,6 +133,9 @@ class Robot:
             source: Where the numbers were read.
             assumed: Field name -> why, for values that the source does not give.
             notes: What else a user should know.
+            tolerances: Name of a number -> its standard deviation [SI], > 0, infinite where nothing is known: one for
+                all of the field, one along each axis where it has three, or the whole field.
+            calibration: The calibration that found some of the numbers, or None.
 
         Raises:
             InvalidValueError: If a field is wrong; the message names it, with its index.
@@ -143,6 +158,7 @@ class Robot:
         pattern = choice(motion_pattern, "motion_pattern", MOTION_PATTERNS)
         normal = checks.plane_normal(plane_normal, pattern)
         lower, upper = checks.tension_limits(tension_min, tension_max, len(frame))
+        source_of = optional(calibration, Provenance, "calibration")
         values = {
             "name": label(name, "name"),
             "frame_anchors": frame,
@@ -164,6 +180,8 @@ class Robot:
             "source": text(source, "source"),
             "assumed": _known_fields(assumed),
             "notes": text(notes, "notes"),
+            "tolerances": deviations(tolerances, "tolerances", len(frame), above=0.0),
+            "calibration": None if source_of is None else source_of._of(len(frame)),
         }
         for field, value in values.items():
             object.__setattr__(self, field, value)
@@ -186,6 +204,9 @@ class Robot:
     def replace(self, **changes: Any) -> Robot:
         """A robot with some fields changed, checked like a new one.
 
+        Tolerances stay as they are. Of a calibration the standard errors stay of the numbers that stay: one that is
+        replaced is none that the calibration found.
+
         Args:
             changes: Fields of `Robot` and their new values.
 
@@ -206,16 +227,30 @@ class Robot:
         guides = None if self.winches is None else self.winches.guides
         if self.winches is not None and guides is not None and "frame_anchors" in changes and "winches" not in changes:
             changes["winches"] = self.winches.replace(guides=guides)  # dead cable follows anew
-        return replace(self, **changes)
+        return replace(self, **changes)._kept(self) if "calibration" not in changes else replace(self, **changes)
+
+    def _kept(self, before: Robot) -> Robot:
+        """This robot without the standard errors of what is not as the calibration left it."""
+        if self.calibration is None:
+            return self
+        errors = self.calibration.standard_error
+        same = {name: error for name, error in errors.items() if _alike(value_of(self, name), value_of(before, name))}
+        if len(same) == len(errors):
+            return self
+        return replace(self, calibration=replace(self.calibration, standard_error=same))
 
     def __reduce__(self) -> tuple[Any, tuple[dict[str, Any]]]:
         """Pickle through the constructor, so that a loaded robot is checked and locked too."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
-        return _from_fields, ({**values, "assumed": dict(self.assumed)},)
+        return _from_fields, ({**values, "assumed": dict(self.assumed), "tolerances": dict(self.tolerances)},)
 
 
 def _from_fields(values: dict[str, Any]) -> Robot:
     return Robot(**values)
+
+
+def _alike(one: Array | None, other: Array | None) -> bool:
+    return one is other if one is None or other is None else np.array_equal(one, other)
 
 
 def _known_fields(assumed: Mapping[str, str]) -> Mapping[str, str]:

@@ -10,13 +10,12 @@ from sagline.kernels.cable.pulls import TURN_ROWS, Curves
 from sagline.kernels.cable.terms import Chord, Material, Model
 from sagline.kernels.codes import CATENARY
 from tests.kernels.cable.room import plain_cables
-from tests.kernels.compiled import from_python, memory
+from tests.kernels.compiled import compiled, from_python, memory
 
 GRAVITY = 9.81
 
 find_turns = from_python(turns.find_turns)
 pull_range = from_python(pulls.pull_range)
-from_tension = from_python(models.from_tension)
 
 
 def random_curves(rng: np.random.Generator, m: int, model: int = CATENARY) -> Curves:
@@ -47,4 +46,13 @@ def pulls_of(curves: Curves, i: int, tensions: Array) -> Array:
     cables = curves.cables
     chord = Chord(float(cables.chord[i]), float(cables.sine[i]), float(cables.cosine[i]))
     material = Material(float(cables.density[i]), float(cables.stiffness[i]))
-    return np.array([from_tension(curves.model, chord, material, float(tau))[1] for tau in tensions])
+    found = np.empty(len(tensions))
+    each_pull(curves.model, chord, material, tensions, found)
+    return found
+
+
+@compiled
+def each_pull(model: Model, chord: Chord, material: Material, tensions: Array, found: Array) -> None:
+    """The same, into an array."""
+    for k in range(tensions.size):
+        found[k] = models.from_tension(model, chord, material, tensions[k])[1]

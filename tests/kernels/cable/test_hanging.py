@@ -19,6 +19,7 @@ from tests.kernels.compiled import from_python, memory
 hang_cables = from_python(h.hang_cables)
 frame_end_tension = from_python(h.frame_end_tension)
 chord_tension_at_frame_end = from_python(h.chord_tension_at_frame_end)
+taut_at_frame_end = from_python(h.taut_at_frame_end)
 from_tension = from_python(models.from_tension)
 room_for = from_python(new_cables)
 
@@ -162,11 +163,32 @@ def test_limits_of_the_frame_end_as_chord_tensions(code: int, case: tuple[float,
         assert frame_end_tension(model, chord, material, NO_PULLEY, tau) == pytest.approx(end, rel=1e-14)
         assert end == pytest.approx(tension, rel=1e-12)
         assert tau > 0.5 * weight * length * sine  # the taut side
-    for tension in (0.0, 0.5 * least, least):  # less than any taut cable has: where it is least
-        assert chord_tension_at_frame_end(model, chord, material, NO_PULLEY, tension) == max(
-            0.5 * weight * length * sine, 0.0
-        )
+    for tension in (0.0, 0.3 * least):  # less than any cable has
+        met = max(0.5 * weight * length * sine, 0.0)
+        assert chord_tension_at_frame_end(model, chord, material, NO_PULLEY, tension) == met
+        assert taut_at_frame_end(model, chord, material, NO_PULLEY, tension, 7.0) == 7.0
     assert chord_tension_at_frame_end(model, chord, material, NO_PULLEY, math.inf) == math.inf
+
+
+PULLEYS = [NO_PULLEY, Pulley(0.05, 1.0, 0.0, 0.0), Pulley(0.05, -1.0, 0.0, 0.0)]
+
+
+@pytest.mark.parametrize("pulley", PULLEYS, ids=["eyelet", "from below", "from above"])
+@pytest.mark.parametrize("case", [*CABLES[:3], (0.2, 40.0, 4.0, -0.97), (0.3, 30.0, 4.0, 0.9)])
+def test_limits_of_the_frame_end_near_the_least_that_a_cable_has(case: tuple[float, ...], pulley: Pulley) -> None:
+    density, stiffness, length, sine = case
+    chord, material = Chord(length, sine, math.sqrt(1.0 - sine * sine)), Material(density, stiffness)
+    half = 0.5 * density * GRAVITY * length
+    tensions = np.geomspace(0.2, 20.0, 4000) * half
+    ends = [frame_end_tension(EXACT, chord, material, pulley, float(tau)) for tau in tensions]
+    least, loosest = min(ends), tensions[np.argmin(ends)]
+    digits = 1e-12 if pulley.radius == 0.0 else 1e-9  # where a slack cable leaves its pulley is a matter of passes
+    for share in (1.001, 1.01, 1.1, 2.0):
+        tau = taut_at_frame_end(EXACT, chord, material, pulley, share * least, 0.0)
+        assert frame_end_tension(EXACT, chord, material, pulley, tau) == pytest.approx(share * least, rel=digits)
+        assert tau > loosest
+    for share in np.linspace(0.1, 0.999, 40):
+        assert taut_at_frame_end(EXACT, chord, material, pulley, float(share) * least, -1.0) == -1.0
 
 
 def test_weightless_cables_have_one_tension() -> None:

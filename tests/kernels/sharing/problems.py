@@ -28,6 +28,27 @@ class Problem(NamedTuple):
         """The verdict of a linear program."""
         return bool(self.program(np.zeros(len(self.null))).status == 0)
 
+    @property
+    def is_endless(self) -> bool:
+        """Whether the set, if there is one, goes on for ever: some way never leaves a strip with two finite limits.
+
+        Of such ways up to a length, the linear program finds one along which tensions without upper limits grow most.
+        """
+        closed = np.isfinite(self.strips[HIGH])
+        if np.linalg.matrix_rank(self.null) < len(self.null):
+            return True
+        grows = self.null[:, ~closed]
+        found = linprog(
+            -grows.sum(axis=1),
+            A_ub=-grows.T if grows.size else None,
+            b_ub=np.zeros(grows.shape[1]) if grows.size else None,
+            A_eq=self.null[:, closed].T if closed.any() else None,
+            b_eq=np.zeros(closed.sum()) if closed.any() else None,
+            bounds=(-1.0, 1.0),
+        )
+        assert found.status == 0
+        return bool(found.fun < -1e-9)
+
     def program(self, cost: Array) -> linprog:
         """Least cost over the set, by SciPy."""
         finite = np.isfinite(self.strips[HIGH])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sagline.kernels.cable.pulls import LOOSEST
 from sagline.kernels.codes import POSE_INFEASIBLE, POSE_SOLVED
 from sagline.kernels.sharing import bracket
 from sagline.kernels.sharing.least_change import Demand
@@ -50,7 +51,7 @@ def test_one_sagging_cable_reaches_the_range_of_its_curve() -> None:
         curves = random_curves(rng, 1)
         low, high = float(curves.cables.low[0]), float(curves.cables.high[0])
         hanging = rng.uniform(-2, 2)
-        tensions = np.geomspace(max(low, curves.cables.half_weight[0] / bracket.LOOSEST), high, 4000)
+        tensions = np.geomspace(max(low, curves.cables.half_weight[0] / LOOSEST), high, 4000)
         reached = tensions - hanging * pulls_of(curves, 0, tensions)
         bend = np.abs(np.diff(reached)).max()
         right = rng.uniform(reached.min() - 0.2 * np.ptp(reached), reached.max() + 0.2 * np.ptp(reached))

@@ -7,7 +7,7 @@ import pytest
 
 from sagline.arrays import Array
 from sagline.kernels.algebra.strips import HIGH, LOW, START
-from sagline.kernels.codes import POSE_INFEASIBLE, POSE_SOLVED, POSE_UNBOUNDED
+from sagline.kernels.codes import POSE_INFEASIBLE, POSE_NOT_CONVERGED, POSE_SOLVED, POSE_UNBOUNDED
 from sagline.kernels.sharing import centers as c
 from tests.kernels.compiled import from_python
 from tests.kernels.sharing.problems import Problem, random_problem, room_of
@@ -50,14 +50,12 @@ def test_infinite_limits_do_not_count_but_an_end_there_must_be(r: int) -> None:
     ends = set()
     for trial in range(60):
         problem = random_problem(rng, r + 3, r, open_share=0.2 if trial % 2 else 0.9)
-        ways = rng.normal(size=(40, r))
         point = np.full(r, np.nan)
         status = share_at_center(*problem, point, room_of(r + 3, r))
-        if not all(problem.program(way).status == 0 for way in ways):
+        if problem.is_endless:
             ends.add(False)
-            assert status in (POSE_UNBOUNDED, POSE_SOLVED)
-            if r < 3:
-                assert status == POSE_UNBOUNDED
+            # beyond a polygon the deepest point of such a set may be found, and Newton's steps then have no end
+            assert status == POSE_UNBOUNDED or (r > 2 and status == POSE_NOT_CONVERGED)
         elif status == POSE_SOLVED:
             ends.add(True)
             left, terms = push(problem, point)

@@ -5,31 +5,37 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pytest
 
 from sagline.arrays import Array
-from sagline.kernels.cable import hanging
+from sagline.kernels.cable import hanging, models
 from sagline.kernels.cable.pulley import Pulley
+from sagline.kernels.cable.pulls import LOOSEST
 from sagline.kernels.cable.terms import Chord, Material, Model
 from sagline.kernels.workspaces import pull_bounds
 from sagline.kernels.workspaces.box_tensions import SLACK
-from tests.kernels.cable.curves import GRAVITY, from_tension, random_curves
+from tests.kernels.cable.curves import GRAVITY, random_curves
 from tests.kernels.compiled import from_python
 
 fall, rise = from_python(pull_bounds.fall), from_python(pull_bounds.rise)
 fall_rate, rise_rate = from_python(pull_bounds.fall_rate), from_python(pull_bounds.rise_rate)
 pull_slope, most_pull = from_python(pull_bounds.pull_slope), from_python(pull_bounds.most_pull)
+from_tension = from_python(models.from_tension)
 chord_tension_at_frame_end = from_python(hanging.chord_tension_at_frame_end)
 MODEL = Model(4, 0.0, 0.0, GRAVITY)
 
 
-def test_tensions() -> None:
+@pytest.mark.parametrize("soft", [False, True], ids=["", "strains to thirty"])
+def test_tensions(soft: bool) -> None:
     rng = np.random.default_rng(1)
     tightest = 0.0
     for _ in range(100):
         curves = random_curves(rng, 8)
         cables: Any = curves.cables
+        if soft:
+            cables.stiffness[:] = cables.low / 10 ** rng.uniform(-2.0, 1.5, 8)
         for i in range(8):
-            low = max(cables.low[i], cables.half_weight[i] / pull_bounds.LOOSEST)
+            low = max(cables.low[i], cables.half_weight[i] / LOOSEST)
             high = low * 10 ** rng.uniform(0.01, 2)
             pulls = [_pull(cables, i, tau) for tau in (low, high, low * 1.0001)]
             tiny = 1e-12 * low
@@ -38,7 +44,7 @@ def test_tensions() -> None:
             change = (pulls[0] - pulls[2]) / (1e-4 * low)
             assert -rise_rate(curves, i, low) - 1e-8 <= change <= fall_rate(curves, i, low) + 1e-8
             tightest = max(tightest, (pulls[0] - pulls[1]) / fall(curves, i, low, high))
-    assert tightest > 0.99  # and not larger than need be
+    assert soft or tightest > 0.99  # and not larger than need be
 
 
 def test_positions() -> None:
@@ -49,7 +55,7 @@ def test_positions() -> None:
         cables: Any = curves.cables
         for i in range(8):
             chord, sine, cosine = cables.chord[i], cables.sine[i], cables.cosine[i]
-            tau = max(cables.low[i], cables.half_weight[i] / pull_bounds.LOOSEST)
+            tau = max(cables.low[i], cables.half_weight[i] / LOOSEST)
             step = rng.normal(size=2)
             step *= chord * 10 ** rng.uniform(-4, -0.5) / np.linalg.norm(step)
             span, height = chord * cosine + step[0], chord * sine + step[1]
@@ -79,7 +85,7 @@ def test_limits_of_the_frame_end_move_no_faster() -> None:
             there = place + step * way / np.linalg.norm(step)
             tight = half * (1.0 + way / cables.chord[i]) / SLACK
             limit = tight * 10 ** rng.uniform(0.2, 1.0)
-            if there[0] <= 0.0 or limit > 0.1 * material.stiffness:
+            if there[0] <= 0.0:
                 continue
             limits = [_chord_limit(at, material, float(limit)) for at in (place, there)]
             if min(limits) < tight:

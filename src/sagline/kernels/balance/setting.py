@@ -17,7 +17,7 @@ from sagline.kernels.balance.wrench import along_freedom, fill_structure_matrix,
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.cables import Cables, chord_of, material_of, pulley_of
 from sagline.kernels.cable.geometry import cable_geometry
-from sagline.kernels.cable.hanging import chord_tension_at_frame_end
+from sagline.kernels.cable.hanging import chord_tension_at_frame_end, taut_at_frame_end
 from sagline.kernels.cable.models import pull_of_shallow
 from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.cable.terms import Model
@@ -167,7 +167,7 @@ def place_cables(model: Model, limits: Limits, robot: Array, geometry: Array, ca
         if limits.quantity == LIMITS_OF_FRAME_END:
             line, material, pulley = chord_of(cables, i), material_of(cables, i), pulley_of(cables, i)
             low = chord_tension_at_frame_end(model, line, material, pulley, low)
-            high = chord_tension_at_frame_end(model, line, material, pulley, high)
+            high = taut_at_frame_end(model, line, material, pulley, high, 0.0)  # 0: no cable hangs with so little
         if not math.isnan(limits.validity):
             # on a vertical cable T_x is zero, and so is a margin of zero
             margin = limits.validity / cables.cosine[i] if limits.validity > 0.0 else 0.0

@@ -27,6 +27,9 @@ CONTACTS = 40
 SAME_PULL = 4e-16  # of the tension: a pull that changes by no more stands still
 LIMIT_STEPS = 30
 LIMIT_PRECISION = 1e-13  # relative
+LIMIT_MISS = 1e-6  # relative: more than what the passes for a slack cable's pulley leave
+SECANT = 1e-6  # relative step below which a slope between two steps is rounding
+TAUT = 1.25  # of wD/2: a chord tension above that of the least tension at the frame end
 
 
 @glue
@@ -153,22 +156,46 @@ def frame_end_tension(model: Model, chord: Chord, material: Material, pulley: Pu
 def chord_tension_at_frame_end(model: Model, chord: Chord, material: Material, pulley: Pulley, tension: float) -> float:
     """Chord tension at which the tension at the frame end has a given value, on the taut side.
 
-    A sagging cable's frame-end tension has a least value, near wD cos(phi)/2; what lies below it is met there.
-    Newton's slope is the first-order one, T_A^2 = tau^2 - tau wD sin phi + (wD/2)^2; the value is the model's own.
+    What no cable hangs with is answered by the chord tension, if any, at which a parabola's frame-end tension is least.
+    """
+    loosest = 0.5 * material.density * model.gravity * chord.length * chord.sine
+    return taut_at_frame_end(model, chord, material, pulley, tension, max(loosest, 0.0))
+
+
+@kernel
+def taut_at_frame_end(
+    model: Model, chord: Chord, material: Material, pulley: Pulley, tension: float, otherwise: float
+) -> float:
+    """Chord tension at which the tension at the frame end has a given value, on the taut side.
+
+    A sagging cable's frame-end tension has a least value, up to 3/4 wD cos(phi). It is convex in the chord tension,
+    with a slope of at most 1 + wD/EA: from the taut side steps by secants come down to the root, or to where the slope
+    is none.
+
+    Args:
+        model: Cable model.
+        chord: Chord.
+        material: Material.
+        pulley: What stands behind.
+        tension: At the frame end [N].
+        otherwise: The answer where no cable hangs with so little.
     """
     weight = material.density * model.gravity
     if model.code == STRAIGHT or model.code == ELASTIC or weight == 0.0 or tension == math.inf:
         return tension
-    along = 0.5 * weight * chord.length * chord.sine
-    across = 0.5 * weight * chord.length * chord.cosine
-    tau = along + math.sqrt(max(tension * tension - across * across, 0.0))
-    if tension <= 1.01 * across or tau <= 0.0:
-        return max(tau, 0.0)
-    for _ in range(LIMIT_STEPS):
+    half = 0.5 * weight * chord.length
+    along, across = half * chord.sine, half * chord.cosine
+    tau = max(along + math.sqrt(max(tension * tension - across * across, 0.0)), TAUT * half)
+    before, before_value, slope = 0.0, 0.0, 1.0 + 2.0 * half / material.stiffness
+    miss = math.inf
+    for k in range(LIMIT_STEPS):
         value = frame_end_tension(model, chord, material, pulley, tau)
-        step = (value - tension) * value / (tau - along)
-        new = tau - step
-        tau = new if new > 0.5 * tau else 0.5 * tau
-        if abs(step) <= LIMIT_PRECISION * tau:
+        if k > 0 and abs(tau - before) > SECANT * tau:
+            slope = (value - before_value) / (tau - before)
+        if not slope > 0.0:
             break
-    return tau
+        before, before_value, miss = tau, value, value - tension
+        tau = max(tau - miss / slope, 0.5 * tau)
+        if abs(tau - before) <= LIMIT_PRECISION * tau:
+            break
+    return before if abs(miss) <= LIMIT_MISS * tension else otherwise

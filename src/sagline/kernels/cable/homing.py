@@ -3,16 +3,42 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from sagline.arrays import Array
 from sagline.kernels import tables
 from sagline.kernels.algebra.angle import angle
 from sagline.kernels.cable.geometry import CHORD, COSINE, SINE, cable_geometry
 from sagline.kernels.cable.hanging import chord_tension_at_frame_end, hang_cable
-from sagline.kernels.cable.pulley import Wrap, behind_cable, pulley_at
-from sagline.kernels.cable.terms import Chord, Material, Terms, model_of
+from sagline.kernels.cable.pulley import Pulley, Wrap, behind_cable, pulley_at
+from sagline.kernels.cable.terms import Chord, Material, Model, Terms, model_of
 from sagline.kernels.codes import CATENARY, ELASTIC, STRAIGHT
-from sagline.kernels.jit import entry
+from sagline.kernels.jit import entry, kernel
+
+
+class Held(NamedTuple):
+    """A cable that is held at a pose: all of it off the drum [m], what it pulls with [N], and at its frame end [N]."""
+
+    length: float
+    pull: float
+    tension: float
+
+
+@kernel
+def hold_cable(model: Model, chord: Chord, material: Material, pulley: Pulley, tau: float) -> Held:
+    """A cable at a chord tension, with what is on its pulley and behind it; pull: T_z - tau sin phi."""
+    weightless = model.code == STRAIGHT or model.code == ELASTIC
+    weight = 0.0 if weightless else material.density * model.gravity
+    length, pull, _status = hang_cable(model, chord, material, pulley, tau)
+    horizontal, vertical = tau * chord.cosine, tau * chord.sine + pull - weight * length
+    tension = math.sqrt(horizontal * horizontal + vertical * vertical)
+    # cables of the shallow models leave along their chord, and have its tension behind it
+    sine, cosine, there = chord.cosine, pulley.entry * chord.sine, tau
+    if model.code == CATENARY:
+        there = tension
+        sine, cosine = horizontal / there, pulley.entry * vertical / there
+    rest = behind_cable(model, material, pulley, there, Wrap(sine, cosine, angle(sine, cosine)))
+    return Held(length + (rest.wrapped + rest.dead), pull, tension)
 
 
 @entry
@@ -45,16 +71,6 @@ def lengths_at_frame_ends(
     for i in range(tension.size):
         chord = Chord(geometry[CHORD, i], geometry[SINE, i], geometry[COSINE, i])
         material, pulley = Material(cables[i, tables.DENSITY], cables[i, tables.STIFFNESS]), pulley_at(cables, i)
-        weightless = model.code == STRAIGHT or model.code == ELASTIC
-        weight = 0.0 if weightless else material.density * model.gravity
         tau = chord_tension_at_frame_end(model, chord, material, pulley, tension[i])
-        length, pull, _status = hang_cable(model, chord, material, pulley, tau)
-        horizontal, vertical = tau * chord.cosine, tau * chord.sine + pull - weight * length
-        tension_out[i] = math.sqrt(horizontal * horizontal + vertical * vertical)
-        # cables of the shallow models leave along their chord, and have its tension behind it
-        sine, cosine, there = chord.cosine, pulley.entry * chord.sine, tau
-        if model.code == CATENARY:
-            there = tension_out[i]
-            sine, cosine = horizontal / there, pulley.entry * vertical / there
-        rest = behind_cable(model, material, pulley, there, Wrap(sine, cosine, angle(sine, cosine)))
-        length_out[i] = length + (rest.wrapped + rest.dead)
+        held = hold_cable(model, chord, material, pulley, tau)
+        tension_out[i], length_out[i] = held.tension, held.length

@@ -19,6 +19,7 @@ from sagline.kernels.codes import CATENARY
 from sagline.kernels.jit import glue, kernel
 from sagline.kernels.memory import Memory, block
 
+LOOSEST = 5.0  # largest X = wD/(2 tau): a cable fifteen times as long as its chord, which no winch pulls on
 SLOPE_STEP = 1e-4  # relative step of the central difference of the pull
 EXITS = 4  # passes over pulleys: for X up to 1 the pull is then known to 1e-9 of the tension
 SHRINKINGS = 30

@@ -15,14 +15,13 @@ from typing import NamedTuple
 
 from sagline.arrays import Array
 from sagline.kernels.algebra.householder import factorize, orthogonal_factor, pseudo_inverse
-from sagline.kernels.cable.pulls import Curves, Section, most_along, pull_at, pull_range, slopes_at
+from sagline.kernels.cable.pulls import LOOSEST, Curves, Section, most_along, pull_at, pull_range, slopes_at
 from sagline.kernels.cable.turns import find_turns
 from sagline.kernels.codes import CATENARY, POSE_BORDERLINE, POSE_INFEASIBLE, POSE_NOT_CONVERGED, POSE_SOLVED
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block
 from sagline.kernels.sharing.least_change import Change, Demand, least_change, length_of
 
-LOOSEST = 5.0  # largest X = wD/(2 tau): a cable fifteen times as long as its chord, which no winch pulls on
 PLENTY = 1e6  # of the largest force at hand: more than any cable carries that has no limit
 FEASIBLE = 1e-9  # of the largest force at hand: what is left of the balance is taken for none
 CERTAIN = 1e-14  # of the numbers at hand: limits that contradict by less may do so by rounding

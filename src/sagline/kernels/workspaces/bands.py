@@ -6,13 +6,11 @@ import math
 
 from sagline.arrays import Array
 from sagline.kernels.cable.cables import Cables
-from sagline.kernels.cable.pulls import Curves, Section, pull_range, pulls_at
+from sagline.kernels.cable.pulls import LOOSEST, Curves, Section, pull_range, pulls_at
 from sagline.kernels.cable.turns import find_turns
 from sagline.kernels.codes import CATENARY
 from sagline.kernels.jit import formula, glue
 from sagline.kernels.memory import Memory
-
-LOOSEST = 5.0  # largest X = wD/(2 tau): a cable fifteen times as long as its chord, which no winch pulls on
 
 # What the formula of `range_between_ends` is good for, on two million random cables.
 SLACKEST, STRETCHED = 0.3, 0.15  # largest X and e

@@ -8,12 +8,12 @@ from typing import NamedTuple
 from sagline.arrays import Array
 from sagline.kernels import tables
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable.pulls import Curves, pulls_at
+from sagline.kernels.cable.pulls import LOOSEST, Curves, pulls_at
 from sagline.kernels.codes import CATENARY, LIMITS_OF_CHORD
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.workspaces.centered import FARTHEST, Centered, find_center, leave
 from sagline.kernels.workspaces.pose_box import MOTIONS, Box, Place
-from sagline.kernels.workspaces.pull_bounds import LOOSEST, most_pull, pull_slope, sags
+from sagline.kernels.workspaces.pull_bounds import most_pull, pull_slope, sags
 
 SMOOTHNESS = 0.01  # of how far the demand goes over a box: so much of it the smoothing leaves
 SLACK = 0.45  # X at a limit of the frame end beyond which it may move faster than the pull
@@ -27,9 +27,9 @@ class Ranges(NamedTuple):
 
     Attributes:
         low: What no limit exceeds, (m,): for inside.
-        high: What no limit falls below, may be infinite.
+        high: What no limit falls below, nor stretches a cable to more than twice its length; may be infinite.
         lowest: What no limit falls below: for outside.
-        highest: What no limit exceeds, or no cable can carry.
+        highest: What no limit exceeds, or no load can cause; may be infinite.
         pull: Pulls at the centered tensions.
     """
 
@@ -54,7 +54,6 @@ def set_ranges(quantity: int, place: Place, curves: Curves, ranges: Ranges) -> N
                 move_limits(place, curves, i, ranges)
             ranges.lowest[i] = max(ranges.lowest[i], loosest)
             ranges.low[i] = max(ranges.low[i], loosest)
-            ranges.highest[i] = min(ranges.highest[i], max(cables.stiffness[i], ranges.lowest[i]))
             ranges.high[i] = min(ranges.high[i], cables.stiffness[i])
 
 

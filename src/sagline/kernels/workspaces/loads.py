@@ -33,6 +33,25 @@ def dot6(a: Array, b: Array) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + a[4] * b[4] + a[5] * b[5]
 
 
+@formula
+def along_axis(axes: Array, k: int, against: Array) -> float:
+    """Inner product of column k of an ellipsoid's matrix (6, 6) and a direction (6,)."""
+    along = 0.0
+    for a in range(6):
+        along += axes[a, k] * against[a]
+    return along
+
+
+@formula
+def reach_of_ellipsoid(axes: Array, against: Array) -> float:
+    """How far an ellipsoid reaches to either side of its center."""
+    square = 0.0
+    for k in range(6):
+        along = along_axis(axes, k, against)
+        square += along * along
+    return math.sqrt(square)
+
+
 @kernel
 def reach(loads: Loads, against: Array) -> float:
     """Largest -against . (w - center) over the set."""
@@ -40,13 +59,7 @@ def reach(loads: Loads, against: Array) -> float:
     for s in range(loads.segments.shape[0]):
         most += abs(dot6(loads.segments[s], against))
     for e in range(loads.ellipsoids.shape[0]):
-        square = 0.0
-        for k in range(6):
-            along = 0.0
-            for a in range(6):
-                along += loads.ellipsoids[e, a, k] * against[a]
-            square += along * along
-        most += math.sqrt(square)
+        most += reach_of_ellipsoid(loads.ellipsoids[e], against)
     first = 0
     for p in range(loads.sizes.size):
         best = -math.inf
@@ -67,20 +80,13 @@ def farthest(loads: Loads, against: Array, wrench: Array) -> None:
         for a in range(6):
             wrench[a] += sign * loads.segments[s, a]
     for e in range(loads.ellipsoids.shape[0]):
-        square = 0.0
-        for k in range(6):
-            along = 0.0
-            for a in range(6):
-                along += loads.ellipsoids[e, a, k] * against[a]
-            square += along * along
-        length = math.sqrt(square)
-        for k in range(6):
-            along = 0.0
-            for a in range(6):
-                along += loads.ellipsoids[e, a, k] * against[a]
-            if length > 0.0:
+        axes = loads.ellipsoids[e]
+        length = reach_of_ellipsoid(axes, against)
+        if length > 0.0:
+            for k in range(6):
+                share = along_axis(axes, k, against) / length
                 for a in range(6):
-                    wrench[a] -= loads.ellipsoids[e, a, k] * (along / length)
+                    wrench[a] -= axes[a, k] * share
     first = 0
     for p in range(loads.sizes.size):
         best = first

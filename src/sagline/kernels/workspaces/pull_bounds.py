@@ -9,11 +9,10 @@ from __future__ import annotations
 
 import math
 
-from sagline.kernels.cable.pulls import Curves
+from sagline.kernels.cable.pulls import LOOSEST, Curves
 from sagline.kernels.codes import CATENARY
 from sagline.kernels.jit import formula, kernel
 
-LOOSEST = 5.0  # largest X: what hangs looser counts as no cable at work, as in the verdicts of the inverse
 SMALL = 1e-3  # X below which series do
 
 

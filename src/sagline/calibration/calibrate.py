@@ -1,0 +1,188 @@
+"""Calibration of a robot from its own readings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Final
+
+import numpy as np
+
+from sagline.arguments import callback, instance, whole_number
+from sagline.arrays import Array, Indices
+from sagline.blocks import Progress
+from sagline.cables.catenary import Catenary
+from sagline.cables.model import CableModel
+from sagline.calibration.conclusion import concluded
+from sagline.calibration.cross_validation import cross_validated
+from sagline.calibration.least_squares import misfit
+from sagline.calibration.log import WinchLog
+from sagline.calibration.parameters import chosen, parameters_of
+from sagline.calibration.problem import Log, Problem
+from sagline.calibration.result import Calibration
+from sagline.calibration.screening import reading_count, screened
+from sagline.calibration.search import found_from
+from sagline.calibration.sensors import Sensors
+from sagline.calibration.status import Omission
+from sagline.calibration.suspicions import GOOD, fits_unmeasured, measured_elsewhere, suspicions, wrong_units
+from sagline.calibration.unknowns import Parameters, Unknown
+from sagline.errors import InvalidValueError
+from sagline.kernels import codes
+from sagline.numbers import counted
+from sagline.robot.robot import Robot
+
+_CATENARY = Catenary()
+MOST_FOLDS: Final = 1000  # each a calibration
+UNKNOWNS: Final = ("frame_anchors", "length_zero", "axial_stiffness", "mass", "center_of_mass")
+
+
+def calibrate(
+    robot: Robot,
+    log: WinchLog,
+    unknowns: Sequence[str | Unknown] = UNKNOWNS,
+    *,
+    model: CableModel = _CATENARY,
+    robust: bool = True,
+    folds: int = 5,
+    progress: Progress | None = None,
+) -> Calibration:
+    """What a robot's anchors, zeros and cables really are, from its own readings, and how far that is known.
+
+    One least squares on exact cables finds all numbers at once, with the true lengths at every pose, which nobody
+    knows: what the encoders say of them counts as far as `log.sensors` trusts it. Numbers that the readings do not tell
+    stay where the robot has them, and are named.
+
+    Args:
+        robot: The robot as it is believed to be: its numbers are where the search begins, and priors. How far they may
+            be off is what its `tolerances` say, or `Unknown(name, deviation=...)`, or what is usual of the kind.
+        log: Readings at poses where it stood.
+        unknowns: What is looked for: names of `KINDS` in `sagline.calibration.unknowns`, or `Unknown`s.
+        model: Cable model, the exact one or the weightless one.
+        robust: Whether poses that do not fit the rest count less.
+        folds: Into how many parts the poses are divided to see how well those are predicted that were left out: no more
+            than there are poses, each of which is then left out by itself; 0 for none, which spares as many
+            calibrations.
+        progress: Told how many poses are done of a pass, of how many.
+
+    Returns:
+        Calibration; `robot` is the one to use.
+
+    Raises:
+        InvalidValueError: If an unknown is none, or seen by no reading; if the log is not of this robot, has swapped
+            cables or wrong units, or tells less than there are unknowns; the message says which, and what to do.
+
+    Examples:
+        >>> import numpy as np
+        >>> import sagline as sl
+        >>> drawn = sl.load_robot("article-suspended")
+        >>> true = drawn.replace(mass=1.02 * drawn.mass)
+        >>> places = np.random.default_rng(0).uniform(-0.5, 0.5, (5, 3)) + [0, 0, 2]
+        >>> plan = sl.inverse(true, sl.Pose(places, np.eye(3)))
+        >>> log = sl.WinchLog(
+        ...     unstrained_length=plan.unstrained_length,
+        ...     load_cells=plan.state.cables.frame_end_tension,
+        ...     sensors=sl.Sensors(tension_deviation=5.0),
+        ... )
+        >>> found = sl.calibrate(drawn, log, ["mass"])
+        >>> print(f"{found.robot.mass / drawn.mass:.3f}")
+        1.020
+
+    Source:
+        docs/model.md, section 14.
+    """
+    instance(robot, Robot, "robot")
+    instance(log, WinchLog, "log")
+    _check_model(robot, instance(model, CableModel, "model"))
+    callback(progress, "progress")
+    if (folds := whole_number(folds, "folds", 0, MOST_FOLDS)) == 1:
+        raise InvalidValueError("folds", "1", "0 for none, or >= 2", "Give 5, say.")
+    asked = chosen(unknowns)  # before any work
+    _refuse(wrong_units(robot, log))
+    fit_for = screened(robot, log)
+    sensors = sensors_there(fit_for.log)
+    parameters = parameters_of(robot, asked, sensors, counted=log.counts is not None)
+    _check_count(fit_for.log, parameters, fit_for.left_out)
+    problem = Problem(robot, model, sensors, parameters, readings_of(fit_for.log))
+    try:
+        found = found_from(problem, fit_for.log.commanded, robust=robust, progress=progress)
+    except InvalidValueError:
+        _refuse(suspicions(robot, _in_known_axes(log, parameters), model))
+        _refuse_unlike(robot, fit_for.log, parameters, model)
+        raise
+    if not found.fit.converged or misfit(found.fit.normal) > GOOD:
+        _refuse(suspicions(robot, _in_known_axes(log, parameters), model))
+        _refuse_unlike(robot, fit_for.log, parameters, model)
+    elif Omission.OTHER_EQUILIBRIUM in found.left_out:
+        _refuse(measured_elsewhere(fit_for.log, found.left_out[Omission.OTHER_EQUILIBRIUM], parameters.names))
+    validation = cross_validated(problem, found, folds, robust=robust, progress=progress) if folds else None
+    return concluded(problem, found, fit_for.rows, fit_for.left_out, log.source, validation)
+
+
+def sensors_there(log: WinchLog) -> Sensors:
+    """The sensors that read anything in a log."""
+    silent = {
+        name: None
+        for name, read in (
+            ("tension_deviation", log.load_cells),
+            ("position_deviation", log.position),
+            ("rotation_deviation", log.rotation),
+        )
+        if read is None or np.isnan(read).all()
+    }
+    return log.sensors.replace(**silent)
+
+
+def readings_of(log: WinchLog) -> Log:
+    """The readings of a log as the least squares take them."""
+    count, m = log.readings.shape
+
+    def table(read: Array | None, width: int) -> Array:
+        return np.full((count, width), np.nan) if read is None else read
+
+    return Log(
+        log.counts,
+        log.unstrained_length,
+        table(log.load_cells, m),
+        table(log.position, 3),
+        table(log.rotation, 4),
+    )
+
+
+def _check_model(robot: Robot, model: CableModel) -> None:
+    if model.code not in (codes.CATENARY, codes.ELASTIC):
+        step = "Use Catenary()."
+        raise InvalidValueError("model", type(model).__name__, "Catenary() or Elastic(), which are exact", step)
+    if robot.winches is not None and robot.winches.guides is not None:
+        step = "Give dead_cable instead of guides, their whole length."
+        raise InvalidValueError("winches: guides", "given", "None for calibrate", step)
+
+
+def _in_known_axes(log: WinchLog, parameters: Parameters) -> WinchLog:
+    """A log without what a measuring system read of which nobody knows yet where it stands, or what it sees."""
+    if {"measuring_frame", "target"}.isdisjoint(parameters.names):
+        return log
+    return log.replace(position=None, rotation=None)
+
+
+def _refuse_unlike(robot: Robot, log: WinchLog, parameters: Parameters, model: CableModel) -> None:
+    """Refuse measured poses where everything fits but them."""
+    if fits_unmeasured(robot, log, model):
+        _refuse(measured_elsewhere(log, np.arange(len(log)), parameters.names))
+
+
+def _refuse(sentences: Iterable[str]) -> None:
+    """Refuse a log that no robot like this one can have written, by the first sentence that says why."""
+    for sentence in sentences:
+        what, _, step = sentence.partition("; " if "; " in sentence else ": ")
+        step = f"{step[:1].upper()}{step[1:]}."
+        raise InvalidValueError("log", f"not what this robot reads: {what}", "what one nearly like it may read", step)
+
+
+def _check_count(log: WinchLog, parameters: Parameters, left_out: Mapping[Omission, Indices]) -> None:
+    readings, wanted = reading_count(log), len(parameters.names)
+    if readings >= wanted:
+        return
+    gone = "".join(f"; {counted(len(rows), 'row')} left out: {reason.text}" for reason, rows in left_out.items())
+    shown = f"{counted(readings, 'reading')} in {counted(len(log), 'row')}{gone}"
+    allowed = f">= {wanted}, one an unknown"
+    step = "Log more poses with load cells or measured positions, or look for fewer unknowns."
+    raise InvalidValueError("log", shown, allowed, step)

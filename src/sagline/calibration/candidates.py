@@ -1,0 +1,184 @@
+"""Where a robot might stand to be calibrated: feasible poses of a box, each with several sets of tensions."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from sagline.arrays import Array, Codes, Flags, Indices, locked
+from sagline.blocks import Progress, blocks
+from sagline.cables.model import CableModel
+from sagline.errors import CableGeometryError, InvalidValueError
+from sagline.kinematics.inverse import inverse
+from sagline.kinematics.status import PoseStatus
+from sagline.robot.pattern import ROTATING
+from sagline.robot.pose import Pose
+from sagline.robot.pose_box import PoseBox
+from sagline.robot.robot import Robot
+from sagline.statics.tables import pose_rows
+from sagline.tension.method import TensionMethod
+from sagline.tension.minimum_norm import MinimumNorm
+from sagline.tension.quadratic_program import QuadraticProgram
+
+MOST_SETS: Final = 5  # of tensions at a pose
+ROUNDS: Final = 6  # of drawing poses, where much of the box is not feasible
+KEPT: Final = 0.02  # of the range between the limits: what is to be calibrated does not have the tensions it is sent
+GROUP: Final = 20  # poses whose sets of tensions are near to the same corners
+UNLIMITED: Final = 3.0  # times the largest tension of least norm: what stands in for an upper limit that is infinite
+SAME: Final = 1e-6  # of the largest tension: sets nearer than this are one
+
+
+class Candidates(NamedTuple):
+    """Equilibria, N of them.
+
+    Attributes:
+        poses: Pose rows, shape (N, POSE_COLUMNS).
+        lengths: All cable off the drums [m], shape (N, m).
+        tensions: At the frame ends [N], shape (N, m).
+        place: Number of the pose: sets of tensions at one pose share it, shape (N,).
+        usual: Whether the pose is one drawn evenly from the box, shape (N,).
+    """
+
+    poses: Array
+    lengths: Array
+    tensions: Array
+    place: Indices
+    usual: Flags
+
+    def part(self, which: Flags | Indices | slice) -> Candidates:
+        """Some of them."""
+        return Candidates(*(locked(np.ascontiguousarray(each[which])) for each in self))
+
+
+def candidates_of(
+    robot: Robot, model: CableModel, box: PoseBox, count: int, seed: int, progress: Progress | None = None
+) -> Candidates:
+    """Feasible poses of a box, each with several sets of tensions near to corners of what is feasible there.
+
+    Of every two poses one is drawn evenly from the box, the other nearer to its faces and its largest tilt, where most
+    is told.
+
+    Args:
+        robot: The robot.
+        model: Cable model.
+        box: Where to look.
+        count: How many are wanted.
+        seed: Of all that is drawn.
+        progress: Told after each group of poses.
+
+    Returns:
+        At most `count` of them.
+
+    Raises:
+        InvalidValueError: If none is feasible; the message says why.
+    """
+    rng = np.random.default_rng(seed)
+    sets = min(MOST_SETS, 1 + 2 * max(robot.cable_count - robot.degrees_of_freedom, 0))
+    for kept in (KEPT, 0.0):
+        found: list[Candidates] = []
+        statuses: list[Codes] = []
+        first, missing = 0, count
+        for _ in range(ROUNDS):
+            drawn = _drawn(robot, box, -(-missing // sets), rng)
+            own, status = _standing(_narrowed(robot, model, drawn, kept), model, drawn, sets, rng, progress)
+            found.append(own._replace(place=own.place + first))
+            statuses.append(status)
+            first += len(drawn)
+            missing -= len(own.place)
+            if missing <= 0 or not found[0].place.size:
+                break
+        if found[0].place.size:
+            return _joined(found).part(slice(count))
+    raise _none_feasible(robot, np.concatenate(statuses))
+
+
+def _joined(parts: list[Candidates]) -> Candidates:
+    return Candidates(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+
+
+def _drawn(robot: Robot, box: PoseBox, count: int, rng: np.random.Generator) -> Pose:
+    """Poses of a box; every other one, from the second on, nearer to its borders."""
+    share, part = rng.uniform(size=(count, 3)), rng.uniform(size=count)
+    share[1::2] = 0.5 - 0.5 * np.cos(np.pi * share[1::2])
+    part[1::2] **= 0.25
+    position = box.low + share * (box.high - box.low)
+    axis = rng.normal(size=(count, 3))
+    if robot.plane_normal is not None:
+        away = (position - 0.5 * (box.low + box.high)) @ robot.plane_normal
+        position -= away[:, None] * robot.plane_normal
+        axis = np.sign(axis[:, :1]) * robot.plane_normal
+    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+    half = 0.5 * part * (box.tilt if robot.motion_pattern in ROTATING else 0.0)
+    turned = np.concatenate((np.sin(half)[:, None] * axis, np.cos(half)[:, None]), axis=1)
+    return Pose.from_quaternion(position, turned)
+
+
+def _narrowed(robot: Robot, model: CableModel, poses: Pose, kept: float) -> Robot:
+    """The robot with finite limits, and a part of the range between them kept clear at both ends."""
+    low, high = robot.tension_min, robot.tension_max
+    if np.isinf(high).any():
+        least = np.nan_to_num(_planned(robot, model, poses[:GROUP], MinimumNorm())[2])
+        high = np.where(np.isinf(high), UNLIMITED * max(float(least.max(initial=0.0)), float(low.max()), 1.0), high)
+    clear = kept * (high - low)
+    return robot.replace(tension_min=low + clear, tension_max=high - clear)
+
+
+def _standing(
+    robot: Robot, model: CableModel, poses: Pose, sets: int, rng: np.random.Generator, progress: Progress | None
+) -> tuple[Candidates, Codes]:
+    """The feasible ones among poses with sets of tensions, and how each was solved."""
+    found, statuses = [], []
+    for part in blocks(len(poses), GROUP, progress):
+        corners = np.where(rng.uniform(size=(sets, robot.cable_count)) < 0.5, robot.tension_min, robot.tension_max)
+        group = poses[part]
+        every = [_planned(robot, model, group, QuadraticProgram(target=corner)) for corner in corners]
+        status, lengths, tensions = (np.stack(parts, axis=1) for parts in zip(*every, strict=True))
+        statuses.append(status.ravel())
+        usable = (status == PoseStatus.SOLVED) & _in_range(robot, lengths, tensions)
+        which, number = np.nonzero(usable & _different(tensions))
+        place = part.start + which
+        found.append(
+            Candidates(pose_rows(group)[which], lengths[which, number], tensions[which, number], place, place % 2 == 0)
+        )
+    return _joined(found), np.concatenate(statuses)
+
+
+def _planned(robot: Robot, model: CableModel, poses: Pose, method: TensionMethod) -> tuple[Codes, Array, Array]:
+    """How each pose was solved, its lengths and its tensions at the frame ends."""
+    try:
+        plan = inverse(robot, poses, model, method)
+    except CableGeometryError:  # one of them is inside an anchor, or a pulley
+        missing = np.full((len(poses), robot.cable_count), np.nan)
+        return np.full(len(poses), PoseStatus.NO_CHORD, dtype=np.int8), missing, missing
+    return plan.status, plan.unstrained_length, plan.state.cables.frame_end_tension
+
+
+def _different(tensions: Array) -> Flags:
+    """Which sets of tensions (N, sets, m) are none of those before them at their pose, shape (N, sets)."""
+    apart = np.abs(tensions[:, :, None] - tensions[:, None]).max(axis=-1)
+    same = apart <= SAME * np.nanmax(tensions, initial=0.0)
+    different: Flags = ~np.tril(same, -1).any(axis=-1)
+    return different
+
+
+def _in_range(robot: Robot, lengths: Array, tensions: Array) -> Flags:
+    """Where the winches have so much cable and their load cells read so much, both of shape (..., m)."""
+    winches = robot.winches
+    fits = np.ones(lengths.shape, dtype=np.bool_)
+    if winches is not None and winches.cable_length is not None:
+        strain = winches.winding_tension / robot.cables.axial_stiffness
+        fits &= lengths * (1.0 + strain) <= winches.cable_length
+    if winches is not None and winches.load_cell_range is not None:
+        fits &= tensions * winches.load_cell_gain + winches.load_cell_bias <= winches.load_cell_range
+    return np.asarray(fits.all(axis=-1))
+
+
+def _none_feasible(robot: Robot, statuses: Codes) -> InvalidValueError:
+    """That no pose will do, and why most will not."""
+    codes, counts = np.unique(statuses, return_counts=True)
+    reason = PoseStatus(int(codes[np.argmax(counts)]))
+    beyond = "the winches have not so much cable, or their load cells do not read so much"
+    why = beyond if reason is PoseStatus.SOLVED else reason.text.split(";")[0]
+    value = f"without a pose that {robot.name} can hold among {len(statuses):,} tried ({why})"
+    return InvalidValueError("box", value, "a box with feasible poses", "Give box=PoseBox(low, high, tilt) of others.")

@@ -1,0 +1,119 @@
+"""What a calibration found, as data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from sagline.arrays import Array, Indices, locked
+from sagline.cables.model import CableModel
+from sagline.calibration.sensors import Sensors
+from sagline.calibration.status import CalibrationStatus, Omission
+from sagline.calibration.unknowns import Parameters
+from sagline.results import Result
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Direction(Result):
+    """A combination of unknowns that the data do not tell, or hardly.
+
+    Attributes:
+        name: What it is: "the world shifted along x", or "pulley_radius with frame_anchors z".
+        vector: The combination, one for its standard deviation; in the units of the parameters, (P,).
+        known: Share of its prior standard deviation that is left: 1 where data say nothing.
+        step: What to do about it: "fix a frame anchor, or measure 3 points".
+    """
+
+    name: str
+    vector: Array
+    known: float
+    step: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outlier(Result):
+    """A pose, or one cable of it, that does not fit the rest.
+
+    Attributes:
+        row: Row of the log.
+        cable: Its number, or None for the whole pose.
+        quantity: "length", "load cell", "position" or "rotation".
+        size: By how much it is off [m, N or rad].
+        deviations: The same in standard deviations.
+    """
+
+    row: int
+    cable: int | None
+    quantity: str
+    size: float
+    deviations: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CrossValidation(Result):
+    """How well poses are predicted that the calibration did not see.
+
+    Attributes:
+        folds: Into how many parts the poses were divided.
+        tension: Root mean square of what load cells read less what was predicted [N]; NaN without load cells.
+        position: The same of the distances from measured positions [m]; NaN where none was measured along all three
+            axes.
+        tension_before: With the robot as it was [N].
+        position_before: With the robot as it was [m]; NaN where the measuring system or its target was looked for.
+    """
+
+    folds: int
+    tension: float
+    position: float
+    tension_before: float
+    position_before: float
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Findings(Result):
+    """The fields of a `Calibration`, which says what they are."""
+
+    robot: Robot
+    before: Robot
+    sensors: Sensors
+    length_offset: Array
+    status: CalibrationStatus
+    parameters: Parameters
+    values: Array
+    covariance: Array
+    chi_squared: float
+    degrees_of_freedom: int
+    rows: Indices
+    left_out: Mapping[Omission, Indices]
+    poses: Pose
+    unstrained_length: Array
+    residuals: Array
+    chi_squared_of_pose: Array
+    weights: Array
+    outliers: tuple[Outlier, ...]
+    gauge: tuple[Direction, ...]
+    cannot_tell_apart: tuple[Direction, ...]
+    cross_validation: CrossValidation | None
+    iterations: int
+    model: CableModel
+    log: str
+    date: str
+
+    @property
+    def standard_error(self) -> Array:
+        """Standard deviations of the values, in their units, (P,); infinite for what nothing tells."""
+        return locked(np.sqrt(np.diagonal(self.covariance)))
+
+    @property
+    def correlation(self) -> Array:
+        """Correlation of the values, (P, P); NaN beside the diagonal for what nothing tells."""
+        error = self.standard_error
+        known = np.isfinite(error) & (error > 0.0)
+        size = np.where(known, error, np.nan)
+        correlation = np.clip(self.covariance / np.outer(size, size), -1.0, 1.0)
+        np.fill_diagonal(correlation, 1.0)
+        return locked(correlation)

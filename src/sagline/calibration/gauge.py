@@ -1,0 +1,231 @@
+"""What the readings leave open: directions in the unknowns that change nothing that is read, each by its name."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from sagline.arrays import Array, Indices, locked
+from sagline.calibration.findings import Direction
+from sagline.calibration.generators import Generator, Symmetries, symmetries
+from sagline.calibration.sensors import Sensors
+from sagline.calibration.steps import easiest
+from sagline.calibration.unknowns import KINDS, Parameters
+from sagline.kernels.calibration import kinds
+from sagline.robot.robot import Robot
+
+OPEN: Final = 1e-12  # of the largest singular value: rounding of slopes that cancel
+_SPREAD: Final = 1e-9  # of the largest: no lower does a gap between told and open begin
+_FIXED: Final = 5e-2  # of the usual deviation: a number that a user states so well is known
+_WIDE: Final = 1e3  # of what is usual of a number that nobody gives: to look for it further away is no use
+_SAME: Final = 1e-6  # sine of an angle between directions that are one
+_TINY: Final = 1e-300
+_NAMED: Final = 3  # numbers that a direction without a name shows
+
+
+class Frame(NamedTuple):
+    """The unknowns in standard deviations of their priors.
+
+    Attributes:
+        scale: One of them in the internal parameters, (P,).
+        units: The same in the units of the parameters, (P,).
+        free: Which are not known beforehand all but exactly, their indices.
+    """
+
+    scale: Array
+    units: Array
+    free: Indices
+
+
+def folded(triangle: Array, matrix: Array) -> Array:
+    """Triangular factor of all rows so far and some more: by reflections, so that nothing is squared.
+
+    Singular values down to rounding are told apart, which sums of products cannot below the root of that.
+
+    Args:
+        triangle: Of the rows before, (at most P, P); of none (0, P).
+        matrix: Whitened slopes, (..., P); rows with NaN are left out.
+
+    Returns:
+        Upper triangle, (at most P, P).
+    """
+    rows = matrix.reshape(-1, matrix.shape[-1])
+    rows = rows[~np.isnan(rows).any(axis=1) & rows.any(axis=1)]
+    return np.asarray(np.linalg.qr(np.vstack((triangle, rows)), mode="r"))
+
+
+def frame_of(parameters: Parameters) -> Frame:
+    """The priors as a measure of directions; where nothing is known, what is usual of a number nobody gives.
+
+    Beside a prior as wide as nothing the others would be rounding: it counts as `_WIDE`.
+    """
+    usual = np.array([KINDS[name].assumed for name in parameters.names])
+    usual = np.where(parameters.logarithmic, usual * np.abs(parameters.prior), usual)
+    units = np.where(np.isfinite(parameters.prior_deviation), parameters.prior_deviation, usual)
+    units = np.minimum(units, _WIDE * usual)
+    scale = units / np.where(parameters.logarithmic, np.abs(parameters.prior), 1.0)
+    common = np.array([KINDS[name].deviation for name in parameters.names])
+    fixed = parameters.stated & (scale < _FIXED * common)
+    return Frame(scale, units, np.flatnonzero(~fixed).astype(np.int64))
+
+
+def open_directions(triangle: Array, frame: Frame) -> Array:
+    """Unit vectors, in standard deviations of the priors, that change nothing that is read: columns, (P, d)."""
+    vectors = np.zeros((len(frame.scale), 0))
+    if not frame.free.size:
+        return vectors
+    scaled = triangle[:, frame.free] * frame.scale[frame.free]
+    _, values, rows = np.linalg.svd(scaled, full_matrices=True)
+    values = np.concatenate((values, np.zeros(len(rows) - len(values))))
+    vectors = np.zeros((len(frame.scale), len(rows) - told(values)))
+    vectors[frame.free] = rows[told(values) :].T
+    return vectors
+
+
+def told(values: Array) -> int:
+    """How many singular values, falling, are more than rounding: those above the widest gap near `OPEN`."""
+    largest = values[0] if values.size else 0.0
+    if largest == 0.0:
+        return 0
+    share = np.maximum(values / largest, 1e-18)
+    first = int(np.sum(share > _SPREAD))
+    last = int(np.sum(share > OPEN))
+    if last == len(share) or first == last == 0:
+        return last
+    gaps = share[max(first, 1) - 1 : last] / share[max(first, 1) : last + 1]
+    return max(first, 1) + int(np.argmax(gaps))
+
+
+def gauge_of(
+    triangle: Array, parameters: Parameters, values: Array, robot: Robot, sensors: Sensors
+) -> tuple[Direction, ...]:
+    """Directions in the unknowns that the readings leave open, where the priors have them, each by its name.
+
+    Args:
+        triangle: Triangular factor of the whitened slopes of all readings, by `folded`, (at most P, P).
+        parameters: The unknowns.
+        values: Theirs where the slopes were taken, (P,).
+        robot: The robot at which the slopes were taken.
+        sensors: What reads.
+
+    Returns:
+        As many directions as the readings leave open; none where all is told.
+    """
+    frame = frame_of(parameters)
+    size = np.linalg.norm(triangle, axis=0) * frame.scale
+    alone = [int(index) for index in frame.free if size[index] <= OPEN * size.max()]
+    unit = np.eye(len(size))
+    found = [_direction(*_largest(unit[index], parameters), frame) for index in alone]
+    frame = frame._replace(free=np.setdiff1d(frame.free, alone))
+    left = open_directions(triangle, frame)
+    known = symmetries(robot, sensors, turn_of(parameters, values), counted=parameters.counted)
+    known = known._replace(matters=known.matters & ~np.isin(parameters.where, alone))
+    vectors, named = _explained(left, frame, parameters.where, known)
+    found += [_direction(name, vector, step, frame) for vector, (name, step) in zip(vectors.T, named, strict=True)]
+    explained = np.linalg.qr(vectors)[0]
+    rest = left - explained @ (explained.T @ left)
+    basis, size, _ = np.linalg.svd(rest, full_matrices=False)
+    for vector in _sparse(basis[:, size > 0.5]).T:
+        found.append(_direction(*_largest(vector, parameters), frame))
+    return tuple(found)
+
+
+def turn_of(parameters: Parameters, values: Array) -> Array:
+    """Rotation vector of the measuring system, by which it is looked for [rad], (3,); zero where it is known."""
+    where = parameters.where[kinds.TURN : kinds.TURN + 3, 0]
+    return np.where(where >= 0, values[where], 0.0)
+
+
+def _direction(name: str, vector: Array, step: str, frame: Frame) -> Direction:
+    unit = vector / np.linalg.norm(vector)
+    unit = unit * np.sign(unit[np.argmax(np.abs(unit))])
+    return Direction(name, locked(frame.units * unit), 1.0, step)
+
+
+def _explained(left: Array, frame: Frame, where: Indices, known: Symmetries) -> tuple[Array, list[tuple[str, str]]]:
+    """Of the open directions those that symmetries are, (P, d), with names and steps."""
+    vectors, shares = _possible(frame, where, known)
+    if not vectors.shape[1] or not left.shape[1]:
+        return np.zeros((len(frame.scale), 0)), []
+    basis, upper = np.linalg.qr(vectors)
+    _, sines, turned = np.linalg.svd(basis - left @ (left.T @ basis), full_matrices=False)
+    inside = np.linalg.solve(upper, turned[sines < _SAME].T)  # of the symmetries, and open
+    mixed = _echelon((shares @ inside).T).T
+    found = vectors @ np.linalg.lstsq(shares, mixed, rcond=None)[0]
+    return found, [_named(column, known.each) for column in mixed.T]
+
+
+def _possible(frame: Frame, where: Indices, known: Symmetries) -> tuple[Array, Array]:
+    """Combinations of symmetries that move unknowns alone: as vectors (P, k), and shares of the symmetries (g, k).
+
+    Both count in standard deviations. What is known stays, what is shared moves alike, and the drums pay out as much as
+    the symmetries ask for.
+    """
+    free = np.isin(where, frame.free)
+    conditions = [known.table[known.matters & ~free], known.lengths]
+    for index in frame.free:
+        same = known.table[where == index]
+        conditions.append(same[1:] - same[0])
+    condition = np.vstack(conditions)
+    combined = _null(condition / np.maximum(np.abs(condition).max(axis=1, keepdims=True), _TINY))
+    single = np.zeros((len(frame.scale), known.table.shape[-1]))
+    for index in frame.free:
+        single[index] = known.table[where == index][0] / frame.scale[index]
+    vectors = single @ combined
+    _, size, rows = np.linalg.svd(vectors, full_matrices=False)
+    kept = rows[size > _SAME * max(size.max(initial=0.0), _TINY)].T
+    shares = np.linalg.norm(single, axis=0)[:, None] * (combined @ kept)
+    return vectors @ kept, shares[: len(known.each)]
+
+
+def _null(matrix: Array) -> Array:
+    """Orthonormal columns that a matrix takes to zero."""
+    _, values, rows = np.linalg.svd(matrix, full_matrices=True)
+    rank = int(np.sum(values > 1e-9 * max(values.max(initial=0.0), _TINY)))
+    found: Array = rows[rank:].T
+    return found
+
+
+def _echelon(rows: Array) -> Array:
+    """Rows of the same span with as few numbers as elimination gives them, each led by a one."""
+    rows = rows.copy()
+    lead = 0
+    for column in range(rows.shape[1]):
+        if lead == len(rows):
+            break
+        pivot = lead + int(np.argmax(np.abs(rows[lead:, column])))
+        if abs(rows[pivot, column]) < _SAME * np.abs(rows[lead:]).max():
+            continue
+        rows[[lead, pivot]] = rows[[pivot, lead]]
+        rows[lead] /= rows[lead, column]
+        others = np.arange(len(rows)) != lead
+        rows[others] -= np.outer(rows[others, column], rows[lead])
+        lead += 1
+    return rows
+
+
+def _named(shares: Array, known: Sequence[Generator]) -> tuple[str, str]:
+    """The first symmetry of a combination names it; a shift beside a turn says about which point it is, no more."""
+    size = np.abs(shares)
+    taken = [known[index] for index in map(int, np.flatnonzero(size > _SAME * size.max()))]
+    first = taken[0]
+    also = [one.name for one in taken[1:] if "shifted" not in one.name]
+    return " and ".join([first.name, *also]), first.step
+
+
+def _sparse(basis: Array) -> Array:
+    """Columns of the same span, each with a number of its own."""
+    return _echelon(basis.T).T if basis.size else basis
+
+
+def _largest(vector: Array, parameters: Parameters) -> tuple[str, Array, str]:
+    """Name a direction by the numbers that it changes most."""
+    size = np.abs(vector)
+    order = np.argsort(-size, kind="stable")
+    moved = [int(index) for index in order if size[index] > 1e-3 * size.max()]
+    name = " with ".join(parameters.labels[index] for index in moved[:_NAMED])
+    if len(moved) > _NAMED:
+        name += f" and {len(moved) - _NAMED} more"
+    return name, vector, easiest(parameters.names[index] for index in moved)

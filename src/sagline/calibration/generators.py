@@ -1,0 +1,183 @@
+"""Changes of a robot that no reading can tell: its symmetries, as directions in the numbers that may be unknown.
+
+Where the world, the platform's frame, the meter or the newton begin is a matter of words: moving one of them changes
+every number that counts from it, and nothing that is read. docs/model.md, section 14.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from sagline.arrays import Array, Flags
+from sagline.calibration.sensors import Sensors
+from sagline.calibration.turn import left_jacobian
+from sagline.errors import InvalidValueError
+from sagline.kernels.calibration import kinds
+from sagline.robot.drum import drums_of
+from sagline.robot.robot import Robot
+
+_AXES: Final = ("x", "y", "z")
+_WORLD: Final = "fix a frame anchor, or measure 3 points"
+_YAW: Final = "fix a second frame anchor, or measure 3 points"
+_TILT: Final = "give a platform anchor a small tolerance, or measure rotations"
+_ORIGIN: Final = (
+    "give a platform anchor or the center of mass a small tolerance, or measure positions of a known target"
+)
+_BOTH: Final = "measure the platform's anchors"
+_SCALE: Final = "weigh some meters of the cable, measure a distance between anchors, or measure the drum"
+_FORCE: Final = "weigh the platform, or check a load cell with a known weight"
+
+
+class Generator(NamedTuple):
+    """A change of all numbers that no reading can tell where all of them may change.
+
+    Attributes:
+        name: What it is.
+        step: What takes it away.
+        change: Of every number of `kernels.calibration.kinds`, (KIND_ROWS, m), logarithms where these are looked for.
+        lengths: By what share the lengths off the drums change.
+    """
+
+    name: str
+    step: str
+    change: Array
+    lengths: float = 0.0
+
+
+class Symmetries(NamedTuple):
+    """Symmetries of a robot, g of them with the freedoms of its drums.
+
+    Attributes:
+        each: Those with a name, at the front of the others.
+        table: Change of every number of `kinds`, (KIND_ROWS, m, g).
+        lengths: What the drums pay out beyond what is asked for, which must vanish, (2 m, g).
+        matters: Which numbers must not move where they are known, (KIND_ROWS, m).
+    """
+
+    each: tuple[Generator, ...]
+    table: Array
+    lengths: Array
+    matters: Flags
+
+
+def symmetries(robot: Robot, sensors: Sensors, turn: Array, *, counted: bool) -> Symmetries:
+    """The symmetries of a robot and its sensors; those that move most come first.
+
+    Args:
+        robot: The robot.
+        sensors: What measures it.
+        turn: Rotation vector by which its frame is looked for [rad], (3,).
+        counted: Whether encoders count turns of drums.
+    """
+    m, turning = robot.cable_count, bool(robot.freedom[:, 3:].any())
+    each = [_scale(robot, sensors), _force(robot), _yaw(robot, sensors, turn)]
+    each += [_turned(robot, sensors, axis) for axis in range(3)]
+    if turning:
+        each += [_platform_shift(robot, axis) for axis in range(3)]
+    else:
+        each += [_cable_shift(robot, cable, axis) for cable in range(m) for axis in range(3)]
+    each += [_world_shift(robot, axis) for axis in range(3)]
+    drums = np.zeros((kinds.KIND_ROWS, m, 2 * m))
+    drums[kinds.ZERO, np.arange(m), np.arange(m)] = 1.0
+    drums[kinds.DRUM, np.arange(m), m + np.arange(m)] = 1.0
+    table = np.concatenate((np.stack([one.change for one in each], axis=-1), drums), axis=-1)
+    asked = np.concatenate(([one.lengths for one in each], np.zeros(2 * m)))
+    shift, share = (np.einsum("rm,rmg->mg", term, table) for term in _paid_terms(robot, counted))
+    matters = np.ones((kinds.KIND_ROWS, m), dtype=np.bool_)
+    matters[kinds.PER_CABLE :, 1:] = False
+    matters[kinds.SHIFT :] = False  # few measured points leave open what many do not: the readings decide
+    if sensors.tension_deviation is None:
+        matters[[kinds.GAIN, kinds.BIAS]] = False
+    if not turning:  # its mass may be anywhere
+        matters[kinds.CENTER : kinds.CENTER + 3] = False
+    return Symmetries(tuple(each), table, np.concatenate((shift, share - asked)), matters)
+
+
+def _paid_terms(robot: Robot, counted: bool) -> tuple[Array, Array]:
+    """How the length off each drum follows what is known of the winch, as a + b L.
+
+    Args:
+        robot: The robot.
+        counted: Whether encoders count turns of drums.
+
+    Returns:
+        a [m] and b, by every number of `kinds`, (KIND_ROWS, m): zero, drum radius and axial stiffness have some.
+    """
+    shift, share = np.zeros((2, kinds.KIND_ROWS, robot.cable_count))
+    if not counted:
+        shift[kinds.ZERO] = 1.0
+        return shift, share
+    drums = drums_of(robot)
+    stretch, zero = 1.0 + drums.rest_strain, drums.winches.length_zero
+    radius, diameter, pitch = drums.winches.drum_radius, robot.cables.diameter, drums.winches.groove_pitch
+    if zero is None or radius is None or diameter is None or pitch is None:  # which counts need
+        raise InvalidValueError("robot", "without counts", "with drums and their zeros", "Give them in the robot file.")
+    circle = (2.0 * np.pi * (radius + 0.5 * diameter)) ** 2
+    by_radius = circle / (circle + pitch**2) * radius / (radius + 0.5 * diameter)  # of a turn, by the logarithm
+    shift[kinds.ZERO] = 1.0 / stretch
+    shift[kinds.DRUM], share[kinds.DRUM] = -by_radius * zero / stretch, by_radius
+    share[kinds.STIFFNESS] = drums.rest_strain / stretch
+    return shift, share
+
+
+def _empty(robot: Robot) -> Array:
+    return np.zeros((kinds.KIND_ROWS, robot.cable_count))
+
+
+def _world_shift(robot: Robot, axis: int) -> Generator:
+    change = _empty(robot)
+    change[[kinds.FRAME + axis, kinds.SHIFT + axis]] = 1.0
+    return Generator(f"the world shifted along {_AXES[axis]}", _WORLD, change)
+
+
+def _yaw(robot: Robot, sensors: Sensors, turn: Array) -> Generator:
+    change, up = _empty(robot), np.array([0.0, 0.0, 1.0])
+    change[kinds.FRAME : kinds.FRAME + 3] = np.cross(up, robot.frame_anchors).T
+    change[kinds.SHIFT : kinds.SHIFT + 3] = np.cross(up, sensors.frame.position)[:, None]
+    change[kinds.TURN : kinds.TURN + 3] = np.linalg.solve(left_jacobian(turn), up)[:, None]
+    return Generator("the world turned about the vertical", _YAW, change)
+
+
+def _platform_shift(robot: Robot, axis: int) -> Generator:
+    change = _empty(robot)
+    change[[kinds.PLATFORM + axis, kinds.CENTER + axis, kinds.TARGET + axis]] = 1.0
+    return Generator(f"the platform's frame shifted along its {_AXES[axis]}", _ORIGIN, change)
+
+
+def _cable_shift(robot: Robot, cable: int, axis: int) -> Generator:
+    """Of a platform that cannot turn."""
+    change = _empty(robot)
+    change[[kinds.FRAME + axis, kinds.PLATFORM + axis], cable] = 1.0
+    return Generator(f"both anchors of cable {cable} shifted along {_AXES[axis]}", _BOTH, change)
+
+
+def _turned(robot: Robot, sensors: Sensors, axis: int) -> Generator:
+    """About the center of mass, which stays where it is."""
+    change, unit = _empty(robot), np.eye(3)[axis]
+    change[kinds.PLATFORM : kinds.PLATFORM + 3] = np.cross(unit, robot.platform_anchors - robot.center_of_mass).T
+    change[kinds.TARGET : kinds.TARGET + 3] = np.cross(unit, sensors.target - robot.center_of_mass)[:, None]
+    return Generator(f"the platform's frame turned about its {_AXES[axis]}", _TILT, change)
+
+
+def _scale(robot: Robot, sensors: Sensors) -> Generator:
+    """Everything larger, of cables lighter by the meter: forces stay."""
+    change = _empty(robot)
+    change[kinds.FRAME : kinds.FRAME + 3] = robot.frame_anchors.T
+    change[kinds.PLATFORM : kinds.PLATFORM + 3] = robot.platform_anchors.T
+    change[kinds.DENSITY] = -1.0
+    if robot.winches is not None:
+        change[kinds.RADIUS], change[kinds.DEAD] = robot.winches.pulley_radius, robot.winches.dead_cable
+    change[kinds.CENTER : kinds.CENTER + 3] = robot.center_of_mass[:, None]
+    change[kinds.SHIFT : kinds.SHIFT + 3] = sensors.frame.position[:, None]
+    change[kinds.TARGET : kinds.TARGET + 3] = sensors.target[:, None]
+    return Generator("the scale: all larger, of lighter cable", _SCALE, change, lengths=1.0)
+
+
+def _force(robot: Robot) -> Generator:
+    """Everything heavier and stiffer, as load cells of less gain read it."""
+    change = _empty(robot)
+    change[[kinds.DENSITY, kinds.STIFFNESS, kinds.MASS]] = 1.0
+    change[kinds.GAIN] = -1.0 if robot.winches is None else -robot.winches.load_cell_gain
+    return Generator("all forces larger, and load cells of less gain", _FORCE, change)

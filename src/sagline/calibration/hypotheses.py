@@ -1,0 +1,230 @@
+"""What may be wrong with a log that no robot fits: each is tried on some rows, and how well the rest then fits."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from sagline.arrays import Array, Indices
+from sagline.cables.model import CableModel
+from sagline.calibration.gauss_newton import best_step
+from sagline.calibration.least_squares import passed, solve
+from sagline.calibration.log import WinchLog
+from sagline.calibration.parameters import parameters_of
+from sagline.calibration.problem import Begun, Log, Problem, State, machine_at, said_lengths
+from sagline.calibration.start import start_of
+from sagline.calibration.unknowns import Unknown
+from sagline.errors import InvalidValueError
+from sagline.robot.drum import drums_of
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+
+MOST_ROWS: Final = 24  # on which changes are tried: three readings of a load cell for each unknown
+STEPS: Final = 12  # of the least squares: where a robot fits, half of them are enough
+SETTLED: Final = 1.0  # of the sum of squares: how well a robot fits is wanted to some percent
+FEWEST_ROWS: Final = 8  # the same where nobody says at which poses
+# What is known of a robot beforehand, wider than it is: the question is whether any robot like it fits. Shares of the
+# values where logarithms are looked for.
+_WIDE: Final = {
+    "frame_anchors": 0.3,
+    "platform_anchors": 0.05,
+    "length_zero": 0.5,
+    "drum_radius": 0.03,
+    "axial_stiffness": 0.5,
+    "linear_density": 0.5,
+    "mass": 0.2,
+    "center_of_mass": 0.2,
+}
+
+
+class Change(NamedTuple):
+    """How readings are taken instead of as they are.
+
+    Attributes:
+        lengths: Two cables whose lengths or counts are exchanged, or None.
+        cells: Two cables whose load cells are exchanged, or None.
+        flipped: A cable whose encoder counts backward, or None.
+        moved: Cables whose zeros are where the commanded poses have them.
+        late: By how many rows the load cells come after the encoders.
+    """
+
+    lengths: tuple[int, int] | None = None
+    cells: tuple[int, int] | None = None
+    flipped: int | None = None
+    moved: tuple[int, ...] = ()
+    late: int = 0
+
+
+class Tried(NamedTuple):
+    """What came of a change.
+
+    Attributes:
+        quality: Median over the rows of the sum of squares for each reading: 1 where a robot fits as well as the
+            deviations of the sensors say, infinite where none fits.
+        departure: Mean square of how far the robot that fits is from the one that is believed, in deviations that it
+            may have.
+        zeros: By how much the zeros of the lengths are off [m], (m,).
+    """
+
+    quality: float
+    departure: float
+    zeros: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trial:
+    """A log on which changes are tried.
+
+    Attributes:
+        robot: The robot as it is believed to be.
+        model: Cable model.
+        log: All of it.
+        rows: Numbers of those that may be looked at.
+        found: Where lengths put the platform, by how they are taken: load cells have no say in it.
+    """
+
+    robot: Robot
+    model: CableModel
+    log: WinchLog
+    rows: Indices
+    found: dict[tuple[Change, int], Pose] = field(default_factory=dict)
+
+    def result(self, change: Change) -> Tried:
+        """How well any robot like this one fits the readings.
+
+        Args:
+            change: How they are taken.
+        """
+        problem, poses, moved = self._problem(change, MOST_ROWS)
+        try:
+            state, normal = _fitted(problem, start_of(problem, poses))
+        except (InvalidValueError, np.linalg.LinAlgError):  # with such readings it goes astray
+            return Tried(np.inf, np.inf, moved)
+        quality = float(np.median(normal.squares / np.maximum(normal.readings, 1)))
+        off = state.numbers - problem.prior
+        zeros = np.array([name == "length_zero" for name in problem.parameters.names])
+        departure = float(np.mean((off / problem.prior_deviation) ** 2))
+        return Tried(quality, departure, moved + off[zeros])
+
+    def promise(self, change: Change, steps: int) -> float:
+        """What the least squares promise of the sum of squares for each row after some steps; infinite for nothing.
+
+        Args:
+            change: How the readings are taken.
+            steps: How many steps are taken before the one that is only promised.
+        """
+        most = FEWEST_ROWS if self.log.commanded is None else MOST_ROWS
+        problem, poses, _ = self._problem(change, most)
+        kept, step = np.ones(len(problem.log.cells), dtype=np.bool_), None
+        try:
+            state = start_of(problem, poses)
+            for _ in range(steps + 1):
+                state, normal = passed(problem, state, step, kept)
+                kept = kept & np.isfinite(normal.squares)
+                step, gain = best_step(problem, state, normal)
+        except (InvalidValueError, np.linalg.LinAlgError):
+            return np.inf
+        there = int(np.count_nonzero(kept))
+        return float(normal.squares[kept].sum() - gain) / there if 2 * there > len(kept) else np.inf
+
+    def promising(self, changes: Iterable[Change], steps: int, most: int) -> list[Change]:
+        """The changes that promise more than none does, the best first.
+
+        Args:
+            changes: What is tried.
+            steps: As of `promise`.
+            most: How many of them are wanted.
+        """
+        promises = {change: self.promise(change, steps) for change in changes}
+        limit = self.promise(Change(), steps)
+        return sorted((change for change in promises if promises[change] < limit), key=promises.__getitem__)[:most]
+
+    def offsets(self) -> tuple[Array, Array]:
+        """How far lengths are from those that hold the platform where it was commanded.
+
+        Returns:
+            Median of what is read less what holds it, and the median distance from that [m], both of shape (m,).
+        """
+        problem, poses, _ = self._problem(Change(), MOST_ROWS)
+        return _offsets(problem, poses)
+
+    def _problem(self, change: Change, most: int) -> tuple[Problem, Pose | None, Array]:
+        """The least squares of some of the rows, their commanded poses, and by how much zeros were moved."""
+        log, late, m = self.log, change.late, self.robot.cable_count
+        rows = self.rows[(self.rows + late >= 0) & (self.rows + late < len(log))]
+        rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(most, len(rows))).round().astype(np.int64))]
+        none = np.full((len(rows), max(m, 4)), np.nan)
+        read = _exchanged(log.readings[rows], change.lengths)
+        cells = none[:, :m] if log.load_cells is None else _exchanged(log.load_cells[rows + late], change.cells)
+        counted, winches = log.counts is not None, self.robot.winches
+        if (cable := change.flipped) is not None:
+            zero = winches.count_zero[cable] if counted and winches is not None else read[:, cable].max()
+            read[:, cable] = 2.0 * zero - read[:, cable]
+        given = Log(
+            read if counted else None,
+            None if counted else read,
+            cells,
+            none[:, :3] if log.position is None else log.position[rows],
+            none[:, :4] if log.rotation is None else log.rotation[rows],
+        )
+        names = [name for name in _WIDE if self._has(name, counted)]
+        wide = [Unknown(name, deviation=_WIDE[name]) for name in names]
+        parameters = parameters_of(self.robot, wide, log.sensors, counted=counted)
+        problem = Problem(self.robot, self.model, log.sensors, parameters, given)
+        poses = self._poses(problem, change, most) if log.commanded is None else log.commanded[rows]
+        moved = np.zeros(m)
+        shifted = list(change.moved)
+        if change.flipped is not None and not counted:  # about which length it counts backward nobody says
+            shifted.append(change.flipped)
+        if shifted and poses is not None:
+            moved[shifted] = -_offsets(problem, poses)[0][shifted]
+            read += moved * (self._counts_of_length() if counted else 1.0)
+        return problem, poses, moved
+
+    def _poses(self, problem: Problem, change: Change, most: int) -> Pose | None:
+        """Where the lengths put the platform, or None where they put it nowhere."""
+        key = change._replace(cells=None), most
+        if key not in self.found:
+            rows = start_of(problem, None).poses
+            if not np.isfinite(rows).all():
+                return None
+            self.found[key] = Pose.from_quaternion(rows[:, :3], rows[:, 3:])
+        return self.found[key]
+
+    def _has(self, name: str, counted: bool) -> bool:
+        """Whether the robot has such a number that may be looked for."""
+        if name == "drum_radius":
+            return counted
+        return name != "linear_density" or bool((self.robot.cables.linear_density > 0.0).all())
+
+    def _counts_of_length(self) -> Array:
+        """Counts for a meter let out of each cable, (m,), on the lowest layer of its drum."""
+        drums = drums_of(self.robot)
+        rate = drums.zero_and_rate()[1]
+        _, travel = drums.turns(drums.starts[:, :1].T)
+        found: Array = rate / np.abs(travel[0])
+        return found
+
+
+def _fitted(problem: Problem, state: State) -> Begun:
+    """A few steps of the least squares: a robot that fits is found in half of them, of others only that it does not."""
+    begun = passed(problem, state, None, np.ones(len(state.poses), dtype=np.bool_))
+    fit = solve(problem, begun, np.isfinite(begun[1].squares), robust=False, steps=STEPS, settled=SETTLED)
+    return fit.state, fit.normal
+
+
+def _offsets(problem: Problem, poses: Pose | None) -> tuple[Array, Array]:
+    state = start_of(problem, poses)
+    off = said_lengths(problem, machine_at(problem, problem.prior), slice(None)) - state.lengths
+    middle = np.median(off, axis=0)
+    return middle, np.median(np.abs(off - middle), axis=0)
+
+
+def _exchanged(values: Array, two: tuple[int, int] | None) -> Array:
+    values = values.copy()
+    if two is not None:
+        values[:, list(two)] = values[:, list(two[::-1])]
+    return values

@@ -1,0 +1,280 @@
+"""The numbers that a calibration looks for: where they stand in a robot, and a robot with other ones."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from sagline.arguments import brief, instance
+from sagline.arrays import Array, locked
+from sagline.calibration.sensors import Sensors
+from sagline.calibration.unknowns import KINDS, Kind, Parameters, Unknown
+from sagline.errors import InvalidValueError
+from sagline.kernels.calibration import kinds
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+
+_CABLE_FIELDS: Final = ("linear_density", "axial_stiffness")
+_NOTHING: Final = {"load_cell_gain": "1", "load_cell_bias": "0 N", "dead_cable": "0 m", "pulley_radius": "0 m"}
+_WINCH_FIELDS: Final = (
+    "length_zero",
+    "drum_radius",
+    "pulley_radius",
+    "dead_cable",
+    "load_cell_gain",
+    "load_cell_bias",
+)
+_OF_ROBOT: Final = ("frame_anchors", "platform_anchors", "mass", "center_of_mass")
+
+
+def parameters_of(robot: Robot, unknowns: Sequence[str | Unknown], sensors: Sensors, *, counted: bool) -> Parameters:
+    """The single numbers of some kinds of unknowns.
+
+    Args:
+        robot: The robot as it is believed to be.
+        unknowns: Kinds of unknowns, each once, by name or with what is known of it beforehand.
+        sensors: What reads.
+        counted: Whether encoders count turns of drums; otherwise lengths are read.
+
+    Returns:
+        Parameters; those of the kinds in order, of a kind by cable and axis.
+
+    Raises:
+        InvalidValueError: If an unknown comes twice, the robot has no such number, or no reading and no stated prior
+            tells of it; the message says what to add.
+    """
+    asked = chosen(unknowns)
+    m = robot.cable_count
+    where = np.full((kinds.KIND_ROWS, m), -1, dtype=np.int64)
+    names: list[str] = []
+    labels: list[str] = []
+    units: list[str] = []
+    cables: list[int] = []
+    prior: list[float] = []
+    deviation: list[float] = []
+    stated: list[bool] = []
+    logarithmic: list[bool] = []
+    for unknown in asked:
+        kind = KINDS[unknown.name]
+        _refuse_unseen(robot, sensors, unknown, kind, counted)
+        own = _value(robot, sensors, unknown.name, counted)
+        width, said = _deviation(robot, unknown, kind, own)
+        shared = _shared(unknown, kind, own, width)
+        for cable in range(m if kind.each and not shared else 1):
+            for axis, component in enumerate(kind.axes):
+                rows = where[kind.first + axis]
+                rows[slice(None) if kind.each and shared else cable] = len(names)
+                names.append(unknown.name)
+                place = f"[{cable}]" if kind.each and not shared else ""
+                labels.append(f"{unknown.name}{place}{'.' * bool(component)}{component}")
+                units.append("rad" if component.startswith("about") else kind.unit)
+                cables.append(cable if kind.each and not shared else -1)
+                prior.append(own[cable, axis])
+                deviation.append(width[cable, axis])
+                stated.append(said)
+                logarithmic.append(kind.logarithmic)
+    return Parameters(
+        tuple(names),
+        tuple(labels),
+        tuple(units),
+        locked(np.array(cables, dtype=np.int64)),
+        locked(where),
+        locked(np.array(prior)),
+        locked(np.array(deviation)),
+        locked(np.array(stated, dtype=np.bool_)),
+        locked(np.array(logarithmic, dtype=np.bool_)),
+        counted,
+    )
+
+
+def chosen(unknowns: Sequence[str | Unknown]) -> list[Unknown]:
+    """Kinds of unknowns, each once.
+
+    Args:
+        unknowns: By name, or with what is known of them beforehand.
+
+    Raises:
+        InvalidValueError: If there is none, one comes twice, or one is no unknown.
+    """
+    given = [unknowns] if isinstance(unknowns, str | Unknown) else _listed(unknowns)
+    if not given:
+        raise InvalidValueError("unknowns", "none", "one at least", f"Name some of {', '.join(KINDS)}.")
+    asked = [Unknown(one) if isinstance(one, str) else instance(one, Unknown, "unknown") for one in given]
+    names = [one.name for one in asked]
+    twice = [name for name in names if names.count(name) > 1]
+    if twice:
+        raise InvalidValueError("unknowns", f"{twice[0]} twice", "each once", "Leave one out.")
+    return asked
+
+
+def _listed(unknowns: Any) -> list[Any]:
+    try:
+        if not isinstance(unknowns, Mapping):  # its values would be lost
+            return list(unknowns)
+        raise TypeError
+    except TypeError:
+        step = 'Give ("frame_anchors", "mass"), say.'
+        raise InvalidValueError("unknowns", brief(unknowns), "names of unknowns", step) from None
+
+
+def _value(robot: Robot, sensors: Sensors, name: str, counted: bool) -> Array:
+    """What there is of a kind, shape (m or 1, axes)."""
+    m = robot.cable_count
+    if name == "measuring_frame":
+        return np.concatenate((sensors.frame.position, np.zeros(3)))[None]
+    if name == "target":
+        return np.asarray(sensors.target)[None]
+    if name == "length_zero" and not counted:
+        return np.zeros((m, 1))
+    value = _field(robot, name)
+    if value is None:
+        owner = "winches" if name in _WINCH_FIELDS else "cables"
+        begin = _NOTHING.get(name, "..., as drawn")
+        step = f"Begin with {owner}: {{{name}: {begin}}} in the robot file, or leave it out."
+        raise InvalidValueError(f"unknown: {name}", f"no number of {robot.name}", "a number that the robot has", step)
+    if name in _OF_ROBOT:
+        return np.asarray(value, dtype=np.float64).reshape(-1, len(KINDS[name].axes))
+    return np.broadcast_to(value, (m,))[:, None]
+
+
+def _field(robot: Robot, name: str) -> Array | None:
+    """What a robot has of a kind; None where it has none."""
+    owner = robot if name in _OF_ROBOT else robot.cables if name in _CABLE_FIELDS else robot.winches
+    value: Array | None = None if owner is None else getattr(owner, name)
+    return value
+
+
+def _refuse_unseen(robot: Robot, sensors: Sensors, unknown: Unknown, kind: Kind, counted: bool) -> None:
+    """Refuse what no reading tells of, and nobody knows beforehand."""
+    there = {
+        "": True,
+        "counts": counted,
+        "load cells": sensors.tension_deviation is not None,
+        "positions": sensors.position_deviation is not None or sensors.rotation_deviation is not None,
+    }
+    if there[kind.needs] or unknown.deviation is not None or unknown.name in robot.tolerances:
+        return
+    add = {
+        "counts": "Add counts to the log, or leave it out.",
+        "load cells": "Add load cells to the log, or say what is known: Unknown(name, deviation=...); or leave it out.",
+        "positions": "Add measured positions to the log, or leave it out.",
+    }[kind.needs]
+    raise InvalidValueError(f"unknown: {unknown.name}", "seen by no reading", f"{kind.needs} in the log", add)
+
+
+def _shared(unknown: Unknown, kind: Kind, own: Array, width: Array) -> bool:
+    """Whether the cables share one number: it must be the same for all, and as well known."""
+    alike = bool((own == own[0]).all() and (width == width[0]).all())
+    if unknown.shared is None:
+        return kind.shared and alike
+    if unknown.shared and not kind.each:
+        return False
+    if unknown.shared and not alike:
+        step = "Leave shared out, so that each has its own."
+        raise InvalidValueError(
+            f"unknown: {unknown.name}", "shared", "equal and as well known for all cables where shared", step
+        )
+    return unknown.shared
+
+
+def _deviation(robot: Robot, unknown: Unknown, kind: Kind, own: Array) -> tuple[Array, bool]:
+    """What is known beforehand, in the unit of the kind, shape of own; and whether somebody said so."""
+    if unknown.deviation is not None:
+        width = np.full(own.shape, unknown.deviation)
+        return (width * np.abs(own) if kind.logarithmic else width), True
+    if unknown.name in robot.tolerances:
+        told = np.asarray(robot.tolerances[unknown.name])
+        spread = told[:, None] if told.ndim == 1 and kind.each and len(kind.axes) == 1 else told
+        return np.broadcast_to(spread, own.shape).astype(np.float64), True
+    field = "cables" if unknown.name in _CABLE_FIELDS else "winches" if unknown.name in _WINCH_FIELDS else unknown.name
+    width = np.full(own.shape, kind.assumed if field in robot.assumed else kind.deviation)
+    if unknown.name == "measuring_frame":
+        width[:, 3:] = np.pi
+    return (width * np.abs(own) if kind.logarithmic else width), False
+
+
+def internal(parameters: Parameters, values: Array) -> Array:
+    """Values as they are looked for: the logarithms of some, shape (P,)."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(parameters.logarithmic, np.log(values), values)
+
+
+def external(parameters: Parameters, found: Array) -> Array:
+    """The values of what is looked for, in units, shape (P,)."""
+    with np.errstate(over="ignore"):
+        return np.where(parameters.logarithmic, np.exp(found), found)
+
+
+def slopes_of_values(robot: Robot, parameters: Parameters) -> Array:
+    """How the values of a robot change with what is looked for: themselves where logarithms are, else 1; (P,)."""
+    slopes = np.ones(len(parameters.names))
+    for name in dict.fromkeys(parameters.names):
+        kind = KINDS[name]
+        if kind.logarithmic:
+            which = parameters.where[kind.first]
+            there = which >= 0
+            slopes[which[there]] = np.broadcast_to(np.asarray(_field(robot, name)), which.shape)[there]
+    return slopes
+
+
+def robot_with(robot: Robot, parameters: Parameters, values: Array) -> Robot:
+    """A robot with other numbers.
+
+    Args:
+        robot: The robot.
+        parameters: Which numbers.
+        values: Theirs, (P,).
+
+    Raises:
+        InvalidValueError: If the robot cannot have them.
+    """
+    changes: dict[str, Any] = {}
+    cables: dict[str, Array] = {}
+    winches: dict[str, Array] = {}
+    for name in dict.fromkeys(parameters.names):
+        if name in ("measuring_frame", "target") or (name == "length_zero" and not parameters.counted):
+            continue
+        kind = KINDS[name]
+        value = np.stack([values[parameters.where[kind.first + axis]] for axis in range(len(kind.axes))], axis=-1)
+        if name in _CABLE_FIELDS:
+            cables[name] = value[:, 0]
+        elif name in _WINCH_FIELDS:
+            winches[name] = value[:, 0]
+        else:
+            changes[name] = value if kind.each else value[0] if len(kind.axes) > 1 else float(value[0, 0])
+    if cables:
+        changes["cables"] = robot.cables.replace(**cables)
+    if winches:
+        assert robot.winches is not None
+        changes["winches"] = robot.winches.replace(**winches)
+    return robot.replace(**changes)
+
+
+def sensors_with(sensors: Sensors, parameters: Parameters, values: Array) -> Sensors:
+    """Sensors with other numbers of the measuring system.
+
+    Args:
+        sensors: The sensors; rotations of the system count from their frame.
+        parameters: Which numbers.
+        values: Theirs, (P,).
+    """
+    changes: dict[str, Any] = {}
+    if "target" in parameters.names:
+        changes["target"] = values[parameters.where[kinds.TARGET : kinds.TARGET + 3, 0]]
+    if "measuring_frame" in parameters.names:
+        from scipy.spatial.transform import Rotation
+
+        turn = Rotation.from_rotvec(values[parameters.where[kinds.TURN : kinds.TURN + 3, 0]])
+        shift = values[parameters.where[kinds.SHIFT : kinds.SHIFT + 3, 0]]
+        changes["frame"] = Pose(shift, turn.as_matrix() @ sensors.frame.matrix)
+    return sensors.replace(**changes) if changes else sensors
+
+
+def offset_with(robot: Robot, parameters: Parameters, values: Array) -> Array:
+    """What is to be added to lengths that the machine believes [m], (m,)."""
+    if parameters.counted or "length_zero" not in parameters.names:
+        return np.zeros(robot.cable_count)
+    offset: Array = values[parameters.where[kinds.ZERO]]
+    return offset

@@ -1,0 +1,174 @@
+"""Which rows of a log are fit for a calibration, and why the others are not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sagline.arguments import instance
+from sagline.arrays import Array, Flags, Indices, locked, number
+from sagline.calibration.log import WinchLog
+from sagline.calibration.sensors import load_cells_of
+from sagline.calibration.status import Omission
+from sagline.errors import InvalidValueError
+from sagline.kinematics.encoder import lengths_from_counts
+from sagline.robot.robot import Robot
+
+SPEED_LIMIT: Final = 0.005  # m/s
+SOONEST: Final = 0.1 * (1.0 - 1e-9)  # s: over a shorter time a step of an encoder is as fast as a platform that moves
+LATEST: Final = 1.0  # s: over a longer time the difference of two rows is no speed, the platform may have stopped
+PULLING: Final = 3.0  # standard deviations above nothing that a load cell must read
+OTHERWISE: Final = 0.5  # share of the rows in which a cable's load cell is read where it is missed in the others
+
+
+class Screened(NamedTuple):
+    """The rows of a log that are fit, and those that are not.
+
+    Attributes:
+        log: The rows that are kept.
+        rows: Their numbers in the whole log, (N,).
+        left_out: Why, and which rows were not kept; each for the first reason that it has, reasons in order.
+    """
+
+    log: WinchLog
+    rows: Indices
+    left_out: Mapping[Omission, Indices]
+
+
+def screened(robot: Robot, log: WinchLog, speed_limit: float = SPEED_LIMIT) -> Screened:
+    """The rows of a log at which the platform stood on taut cables and every sensor was read, once.
+
+    Left out, in this order, are rows
+
+    - without a count or length of a cable, or without a reading of a load cell that more than half of the rows have
+      (measured positions and rotations may be missing anywhere);
+    - whose readings are all those of an earlier row;
+    - at which a length changes faster than the limit, against the nearest row that is a tenth of a second away or more,
+      before it or behind it in time; rows further apart than a second do not tell a speed, and without times nothing
+      does;
+    - where a load cell, less the bias that the robot's winches have, reads no more than three of its standard
+      deviations: the cable may as well be slack.
+
+    Args:
+        robot: The robot.
+        log: The log.
+        speed_limit: Largest change of a length of a platform that stands [m/s], > 0.
+
+    Returns:
+        The log of the rows that are left, which may be none.
+
+    Raises:
+        InvalidValueError: If the log is of another number of cables, the robot's winches cannot tell lengths from
+            counts, or a count is on no drum; the message names row and cable.
+    """
+    limit = number(speed_limit, "speed_limit", "m/s", above=0.0)
+    lengths = lengths_of(robot, log)
+    found: dict[Omission, Indices] = {}
+    kept = np.ones(len(log), dtype=np.bool_)
+    for reason, wrong in (
+        (Omission.NOT_A_NUMBER, _incomplete(log)),
+        (Omission.REPEATED, _repeated(log)),
+        (Omission.MOVING, _moving(log, lengths, limit)),
+        (Omission.SLACK, _slack(robot, log)),
+    ):
+        if (wrong & kept).any():
+            found[reason] = locked(np.flatnonzero(wrong & kept))
+            kept &= ~wrong
+    return Screened(log if kept.all() else log.rows(kept), locked(np.flatnonzero(kept)), found)
+
+
+def lengths_of(robot: Robot, log: WinchLog) -> Array:
+    """Lengths off the drums that the readings of a log stand for.
+
+    Args:
+        robot: The robot.
+        log: The log.
+
+    Returns:
+        L [m], shape (N, m), NaN where nothing was read.
+
+    Raises:
+        InvalidValueError: As of `screened`.
+    """
+    m = instance(robot, Robot, "robot").cable_count
+    cables = instance(log, WinchLog, "log").readings.shape[1]
+    if cables != m:
+        step = "Give the log of this robot."
+        raise InvalidValueError("log", f"of {cables} cables", f"{m} cables, those of {robot.name}", step)
+    if log.counts is None:
+        return log.readings
+    try:
+        return lengths_from_counts(robot, log.counts)
+    except InvalidValueError as error:
+        where = error.item.replace("sample", "row") if len(log) > 1 else f"row 0, {error.item}"
+        if "count" not in error.item or "cable" not in error.item:  # a field of the robot, and no reading
+            raise
+        raise InvalidValueError(where, error.value, error.allowed, error.next_step) from None
+
+
+def reading_count(log: WinchLog) -> int:
+    """How many readings of a log tell of unknowns: lengths do not, every row has as many unknown lengths as read ones.
+
+    Args:
+        log: The log.
+
+    Returns:
+        Readings of load cells, measured coordinates, and three for a rotation.
+    """
+    cells, positions, rotations = (
+        0 if values is None else int(np.count_nonzero(~np.isnan(values)))
+        for values in (log.load_cells, log.position, None if log.rotation is None else log.rotation[:, :3])
+    )
+    return cells + positions + rotations
+
+
+def _incomplete(log: WinchLog) -> Flags:
+    missing = np.asarray(np.isnan(log.readings).any(axis=1))
+    if log.load_cells is not None:
+        unread = np.isnan(log.load_cells)
+        usual = np.mean(~unread, axis=0) > OTHERWISE if len(log) else np.zeros(unread.shape[1], dtype=np.bool_)
+        missing |= (unread & usual).any(axis=1)
+    return missing
+
+
+def _repeated(log: WinchLog) -> Flags:
+    """Rows that have the readings of an earlier one, to the last bit."""
+    read = [v for v in (log.readings, log.load_cells, log.position, log.rotation) if v is not None]
+    bits: list[NDArray[np.uint64]] = [np.ascontiguousarray(v + 0.0).view(np.uint64) for v in read]  # no -0.0
+    digest = np.zeros(len(log), dtype=np.uint64)
+    odd = np.random.default_rng(0).integers(2**63, size=sum(b.shape[1] for b in bits), dtype=np.uint64) * 2 + 1
+    for column, factor in zip((c for b in bits for c in b.T), odd, strict=True):
+        digest += (column ^ (column >> np.uint64(29))) * factor
+    _, first, inverse = np.unique(digest, return_index=True, return_inverse=True)
+    earlier = first[inverse]
+    found: Flags = earlier != np.arange(len(log))
+    late = np.flatnonzero(found)
+    found[late] = np.all([(b[late] == b[earlier[late]]).all(axis=1) for b in bits], axis=0)  # not their digests alone
+    return found
+
+
+def _moving(log: WinchLog, lengths: Array, limit: float) -> Flags:
+    moving = np.zeros(len(log), dtype=np.bool_)
+    if log.time is None:
+        return moving
+    order = np.argsort(log.time, kind="stable")
+    time, length = log.time[order], lengths[order]
+    last = len(time) - 1
+    for near in (np.searchsorted(time, time + SOONEST), np.searchsorted(time, time - SOONEST, side="right") - 1):
+        other = np.clip(near, 0, last)
+        step = np.abs(time[other] - time)
+        there = (near == other) & (step <= LATEST)
+        change = np.abs(length[other] - length).max(axis=1, initial=0.0)
+        moving[order[there & (change > limit * step)]] = True  # NaN, a row that is left out anyway, is not fast
+    return moving
+
+
+def _slack(robot: Robot, log: WinchLog) -> Flags:
+    if log.load_cells is None:
+        return np.zeros(len(log), dtype=np.bool_)
+    assert log.sensors.tension_deviation is not None  # the log saw to it
+    _, bias = load_cells_of(robot)
+    return np.asarray((log.load_cells - bias <= PULLING * log.sensors.tension_deviation).any(axis=1))

@@ -1,0 +1,259 @@
+"""What looks wrong with a log before anything is calibrated by it: units, columns, signs, times and zeros."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from itertools import combinations
+from typing import Final
+
+import numpy as np
+
+from sagline.arguments import instance
+from sagline.arrays import Array, Flags, Indices
+from sagline.cables.catenary import Catenary
+from sagline.cables.model import CableModel
+from sagline.calibration.hypotheses import Change, Trial
+from sagline.calibration.log import WinchLog
+from sagline.calibration.screening import screened
+from sagline.calibration.sensors import load_cells_of
+from sagline.robot.robot import Robot
+
+_CATENARY = Catenary()
+UNIT: Final = 50.0  # times what is expected, between 1 and the 1000 of a wrong unit
+GOOD: Final = 5.0  # squares for each reading of a log that a robot fits: slips and rope make more than 1 of it
+POOR: Final = 50.0  # the same where it is a hundredth of what it was before
+NEAR: Final = 0.25  # departure: a robot with anchors a quarter of a meter off fits, with some luck, swapped cables too
+ROUGH: Final = 10.0  # times a deviation: from a tenth of the robot's size on, a length tells nothing
+FAR: Final = 0.25  # of a cable's length by which a zero is far off: no tape measure is so wrong
+SHIFTS: Final = 5  # rows by which load cells may be early or late
+_FULLY: Final = 3  # changes of those that promise most which are tried to the end
+
+
+def suspicions(robot: Robot, log: WinchLog, model: CableModel = _CATENARY) -> tuple[str, ...]:
+    """What looks wrong with a log, in sentences with the next step; none for an honest one.
+
+    First the sizes of readings: lengths and positions in mm, load cells in kN. Then whether some robot, nearly this
+    one, fits some two dozen of the rows. Where none does, the readings are changed, by one mistake at a time (columns
+    of two cables exchanged, those of encoders or load cells alone, an encoder that counts backward, zeros far off, load
+    cells that come up to five rows early or late), and the mistake is told without which a robot fits. What fits with
+    no change is not suspected, and what no single change mends is not either: the calibration says how badly it fits.
+    Zeros far off, and lengths instead of counts that go backward, are told where poses were commanded.
+
+    Args:
+        robot: The robot as it is believed to be.
+        log: The log, with all its rows.
+        model: Cable model with forces.
+
+    Returns:
+        Sentences.
+
+    Raises:
+        InvalidValueError: As of `screened`.
+    """
+    instance(robot, Robot, "robot")
+    instance(log, WinchLog, "log")
+    instance(model, CableModel, "model")
+    if found := tuple(wrong_units(robot, log)):
+        return found  # what else there is shows when they are right
+    rows = screened(robot, log).rows
+    if not len(rows) or (log.load_cells is None and log.position is None):
+        return ()
+    return tuple(_mistakes(Trial(robot, model, log, rows)))
+
+
+def wrong_units(robot: Robot, log: WinchLog) -> Iterator[str]:
+    """Sentences about readings of the size that another unit would give them.
+
+    Args:
+        robot: The robot as it is believed to be.
+        log: The log, with all its rows.
+    """
+    size = _extent(robot)
+    if log.unstrained_length is not None and log.unstrained_length.size:
+        typical = float(np.nanmedian(log.unstrained_length)) if not np.isnan(log.unstrained_length).all() else 0.0
+        if typical > UNIT * size:
+            yield (
+                f"lengths are in mm, it seems: about {typical:.4g} m, and the robot is {size:.3g} m across; divide "
+                "them by 1000, or write their unit, length_0 [mm]"
+            )
+    if log.position is not None and (far := _spread(log.position)) > UNIT * size:
+        yield (
+            f"positions are in mm, it seems: they differ by {far:.4g} m, and the robot is {size:.3g} m across; divide "
+            "them by 1000, or write their unit, x [mm]"
+        )
+    if log.commanded is not None and (far := _spread(log.commanded.position)) > UNIT * size:
+        yield (
+            f"commanded positions are in mm, it seems: they differ by {far:.4g} m, and the robot is {size:.3g} m "
+            "across; divide them by 1000, or write their unit, x_commanded [mm]"
+        )
+    for name in ("length_deviation", "position_deviation"):
+        deviation = getattr(log.sensors, name)
+        if deviation is not None and (worst := float(np.max(deviation))) * ROUGH > size:
+            yield (
+                f"the {name} is {worst:.3g} m, and the robot is {size:.3g} m across: is it in mm? Write its unit, "
+                f"{name}: 0.5 mm"
+            )
+    if log.load_cells is None or np.isnan(log.load_cells).all():
+        return
+    gain, bias = load_cells_of(robot)
+    typical = float(np.nanmedian(np.nanmax(np.abs((log.load_cells - bias) / gain), axis=1, initial=0.0)))
+    share = robot.mass * robot.gravity / robot.cable_count
+    if typical * UNIT < share:
+        yield (
+            f"load cells are in kN, it seems: the largest of a row reads about {typical:.3g} N, and a cable's share of "
+            f"the weight is {share:.3g} N; multiply them by 1000, or write their unit, load_cell_0 [kN]"
+        )
+    elif typical > UNIT * max(share, float(np.median(robot.cables.axial_stiffness)) / UNIT):
+        yield (
+            f"load cells read about {typical:.3g} N, which no cable of {robot.name} holds: are they in mN? Divide them "
+            "by 1000, or write their unit, load_cell_0 [mN]"
+        )
+
+
+def fits_unmeasured(robot: Robot, log: WinchLog, model: CableModel) -> bool:
+    """Whether some robot like this one reads what lengths and load cells say, whatever was measured.
+
+    Args:
+        robot: The robot as it is believed to be.
+        log: The rows that are fit.
+        model: Cable model with forces.
+    """
+    if log.load_cells is None or (log.position is None and log.rotation is None):
+        return False
+    own = log.replace(position=None, rotation=None)
+    return Trial(robot, model, own, np.arange(len(log))).result(Change()).quality <= GOOD
+
+
+def measured_elsewhere(log: WinchLog, left_out: Indices, asked: Collection[str]) -> Iterator[str]:
+    """A sentence about measured poses that fit nowhere, though everything else does.
+
+    Args:
+        log: The rows that are fit.
+        left_out: Which of them the lengths put elsewhere than they were measured.
+        asked: Names of the unknowns.
+    """
+    measured = np.zeros(len(log), dtype=np.bool_)
+    for read in (log.position, log.rotation):
+        if read is not None:
+            measured |= ~np.isnan(read).all(axis=1)
+    lost, count = int(np.count_nonzero(measured[left_out])), int(np.count_nonzero(measured))
+    if 2 * lost <= count:
+        return
+    more = " and ".join(name for name in ("measuring_frame", "target") if name not in asked)
+    yield (
+        f"{lost} of {count} measured poses are not where lengths put it: axes of their own, it seems; "
+        f"{f'ask for {more} too' if more else 'correct them'}, or write '# frame: ...' above the columns"
+    )
+
+
+def _extent(robot: Robot) -> float:
+    """The size of the frame and of the platform together [m]."""
+    frame, platform = (float(np.linalg.norm(np.ptp(p, axis=0))) for p in (robot.frame_anchors, robot.platform_anchors))
+    behind = 0.0 if robot.winches is None else float(robot.winches.dead_cable.max())
+    return frame + platform + behind
+
+
+def _spread(position: Array) -> float:
+    """Largest difference of measured coordinates [m]; of a single position its size."""
+    there = ~np.isnan(position).all(axis=0)
+    if not there.any():
+        return 0.0
+    low, high = np.nanmin(position[:, there], axis=0), np.nanmax(position[:, there], axis=0)
+    return float(np.max(high - low))
+
+
+def _mistakes(trial: Trial) -> Iterator[str]:
+    """The one mistake without which a robot fits the readings."""
+    whole = trial.result(Change())
+    far = _far(trial, whole.zeros)
+    if whole.quality <= GOOD:
+        if far.any():
+            yield _of_zeros(whole.zeros, far)
+        return
+    enough = max(GOOD, min(POOR, 0.01 * whole.quality))
+    for changes, steps in ((_of_lengths(trial), 0), (_of_cells(trial), 1)):
+        for change in trial.promising(changes, steps, _FULLY):
+            found = trial.result(change)
+            if found.quality > enough or found.departure > NEAR:
+                continue
+            if change.moved:
+                yield _of_zeros(found.zeros, _far(trial, found.zeros))
+            else:
+                yield f"{_told(change, trial.log)} (misfit {_root(whole.quality)}, then {_root(found.quality)})"
+            return
+
+
+def _of_lengths(trial: Trial) -> Iterator[Change]:
+    """What may be wrong with lengths or counts, alone or with the load cells of the same cables."""
+    m = trial.robot.cable_count
+    for two in combinations(range(m), 2):
+        yield Change(lengths=two)
+        if trial.log.load_cells is not None:
+            yield Change(lengths=two, cells=two)
+    for cable in range(m):
+        if trial.log.counts is not None or trial.log.commanded is not None:
+            yield Change(flipped=cable)
+    if trial.log.commanded is not None:
+        off, scatter = trial.offsets()
+        far = (np.abs(off) > FAR * _usual(trial)) & (scatter < 0.5 * np.abs(off))
+        if far.any():
+            yield Change(moved=tuple(np.flatnonzero(far).tolist()))
+
+
+def _of_cells(trial: Trial) -> Iterator[Change]:
+    """What may be wrong with the load cells alone."""
+    if trial.log.load_cells is None:
+        return
+    for two in combinations(range(trial.robot.cable_count), 2):
+        yield Change(cells=two)
+    for late in range(1, SHIFTS + 1):
+        if len(trial.log) > 2 * late:
+            yield Change(late=late)
+            yield Change(late=-late)
+
+
+def _usual(trial: Trial) -> Array:
+    """Typical lengths of the cables [m], as nobody's zero has a say in: distances of the anchors."""
+    middle = trial.robot.frame_anchors.mean(axis=0) if trial.log.commanded is None else None
+    if middle is None and trial.log.commanded is not None:
+        middle = np.median(trial.log.commanded.position, axis=0)
+    assert middle is not None
+    distance: Array = np.linalg.norm(trial.robot.frame_anchors - middle, axis=1)
+    return distance
+
+
+def _far(trial: Trial, zeros: Array) -> Flags:
+    return np.asarray(np.abs(zeros) > FAR * _usual(trial))
+
+
+def _of_zeros(zeros: Array, far: Flags) -> str:
+    """Cables whose zeros are far off."""
+    cables = np.flatnonzero(far).tolist()
+    listed = ", ".join(
+        f"{abs(zeros[i]):.2f} m too {'short' if zeros[i] > 0.0 else 'long'} on cable {i}" for i in cables
+    )
+    return f"lengths have a zero far off: {listed}; correct length_zero of the winches there, or home the robot again"
+
+
+def _told(change: Change, log: WinchLog) -> str:
+    kind = "count" if log.counts is not None else "length"
+    if change.lengths is not None:
+        i, j = change.lengths
+        what, columns = ("encoders of ", f"{kind}_{i} and {kind}_{j}")
+        if change.cells is not None:
+            what, columns = "", f"{columns}, load_cell_{i} and load_cell_{j}"
+        return f"the {what}cables {i} and {j} are swapped, it seems: exchange columns {columns}"
+    if change.cells is not None:
+        i, j = change.cells
+        return f"the load cells of cables {i} and {j} are swapped, it seems: exchange columns load_cell_{i} and _{j}"
+    if change.flipped is not None:
+        i = change.flipped
+        return f"the encoder of cable {i} counts backward, it seems: change the sign of gear[{i}], or of {kind}_{i}"
+    rows = f"{abs(change.late)} row{'s'[: abs(change.late) != 1]}"
+    way, where = ("after", "up") if change.late > 0 else ("before", "down")
+    return f"load cells come {rows} {way} the lengths they belong to, it seems: move their columns {where} by {rows}"
+
+
+def _root(quality: float) -> str:
+    """A quality in standard deviations, in words."""
+    return f"{np.sqrt(quality):.3g} standard deviations" if np.isfinite(quality) else "without bound"

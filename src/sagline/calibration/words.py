@@ -1,0 +1,274 @@
+"""A calibration as a person reads it, in lines of 80 columns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from textwrap import wrap
+from typing import Final
+
+import numpy as np
+
+from sagline.arrays import Indices
+from sagline.calibration.findings import Direction, Findings, Outlier
+from sagline.calibration.relative import Anchors, anchor_covariance, relative_covariance
+from sagline.calibration.status import CalibrationStatus
+from sagline.calibration.unknowns import KINDS
+from sagline.numbers import SPACE, counted, n, plus_minus
+
+WIDTH: Final = 80
+MOST_OUTLIERS: Final = 12  # that are listed; the rest are counted
+MOST_ROWS: Final = 8  # of the log that are named; the rest are counted
+UNITS: Final = {"length": "m", "load cell": "N", "position": "m", "rotation": "rad"}
+ANCHORS: Final[tuple[Anchors, ...]] = ("frame_anchors", "platform_anchors")
+
+
+def in_words(found: Findings, width: int = WIDTH) -> str:
+    """A calibration in some lines, the verdict first.
+
+    Args:
+        found: The calibration.
+        width: Columns of a line; numbers are not broken.
+    """
+    parts = (
+        _verdict(found, width),
+        _rows(found, width),
+        _values(found, width),
+        _open(found.gauge, "What the readings leave open; it stays where the robot had it:", width),
+        _open(found.cannot_tell_apart, "What they hardly tell apart:", width),
+        _outliers(found, width),
+        _cross_validation(found, width),
+    )
+    return "\n".join(line for part in parts for line in part)
+
+
+def table(found: Findings) -> str:
+    """Every number with its standard error and what was there before, one a line.
+
+    Args:
+        found: The calibration.
+    """
+    numbers = found.parameters
+    head = ("number", "found", "before", "moved by, of the error before")
+    rows = [head]
+    for k, label in enumerate(numbers.labels):
+        unit, prior = numbers.units[k], numbers.prior_deviation[k]
+        moved = n((found.values[k] - numbers.prior[k]) / prior, ".2f") if np.isfinite(prior) else "–"
+        now = plus_minus(found.values[k], found.standard_error[k], unit)
+        rows.append((label, now, plus_minus(numbers.prior[k], prior, unit), moved))
+    widths = [max(len(row[column]) for row in rows) for column in range(len(head))]
+    return "\n".join(
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
+    )
+
+
+def outlier_in_words(outlier: Outlier) -> str:
+    """What does not fit: of which row of the log and which cable, by how much.
+
+    Args:
+        outlier: One of a calibration.
+    """
+    where = "" if outlier.cable is None else f", cable {outlier.cable}"
+    size = n(outlier.size, ".3g", UNITS.get(outlier.quantity, ""))
+    times = n(outlier.deviations, ".2g")
+    return f"row {outlier.row}{where}: {outlier.quantity} {size} off ({times} deviations)"
+
+
+def rows_in_words(rows: Sequence[int] | Indices) -> str:
+    """Numbers of rows, those that follow each other as a span: "rows 3, 17 to 19 and 5 more".
+
+    Args:
+        rows: Rising numbers.
+    """
+    spans: list[list[int]] = []
+    for row in map(int, rows):
+        if spans and row == spans[-1][1] + 1:
+            spans[-1][1] = row
+        else:
+            spans.append([row, row])
+    shown, rest = spans[:MOST_ROWS], sum(last - first + 1 for first, last in spans[MOST_ROWS:])
+    names = [str(first) if first == last else f"{first} to {last}" for first, last in shown]
+    more = f" and {rest:,} more" if rest else ""
+    return f"{'row' if len(rows) == 1 else 'rows'} {', '.join(names)}{more}"
+
+
+def chi_squared_in_words(found: Findings) -> str:
+    """The sum of squares beside what it should be.
+
+    Args:
+        found: The calibration.
+    """
+    freedom = found.degrees_of_freedom
+    if freedom <= 0:
+        return f"chi squared {n(found.chi_squared, '.4g')}, of no degree of freedom: nothing proves the numbers"
+    expected = f"{freedom:,}{SPACE}±{SPACE}{n((2.0 * freedom) ** 0.5, '.2g')}"
+    return f"chi squared {n(found.chi_squared, ',.0f')}, expected {expected}"
+
+
+def _verdict(found: Findings, width: int) -> Iterator[str]:
+    """How it ended; what is doubtful is said before anything else."""
+    source = found.log or "the log"
+    what = f"{len(found.values)} numbers of {found.robot.name} from {counted(len(found.rows), 'pose')} of {source}"
+    when = f", {found.date}" if found.date else ""
+    iterations = counted(found.iterations, "iteration")
+    if found.status is CalibrationStatus.FOUND:
+        yield from _wrapped(f"Found: {what}{when}", width)
+        yield from _wrapped(f"{chi_squared_in_words(found)}; {iterations}", width, "  ")
+    elif found.status is CalibrationStatus.DOUBTFUL:
+        text = found.status.text.removeprefix("found, but ").removeprefix("chi squared says that ")
+        yield from _wrapped(f"DOUBTFUL: {chi_squared_in_words(found)}: {text}", width)
+        yield from _wrapped(f"{what}{when}; {iterations}", width, "  ")
+    else:
+        yield from _wrapped(f"{found.status.text[:1].upper()}{found.status.text[1:]}", width)
+        yield from _wrapped(f"{what}{when}; {iterations}; {chi_squared_in_words(found)}", width, "  ")
+
+
+def _rows(found: Findings, width: int) -> Iterator[str]:
+    """How many rows were used, and why the others were not."""
+    left = {reason: rows for reason, rows in found.left_out.items() if len(rows)}
+    count = sum(map(len, left.values()))
+    if not count:
+        yield f"Rows: all {len(found.rows):,} were used"
+        return
+    yield f"Rows: {len(found.rows):,} of {len(found.rows) + count:,} were used, {count:,} left out:"
+    for reason, rows in left.items():
+        yield from _wrapped(f"{reason.text}: {rows_in_words(rows)}", width, "  ")
+
+
+def _values(found: Findings, width: int) -> Iterator[str]:
+    """What was found, by kinds."""
+    yield "Values ± standard errors:"
+    numbers = found.parameters
+    for name in dict.fromkeys(numbers.names):
+        mine = [k for k, own in enumerate(numbers.names) if own == name]
+        title = f"  {name}{_moved(found, mine)}"
+        anchors = next((which for which in ANCHORS if which == name), None)
+        if anchors is not None:
+            yield title.replace(name, f"{name} [m]", 1)
+            yield from _coordinates(found, anchors, width)
+        elif len(mine) == 1:
+            unit, before = numbers.units[mine[0]], numbers.prior[mine[0]]
+            now = plus_minus(found.values[mine[0]], found.standard_error[mine[0]], unit)
+            yield f"  {name}: {now}  (before {n(before, '.6g', unit)})"
+        else:
+            yield title
+            yield from _in_columns([_cell(found, k) for k in mine], width)
+
+
+def _moved(found: Findings, mine: list[int]) -> str:
+    """By how much the largest of some numbers has moved, and whose it is."""
+    numbers = found.parameters
+    moved = np.abs(found.values[mine] - numbers.prior[mine])
+    units = {numbers.units[k] for k in mine}
+    if len(units) > 1 or not np.isfinite(moved).all():
+        return ""
+    most = mine[int(np.argmax(moved))]
+    cable = int(numbers.cables[most])
+    whose = f" (cable {cable})" if cable >= 0 else ""
+    return f", moved by up to {n(moved.max(), '.3g', units.pop())}{whose}"
+
+
+def _coordinates(found: Findings, name: Anchors, columns: int) -> Iterator[str]:
+    """The anchors, one a line, and how well they are known relative to one another."""
+    first = KINDS[name].first
+    where = found.parameters.where[first : first + 3].T.astype(np.int64)
+    anchors = getattr(found.robot, name)
+    cells = [
+        [
+            plus_minus(found.values[k], found.standard_error[k], prefixed=False)
+            if k >= 0
+            else n(anchors[cable, axis], ".6g")
+            for axis, k in enumerate(row)
+        ]
+        for cable, row in enumerate(where)
+    ]
+    widths = [max(len(row[axis]) for row in cells) for axis in range(3)]
+    if sum(widths) + 15 > columns:
+        yield from _in_columns([_cell(found, int(k)) for k in where.ravel() if k >= 0], columns)
+        return
+    yield "    cable  " + "  ".join(letter.rjust(width) for letter, width in zip("xyz", widths, strict=True))
+    for cable, row in enumerate(cells):
+        yield f"    {cable:5}  " + "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True))
+    covariance = anchor_covariance(found.parameters, found.covariance, name)
+    if covariance is not None:
+        own = relative_covariance(anchors, covariance, name).reshape(where.size, where.size)
+        error = float(np.sqrt(np.trace(own) / where.size))
+        if np.isfinite(error):
+            yield f"    relative to one another ±{SPACE}{n(error, '.2g', 'm')} a coordinate"
+
+
+def _cell(found: Findings, k: int) -> str:
+    """One number, by its cable or its axis."""
+    numbers = found.parameters
+    _, _, axis = numbers.labels[k].partition(".")
+    cable = int(numbers.cables[k])
+    name = " ".join(([str(cable)] if cable >= 0 else []) + ([axis] if axis else []))
+    return f"{name}{': ' if name else ''}{plus_minus(found.values[k], found.standard_error[k], numbers.units[k])}"
+
+
+def _in_columns(cells: list[str], columns: int) -> Iterator[str]:
+    """Cells beside each other, as many as a line holds."""
+    width = max(map(len, cells)) + 3
+    each = max((columns - 4) // width, 1)
+    for start in range(0, len(cells), each):
+        yield ("    " + "".join(cell.ljust(width) for cell in cells[start : start + each])).rstrip()
+
+
+def _open(directions: Sequence[Direction], head: str, width: int) -> Iterator[str]:
+    """Directions, those with one step together, with the share of their priors that is left."""
+    if not directions:
+        return
+    yield from _wrapped(head, width)
+    by_step: dict[str, list[Direction]] = {}
+    for direction in directions:
+        by_step.setdefault(direction.step, []).append(direction)
+    for step, same in by_step.items():
+        yield from _wrapped(f"- {'; '.join(_together(same))}: {step}", width, "  ", "    ")
+
+
+def _together(directions: Sequence[Direction]) -> Iterator[str]:
+    """Names, those that differ in their last word alone as one, with what is left of their priors."""
+    ends: dict[tuple[str, str], list[str]] = {}
+    for one in directions:
+        head, _, end = one.name.rpartition(" ")
+        left = "" if one.known > 0.995 else f" ({100.0 * one.known:.0f}{SPACE}% of its prior error is left)"
+        ends.setdefault((head, left), []).append(end)
+    return (f"{head} {', '.join(own)}{left}".lstrip() for (head, left), own in ends.items())
+
+
+def _outliers(found: Findings, width: int) -> Iterator[str]:
+    """What does not fit, where the platform stood then."""
+    if not found.outliers:
+        yield "Outliers: none"
+        return
+    place = {int(row): k for k, row in enumerate(found.rows)}
+    less = (found.weights < 1.0).any()  # but for a calibration that was told not to
+    yield f"Outliers, {len(found.outliers)}{'; their poses count less' if less else ''}:"
+    for outlier in found.outliers[:MOST_OUTLIERS]:
+        at = ""
+        if outlier.row in place:
+            position = found.poses.position[place[outlier.row]]
+            at = f", at ({', '.join(n(x, '.2f') for x in position)}) m".replace(" ", SPACE)
+        yield from _wrapped(f"- {outlier_in_words(outlier)}{at}", width, "  ", "    ")
+    if len(found.outliers) > MOST_OUTLIERS:
+        yield f"  and {len(found.outliers) - MOST_OUTLIERS:,} more"
+
+
+def _cross_validation(found: Findings, width: int) -> Iterator[str]:
+    """The error at poses that the calibration did not see."""
+    check = found.cross_validation
+    if check is None:
+        return
+    yield from _wrapped(
+        f"At poses left out of the calibration, in turn by {check.folds} folds (root mean square):", width
+    )
+    pairs = (("position", check.position_before, check.position, "m"),
+             ("load cells", check.tension_before, check.tension, "N"))  # fmt: skip
+    for name, before, after, unit in pairs:
+        if np.isfinite(after):
+            was = f", before {n(before, '.3g', unit)}" if np.isfinite(before) else ""
+            yield f"  {name}: {n(after, '.3g', unit)}{was}"
+
+
+def _wrapped(text: str, width: int, indent: str = "", further: str = "") -> list[str]:
+    """A sentence in lines."""
+    return wrap(text, width, initial_indent=indent, subsequent_indent=further or indent + "  ", break_on_hyphens=False)

@@ -1,0 +1,141 @@
+"""What readings at equilibria say of a robot's numbers: residuals and slopes, whitened; docs/model.md, section 14.
+
+The true lengths at every pose are unknowns too. They are eliminated pose by pose: the residual counts what the lengths
+that were read do to it as noise, of covariance diag(sigma^2) + sigma_L^2 A A^T.
+"""
+
+from __future__ import annotations
+
+import math
+
+from sagline.arrays import Array, Indices
+from sagline.kernels import tables
+from sagline.kernels.algebra.cholesky import factor_positive
+from sagline.kernels.balance.freedom import symmetric_part
+from sagline.kernels.cable import rows as t
+from sagline.kernels.cable.terms import Model
+from sagline.kernels.calibration.columns import fill_cable, fill_ends, fill_moved, fill_platform
+from sagline.kernels.calibration.terms import (
+    BESIDE,
+    Observed,
+    ObservedArrays,
+    ReadingArrays,
+    Readings,
+    Sensing,
+    SensingArrays,
+    Sought,
+    SoughtArrays,
+    Space,
+    new_space,
+)
+from sagline.kernels.calibration.vectors import into, opposite, plus, unit_vector
+from sagline.kernels.calibration.whitening import store, whiten
+from sagline.kernels.forward.platform import Triple, platform_stiffness, turned, unbalance
+from sagline.kernels.forward.problem import ForwardTerms, Given, GivenArrays, row_of
+from sagline.kernels.jit import entry, formula, glue
+from sagline.kernels.memory import Memory
+
+
+@formula
+def rotation_between(read: Array, pose: Array, frame: Array) -> Triple:
+    """Rotation vector, in the measuring system's axes, from the platform's predicted rotation to that read."""
+    # what the system should read: conj(frame) * pose
+    fx, fy, fz, fw = -frame[3], -frame[4], -frame[5], frame[6]
+    ax = fw * pose[3] + fx * pose[6] + fy * pose[5] - fz * pose[4]
+    ay = fw * pose[4] + fy * pose[6] + fz * pose[3] - fx * pose[5]
+    az = fw * pose[5] + fz * pose[6] + fx * pose[4] - fy * pose[3]
+    aw = fw * pose[6] - fx * pose[3] - fy * pose[4] - fz * pose[5]
+    # read * conj(that)
+    rx, ry, rz, rw = read[0], read[1], read[2], read[3]
+    x = -rw * ax + rx * aw - ry * az + rz * ay
+    y = -rw * ay + ry * aw - rz * ax + rx * az
+    z = -rw * az + rz * aw - rx * ay + ry * ax
+    w = rw * aw + rx * ax + ry * ay + rz * az
+    if w < 0.0:
+        x, y, z, w = -x, -y, -z, -w
+    sine = math.sqrt(x * x + y * y + z * z)
+    factor = 2.0 * math.atan2(sine, w) / sine if sine > 0.0 else 2.0
+    return factor * x, factor * y, factor * z
+
+
+@glue
+def fill_residual(
+    sensing: Sensing, readings: Readings, p: int, pose: Array, from_system: Triple, space: Space, residual: Array
+) -> None:
+    """Fill readings less predictions, and the deviations: infinite where nothing was read."""
+    m = residual.size - BESIDE
+    for i in range(m):
+        residual[i] = readings.cells[p, i] - (sensing.gain[i] * space.shares[i, 4] + sensing.bias[i])
+        space.deviation[i] = sensing.tension_deviation[i]
+    place = into(space.axes, from_system)
+    turn = rotation_between(readings.rotations[p], pose, sensing.frame)
+    for k in range(3):
+        residual[m + k] = readings.positions[p, k] - place[k]
+        residual[m + 3 + k] = turn[k]
+        space.deviation[m + k] = sensing.position_deviation[k]
+        space.deviation[m + 3 + k] = sensing.rotation_deviation[k]
+
+
+@entry
+def observe(
+    model: ForwardTerms,
+    given: GivenArrays,
+    sensing: SensingArrays,
+    read: ReadingArrays,
+    looked_for: SoughtArrays,
+    room: tuple[Array, Indices],
+    found: ObservedArrays,
+) -> None:
+    """What the readings at N equilibria say; NaN where the platform has no stable one.
+
+    Args:
+        model: Cable model, the exact or the weightless one, as of `forward_poses`.
+        given: `Given`, its starts the poses, which are equilibria at the lengths.
+        sensing: `Sensing`.
+        read: `Readings`.
+        looked_for: `Sought`.
+        room: `memory_for` as many cables.
+        found: `Observed`, filled.
+    """
+    batch, sensors, readings = Given(*given), Sensing(*sensing), Readings(*read)
+    sought, answer = Sought(*looked_for), Observed(*found)
+    code, k_h, k_p, behind = model
+    count, m = batch.lengths.shape
+    free = batch.freedom
+    space = new_space(Memory(*room), m, free.shape[0])
+    work = answer.work
+    for axis in range(3):
+        unit = unit_vector(axis)
+        x, y, z = turned(sensors.frame, unit[0], unit[1], unit[2])
+        space.axes[0, axis], space.axes[1, axis], space.axes[2, axis] = x, y, z
+    for p in range(count):
+        body, cables, pose = row_of(batch.bodies, p), row_of(batch.robots, p), batch.starts[p]
+        placed = Model(code, k_h, k_p, body[tables.GRAVITY], behind)
+        for i in range(m):
+            space.rows[t.LENGTH, i] = batch.lengths[p, i]
+            space.rows[t.PARAMETER, i] = math.nan  # an answer must not depend on the sample before
+        unbalance(placed, cables, body, row_of(batch.wrenches, p), pose, space.rotation, space.rows, space.six)
+        platform_stiffness(placed, cables, space.rows, space.stiffness)
+        symmetric_part(free, space.stiffness, space.matrix)
+        if not factor_positive(space.matrix, 0.0, space.factor):
+            answer.matrix[p] = math.nan
+            answer.misfit[p] = math.nan
+            answer.residual[p] = math.nan
+            answer.back[p] = math.nan
+            continue
+        center = turned(pose, body[tables.CENTER_X], body[tables.CENTER_Y], body[tables.CENTER_Z])
+        target = turned(pose, sensors.target[0], sensors.target[1], sensors.target[2])
+        reach = plus(target, opposite(center))
+        shift = (sensors.frame[0], sensors.frame[1], sensors.frame[2])
+        from_system = plus(plus((pose[0], pose[1], pose[2]), target), opposite(shift))
+        fill_ends(placed, cables, space)
+        fill_moved(sensors, free, m, reach, space)
+        for j in range(work.shape[0]):
+            for q in range(work.shape[1]):
+                work[j, q] = 0.0
+        for i in range(m):
+            fill_cable(placed, cables, sensors.gain[i], sought, p, i, space, work)
+        fill_platform(placed, cables, sensors, sought, free, from_system, space, work)
+        fill_residual(sensors, readings, p, pose, from_system, space, answer.residual[p])
+        whiten(sensors, answer.residual[p], space, work)
+        store(sensors, answer, p, readings.lengths[p], batch.lengths[p], space)

@@ -1,0 +1,111 @@
+"""Lengths to begin with: of cables held at a pose with the tensions that were read, made to balance the platform."""
+
+from __future__ import annotations
+
+import math
+
+from sagline.arrays import Array, Indices
+from sagline.kernels import tables
+from sagline.kernels.algebra.cholesky import factor_positive, solve_lower, solve_upper
+from sagline.kernels.balance.freedom import components_along
+from sagline.kernels.cable import geometry as g
+from sagline.kernels.cable.geometry import GEOMETRY_ROWS, cable_geometry
+from sagline.kernels.cable.hanging import chord_tension_at_frame_end
+from sagline.kernels.cable.homing import hold_cable
+from sagline.kernels.cable.pulley import pulley_at
+from sagline.kernels.cable.terms import Chord, Material, Terms, model_of
+from sagline.kernels.jit import entry
+from sagline.kernels.memory import block
+
+ROUNDS = 3  # of balancing: what the cables' weight pulls changes little with the tensions
+LEAST = 0.2  # of a tension that was read: balancing takes no more of it away
+
+
+@entry
+def starting_lengths(
+    terms: Terms,
+    freedom: Array,
+    cables: Array,
+    body: Array,
+    poses: Array,
+    tension: Array,
+    room: tuple[Array, Indices],
+    length_out: Array,
+) -> None:
+    """Unstrained lengths off the drums [m] of cables that hold the platform with nearly the tensions given.
+
+    The chord tensions change by the least that balances the platform.
+
+    Args:
+        terms: Of the cable model.
+        freedom: Rows that pick the free motions, (n, 6).
+        cables: Row of the cable_table, (m, CABLE_COLUMNS).
+        body: Row of the body_table.
+        poses: Pose rows (N, POSE_COLUMNS).
+        tension: At the frame ends [N], (N, m).
+        room: `memory_for` as many cables.
+        length_out: (N, m).
+    """
+    model = model_of(terms)
+    count, m = tension.shape
+    n = freedom.shape[0]
+    numbers = room[0]
+    rotation, at = block(numbers, 0, 3, 3)
+    geometry, at = block(numbers, at, GEOMETRY_ROWS, m)
+    along, at = block(numbers, at, m, n)
+    matrix, at = block(numbers, at, n, n)
+    factor, at = block(numbers, at, n, n)
+    tau, pull, least = numbers[at : at + m], numbers[at + m : at + 2 * m], numbers[at + 2 * m : at + 3 * m]
+    at += 3 * m
+    six, part = numbers[at : at + 6], numbers[at + 6 : at + 6 + n].reshape((n,))
+    for p in range(count):
+        cable_geometry(cables, body, poses[p], rotation, geometry)
+        for i in range(m):
+            chord = Chord(geometry[g.CHORD, i], geometry[g.SINE, i], geometry[g.COSINE, i])
+            material = Material(cables[i, tables.DENSITY], cables[i, tables.STIFFNESS])
+            tau[i] = chord_tension_at_frame_end(model, chord, material, pulley_at(cables, i), tension[p, i])
+            least[i] = LEAST * max(tau[i], 0.5 * material.density * model.gravity * chord.length)
+            tau[i] = max(tau[i], least[i])
+            x, y = geometry[g.AZIMUTH_X, i] * chord.cosine, geometry[g.AZIMUTH_Y, i] * chord.cosine
+            rx, ry, rz = geometry[g.LEVER_X, i], geometry[g.LEVER_Y, i], geometry[g.LEVER_Z, i]
+            six[0], six[1], six[2] = x, y, chord.sine
+            six[3], six[4], six[5] = ry * chord.sine - rz * y, rz * x - rx * chord.sine, rx * y - ry * x
+            components_along(freedom, six, along[i])
+        for j in range(n):
+            for k in range(n):
+                matrix[j, k] = 0.0
+                for i in range(m):
+                    matrix[j, k] += along[i, j] * along[i, k]
+        positive = factor_positive(matrix, 0.0, factor)
+        for _ in range(ROUNDS):
+            for k in range(6):
+                six[k] = 0.0
+            six[2] = body[tables.MASS] * model.gravity
+            for i in range(m):
+                chord = Chord(geometry[g.CHORD, i], geometry[g.SINE, i], geometry[g.COSINE, i])
+                material = Material(cables[i, tables.DENSITY], cables[i, tables.STIFFNESS])
+                held = hold_cable(model, chord, material, pulley_at(cables, i), tau[i])
+                pull[i] = held.pull
+                length_out[p, i] = held.length
+                six[2] += pull[i]
+                six[3] += geometry[g.LEVER_Y, i] * pull[i]
+                six[4] -= geometry[g.LEVER_X, i] * pull[i]
+            components_along(freedom, six, part)
+            for i in range(m):
+                for j in range(n):
+                    part[j] += along[i, j] * tau[i]
+            if not positive:
+                break
+            solve_lower(factor, part)
+            solve_upper(factor, part)
+            for i in range(m):
+                change = 0.0
+                for j in range(n):
+                    change += along[i, j] * part[j]
+                tau[i] = max(tau[i] - change, least[i])
+        for i in range(m):
+            chord = Chord(geometry[g.CHORD, i], geometry[g.SINE, i], geometry[g.COSINE, i])
+            material = Material(cables[i, tables.DENSITY], cables[i, tables.STIFFNESS])
+            length_out[p, i] = hold_cable(model, chord, material, pulley_at(cables, i), tau[i]).length
+            if not length_out[p, i] > 0.0:
+                length_out[p, i] = math.nan

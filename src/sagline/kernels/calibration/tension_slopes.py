@@ -1,0 +1,87 @@
+"""How the tension at a cable's frame end follows the force on its platform end, and its own data."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from sagline.arrays import Array
+from sagline.kernels.cable import geometry as g
+from sagline.kernels.cable import rows as t
+from sagline.kernels.cable.over_pulleys import material_at
+from sagline.kernels.cable.pulley import pulley_at
+from sagline.kernels.cable.terms import Model
+from sagline.kernels.codes import CATENARY
+from sagline.kernels.jit import formula
+
+
+class TensionSlopes(NamedTuple):
+    """The tension at the frame end, and its derivatives while the force on the platform end stays, unless named.
+
+    Attributes:
+        tension: T_A [N].
+        along: By the horizontal part of the force on the platform end, in the cable's plane.
+        up: By its vertical part.
+        by_height: By the height of the platform end over the frame anchor [N/m].
+        by_length: By the length [N/m].
+        by_density: [N m/kg].
+        by_stiffness: By EA.
+        by_radius: By that of the pulley [N/m].
+        by_dead: By the dead cable [N/m].
+    """
+
+    tension: float
+    along: float
+    up: float
+    by_height: float
+    by_length: float
+    by_density: float
+    by_stiffness: float
+    by_radius: float
+    by_dead: float
+
+
+@formula
+def tension_slopes(model: Model, cables: Array, rows: Array, i: int) -> TensionSlopes:
+    """Those of cable i, after its forces; zero without a force there."""
+    material = material_at(cables, i)
+    gravity = model.gravity if model.code == CATENARY else 0.0
+    weight = material.density * gravity
+    x, z = rows[t.HORIZONTAL, i], rows[t.VERTICAL, i]
+    if model.behind is None:
+        length = rows[t.LENGTH, i]
+        at_frame = z - weight * length
+        tension = math.sqrt(x * x + at_frame * at_frame)
+        share = 1.0 / tension if tension > 0.0 else 0.0
+        along, up = x * share, at_frame * share
+        return TensionSlopes(tension, along, up, 0.0, -up * weight, -up * gravity * length, 0.0, 0.0, 0.0)
+    # T + T^2/(2 EA) - w z is one number from the platform end to the pulley's exit P, which moves on the pulley
+    stiffness, pulley = material.stiffness, pulley_at(cables, i)
+    leaving, free = rows[t.LEAVING, i], rows[t.FREE_LENGTH, i]
+    end = math.sqrt(x * x + z * z)
+    if not (leaving > 0.0 and end > 0.0):
+        return TensionSlopes(leaving, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    sine, cosine, entry = rows[t.WRAP_SINE, i], rows[t.WRAP_COSINE, i], pulley.entry
+    strained = 1.0 + leaving / stiffness
+    share = 1.0 / strained
+    grown = (1.0 + end / stiffness) / end * share
+    lifted = weight * pulley.radius * entry * cosine * share  # by the wrap angle
+    turned_x, turned_z = cosine / leaving, -entry * sine / leaving  # the wrap angle by the force at P
+    rise = rows[t.FREE_RISE, i]
+    return TensionSlopes(
+        leaving,
+        grown * x + lifted * turned_x,
+        grown * z + lifted * turned_z,
+        -weight * share,
+        -lifted * turned_z * weight,
+        -(rise * share + lifted * turned_z * free) * gravity,
+        0.5 * (leaving * leaving - end * end) / (stiffness * stiffness) * share,
+        weight * entry * sine * share + lifted * turned_z * weight * rows[t.WRAP, i] / strained,
+        lifted * turned_z * weight / strained,
+    )
+
+
+@formula
+def share_of(rows: Array, i: int, along: float, up: float) -> tuple[float, float, float]:
+    """Derivatives by the force on the platform end in world axes."""
+    return along * rows[g.AZIMUTH_X, i], along * rows[g.AZIMUTH_Y, i], up

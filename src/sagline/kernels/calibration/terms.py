@@ -1,0 +1,147 @@
+"""What the calibration kernels pass to each other: sensors, readings, what is looked for, and memory to work in."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from sagline.arrays import Array, Indices
+from sagline.kernels.cable.rows import CABLE_ROWS
+from sagline.kernels.jit import glue
+from sagline.kernels.memory import Memory, block
+
+BESIDE = 6  # readings of a pose beside its load cells: position and rotation in the measuring system's axes
+
+SensingArrays = tuple[Array, Array, Array, Array, Array, Array, Array, Array]
+ReadingArrays = tuple[Array, Array, Array, Array]
+SoughtArrays = tuple[Indices, Array, Array]
+ObservedArrays = tuple[Array, Array, Array, Array, Array]
+
+
+class Sensing(NamedTuple):
+    """The sensors.
+
+    Attributes:
+        gain: Of the load cells, (m,).
+        bias: [N], (m,).
+        tension_deviation: [N], (m,); infinite for no cell.
+        length_deviation: [m], (m,).
+        position_deviation: [m], (3,); infinite for none.
+        rotation_deviation: [rad], (3,); infinite for none.
+        frame: Pose row of the measuring system in the world.
+        target: Platform frame [m], (3,).
+    """
+
+    gain: Array
+    bias: Array
+    tension_deviation: Array
+    length_deviation: Array
+    position_deviation: Array
+    rotation_deviation: Array
+    frame: Array
+    target: Array
+
+
+class Readings(NamedTuple):
+    """What was read at N poses, or nothing: then a residual is zero; NaN where a sensor was silent.
+
+    Attributes:
+        lengths: That the winches say [m], (N, m).
+        cells: Of the load cells [N], (N, m).
+        positions: [m], (N, 3).
+        rotations: Unit quaternions, scalar last, (N, 4).
+    """
+
+    lengths: Array
+    cells: Array
+    positions: Array
+    rotations: Array
+
+
+class Sought(NamedTuple):
+    """The P numbers that are looked for.
+
+    Attributes:
+        where: Which number each row of `kinds` is, (KIND_ROWS, m), -1 for none.
+        scale: What one of it changes of that row, (KIND_ROWS, m).
+        paid: Slopes of the lengths that the winches say, by zero, drum radius and EA, (3, N, m).
+    """
+
+    where: Indices
+    scale: Array
+    paid: Array
+
+
+class Observed(NamedTuple):
+    """What is filled; rows of a pose are its load cells, three of its position and three of its rotation.
+
+    Attributes:
+        matrix: Whitened slopes, (N, m + 6, P); rows without a reading are zero.
+        misfit: Whitened residuals, (N, m + 6).
+        residual: As they are, readings less predictions at the lengths given [N, m, rad], (N, m + 6); NaN for none.
+        back: What a whitened residual changes of the true lengths [m], (N, m, m + 6).
+        work: To work in, (m + 6, P).
+    """
+
+    matrix: Array
+    misfit: Array
+    residual: Array
+    back: Array
+    work: Array
+
+
+class Space(NamedTuple):
+    """Working memory of one pose."""
+
+    rows: Array  # (CABLE_ROWS, m)
+    rotation: Array  # (3, 3)
+    axes: Array  # of the measuring system, columns, (3, 3)
+    stiffness: Array  # (6, 6)
+    factor: Array  # (n, n)
+    matrix: Array  # (n, n)
+    part: Array  # (n,)
+    six: Array  # (6,)
+    moved: Array  # change of the readings by a wrench on the platform, (m + 6, 6)
+    ends: Array  # stiffness of the platform ends, (m, 9)
+    shares: Array  # of the frame ends' tensions: by the forces on the platform ends, by height; and they, (m, 5)
+    by_length: Array  # change of the readings by the lengths, A, (m, m + 6)
+    whole: Array  # covariance, then the inverse of its factor, (m + 6, m + 6)
+    own: Array  # (m + 6, m + 6)
+    deviation: Array  # (m + 6,)
+
+
+@glue
+def new_space(memory: Memory, m: int, n: int) -> Space:
+    """Working memory for m cables and n free motions."""
+    numbers, readings = memory.numbers, m + BESIDE
+    rows, at = block(numbers, 0, CABLE_ROWS, m)
+    rotation, at = block(numbers, at, 3, 3)
+    axes, at = block(numbers, at, 3, 3)
+    stiffness, at = block(numbers, at, 6, 6)
+    factor, at = block(numbers, at, n, n)
+    matrix, at = block(numbers, at, n, n)
+    moved, at = block(numbers, at, readings, 6)
+    ends, at = block(numbers, at, m, 9)
+    shares, at = block(numbers, at, m, 5)
+    by_length, at = block(numbers, at, m, readings)
+    whole, at = block(numbers, at, readings, readings)
+    own, at = block(numbers, at, readings, readings)
+    part, six = numbers[at : at + n], numbers[at + n : at + n + 6]
+    at += n + 6
+    deviation = numbers[at : at + readings].reshape((readings,))  # which tells when there is too little memory
+    return Space(
+        rows,
+        rotation,
+        axes,
+        stiffness,
+        factor,
+        matrix,
+        part,
+        six,
+        moved,
+        ends,
+        shares,
+        by_length,
+        whole,
+        own,
+        deviation,
+    )

@@ -1,0 +1,132 @@
+"""How far the numbers of a robot may be off: which of them may have a tolerance, in which unit and shape."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sagline.arguments import brief, choice
+from sagline.arrays import Array, checked, locked
+from sagline.errors import InvalidValueError
+
+
+class Uncertain(NamedTuple):
+    """A number of a robot that may be off.
+
+    Attributes:
+        place: Where a robot has it, as a dotted attribute.
+        unit: Its unit in SI.
+        each: Whether every cable has its own.
+        axes: Whether it has three components, along x, y and z.
+        share: Whether a file may give its tolerance as a share of it, in percent.
+    """
+
+    place: str
+    unit: str
+    each: bool = True
+    axes: bool = False
+    share: bool = False
+
+    def shape(self, cables: int) -> tuple[int, ...]:
+        """Its shape in a robot of so many cables.
+
+        Args:
+            cables: Number of cables m.
+        """
+        return (*((cables,) if self.each else ()), *((3,) if self.axes else ()))
+
+
+UNCERTAIN: Final[Mapping[str, Uncertain]] = MappingProxyType(
+    {
+        "frame_anchors": Uncertain("frame_anchors", "m", axes=True),
+        "platform_anchors": Uncertain("platform_anchors", "m", axes=True),
+        "length_zero": Uncertain("winches.length_zero", "m"),
+        "drum_radius": Uncertain("winches.drum_radius", "m", share=True),
+        "linear_density": Uncertain("cables.linear_density", "kg/m", share=True),
+        "axial_stiffness": Uncertain("cables.axial_stiffness", "N", share=True),
+        "pulley_radius": Uncertain("winches.pulley_radius", "m"),
+        "dead_cable": Uncertain("winches.dead_cable", "m"),
+        "load_cell_gain": Uncertain("winches.load_cell_gain", "", share=True),
+        "load_cell_bias": Uncertain("winches.load_cell_bias", "N"),
+        "mass": Uncertain("mass", "kg", each=False, share=True),
+        "center_of_mass": Uncertain("center_of_mass", "m", each=False, axes=True),
+    }
+)
+
+
+def deviations(
+    given: Any, item: str, cables: int, *, low: float = -np.inf, above: float = -np.inf
+) -> Mapping[str, Array]:
+    """Standard deviations of a robot's numbers, each in the shape of its field.
+
+    Args:
+        given: Of some names of `UNCERTAIN`: one number for all of the field, three along the axes where it has them,
+            or the whole field.
+        item: The name a message uses.
+        cables: Number of cables m.
+        low: The least allowed; it may be infinite, where nothing is known.
+        above: A bound they must exceed.
+
+    Returns:
+        The same names, in the same order.
+
+    Raises:
+        InvalidValueError: If it is no mapping, has another name, or a value of another shape or out of range.
+    """
+    if not isinstance(given, Mapping):
+        allowed = "names of fields and standard deviations"
+        raise InvalidValueError(item, brief(given), allowed, 'Give {"frame_anchors": 0.005}, in SI.')
+    found = {}
+    for name, value in given.items():
+        what = UNCERTAIN[choice(name, f"{item}: field", UNCERTAIN)]
+        shape, label = what.shape(cables), f"{item}: {name}"
+        array = checked(value, label, what.unit, low=low, above=above, infinite=True)
+        if array.shape not in ((), shape, shape[-1:] if what.axes else ()):
+            ways = " or ".join(str(way) for way in dict.fromkeys(((), shape[-1:] if what.axes else (), shape)))
+            raise InvalidValueError(
+                label, f"of shape {array.shape}", f"shape {ways}", "Give one for all, or every one."
+            )
+        found[name] = locked(np.array(np.broadcast_to(array, shape)))
+    return MappingProxyType(found)
+
+
+def value_of(robot: object, name: str) -> Array | None:
+    """The number of a robot that a tolerance is about.
+
+    Args:
+        robot: The robot.
+        name: Of `UNCERTAIN`.
+
+    Returns:
+        Its value in SI, shape () or that of the field; None where the robot does not have it.
+    """
+    found: Any = robot
+    for part in UNCERTAIN[name].place.split("."):
+        found = None if found is None else getattr(found, part)
+    return None if found is None else np.asarray(found, dtype=np.float64)
+
+
+def of_share(share: ArrayLike, value: Array | None, item: str) -> Array:
+    """Standard deviation of a number, from a share of it.
+
+    Args:
+        share: The share, shape () or that of the number.
+        value: The number, or None where it is not known.
+        item: The name a message uses.
+
+    Returns:
+        In the unit of the number, in its shape.
+
+    Raises:
+        InvalidValueError: If the number is not known, or of another shape.
+    """
+    if value is None:
+        raise InvalidValueError(item, "in percent", "a field that is given", f"Give {item} in its unit, or the field.")
+    array = checked(share, item, "%")
+    if array.shape not in ((), value.shape):
+        raise InvalidValueError(item, f"of shape {array.shape}", f"shape () or {value.shape}", "Give one for all.")
+    return np.asarray(array * np.abs(value))

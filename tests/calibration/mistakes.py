@@ -1,0 +1,140 @@
+"""Mistakes that people make with logs, made on purpose, and the words by which each is to be told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final, NamedTuple
+
+import numpy as np
+
+import sagline as sl
+from sagline.arrays import Array
+from sagline.robot.drum import drums_of
+
+
+class Mistake(NamedTuple):
+    """A log with a mistake in it.
+
+    Attributes:
+        log: The log.
+        told: What a sentence about it must have in it.
+    """
+
+    log: sl.WinchLog
+    told: tuple[str, ...]
+
+
+def _two(log: sl.WinchLog, rng: np.random.Generator) -> tuple[int, int]:
+    i, j = sorted(rng.choice(log.readings.shape[1], 2, replace=False).tolist())
+    return i, j
+
+
+def _column(log: sl.WinchLog) -> str:
+    return "counts" if log.counts is not None else "unstrained_length"
+
+
+def _cells(log: sl.WinchLog) -> Array:
+    assert log.load_cells is not None
+    return log.load_cells
+
+
+def _exchanged(values: Array, i: int, j: int) -> Array:
+    values = values.copy()
+    values[:, [i, j]] = values[:, [j, i]]
+    return values
+
+
+def swapped_encoders(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> Mistake:
+    i, j = _two(log, rng)
+    changed = log.replace(**{_column(log): _exchanged(log.readings, i, j)})
+    return Mistake(changed, (f"the encoders of cables {i} and {j} are swapped",))
+
+
+def swapped_cables(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> Mistake:
+    i, j = _two(log, rng)
+    cells = _exchanged(_cells(log), i, j)
+    changed = log.replace(**{_column(log): _exchanged(log.readings, i, j), "load_cells": cells})
+    return Mistake(changed, (f"the cables {i} and {j} are swapped",))
+
+
+def swapped_cells(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> Mistake:
+    i, j = _two(log, rng)
+    return Mistake(
+        log.replace(load_cells=_exchanged(_cells(log), i, j)), (f"the load cells of cables {i} and {j} are swapped",)
+    )
+
+
+def flipped_encoder(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> Mistake:
+    """Counts go backward from their zero; lengths from one at which somebody switched on."""
+    i = int(rng.integers(log.readings.shape[1]))
+    read = log.readings.copy()
+    counts = robot.winches is not None and log.counts is not None
+    about = robot.winches.count_zero[i] if counts and robot.winches is not None else max(read[:, i]) - 1.0
+    read[:, i] = 2.0 * about - read[:, i]
+    return Mistake(log.replace(**{_column(log): read}), (f"the encoder of cable {i} counts backward",))
+
+
+def late_cells(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> Mistake:
+    by = int(rng.integers(1, 4)) * int(rng.choice([-1, 1]))
+    n = len(log)
+    cells = np.arange(max(0, -by), min(n, n - by))  # what they read is written beside the lengths of so many rows later
+    shifted = log.rows(cells + by).replace(load_cells=_cells(log)[cells])
+    words = f"load cells come {abs(by)} row{'s'[: abs(by) != 1]} {'after' if by > 0 else 'before'} the lengths"
+    return Mistake(shifted, (words,))
+
+
+def far_zero(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> Mistake:
+    i = int(rng.integers(log.readings.shape[1]))
+    off = float(rng.uniform(4.0, 5.0))
+    read = log.readings.copy()
+    if log.counts is None:
+        read[:, i] -= off
+        read[:, i] += 2.0 * off if read[:, i].min() < 0.1 else 0.0
+    else:
+        drums = drums_of(robot)
+        length = drums.lengths_at(read)
+        length[:, i] += off
+        read = drums.counts(length)
+    return Mistake(log.replace(**{_column(log): read}), ("lengths have a zero far off", f"on cable {i};"))
+
+
+def millimeters(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> Mistake:
+    assert log.unstrained_length is not None
+    return Mistake(log.replace(unstrained_length=1e3 * log.unstrained_length), ("lengths are in mm",))
+
+
+def positions_in_millimeters(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> Mistake:
+    assert log.position is not None
+    return Mistake(log.replace(position=1e3 * log.position), ("positions are in mm",))
+
+
+def commanded_in_millimeters(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> Mistake:
+    assert log.commanded is not None
+    commanded = sl.Pose(1e3 * log.commanded.position, log.commanded.matrix)
+    return Mistake(log.replace(commanded=commanded), ("commanded positions are in mm", "x_commanded [mm]"))
+
+
+def deviations_in_millimeters(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> Mistake:
+    name = str(rng.choice(["length_deviation", "position_deviation"]))
+    sensors = log.sensors.replace(**{name: float(rng.uniform(5.0, 20.0))})
+    return Mistake(log.replace(sensors=sensors), (f"the {name} is", f"{name}: 0.5 mm"))
+
+
+def kilonewtons(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> Mistake:
+    return Mistake(log.replace(load_cells=1e-3 * _cells(log)), ("load cells are in kN",))
+
+
+Maker = Callable[[sl.WinchLog, sl.Robot, np.random.Generator], Mistake]
+MISTAKES: Final[tuple[Maker, ...]] = (
+    swapped_encoders,
+    swapped_cables,
+    swapped_cells,
+    flipped_encoder,
+    late_cells,
+    far_zero,
+    millimeters,
+    positions_in_millimeters,
+    commanded_in_millimeters,
+    deviations_in_millimeters,
+    kilonewtons,
+)

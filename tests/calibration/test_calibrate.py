@@ -1,0 +1,321 @@
+"""Calibrations of robots that are known: whether the answer is right, and whether it knows how right."""
+
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.arrays import Array
+from sagline.calibration import search
+from sagline.calibration.parameters import parameters_of
+from sagline.errors import InvalidValueError
+from tests.calibration.synthetic import Truth, log_of, true_robot, usual_sensors, with_drums
+
+COGIRO = with_drums()
+ALL = {  # of 63 numbers: what an honest drawing may be off
+    "frame_anchors": 0.02,
+    "platform_anchors": 0.005,
+    "length_zero": 0.03,
+    "drum_radius": 0.005,
+    "linear_density": 0.05,
+    "axial_stiffness": 0.1,
+    "mass": 0.03,
+    "center_of_mass": 0.02,
+}
+SLIP = 0.02  # m
+
+
+def unknowns(errors: dict[str, float]) -> list[sl.Unknown]:
+    return [sl.Unknown(name, deviation=error) for name, error in errors.items()]
+
+
+def missed(found: sl.Calibration, truth: Truth) -> Array:
+    """By how much the values are off, (P,)."""
+    names = tuple(dict.fromkeys(found.parameters.names))
+    really = parameters_of(truth.robot, names, truth.sensors, counted=True)
+    assert really.labels == found.parameters.labels
+    return np.asarray(found.values - really.prior)
+
+
+class Covered(NamedTuple):
+    """How often the truth lies within one and two standard errors; mean square of Mahalanobis; slips not found.
+
+    Attributes:
+        one: Within one.
+        two: Within two.
+        mahalanobis: Mean square.
+        unseen: Poses with a slip that are no outlier.
+        misnamed: Outliers that tell of another cable than the one that slipped.
+        wrong: Outliers that are none.
+        statuses: How they ended.
+    """
+
+    one: float
+    two: float
+    mahalanobis: float
+    unseen: int
+    misnamed: int
+    wrong: int
+    statuses: frozenset[str]
+
+
+@cache
+def covered(robots: int, slips: int = 0, *, robust: bool = True) -> Covered:
+    inside, distances, unseen, misnamed, wrong, statuses = [], [], 0, 0, 0, set()
+    for seed in range(robots):
+        rng = np.random.default_rng(seed)
+        rows = [int(row) for row in rng.choice(60, slips, replace=False)]
+        slipped = {(row, int(rng.integers(8))): SLIP * float(rng.choice([-1.0, 1.0])) for row in rows}
+        truth = true_robot(COGIRO, ALL, seed)
+        made = log_of(truth, 60, seed, slips=slipped)
+        found = sl.calibrate(COGIRO, made.log, unknowns(ALL), folds=0, robust=robust)
+        error = missed(found, truth)
+        inside.append(np.abs(error) / found.standard_error)
+        distances.append(error @ np.linalg.solve(found.covariance, error))
+        named = {one.row: one.cable for one in found.outliers}
+        unseen += sum(row not in named for row, _ in slipped)
+        misnamed += sum(named.get(row) not in (cable, None) for row, cable in slipped)
+        wrong += len(named.keys() - {row for row, _ in slipped})
+        statuses.add(found.status.name)
+    deviations = np.concatenate(inside)
+    shares = float(np.mean(deviations < 1.0)), float(np.mean(deviations < 2.0))
+    return Covered(*shares, float(np.mean(distances)), unseen, misnamed, wrong, frozenset(statuses))
+
+
+def test_the_truth_lies_within_the_standard_errors_as_often_as_it_must() -> None:
+    found = covered(60)
+    assert abs(found.one - 0.683) < 0.04
+    assert abs(found.two - 0.954) < 0.02
+    assert abs(found.mahalanobis - 63.0) < 3.0 * np.sqrt(2.0 * 63.0 / 60)
+    assert found.statuses == {"FOUND"}
+
+
+@pytest.mark.soak
+def test_the_same_of_many_robots() -> None:
+    found = covered(2000)
+    assert abs(found.one - 0.683) < 0.015
+    assert abs(found.two - 0.954) < 0.007
+    assert abs(found.mahalanobis - 63.0) < 1.0
+
+
+@pytest.mark.parametrize("robots", [10, pytest.param(200, marks=pytest.mark.soak)])
+def test_slipped_cables_are_found_and_do_no_harm(robots: int) -> None:
+    found = covered(robots, slips=3)
+    assert found.unseen == 0
+    assert found.misnamed <= 0.01 * 3 * robots
+    assert found.wrong <= max(1, 0.05 * robots)
+    assert found.two >= 0.94
+    plain = covered(robots, slips=3, robust=False)
+    assert plain.two < 0.9
+
+
+@pytest.mark.parametrize("trials", [20, pytest.param(200, marks=pytest.mark.soak)])
+def test_few_poses_and_few_unknowns_converge(trials: int) -> None:
+    """20 poses and 10 numbers from load cells and counts."""
+    errors = {"length_zero": 0.05, "linear_density": 0.1, "axial_stiffness": 0.2}
+    right = told = 0
+    for seed in range(trials):
+        truth = true_robot(COGIRO, errors, seed)
+        found = sl.calibrate(COGIRO, log_of(truth, 20, seed).log, unknowns(errors), folds=0)
+        error = missed(found, truth)
+        good = float(error @ np.linalg.solve(found.covariance, error)) < 40.0  # chi squared of 10: 2e-5
+        right += good
+        told += good or found.status != sl.CalibrationStatus.FOUND
+    assert told == trials
+    assert right >= 0.95 * trials
+
+
+@pytest.mark.parametrize("robots", [5, pytest.param(100, marks=pytest.mark.soak)])
+def test_anchors_half_a_meter_off_end_where_the_truth_begins(robots: int) -> None:
+    """The sum of squares has one minimum near the truth: whoever starts there must find no better one."""
+    errors = {"frame_anchors": 0.5, "length_zero": 0.1, "axial_stiffness": 0.1, "mass": 0.03, "center_of_mass": 0.02}
+    reached = told = 0
+    for seed in range(robots):
+        truth = true_robot(COGIRO, errors, seed, usual_sensors(position_deviation=1e-3))
+        made = log_of(truth, 60, seed, positions=60)
+        found = sl.calibrate(COGIRO, made.log, unknowns(errors), folds=0)
+        error = missed(found, truth)
+        good = float(error @ np.linalg.solve(found.covariance, error)) < 3.0 * len(error)
+        reached += good
+        told += good or found.status != sl.CalibrationStatus.FOUND
+    assert reached >= 0.95 * robots
+    assert told == robots
+
+
+def test_poses_that_fit_nowhere_put_the_rest_in_doubt_where_they_are_many() -> None:
+    """Lengths of other poses at seven of sixty: some count little, some are left out, and each is an odd one."""
+    truth = true_robot(COGIRO, ALL, 4)
+    made = log_of(truth, 60, 4)
+    counts = made.log.readings.copy()
+    rows = np.arange(2, 58, 8)
+    counts[rows] = counts[np.roll(rows, 1)]
+    found = sl.calibrate(COGIRO, made.log.replace(counts=counts), unknowns(ALL), folds=0)
+    assert len(found.left_out[sl.Omission.OTHER_EQUILIBRIUM]) == 4
+    assert np.count_nonzero(found.weights < 0.5) == 3
+    assert found.status == sl.CalibrationStatus.DOUBTFUL
+
+
+@pytest.mark.parametrize("deviation", [1e3, 1e6, 1e9])
+def test_a_prior_as_wide_as_nothing_tells_nothing(deviation: float) -> None:
+    """Of the anchors, of which the readings leave four directions open: what they tell is told as well as without."""
+    robot = sl.load_robot("cogiro")
+    log = log_of(true_robot(robot), 40).log
+    wide, none = (
+        sl.calibrate(robot, log, (sl.Unknown("frame_anchors", deviation=one), "mass", "length_zero"), folds=0)
+        for one in (deviation, np.inf)
+    )
+    assert wide.status == sl.CalibrationStatus.FOUND
+    for label in ("mass", "length_zero[3]"):
+        assert wide.value_of(label) == pytest.approx(none.value_of(label), rel=1e-4)
+    assert [one.name for one in wide.gauge] == [one.name for one in none.gauge]
+    assert np.isinf(none.value_of("frame_anchors[0].x")[1])
+    assert wide.value_of("frame_anchors[0].x")[1] > 0.3 * deviation
+    # readings of 8 cells, less the numbers that they tell: of 33 all but the four, 9 of which priors hold beside
+    assert none.degrees_of_freedom == 40 * 8 + 9 - (33 - 4)
+    assert none.chi_squared == pytest.approx(wide.chi_squared, rel=1e-6)
+
+
+@pytest.mark.parametrize(("radius", "least"), [(0.06, 0.01), (0.0, 0.0)])
+def test_pulleys_are_found_by_a_robot_that_is_drawn_without(radius: float, least: float) -> None:
+    bare = sl.load_robot("cogiro").replace(winches=sl.Winch())
+    truth = true_robot(bare.replace(winches=sl.Winch(pulley_radius=radius)), {"mass": 0.03}, 3)
+    asked = ("length_zero", "mass", sl.Unknown("pulley_radius", deviation=0.05))
+    found = sl.calibrate(bare, log_of(truth, 40, 3).log, asked, folds=0)
+    assert found.status == sl.CalibrationStatus.FOUND
+    assert not found.gauge
+    value, error = found.value_of("pulley_radius")
+    assert abs(value - radius) < 2.5 * error
+    assert error < 0.01
+    assert value >= least
+
+
+def test_a_log_of_which_no_pose_fits_is_refused() -> None:
+    """One pose, and only the mass may be other than drawn."""
+    robot = sl.load_robot("cogiro")
+    log = log_of(true_robot(robot), 40).log.rows(slice(0, 1))
+    with pytest.raises(InvalidValueError, match="without a pose at which this robot reads so"):
+        sl.calibrate(robot, log, ["mass"], folds=0)
+
+
+def test_too_few_readings_are_refused() -> None:
+    log = log_of(true_robot(COGIRO, ALL), 7).log
+    with pytest.raises(InvalidValueError, match=r"56 readings in 7 rows.*>= 63"):
+        sl.calibrate(COGIRO, log, unknowns(ALL))
+
+
+@pytest.mark.parametrize(
+    ("changes", "unknown", "message"),
+    [
+        ({}, "frame_anchor", r"Did you mean frame_anchors\?$"),
+        ({}, "load_cell_gain", r"no number of cogiro; .*Begin with winches: \{load_cell_gain: 1\} in the robot file"),
+        ({}, "pulley_radius", r"Begin with winches: \{pulley_radius: 0 m\}"),
+        ({}, "drum_radius", "drum_radius is seen by no reading; allowed: counts in the log"),
+        (
+            {"load_cells": None},
+            "load_cell_gain",
+            "seen by no reading; allowed: load cells in the log",
+        ),
+    ],
+)
+def test_unknowns_that_are_none_say_what_to_do(changes: dict[str, None], unknown: str, message: str) -> None:
+    robot = sl.load_robot("cogiro")
+    log = log_of(true_robot(robot, {}), 8).log.replace(**changes)
+    with pytest.raises(InvalidValueError, match=message):
+        sl.calibrate(robot, log, ("mass", unknown))
+
+
+def test_readings_that_are_too_few_are_counted_with_the_reason() -> None:
+    log = log_of(true_robot(COGIRO, ALL), 9).log
+    slack = np.array(log.load_cells)
+    slack[2:, 3] = 0.0
+    with pytest.raises(InvalidValueError, match="16 readings in 2 rows; 7 rows left out: a cable was slack; allowed"):
+        sl.calibrate(COGIRO, log.replace(load_cells=slack), unknowns(ALL))
+
+
+def test_wrong_deviations_are_said_first() -> None:
+    truth = true_robot(COGIRO, ALL, 1)
+    log = log_of(truth, 60, 1).log
+    trusted = log.replace(sensors=usual_sensors(length_deviation=1e-4, tension_deviation=1.0))
+    found = sl.calibrate(COGIRO, trusted, unknowns(ALL), folds=0)
+    assert found.status == sl.CalibrationStatus.DOUBTFUL
+    assert "chi squared" in str(found).splitlines()[0]
+
+
+def test_a_log_of_another_wiring_is_refused_with_the_reason() -> None:
+    truth = true_robot(COGIRO, ALL, 1)
+    log = log_of(truth, 60, 1).log
+    swapped = log.readings.copy()
+    swapped[:, [2, 5]] = swapped[:, [5, 2]]
+    message = "log is not what this robot reads: the encoders of cables 2 and 5 are swapped"
+    with pytest.raises(InvalidValueError, match=message):
+        sl.calibrate(COGIRO, log.replace(counts=swapped), unknowns(ALL), folds=0)
+
+
+def test_poses_in_another_equilibrium_are_left_out_and_counted() -> None:
+    """Two rows of a robot that hangs elsewhere at these lengths: cables of no length that it has."""
+    truth = true_robot(COGIRO, ALL, 2)
+    made = log_of(truth, 60, 2)
+    counts = made.log.readings.copy()
+    counts[[4, 9]] = counts[[9, 4]]  # lengths of other poses, beside the tensions of these
+    found = sl.calibrate(COGIRO, made.log.replace(counts=counts), unknowns(ALL), folds=0)
+    honest = sl.calibrate(COGIRO, made.log, unknowns(ALL), folds=0)
+    out = {int(row) for rows in found.left_out.values() for row in rows}
+    light = {int(row) for row, weight in zip(found.rows, found.weights, strict=True) if weight < 0.05}
+    assert out | light == {4, 9}
+    assert (np.abs(found.values - honest.values) / honest.standard_error).max() < 1.0
+
+
+def test_a_log_of_which_no_row_is_left_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As that of another robot may be: every pose fits worse than noise, and the lengths put it elsewhere."""
+    log = log_of(true_robot(COGIRO, ALL, 2), 10, 2).log
+    monkeypatch.setattr(search, "STRANGE", 1.0)
+    monkeypatch.setattr(search, "FAR", -1.0)
+    with pytest.raises(InvalidValueError, match="without a pose at which this robot reads so"):
+        sl.calibrate(COGIRO, log, ("mass",), folds=0)
+
+
+TURNED = np.array([[-0.5, -(0.75**0.5), 0.0], [0.75**0.5, -0.5, 0.0], [0.0, 0.0, 1.0]])  # by 120 degrees about z
+
+
+@pytest.mark.parametrize(("shift", "rows"), [((0.0, 0.0, 0.0), 5), ((3.0, -2.0, 1.0), 5), ((3.0, -2.0, 1.0), 60)])
+def test_measured_positions_in_other_axes_are_refused_with_what_to_ask_for(shift: tuple[float, ...], rows: int) -> None:
+    sensors = usual_sensors(position_deviation=1e-3)
+    log = log_of(true_robot(COGIRO, ALL, 3, sensors), 60, 3, positions=rows).log
+    assert log.position is not None
+    turned = log.replace(position=(log.position - shift) @ TURNED)
+    with pytest.raises(InvalidValueError, match=rf"{rows} of {rows} measured poses are not where") as refused:
+        sl.calibrate(COGIRO, turned, unknowns(ALL), folds=0)
+    assert "Ask for measuring_frame and target too" in str(refused.value)
+    assert len(str(refused.value)) < 300
+    assert "…" not in str(refused.value)
+    found = sl.calibrate(COGIRO, turned, [*unknowns(ALL), "measuring_frame"], folds=0)
+    angle, error = found.value_of("measuring_frame.about z")
+    assert abs(angle - np.radians(120.0)) < 4.0 * error < 0.1
+
+
+def test_a_log_of_another_wiring_is_told_whatever_axes_it_was_measured_in() -> None:
+    sensors = usual_sensors(position_deviation=1e-3)
+    log = log_of(true_robot(COGIRO, ALL, 1, sensors), 60, 1, positions=5).log
+    assert log.position is not None
+    swapped = log.readings.copy()
+    swapped[:, [2, 5]] = swapped[:, [5, 2]]
+    wrong = log.replace(counts=swapped, position=log.position @ TURNED)
+    with pytest.raises(InvalidValueError, match="the encoders of cables 2 and 5 are swapped"):
+        sl.calibrate(COGIRO, wrong, [*unknowns(ALL), "measuring_frame"], folds=0)
+
+
+def test_an_unknown_that_is_none_is_refused_before_any_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    def work(*_: object) -> None:
+        raise AssertionError("it has begun")
+
+    monkeypatch.setattr("sagline.calibration.calibrate.wrong_units", work)
+    robot = sl.load_robot("cogiro")
+    log = sl.WinchLog(
+        unstrained_length=np.full((3, 8), 9.0),
+        load_cells=np.full((3, 8), 500.0),
+        sensors=sl.Sensors(tension_deviation=5.0),
+    )
+    with pytest.raises(sl.InvalidValueError, match="'1e999'; allowed: frame_anchors"):
+        sl.calibrate(robot, log, ["1e999"])

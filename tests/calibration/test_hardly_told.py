@@ -1,0 +1,96 @@
+"""What is hardly told: checked against covariances of normal equations, and machines of which it is known."""
+
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.arrays import Array
+from sagline.calibration.findings import Direction
+from sagline.calibration.gauge import folded, frame_of, gauge_of
+from sagline.calibration.hardly_told import cannot_tell_apart
+from sagline.calibration.observing import observed
+from sagline.calibration.unknowns import Parameters
+from sagline.statics.tables import pose_rows
+from tests.calibration import reference
+from tests.calibration.machines import standing
+
+
+class Told(NamedTuple):
+    """What was asked for, the scatter of it but for the gauge, in deviations of its priors, and what is hardly told."""
+
+    parameters: Parameters
+    scatter: Array
+    found: tuple[Direction, ...]
+
+
+@cache
+def told(robot: str, unknowns: tuple[str, ...], *, positions: bool = False) -> Told:
+    machine, pose, lengths = standing(sl.load_robot(robot), 40)
+    sensors = sl.Sensors(5e-4, 5.0, 1e-3 if positions else None)
+    shared = tuple(name for name in unknowns if name in ("pulley_radius", "axial_stiffness", "linear_density"))
+    parameters = reference.parameters(machine, unknowns, shared=shared)
+    matrix = observed(machine.robot, sl.Catenary(), parameters, sensors, pose_rows(pose), lengths).matrix
+    triangle = folded(np.zeros((0, len(parameters.names))), matrix)
+    gauge = gauge_of(triangle, parameters, parameters.prior, machine.robot, sensors)
+    rows = matrix.reshape(-1, matrix.shape[2]) * frame_of(parameters).scale
+    left = np.array([one.vector for one in gauge]).reshape(len(gauge), rows.shape[1]) / frame_of(parameters).units
+    basis = np.linalg.qr(left.T)[0]
+    outside = np.eye(rows.shape[1]) - basis @ basis.T
+    scatter: Array = outside @ np.linalg.inv(rows.T @ rows + np.eye(rows.shape[1])) @ outside
+    return Told(parameters, scatter, cannot_tell_apart(triangle, parameters, gauge))
+
+
+def test_a_pulley_and_the_height_of_anchors() -> None:
+    seen = told("ipanema-2-pulleys", ("frame_anchors", "length_zero", "pulley_radius"), positions=True).found
+    assert [(one.name, one.step) for one in seen] == [
+        ("pulley_radius with frame_anchors z", "measure the pulley with a caliper")
+    ]
+
+
+def test_a_pulley_and_zeros() -> None:
+    seen = told(
+        "ipanema-2-pulleys", ("length_zero", "pulley_radius", "axial_stiffness", "mass", "center_of_mass")
+    ).found
+    assert [one.name for one in seen] == ["pulley_radius with length_zero"]
+
+
+def test_rope_and_platform_weigh_alike() -> None:
+    seen = told("cogiro", ("length_zero", "linear_density", "mass")).found
+    assert [(one.name, one.step) for one in seen] == [("linear_density with mass", "weigh some meters of the cable")]
+
+
+@pytest.mark.parametrize(
+    ("robot", "unknowns"),
+    [
+        ("cogiro", ("frame_anchors", "length_zero", "axial_stiffness", "mass", "center_of_mass")),
+        ("cogiro", ("frame_anchors", "platform_anchors", "length_zero", "linear_density", "mass", "center_of_mass")),
+        ("ipanema-2-pulleys", ("frame_anchors", "length_zero", "pulley_radius")),
+        ("article-suspended", ("length_zero", "axial_stiffness", "linear_density", "mass")),
+    ],
+)
+def test_what_is_left_of_the_prior(robot: str, unknowns: tuple[str, ...]) -> None:
+    parameters, scatter, found = told(robot, unknowns)
+    units = frame_of(parameters).units
+    for one in found:
+        vector = one.vector / units
+        np.testing.assert_allclose(np.linalg.norm(vector), one.known, rtol=1e-9)
+        unit = vector / one.known
+        np.testing.assert_allclose(np.sqrt(unit @ scatter @ unit), one.known, rtol=1e-4)
+
+
+@pytest.mark.parametrize("robot", ["cogiro", "article-suspended"])
+def test_every_strong_correlation_is_named(robot: str) -> None:
+    unknowns = ("platform_anchors", "length_zero", "axial_stiffness", "mass", "center_of_mass")
+    parameters, scatter, found = told(robot, unknowns)
+    size = np.sqrt(np.diag(scatter))
+    strong = np.argwhere(np.triu(np.abs(scatter / np.outer(size, size)), 1) > 0.98)
+    kinds = {(parameters.labels[i].partition("[")[0], parameters.labels[j].partition("[")[0]) for i, j in strong}
+    named = {tuple(part.partition("[")[0] for part in one.name.split(" with ")) for one in found if "[" in one.name}
+    assert kinds <= named | {(other, one) for one, other in named if (one, other) in named}
+
+
+def test_nothing_is_hardly_told_where_all_is_measured() -> None:
+    assert told("cogiro", ("length_zero", "mass"), positions=True).found == ()

@@ -1,0 +1,121 @@
+"""The least squares, against one that knows nothing of it: all lengths unknowns, slopes by differences."""
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+import sagline as sl
+from sagline.arrays import Array
+from sagline.calibration.calibrate import readings_of, sensors_there
+from sagline.calibration.least_squares import passed, solve
+from sagline.calibration.parameters import external, parameters_of, robot_with
+from sagline.calibration.problem import Fit, Problem
+from sagline.calibration.start import start_of
+from sagline.robot.drum import drums_of
+from tests.calibration.synthetic import Synthetic, log_of, true_robot, usual_sensors, with_drums
+
+NOMINAL = with_drums(pulley_radius=0.04, dead_cable=2.0)
+ERRORS = {"frame_anchors": 0.02, "axial_stiffness": 0.05, "mass": 0.02}
+UNKNOWNS = [sl.Unknown(name, deviation=error) for name, error in ERRORS.items()]
+
+
+def problem_of(made: Synthetic, unknowns: list[sl.Unknown], nominal: sl.Robot = NOMINAL) -> Problem:
+    sensors = sensors_there(made.log)
+    parameters = parameters_of(nominal, unknowns, sensors, counted=made.log.counts is not None)
+    return Problem(nominal, sl.Catenary(), sensors, parameters, readings_of(made.log))
+
+
+def fitted(problem: Problem, made: Synthetic, *, robust: bool = False) -> Fit:
+    kept = np.ones(len(made.log), dtype=np.bool_)
+    begun = passed(problem, start_of(problem, made.log.commanded), None, kept)
+    return solve(problem, begun, kept, robust=robust)
+
+
+def errors_of(problem: Problem, fit: Fit) -> Array:
+    """Standard errors of the internal numbers, (P,)."""
+    information = fit.normal.matrix + np.diag(problem.prior_deviation**-2.0)
+    return np.asarray(np.sqrt(np.diag(np.linalg.inv(information))))
+
+
+def plainly(problem: Problem, made: Synthetic, fit: Fit) -> Array:
+    """The numbers and lengths that a library's least squares finds from the same sum of squares, by the public API."""
+    log, sensors, poses = made.log, problem.sensors, made.pose
+    assert log.counts is not None
+    assert log.load_cells is not None
+    assert sensors.tension_deviation is not None
+    counts, cells, tension = log.counts, log.load_cells, sensors.tension_deviation
+    width = len(problem.prior)
+
+    def misses(x: Array) -> Array:
+        numbers, lengths = x[:width], x[width:].reshape(cells.shape)
+        robot = robot_with(NOMINAL, problem.parameters, external(problem.parameters, numbers))
+        drums = drums_of(robot)
+        said = drums.lengths_at(counts) / (1.0 + drums.rest_strain)
+        found = sl.forward(robot, lengths, poses)
+        assert found.solved.all()
+        return np.concatenate(
+            (
+                ((cells - found.state.cables.frame_end_tension) / tension).ravel(),
+                ((lengths - said) / sensors.length_deviation).ravel(),
+                (numbers - problem.prior) / problem.prior_deviation,
+            )
+        )
+
+    scale = np.concatenate((problem.prior_deviation, np.full(cells.size, 1e-3)))
+    begin = np.concatenate((fit.state.numbers + 1e-4 * scale[:width], fit.state.lengths.ravel()))
+    answer = least_squares(misses, begin, jac="3-point", x_scale=scale, xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    found: Array = answer.x
+    return found
+
+
+def test_the_minimum_is_that_of_a_plain_least_squares_with_all_lengths_as_unknowns() -> None:
+    made = log_of(true_robot(NOMINAL, ERRORS, 3), 4, 3, sets=4)
+    problem = problem_of(made, UNKNOWNS)
+    fit = fitted(problem, made)
+    assert fit.converged
+    width = len(problem.prior)
+    plain = plainly(problem, made, fit)
+    error = errors_of(problem, fit)
+    assert (np.abs(plain[:width] - fit.state.numbers) / error).max() < 1e-3
+    assert np.abs(plain[width:] - fit.state.lengths.ravel()).max() < 1e-6  # of 0.5 mm that a length may be off
+
+
+def test_no_number_falls_below_the_least_that_it_may_be_and_the_others_fit_best_beside_it() -> None:
+    """No pulleys, and lengths that want some of less than none: the conditions of Karush, Kuhn and Tucker."""
+    small = with_drums(pulley_radius=0.001)
+    made = log_of(true_robot(with_drums(pulley_radius=0.0), {}, 1), 12, 1)
+    shifted = made._replace(log=made.log.replace(counts=made.log.readings - 200.0))
+    problem = problem_of(shifted, [sl.Unknown("pulley_radius", deviation=0.02, shared=False)], small)
+    kept = np.ones(12, dtype=np.bool_)
+    begun = passed(problem, start_of(problem, made.log.commanded), None, kept)
+    fit = solve(problem, begun, kept, robust=False)
+    assert fit.converged
+    numbers = fit.state.numbers
+    at_least = numbers == 0.0
+    assert 0 < at_least.sum() < len(numbers)
+    assert numbers.min() == 0.0
+    downhill = fit.normal.gradient - (numbers - problem.prior) / problem.prior_deviation**2
+    assert (downhill[at_least] < 0.0).all()
+    assert np.abs(downhill[~at_least] * errors_of(problem, fit)[~at_least]).max() < 0.01
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_pose_that_does_not_fit_counts_less_and_changes_little(seed: int) -> None:
+    true = true_robot(NOMINAL, ERRORS, seed)
+    honest = log_of(true, 40, seed)
+    slipped = log_of(true, 40, seed, slips={(7, 2): 0.02})
+    fits = [fitted(problem_of(made, UNKNOWNS), made, robust=True) for made in (honest, slipped)]
+    assert fits[1].normal.weights[7] < 0.3
+    assert np.delete(fits[1].normal.weights, 7).min() > 0.6
+    error = np.sqrt(
+        np.diag(np.linalg.inv(fits[0].normal.matrix + np.diag(problem_of(honest, UNKNOWNS).prior_deviation ** -2.0)))
+    )
+    assert (np.abs(fits[1].state.numbers - fits[0].state.numbers) / error).max() < 1.5
+
+
+def test_lengths_follow_their_readings_as_far_as_these_are_trusted() -> None:
+    true = true_robot(NOMINAL, {}, 0, usual_sensors(length_deviation=1e-6))
+    made = log_of(true, 8, 2)
+    fit = fitted(problem_of(made, UNKNOWNS), made)
+    assert np.abs(fit.state.lengths - made.length).max() < 1e-4
+    assert fit.normal.squares.sum() < 3.0 * made.log.readings.size

@@ -1,0 +1,148 @@
+"""What readings tell of the unknowns, block by block, against differences of forward solutions."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.arrays import Array
+from sagline.calibration.observing import observed
+from sagline.calibration.unknowns import KINDS
+from sagline.statics.tables import pose_rows
+from tests.calibration import reference
+from tests.calibration.machines import Standing, robots, sensors, standing
+from tests.calibration.reference import Machine
+
+ROBOTS = robots()
+WITHOUT_WINCHES = ("cogiro", "article-suspended", "planar", "point")
+WITH = {"pulley_radius": ("pulleys", "layers"), "dead_cable": ("pulleys", "layers"), "drum_radius": ("drums", "layers")}
+WITH |= {"load_cell_gain": ("pulleys", "drums"), "load_cell_bias": ("pulleys", "drums")}
+POSE_ONLY = ("measuring_frame", "target")
+CELL_ONLY = ("load_cell_gain", "load_cell_bias")
+CELLS = [(robot, kind) for kind in KINDS if kind not in POSE_ONLY for robot in WITH.get(kind, tuple(ROBOTS))]
+POSES = [(robot, kind) for kind in KINDS if kind not in CELL_ONLY for robot in WITH.get(kind, tuple(ROBOTS))]
+LENGTH = 5e-4  # m
+
+
+@cache
+def stand(name: str) -> Standing:
+    return standing(ROBOTS[name])
+
+
+@cache
+def told(name: str, kind: str) -> Array:
+    """What `observed` says of a kind, not whitened any more: lengths are known to a nanometer."""
+    machine, pose, lengths = stand(name)
+    asked = reference.parameters(machine, (kind,))
+    seen = observed(machine.robot, sl.Catenary(), asked, machine.sensors, pose_rows(pose), lengths)
+    assert not seen.misfit.any()
+    found: Array = seen.matrix * deviations(machine)[:, None]
+    return found
+
+
+@cache
+def differences(name: str, kind: str) -> Array:
+    """The same, (N, m + 6, P)."""
+    machine, pose, lengths = stand(name)
+    each = KINDS[kind]
+    cables = range(machine.robot.cable_count) if each.each else range(1)
+    columns = [
+        reference.slopes(machine, pose, lengths, each.first + axis, cable)
+        for cable in cables
+        for axis in range(len(each.axes))
+    ]
+    return np.stack(columns, axis=-1)
+
+
+def deviations(machine: Machine) -> Array:
+    given = machine.sensors
+    assert given.tension_deviation is not None
+    assert given.position_deviation is not None
+    assert given.rotation_deviation is not None
+    cells = np.full(machine.robot.cable_count, given.tension_deviation)
+    return np.concatenate((cells, given.position_deviation, given.rotation_deviation))
+
+
+def agree(found: Array, wanted: Array) -> None:
+    assert found.shape == wanted.shape
+    largest = np.abs(wanted).max() or 1e-3  # where nothing is told, rounding
+    np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-7 * largest)
+
+
+@pytest.mark.parametrize(("robot", "kind"), CELLS, ids=[f"{kind}-{robot}" for robot, kind in CELLS])
+def test_load_cells_by(robot: str, kind: str) -> None:
+    m = ROBOTS[robot].cable_count
+    agree(told(robot, kind)[:, :m], differences(robot, kind)[:, :m])
+
+
+@pytest.mark.parametrize(("robot", "kind"), POSES, ids=[f"{kind}-{robot}" for robot, kind in POSES])
+def test_positions_by(robot: str, kind: str) -> None:
+    rows = slice(ROBOTS[robot].cable_count, -3)
+    agree(told(robot, kind)[:, rows], differences(robot, kind)[:, rows])
+
+
+@pytest.mark.parametrize(("robot", "kind"), POSES, ids=[f"{kind}-{robot}" for robot, kind in POSES])
+def test_rotations_by(robot: str, kind: str) -> None:
+    agree(told(robot, kind)[:, -3:], differences(robot, kind)[:, -3:])
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_whitening_by_what_lengths_are_off(robot: str) -> None:
+    machine, pose, lengths = stand(robot)
+    loose = machine.sensors.replace(length_deviation=LENGTH)
+    asked = reference.parameters(machine, ("frame_anchors", "mass"))
+    seen = observed(machine.robot, sl.Catenary(), asked, loose, pose_rows(pose), lengths)
+    by_lengths = reference.by_lengths(machine, pose, lengths, sl.Catenary())
+    scatter = np.diag(deviations(machine) ** 2) + LENGTH**2 * by_lengths @ np.swapaxes(by_lengths, -1, -2)
+    slopes = np.concatenate((differences(robot, "frame_anchors"), differences(robot, "mass")), axis=-1)
+    agree(
+        np.swapaxes(seen.matrix, -1, -2) @ seen.matrix, np.swapaxes(slopes, -1, -2) @ np.linalg.solve(scatter, slopes)
+    )
+
+
+@pytest.mark.parametrize("robot", ["cogiro", "drums"])
+@pytest.mark.parametrize("absent", ["tension_deviation", "position_deviation", "rotation_deviation"])
+def test_a_sensor_that_is_not_there_tells_nothing(robot: str, absent: str) -> None:
+    machine, pose, lengths = stand(robot)
+    rows = {"tension_deviation": slice(0, 8), "position_deviation": slice(8, 11), "rotation_deviation": slice(11, 14)}
+    without = machine.sensors.replace(**{absent: None}, length_deviation=LENGTH)
+    asked = reference.parameters(machine, ("frame_anchors", "measuring_frame", "target"))
+    seen = observed(machine.robot, sl.Catenary(), asked, without, pose_rows(pose), lengths)
+    by_lengths = reference.by_lengths(machine, pose, lengths, sl.Catenary())
+    there = np.delete(np.arange(14), rows[absent])
+    kinds = ("frame_anchors", "measuring_frame", "target")
+    slopes = np.concatenate([differences(robot, kind) for kind in kinds], axis=-1)[:, there]
+    scatter = np.diag(deviations(machine)[there] ** 2)
+    scatter = scatter + LENGTH**2 * by_lengths[:, there] @ np.swapaxes(by_lengths[:, there], -1, -2)
+    assert not seen.matrix[:, rows[absent]].any()
+    agree(
+        np.swapaxes(seen.matrix, -1, -2) @ seen.matrix, np.swapaxes(slopes, -1, -2) @ np.linalg.solve(scatter, slopes)
+    )
+
+
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if KINDS[kind].each])
+def test_a_number_of_all_cables_is_the_sum_of_theirs(kind: str) -> None:
+    machine, pose, lengths = stand("layers")
+    asked = reference.parameters(machine, (kind,), shared=(kind,))
+    seen = observed(machine.robot, sl.Catenary(), asked, machine.sensors, pose_rows(pose), lengths)
+    each = told("layers", kind)
+    wanted = each.reshape(*each.shape[:2], 8, -1).sum(axis=2)
+    agree(seen.matrix * deviations(machine)[:, None], wanted)
+
+
+def test_the_reference_itself_with_half_the_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    wide = {(name, kind): differences(name, kind) for name in ("layers", "planar") for kind in ("mass", "length_zero")}
+    monkeypatch.setattr(reference, "STEPS", {row: 0.5 * step for row, step in reference.STEPS.items()})
+    for (name, kind), found in wide.items():
+        agree(differences.__wrapped__(name, kind), found)
+
+
+def test_a_measured_point_written_out() -> None:
+    machine, pose, _ = stand("cogiro")
+    read, _ = reference.readings(machine, stand("cogiro").lengths, pose, sl.Catenary())
+    frame, target = sensors().frame, sensors().target
+    by_hand = [
+        frame.matrix.T @ (p + r @ target - frame.position) for p, r in zip(pose.position, pose.matrix, strict=True)
+    ]
+    np.testing.assert_allclose(read[:, 8:], by_hand, atol=1e-9)

@@ -1,0 +1,60 @@
+"""The numbers that a calibration looks for, and what is known of each beforehand."""
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.calibration.parameters import parameters_of
+from sagline.calibration.unknowns import Parameters
+from sagline.errors import InvalidValueError
+from tests.calibration.synthetic import usual_sensors, with_drums
+
+COGIRO = with_drums(pulley_radius=0.04)
+
+
+def asked(robot: sl.Robot, *unknowns: str | sl.Unknown, sensors: sl.Sensors | None = None) -> Parameters:
+    return parameters_of(robot, unknowns, sensors or usual_sensors(), counted=True)
+
+
+def test_who_asks_knows_best_then_the_robot_file_then_what_is_usual() -> None:
+    told = COGIRO.replace(tolerances={"frame_anchors": [0.01, 0.02, 0.03], "mass": 2.0})
+    own = asked(told, "frame_anchors", "mass", "center_of_mass")
+    np.testing.assert_array_equal(own.prior_deviation[:24], np.tile([0.01, 0.02, 0.03], 8))
+    assert own.prior_deviation[24] == 2.0  # kg: tolerances are in units
+    np.testing.assert_array_equal(own.stated, [True] * 25 + [False] * 3)
+    np.testing.assert_array_equal(own.prior_deviation[25:], 0.05)
+    over = asked(told, sl.Unknown("frame_anchors", deviation=0.5), sl.Unknown("mass", deviation=0.1))
+    np.testing.assert_array_equal(over.prior_deviation[:24], 0.5)
+    assert over.prior_deviation[24] == pytest.approx(0.1 * told.mass)  # a share, as an unknown says it
+    assert over.stated.all()
+
+
+def test_what_the_source_does_not_give_is_less_well_known() -> None:
+    known, guessed = (
+        asked(COGIRO.replace(assumed=assumed), "center_of_mass", "mass")
+        for assumed in ({}, {"center_of_mass": "nobody says"})
+    )
+    np.testing.assert_array_equal(known.prior_deviation[:3], 0.05)
+    np.testing.assert_array_equal(guessed.prior_deviation[:3], 0.2)
+    assert guessed.prior_deviation[3] == known.prior_deviation[3]
+    assert not guessed.stated.any()
+
+
+@pytest.mark.parametrize(("name", "value"), [("axial_stiffness", 1e4), ("pulley_radius", 1e-3)])
+def test_cables_share_a_number_only_where_it_is_equal_and_as_well_known(name: str, value: float) -> None:
+    assert asked(COGIRO, name).labels == (name,)
+    each = value * np.arange(1, 9)
+    apart = asked(COGIRO.replace(tolerances={name: each}), name)
+    assert apart.labels == tuple(f"{name}[{k}]" for k in range(8))
+    np.testing.assert_array_equal(apart.prior_deviation, each)
+    with pytest.raises(InvalidValueError, match=f"unknown: {name} is shared; allowed: equal and as well known"):
+        asked(COGIRO.replace(tolerances={name: each}), sl.Unknown(name, shared=True))
+
+
+@pytest.mark.parametrize("name", ["load_cell_gain", "load_cell_bias"])
+def test_what_no_sensor_sees_is_refused_unless_somebody_knows_it(name: str) -> None:
+    blind = sl.Sensors(position_deviation=1e-3)
+    with pytest.raises(InvalidValueError, match=f"unknown: {name} is seen by no reading.*Add load cells"):
+        asked(COGIRO, name, sensors=blind)
+    assert asked(COGIRO, sl.Unknown(name, deviation=0.2), sensors=blind).prior_deviation[0] == 0.2
+    assert asked(COGIRO.replace(tolerances={name: 0.1}), name, sensors=blind).prior_deviation[0] == 0.1

@@ -1,0 +1,143 @@
+"""Which rows of a log are left out, why, and that none of the good ones are."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.arrays import Array
+from sagline.calibration.screening import lengths_of, reading_count, screened
+from tests.calibration.synthetic import Synthetic, log_of, true_robot, usual_sensors, with_drums
+
+ROBOT = with_drums()
+SENSORS = usual_sensors(position_deviation=1e-3, rotation_deviation=1e-3)
+
+
+@pytest.fixture(scope="module")
+def honest() -> Synthetic:
+    return log_of(true_robot(ROBOT, seed=1, sensors=SENSORS), 40, seed=1, positions=7, rotations=3)
+
+
+def changed(values: Array | None, index: Any, value: float) -> Array:
+    assert values is not None
+    copied = values.copy()
+    copied[index] = value
+    return copied
+
+
+def left_out(log: sl.WinchLog, **options: float) -> dict[str, list[int]]:
+    found = screened(ROBOT, log, **options)
+    assert len(found.log) == len(found.rows)
+    np.testing.assert_array_equal(found.log.readings, log.readings[found.rows])
+    omitted = np.concatenate([found.rows, *found.left_out.values()])
+    np.testing.assert_array_equal(np.sort(omitted), np.arange(len(log)))  # none is counted twice, none in silence
+    return {reason.name: rows.tolist() for reason, rows in found.left_out.items()}
+
+
+def test_every_row_of_an_honest_log_is_kept(honest: Synthetic) -> None:
+    assert left_out(honest.log) == {}
+    assert screened(ROBOT, honest.log).log is honest.log
+
+
+def test_lengths_are_those_of_the_counts(honest: Synthetic) -> None:
+    counts = honest.log.counts
+    assert counts is not None
+    np.testing.assert_array_equal(lengths_of(ROBOT, honest.log), sl.lengths_from_counts(ROBOT, counts))
+    lengths = honest.log.replace(counts=None, unstrained_length=honest.length)
+    assert lengths_of(ROBOT, lengths) is lengths.unstrained_length
+
+
+def test_readings_that_tell_are_counted(honest: Synthetic) -> None:
+    assert reading_count(honest.log) == 40 * 8 + 7 * 3 + 3 * 3
+    log = honest.log.replace(load_cells=changed(honest.log.load_cells, (slice(4), 2), np.nan), rotation=None)
+    assert reading_count(log) == 40 * 8 - 4 + 7 * 3
+    assert reading_count(honest.log.replace(load_cells=None, position=None, rotation=None)) == 0
+
+
+def test_rows_without_a_reading_that_the_others_have_are_left_out(honest: Synthetic) -> None:
+    log = honest.log
+    assert left_out(log.replace(counts=changed(log.counts, (5, 2), np.nan))) == {"NOT_A_NUMBER": [5]}
+    cells = changed(log.load_cells, (9, 1), np.nan)
+    assert left_out(log.replace(load_cells=cells)) == {"NOT_A_NUMBER": [9]}
+    assert left_out(log.replace(load_cells=changed(log.load_cells, (slice(None), 3), np.nan))) == {}  # it has no cell
+    rare = changed(log.load_cells, (slice(0, 30), 3), np.nan)
+    assert left_out(log.replace(load_cells=rare)) == {}
+    often = changed(log.load_cells, (slice(0, 19), 3), np.nan)
+    assert left_out(log.replace(load_cells=often)) == {"NOT_A_NUMBER": list(range(19))}
+
+
+def test_repeated_rows_are_left_out(honest: Synthetic) -> None:
+    log = honest.log.rows(np.array([0, 1, 2, 1, 3, 0, 1]))
+    assert left_out(log) == {"REPEATED": [3, 5, 6]}
+    cells = log.load_cells
+    assert cells is not None
+    almost = log.replace(load_cells=changed(cells, (5, 7), float(np.nextafter(cells[5, 7], 1e9))))
+    assert left_out(almost) == {"REPEATED": [3, 6]}
+
+
+def test_rows_that_move_are_left_out() -> None:
+    """Three rows of a stop, a drive of four, a stop, at 10 Hz; then a row half a minute later."""
+    drive = np.array([0.0, 0.0, 0.0, 0.002, 0.03, 0.06, 0.09, 0.09, 0.0901, 5.0])
+    time = np.array([*np.arange(9) / 10.0, 30.0])
+    length = 8.0 + drive[:, None] * np.array([1.0, -0.5, 0, 0, 0, 0, 0, 0]) + 1e-9 * np.arange(10)[:, None]
+    log = sl.WinchLog(unstrained_length=length, time=time)
+    assert left_out(log) == {"MOVING": [2, 3, 4, 5, 6]}
+    mixed = np.array([9, 3, 4, 0, 1, 2, 8, 7, 6, 5])
+    assert left_out(log.rows(mixed)) == {"MOVING": [1, 2, 5, 8, 9]}
+    assert left_out(log, speed_limit=0.31) == {}
+    assert left_out(log, speed_limit=0.0009)["MOVING"] == [2, 3, 4, 5, 6, 7, 8]
+    assert left_out(log.replace(time=None)) == {}
+    assert left_out(log.replace(time=np.zeros(10))) == {}
+
+
+@pytest.mark.parametrize("rate", [10.0, 100.0, 2000.0])
+def test_encoders_that_tremble_do_not_move(rate: float) -> None:
+    """A count either way is 9 mm/s from row to row at a kilohertz; a creep of 6 mm/s is none of that."""
+    time = np.arange(0.0, 2.0, 1.0 / rate)
+    counts = np.random.default_rng(0).integers(-1, 2, (len(time), 8)).astype(np.float64)
+    still = sl.WinchLog(counts=counts, time=time)
+    assert "MOVING" not in left_out(still)
+    creeping = still.replace(counts=counts + 1.1e5 * 0.007 * time[:, None])
+    assert left_out(creeping) == {"MOVING": list(range(len(time)))}
+
+
+def test_slack_rows_are_left_out(honest: Synthetic) -> None:
+    log = honest.log
+    assert left_out(log.replace(load_cells=changed(log.load_cells, (4, 6), 15.0))) == {"SLACK": [4]}
+    assert left_out(log.replace(load_cells=changed(log.load_cells, (4, 6), 15.01))) == {}
+    biased = with_drums(load_cell_bias=20.0)
+    found = screened(biased, log.replace(load_cells=changed(log.load_cells, (4, 6), 35.0)))
+    assert found.left_out[sl.Omission.SLACK].tolist() == [4]
+
+
+def test_a_row_is_counted_for_its_first_reason(honest: Synthetic) -> None:
+    log = honest.log.rows(np.array([0, 1, 1, 1, 2]))
+    cells = changed(log.load_cells, (slice(1, 4), 0), -3.0)
+    log = log.replace(load_cells=cells, counts=changed(log.counts, (3, 0), np.nan))
+    assert left_out(log) == {"NOT_A_NUMBER": [3], "REPEATED": [2], "SLACK": [1]}
+
+
+def test_a_log_of_no_rows_keeps_none(honest: Synthetic) -> None:
+    assert left_out(honest.log.rows(slice(0, 0))) == {}
+
+
+@pytest.mark.parametrize("rows", [slice(None), slice(3, 4)])
+def test_counts_on_no_drum_are_told_by_row_and_cable(honest: Synthetic, rows: slice) -> None:
+    robot = with_drums(cable_length=22.0)
+    log = honest.log.rows(rows)
+    row = len(log) - 1
+    off = log.replace(counts=changed(log.counts, (row, 5), 4e6))
+    with pytest.raises(sl.InvalidValueError, match=f"^row {row}, cable 5: count is 4000000; allowed: -inf to 1261589"):
+        screened(robot, off)
+
+
+def test_what_does_not_fit_the_robot_is_refused(honest: Synthetic) -> None:
+    with pytest.raises(sl.InvalidValueError, match="log is of 8 cables; allowed: 7 cables, those of"):
+        screened(sl.load_robot("falcon-7"), honest.log)
+    with pytest.raises(sl.InvalidValueError, match="winches"):
+        screened(sl.load_robot("cogiro"), honest.log)
+    with pytest.raises(sl.InvalidValueError, match="speed_limit is 0 m/s"):
+        screened(ROBOT, honest.log, 0.0)

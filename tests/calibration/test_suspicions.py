@@ -1,0 +1,149 @@
+"""Mistakes in logs are told by what they are, and honest logs, however wrong the drawing is, raise no alarm."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.calibration.suspicions import suspicions
+from tests.calibration.mistakes import (
+    MISTAKES,
+    Maker,
+    commanded_in_millimeters,
+    deviations_in_millimeters,
+    far_zero,
+    kilonewtons,
+    late_cells,
+    millimeters,
+    positions_in_millimeters,
+    swapped_cables,
+    swapped_cells,
+    swapped_encoders,
+)
+from tests.calibration.synthetic import USUAL, log_of, true_robot, usual_sensors, with_drums
+
+SENSORS = usual_sensors(position_deviation=1e-3)
+ROBOTS = (
+    with_drums(),
+    sl.load_robot("cogiro"),
+    with_drums(pulley_radius=0.05, dead_cable=3.0, gear=np.array([10.0, -10.0] * 4), count_zero=1e5),
+)
+MORE_ERRORS = {**USUAL, "platform_anchors": 0.01, "drum_radius": 0.01, "load_cell_gain": 0.01, "load_cell_bias": 10.0}
+
+
+class Honest(NamedTuple):
+    """An honest log, what it is called, and the robot as drawn."""
+
+    name: str
+    robot: sl.Robot
+    log: sl.WinchLog
+
+
+def honest(count: int, anchors: float) -> Iterator[Honest]:
+    """Logs of robots with anchors so far off [m]."""
+    for seed in range(count):
+        rng = np.random.default_rng((seed, int(1e3 * anchors)))
+        robot = ROBOTS[int(rng.integers(len(ROBOTS)))]
+        usual = MORE_ERRORS if robot.winches is not None and rng.random() < 0.3 else USUAL
+        truth = true_robot(robot, {**usual, "frame_anchors": anchors}, seed, sensors=SENSORS)
+        rows, sets, positions = int(rng.choice([20, 60])), int(rng.choice([1, 4])), int(rng.choice([0, 5]))
+        log = log_of(truth, rows, seed, sets=sets, positions=positions).log
+        if rng.random() < 0.3:
+            log = log.replace(commanded=None)
+        yield Honest(f"{robot.name}, seed {seed}: {log}", robot, log)
+
+
+@pytest.mark.parametrize(
+    ("count", "anchors"),
+    [
+        (10, 0.05),
+        (2, 0.5),
+        pytest.param(100, 0.05, marks=pytest.mark.soak),
+        pytest.param(100, 0.5, marks=pytest.mark.soak),
+    ],
+)
+def test_honest_logs_raise_no_alarm(count: int, anchors: float) -> None:
+    alarms = {name: told for name, robot, log in honest(count, anchors) if (told := suspicions(robot, log))}
+    assert alarms == {}
+
+
+def told_wrongly(makers: tuple[Maker, ...], seeds: range) -> list[str]:
+    """Cases in which the mistake is not what is told, and nothing else."""
+    wrong = []
+    for seed in seeds:
+        robot = ROBOTS[seed % 2]
+        truth = true_robot(robot, USUAL, seed, sensors=SENSORS)
+        log = log_of(truth, 60, seed, positions=4).log
+        for make in makers:
+            if make is millimeters and log.counts is not None:
+                continue
+            made = make(log, robot, np.random.default_rng(seed))
+            told = suspicions(robot, made.log)
+            if len(told) != 1 or not all(words in told[0] for words in made.told) or len(told[0]) > 220:
+                wrong.append(f"{make.__name__}, seed {seed}: {made.told} but {told}")
+    return wrong
+
+
+def test_the_units_of_readings_are_told() -> None:
+    units = (millimeters, positions_in_millimeters, commanded_in_millimeters, deviations_in_millimeters, kilonewtons)
+    assert told_wrongly((*units, far_zero), range(4)) == []
+
+
+@pytest.mark.parametrize("make", MISTAKES[:5], ids=lambda make: make.__name__)
+def test_a_mistake_is_told_by_what_it_is(make: Maker) -> None:
+    assert told_wrongly((make,), range(1, 2)) == []
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("make", MISTAKES, ids=lambda make: make.__name__)
+def test_mistakes_are_told_by_what_they_are(make: Maker) -> None:
+    assert told_wrongly((make,), range(40)) == []
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("make", [swapped_encoders, swapped_cables, swapped_cells, late_cells])
+def test_mistakes_are_told_without_commanded_poses(make: Maker) -> None:
+    robot = ROBOTS[0]
+    log = log_of(true_robot(robot, USUAL, 5), 60, 5).log.replace(commanded=None)
+    made = make(log, robot, np.random.default_rng(5))
+    (told,) = suspicions(robot, made.log)
+    assert all(words in told for words in made.told), told
+
+
+def test_a_mistake_is_told_of_a_log_with_rows_that_are_not_fit() -> None:
+    """Rows keep their numbers: cells that are late are late in the whole log."""
+    robot = ROBOTS[0]
+    log = log_of(true_robot(robot, USUAL, 3), 60, 3).log
+    made = late_cells(log, robot, np.random.default_rng(3))
+    cells = made.log.load_cells
+    assert cells is not None
+    gaps = cells.copy()
+    gaps[[3, 17, 18, 40], 2] = np.nan
+    (told,) = suspicions(robot, made.log.replace(load_cells=gaps))
+    assert all(words in told for words in made.told), told
+
+
+@pytest.mark.parametrize("changes", [{"load_cells": None}, {"load_cells": None, "commanded": None}])
+def test_lengths_alone_say_nothing(changes: dict[str, Any]) -> None:
+    robot = ROBOTS[1]
+    log = log_of(true_robot(robot, USUAL, 3), 20, 3).log.replace(**changes)
+    assert suspicions(robot, log) == ()
+    assert suspicions(robot, log.rows(slice(0, 0))) == ()
+
+
+def test_what_is_none_is_refused() -> None:
+    log = log_of(true_robot(ROBOTS[1]), 4).log
+    wrong: Any = "a log"
+    for robot, given, model in (
+        (ROBOTS[1], wrong, sl.Catenary()),
+        (wrong, log, sl.Catenary()),
+        (ROBOTS[1], log, wrong),
+    ):
+        with pytest.raises(sl.InvalidValueError):
+            suspicions(robot, given, model)
+    with pytest.raises(sl.InvalidValueError, match="log is of 8 cables"):
+        suspicions(sl.load_robot("falcon-7"), log)
