@@ -31,6 +31,13 @@ from tests.effort import least_seconds
         ("100 Hz", "1/s", 100.0),
         ("5 N*m/m", "N", 5.0),
         ("1 lbf", "N", 4.4482216152605),
+        ("20 Nm", "N m", 20.0),
+        ("20Nm", "N*m", 20.0),
+        ("2 cNm", "N m", 0.02),
+        ("0.5 kNm", "N m", 500.0),
+        ("3 Nm/rad", "N m/rad", 3.0),
+        ("2 1/Nm", "1/(N*m)", 2.0),  # the whole of it below the line
+        ("5 nm", "m", 5e-9),
         ("180 deg", "rad", 3.141592653589793),
         ("980.665 cm/s^2", "m/s^2", 9.80665),
         (float("inf"), "N", float("inf")),
@@ -138,6 +145,13 @@ def test_not_a_number_is_a_word_that_nobody_takes() -> None:
         ("5 m\n", "kg"),
         ("5 degC", "m"),
         ("5 dB", "N"),
+        ("5 nm", "N m"),
+        ("5 NM", "N m"),
+        ("5 Nm", "m"),
+        ("5 Nms", "N m"),  # seconds, or several Nm
+        ("5 Nms", "N m s"),
+        ("5 Nm^2", "N m^2"),
+        ("5 Nm²", "N m^2"),
     ],
 )
 def test_units_that_will_not_do_are_told_at_once(text: str, unit: str) -> None:

@@ -14,7 +14,9 @@ from sagline.errors import FileError, InvalidValueError, printable
 from sagline.files.robot_file import dump_robot, load_robot, parse_robot
 from sagline.robot.catalogue import robot_names
 from sagline.robot.pose_box import PoseBox
+from sagline.robot.provenance import Provenance
 from sagline.robot.robot import Robot
+from sagline.robot.tolerances import UNCERTAIN, value_of
 from sagline.robot.winch import Winch
 
 TEXT = """
@@ -28,6 +30,7 @@ tension_min: 20
 tension_max: [1 kN, 2 kN, .inf]
 assumed: {mass: a guess}
 """
+LOG = {"log": "winches.csv", "date": "2026-03-01"}
 
 
 def edited(**changes: Any) -> str:
@@ -38,6 +41,10 @@ def edited(**changes: Any) -> str:
 def arrays_of(robot: Robot) -> dict[str, Any]:
     values = {field.name: getattr(robot, field.name) for field in fields(robot)}
     cables, box, winches = values.pop("cables"), values.pop("test_box"), values.pop("winches")
+    values |= {f"tolerances.{key}": field for key, field in values.pop("tolerances").items()}
+    if (known := values.pop("calibration")) is not None:
+        values |= {"calibration": (known.log, known.date, known.note)}
+        values |= {f"calibration.standard_error.{key}": field for key, field in known.standard_error.items()}
     values |= {f"cables.{key}": field for key, field in cables.known().items()}
     if winches is not None:
         values |= {f"winches.{key}": field for key, field in winches.known().items()}
@@ -124,6 +131,23 @@ QUANTITIES: dict[str, tuple[Any, Any]] = {
     "winches.load_cell_deviation": (2.5, "250 cN"),
     "winches.load_cell_bias": (-1.5, "-1500 mN"),
     "winches.load_cell_gain": (1.01, "1.01"),
+    "tolerances.frame_anchors": ([0.01, 0.02, 0.03], ["10 mm", "2 cm", 0.03]),
+    "tolerances.platform_anchors": ([[0.01, 0.02, 0.03]] * 3, [["10 mm", "2 cm", 0.03]] * 3),
+    "tolerances.length_zero": ([1, 2, 3], ["1 m", "200 cm", 3]),
+    "tolerances.drum_radius": (1e-4, "0.1 mm"),
+    "tolerances.linear_density": (1e-3, "1 g/m"),
+    "tolerances.axial_stiffness": ([1e3, 2e3, np.inf], ["1 kN", "2 kN", "inf"]),
+    "tolerances.pulley_radius": (1e-3, "1 mm"),
+    "tolerances.dead_cable": (0.1, "10 cm"),
+    "tolerances.load_cell_gain": (0.02, "0.02"),
+    "tolerances.load_cell_bias": (20, "0.02 kN"),
+    "tolerances.mass": (0.01, "10 g"),
+    "tolerances.center_of_mass": (0.01, "1 cm"),
+}
+QUANTITIES |= {
+    key.replace("tolerances", "calibration.standard_error"): QUANTITIES[key]
+    for key in QUANTITIES
+    if key.startswith("tol")
 }
 BESIDE: dict[str, dict[str, Any]] = {
     "cables.linear_density": {"axial_stiffness": 1e4},
@@ -148,6 +172,8 @@ BESIDE: dict[str, dict[str, Any]] = {
 
 
 def with_quantity(key: str, value: Any) -> Robot:
+    if key.startswith("calibration"):
+        return parse_robot(edited(calibration={**LOG, "standard_error": {key.split(".")[2]: value}}), "robot.yaml")
     outer, _, inner = key.partition(".")
     return parse_robot(edited(**{outer: {**BESIDE.get(key, {}), inner: value} if inner else value}), "robot.yaml")
 
@@ -167,7 +193,9 @@ def test_a_tilt_in_degrees() -> None:
 
 
 def test_the_block_has_every_field_of_the_winch() -> None:
-    assert {f"winches.{field.name}" for field in fields(Winch)} == {key for key in QUANTITIES if "winches" in key}
+    assert {f"winches.{field.name}" for field in fields(Winch)} == {
+        key for key in QUANTITIES if key.startswith("winches")
+    }
 
 
 @pytest.mark.parametrize(
@@ -289,6 +317,28 @@ def test_ways_to_give_the_inertia(inertia: object, expected: object) -> None:
         ({"name": 12}, 'name is 12; allowed: text. Put it in quotes: name: "..."'),
         ({"assumed": {"masss": "x"}}, "assumed: field is 'masss'"),
         ({"test_box": {"low": [0, 0, 0], "high": [1, 1, "1 kg"]}}, "test_box.high\\[2\\] is '1 kg'"),
+        ({"tolerances": {"masss": 1}}, "tolerances.masss is an unknown key.*mean mass"),
+        ({"tolerances": 3}, "tolerances is 3; allowed: keys frame_anchors"),
+        ({"tolerances": {"mass": 0}}, "tolerances: mass is 0 kg; allowed: > 0 kg"),
+        ({"tolerances": {"mass": "-1 %"}}, "tolerances: mass is -0.005 kg; allowed: > 0 kg"),
+        ({"tolerances": {"mass": "1 m"}}, "tolerances.mass is '1 m'; allowed: a number in kg"),
+        ({"tolerances": {"mass": "x %"}}, "tolerances.mass is 'x %'; allowed: a share"),
+        ({"tolerances": {"frame_anchors": "1 %"}}, "tolerances.frame_anchors is '1 %'; allowed: a number in m"),
+        ({"tolerances": {"drum_radius": "1 %"}}, "tolerances: drum_radius is in percent; allowed: a field that is"),
+        (
+            {"tolerances": {"axial_stiffness": ["1 %", 5e3, "1 %"]}},
+            "axial_stiffness\\[1\\] is 5000.0; allowed: a share",
+        ),
+        ({"tolerances": {"axial_stiffness": ["1 %", "2 %"]}}, "axial_stiffness is of shape \\(2,\\)"),
+        ({"tolerances": {"frame_anchors": [[1, 1, 1]] * 2}}, "frame_anchors is of shape \\(2, 3\\); allowed: shape"),
+        ({"calibration": {"date": "2026-01-01"}}, "calibration.log is missing"),
+        ({"calibration": {"log": "a.csv", "date": "soon"}}, "calibration: date is 'soon'; allowed: a date in ISO"),
+        ({"calibration": {**LOG, "standard_error": {"target": 1}}}, "calibration.standard_error.target is an unknown"),
+        ({"calibration": {**LOG, "standard_error": {"mass": -1}}}, "calibration: standard_error: mass is -1 kg"),
+        (
+            {"calibration": {**LOG, "standard_error": {"length_zero": [0.1] * 4}}},
+            "standard_error: length_zero is of shape \\(4,\\); allowed: shape \\(\\) or \\(3,\\)",
+        ),
     ],
 )
 def test_a_wrong_value_is_named_with_its_file(changes: dict[str, Any], message: str) -> None:
@@ -389,6 +439,25 @@ def test_a_row_too_few_or_a_wrong_unit_of_any_key_of_a_winch_is_named(key: str) 
             parse_robot(edited(winches={key: wrong}), "robot.yaml")
 
 
+def test_the_blocks_have_every_number_that_may_be_off() -> None:
+    for block in ("tolerances", "calibration.standard_error"):
+        keys = [key.removeprefix(f"{block}.") for key in QUANTITIES if key.startswith(block)]
+        assert keys == list(UNCERTAIN), block
+
+
+@pytest.mark.parametrize("name", [name for name, what in UNCERTAIN.items() if what.share])
+def test_a_share_is_of_the_robots_own_number(name: str) -> None:
+    winches = {"drum_radius": ["60 mm", 0.07, 0.08], "load_cell_gain": [1.0, 1.1, 0.9]}
+    for percent in ("5 %", "5%", " 5.0 %"):
+        robot = parse_robot(edited(winches=winches, tolerances={name: percent}), "robot.yaml")
+        value = value_of(robot, name)
+        assert value is not None
+        np.testing.assert_allclose(robot.tolerances[name], 0.05 * value, rtol=1e-15)
+    if name != "mass":
+        robot = parse_robot(edited(winches=winches, tolerances={name: ["1 %", "2 %", "3 %"]}), "robot.yaml")
+        np.testing.assert_allclose(robot.tolerances[name], np.array([0.01, 0.02, 0.03]) * np.asarray(value), rtol=1e-15)
+
+
 NUMBER = st.floats(-1e9, 1e9)
 POSITIVE = st.floats(1e-12, 1e12)
 
@@ -430,5 +499,9 @@ def test_any_robot_survives_the_dump_bit_for_bit(
         source=text,
         notes=text,
         assumed={"mass": text},
+        tolerances={"frame_anchors": np.reshape(positive, (2, 3)), "axial_stiffness": positive[:2], "mass": np.inf},
+        calibration=Provenance(text, "2026-03-01", {"platform_anchors": positive[3:], "mass": positive[0]}, text)
+        if wound
+        else None,
     )
     assert_same(parse_robot(dump_robot(robot), "dump"), robot)

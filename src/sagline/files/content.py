@@ -17,6 +17,7 @@ OTHERS: Final = {
     "sagline_simulation_format": ("a simulation", "Read it with load_simulation, or play it: sagline view ROBOT FILE."),
     "sagline_execution_format": ("an execution", "Open it with xarray.open_dataset; its plan is its group 'plan'."),
     "sagline_workspace_format": ("a workspace", "Read it with load_workspace."),
+    "sagline_calibration_format": ("a calibration", "Read it with load_calibration."),
     "sagline_frequency_map_format": ("a frequency map", "Open it with xarray.open_dataset."),
 }
 

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sagline.files.plan_file import MODELS, choice_attributes, choice_of
+from sagline.cables.models import MODELS
+from sagline.files.plan_file import choice_attributes, choice_of
 from sagline.files.workspace_layout import CRITERIA
 from sagline.interference.mesh import Mesh
 from sagline.interference.obstacles import Box, Capsule, Sphere

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal
 
-from sagline.errors import FileError
+from sagline.errors import FileError, InvalidValueError
 from sagline.files.content import Content
 from sagline.files.kinds import kind_of
 from sagline.files.seal import Seal, seal, seal_of
@@ -22,7 +23,7 @@ _KINDS: Final = {
     **{f".{kind}": f"a {kind.upper()} file" for kind in ("csv", "json", "png", "svg")},
 }
 INFLATION = 1000  # times the size of a file that its numbers may take in memory: nobody packs them so well
-HEADERS: Final = 1 << 18  # bytes, more than all names and attributes take beside the robot
+HEADERS: Final = 1 << 18  # bytes, more than all names and attributes take beside texts, such as the robot
 
 
 def write_dataset(data: Dataset, file: Path, groups: Mapping[str, Dataset] | None = None) -> None:
@@ -37,7 +38,8 @@ def write_dataset(data: Dataset, file: Path, groups: Mapping[str, Dataset] | Non
         FileError: If the file cannot be written; what was there before is untouched.
     """
     parts: list[tuple[str | None, Dataset]] = [(None, data), *(groups or {}).items()]
-    size = sum(part.nbytes + HEADERS + len(part.attrs["robot"].encode()) for _, part in parts)
+    texts = [value for _, part in parts for value in part.attrs.values() if isinstance(value, str)]
+    size = sum(part.nbytes + HEADERS for _, part in parts) + sum(len(text.encode()) for text in texts)
     with written_whole(file, size=size) as partial:
         try:
             for group, part in parts:
@@ -66,6 +68,24 @@ def read_dataset(path: Path, content: Content) -> tuple[Dataset, Seal]:
     """
     found = _seal(path, content)
     return _opened(path, content), found
+
+
+@contextmanager
+def told_of(path: Path) -> Iterator[None]:
+    """Tell what is wrong with the values of a file with the file that has them.
+
+    Args:
+        path: The file.
+
+    Raises:
+        FileError: If a variable or an attribute is missing, or a value is none that will do.
+    """
+    try:
+        yield
+    except KeyError as error:
+        raise FileError(path, f"has no {error.args[0]}", "Write it again; it is incomplete or was edited.") from None
+    except InvalidValueError as error:
+        raise FileError.of(path, error) from None
 
 
 def is_of(path: Path, content: Content) -> bool:

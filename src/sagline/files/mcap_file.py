@@ -203,5 +203,4 @@ def check_packages() -> None:
     """
     for name in PACKAGES:
         if find_spec(name) is None:
-            step = 'Logs need it: pip install "sagline[log]"'
-            raise FileError(f"package {name}", "is not installed", step)
+            raise FileError.not_installed(name, "Logs need it", "log")

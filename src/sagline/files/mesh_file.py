@@ -94,8 +94,7 @@ def _triangles(path: Path, data: bytes) -> tuple[Array, Indices]:
     try:
         import trimesh
     except ImportError:
-        step = 'Meshes need it: pip install "sagline[workspace]"'
-        raise FileError("package trimesh", "is not installed", step) from None
+        raise FileError.not_installed("trimesh", "Meshes need it", "workspace") from None
     kind = path.suffix.lower()[1:]
     try:
         read: Any = trimesh.load(BytesIO(data), file_type=kind, force="mesh", process=False, skip_materials=True)

@@ -6,12 +6,10 @@ import os
 from pathlib import Path as FilePath
 from typing import Any, Literal
 
-import numpy as np
-
 from sagline.arguments import file_path
-from sagline.arrays import Array, checked
 from sagline.errors import FileError, InvalidValueError
-from sagline.files.path_table import FARTHEST, QUATERNION_TOLERANCE, path_from_table
+from sagline.files.path_table import path_from_table
+from sagline.files.pose_entry import PoseEntry, pose_of_entry
 from sagline.files.quantity import in_si
 from sagline.files.schema import Entry, validated
 from sagline.files.table import TABLE_LIMIT
@@ -19,7 +17,6 @@ from sagline.files.text import read_text
 from sagline.files.yaml_text import YAML_LIMIT, parse_mapping
 from sagline.motion.path import Path
 from sagline.motion.rest_to_rest import quintic_path, septic_path
-from sagline.robot.pose import Pose
 
 TIMING_UNITS = {
     "rate": "1/s",
@@ -29,7 +26,6 @@ TIMING_UNITS = {
     "angular_speed": "rad/s",
     "angular_acceleration": "rad/s^2",
 }
-UNITS_STEP = "Check its unit: numbers are meters, millimeters are written as 1500 mm."
 PROFILES = {"quintic": quintic_path, "septic": septic_path}
 
 
@@ -47,6 +43,8 @@ def load_path(file: str | os.PathLike[str]) -> Path:
           - {position: [0, 0, 1.5]}
           - {position: [2 m, 1500 mm, 1.5], euler: {alpha: 20 deg}}        # alpha about z, beta about y, gamma about x
           - {position: [2, 1, 1.5], quaternion: [0, 0, 0.6, 0.8]}          # x, y, z, w
+
+    Poses to calibrate by, as their `save` writes them, are such a file, with the tensions and lengths of each waypoint.
 
     A CSV file has one row for each sample, below a header `time,x,y,z`, followed by `alpha,beta,gamma`, by
     `qx,qy,qz,qw`, or by nothing for a constant orientation. Units stand in brackets, `time [s],x [mm],...,alpha [deg]`;
@@ -80,16 +78,12 @@ def load_path(file: str | os.PathLike[str]) -> Path:
         raise FileError.of(path, error) from None
 
 
-class _Euler(Entry):
-    alpha: Any = 0.0
-    beta: Any = 0.0
-    gamma: Any = 0.0
+class _Waypoint(PoseEntry):
+    """A pose, and what `CalibrationPoses.save` writes beside it: how the cables are wound there, which is no path."""
 
-
-class _Waypoint(Entry):
-    position: Any
-    euler: _Euler | None = None
-    quaternion: Any = None
+    frame_end_tension: Any = None
+    unstrained_length: Any = None
+    counts: Any = None
 
 
 class _Waypoints(Entry):
@@ -101,6 +95,7 @@ class _Waypoints(Entry):
     angular_acceleration: Any = None
     profile: Literal["quintic", "septic"] = "quintic"
     waypoints: list[_Waypoint]
+    calibration: dict[str, Any] | None = None  # what poses to calibrate by are for
 
 
 def _path_from_yaml(path: FilePath, text: str) -> Path:
@@ -110,32 +105,6 @@ def _path_from_yaml(path: FilePath, text: str) -> Path:
         for name, unit in TIMING_UNITS.items()
         if name in entry.model_fields_set
     }
-    return PROFILES[entry.profile]([_pose(w, f"waypoints[{k}]") for k, w in enumerate(entry.waypoints)], **timing)
-
-
-def _pose(waypoint: _Waypoint, item: str) -> Pose:
-    position = _numbers(waypoint.position, 3, "m", f"{item}.position")
-    if (far := float(np.abs(position).max())) > FARTHEST:
-        raise InvalidValueError(f"{item}.position", f"{far:g} m away", f"up to {FARTHEST:g} m", UNITS_STEP)
-    if waypoint.quaternion is None:
-        euler = waypoint.euler or _Euler()
-        angles = [in_si(angle, "rad", f"{item}.euler.{name}") for name, angle in euler]
-        return Pose.from_euler(position, *_numbers(angles, 3, "rad", f"{item}.euler"))
-    if waypoint.euler is not None:
-        raise InvalidValueError(
-            item, "given with euler and quaternion", "one of the two, or none", "Leave one of them out."
-        )
-    quaternion = _numbers(waypoint.quaternion, 4, "", f"{item}.quaternion")
-    length = float(np.linalg.norm(quaternion))
-    if abs(length - 1.0) > QUATERNION_TOLERANCE:
-        raise InvalidValueError(
-            f"the length of {item}.quaternion", f"{length:.6g}", f"1 to {QUATERNION_TOLERANCE:g}", f"Correct {item}."
-        )
-    return Pose.from_quaternion(position, quaternion / length)
-
-
-def _numbers(value: Any, count: int, unit: str, item: str) -> Array:
-    numbers = checked(in_si(value, unit, item), item, unit)
-    if numbers.shape != (count,):
-        raise InvalidValueError(item, f"of shape {numbers.shape}", f"a list of {count} numbers", f"Correct {item}.")
-    return numbers
+    return PROFILES[entry.profile](
+        [pose_of_entry(w, f"waypoints[{k}]") for k, w in enumerate(entry.waypoints)], **timing
+    )

@@ -13,15 +13,11 @@ import numpy as np
 
 from sagline.arguments import file_path, instance
 from sagline.arrays import locked
-from sagline.cables.catenary import Catenary
-from sagline.cables.elastic import Elastic
-from sagline.cables.empirical import Empirical
 from sagline.cables.model import CableState
-from sagline.cables.parabolic import Parabolic
-from sagline.cables.straight import Straight
+from sagline.cables.models import MODELS
 from sagline.errors import FileError, InvalidValueError, SaglineWarning
 from sagline.files.content import Content
-from sagline.files.dataset import read_dataset, write_dataset
+from sagline.files.dataset import read_dataset, told_of, write_dataset
 from sagline.files.plan_checks import check_plan
 from sagline.files.plan_layout import JERK, MACHINE, MOTION, PROOF, QUANTITIES, TIME, WINDING
 from sagline.files.robot_file import dump_robot, parse_robot
@@ -46,7 +42,6 @@ CONTENT = Content(
     key="sagline_format",
     format=2,  # 2: with a digest
 )
-MODELS = {model.__name__: model for model in (Straight, Elastic, Empirical, Parabolic, Catenary)}
 RESTS = "rests"  # of a path whose rests are known
 FREE = {"unstrained_length": "free_length", "chord_tension": "free_chord_tension"}  # of cables over pulleys
 STATE_ARRAYS = ("span", "rise", "unstrained_length", "horizontal_tension", "vertical_force", "chord_tension")
@@ -106,12 +101,8 @@ def load_plan(file: os.PathLike[str] | str) -> Plan:
     else:
         text = f"{path} is from before plans carried a digest: damage to it need not show. Save it again to have one."
         warnings.warn(text, SaglineWarning, stacklevel=2)
-    try:
+    with told_of(path):
         return plan_of(path, data, parse_robot(str(data.attrs["robot"]), f"{path}, robot"))
-    except KeyError as error:
-        raise FileError(path, f"has no {error.args[0]}", "Write it again; it is incomplete or was edited.") from None
-    except InvalidValueError as error:
-        raise FileError.of(path, error) from None
 
 
 def plan_dataset(plan: Plan) -> Dataset:

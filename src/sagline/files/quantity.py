@@ -25,6 +25,7 @@ _WORD = r"[-+]?\.?(?:inf|Inf|INF)|\.?(?:nan|NaN|NAN)"  # as YAML and Python writ
 _FACTOR = r"[A-Za-zµμΩÅ°_]+(?:[ \t]?(?:\^|\*\*)[ \t]?[-+]?[0-9]|[²³])?"  # no parentheses, pint trips over some
 _UNIT = rf"{_FACTOR}(?:(?:[ \t]?[*/·][ \t]?|[ \t]){_FACTOR}){{0,5}}"
 _BLANKS = re.compile("[ \t\r\n\u00a0\u202f]+")  # the last two are what typographers put before a unit
+_TORQUE = re.compile(r"\b([cmkM]?N)m\b(?![ \t]?(?:\^|\*\*))")  # Nm, written as people do; Nm^2 and Nms are not clear
 _PLAIN = re.compile(rf"[ \t]*(?:({_DECIMAL})|{_WORD})[ \t]*")
 _WITH_UNIT = re.compile(rf"[ \t]*({_DECIMAL})([ \t]+1[ \t]?/[ \t]?{_UNIT}|[ \t]*{_UNIT})[ \t]*")
 
@@ -114,7 +115,8 @@ def _factor(given: str, wanted: str) -> float | None:
 
     units = _registry()
     try:
-        one, wish = (units.Quantity(1.0, units.parse_units(text)) for text in (given, wanted))
+        texts = (_TORQUE.sub(r"(\1*m)", given), wanted)
+        one, wish = (units.Quantity(1.0, units.parse_units(text)) for text in texts)
         # to pint an angle is no dimension, and 5 Hz would do for 5 rad/s; a root unit it is
         same = one.to_root_units().units == wish.to_root_units().units
         return float(one.to(wish.units).magnitude) if same else None

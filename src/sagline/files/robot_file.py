@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from sagline.arguments import brief, file_path, instance
+from sagline.arrays import Array
 from sagline.errors import FileError, InvalidValueError, nearest
 from sagline.files.robot_schema import SWIVEL_AXES, RobotEntry
 from sagline.files.schema import validated
@@ -35,6 +37,11 @@ def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
             # or cylinder_radius and cylinder_height (along z), Ixx ... Iyz, three numbers, or a 3 x 3 matrix
         tension_min: 20 N
         assumed: {tension_min: the winch's data sheet gives none}
+        tolerances: {frame_anchors: 5 mm, axial_stiffness: 20 %, mass: 0.5 kg}
+            # standard deviations of what stands above, for `calibrate`: one number for all, [x, y, z], or a list of
+            # one a cable; shares for drum_radius, linear_density, axial_stiffness, load_cell_gain and mass alone
+        calibration: {log: winches.csv, date: 2026-03-01, standard_error: {frame_anchors: 1 mm, mass: 80 g}}
+            # what `calibrate` found of the above; it writes this itself
         scene: [{name: pole, capsule: [[1, 0, 0], [1, 0, 3]], radius: 5 cm}]      # what stands around: `load_scene`
 
     A file may begin with a preset and say what is other, `base: cogiro` beside its own name: what it does not say is
@@ -128,7 +135,17 @@ def dump_robot(robot: Robot) -> str:
             data[key] = value.tolist()
     if (box := robot.test_box) is not None:
         data["test_box"] = {"low": box.low.tolist(), "high": box.high.tolist(), "tilt": box.tilt}
+    if robot.tolerances:
+        data["tolerances"] = _deviations(robot.tolerances)
+    if (known := robot.calibration) is not None:
+        data["calibration"] = {"log": known.log, "date": known.date, "note": known.note}
+        data["calibration"]["standard_error"] = _deviations(known.standard_error)
     return dump_mapping(data)
+
+
+def _deviations(found: Mapping[str, Array]) -> dict[str, Any]:
+    """Standard deviations, one number where all of a field are alike."""
+    return {name: (one.flat[0].item() if (one == one.flat[0]).all() else one.tolist()) for name, one in found.items()}
 
 
 def _on_base(data: dict[Any, Any], origin: Path | str) -> dict[Any, Any]:

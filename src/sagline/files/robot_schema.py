@@ -16,9 +16,12 @@ from sagline.files.scene_schema import Place, check_scene
 from sagline.files.schema import Entry
 from sagline.robot.inertia import box_inertia, cylinder_inertia
 from sagline.robot.pose_box import PoseBox
+from sagline.robot.provenance import Provenance
 from sagline.robot.robot import Robot
+from sagline.robot.tolerances import UNCERTAIN, of_share, value_of
 from sagline.robot.winch import RULES, Winch
 
+_ERROR: Final = "calibration.standard_error."  # where those of a robot's numbers are
 _UNITS: Final = {
     "frame_anchors": "m",
     "platform_anchors": "m",
@@ -40,6 +43,8 @@ _UNITS: Final = {
     "inertia.box": "m",
     "inertia.cylinder_radius": "m",
     "inertia.cylinder_height": "m",
+    **{f"tolerances.{name}": what.unit for name, what in UNCERTAIN.items()},
+    **{f"{_ERROR}{name}": what.unit for name, what in UNCERTAIN.items()},
     "test_box.low": "m",
     "test_box.high": "m",
     "test_box.tilt": "rad",
@@ -208,6 +213,64 @@ class _TestBox(_RobotPart):
     tilt: Any = 0.0
 
 
+class _Deviations(_RobotPart):
+    """Standard deviations of a robot's numbers; each one number for the field, one along each axis, or all of it."""
+
+    frame_anchors: Any = None
+    platform_anchors: Any = None
+    length_zero: Any = None
+    drum_radius: Any = None
+    linear_density: Any = None
+    axial_stiffness: Any = None
+    pulley_radius: Any = None
+    dead_cable: Any = None
+    load_cell_gain: Any = None
+    load_cell_bias: Any = None
+    mass: Any = None
+    center_of_mass: Any = None
+
+    def of(self, robot: Robot, within: str) -> dict[str, Any]:
+        """Those that are given, in SI; percents are of the robot's own numbers."""
+        found = {}
+        for key in (key for key in _Deviations.model_fields if key in self.model_fields_set):
+            item, value = within + key, getattr(self, key)
+            if UNCERTAIN[key].share and _in_percent(value):
+                found[key] = of_share(_share(value, item), value_of(robot, key), item.replace(".", ": "))
+            else:
+                found[key] = self.given(key, within)
+        return found
+
+
+def _in_percent(value: object) -> bool:
+    """Whether a text, or the first of a list, is a share in percent."""
+    if isinstance(value, list):
+        return bool(value) and _in_percent(value[0])
+    return isinstance(value, str) and value.rstrip().endswith("%")
+
+
+def _share(value: Any, item: str) -> Any:
+    """Shares in percent as numbers."""
+    if isinstance(value, list):
+        return [_share(element, f"{item}[{i}]") for i, element in enumerate(value)]
+    number = plain_number(value.strip().removesuffix("%")) if _in_percent(value) else None
+    if number is None:
+        raise InvalidValueError(item, reprlib.repr(value), 'a share, such as "5 %"', "Give all of them in percent.")
+    return number / 100.0
+
+
+class _Calibration(_RobotPart):
+    """The calibration that found some of the numbers."""
+
+    log: str
+    date: str
+    note: str = ""
+    standard_error: _Deviations = Field(default_factory=_Deviations)
+
+    def provenance(self, robot: Robot) -> Provenance:
+        """Where the robot's numbers come from."""
+        return Provenance(self.log, self.date, self.standard_error.of(robot, _ERROR), self.note)
+
+
 class RobotEntry(_RobotPart):
     """A whole robot file. Keys are the robot's fields; what is left out takes the robot's own default."""
 
@@ -231,6 +294,8 @@ class RobotEntry(_RobotPart):
     source: str = ""
     assumed: dict[str, str] = Field(default_factory=dict)
     notes: str = ""
+    tolerances: _Deviations | None = None
+    calibration: _Calibration | None = None
     scene: list[Place] = Field(default_factory=list)  # the file's, not the robot's: sagline.files.scene_file
 
     def robot(self) -> Robot:
@@ -242,7 +307,7 @@ class RobotEntry(_RobotPart):
         Raises:
             InvalidValueError: If a value has a wrong unit, or is none the robot accepts.
         """
-        keys = self.model_fields_set - {"scene"}
+        keys = self.model_fields_set - {"scene", "tolerances", "calibration"}
         fields = {key: self.given(key) if key in _UNITS else getattr(self, key) for key in keys}
         check_scene(self.scene)
         fields["cables"] = self.cables.cable()
@@ -253,4 +318,13 @@ class RobotEntry(_RobotPart):
             fields["inertia"] = self.inertia.about_center(mass)
         if self.test_box is not None:
             fields["test_box"] = PoseBox(*(self.test_box.given(key, "test_box.") for key in ("low", "high", "tilt")))
-        return Robot(**fields)
+        return self._trusted(Robot(**fields))
+
+    def _trusted(self, robot: Robot) -> Robot:
+        """The robot with how far its numbers are to be trusted, which shares of them may say."""
+        about: dict[str, Any] = {}
+        if self.tolerances is not None:
+            about["tolerances"] = self.tolerances.of(robot, "tolerances.")
+        if self.calibration is not None:
+            about["calibration"] = self.calibration.provenance(robot)
+        return robot.replace(**about) if about else robot

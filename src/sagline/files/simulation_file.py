@@ -13,9 +13,9 @@ from sagline.arrays import locked
 from sagline.dynamics.damping import Damping
 from sagline.dynamics.drives import SecondOrder, Winches
 from sagline.dynamics.simulation import EnergyBalance, Occurrence, Simulation
-from sagline.errors import FileError, InvalidValueError
+from sagline.errors import FileError
 from sagline.files.content import Content
-from sagline.files.dataset import read_dataset, write_dataset
+from sagline.files.dataset import read_dataset, told_of, write_dataset
 from sagline.files.robot_file import dump_robot, parse_robot
 from sagline.files.simulation_checks import EVENT_ROWS, ROWS, check_simulation, has_events
 from sagline.files.simulation_layout import EVENTS, LAG, LAGGING, LARGEST, LOSSES, NO_CABLE, NODES, SAMPLES, STEP, TIME
@@ -72,12 +72,8 @@ def load_simulation(file: os.PathLike[str] | str) -> Simulation:
     data, found = read_dataset(path, CONTENT)
     CONTENT.format_of(path, data.attrs)
     CONTENT.check_sealed(path, found)
-    try:
+    with told_of(path):
         return _simulation(path, data, parse_robot(str(data.attrs["robot"]), f"{path}, robot"))
-    except KeyError as error:
-        raise FileError(path, f"has no {error.args[0]}", "Write it again; it is incomplete or was edited.") from None
-    except InvalidValueError as error:
-        raise FileError.of(path, error) from None
 
 
 def _dataset(simulation: Simulation) -> Dataset:

@@ -65,8 +65,7 @@ def _by_trimesh(surface: Surface, kind: str, colors: NDArray[np.uint8] | None) -
     try:
         import trimesh
     except ModuleNotFoundError:
-        step = 'Surfaces need it: pip install "sagline[workspace]"'
-        raise FileError("package trimesh", "is not installed", step) from None
+        raise FileError.not_installed("trimesh", "Surfaces need it", "workspace") from None
     vertices, faces = surface.vertices, surface.faces
     if kind == "stl":  # has triangles alone: corners that are one in its 24 bits are one to who reads it
         vertices, faces = _in_single_precision(vertices, faces)

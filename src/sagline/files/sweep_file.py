@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike
 
 from sagline.arguments import brief, file_path, whole_number
 from sagline.arrays import Array, number
+from sagline.cables.models import MODELS
 from sagline.errors import FileError, InvalidValueError
 from sagline.files.path_file import load_path
-from sagline.files.plan_file import MODELS, Choice
+from sagline.files.plan_file import Choice
 from sagline.files.quantity import in_si
 from sagline.files.robot_file import load_robot
 from sagline.files.schema import Entry, validated

@@ -20,9 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sagline.arrays import locked
+from sagline.cables.models import MODELS
 from sagline.errors import FileError, InvalidValueError
 from sagline.files.content import Content
-from sagline.files.plan_file import MODELS, choice_attributes, choice_of
+from sagline.files.plan_file import choice_attributes, choice_of
 from sagline.files.robot_file import dump_robot, parse_robot
 from sagline.files.staging import staging
 from sagline.robot.pose import Pose

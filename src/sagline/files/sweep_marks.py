@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import IO, Final, NamedTuple
@@ -10,6 +9,7 @@ from typing import IO, Final, NamedTuple
 import numpy as np
 
 from sagline.errors import FileError
+from sagline.files.staging import is_taken
 from sagline.files.sweep_folder import STEP, SweepFolder
 from sagline.sweep.work import Counts
 
@@ -116,7 +116,7 @@ def marking(folder: SweepFolder) -> Iterator[Marks]:
     except OSError as error:
         raise FileError(path, f"cannot be written ({error.strerror or error})", STEP) from None
     with file:
-        if not _taken(file):
+        if not is_taken(file.fileno(), if_unknown=True):
             raise FileError(folder.path, "is being worked on by another process", "Wait for it, or stop it.")
         marks = Marks(folder, file, read_marks(folder))
         marks.begin()
@@ -143,18 +143,3 @@ def _mark(line: str) -> tuple[int, Mark] | None:
     except (ValueError, IndexError, TypeError):
         return None
     return (number, Mark(seconds, counts)) if number >= 0 else None
-
-
-def _taken(file: IO[bytes]) -> bool:
-    """Whether the lock could be taken; the system frees it, however the process ends."""
-    if sys.platform == "win32":
-        return True
-    import fcntl
-
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    except OSError:  # a file system without locks
-        return True
-    return True

@@ -7,7 +7,7 @@ import csv
 import io
 import re
 from array import array
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path as FilePath
 from types import MappingProxyType
@@ -24,7 +24,9 @@ TABLE_LIMIT: Final = 64.0  # MB, about half a million rows
 _TOO_LONG: Final = 100.0  # times the size of what it belongs to: no length in m, but perhaps one in mm
 _NONE: Final[Mapping[str, str]] = MappingProxyType({})
 _COLUMN = re.compile(r"\s*(\w+)\s*(?:\[(.*)\])?\s*")  # name, or name [unit]
-_PLAIN_ROW = re.compile(r"[-+.0-9eE \t,]*")  # of these letters float reads plain numbers only, and much faster
+_PLAIN_ROW = re.compile(
+    r"(?:[-+.0-9eE \t]*,|nan,)*"
+)  # of these letters float reads plain numbers only, and much faster
 _DECIMAL_COMMA = re.compile(r"\s*[-+]?[0-9]+,[0-9]+\s*")
 
 
@@ -47,7 +49,14 @@ class Table:
     plain: frozenset[str]
 
     @classmethod
-    def read(cls, path: FilePath, text: str, units: Mapping[str, str], strangers: Mapping[str, str] = _NONE) -> Table:
+    def read(
+        cls,
+        path: FilePath,
+        text: str,
+        units: Mapping[str, str],
+        strangers: Mapping[str, str] = _NONE,
+        gaps: Collection[str] = (),
+    ) -> Table:
         """Read a CSV text whose first row names its columns, `name` or `name [unit]`.
 
         Args:
@@ -55,9 +64,10 @@ class Table:
             text: What is in it.
             units: The columns it may have, and the SI unit of each.
             strangers: Columns of another kind of table, and what to do with one of these.
+            gaps: Columns whose cells may be blank, or nan.
 
         Returns:
-            The table, all its numbers finite.
+            The table, all its numbers finite; NaN in the gaps.
 
         Raises:
             FileError: If it is no such text; the message names the line.
@@ -72,7 +82,7 @@ class Table:
                 if not found:
                     found, header = _factors(path, reader.line_num, row, units, strangers), reader.line_num
                 else:
-                    numbers.extend(_numbers(path, reader.line_num, row, tuple(found)))
+                    numbers.extend(_numbers(path, reader.line_num, row, tuple(found), gaps))
                     lines.append(reader.line_num)
         except csv.Error as error:
             raise line_error(path, reader.line_num, f"it is no CSV ({error})") from None
@@ -85,7 +95,8 @@ class Table:
         plain = frozenset(name for name, factor in found.items() if factor is None)
         table = cls(path, columns, lines, header, plain)
         for name, column in columns.items():
-            table.refuse(~np.isfinite(column), name, column, units[name], "a finite number")
+            wrong = np.isinf(column) if name in gaps else ~np.isfinite(column)
+            table.refuse(wrong, name, column, units[name], "a finite number")
             table.refuse(np.abs(column) > LARGEST, name, column, units[name], f"{REACH} {units[name]}".rstrip())
         return table
 
@@ -157,11 +168,15 @@ def _factor(path: FilePath, line: int, name: str, unit: str, wanted: str) -> flo
     raise line_error(path, line, f"the unit of {name} is [{unit}]; allowed: {allowed}")
 
 
-def _numbers(path: FilePath, line: int, row: list[str], names: tuple[str, ...]) -> list[float]:
+def _numbers(path: FilePath, line: int, row: list[str], names: tuple[str, ...], gaps: Collection[str]) -> list[float]:
+    if row[0].lstrip().startswith("#"):
+        raise line_error(path, line, "a comment; allowed: comments above the names of the columns")
     if len(row) != len(names):
         comma = ", and a point in the numbers, not a comma" if len(row) == 2 * len(names) else ""
         raise line_error(path, line, f"{len(row)} columns; allowed: {len(names)}, as in the header{comma}")
-    if _PLAIN_ROW.fullmatch(",".join(row)):
+    if gaps:
+        row = [cell if name not in gaps or cell.strip() else "nan" for name, cell in zip(names, row, strict=True)]
+    if _PLAIN_ROW.fullmatch(",".join(row) + ","):
         with contextlib.suppress(ValueError):  # which cell it is, the slow way tells
             return [float(cell) for cell in row]
     numbers = [plain_number(cell) for cell in row]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -55,6 +56,24 @@ def check_variable(
         _check_numbers(quantity, np.asarray(variable.values), solved)
     elif quantity.values is str:
         _check_texts(quantity, variable)
+
+
+def check_indices(name: str, values: np.ndarray[Any, Any], low: int, high: int) -> None:
+    """Refuse indices out of range.
+
+    Args:
+        name: What they are, for the message.
+        values: The indices.
+        low: The least allowed.
+        high: One more than the largest allowed.
+
+    Raises:
+        InvalidValueError: If one is out of range; the message has the first.
+    """
+    wrong = (values < low) | (values >= high)
+    if wrong.any():
+        allowed = f"{low} to {high - 1}" if high < sys.maxsize else f">= {low}"
+        raise InvalidValueError(name, int(values[wrong][0]), allowed, STEP)
 
 
 def _check_form(quantity: Quantity, variable: Variable, wanted: Mapping[str, int]) -> None:

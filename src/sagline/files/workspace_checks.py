@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sagline.arguments import choice
 from sagline.arrays import number
-from sagline.errors import InvalidValueError
-from sagline.files.variable_checks import STEP, check_labels, check_variable
+from sagline.files.variable_checks import check_indices, check_labels, check_variable
 from sagline.files.workspace_layout import QUANTITIES
 
 if TYPE_CHECKING:
@@ -45,10 +44,4 @@ def check_workspace(data: Dataset, cables: int) -> None:
         ("vertex_component", 0, sizes["component"]),
         ("component_nodes", -1, sizes["component"]),
     ):
-        _check_indices(name, data.variables[name].values, low, high)
-
-
-def _check_indices(name: str, values: np.ndarray[Any, Any], low: int, high: int) -> None:
-    wrong = (values < low) | (values >= high)
-    if wrong.any():
-        raise InvalidValueError(name, int(values[wrong][0]), f"{low} to {high - 1}", STEP)
+        check_indices(name, data.variables[name].values, low, high)

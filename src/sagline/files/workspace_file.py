@@ -11,11 +11,11 @@ import numpy as np
 
 from sagline.arguments import file_path, instance
 from sagline.arrays import locked
-from sagline.errors import FileError, InvalidValueError
+from sagline.cables.models import MODELS
 from sagline.files.content import Content
 from sagline.files.criteria_attributes import criteria_attributes, criteria_of
-from sagline.files.dataset import read_dataset, write_dataset
-from sagline.files.plan_file import MODELS, choice_attributes, choice_of
+from sagline.files.dataset import read_dataset, told_of, write_dataset
+from sagline.files.plan_file import choice_attributes, choice_of
 from sagline.files.robot_file import dump_robot, parse_robot
 from sagline.files.variables import PARTS, Quantity
 from sagline.files.workspace_checks import check_workspace
@@ -81,12 +81,8 @@ def load_workspace(file: os.PathLike[str] | str) -> Workspace:
     data, found = read_dataset(path, CONTENT)
     CONTENT.format_of(path, data.attrs)
     CONTENT.check_sealed(path, found)
-    try:
+    with told_of(path):
         return _workspace(path, data, parse_robot(str(data.attrs["robot"]), f"{path}, robot"))
-    except KeyError as error:
-        raise FileError(path, f"has no {error.args[0]}", "Write it again; it is incomplete or was edited.") from None
-    except InvalidValueError as error:
-        raise FileError.of(path, error) from None
 
 
 def _dataset(space: Workspace) -> Dataset:

@@ -1,0 +1,99 @@
+"""Files of poses to calibrate by: a path that rests at each, with the tensions and lengths to stand there with."""
+
+from __future__ import annotations
+
+import os
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from sagline.arguments import file_path
+from sagline.arrays import Array
+from sagline.calibration.paid import can_count, counts_of
+from sagline.files.whole import write_text
+from sagline.files.yaml_text import dump_mapping
+from sagline.robot.drum import drums_of
+
+if TYPE_CHECKING:
+    from sagline.calibration.chosen_poses import CalibrationPoses
+    from sagline.robot.pose import Pose
+
+HEAD: Final = """\
+# Poses to calibrate {robot} by, in an order that is short to drive. It is a path from rest to rest as well: load_path
+# reads it, and `sagline track` plans it. At each pose stands with which tensions to read there: frame_end_tension [N],
+# reached by unstrained_length [m], all cable off the drums{counts}.
+"""
+SPEED: Final = 0.2  # m/s, at most, on the way from pose to pose
+ANGULAR_SPEED: Final = 0.1  # rad/s
+DWELL: Final = 2.0  # s, the least from pose to pose, and between two sets of tensions at one pose
+RATE: Final = 10.0  # samples of the path a second
+_PEAK: Final = 15.0 / 8.0  # of a quintic's speed, to its mean
+_DECIMALS: Final = {"position": 4, "quaternion": 6, "frame_end_tension": 1, "unstrained_length": 5, "counts": 0}
+_DIGITS: Final = 4  # of an error: more is not known of one
+
+
+def save_calibration_poses(plan: CalibrationPoses, file: os.PathLike[str] | str) -> None:
+    """Write poses, tensions and lengths, and the errors to expect, to a YAML file, whole or not at all.
+
+    Args:
+        plan: The poses.
+        file: The file, "poses.yaml" for instance; one that exists is replaced.
+
+    Raises:
+        FileError: If the file cannot be written; what was there before is untouched.
+    """
+    rows = {
+        "position": plan.poses.position,
+        "quaternion": plan.poses.quaternion,
+        "frame_end_tension": plan.frame_end_tension,
+        "unstrained_length": plan.unstrained_length,
+    }
+    if can_count(plan.robot):
+        rows["counts"] = counts_of(drums_of(plan.robot), plan.unstrained_length)
+    poses = [
+        {name: _rounded(row, _DECIMALS[name]) for name, row in zip(rows, each, strict=True)}
+        for each in zip(*rows.values(), strict=True)
+    ]
+    data: dict[str, Any] = {"rate": RATE}
+    if len(plan.poses) > 1:
+        data["durations"] = _durations(plan.poses)
+    data |= {"calibration": _about(plan), "waypoints": poses}
+    head = HEAD.format(robot=plan.robot.name, counts=", at these counts" if "counts" in rows else "")
+    write_text(file_path(file), head + dump_mapping(data))
+
+
+def _durations(poses: Pose) -> list[float]:
+    """Time of each way [s]: slow enough for any machine, and never less than a dwell."""
+    way = np.linalg.norm(np.diff(poses.position, axis=0), axis=1)
+    turn = (poses.rotation[1:] * poses.rotation[:-1].inv()).magnitude()
+    times = np.maximum(_PEAK * np.maximum(way / SPEED, turn / ANGULAR_SPEED), DWELL)
+    return _rounded(np.ceil(10.0 * times) / 10.0, 1)
+
+
+def _about(plan: CalibrationPoses) -> dict[str, Any]:
+    """For whom, by whom and to what end they were chosen."""
+    numbers = plan.parameters
+    names = ("length_deviation", "tension_deviation", "position_deviation", "rotation_deviation")
+    given = {name: getattr(plan.sensors, name) for name in names}
+    errors = {
+        f"{label} [{unit}]" if unit else label: _plain(error)
+        for label, unit, error in zip(numbers.labels, numbers.units, plan.expected_error, strict=True)
+    }
+    return {
+        "robot": plan.robot.name,
+        "source": f"sagline {version('sagline')}",
+        "sensors": {name: value.tolist() for name, value in given.items() if value is not None},
+        "most_helpful": plan.most_helpful,
+        "expected_error": errors,
+    }
+
+
+def _rounded(row: Array, decimals: int) -> list[Any]:
+    rounded: list[float] = (np.round(row, decimals) + 0.0).tolist()
+    return rounded if decimals else [int(number) for number in rounded]
+
+
+def _plain(error: float) -> float | None:
+    """A number of few digits; None for what stays open."""
+    return float(f"{error:.{_DIGITS}g}") if np.isfinite(error) else None

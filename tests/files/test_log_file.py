@@ -1,0 +1,201 @@
+"""Logs of winches in CSV: what is written is read again to the last bit, and what is wrong is told by its line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.files.log_file import dump_log
+from tests.calibration.synthetic import log_of, true_robot, usual_sensors, with_drums
+
+SENSORS = usual_sensors(
+    length_deviation=[4e-4, *[5e-4] * 7],
+    position_deviation=[1e-3, 1e-3, 2e-3],
+    rotation_deviation=1e-3,
+    frame=sl.Pose.from_euler([1.0, -2.0, 0.3], 0.4, 0.0, 0.1),
+    target=[0.1, 0.0, -0.2],
+)
+
+
+def read(folder: Path, text: str, sensors: sl.Sensors | None = None) -> sl.WinchLog:
+    file = folder / "log.csv"
+    file.write_text(text)
+    return sl.load_log(file, sensors)
+
+
+@pytest.mark.parametrize("robot", [sl.load_robot("cogiro"), with_drums()], ids=["lengths", "counts"])
+@pytest.mark.parametrize("measured", [0, 4])
+def test_what_is_saved_is_read_again(robot: sl.Robot, measured: int, tmp_path: Path) -> None:
+    truth = true_robot(robot, seed=2, sensors=SENSORS)
+    log = log_of(truth, 12, seed=2, positions=measured, rotations=measured).log
+    assert log.load_cells is not None
+    cells = log.load_cells.copy()
+    cells[:, 3] = np.nan
+    log = log.replace(load_cells=cells)
+    log.save(tmp_path / "log.csv")
+    again = sl.load_log(tmp_path / "log.csv")
+    for name in ("counts", "unstrained_length", "load_cells", "position", "rotation", "time"):
+        one, other = getattr(again, name), getattr(log, name)
+        assert (one is None) == (other is None), name
+        if other is not None:
+            np.testing.assert_array_equal(one, other, err_msg=name)
+    assert log.commanded is not None
+    assert again.commanded is not None
+    np.testing.assert_array_equal(again.commanded.position, log.commanded.position)
+    np.testing.assert_array_equal(again.commanded.quaternion, log.commanded.quaternion)
+    for name in ("length_deviation", "tension_deviation", "position_deviation", "rotation_deviation", "target"):
+        np.testing.assert_array_equal(getattr(again.sensors, name), getattr(SENSORS, name))
+    np.testing.assert_array_equal(again.sensors.frame.position, SENSORS.frame.position)
+    np.testing.assert_array_equal(again.sensors.frame.quaternion, SENSORS.frame.quaternion)
+    assert again.source == str(tmp_path / "log.csv")
+    assert dump_log(again) == (tmp_path / "log.csv").read_text()
+
+
+WHOLE = """\
+# Winches of the shelf, read by hand: a comment of a person.
+# name: shelf
+# length_deviation: 0.4 mm
+# tension_deviation: [5, 0.006 kN]
+#position_deviation: [1 mm, 0.001, 2 mm]
+# frame: {position: [1, 0, 500 mm], euler: {alpha: 90 deg}}
+# target: [0, 0, 0.1]
+# rotation_deviation: 0.1 deg
+
+"load_cell_0 [kN]",length_1 [mm],length_0,z [mm],alpha [deg],beta,gamma,x_commanded,y_commanded [mm],z_commanded
+0.41,2001.5,3,1012.5,90,0,0,1,2500,3
+
+ ,2002,3.5,,,,,1,2500,3
+0.43,,nan,1013, , ,,1,2500,3.5
+"""
+
+
+def test_columns_come_in_any_order_with_units_and_gaps(tmp_path: Path) -> None:
+    log = read(tmp_path, WHOLE)
+    nan = np.nan
+    assert log.counts is None
+    assert log.time is None
+    sensors, lengths, turned = log.sensors, log.unstrained_length, log.rotation
+    assert lengths is not None
+    assert log.position is not None
+    assert turned is not None
+    assert sensors.rotation_deviation is not None
+    np.testing.assert_allclose(lengths, [[3.0, 2.0015], [3.5, 2.002], [nan, nan]], rtol=1e-15)
+    np.testing.assert_array_equal(log.load_cells, [[410.0, nan], [nan, nan], [430.0, nan]])
+    np.testing.assert_allclose(log.position, [[nan, nan, 1.0125], [nan] * 3, [nan, nan, 1.013]], rtol=1e-15)
+    np.testing.assert_allclose(turned, [[0, 0, 0.5**0.5, 0.5**0.5], [nan] * 4, [nan] * 4], atol=1e-15)
+    assert log.commanded is not None
+    np.testing.assert_array_equal(log.commanded.position, [[1, 2.5, 3], [1, 2.5, 3], [1, 2.5, 3.5]])
+    np.testing.assert_array_equal(log.commanded.quaternion, [[0, 0, 0, 1]] * 3)
+    assert float(sensors.length_deviation) == 0.4e-3
+    np.testing.assert_array_equal(sensors.tension_deviation, [5.0, 6.0])
+    np.testing.assert_array_equal(sensors.position_deviation, [1e-3, 1e-3, 2e-3])
+    np.testing.assert_allclose(sensors.rotation_deviation, np.pi / 1800, rtol=1e-15)
+    np.testing.assert_allclose(sensors.frame.matrix @ [1, 0, 0], [0, 1, 0], atol=1e-15)
+    np.testing.assert_array_equal(sensors.frame.position, [1, 0, 0.5])
+    np.testing.assert_array_equal(sensors.target, [0, 0, 0.1])
+
+
+def test_sensors_that_are_given_stand_in_place_of_the_comments(tmp_path: Path) -> None:
+    given = sl.Sensors(tension_deviation=1.0, position_deviation=1.0, rotation_deviation=1.0)
+    assert read(tmp_path, WHOLE, given).sensors is given
+    with pytest.raises(sl.InvalidValueError, match=r"tension_deviation is of shape \(3,\)"):
+        read(tmp_path, WHOLE, given.replace(tension_deviation=np.ones(3)))
+    with pytest.raises(sl.InvalidValueError, match="sensors is"):
+        read(tmp_path, WHOLE, 5.0)  # type: ignore[arg-type]
+
+
+def test_a_log_of_counts_alone_needs_no_comment(tmp_path: Path) -> None:
+    log = read(tmp_path, "count_0,count_1,time [ms]\n1,2,0\n-3,4.5,500\r\n")
+    np.testing.assert_array_equal(log.counts, [[1, 2], [-3, 4.5]])
+    np.testing.assert_array_equal(log.time, [0.0, 0.5])
+    assert float(log.sensors.length_deviation) == 5e-4
+
+
+ROWS = "length_0,length_1,load_cell_0\n3,2,40\n3,2,41\n"
+CELLS = "# tension_deviation: 5\n"
+COMMANDED = "length_0,x_commanded,y_commanded,z_commanded"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (ROWS, "does not say the tension_deviation of what it holds. Write a comment"),
+        (ROWS, r"for instance '# tension_deviation: 5 N', or give sensors \(--tension-deviation\)"),
+        ("length_0,z\n3,1\n", "does not say the position_deviation.*'# position_deviation: 1 mm'"),
+        ("length_0,alpha,beta,gamma\n3,1,0,0\n", "does not say the rotation_deviation"),
+        ("# length_deviation: 1\n", "no columns; allowed: time, count_0"),
+        ("load_cell_0\n1\n", "line 1: neither columns count_0, ... nor length_0, ...; allowed: one of the two"),
+        ("length_0,count_0\n1,1\n", "line 1: columns of counts and of lengths; allowed: one of the two"),
+        ("length_0,length_2\n1,1\n", "line 1: missing column length_1; the last is length_2"),
+        ("count_1,count_2\n1,1\n", "line 1: missing column count_0; the last is count_2"),
+        ("count_9999\n1\n", "line 1: unknown column 'count_9999'"),
+        ("count_99999999999\n1\n", "line 1: unknown column 'count_99999999999'"),
+        ("L0,length_0\n1,1\n", "line 1: unknown column 'L0': lengths are called length_0"),
+        ("count_0,C0\n1,1\n", "line 1: unknown column 'C0': counts are called count_0"),
+        ("count_0,load_cell_1\n1,1\n", "line 1: unknown column 'load_cell_1'"),
+        ("count_0,load_cel_0\n1,1\n", r"line 1: unknown column 'load_cel_0' \(did you mean load_cell_0\?\)"),
+        ("count_0;count_1\n1;2\n", "line 1: the columns are parted by semicolons"),
+        ("count_0\n", "line 1: no rows below"),
+        ("count_0,count_1\n# time: 5\n1,2\n", "line 2: a comment; allowed: comments above the names of the columns"),
+        ("# a word\n\ncount_0 [mm]\n1\n", r"line 3: the unit of count_0 is \[mm\]; allowed: none"),
+        ("length_0 [N]\n1\n", r"line 1: the unit of length_0 is \[N\]"),
+        ("# x\nlength_0\n1\n-2\n", "line 4: length_0 is -2 m; allowed: >= 0 m"),
+        ("length_0\n1\ninf\n", "line 3: length_0 is inf m; allowed: a finite number"),
+        ("length_0\n1\n1e60\n", "line 3: length_0 is 1e\\+60 m"),
+        ("length_0\n1\ntwo\n", "line 3: length_0 is two; allowed: a number"),
+        ("length_0,length_1\n1,2\n1,2,3\n", "line 3: 3 columns; allowed: 2"),
+        ("time,length_0\n0,1\n,2\n", "line 3: time is empty; allowed: a number"),
+        ("time,length_0\n0,1\nnan,2\n", "line 3: time is nan s; allowed: a finite number"),
+        (f"{COMMANDED}\n1,1,1,1\n1,1,,1\n", "line 3: y_commanded is empty"),
+        ("length_0,x_commanded\n1,1\n", "line 1: missing column y_commanded, z_commanded beside x_commanded"),
+        ("length_0,alpha_commanded,beta_commanded,gamma_commanded\n1,1,1,1\n", "line 1: missing column x_commanded"),
+        ("length_0,qx,qy,qz\n1,0,0,0\n", "line 1: missing column qw beside qx, qy, qz"),
+        ("length_0,qx,qy,qz,qw\n1,0,0,0,1\n1,0,0,0,\n", "line 3: one of qx, qy, qz, qw is nan; allowed: all of them"),
+        ("length_0,qx,qy,qz,qw\n1,0,0,1,1\n", "line 2: the length of qx, qy, qz, qw is 1.41421"),
+        ("length_0,qx,qy,qz,qw,alpha,beta,gamma\n1,0,0,1,1,0,0,0\n", "line 1: columns alpha beside qx; allowed: one"),
+        ("# lenght_deviation: 1 mm\n" + ROWS, "lenght_deviation is an unknown key.*Did you mean length_deviation"),
+        ("# length deviation: 1 mm\n" + ROWS, "length deviation is an unknown key.*Did you mean length_deviation"),
+        ("# targets: 1 mm\n" + ROWS, "targets is an unknown key.*Did you mean target"),
+        ("# tension_deviation: 5 m\n" + ROWS, "tension_deviation is '5 m'; allowed: a number in N"),
+        ("# tension_deviation: -5\n" + ROWS, "tension_deviation is -5 N; allowed: > 0 N"),
+        ("# tension_deviation: [1, 2, 3]\n" + ROWS, r"tension_deviation is of shape \(3,\); allowed: shape \(\) or"),
+        ("# tension_deviation: [1, 2\n" + ROWS, r"is not.* YAML \("),
+        (CELLS + CELLS + ROWS, "line 2: key tension_deviation is given twice"),
+        (CELLS + "# frame: [0, 0, 0]\n" + ROWS, "frame is .*; allowed: keys position, euler, quaternion"),
+        (CELLS + "# frame: {position: [0, 0]}\n" + ROWS, "frame.position is of shape"),
+        (CELLS + "# target: [0, 0]\n" + ROWS, r"target is of shape \(2,\); allowed: shape \(3,\)"),
+    ],
+)
+def test_what_is_wrong_is_told_by_its_line_or_key(text: str, message: str, tmp_path: Path) -> None:
+    with pytest.raises(sl.FileError, match=message) as raised:
+        read(tmp_path, text)
+    assert str(raised.value).startswith(str(tmp_path / "log.csv"))
+    assert len(str(raised.value)) < 300
+
+
+def test_a_log_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
+    log = sl.WinchLog(counts=[[1.0]])
+    (tmp_path / "taken").mkdir()
+    with pytest.raises(sl.FileError, match="is a folder"):
+        log.save(tmp_path / "taken")
+    with pytest.raises(sl.FileError, match="Create the folder"):
+        log.save(tmp_path / "none" / "log.csv")
+    with pytest.raises(sl.InvalidValueError, match="log is"):
+        dump_log("a log")  # type: ignore[arg-type]
+    odd: Any = sl.WinchLog(counts=[[-0.0, 1e-300, 1 / 3]])
+    odd.save(tmp_path / "odd.csv")
+    again = sl.load_log(tmp_path / "odd.csv").counts
+    assert again is not None
+    assert again.tobytes() == odd.counts.tobytes()
+
+
+def test_quaternions_of_few_decimals_are_normalized(tmp_path: Path) -> None:
+    comment = "# rotation_deviation: 0.1 deg\n"
+    turned = read(tmp_path, f"{comment}length_0,qx,qy,qz,qw\n1,0.5001,0.5,0.5,0.5\n").rotation
+    assert turned is not None
+    given = np.array([[0.5001, 0.5, 0.5, 0.5]])
+    np.testing.assert_allclose(turned, given / np.linalg.norm(given), rtol=1e-14)
