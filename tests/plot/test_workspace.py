@@ -1,7 +1,9 @@
 """Figures of workspaces hold what they claim to show: boundaries, margins, limits and fronts."""
 
 import re
+import sys
 from typing import Any, cast
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -70,6 +72,14 @@ def test_a_plane_of_symmetry_has_regions_rather_than_noise(space: sl.Workspace) 
     shades = np.asarray(mesh.get_array())
     changes = (shades[:, 1:] != shades[:, :-1]).any(axis=-1)
     assert changes.mean() < 0.08
+
+
+def test_a_plane_is_looked_at_once(space: sl.Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
+    module = sys.modules["sagline.plot.slice"]
+    look = Mock(wraps=module.slice_of)
+    monkeypatch.setattr(module, "slice_of", look)
+    plot.slice(space, "z", at=2.0)
+    assert look.call_count == 1
 
 
 def test_a_slice_beside_the_workspace_says_that_nothing_is_there(space: sl.Workspace) -> None:

@@ -10,7 +10,9 @@ from matplotlib.ticker import MaxNLocator
 from sagline.arguments import choice, instance
 from sagline.errors import InvalidValueError
 from sagline.kinematics.plan import Plan
-from sagline.plot.sheet import COLORS, TICK, axes_or_new, draw_course, dressed, legend_outside, shade, sheet
+from sagline.plot.names import name_all, name_lines
+from sagline.plot.sheet import COLORS, axes_or_new, draw_course, dressed, shade, sheet
+from sagline.plot.style import current
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -31,6 +33,7 @@ LENGTHS = {
     "unstrained_length": (r"unstrained length $L$ [m]", 1.0),
     "adjusting_length": (r"adjusting length $d = L - D$ [mm]", 1e3),
 }
+OVERVIEW = ("unstrained_length", "adjusting_length", "horizontal_tension", "vertical_force")
 INFEASIBLE = "infeasible"
 
 Entry = TypeVar("Entry")
@@ -53,7 +56,7 @@ def tensions(plan: Plan, quantity: str = "chord_tension", ax: Axes | None = None
     """
     ax = axes_or_new(ax)
     _tensions(ax, plan, quantity)
-    legend_outside(ax)
+    name_lines(ax)
     return ax
 
 
@@ -73,7 +76,7 @@ def lengths(plan: Plan, quantity: str = "unstrained_length", ax: Axes | None = N
     """
     ax = axes_or_new(ax)
     _lengths(ax, plan, quantity)
-    legend_outside(ax)
+    name_lines(ax)
     return ax
 
 
@@ -86,15 +89,14 @@ def overview(plan: Plan) -> Figure:
     Returns:
         A figure of four panels.
     """
-    figure = sheet(height=5.0)
-    panels = figure.subplots(2, 2, sharex=True)
-    _lengths(panels[0, 0], plan, "unstrained_length")
-    _lengths(panels[0, 1], plan, "adjusting_length")
-    _tensions(panels[1, 0], plan, "horizontal_tension")
-    _tensions(panels[1, 1], plan, "vertical_force")
-    for ax in panels[0]:
-        ax.set_xlabel("")
-    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside right center", fontsize=TICK, frameon=False)
+    rows, columns, height = (4, 1, 9.0) if current().narrow else (2, 2, 5.0)
+    figure = sheet(height)
+    panels = figure.subplots(rows, columns, sharex=True).flat
+    for draw, ax, quantity in zip((_lengths, _lengths, _tensions, _tensions), panels, OVERVIEW, strict=True):
+        draw(ax, plan, quantity)
+        ax.label_outer()
+    handles, labels = panels[0].get_legend_handles_labels()
+    name_all(figure, handles, labels, "outside right center")
     return figure
 
 

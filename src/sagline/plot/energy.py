@@ -9,7 +9,9 @@ import numpy as np
 from sagline.arguments import instance
 from sagline.dynamics.simulation import Simulation
 from sagline.numbers import n
-from sagline.plot.sheet import COLORS, GAP_COLOR, TICK, dressed, legend_outside, sheet
+from sagline.plot.names import name_lines, wrapped
+from sagline.plot.sheet import COLORS, GAP_COLOR, dressed, sheet
+from sagline.plot.style import current
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,17 +46,18 @@ def energy(simulation: Simulation) -> Figure:
         above.plot(time, course, color=color, linestyle=style, linewidth=1.2, label=name)
     dressed(above, "", "energy [J]")
     _mark(above, simulation, named=True)
-    legend_outside(above)
+    if time.size > 1:
+        above.set_xlim(time[0], time[-1])
+    name_lines(above)
     below.plot(time, balance.error, color="black", linewidth=1.0, label="error of the balance")
     dressed(below, "time [s]", "error [J]")
     _mark(below, simulation, named=False)
-    if time.size > 1:
-        below.set_xlim(time[0], time[-1])
     least = ROUNDING * _largest(*courses.values(), balance.potential)
     low, high = below.get_ylim()
     below.set_ylim(min(low, -least), max(high, least))
     worst = n(_largest(balance.error), ".2g", "J", size=_largest(balance.potential))
-    below.set_title(f"the sum, supplied counted negative, less its start: at most {worst}", fontsize=TICK, loc="left")
+    told = wrapped(f"the sum, supplied counted negative, less its start: at most {worst}", current().tick)
+    below.set_title(told, fontsize=current().tick, loc="left")
     return figure
 
 
@@ -70,5 +73,5 @@ def _mark(ax: Axes, simulation: Simulation, *, named: bool) -> None:
             what = event.kind if event.cable is None else f"{event.kind}, cable {event.cable}"
             ax.annotate(
                 what, (event.time, 1.0), xycoords=("data", "axes fraction"), xytext=(0.0, 2.0),
-                textcoords="offset points", fontsize=TICK, ha="center", va="bottom", annotation_clip=False,
+                textcoords="offset points", fontsize=current().tick, ha="center", va="bottom", annotation_clip=False,
             )  # fmt: skip

@@ -11,17 +11,9 @@ from sagline.errors import InvalidValueError
 from sagline.kinematics.confirm import Confirmation
 from sagline.numbers import n
 from sagline.plot.courses import INFEASIBLE, clock_of, dress_over
-from sagline.plot.sheet import (
-    COLORS,
-    ORANGE,
-    TICK,
-    axes_or_new,
-    draw_course,
-    legend_outside,
-    runs,
-    shade,
-    sheet,
-)
+from sagline.plot.names import name_all, name_lines
+from sagline.plot.sheet import COLORS, ORANGE, axes_or_new, draw_course, runs, shade, sheet
+from sagline.plot.style import current
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -49,7 +41,7 @@ def error(confirmation: Confirmation, ax: Axes | None = None) -> Axes:
     ax = axes_or_new(ax, height=2.6)
     _draw(ax, confirmation)
     _tell_flat(ax, confirmation)
-    legend_outside(ax)
+    name_lines(ax)
     return ax
 
 
@@ -71,12 +63,12 @@ def errors(*confirmations: Confirmation) -> Figure:
     panels = figure.subplots(1, len(confirmations), sharey=True, squeeze=False)[0]
     for ax, confirmation in zip(panels, confirmations, strict=True):
         _draw(ax, confirmation)
-        ax.set_title(confirmation.plan.state.one_robot.name, fontsize=TICK)
+        ax.set_title(confirmation.plan.state.one_robot.name, fontsize=current().tick)
         ax.label_outer()
     for ax, confirmation in zip(panels, confirmations, strict=True):
         _tell_flat(ax, confirmation)  # on the scale that they have found together
     handles = {label: line for ax in panels for line, label in zip(*ax.get_legend_handles_labels(), strict=True)}
-    figure.legend(handles.values(), handles.keys(), loc="outside right upper", fontsize=TICK, frameon=False)
+    name_all(figure, [*handles.values()], [*handles], "outside right upper")
     return figure
 
 
@@ -101,4 +93,4 @@ def _tell_flat(ax: Axes, confirmation: Confirmation) -> None:
     if known.size and known.max() < FLAT * max(map(abs, ax.get_ylim())):
         size = 1e3 * float(np.nanmax(confirmation.plan.unstrained_length))
         text = f"largest: {n(known.max(), '.2g', 'mm', size=size)}"
-        ax.text(0.03, 0.95, text, transform=ax.transAxes, fontsize=TICK, va="top")
+        ax.text(0.03, 0.95, text, transform=ax.transAxes, fontsize=current().tick, va="top")

@@ -11,6 +11,7 @@ from sagline.control.deviation import null_space_error, position_error
 from sagline.control.events import EventKind
 from sagline.control.execution import Execution
 from sagline.control.states import State
+from sagline.plot.names import above, name_lines
 from sagline.plot.sheet import (
     BLUE,
     COLORS,
@@ -19,16 +20,15 @@ from sagline.plot.sheet import (
     ORANGE,
     PURPLE,
     SKY,
-    TICK,
     VERMILLION,
     WIDTH,
     axes_or_new,
     draw_course,
     dressed,
-    legend_outside,
     runs,
     sheet,
-)  # fmt: skip
+)
+from sagline.plot.style import current
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -42,7 +42,7 @@ MOST_POINTS: Final = 4000  # of a line: what lies closer is drawn as the range t
 DASHED: Final = (0, (4.0, 1.6))
 PER_METER: Final = 1e3  # mm
 BESIDE: Final[dict[str, Any]] = {  # the axes, in two columns: the band of the states is low
-    "loc": "upper left", "bbox_to_anchor": (1.01, 1.6), "borderaxespad": 0.0, "fontsize": TICK, "frameon": False,
+    "loc": "upper left", "bbox_to_anchor": (1.01, 1.6), "borderaxespad": 0.0, "frameon": False,
 }  # fmt: skip
 STATES: Final = {  # that have a color of their own
     State.HOMING: ORANGE, State.MOVING: BLUE, State.JOGGING: SKY, State.PAUSING: GREEN, State.STOPPING: PURPLE,
@@ -103,7 +103,9 @@ def states(done: Execution, ax: Axes | None = None) -> Axes:
     ax.grid(visible=False)
     ax.spines["left"].set_visible(False)
     _limit(ax, clock)
-    ax.legend(*ax.get_legend_handles_labels(), ncols=2, handlelength=1.0, columnspacing=1.0, **BESIDE)
+    handles, labels = ax.get_legend_handles_labels()
+    place = above(ax, labels) if current().direct else {**BESIDE, "ncols": 2, "fontsize": current().tick}
+    ax.legend(handles, labels, **{**place, "handlelength": 1.0, "columnspacing": 1.0})
     return ax
 
 
@@ -125,7 +127,7 @@ def measured_tensions(done: Execution, ax: Axes | None = None) -> Axes:
         _line(ax, clock, planned, color="black", linewidth=0.7, linestyle=DASHED, label="planned" if i == 0 else "_")
     dressed(ax, "time [s]", "tension at the frame [N]")
     _limit(ax, clock)
-    legend_outside(ax)
+    name_lines(ax)
     return ax
 
 
@@ -145,7 +147,7 @@ def mendable_tensions(done: Execution, ax: Axes | None = None) -> Axes:
         _line(ax, clock, course, color=_color(i), linestyle=_style(i), linewidth=1.0, label=f"cable {i}")
     dressed(ax, "time [s]", "mendable tension\nerror [N]")
     _limit(ax, clock)
-    legend_outside(ax)
+    name_lines(ax)
     return ax
 
 
@@ -167,7 +169,7 @@ def place_errors(done: Execution, ax: Axes | None = None) -> Axes:
         _line(ax, clock, course, color=color, linestyle=style, linewidth=1.1, label=f"${name}$")
     dressed(ax, "time [s]", "estimated less\nplanned [mm]")
     _limit(ax, clock)
-    legend_outside(ax)
+    name_lines(ax)
     return ax
 
 
@@ -214,6 +216,6 @@ def _mark(ax: Axes, done: Execution) -> None:
             if not ax.get_yticks().size:
                 ax.annotate(
                     event.name, (event.time - done.time[0], 1.0), xycoords=("data", "axes fraction"),
-                    xytext=(0.0, 2.0), textcoords="offset points", fontsize=TICK, ha="center", va="bottom",
+                    xytext=(0.0, 2.0), textcoords="offset points", fontsize=current().tick, ha="center", va="bottom",
                     annotation_clip=False,
                 )  # fmt: skip

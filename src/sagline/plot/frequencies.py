@@ -16,7 +16,9 @@ from sagline.arguments import instance
 from sagline.arrays import checked
 from sagline.dynamics.vibration import Vibration
 from sagline.errors import InvalidValueError
+from sagline.plot.names import above
 from sagline.plot.sheet import BLUE, TICK, VERMILLION, axes_or_new, dressed
+from sagline.plot.style import current
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -112,4 +114,6 @@ def _legend(ax: Axes) -> None:
         for share in SHARES
     ]  # fmt: skip
     handles.append(Line2D([], [], color=VERMILLION, linewidth=0.9, linestyle=(0, (4.0, 1.6)), label="massless"))
-    ax.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, fontsize=TICK, frameon=False)
+    labels = [str(handle.get_label()) for handle in handles]
+    place = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "ncols": 2, "fontsize": TICK, "frameon": False}
+    ax.legend(handles=handles, **(above(ax, labels) if current().direct else place))

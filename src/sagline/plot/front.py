@@ -8,7 +8,9 @@ import numpy as np
 
 from sagline.arguments import instance
 from sagline.optimization.front import Front
-from sagline.plot.sheet import BLUE, GAP_COLOR, LABEL, VERMILLION, dressed, legend_outside, sheet
+from sagline.plot.names import name_lines, wrapped
+from sagline.plot.sheet import BLUE, GAP_COLOR, VERMILLION, dressed, sheet
+from sagline.plot.style import current
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,8 +46,9 @@ def front(front: Front) -> Figure:
     else:
         for k, ax in enumerate(panels, start=1):
             _draw_pair(ax, front, k)
-    legend_outside(panels[0])
-    figure.suptitle(f"{front.start.name}, {len(front.evaluated):,} robots by {front.optimizer}", fontsize=LABEL)
+    name_lines(panels[0])
+    told = f"{front.start.name}, {len(front.evaluated):,} robots by {front.optimizer}"
+    figure.suptitle(wrapped(told, current().label), fontsize=current().label)
     return figure
 
 

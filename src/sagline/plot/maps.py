@@ -11,7 +11,8 @@ from matplotlib.colors import LogNorm, Normalize
 from sagline.arguments import choice, instance
 from sagline.dynamics.frequency_map import FrequencyMap
 from sagline.errors import InvalidValueError
-from sagline.plot.sheet import GAP_COLOR, LABEL, TICK, WIDTH, sheet
+from sagline.plot.sheet import GAP_COLOR, WIDTH, sheet
+from sagline.plot.style import current
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -67,16 +68,16 @@ def frequency_map(found: FrequencyMap, quantity: str = "frequency") -> Figure:
     for ax, row in zip(panels.flat, rows, strict=True):
         ax.set_facecolor(GAP_COLOR)
         ax.pcolormesh(_edges(x), _edges(y), values[:, :, row].T, norm=scale, cmap=COLORS, rasterized=True)
-        ax.set_title(f"$z$ = {z[row]:.3g} m", fontsize=TICK)
+        ax.set_title(f"$z$ = {z[row]:.3g} m", fontsize=current().tick)
         ax.set_aspect("equal")
-        ax.tick_params(labelsize=TICK, length=3.0, width=0.6)
-        ax.set_xlabel("$x$ [m]", fontsize=LABEL)
-        ax.set_ylabel("$y$ [m]", fontsize=LABEL)
+        ax.tick_params(labelsize=current().tick, length=3.0, width=0.6)
+        ax.set_xlabel("$x$ [m]", fontsize=current().label)
+        ax.set_ylabel("$y$ [m]", fontsize=current().label)
         ax.label_outer()
     bar = figure.colorbar(ScalarMappable(scale, COLORS), ax=list(panels.flat), shrink=0.8, pad=0.02)
-    bar.set_label(label, fontsize=LABEL)
-    bar.ax.tick_params(labelsize=TICK)
-    figure.suptitle(found.robot.name, fontsize=LABEL)
+    bar.set_label(label, fontsize=current().label)
+    bar.ax.tick_params(labelsize=current().tick)
+    figure.suptitle(found.robot.name, fontsize=current().label)
     return figure
 
 

@@ -8,7 +8,9 @@ import numpy as np
 
 from sagline.arguments import instance
 from sagline.motion.path import Path
-from sagline.plot.sheet import BLUE, COLORS, TICK, VERMILLION, axes_or_new, dressed, legend_outside
+from sagline.plot.names import name_lines
+from sagline.plot.sheet import BLUE, COLORS, VERMILLION, axes_or_new, dressed
+from sagline.plot.style import current
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,7 +34,7 @@ def path(path: Path, ax: Axes | None = None) -> Axes:
     x, y, z = instance(path, Path, "path").pose.position.T
     ax.plot(x, y, color=BLUE, linewidth=1.3)
     ax.plot(x[0], y[0], "o", color=VERMILLION, markersize=5.0, zorder=3.0)
-    ax.set_title("\N{BLACK CIRCLE} start", color=START_COLOR, fontsize=TICK, loc="left")
+    ax.set_title("\N{BLACK CIRCLE} start", color=START_COLOR, fontsize=current().tick, loc="left")
     for k in _marks(path):
         base = path.pose.position[k, :2]
         tip = base + 1e-3 * path.twist[k, :2]  # s: short enough to show the direction only
@@ -40,7 +42,7 @@ def path(path: Path, ax: Axes | None = None) -> Axes:
         ax.annotate("", (tip[0], tip[1]), (base[0], base[1]), arrowprops=arrow)
     low, high = float(z.min()), float(z.max())
     height = f"$z$ = {low:g} m" if high - low < LEVEL else f"$z$ from {low:g} m to {high:g} m"
-    ax.set_title(height, fontsize=TICK, loc="right")
+    ax.set_title(height, fontsize=current().tick, loc="right")
     dressed(ax, "$x$ [m]", "$y$ [m]")
     ax.set_aspect("equal")
     ax.margins(0.06)
@@ -65,7 +67,7 @@ def velocity(path: Path, ax: Axes | None = None) -> Axes:
     dressed(ax, "time [s]", "velocity [m/s]")
     if len(path) > 1:
         ax.set_xlim(path.time[0], path.time[-1])
-    legend_outside(ax)
+    name_lines(ax)
     return ax
 
 

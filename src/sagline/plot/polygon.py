@@ -11,7 +11,9 @@ from matplotlib.textpath import TextPath
 
 from sagline.arguments import instance
 from sagline.errors import InvalidValueError
-from sagline.plot.sheet import COLORS, GAP_COLOR, TICK, axes_or_new, dressed, legend_outside
+from sagline.plot.names import name_lines
+from sagline.plot.sheet import COLORS, GAP_COLOR, axes_or_new, dressed
+from sagline.plot.style import current
 from sagline.tension.polygon import TensionPolygon
 
 if TYPE_CHECKING:
@@ -71,7 +73,7 @@ def polygon(shape: TensionPolygon, points: Mapping[str, ArrayLike] | None = None
     ax.set_aspect("equal")
     ax.margins(x=0.33, y=0.16)  # room for names
     if any(np.isfinite(place).all() for place in places.values()):
-        legend_outside(ax)
+        name_lines(ax)
     _name_sides(ax, shape, corners)
     return ax
 
@@ -117,7 +119,7 @@ def _name_sides(ax: Axes, shape: TensionPolygon, corners: Array) -> None:
             textcoords="offset points",
             ha="center",
             va="center",
-            fontsize=TICK,
+            fontsize=current().tick,
             color="0.3",
             arrowprops=line if name.moved else None,
         )
@@ -126,19 +128,20 @@ def _name_sides(ax: Axes, shape: TensionPolygon, corners: Array) -> None:
 def _names(shape: TensionPolygon, corners: Array, scale: float) -> list[_Name]:
     """Each name beyond its side, where a convex polygon has no other line; names that would meet move outward."""
     names: list[_Name] = []
+    size = current().tick
     normals = _normals(corners)
     for k, side in enumerate(shape.sides):
         if side is None:
             continue
         text, middle = f"cable {side.cable} {side.limit}", 0.5 * (corners[k] + corners[(k + 1) % len(corners)])
         out = normals[k]
-        half = 0.5 * np.array([TextPath((0.0, 0.0), text, size=TICK).get_extents().width + 4.0, 1.3 * TICK])
+        half = 0.5 * np.array([TextPath((0.0, 0.0), text, size=size).get_extents().width + 4.0, 1.3 * size])
         away = least = GAP + half @ np.abs(out)  # then the whole box is beyond the line
         while any(
             np.all(np.abs(scale * (middle - name.middle) + away * out - name.offset) < half + name.half + 1.0)
             for name in names
         ):
-            away += 0.5 * TICK
+            away += 0.5 * size
         names.append(_Name(text, middle, away * out, half, bool(away > least)))
     return names
 

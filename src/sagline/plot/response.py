@@ -8,7 +8,9 @@ from matplotlib.ticker import LogLocator, NullFormatter
 
 from sagline.dynamics.response import FrequencyResponse
 from sagline.dynamics.response_curves import drawn_curves, response_curves
-from sagline.plot.sheet import BLUE, TICK, VERMILLION, axes_or_new, dressed, legend_outside
+from sagline.plot.names import name_lines
+from sagline.plot.sheet import BLUE, VERMILLION, axes_or_new, dressed
+from sagline.plot.style import current
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -62,8 +64,8 @@ def response(
     for frequency, share in modes:
         shade = FAINTEST + (1.0 - FAINTEST) * float(share)
         ax.axvline(frequency, ymax=MARK, color=BLUE, alpha=shade, linewidth=0.9, zorder=1.9)
-    ax.set_title(_damping(vibration), fontsize=TICK, loc="right")
-    legend_outside(ax)
+    ax.set_title(_damping(vibration), fontsize=current().tick, loc="right")
+    name_lines(ax)
     return ax
 
 

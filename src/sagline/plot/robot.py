@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import combinations, product
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from matplotlib import patheffects
@@ -12,27 +11,24 @@ from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from mpl_toolkits.mplot3d.axes3d import Axes3D
-from scipy.spatial import ConvexHull
 
 from sagline.arguments import instance, optional
-from sagline.errors import InvalidValueError
 from sagline.kinematics.inverse import inverse
 from sagline.numbers import n
-from sagline.plot.sheet import LABEL, TICK, VERMILLION, sheet
+from sagline.plot.scene import EDGES, frame_box, ground, hung, platform_box, pose_of, taut, wheels
+from sagline.plot.sheet import VERMILLION, sheet
+from sagline.plot.style import current
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.robot.several import pulleys_of
-from sagline.robot.wheels import on_wheels
-from sagline.viewer import lines
 from sagline.viewer.tension_scale import TensionScale
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
     from sagline.arrays import Array
     from sagline.kinematics.plan import Plan
 
-POINTS = 50  # around each pulley
 FRAME_COLOR, FLOOR_COLOR, SHADOW_COLOR, WHEEL_COLOR = "0.6", "0.955", "0.82", "0.35"
-FLAT = 1e-6  # of the robot's size: a platform that is thinner casts a line
 NEAR = 0.04  # of the robot's size: anchors that are closer share a label
 HALO = [patheffects.withStroke(linewidth=2.0, foreground="white")]
 AWAY = 0.045  # of the robot's size: how far outside its anchor a label stands
@@ -58,7 +54,7 @@ def robot(robot: Robot, pose: Pose | None = None, ax: Axes3D | None = None) -> A
     Raises:
         InvalidValueError: If no pose is given and the robot has no test box, or the pose is a batch.
     """
-    where = _pose_of(instance(robot, Robot, "robot"), optional(pose, Pose, "pose"))
+    where = pose_of(instance(robot, Robot, "robot"), optional(pose, Pose, "pose"))
     optional(ax, Axes3D, "ax")
     if ax is None:
         ax = sheet(height=4.0, width=5.6).add_subplot(projection="3d")
@@ -67,7 +63,7 @@ def robot(robot: Robot, pose: Pose | None = None, ax: Axes3D | None = None) -> A
         ax, points, robot.name if plan.feasible else f"{robot.name}: no tensions within the limits carry it here"
     )
     if plan.feasible:
-        _tension_bar(ax, TensionScale.of(robot), plan.chord_tension)
+        tension_bar(ax, TensionScale.of(robot), plan.chord_tension, "left")
     return ax
 
 
@@ -84,107 +80,43 @@ def draw_robot(ax: Axes3D, robot: Robot, where: Pose, color: str | None = None) 
         What carries the platform, and points that stand for what is drawn [m], shape (n, 3).
     """
     ax.computed_zorder = False  # by the middles of things, which puts the ground over what stands on it
-    plan, courses = _cable_lines(robot, where)
+    plan = inverse(robot, where)
+    courses = hung(robot, where, plan) if plan.feasible else taut(robot, where)
     colors = TensionScale.of(robot).colors(plan.chord_tension) / 255.0  # gray where there is no tension
     for line, own in zip(courses, colors, strict=True):
         style = "-" if plan.feasible else (0, (3.0, 2.0))
         ax.plot(*line.T, color=own if color is None else color, linewidth=1.4, linestyle=style, zorder=2.0)
-    wheels = _draw_wheels(ax, robot, where)
-    frame = _frame_box(robot)
+    machinery = _draw_wheels(ax, robot, where)
+    frame = frame_box(robot)
     if frame is not None:
         _draw_box(ax, frame, FRAME_COLOR, 0.7)
     ax.scatter(*robot.frame_anchors.T, color="black", s=8.0, depthshade=False, zorder=4.0)
-    low, high = robot.platform_anchors.min(axis=0), robot.platform_anchors.max(axis=0)
-    size = high - low if robot.platform_size is None else robot.platform_size
-    platform = where.position + _corners(0.5 * (low + high), size) @ where.matrix.T
+    platform = platform_box(robot, where)
     _draw_box(ax, platform, VERMILLION, 1.3)
-    points = np.concatenate((courses.reshape(-1, 3), wheels, platform, *([] if frame is None else [frame])))
+    points = np.concatenate((courses.reshape(-1, 3), machinery, platform, *([] if frame is None else [frame])))
     _draw_ground(ax, points, platform)
     _number(ax, robot.frame_anchors, points)
     return plan, points
 
 
-def _pose_of(robot: Robot, pose: Pose | None) -> Pose:
-    if pose is None and robot.test_box is not None:
-        return Pose(0.5 * (robot.test_box.low + robot.test_box.high), np.eye(3))
-    if pose is None or pose.shape:
-        value = "missing" if pose is None else f"a batch of {len(pose)}"
-        raise InvalidValueError("pose", value, "a single pose, where the robot has no test box", "Give one pose.")
-    return pose
-
-
-def _cable_lines(robot: Robot, pose: Pose) -> tuple[Plan, Array]:
-    """What carries the platform, and points of the cables in the world [m], shape (m, points, 3)."""
-    plan = inverse(robot, pose)
-    contact = plan.state.contact if plan.feasible else None
-    wraps = lines.wraps(robot, pose, None if contact is None else contact.wrap_angle)
-    ends = lines.chords(robot, pose, wraps[:, -1])
-    free = lines.hanging(ends, plan.state.cables, 1.0) if plan.feasible else lines.straight(ends)
-    return plan, np.concatenate((wraps, free), axis=1)
-
-
 def _draw_wheels(ax: Axes3D, robot: Robot, pose: Pose) -> Array:
     """The pulleys, the runs behind them and the drums that are known; returns their points (n, 3)."""
-    turn = np.linspace(0.0, 2.0 * np.pi, POINTS)[:, None]
-    wheels = np.swapaxes(on_wheels(robot, pose, turn), 0, 1)[pulleys_of(robot).radius > 0.0]
-    runs, upright = lines.dead_runs(robot)
-    drums = [_circle(ends, radius) for ends, radius in zip(lines.drum_axes(robot), _drum_radii(robot), strict=False)]
-    for circle in (*wheels, *drums):
+    circles, runs = wheels(robot, pose)
+    for circle in circles:
         ax.plot(*circle.T, color=WHEEL_COLOR, linewidth=0.9, zorder=1.9)
-    for run, known in zip(runs, upright, strict=True):
-        if run[0, 2] != run[1, 2]:
-            ax.plot(*run.T, color=WHEEL_COLOR, linewidth=0.7, linestyle="-" if known else ":", zorder=1.8)
-    return np.concatenate((wheels.reshape(-1, 3), runs.reshape(-1, 3), *drums))
-
-
-def _drum_radii(robot: Robot) -> Array:
-    known = None if robot.winches is None else robot.winches.drum_radius
-    return np.empty(0) if known is None else known
-
-
-def _circle(ends: Array, radius: float) -> Array:
-    """Both rims of a level drum, from one end of its axis to the other (2, 3), as one line."""
-    axis = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
-    turn = np.linspace(0.0, 2.0 * np.pi, POINTS)[:, None]
-    rim = radius * (np.cos(turn) * np.cross(axis, [0.0, 0.0, 1.0]) + np.sin(turn) * [0.0, 0.0, 1.0])
-    return np.concatenate((ends[0] + rim, ends[1] + rim))
-
-
-def _frame_box(robot: Robot) -> Array | None:
-    """Corners of the frame, shape (8, 3). Frames stand: their top is where the highest anchors are."""
-    if robot.frame_size is None:
-        return None
-    top = robot.frame_anchors.max(axis=0)
-    middle = 0.5 * (top + robot.frame_anchors.min(axis=0))
-    middle[2] = top[2] - 0.5 * robot.frame_size[2]
-    return _corners(middle, robot.frame_size)
-
-
-def _corners(middle: Array, size: Array) -> Array:
-    """The eight corners of a box, shape (8, 3)."""
-    signs = np.array(list(product((-1.0, 1.0), repeat=3)))
-    corners: Array = middle + 0.5 * size * signs
-    return corners
+    for run, upright in runs:
+        ax.plot(*run.T, color=WHEEL_COLOR, linewidth=0.7, linestyle="-" if upright else ":", zorder=1.8)
+    return np.concatenate([*circles, *(run for run, _ in runs), np.empty((0, 3))])
 
 
 def _draw_box(ax: Axes3D, corners: Array, color: str, width: float) -> None:
-    """The twelve edges: between corners that differ in one direction."""
-    signs = list(product((0, 1), repeat=3))
-    for a, b in combinations(range(8), 2):
-        if sum(p != q for p, q in zip(signs[a], signs[b], strict=True)) == 1:
-            ax.plot(*corners[[a, b]].T, color=color, linewidth=width, zorder=1.0 + width)
+    for edge in EDGES:
+        ax.plot(*corners[list(edge)].T, color=color, linewidth=width, zorder=1.0 + width)
 
 
 def _draw_ground(ax: Axes3D, points: Array, platform: Array) -> None:
     """The ground under everything, and the platform's shadow on it."""
-    low, high = points.min(axis=0), points.max(axis=0)
-    height = min(0.0, float(low[2]))
-    outline = _corners(0.5 * (low + high), high - low)[[0, 2, 6, 4], :2]
-    shadow = platform[:, :2]
-    if np.linalg.matrix_rank(shadow - shadow[0], tol=FLAT * float(np.ptp(points))) == 2:
-        shadow = shadow[ConvexHull(shadow).vertices]
-    for place, color in ((outline, FLOOR_COLOR), (shadow, SHADOW_COLOR)):
-        flat = np.column_stack((place, np.full(len(place), height)))
+    for flat, color in zip(ground(points, platform), (FLOOR_COLOR, SHADOW_COLOR), strict=True):
         ax.add_collection3d(Poly3DCollection([flat], facecolor=color, edgecolor="none", zorder=0.5))
 
 
@@ -200,35 +132,46 @@ def _number(ax: Axes3D, anchors: Array, points: Array) -> None:
         out = 0.5 * out / (np.linalg.norm(out) or 1.0) + (0.0, 0.0, 0.85)  # upward: the axes have their numbers below
         place = place + AWAY * size * out
         text = ", ".join(map(str, together))
-        ax.text(*place, text, fontsize=TICK, ha="center", va="center", path_effects=HALO, zorder=5.0)
+        ax.text(*place, text, fontsize=current().tick, ha="center", va="center", path_effects=HALO, zorder=5.0)
 
 
-def _tension_bar(ax: Axes3D, scale: TensionScale, tension: Array) -> None:
+def tension_bar(ax: Axes, scale: TensionScale, tension: Array, place: Literal["left", "right"]) -> None:
+    """A bar that says what the colors of cables mean.
+
+    Args:
+        ax: Axes beside which it stands.
+        scale: What the colors mean.
+        tension: Of the cables [N], shape (m,); a bar has an arrow where one of them is beyond its end.
+        place: "left" or "right".
+    """
     steps = np.geomspace(scale.low, scale.high, 128)
     shown = ScalarMappable(LogNorm(scale.low, scale.high), ListedColormap(scale.colors(steps) / 255.0))
     below, above = tension.min() < scale.low * (1.0 - 1e-6), tension.max() > scale.high * (1.0 + 1e-6)
     extend = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
     bar = ax.figure.colorbar(
-        shown, ax=ax, location="left", shrink=0.6, pad=0.0, aspect=24, extend=extend[bool(below), bool(above)]
+        shown, ax=ax, location=place, shrink=0.6, pad=0.0, aspect=24, extend=extend[bool(below), bool(above)]
     )
-    bar.set_label(r"chord tension $\tau$ [N]", fontsize=LABEL)
+    if bar.solids is not None:
+        bar.solids.set_rasterized(False)
+        bar.solids.set_edgecolor("face")  # no white seams
+    bar.set_label(r"chord tension $\tau$ [N]", fontsize=current().label)
     bar.set_ticks(list(scale.ticks()), labels=[n(tick, ",.4g") for tick in scale.ticks()])
     bar.ax.minorticks_off()
-    bar.ax.tick_params(labelsize=TICK)
+    bar.ax.tick_params(labelsize=current().tick)
 
 
 def dress_space(ax: Axes3D, points: Array, title: str) -> None:
     """Labels, and ticks as far apart as their numbers are wide, none where two axes meet."""
-    ax.set_title(title, fontsize=LABEL, y=0.97)
+    ax.set_title(title, fontsize=current().label, y=0.97)
     low, high = points.min(axis=0), points.max(axis=0)
     low[2] = min(0.0, low[2])
     size = np.maximum(high - low, 0.1 * np.max(high - low))
     middle = 0.5 * (low + high)
     ax.set(**{f"{name}lim": (m - 0.5 * s, m + 0.5 * s) for name, m, s in zip("xyz", middle, size, strict=True)})
     for name, axis, share in zip("xyz", (ax.xaxis, ax.yaxis, ax.zaxis), size / size.max(), strict=True):
-        axis.set_label_text(f"${name}$ [m]", fontsize=LABEL)
+        axis.set_label_text(f"${name}$ [m]", fontsize=current().label)
         axis.labelpad = 7.0
-        axis.set_tick_params(labelsize=TICK, pad=0.0)
+        axis.set_tick_params(labelsize=current().tick, pad=0.0)
         axis.set_major_locator(MaxNLocator(max(1, round(4.5 * share)), steps=[1, 2, 5, 10], prune="both"))
         axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
     ax.grid(visible=False)

@@ -10,11 +10,15 @@ from typing import TYPE_CHECKING, Any, cast
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 
 from sagline.arguments import brief, file_path, optional
 from sagline.errors import FileError, InvalidValueError
 from sagline.files.whole import written_whole
+from sagline.plot.fonts import with_fonts
+from sagline.plot.names import break_labels
+from sagline.plot.style import PLAIN, Using, current
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -26,12 +30,33 @@ BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY = "#0072B2", "#D55E00", "#009E73", 
 COLORS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
 GAP_COLOR = "#BBBBBB"
 WIDTH = 7.0  # in, of a page with margins
-LABEL, TICK = 9.0, 8.0  # pt
+LABEL, TICK = PLAIN.label, PLAIN.tick  # pt, of a page of documentation
 RESOLUTION = 200  # dots an inch
 
 
 class Sheet(Figure):
-    """A figure without pyplot that a notebook can show."""
+    """A figure without pyplot that a notebook can show; it keeps the style that it is made in."""
+
+    def __init__(self, *arguments: Any, **named: Any) -> None:
+        """A figure as Matplotlib makes it."""
+        super().__init__(*arguments, **named)
+        self.style = current()
+        self._fitted = not self.style.name
+
+    def draw(self, renderer: Any) -> None:
+        """Draw in the style of the figure: what Matplotlib makes at the last moment, such as numbers of ticks, too."""
+        with Using(self.style):
+            if not self._fitted:
+                self._fitted = True  # before it is drawn for the first time
+                _thicken(self, self.style.line)
+                self.draw_without_rendering()  # now it is known how long the axes are
+                break_labels(self)
+            super().draw(renderer)
+
+    def savefig(self, *arguments: Any, **named: Any) -> None:
+        """Write the figure, in its style."""
+        with Using(self.style):
+            super().savefig(*arguments, **named)
 
     def _repr_png_(self) -> bytes:
         buffer = BytesIO()
@@ -40,16 +65,28 @@ class Sheet(Figure):
 
 
 def sheet(height: float, width: float = WIDTH) -> Sheet:
-    """An empty figure that leaves room for what stands outside its axes.
+    """An empty figure that leaves room for what stands outside its axes, in the style that is in use.
 
     Args:
-        height: [in].
-        width: [in].
+        height: As it would be on a page of documentation [in].
+        width: As well [in].
 
     Returns:
         The figure.
     """
-    return Sheet(figsize=(width, height), layout="constrained")
+    return Sheet(figsize=current().size(width, height), layout="constrained")
+
+
+def _thicken(figure: Figure, factor: float) -> None:
+    """Make what is drawn on axes so many times as thick; their frames and ticks are so already."""
+    owners: list[Any] = [*figure.axes, *figure.legends, *(ax.get_legend() for ax in figure.axes if ax.get_legend())]
+    for line in (line for owner in owners for line in owner.get_lines()):
+        line.set_linewidth(factor * line.get_linewidth())
+        line.set_markersize(factor * line.get_markersize())
+    for collection in (each for ax in figure.axes for each in ax.collections):
+        collection.set_linewidth((factor * np.asarray(collection.get_linewidth())).tolist())
+        if isinstance(collection, PathCollection):
+            collection.set_sizes(factor**2 * collection.get_sizes())
 
 
 def axes_or_new(ax: Axes | None, height: float = 3.0, width: float = WIDTH) -> Axes:
@@ -82,32 +119,14 @@ def dressed(ax: Axes, x: str, y: str) -> None:
         x: Label of the horizontal axis, with its unit.
         y: Label of the vertical axis, with its unit.
     """
-    ax.set_xlabel(x, fontsize=LABEL)
-    ax.set_ylabel(y, fontsize=LABEL)
-    ax.tick_params(labelsize=TICK, length=3.0, width=0.6)
-    ax.grid(color="0.9", linewidth=0.6)
+    look = current()
+    ax.set_xlabel(x, fontsize=look.label)
+    ax.set_ylabel(y, fontsize=look.label)
+    ax.tick_params(labelsize=look.tick, length=3.0 * look.line, width=0.6 * look.line)
+    ax.grid(color="0.9", linewidth=0.6 * look.line)
     ax.set_axisbelow(True)
     ax.spines[["top", "right"]].set_visible(False)
-    ax.spines[["left", "bottom"]].set_linewidth(0.6)
-
-
-def legend_outside(ax: Axes, title: str = "") -> None:
-    """The legend of the axes, to the right of them.
-
-    Args:
-        ax: The axes.
-        title: Over the legend; "" for none.
-    """
-    ax.legend(
-        loc="upper left",
-        bbox_to_anchor=(1.01, 1.0),
-        borderaxespad=0.0,
-        fontsize=TICK,
-        title=title or None,
-        title_fontsize=TICK,
-        frameon=False,
-        handlelength=2.4,
-    )
+    ax.spines[["left", "bottom"]].set_linewidth(0.6 * look.line)
 
 
 def draw_course(ax: Axes, clock: Array, course: Array, **look: Any) -> None:
@@ -181,9 +200,12 @@ def save(drawing: Figure | Axes, file: os.PathLike[str] | str) -> None:
     if kind not in known:
         raise FileError(path, f"the suffix is {path.suffix or 'missing'}", f"Choose one of {', '.join(known)}.")
     # the same figure gives the same bytes: no date, no random names
-    metadata = {"Date": None} if kind == "svg" else None
+    metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
     drawn = BytesIO()  # matplotlib leaves a file open that it cannot write to
     with matplotlib.rc_context({"svg.hashsalt": "sagline"}):
         figure.savefig(drawn, format=kind, dpi=RESOLUTION, metadata=metadata)
+    content = drawn.getvalue()
+    if kind == "svg" and isinstance(figure, Sheet) and figure.style.name:
+        content = with_fonts(content.decode("utf-8")).encode("utf-8")
     with written_whole(path) as partial:
-        partial.write_bytes(drawn.getbuffer())
+        partial.write_bytes(content)

@@ -14,7 +14,9 @@ from sagline.arguments import choice, instance
 from sagline.arrays import number
 from sagline.errors import InvalidValueError
 from sagline.numbers import n
-from sagline.plot.sheet import GAP_COLOR, LABEL, TICK, axes_or_new, dressed
+from sagline.plot.names import wrapped
+from sagline.plot.sheet import GAP_COLOR, axes_or_new, dressed
+from sagline.plot.style import current
 from sagline.viewer.cable_colors import CABLES, cable_color
 from sagline.workspaces.region import flat_axis
 from sagline.workspaces.slice import AXES, Plane, Slice, slice_of
@@ -61,8 +63,9 @@ def slice(space: Workspace, normal: str = "z", at: float | None = None, ax: Axes
     size = high - low
     longest = max(size[first], size[second])
     shape = tuple(max(2, round(POINTS * float(size[axis] / longest))) for axis in plane.axes)
-    find = space.levels().details
-    cut = slice_of(find, plane, low, high, (shape[0], shape[1]))
+    # in a plane of symmetry rounding alone says which of two cables limits: what is drawn is that of a plane beside
+    beside = plane._replace(at=plane.at + BESIDE * float(high[plane.normal] - plane.at))
+    cut = slice_of(space.levels().details, beside, low, high, (shape[0], shape[1]))
     ax = axes_or_new(ax, height=0.9 + 5.6 * float(np.clip(size[second] / size[first], 0.3, 1.3)))
     dressed(ax, f"${AXES[first]}$ [m]", f"${AXES[second]}$ [m]")
     ax.grid(visible=False)
@@ -70,14 +73,16 @@ def slice(space: Workspace, normal: str = "z", at: float | None = None, ax: Axes
     ax.set(xlim=(low[first], high[first]), ylim=(low[second], high[second]))
     if not (cut.level >= 0.0).any():
         ax.set_facecolor(OUTSIDE)
-        ax.text(0.5, 0.5, "nothing of the workspace is here", transform=ax.transAxes, ha="center", fontsize=LABEL)
+        ax.text(
+            0.5, 0.5, "nothing of the workspace is here", transform=ax.transAxes, ha="center", fontsize=current().label
+        )
     else:
         levels = round_levels(float(cut.margin[(cut.level >= 0.0) & np.isfinite(cut.margin)].max(initial=0.0)))
-        beside = plane._replace(at=plane.at + BESIDE * float(space.box.high[plane.normal] - plane.at))
-        _draw_regions(ax, cut, slice_of(find, beside, low, high, (shape[0], shape[1])), space, levels)
+        _draw_regions(ax, cut, space, levels)
         _draw_lines(ax, cut, levels)
     held = f"{space.wrenches}; {space.orientations}"
-    ax.set_title(f"{space.robot.name}, {AXES[plane.normal]} = {n(plane.at, unit='m')}; {held}", fontsize=LABEL)
+    told = f"{space.robot.name}, {AXES[plane.normal]} = {n(plane.at, unit='m')}; {held}"
+    ax.set_title(wrapped(told, current().label), fontsize=current().label)
     return ax
 
 
@@ -134,14 +139,11 @@ def _shade(color: tuple[int, int, int]) -> Color:
     return red / 255.0, green / 255.0, blue / 255.0
 
 
-def _draw_regions(ax: Axes, cut: Slice, beside: Slice, space: Workspace, levels: Array) -> None:
-    """Pale colors by what limits, each region with its name; gray outside.
-
-    What limits is taken from a plane beside: in a plane of symmetry rounding alone says which of two cables it is.
-    """
+def _draw_regions(ax: Axes, cut: Slice, space: Workspace, levels: Array) -> None:
+    """Pale colors by what limits, each region with its name; gray outside."""
     ax.set_facecolor(OUTSIDE)
     inside = ax.contourf(cut.across, cut.up, cut.level, levels=[0.0, np.inf], colors=["white"], zorder=0.8)
-    pairs = np.stack((beside.criterion, beside.cable), axis=-1).reshape(-1, 2)
+    pairs = np.stack((cut.criterion, cut.cable), axis=-1).reshape(-1, 2)
     kinds, which = np.unique(pairs, axis=0, return_inverse=True)
     region = which.reshape(cut.level.shape)
     shades, keys = limit_colors(space), [(int(which), int(cable)) for which, cable in kinds]
@@ -176,7 +178,7 @@ def _name_region(ax: Axes, cut: Slice, within: Flags, free: Flags, name: str) ->
             row, column = np.unravel_index(int(np.argmax(depth)), depth.shape)
             if points * depth[row, column] >= ROOM:
                 place = cut.across[column], cut.up[row]
-                ax.text(*place, name, fontsize=TICK, ha="center", va="center", path_effects=HALO, zorder=3.0)
+                ax.text(*place, name, fontsize=current().tick, ha="center", va="center", path_effects=HALO, zorder=3.0)
                 break
 
 
@@ -185,7 +187,9 @@ def _draw_lines(ax: Axes, cut: Slice, levels: Array) -> None:
     if levels.size:
         margin = np.ma.masked_where((cut.level < 0.0) | ~np.isfinite(cut.margin), cut.margin)
         drawn = ax.contour(cut.across, cut.up, margin, levels=levels, colors="0.25", linewidths=0.7, zorder=2.0)
-        for text in ax.clabel(drawn, fmt=lambda value: n(value, unit="N"), fontsize=TICK - 1.0, inline_spacing=3):
+        for text in ax.clabel(
+            drawn, fmt=lambda value: n(value, unit="N"), fontsize=current().tick - 1.0, inline_spacing=3
+        ):
             text.set_path_effects([*HALO])
     ax.contour(cut.across, cut.up, cut.level, levels=[0.0], colors="black", linewidths=2.2, zorder=2.5)
 

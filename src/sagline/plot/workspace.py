@@ -9,9 +9,11 @@ from matplotlib.colors import to_rgb
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from sagline.arguments import instance
+from sagline.plot.names import wrapped
 from sagline.plot.robot import draw_robot, dress_space
-from sagline.plot.sheet import GAP_COLOR, LABEL, TICK, sheet
+from sagline.plot.sheet import GAP_COLOR, sheet
 from sagline.plot.slice import limit_colors, limit_name, slice
+from sagline.plot.style import current
 from sagline.robot.pose import Pose
 from sagline.workspaces.region import flat_axis
 from sagline.workspaces.slice import AXES
@@ -29,6 +31,7 @@ NEAR_SIDE, FAR_SIDE = 0.5, 0.22  # opacity of the hull before and behind the rob
 FINEST: Final = 90  # cells along the longest side of the hull as it is drawn: more is not seen, and takes long
 HEIGHT, ZOOM = 3.4, 1.0  # in; and how large the robot stands in its axes
 WHOLE, ROBOT, BARS = (0.0, 0.0, 1.0, 0.94), (-0.02, 0.0, 0.7, 0.96), (0.78, 0.2, 0.19, 0.6)  # of the sheet
+ABOVE, BELOW = (-0.05, 0.42, 1.1, 0.52), (0.2, 0.1, 0.75, 0.3)  # the same where nothing fits beside anything
 MOST_LIMITS: Final = 10  # that have a bar of their own
 REST: Final = "others"
 
@@ -52,9 +55,10 @@ def workspace(space: Workspace) -> Figure:
     flat = flat_axis(instance(space, Workspace, "space").box)
     if flat is not None:
         return slice(space, AXES[flat[0]]).get_figure(root=True)  # type: ignore[return-value] # a new figure
-    figure, limits = sheet(height=HEIGHT), space.limits
+    limits, narrow = space.limits, current().narrow
+    figure = sheet(height=2.3 * HEIGHT if limits and narrow else HEIGHT)
     figure.set_layout_engine("none")  # none knows how much of its axes a robot in space takes
-    ax: Any = figure.add_axes(ROBOT if limits else WHOLE, projection="3d")
+    ax: Any = figure.add_axes((ABOVE if narrow else ROBOT) if limits else WHOLE, projection="3d")
     colors = limit_colors(space)
     _, points = draw_robot(ax, space.robot, _place(space), "0.4")
     _draw_hull(ax, space, colors)
@@ -63,9 +67,10 @@ def workspace(space: Workspace) -> Figure:
     ax.set_box_aspect([np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim()), np.ptp(ax.get_zlim())], zoom=ZOOM)
     for each in ax.get_children():
         each.set_clip_on(False)
-    figure.suptitle(f"{space.robot.name}: {amount_of(space)}; {space.wrenches}; {space.orientations}", fontsize=LABEL)
+    told = f"{space.robot.name}: {amount_of(space)}; {space.wrenches}; {space.orientations}"
+    figure.suptitle(wrapped(told, current().label), fontsize=current().label)
     if limits:
-        _draw_bars(figure.add_axes(BARS), space, colors)
+        _draw_bars(figure.add_axes(BELOW if narrow else BARS), space, colors)
     return figure
 
 
@@ -124,10 +129,10 @@ def _draw_bars(ax: Axes, space: Workspace, colors: dict[Key, tuple[float, float,
         bars = [*bars[: MOST_LIMITS - 1], (REST, rest, to_rgb(GAP_COLOR))]
     names, shares, shades = zip(*bars, strict=True)
     drawn = ax.barh(range(len(bars)), shares, color=shades, alpha=0.75, height=0.7)
-    ax.bar_label(drawn, fmt="%.0f %%", fontsize=TICK, padding=2.0)
-    ax.set_yticks(range(len(bars)), labels=names, fontsize=TICK)
+    ax.bar_label(drawn, fmt="%.0f %%", fontsize=current().tick, padding=2.0)
+    ax.set_yticks(range(len(bars)), labels=names, fontsize=current().tick)
     ax.invert_yaxis()
-    ax.set_xlabel("share of the boundary [%]", fontsize=LABEL)
+    ax.set_xlabel("share of the boundary [%]", fontsize=current().label)
     ax.set_xlim(0.0, 1.25 * max(shares))
-    ax.tick_params(labelsize=TICK, length=3.0, width=0.6)
+    ax.tick_params(labelsize=current().tick, length=3.0, width=0.6)
     ax.spines[["top", "right"]].set_visible(False)

@@ -1,0 +1,283 @@
+"""What a calibration left over, what it tells apart, and how far the platform is to be expected from its place."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
+
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LogNorm
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
+
+from sagline.arguments import choice, instance
+from sagline.arrays import locked, number
+from sagline.calibration.result import Calibration
+from sagline.calibration.words import chi_squared_in_words
+from sagline.errors import InvalidValueError
+from sagline.numbers import n
+from sagline.plot.names import fitting, wrapped
+from sagline.plot.sheet import COLORS, GAP_COLOR, VERMILLION, dressed, sheet
+from sagline.plot.style import current
+from sagline.robot.pose import Pose
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
+
+    from sagline.arrays import Array
+
+PARTS: Final = ("all", "residuals", "correlation", "errors")
+BANDS: Final = ((2.0, 0.35), (1.0, 0.55))  # standard deviations, and how dense
+REACH: Final = 5.0  # standard deviations: what is farther out stands at the edge, with its number
+MOST_POSES: Final = 1500  # whose residuals are drawn; of more every so-manieth, and all that do not fit
+MOST_NAMED: Final = 8  # outliers that are named
+POINTS: Final = 25  # of a map, along each side
+MARKS: Final = ("o", "s", "^", "D")
+PANEL, MATRIX, BESIDE, MAP = 0.95, 3.2, 1.2, 2.7  # in: heights of a panel, of the matrix, beside a map; its width
+LINE: Final = 0.048  # of the matrix: height of a name beside it
+LEADER: Final[dict[str, Any]] = {"arrowstyle": "-", "linewidth": 0.5, "relpos": (1.0, 0.5), "shrinkB": 0.0}
+ROUND: Final = FuncFormatter(lambda value, _: f"{value:g}")
+PER_METER: Final = 1e3  # mm
+
+
+class Kind(NamedTuple):
+    """Residuals of one kind.
+
+    Attributes:
+        label: Of their axis.
+        values: In standard deviations, shape (N, c).
+        names: Of the columns.
+        quantity: As outliers call it.
+    """
+
+    label: str
+    values: Array
+    names: tuple[str, ...]
+    quantity: str
+
+
+def calibration(found: Calibration, part: str = "all", *, height: float | None = None) -> Figure:
+    """Residuals, correlations and expected errors of a calibration.
+
+    Residuals are in standard deviations of their sensors, by rows of the log; the bands are one and two of them, what
+    does not fit has a ring, and what is off the scale is a triangle at its edge. The correlations are those of all
+    numbers that were found, by kinds. The maps show how far the platform is to be expected from where it is commanded,
+    on a level slice, before (as the priors say) and after; where the readings leave shifts and turns of the world open,
+    but for those.
+
+    Args:
+        found: From `calibrate`.
+        part: "residuals", "correlation" or "errors"; "all" for all of them.
+        height: Of the slice [m]; None for the middle of the calibration's poses.
+
+    Returns:
+        The figure.
+
+    Raises:
+        InvalidValueError: If it is no calibration, or there is no such part.
+    """
+    instance(found, Calibration, "found")
+    choice(part, "part", PARTS)
+    at = None if height is None else number(height, "height", "m")
+    heights: dict[str, float] = {
+        "residuals": 0.5 + PANEL * (len(_kinds(found)) + current().direct),
+        "correlation": MATRIX,
+        "errors": _height_of_maps(found),
+    }
+    draw: dict[str, Callable[[Any], None]] = {
+        "residuals": lambda own: _residuals(own, found),
+        "correlation": lambda own: _correlation(own, found),
+        "errors": lambda own: _errors(own, found, at),
+    }
+    shown = [part] if part != "all" else list(draw)
+    figure = sheet(height=sum(heights[name] for name in shown))
+    own = figure.subfigures(len(shown), 1, height_ratios=[heights[name] for name in shown], squeeze=False)[:, 0]
+    for name, where in zip(shown, own, strict=True):
+        draw[name](where)
+    return figure
+
+
+def _kinds(found: Calibration) -> list[Kind]:
+    """The residuals of what was read."""
+    sensors, m = found.sensors, found.robot.cable_count
+    cables, axes = tuple(f"cable {k}" for k in range(m)), ("$x$", "$y$", "$z$")
+    spans = (
+        ("lengths", sensors.length_deviation, slice(0, m), cables, "length"),
+        ("load cells", sensors.tension_deviation, slice(m, 2 * m), cables, "load cell"),
+        ("positions", sensors.position_deviation, slice(2 * m, 2 * m + 3), axes, "position"),
+        ("rotations", sensors.rotation_deviation, slice(2 * m + 3, 2 * m + 6), axes, "rotation"),
+    )
+    return [
+        Kind(label, found.residuals[:, where] / deviation, names, quantity)
+        for label, deviation, where, names, quantity in spans
+        if deviation is not None and np.isfinite(found.residuals[:, where]).any()
+    ]
+
+
+def _residuals(figure: SubFigure, found: Calibration) -> None:
+    """A panel for each kind."""
+    kinds = _kinds(found)
+    panels = figure.subplots(len(kinds), 1, sharex=True, squeeze=False)[:, 0]
+    held = np.isin(found.rows, [outlier.row for outlier in found.outliers])
+    some = np.arange(len(found.rows))[:: -(-len(found.rows) // MOST_POSES)]
+    shown = np.union1d(some, np.flatnonzero(held))
+    for ax, kind in zip(panels, kinds, strict=True):
+        for size, density in BANDS:
+            ax.axhspan(-size, size, color=GAP_COLOR, alpha=density, linewidth=0.0, zorder=0.4)
+        far = bool((np.abs(kind.values[shown]) > REACH).any())
+        for k, name in enumerate(kind.names):
+            values, color = kind.values[shown, k], COLORS[k % len(COLORS)]
+            within = np.where(np.abs(values) <= REACH, values, np.nan)
+            look = {"color": color, "linewidth": 0.0, "zorder": 2.0}
+            mark = MARKS[k // len(COLORS) % len(MARKS)]
+            ax.plot(found.rows[shown], within, mark, markersize=2.6, label=name, **look)
+            for side, arrow in ((1.0, "^"), (-1.0, "v")):
+                beyond = side * values > REACH
+                ax.plot(found.rows[shown][beyond], np.full(beyond.sum(), side * REACH), arrow, markersize=4.0, **look)
+        _mark_outliers(ax, found, kind)
+        dressed(ax, "", f"{kind.label} [$\\sigma$]")
+        ax.grid(visible=False)
+        if far:
+            ax.set_ylim(-1.12 * REACH, 1.12 * REACH)
+        else:
+            ax.set_ylim(*(np.array([-1.0, 1.0]) * max(2.5, 1.1 * float(np.nanmax(np.abs(kind.values[shown]))))))
+        ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+    every = f", every {-(-len(found.rows) // MOST_POSES)}th is drawn" if len(shown) < len(found.rows) else ""
+    panels[-1].set_xlabel(f"row of the log{every}", fontsize=current().label)
+    handles = {label: line for ax in panels for line, label in zip(*ax.get_legend_handles_labels(), strict=True)}
+    style, names = current(), list(handles)
+    place: Any = "outside right upper"
+    columns = 1
+    if style.direct:
+        width = cast("Figure", panels[0].get_figure(root=True)).get_figwidth()
+        place, columns = "outside lower center", fitting(names, width, style.tick)
+    figure.legend(handles.values(), names, loc=place, ncols=columns, fontsize=style.tick, frameon=False)
+    figure.align_ylabels(panels)
+    told = wrapped(f"{found.robot.name}: {chi_squared_in_words(found)}", current().label)
+    figure.suptitle(told, fontsize=current().label)
+
+
+def _mark_outliers(ax: Axes, found: Calibration, kind: Kind) -> None:
+    """A ring around what does not fit, and what it is."""
+    named = 0
+    for outlier in found.outliers:
+        if outlier.quantity != kind.quantity:
+            continue
+        place = float(np.clip(outlier.deviations * np.sign(outlier.size), -REACH, REACH))
+        ax.plot(outlier.row, place, "o", markersize=8.0, markerfacecolor="none", markeredgecolor=VERMILLION, zorder=3.0)
+        if named < MOST_NAMED:
+            cable = "" if outlier.cable is None else f"cable {outlier.cable}, "
+            unit = {"length": "m", "load cell": "N", "position": "m"}.get(outlier.quantity, "rad")
+            left = outlier.row > found.rows[0] + 0.7 * (found.rows[-1] - found.rows[0])
+            ax.annotate(
+                f"{cable}{n(outlier.size, '.2g', unit)}", (outlier.row, place), xytext=(-7.0 if left else 7.0, 0.0),
+                textcoords="offset points", fontsize=current().tick - 1.0, va="center", zorder=4.0,
+                ha="right" if left else "left",
+            )  # fmt: skip
+            named += 1
+
+
+def _correlation(figure: SubFigure, found: Calibration) -> None:
+    """The matrix, kinds apart and named."""
+    ax = figure.subplots()
+    ax.set_facecolor(GAP_COLOR)
+    image = ax.imshow(found.correlation, vmin=-1.0, vmax=1.0, cmap="PuOr_r", interpolation="nearest", rasterized=True)
+    names = found.parameters.names
+    starts = [k for k in range(len(names)) if k == 0 or names[k] != names[k - 1]]
+    ends = [*starts[1:], len(names)]
+    for edge in starts[1:]:
+        ax.axhline(edge - 0.5, color="0.3", linewidth=0.6)
+        ax.axvline(edge - 0.5, color="0.3", linewidth=0.6)
+    ax.set_xticks([])
+    ax.set_yticks([])
+    middles = np.array([0.5 * (start + end - 1) for start, end in zip(starts, ends, strict=True)])
+    for start, middle, place in zip(starts, middles, _apart(middles, LINE * len(names), len(names)), strict=True):
+        ax.annotate(
+            names[start].replace("_", " "), (-0.5, middle), xytext=(-0.5 - 0.05 * len(names), place),
+            fontsize=current().tick, ha="right", va="center", annotation_clip=False, arrowprops=LEADER,
+        )  # fmt: skip
+    bar = figure.colorbar(image, ax=ax, shrink=0.8, pad=0.02)
+    bar.set_label("correlation", fontsize=current().label)
+    bar.ax.tick_params(labelsize=current().tick)
+
+
+def _apart(places: Array, least: float, end: float) -> Array:
+    """Rising places on a line from 0 to an end, moved so that none is nearer than that to the one before."""
+    moved = np.array(places)
+    for k in range(1, len(moved)):
+        moved[k] = max(moved[k], moved[k - 1] + least)
+    moved[-1] = min(moved[-1], max(end - 0.5 * least, places[-1]))
+    for k in range(len(moved) - 2, -1, -1):
+        moved[k] = min(moved[k], moved[k + 1] - least)
+    return moved
+
+
+def _errors(figure: SubFigure, found: Calibration, at: float | None) -> None:
+    """Maps before and after."""
+    x, y, z = _slice(found, at)
+    grid = np.stack(np.meshgrid(x, y, [z], indexing="ij"), axis=-1).reshape(-1, 3)
+    poses = Pose(grid, np.eye(3))
+    own = any("world" in direction.name for direction in found.gauge)
+    maps = []
+    for each in (_before(found), found):
+        error = each.pose_error(poses)
+        maps.append(PER_METER * (error.own_position if own else error.position).reshape(len(x), len(y)))
+    known = np.concatenate([values[np.isfinite(values) & (values > 0.0)] for values in maps])
+    low, high = (float(known.min()), float(known.max())) if known.size else (1.0, 10.0)
+    scale = LogNorm(low, max(high, 1.01 * low))
+    panels = figure.subplots(*((2, 1) if current().narrow else (1, 2)), sharex=True, sharey=True)
+    for ax, values, name in zip(panels, maps, ("before: as the priors say", "after"), strict=True):
+        ax.set_facecolor(GAP_COLOR)
+        ax.pcolormesh(
+            x, y, np.ma.masked_invalid(values.T), norm=scale, cmap="cividis", shading="nearest", rasterized=True
+        )
+        told = (
+            f"median {n(float(np.nanmedian(values)), '.2g', 'mm')}" if np.isfinite(values).any() else "told by nothing"
+        )
+        ax.set_title(f"{name}, {told}", fontsize=current().tick)
+        dressed(ax, "$x$ [m]", "$y$ [m]")
+        ax.grid(visible=False)
+        ax.set_aspect("equal")
+        ax.label_outer()
+    places = found.poses.position[:: -(-len(found.rows) // MOST_POSES)]
+    panels[1].plot(
+        places[:, 0], places[:, 1], ".", color="white", markeredgecolor="0.2", markeredgewidth=0.4, markersize=4.0
+    )
+    bar = figure.colorbar(ScalarMappable(scale, "cividis"), ax=list(panels), shrink=0.85, pad=0.02, format=ROUND)
+    bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    bar.ax.yaxis.set_minor_locator(NullLocator())
+    bar.set_label("expected position error [mm]", fontsize=current().label)
+    bar.ax.tick_params(labelsize=current().tick)
+    but = ", but for a shift and a turn of the world" if own else ""
+    told = wrapped(f"at $z$ = {n(z, '.3g', 'm')}{but}; dots: poses of the log", current().label)
+    figure.suptitle(told, fontsize=current().label)
+
+
+def _height_of_maps(found: Calibration) -> float:
+    """Of two maps beside each other [in]."""
+    x, y, _ = _slice(found, None)
+    high = BESIDE + MAP * float(np.clip(np.ptp(y) / max(float(np.ptp(x)), 1e-9), 0.3, 1.3))
+    return 2.0 * high if current().narrow else high
+
+
+def _before(found: Calibration) -> Calibration:
+    """The robot as it was, known as the priors say."""
+    numbers = found.parameters
+    return replace(
+        found, robot=found.before, values=numbers.prior, covariance=locked(np.diag(numbers.prior_deviation**2))
+    )
+
+
+def _slice(found: Calibration, at: float | None) -> tuple[Array, Array, float]:
+    """Coordinates of a level grid over the robot's poses, or those of the log."""
+    low, high = found.poses.position.min(axis=0), found.poses.position.max(axis=0)
+    box = found.robot.test_box
+    if box is not None:
+        low, high = np.minimum(low, box.low), np.maximum(high, box.high)
+    z = 0.5 * float(found.poses.position[:, 2].min() + found.poses.position[:, 2].max()) if at is None else at
+    if not low[2] <= z <= high[2]:
+        raise InvalidValueError("height", f"{z:g} m", f"{low[2]:g} to {high[2]:g} m, where it works", "Give another.")
+    return np.linspace(low[0], high[0], POINTS), np.linspace(low[1], high[1], POINTS), z

@@ -1,0 +1,223 @@
+"""A robot as a drawing for print: lines alone, of which what lies behind something is left out."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+from matplotlib.collections import LineCollection, PolyCollection
+
+from sagline.arguments import instance, optional
+from sagline.arrays import number
+from sagline.errors import InvalidValueError
+from sagline.kinematics.inverse import inverse
+from sagline.plot.marks import draw_axes, free_axes, label_boxes, places_of_numbers
+from sagline.plot.occlusion import Line, directions, seen
+from sagline.plot.robot import tension_bar
+from sagline.plot.scene import EDGES, FACES, frame_box, ground, hung, platform_box, pose_of, taut, wheels
+from sagline.plot.sheet import VERMILLION, Sheet, axes_or_new
+from sagline.plot.style import current
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.viewer.tension_scale import TensionScale
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from sagline.arrays import Array
+    from sagline.kinematics.plan import Plan
+
+AZIMUTH, ELEVATION = np.radians(-60.0), np.radians(24.0)
+USUAL: Final = directions(float(AZIMUTH), float(ELEVATION))
+FRAME, GROUND, BODY, WHEEL = "0.45", (0.5, 0.5, 0.5, 0.12), (0.835, 0.369, 0.0, 0.16), "0.4"
+CABLE_WIDTH, FRAME_WIDTH, BODY_WIDTH, THIN, GAP = 1.2, 0.7, 1.1, 0.6, 1.3  # pt
+SPECK: Final = 1.5  # pt: what is left of a line between two gaps and shorter looks like dirt
+SPARE: Final = 0.05  # of the picture, around it
+WIDTH, LEAST, MOST = 5.6, 0.35, 1.1  # in; of the width, that the drawing is tall
+
+
+class _Stroke(NamedTuple):
+    """Something drawn as a line.
+
+    Attributes:
+        points: In the world [m], shape (P, 3).
+        color: Its color.
+        width: Its width [pt].
+        style: Solid, or dashes.
+        covers: Whether it hides what lies behind it.
+    """
+
+    points: Array
+    color: Any
+    width: float
+    style: Any
+    covers: bool
+
+
+def drawing(
+    robot: Robot,
+    pose: Pose | None = None,
+    azimuth: float = float(AZIMUTH),
+    elevation: float = float(ELEVATION),
+    ax: Axes | None = None,
+) -> Axes:
+    """The robot at rest as a drawing for print: lines alone, and nothing seen that lies behind something else.
+
+    What is hidden is computed, not painted over: a cable that passes behind another, the frame or the platform is
+    interrupted there, so that it is clear which is in front. Every cable has its number on itself, and the color of its
+    chord tension. The platform is drawn as `sl.plot.robot` draws it, and seen from infinitely far away, so that
+    parallel lines are parallel; the three axes at the ground have one length, which is written there.
+
+    Args:
+        robot: The robot.
+        pose: Where the platform is; None for the middle of the robot's test box. Where no tensions carry the platform
+            the cables are straight, dashed and gray.
+        azimuth: Where the viewer stands, from the x axis toward the y axis [rad].
+        elevation: How far the viewer looks down [rad], 0 to pi / 2.
+        ax: Axes to draw on, as large as they will be; None for a new figure.
+
+    Returns:
+        The axes; their coordinates are those of the picture, to the right and up [m].
+
+    Raises:
+        InvalidValueError: If no pose is given and the robot has no test box, the pose is a batch, or the viewer looks
+            up from under the ground.
+
+    Examples:
+        >>> import sagline as sl
+        >>> with sl.plot.style("ieee"):
+        ...     ax = sl.plot.drawing(sl.load_robot("cogiro"))
+        >>> [text.get_text() for text in ax.texts[:8]]
+        ['0', '1', '2', '3', '4', '5', '6', '7']
+    """
+    where = pose_of(instance(robot, Robot, "robot"), optional(pose, Pose, "pose"))
+    turn, above = number(azimuth, "azimuth", "rad"), number(elevation, "elevation", "rad")
+    if not 0.0 <= above <= 0.5 * np.pi:
+        raise InvalidValueError("elevation", f"{above:g} rad", "0 to pi / 2", "Look down at the robot.")
+    return draw_at_rest(robot, where, inverse(robot, where), directions(turn, above), ax)
+
+
+def draw_at_rest(robot: Robot, where: Pose, plan: Plan | None, view: Array = USUAL, ax: Axes | None = None) -> Axes:
+    """The robot at a pose, with what is known of its tensions.
+
+    Args:
+        robot: The robot.
+        where: Where the platform is.
+        plan: What holds it there; None if nobody knows: cables are straight and gray then.
+        view: To the right, up and toward the viewer, as rows, shape (3, 3).
+        ax: Axes to draw on; None for a new figure.
+
+    Returns:
+        The axes.
+    """
+    held, scale = plan is not None and bool(plan.feasible), TensionScale.of(robot)
+    tension = plan.chord_tension if plan is not None else np.full(len(robot.frame_anchors), np.nan)
+    courses = hung(robot, where, plan) if plan is not None and held else taut(robot, where)
+    scene = _Scene.of(robot, where, courses, scale.colors(tension) / 255.0, dashed=not held)
+    ax = _axes(ax, scene, view, bar=held)
+    if held:
+        tension_bar(ax, scale, tension, "right")
+    elif plan is not None:
+        ax.set_title("no tensions within the limits carry it here", fontsize=current().label)
+    _draw(ax, scene, view)
+    return ax
+
+
+class _Scene(NamedTuple):
+    """What is drawn, in the world.
+
+    Attributes:
+        cables: As they hang.
+        others: Frame, platform, pulleys and drums.
+        faces: Of the platform, each with its corners in order, seen from outside, shape (6, 4, 3).
+        flat: The ground and the shadow of the platform, corners of each.
+    """
+
+    cables: list[_Stroke]
+    others: list[_Stroke]
+    faces: Array
+    flat: tuple[Array, Array]
+
+    @classmethod
+    def of(cls, robot: Robot, where: Pose, courses: Array, colors: Array, *, dashed: bool) -> _Scene:
+        """The robot with its platform at a pose."""
+        style = (0, (3.0, 2.0)) if dashed else "-"
+        cables = [
+            _Stroke(course, color, CABLE_WIDTH, style, covers=True)
+            for course, color in zip(courses, colors, strict=True)
+        ]
+        circles, runs = wheels(robot, where)
+        others = [_Stroke(circle, WHEEL, THIN, "-", covers=False) for circle in circles]
+        others += [_Stroke(run, WHEEL, THIN, "-" if known else ":", covers=False) for run, known in runs]
+        frame, body = frame_box(robot), platform_box(robot, where)
+        if frame is not None:
+            others += [_Stroke(frame[[*edge]], FRAME, FRAME_WIDTH, "-", covers=True) for edge in EDGES]
+        others += [_Stroke(body[[*edge]], VERMILLION, BODY_WIDTH, "-", covers=False) for edge in EDGES]
+        points = np.concatenate([stroke.points for stroke in (*cables, *others)])
+        return cls(cables, others, body[np.array(FACES)], ground(points, body))
+
+    @property
+    def points(self) -> Array:
+        """All of it, shape (n, 3)."""
+        return np.concatenate([stroke.points for stroke in (*self.cables, *self.others)] + [self.flat[0]])
+
+
+def _axes(ax: Axes | None, scene: _Scene, view: Array, *, bar: bool) -> Axes:
+    """Axes whose limits hold the picture, at one scale, and no more."""
+    low, high = (end(scene.points @ view[:2].T, axis=0) for end in (np.min, np.max))
+    spare = SPARE * float((high - low).max())
+    low, high = low - spare, high + spare
+    if ax is None:
+        width = current().width or WIDTH
+        shape = float(np.clip((high[1] - low[1]) / (high[0] - low[0]), LEAST, MOST))
+        tall = min(width * shape * (0.82 if bar else 1.0), current().tallest)
+        ax = Sheet(figsize=(width, tall), layout="compressed").add_subplot()
+    else:
+        ax = axes_or_new(ax)
+    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+    ax.set_axis_off()
+    return ax
+
+
+def _draw(ax: Axes, scene: _Scene, view: Array) -> None:
+    """Everything, with its lines cut to what is seen of them; it is known now how large the picture is on paper."""
+    figure: Any = ax.get_figure(root=True)
+    figure.draw_without_rendering()
+    point = float(np.ptp(ax.get_xlim())) / (ax.bbox.width / figure.dpi * 72.0)  # m
+    look = current()
+    strokes = [*scene.cables, *scene.others]
+    lines = [
+        Line(each.points @ view.T, *(each.covers * look.line * point * np.array([0.5 * each.width, GAP])))
+        for each in strokes
+    ]
+    courses = [line.points[:, :2] for line in lines]
+    numbers = places_of_numbers(courses[: len(scene.cables)], courses, look.tick * point)
+    boxes = label_boxes(numbers, look.tick * point)
+    turned = scene.faces @ view.T
+    facing = [face for face in turned if _seen_from_outside(face)]
+    for flat, color in (*((each @ view[:2].T, GROUND) for each in scene.flat), *((f[:, :2], BODY) for f in facing)):
+        ax.add_collection(PolyCollection([flat], facecolors=[color], edgecolors="none", zorder=0.5))
+    for k, (stroke, parts) in enumerate(zip(strokes, seen(lines, facing, boxes), strict=True)):
+        long = [part[:, :2] for part in parts if _length(part) > SPECK * point]
+        shown = LineCollection(
+            long, colors=[stroke.color], linewidths=stroke.width, linestyles=[stroke.style],
+            capstyle="butt", joinstyle="round", zorder=2.0,
+        )  # fmt: skip
+        ax.add_collection(shown, autolim=False)
+        if k < len(scene.cables) and parts and np.array_equal(parts[0][0], lines[k].points[0]):
+            ax.scatter(parts[0][0, 0], parts[0][0, 1], color="black", s=5.0, linewidths=0.0, zorder=3.0)
+    for k, place in enumerate(numbers):
+        ax.text(place[0], place[1], str(k), fontsize=look.tick, ha="center", va="center", zorder=4.0)
+    taken = np.concatenate([*courses, *(each @ view[:2].T for each in scene.flat)])
+    draw_axes(ax, *free_axes(taken, view, np.array([ax.get_xlim(), ax.get_ylim()]), look.tick * point), look)
+
+
+def _length(part: Array) -> float:
+    """Of a line in the picture [m]."""
+    return float(np.linalg.norm(np.diff(part[:, :2], axis=0), axis=1).sum())
+
+
+def _seen_from_outside(face: Array) -> bool:
+    """Whether the corners of a face turn counter-clockwise in the picture."""
+    one, other = face[1, :2] - face[0, :2], face[2, :2] - face[1, :2]
+    return bool(one[0] * other[1] > one[1] * other[0])

@@ -1,0 +1,243 @@
+"""What of lines is seen from where one stands: what lies behind surfaces and behind nearer lines is cut away.
+
+Sorting things by how far away they are cannot do that: three cables can each pass before the next. Seen from infinitely
+far away all is linear along a segment, in the picture and in depth, so that what hides a part of it begins and ends
+where one of a few straight lines is crossed, exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from sagline.arrays import Array, Indices
+
+FLAT = 1e-9  # of the size of the picture: a surface seen from its edge, or a line from its end, hides nothing
+TOUCHING = 1e-6  # of the size of the picture: so near a line lies on a surface, not behind it
+CHUNK = 2_000_000  # pairs of segments and limits at a time
+FAR = 1e3  # of the size of the picture: before everything
+ALONG = 3.0  # times as far along a line as beside it what crosses it is hidden, where both run nearly the same way
+
+
+class Line(NamedTuple):
+    """A line in the picture.
+
+    Attributes:
+        points: Along it: to the right, up, and toward the viewer [m], shape (P, 3).
+        half_width: Half as wide as it is drawn [m]: so far from its middle it hides what lies behind it.
+        gap: How much farther it hides what passes behind it, where they cross [m]: so that one sees which is in front.
+            0 for both if it hides nothing. What is not farther behind than half_width + gap passes on, as cables do
+            that meet at an anchor.
+    """
+
+    points: Array
+    half_width: float
+    gap: float
+
+
+class _Covers(NamedTuple):
+    """R convex flat pieces that hide what lies behind them, each within K limits.
+
+    Attributes:
+        normals: Outward, of the limits in the picture, shape (R, K, 2).
+        offsets: Normal times place is at most that inside, shape (R, K).
+        planes: Depth is planes[:, :2] times place, and planes[:, 2], shape (R, 3).
+        behind: How much farther away something must be to be hidden, shape (R,).
+        owners: Numbers of the lines they belong to, -1 for surfaces, shape (R,).
+        hides: Numbers of the lines that they hide, -1 for all but their owners, shape (R,).
+    """
+
+    normals: Array
+    offsets: Array
+    planes: Array
+    behind: Array
+    owners: Indices
+    hides: Indices
+
+
+class _Crossing(NamedTuple):
+    """Where a line passes before another.
+
+    Attributes:
+        line: Number of the line in front.
+        behind: Number of the other.
+        place: On it, in the picture and in depth, shape (3,).
+        along: Its direction there, of length 1 in the picture, shape (3,).
+    """
+
+    line: int
+    behind: int
+    place: Array
+    along: Array
+
+
+def directions(azimuth: float, elevation: float) -> Array:
+    """To the right, up, and toward the viewer, as rows, in the world's axes, shape (3, 3).
+
+    Args:
+        azimuth: Where the viewer stands, from x toward y [rad].
+        elevation: How far above the ground, as an angle [rad].
+    """
+    around, above = np.array([np.cos(azimuth), np.sin(azimuth)]), np.array([np.cos(elevation), np.sin(elevation)])
+    toward = np.array([above[0] * around[0], above[0] * around[1], above[1]])
+    right = np.array([-around[1], around[0], 0.0])
+    return np.stack((right, np.cross(toward, right), toward))
+
+
+def seen(lines: Sequence[Line], surfaces: Sequence[Array], labels: Sequence[Array] = ()) -> list[list[Array]]:
+    """The parts of lines that are seen.
+
+    Args:
+        lines: In the picture.
+        surfaces: Corners of flat convex surfaces in the picture, each of shape (k, 3), in order around them.
+        labels: Corners of what is written over everything, each of shape (k, 2).
+
+    Returns:
+        Of each line its parts, each of shape (p, 3), p >= 2.
+    """
+    if not lines:
+        return []
+    everything = np.concatenate([line.points for line in lines])
+    size = float(np.ptp(everything, axis=0).max()) or 1.0
+    over = [np.column_stack((label, np.full(len(label), FAR * size))) for label in labels]
+    starts = np.concatenate([line.points[:-1] for line in lines])
+    ends = np.concatenate([line.points[1:] for line in lines])
+    owners = np.repeat(np.arange(len(lines)), [len(line.points) - 1 for line in lines])
+    covers = _covers(lines, [*surfaces, *over], _crossings(lines, starts, ends, owners), size)
+    hidden = _hidden(starts, ends, owners, covers)
+    found: list[list[Array]] = [[] for _ in lines]
+    for start, end, owner, spans in zip(starts, ends, owners, hidden, strict=True):
+        for low, high in _rest(spans):
+            part = np.stack((start + low * (end - start), start + high * (end - start)))
+            parts = found[owner]
+            if parts and low == 0.0 and np.array_equal(parts[-1][-1], part[0]):
+                parts[-1] = np.concatenate((parts[-1], part[1:]))
+            else:
+                parts.append(part)
+    return found
+
+
+def _rest(spans: Array) -> list[tuple[float, float]]:
+    """What spans (n, 2) leave of 0 to 1."""
+    left, reached = [], 0.0
+    for low, high in spans[np.argsort(spans[:, 0])].tolist():
+        if low > reached:
+            left.append((reached, low))
+        reached = max(reached, high)
+    return [*left, (reached, 1.0)] if reached < 1.0 else left
+
+
+def _hidden(starts: Array, ends: Array, owners: Indices, covers: _Covers) -> list[Array]:
+    """Which spans of segments (S, 3) are hidden, 0 at the start and 1 at the end, of each of shape (n, 2)."""
+    if not len(covers.owners):
+        return [np.empty((0, 2)) for _ in starts]
+    at_once = max(1, CHUNK // covers.offsets.size)
+    found: list[Array] = []
+    for first in range(0, len(starts), at_once):
+        part = slice(first, first + at_once)
+        found += _hidden_at_once(starts[part], ends[part], owners[part], covers)
+    return found
+
+
+def _hidden_at_once(starts: Array, ends: Array, owners: Indices, covers: _Covers) -> list[Array]:
+    """Within all limits and behind the plane: where k + 1 linear functions of the place along a segment are <= 0."""
+    steps = ends - starts
+    outside = np.einsum("sc,rkc->srk", starts[:, :2], covers.normals) - covers.offsets
+    rise = np.einsum("sc,rkc->srk", steps[:, :2], covers.normals)
+    depth = starts[:, :2] @ covers.planes[:, :2].T + covers.planes[:, 2]
+    before = (starts[:, 2:] - depth + covers.behind)[..., None]
+    nearer = (steps[:, 2:] - steps[:, :2] @ covers.planes[:, :2].T)[..., None]
+    value, slope = np.concatenate((outside, before), axis=2), np.concatenate((rise, nearer), axis=2)
+    crossed = np.divide(-value, slope, out=np.zeros_like(value), where=slope != 0.0)
+    low = np.where(slope < 0.0, crossed, 0.0).max(axis=2, initial=0.0)
+    high = np.where(slope > 0.0, crossed, 1.0).min(axis=2, initial=1.0)
+    never = ((slope == 0.0) & (value > 0.0)).any(axis=2) | (owners[:, None] == covers.owners)
+    never |= (covers.hides >= 0) & (covers.hides != owners[:, None])
+    there = (low < high) & ~never
+    return [np.column_stack((low[s, there[s]], high[s, there[s]])) for s in range(len(starts))]
+
+
+def _covers(lines: Sequence[Line], surfaces: Sequence[Array], crossings: Sequence[_Crossing], size: float) -> _Covers:
+    """Strips along the lines, wider ones where others cross, and the surfaces."""
+    corners, behind, owners, hides = [], [], [], []
+    for number, line in enumerate(lines):
+        long = np.linalg.norm(np.diff(line.points[:, :2], axis=0), axis=1) > FLAT * size
+        if line.half_width > 0.0:
+            for start, end in zip(line.points[:-1][long], line.points[1:][long], strict=True):
+                corners.append(_strip(start, end, line.half_width))
+                behind.append(line.half_width + line.gap)
+                owners.append(number)
+    hides += [-1] * len(corners)
+    for crossing in crossings:
+        line = lines[crossing.line]
+        half = line.half_width + line.gap
+        step = ALONG * half * crossing.along
+        corners.append(_strip(crossing.place - step, crossing.place + step, half))
+        behind.append(half)
+        owners.append(crossing.line)
+        hides.append(crossing.behind)
+    wide = [surface for surface in surfaces if abs(_area(surface)) > FLAT * size**2]
+    corners += [surface if _area(surface) > 0.0 else surface[::-1] for surface in wide]
+    behind += [TOUCHING * size] * len(wide)
+    owners += [-1] * len(wide)
+    hides += [-1] * len(wide)
+    most = max(map(len, corners), default=0)
+    padded = np.array([np.concatenate((each, np.repeat(each[-1:], most - len(each), axis=0))) for each in corners])
+    padded = padded.reshape(len(corners), most, 3)
+    along = np.roll(padded[..., :2], -1, axis=1) - padded[..., :2]
+    normals = np.stack((along[..., 1], -along[..., 0]), axis=-1)  # of corners counter-clockwise: outward
+    offsets = np.einsum("rkc,rkc->rk", normals, padded[..., :2])
+    planes = np.array([_plane(each) for each in corners]).reshape(-1, 3)
+    numbers = np.array([owners, hides], dtype=np.int64)
+    return _Covers(normals, offsets, planes, np.array(behind), numbers[0], numbers[1])
+
+
+def _crossings(lines: Sequence[Line], starts: Array, ends: Array, owners: Indices) -> list[_Crossing]:
+    """Where a line that hides something passes before another."""
+    steps = ends - starts
+    hides = np.array([line.half_width + line.gap for line in lines])[owners]
+    front = np.flatnonzero(hides > 0.0)
+    away = starts[:, None, :2] - starts[None, front, :2]
+    turn = _cross(steps[None, front, :2], steps[:, None, :2])
+    crossing = np.abs(turn) > 0.0
+    safe = np.where(crossing, turn, 1.0)
+    here = _cross(away, steps[:, None, :2]) / safe  # along the one in front
+    there = _cross(away, steps[None, front, :2]) / safe
+    inside = crossing & (np.minimum(here, there) >= 0.0) & (np.maximum(here, there) <= 1.0)
+    inside &= owners[:, None] != owners[None, front]
+    depth = starts[None, front, 2] + here * steps[None, front, 2] - starts[:, None, 2] - there * steps[:, None, 2]
+    found = []
+    for back, k in np.argwhere(inside & (depth > hides[None, front])):
+        segment, share = int(front[k]), float(here[back, k])
+        step = steps[segment]
+        place = starts[segment] + share * step
+        found.append(
+            _Crossing(int(owners[segment]), int(owners[back]), place, step / float(np.hypot(step[0], step[1])))
+        )
+    return found
+
+
+def _cross(one: Array, other: Array) -> Array:
+    return np.asarray(one[..., 0] * other[..., 1] - one[..., 1] * other[..., 0])
+
+
+def _strip(start: Array, end: Array, half_width: float) -> Array:
+    """A flat strip from one point to another, level across, its corners counter-clockwise, shape (4, 3)."""
+    along = (end - start)[:2]
+    across = half_width / float(np.hypot(*along)) * np.array([-along[1], along[0], 0.0])
+    return np.stack((start - across, end - across, end + across, start + across))
+
+
+def _area(corners: Array) -> float:
+    """In the picture, positive for corners counter-clockwise."""
+    x, y = corners[:, 0] - corners[0, 0], corners[:, 1] - corners[0, 1]
+    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+
+
+def _plane(corners: Array) -> Array:
+    """Depth over the picture: a, b and c of a x + b y + c."""
+    middle = corners.mean(axis=0)
+    slopes, *_ = np.linalg.lstsq(corners[:, :2] - middle[:2], corners[:, 2] - middle[2], rcond=None)
+    return np.array([*slopes, middle[2] - slopes @ middle[:2]])

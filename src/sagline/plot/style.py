@@ -1,0 +1,142 @@
+"""How figures look in a journal's column or on a slide: width, fonts, and what lines carry themselves."""
+
+from __future__ import annotations
+
+from contextlib import ContextDecorator, ExitStack
+from contextvars import ContextVar
+from dataclasses import dataclass, replace
+from typing import Any, Final, cast
+
+import matplotlib
+
+from sagline.arguments import choice, whole_number
+
+SANS, SERIF = "DejaVu Sans", "STIXGeneral"  # come with Matplotlib, so that they are on any machine; one like Times
+SLIDE_HEIGHT, PAGE_HEIGHT = 6.0, 9.0  # in, that a figure may be tall
+
+
+@dataclass(frozen=True, slots=True)
+class Style:
+    """How figures look. `style` puts one to use.
+
+    Attributes:
+        name: What it is called; "" for that of a page of documentation.
+        width: Of every figure [in]; None for as wide as each function likes.
+        height: Heights of figures, relative to those on a page of documentation.
+        tallest: What no figure is taller than [in].
+        font: The family of all text.
+        mathematics: What Matplotlib calls the font of formulas.
+        label: Size of the text at axes, in titles and at bars [pt].
+        tick: Size of numbers and of names of lines [pt].
+        line: Widths of lines and sizes of markers, relative to those on a page of documentation.
+        direct: Whether lines carry their names where they can.
+    """
+
+    name: str
+    width: float | None
+    height: float
+    tallest: float
+    font: str
+    mathematics: str
+    label: float
+    tick: float
+    line: float
+    direct: bool
+
+    def size(self, width: float, height: float) -> tuple[float, float]:
+        """Width and height of a figure that would like to be so large [in]."""
+        return self.width or width, min(self.height * height, self.tallest)
+
+    @property
+    def narrow(self) -> bool:
+        """Whether no two panels have room side by side."""
+        return self.width is not None and self.width < 36.0 * self.tick / 72.0
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """What Matplotlib is told of it; its text stays text, and its fonts are in the file."""
+        if not self.name:
+            return {}
+        sizes = dict.fromkeys(("axes.labelsize", "axes.titlesize", "figure.titlesize"), self.label)
+        sizes |= dict.fromkeys(("font.size", "xtick.labelsize", "ytick.labelsize", "legend.fontsize"), self.tick)
+        return {
+            **sizes,
+            "font.family": [self.font, SANS],
+            "mathtext.fontset": self.mathematics,
+            "figure.figsize": self.size(7.0, 3.0),
+            "lines.linewidth": 1.1 * self.line,
+            "axes.linewidth": 0.6 * self.line,
+            "pdf.fonttype": 42,  # TrueType, embedded: journals refuse Type 3
+            "ps.fonttype": 42,
+            "svg.fonttype": "none",
+        }
+
+
+PLAIN: Final = Style("", None, 1.0, PAGE_HEIGHT, SANS, "dejavusans", 9.0, 8.0, 1.0, direct=False)
+_IEEE = Style("ieee", 3.5, 0.75, PAGE_HEIGHT, SERIF, "stix", 9.0, 8.0, 1.0, direct=True)
+_MDPI = Style("mdpi", 5.45, 0.85, PAGE_HEIGHT, SERIF, "stix", 10.0, 9.0, 1.0, direct=True)
+_SLIDES = Style("slides", 6.0, 1.5, SLIDE_HEIGHT, SANS, "dejavusans", 16.0, 14.0, 1.8, direct=True)
+STYLES: Final = {  # name -> over one column, and over two
+    # IEEE Author Center, "Size requirements for graphics": 3.5 in and 7.16 in
+    "ieee": (_IEEE, replace(_IEEE, width=7.16, height=0.9)),
+    # the class mdpi.cls: text of 394.36 pt, with the margin beside it 525.5 pt, of 72.27 pt an inch
+    "mdpi": (_MDPI, replace(_MDPI, width=7.27, height=0.95)),
+    # 13.33 in by 7.5 in, half of it or all of it, with room for a heading
+    "slides": (_SLIDES, replace(_SLIDES, width=12.4, height=1.9, label=18.0, tick=16.0, line=2.0)),
+}
+_current: ContextVar[Style] = ContextVar("style", default=PLAIN)
+
+
+def current() -> Style:
+    """The style that figures are made in."""
+    return _current.get()
+
+
+def style(name: str, columns: int = 1) -> Using:
+    """Make figures for a journal or a slide: what is drawn inside a `with` statement of it has its look, and keeps it.
+
+    Figures have the width of the column, fonts that come with Matplotlib and so are the same on any machine, sizes that
+    are read on paper at that width, and lines carry their names at their ends where there is room for them. Figures of
+    your own that are made inside, by Matplotlib alone, have its fonts and sizes as well. In PDF and SVG text stays text
+    and its fonts are in the file.
+
+    Args:
+        name: "ieee" for 3.5 in or 7.16 in, "mdpi" for 5.45 in or 7.27 in, "slides" for half a slide or a whole one of
+            13.33 in by 7.5 in.
+        columns: How much of the page a figure takes: 1 for a column, 2 for all of its width.
+
+    Returns:
+        What goes into a `with` statement, and decorates functions; of it comes the `Style` with width and sizes.
+
+    Raises:
+        InvalidValueError: If there is no such style, or the page has not so many columns.
+
+    Examples:
+        >>> import sagline as sl
+        >>> with sl.plot.style("ieee"):
+        ...     ax = sl.plot.velocity(sl.article_path())
+        >>> float(ax.figure.get_figwidth())
+        3.5
+    """
+    return Using(STYLES[choice(name, "name", STYLES)][whole_number(columns, "columns", 1, 2) - 1])
+
+
+class Using(ContextDecorator):
+    """Draw in a style; one object can be used many times, also inside itself."""
+
+    def __init__(self, chosen: Style) -> None:
+        """Nothing changes before the `with` statement begins."""
+        self.style = chosen
+        self._open: list[ExitStack] = []
+
+    def __enter__(self) -> Style:
+        """Put the style to use."""
+        stack = ExitStack()
+        stack.callback(_current.reset, _current.set(self.style))
+        stack.enter_context(matplotlib.rc_context(cast(Any, self.style.settings)))
+        self._open.append(stack)
+        return self.style
+
+    def __exit__(self, *_: object) -> None:
+        """Put back what there was before."""
+        self._open.pop().close()

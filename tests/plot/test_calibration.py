@@ -1,0 +1,151 @@
+"""Figures of a calibration hold what they claim to show: residuals, what does not fit, correlations and maps."""
+
+import re
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.collections import QuadMesh
+
+import sagline as sl
+from sagline import plot
+from sagline.arrays import Array
+from sagline.calibration.result import Calibration
+from sagline.plot.calibration import LINE, MOST_POSES, REACH, _apart
+from tests.calibration.made_up import made_up
+
+
+@pytest.fixture(scope="module")
+def found() -> sl.Calibration:
+    return made_up(count=20)
+
+
+def lines_of(ax: Any, label: str) -> Array:
+    """The points of a line."""
+    return np.asarray(next(line for line in ax.get_lines() if line.get_label() == label).get_xydata())
+
+
+def test_residuals_stand_at_their_rows_in_standard_deviations(found: sl.Calibration) -> None:
+    lengths, cells, places = plot.calibration(found, "residuals").axes
+    for ax, first, deviation, names in (
+        (lengths, 0, 5e-4, [f"cable {k}" for k in range(8)]),
+        (cells, 8, 5.0, [f"cable {k}" for k in range(8)]),
+        (places, 16, 1e-3, ["$x$", "$y$", "$z$"]),
+    ):
+        assert ax.get_ylabel().endswith(r"[$\sigma$]")
+        for k, name in enumerate(names):
+            points, wanted = lines_of(ax, name), found.residuals[:, first + k] / deviation
+            np.testing.assert_array_equal(points[:, 0], found.rows)
+            np.testing.assert_allclose(points[:, 1], np.where(np.abs(wanted) > REACH, np.nan, wanted), rtol=1e-12)
+    assert cells.get_ylim()[0] < -2.0 < 2.0 < cells.get_ylim()[1]
+    patches: list[Any] = list(cells.patches)
+    bands = sorted(patch.get_height() for patch in patches)
+    assert bands == [2.0, 4.0]
+    assert places.get_xlabel() == "row of the log"
+
+
+def test_what_does_not_fit_has_a_ring_and_its_size(found: sl.Calibration) -> None:
+    lengths, cells, _ = plot.calibration(found, "residuals").axes
+    rings = [line for line in lengths.get_lines() if line.get_markerfacecolor() == "none"]
+    assert [tuple(np.asarray(ring.get_xydata())[0]) for ring in rings] == [(4.0, REACH), (17.0, -REACH)]
+    assert [text.get_text() for text in lengths.texts] == ["cable 3, 20\u00a0mm", "cable 6, −15\u00a0mm"]
+    edges = {line.get_marker(): np.asarray(line.get_xydata()) for line in lengths.get_lines() if len(line.get_xydata())}  # type: ignore[arg-type]
+    np.testing.assert_array_equal(edges["^"], [[4.0, REACH]])
+    np.testing.assert_array_equal(edges["v"], [[17.0, -REACH]])
+    assert not cells.texts
+
+
+def test_what_nobody_read_has_no_panel(found: sl.Calibration) -> None:
+    some = np.array(found.residuals)
+    some[:, 8:] = np.nan
+    assert len(plot.calibration(replace(found, residuals=some), "residuals").axes) == 1
+
+
+def test_of_many_poses_some_are_drawn_and_all_that_do_not_fit(found: sl.Calibration) -> None:
+    count = 5 * MOST_POSES
+    rows = np.arange(count)
+    long = replace(
+        found, rows=rows, residuals=np.resize(found.residuals, (count, 22)),
+        outliers=(replace(found.outliers[0], row=1234),),
+    )  # fmt: skip
+    ax = plot.calibration(long, "residuals").axes[0]
+    drawn = lines_of(ax, "cable 5")[:, 0]
+    assert len(drawn) <= MOST_POSES + 1
+    assert 1234 in drawn
+    assert "every 5th" in plot.calibration(long, "residuals").axes[-1].get_xlabel()
+
+
+def test_the_matrix_is_the_correlation_by_kinds(found: sl.Calibration) -> None:
+    figure = plot.calibration(found, "correlation")
+    ax = figure.axes[0]
+    np.testing.assert_array_equal(np.asarray(ax.images[0].get_array()), found.correlation)
+    names = {text.get_text(): text.xy[1] for text in ax.texts}  # type: ignore[attr-defined]
+    assert names == {"frame anchors": 11.5, "length zero": 27.5, "axial stiffness": 32.0, "mass": 33.0,
+                     "center of mass": 35.0}  # fmt: skip
+    assert figure.axes[1].get_ylabel() == "correlation"
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_names_beside_the_matrix_never_meet(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    sizes = random.choice([1, 3, 8, 24], int(random.integers(1, 15)))
+    ends = np.cumsum(sizes)
+    middles = ends - 0.5 * sizes - 0.5
+    moved = _apart(middles, LINE * ends[-1], int(ends[-1]))
+    assert np.diff(moved).min(initial=np.inf) >= LINE * ends[-1] - 1e-9
+    assert moved[-1] <= max(ends[-1], middles[-1])
+
+
+def test_maps_are_the_expected_errors_before_and_after(found: sl.Calibration, monkeypatch: pytest.MonkeyPatch) -> None:
+    def errors(self: Calibration, pose: sl.Pose) -> SimpleNamespace:
+        """Half of the mean standard error at the middle, more with the distance; without a shift a tenth of it."""
+        size = np.mean(self.standard_error[:24]) * (0.5 + np.linalg.norm(pose.position, axis=-1))
+        return SimpleNamespace(position=size, own_position=0.1 * size)
+
+    monkeypatch.setattr(Calibration, "pose_error", errors)
+    for one, share in ((found, 0.1), (replace(found, gauge=()), 1.0)):
+        figure = plot.calibration(one, "errors", height=2.0)
+        for ax, size in zip(figure.axes[:2], (0.05, float(np.mean(found.standard_error[:24]))), strict=True):
+            mesh = next(each for each in ax.collections if isinstance(each, QuadMesh))
+            corners = np.asarray(mesh.get_coordinates())
+            middles = 0.25 * (corners[1:, 1:] + corners[1:, :-1] + corners[:-1, 1:] + corners[:-1, :-1])
+            away = np.linalg.norm(np.dstack((middles, np.full(middles.shape[:2], 2.0))), axis=-1)
+            shown = np.asarray(mesh.get_array()).reshape(away.shape)
+            np.testing.assert_allclose(shown, 1e3 * share * size * (0.5 + away), rtol=1e-9)
+            assert (ax.get_xlabel(), figure.axes[0].get_ylabel()) == ("$x$ [m]", "$y$ [m]")
+        assert ("but for a shift" in figure.subfigs[0].get_suptitle()) == (share < 1.0)
+        assert figure.axes[2].get_ylabel() == "expected position error [mm]"
+
+
+def test_maps_of_errors_without_bound_say_that_nothing_tells(
+    found: sl.Calibration, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def expected(_: sl.Calibration, poses: sl.Pose) -> Any:
+        return SimpleNamespace(position=np.full(len(poses), np.inf), own_position=np.full(len(poses), np.inf))
+
+    monkeypatch.setattr(Calibration, "pose_error", expected)
+    titles = [ax.get_title() for ax in plot.calibration(found, "errors").axes]
+    assert titles[:2] == ["before: as the priors say, told by nothing", "after, told by nothing"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"part": "all of it"}, "part"),
+        ({"height": 99.0}, "height is 99 m"),
+        ({"height": np.nan}, "height"),
+        ({"height": "up"}, "height"),
+    ],
+)
+def test_parts_and_heights_that_are_none_are_refused(
+    found: sl.Calibration, arguments: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(sl.InvalidValueError, match=re.escape(message)):
+        plot.calibration(found, **{"part": "errors"} | arguments)
+
+
+def test_what_is_no_calibration_is_refused() -> None:
+    with pytest.raises(sl.InvalidValueError, match="found"):
+        plot.calibration("found.nc")  # type: ignore[arg-type]

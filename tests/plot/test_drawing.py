@@ -1,0 +1,112 @@
+"""A robot drawn for print: what is where, which is which, and what it says where nothing holds it."""
+
+import re
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+
+import sagline as sl
+from sagline import plot
+from sagline.errors import InvalidValueError
+from sagline.viewer.tension_scale import TensionScale
+
+ROBOT = sl.load_robot("article-mixed")
+POSE = sl.Pose.from_euler((1.0, 0.5, 1.7), 0.1, 0.0, 0.2)
+SOME = ("falcon-7", "fast", "ipanema-3-pulleys")  # the others in a long run
+
+
+def strokes(ax: Axes) -> list[LineCollection]:
+    return [each for each in ax.collections if isinstance(each, LineCollection)]
+
+
+def lying_on(points: np.ndarray, course: np.ndarray) -> float:
+    """The largest distance of points from a polyline."""
+    starts, steps = course[:-1], np.diff(course, axis=0)
+    away = points[:, None] - starts
+    square = np.maximum(np.einsum("sc,sc->s", steps, steps), 1e-30)
+    share = np.clip(np.einsum("nsc,sc->ns", away, steps) / square, 0.0, 1.0)
+    return float(np.linalg.norm(away - share[..., None] * steps, axis=2).min(axis=1).max())
+
+
+@pytest.mark.parametrize(("azimuth", "elevation"), [(-1.0, 0.4), (2.3, 0.9), (0.0, 0.0), (0.4, 0.5 * np.pi)])
+def test_cables_hang_where_they_hang_in_the_color_of_their_tension(azimuth: float, elevation: float) -> None:
+    ax = plot.drawing(ROBOT, POSE, azimuth, elevation)
+    plan = sl.inverse(ROBOT, POSE)
+    right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
+    up = np.array([-np.sin(elevation) * np.cos(azimuth), -np.sin(elevation) * np.sin(azimuth), np.cos(elevation)])
+    colors = TensionScale.of(ROBOT).colors(plan.chord_tension) / 255.0
+    ends = POSE.transform(ROBOT.platform_anchors)
+    for i, drawn in enumerate(strokes(ax)[:8]):
+        np.testing.assert_allclose(np.asarray(drawn.get_colors())[0, :3], colors[i], atol=1e-12)
+        profile = plan.state.cables[i].points(41)  # along the cable's own plane, from its frame end
+        level = (ends[i] - ROBOT.frame_anchors[i])[:2]
+        level = level / np.linalg.norm(level)
+        course = ROBOT.frame_anchors[i] + np.column_stack((profile[:, :1] * level, profile[:, 1]))
+        picture = np.column_stack((course @ right, course @ up))
+        parts = [np.asarray(path.vertices) for path in drawn.get_paths()]
+        assert parts
+        assert max(lying_on(part, picture) for part in parts) < 1e-9
+
+
+def test_each_number_is_nearest_to_its_own_cable() -> None:
+    for name in ("article-mixed", "cogiro", "ipanema-2"):
+        robot = sl.load_robot(name)
+        ax = plot.drawing(robot)
+        texts = [text for text in ax.texts if text.get_text().isdigit()]
+        assert [text.get_text() for text in texts] == [str(i) for i in range(8)]
+        places = np.array([text.get_position() for text in texts], dtype=np.float64)
+        courses = [np.concatenate([np.asarray(path.vertices) for path in each.get_paths()]) for each in strokes(ax)[:8]]
+        for i, place in enumerate(places):
+            nearest = [lying_on(place[None], course) for course in courses]
+            assert nearest[i] <= min(nearest) + 1e-9, (name, i)
+        room = 8.0 * np.ptp(ax.get_xlim()) / (ax.bbox.width / ax.figure.dpi * 72.0)
+        gaps = np.linalg.norm(places[:, None] - places, axis=2) + 9e9 * np.eye(8)
+        assert gaps.min() > 0.9 * room, name  # numbers do not meet
+
+
+def test_where_nothing_holds_it_cables_are_straight_dashed_and_gray() -> None:
+    ax = plot.drawing(ROBOT, sl.Pose([0.0, 0.0, 9.0], np.eye(3)))
+    assert ax.get_title() == "no tensions within the limits carry it here"
+    assert len(ax.figure.axes) == 1  # no bar: there are no tensions
+    for drawn in strokes(ax)[:8]:
+        dashes: Any = drawn.get_linestyle()
+        assert dashes[0][1] is not None
+        assert np.ptp(np.asarray(drawn.get_colors())[0, :3]) < 0.06
+
+
+@pytest.mark.parametrize("elevation", [-0.1, 1.6])
+def test_nobody_looks_from_under_the_ground(elevation: float) -> None:
+    with pytest.raises(InvalidValueError, match=re.escape("0 to pi / 2")):
+        plot.drawing(ROBOT, POSE, elevation=elevation)
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[] if name in SOME else pytest.mark.soak) for name in sl.robot_names()]
+)
+def test_every_robot_is_drawn_within_its_figure(name: str, tmp_path: FilePath) -> None:
+    with plot.style("ieee"):
+        ax = plot.drawing(sl.load_robot(name))
+    assert isinstance(ax.figure, Figure)
+    ax.figure.draw_without_rendering()
+    box, bounds = ax.get_tightbbox(), ax.figure.bbox
+    assert box is not None
+    assert bounds.x0 - 1.0 <= box.x0 < box.x1 <= bounds.x1 + 1.0
+    assert bounds.y0 - 1.0 <= box.y0 < box.y1 <= bounds.y1 + 1.0
+    plot.save(ax, tmp_path / "robot.svg")
+    text = (tmp_path / "robot.svg").read_text(encoding="utf-8")
+    assert "<image" not in text
+    assert "chord tension" in text
+
+
+def test_axes_of_the_caller_are_used_and_a_point_has_no_faces() -> None:
+    point = sl.Robot(
+        "point", [[3, 0, 3], [-2, 2, 3], [-2, -2, 3]], np.zeros((3, 3)), sl.Cable(0.05, 5e4), 10.0, motion_pattern="3T"
+    )
+    ax = Figure().add_subplot()
+    assert plot.drawing(point, sl.Pose([0.0, 0.0, 1.0], np.eye(3)), ax=ax) is ax
+    assert all(each.get_paths() for each in strokes(ax)[:3])
