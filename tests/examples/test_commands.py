@@ -21,6 +21,7 @@ from sagline.files.mcap_log import Recorder
 from sagline.files.mcap_reader import read_log
 from sagline.report.blocks import Chapter
 from tests.abuse.command_lines import commands
+from tests.calibration.made_up import made_up
 from tests.files.executions import execution
 from tests.kinematics.winches import wound
 from tests.stand_ins import instead_of_machines
@@ -72,13 +73,24 @@ def with_logs(place: Path) -> None:
         recorder.truth(0.0, np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
 
 
+def with_two_runs(place: Path) -> None:
+    """Two runs of a robot."""
+    for name, speed in (("run_a.nc", 1.0), ("run_b.nc", 0.5)):
+        path = sl.quintic_path([(0.0, 0.0, 1.5), (0.1, 0.0, 1.5)], durations=1.0 / speed, rate=10)
+        sl.inverse(sl.load_robot("article-mixed"), path).save(place / name)
+
+
 @pytest.mark.parametrize("words", printed(), ids=" ".join)
 def test_a_printed_command_runs(words: list[str], folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
     served: list[Any] = []
 
-    def serve(robot: sl.Robot, run: Path | None, *more: Any, **others: Any) -> int:
-        served.append((robot, None if run is None else sl.load_plan(run)))
+    def serve(robot: sl.Robot, *more: Any, **others: Any) -> int:
+        served.append(robot)
+        return 0
+
+    def serve_run(robot: sl.Robot, run: Path, *more: Any, beside: Path | None = None, **others: Any) -> int:
+        served.append([sl.load_plan(file) for file in (run, beside) if file is not None])
         return 0
 
     def serve_log(log: Path, robot: str | None, live: bool, truth: Path | None, *more: Any, **others: Any) -> int:
@@ -86,7 +98,13 @@ def test_a_printed_command_runs(words: list[str], folder: Path, monkeypatch: pyt
         served.append(sl.load_execution(log))
         return 0
 
+    def serve_found(file: Path, *more: Any, **others: Any) -> int:
+        served.append(sl.load_calibration(file))
+        return 0
+
     monkeypatch.setattr("sagline.cli.view.serve", serve)
+    monkeypatch.setattr("sagline.cli.view.view_run", serve_run)
+    monkeypatch.setattr("sagline.cli.view.view_calibration", serve_found)
     monkeypatch.setattr("sagline.cli.view.view_log", serve_log)
     monkeypatch.setattr("sagline.report.parts.Part.build", lambda part: Chapter(part.key, part.key, "", ()))
     monkeypatch.setattr("sagline.cli.run.FIGURES", ())
@@ -95,12 +113,18 @@ def test_a_printed_command_runs(words: list[str], folder: Path, monkeypatch: pyt
     instead_of_machines(monkeypatch)
     if words[0] == "twin":
         words = [*words, "--port", "0"]  # another twin may have the usual ones
+    if words[0] == "workspace":
+        words = [*words, "--cells", "6"]  # the same with less to do, as CELLS above
     if "worn.yaml" in words:
         (folder / "worn.yaml").write_text(sl.dump_robot(sl.load_robot("article-prototype").replace(mass=52.0)))
     if words[0] == "new":
         (folder / words[1]).unlink(missing_ok=True)
     if any(word.endswith(".mcap") for word in words):
         with_logs(folder)
+    if "--beside" in words:
+        with_two_runs(folder)
+    if words == ["view", "found.nc"]:
+        made_up(count=6).save(folder / "found.nc")
     if words[0] == "encoder" or "--counts" in words:
         with_winches(folder)
     result = CliRunner().invoke(app, words, input="\n" * 9)  # every question takes its default

@@ -1,0 +1,149 @@
+"""The small figures of notebooks, each drawn in a second or less however large the result is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import singledispatch
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from sagline.calibration.result import Calibration
+from sagline.dynamics.simulation import Simulation
+from sagline.kinematics.confirm import Confirmation
+from sagline.kinematics.plan import Plan
+from sagline.motion.path import Path
+from sagline.notebook.verdicts import plan_of
+from sagline.plot.calibration import calibration
+from sagline.plot.drawing import draw_at_rest
+from sagline.plot.names import name_lines
+from sagline.plot.scene import pose_of
+from sagline.plot.sheet import BLUE, COLORS, axes_or_new, draw_course, dressed, runs, shade, sheet
+from sagline.plot.style import PLAIN
+from sagline.robot.robot import Robot
+from sagline.workspaces.space import Workspace
+
+if TYPE_CHECKING:
+    from sagline.arrays import Array, Flags, Indices
+
+STYLE: Final = replace(PLAIN, name="notebook", width=6.0, height=0.8, direct=True)
+MOST_SAMPLES: Final = 300  # of a course
+MOST_CABLES: Final = 16
+LEVELS: Final = 4  # slices of a workspace that are drawn
+
+
+@singledispatch
+def figure_of(thing: object) -> Figure | None:
+    """A small figure of something; None of what has none."""
+    return None
+
+
+@figure_of.register
+def _(robot: Robot) -> Figure | None:
+    if robot.test_box is None:
+        return None
+    return _whole(draw_at_rest(robot, pose_of(robot, None), plan_of(robot)))
+
+
+@figure_of.register
+def _(plan: Plan) -> Figure | None:
+    state = plan.state
+    if not state.pose.shape:
+        return _whole(draw_at_rest(state.one_robot, state.pose, plan))
+    clock = np.arange(plan.status.size, dtype=np.float64) if plan.path is None else plan.path.time
+    label = r"chord tension $\tau$ [N]"
+    return _courses(clock, plan.chord_tension, "pose" if plan.path is None else "time [s]", label, ~plan.feasible)
+
+
+@figure_of.register
+def _(proof: Confirmation) -> Figure | None:
+    plan = proof.plan
+    if not plan.state.pose.shape:
+        return None
+    clock = np.arange(plan.status.size, dtype=np.float64) if plan.path is None else plan.path.time
+    axis = "pose" if plan.path is None else "time [s]"
+    return _courses(clock, 1e3 * proof.position_error, axis, "position error [mm]", ~proof.held, ("$x$", "$y$", "$z$"))
+
+
+@figure_of.register
+def _(run: Simulation) -> Figure | None:
+    return _courses(run.time, run.tensions, "time [s]", "tension at the frame [N]", np.zeros(run.time.size, dtype=bool))
+
+
+@figure_of.register
+def _(path: Path) -> Figure | None:
+    ax = axes_or_new(None, height=3.4)
+    x, y, _ = path.pose.position[_chosen(path.pose.position)].T
+    ax.plot(x, y, color=BLUE, linewidth=1.3)
+    ax.plot(x[:1], y[:1], "o", color=BLUE, markersize=5.0)
+    dressed(ax, "$x$ [m]", "$y$ [m]")
+    ax.set_aspect("equal", adjustable="datalim")
+    return _whole(ax)
+
+
+@figure_of.register
+def _(space: Workspace) -> Figure | None:
+    """Where the boundary is at some heights, seen from above; of a flat one in its own plane."""
+    sides = [k for k, axis in enumerate(space.axes) if axis.size > 1]
+    if space.volume <= 0.0 or len(sides) < 2:
+        return None
+    first, second = sides[:2]
+    (third,) = set(range(3)) - {first, second}
+    level = np.moveaxis(space.level, third, 2)
+    inside = np.flatnonzero((level >= 0.0).any(axis=(0, 1)))
+    shown = np.unique(inside[np.linspace(0, inside.size - 1, LEVELS + 2).astype(np.intp)[1:-1]])
+    ax = axes_or_new(None, height=4.0)
+    for k, row in enumerate(shown):
+        color = COLORS[k % len(COLORS)]
+        ax.contour(space.axes[first], space.axes[second], level[:, :, row].T, levels=[0.0], colors=[color])
+        ax.plot([], [], color=color, label=f"${'xyz'[third]}$ = {space.axes[third][row]:.3g} m")
+    dressed(ax, f"${'xyz'[first]}$ [m]", f"${'xyz'[second]}$ [m]")
+    ax.set_aspect("equal")
+    name_lines(ax)
+    return _whole(ax)
+
+
+@figure_of.register
+def _(found: Calibration) -> Figure | None:
+    return calibration(found, "residuals")
+
+
+def _courses(
+    clock: Array, values: Array, axis: str, label: str, gaps: Flags, names: tuple[str, ...] | None = None
+) -> Figure:
+    """Lines over time, with as many samples as are seen."""
+    figure = sheet(3.2)
+    ax = figure.add_subplot()
+    chosen = _chosen(values)
+    for i, course in enumerate(values[chosen].T[:MOST_CABLES]):
+        style = "-" if i % 2 == 0 or names else (0, (4.0, 1.6))
+        color = COLORS[(i if names else i // 2) % len(COLORS)]
+        name = names[i] if names else f"cable {i}"
+        draw_course(ax, clock[chosen], course, color=color, linestyle=style, linewidth=1.2, label=name)
+    shade(ax, clock, runs(gaps)[:MOST_SAMPLES], "no answer")
+    dressed(ax, axis, label)
+    if axis == "pose":
+        ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+    if clock.size > 1:
+        ax.set_xlim(clock[0], clock[-1])
+    name_lines(ax)
+    return figure
+
+
+def _chosen(values: Array) -> Indices:
+    """Evenly spaced samples (N, c), with the largest and smallest of each column."""
+    count = len(values)
+    if count <= MOST_SAMPLES:
+        return np.arange(count, dtype=np.int64)
+    even = np.linspace(0, count - 1, MOST_SAMPLES).astype(np.intp)
+    known = np.where(np.isfinite(values), values, np.nan)
+    columns = known[:, np.isfinite(known).any(axis=0)]
+    ends = [end(columns, axis=0) for end in (np.nanargmax, np.nanargmin)] if columns.size else []
+    return np.unique(np.concatenate((even, *ends))).astype(np.int64)
+
+
+def _whole(ax: object) -> Figure | None:
+    figure = getattr(ax, "figure", None)
+    return figure if isinstance(figure, Figure) else None

@@ -1,0 +1,177 @@
+"""What is said of a robot, a plan or a result before anything else, in a few lines."""
+
+from __future__ import annotations
+
+from functools import singledispatch
+from typing import NamedTuple
+
+import numpy as np
+
+from sagline.calibration.result import Calibration
+from sagline.calibration.words import chi_squared_in_words
+from sagline.dynamics.simulation import Simulation
+from sagline.dynamics.vibration import Vibration
+from sagline.kernels.jit import is_compiled
+from sagline.kinematics.confirm import Confirmation
+from sagline.kinematics.forward_solution import ForwardSolution
+from sagline.kinematics.inverse import inverse
+from sagline.kinematics.plan import Plan
+from sagline.kinematics.status import PoseStatus
+from sagline.motion.path import Path
+from sagline.numbers import n
+from sagline.results import Result
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.workspaces.space import Workspace
+
+MOST_GAPS = 5  # that are listed
+MOST_MODES = 8
+
+
+class Told(NamedTuple):
+    """What is said of something.
+
+    Attributes:
+        name: What it is.
+        verdict: In one line.
+        good: Whether that is well; None where it is neither.
+        lines: What else there is to say.
+    """
+
+    name: str
+    verdict: str
+    good: bool | None
+    lines: tuple[str, ...]
+
+
+@singledispatch
+def told(thing: object) -> Told | None:
+    """What is said of something; None of what has no more to say than its ordinary text."""
+    if isinstance(thing, Result) and type(thing).__str__ is not object.__str__:
+        first, *rest = str(thing).splitlines()
+        return Told(type(thing).__name__, first, None, tuple(rest))
+    return None
+
+
+@told.register
+def _(robot: Robot) -> Told:
+    plan = plan_of(robot)
+    verdict, good = f"{robot.cable_count} cables", None
+    if plan is not None:
+        there = "in the middle of its test box"
+        good = bool(plan.feasible)
+        verdict = f"held {there} by {_range(plan.chord_tension)}" if good else f"no tensions hold it {there}"
+    lines = [
+        f"{robot.cable_count} cables, {robot.degrees_of_freedom} freedoms ({robot.motion_pattern}), "
+        f"platform of {n(robot.mass, '.4g', 'kg')}",
+        f"limits of the {robot.tension_limits_of.replace('_', ' ')} tension: "
+        f"{n(robot.tension_min.min(), unit='N')} to {n(robot.tension_max.max(), unit='N')}",
+    ]
+    if robot.assumed:
+        lines.append(f"assumed: {', '.join(robot.assumed)}")
+    return Told(robot.name, verdict, good, tuple(lines))
+
+
+def plan_of(robot: Robot) -> Plan | None:
+    """What holds a robot in the middle of its test box; None if it has none, or compiling would take long."""
+    from sagline.kernels.inverse.poses import inverse_poses
+    from sagline.kernels.inverse.verdicts import decide_poses
+
+    box = robot.test_box
+    if box is None or not (is_compiled(inverse_poses) and is_compiled(decide_poses)):
+        return None
+    return inverse(robot, Pose(0.5 * (box.low + box.high), np.eye(3)))
+
+
+@told.register
+def _(plan: Plan) -> Told:
+    feasible, name = np.atleast_1d(plan.feasible), plan.state.one_robot.name
+    good, count = bool(feasible.all()), feasible.size
+    lines = [f"chord tensions {_range(plan.chord_tension)}"] if feasible.any() else []
+    gaps = plan.gaps if feasible.size > 1 else ()
+    for gap in gaps[:MOST_GAPS]:
+        why = PoseStatus(gap.status).text
+        short = f", {n(gap.shortfall, '.3g', 'N')} short" if np.isfinite(gap.shortfall) and gap.shortfall > 0.0 else ""
+        lines.append(f"{_when(plan, gap.first, gap.last)}{short}: {why}")
+    if len(gaps) > MOST_GAPS:
+        lines.append(f"and {len(gaps) - MOST_GAPS} more gaps")
+    if count == 1:
+        verdict = "feasible" if good else PoseStatus(int(plan.status.reshape(-1)[0])).text
+    else:
+        verdict = f"all {count:,} poses are feasible" if good else f"{int(feasible.sum()):,} of {count:,} feasible"
+    return Told(f"Plan of {name}", verdict, good, (*lines, *plan.warnings))
+
+
+def _when(plan: Plan, first: int, last: int) -> str:
+    if plan.path is None:
+        return f"pose {first}" if first == last else f"poses {first} to {last}"
+    times = plan.path.time[[first, last]]
+    return f"at {times[0]:.4g} s" if first == last else f"{times[0]:.4g} s to {times[1]:.4g} s"
+
+
+@told.register
+def _(proof: Confirmation) -> Told:
+    held, planned = np.atleast_1d(proof.held), np.atleast_1d(proof.plan.feasible)
+    good, size = bool(held[planned].all()), 1e3 * float(np.nanmax(proof.plan.unstrained_length, initial=0.0))
+    away = 1e3 * np.linalg.norm(np.atleast_2d(proof.position_error), axis=1)
+    largest = float(np.nanmax(away, initial=0.0))
+    verdict = f"{int(held.sum()):,} of {int(planned.sum()):,} planned poses are confirmed"
+    line = f"largest position error {n(largest, '.2g', 'mm', size=size)}"
+    return Told(f"Confirmation of {proof.plan.state.one_robot.name}", verdict, good, (line,))
+
+
+@told.register
+def _(found: ForwardSolution) -> Told:
+    solved, stable = np.atleast_1d(found.solved), np.atleast_1d(found.stable)
+    verdict = f"{int(solved.sum()):,} of {solved.size:,} solved, {int((solved & stable).sum()):,} stable"
+    lines = []
+    if solved.size == 1 and solved[0]:
+        place = ", ".join(n(each, ".4f") for each in found.pose.position.reshape(-1))
+        lines = [f"at ({place}) m, least stiffness {n(np.min(found.stiffness_min), '.3g', 'N/m')}"]
+    return Told(f"Equilibrium of {found.state.one_robot.name}", verdict, bool((solved & stable).all()), tuple(lines))
+
+
+@told.register
+def _(run: Simulation) -> Told:
+    happened = [
+        f"{event.time:.4g} s: {event.kind}" + ("" if event.cable is None else f", cable {event.cable}")
+        for event in run.events[:MOST_GAPS]
+    ]
+    verdict = f"{n(run.time[-1] - run.time[0], '.4g', 's')}, tensions at the frame {_range(run.tensions)}"
+    return Told(f"Simulation of {run.robot.name}", verdict, None, tuple(happened))
+
+
+@told.register
+def _(swings: Vibration) -> Told:
+    count = swings.frequency.size
+    verdict = f"{count} modes below {n(swings.up_to, '.4g', 'Hz')}" + ("" if swings.complete else ", some are missing")
+    listed = [
+        f"{k + 1}: {frequency:.3f} Hz, platform {100.0 * share:.0f} %"
+        for k, (frequency, share) in enumerate(zip(swings.frequency, swings.platform_share, strict=True))
+    ]
+    return Told(f"Vibration of {swings.state.one_robot.name}", verdict, swings.complete, tuple(listed[:MOST_MODES]))
+
+
+@told.register
+def _(path: Path) -> Told:
+    length = float(np.linalg.norm(np.diff(path.pose.position, axis=0), axis=1).sum())
+    span = float(path.time[-1] - path.time[0])
+    return Told("Path", f"{len(path):,} poses, {n(span, '.4g', 's')}, {n(length, '.4g', 'm')}", None, ())
+
+
+@told.register
+def _(space: Workspace) -> Told:
+    first, *rest = str(space).splitlines()
+    return Told("Workspace", first.removeprefix("Workspace of "), space.volume > 0.0, tuple(rest))
+
+
+@told.register
+def _(found: Calibration) -> Told:
+    verdict = f"{len(found.values)} numbers from {len(found.rows)} poses; {chi_squared_in_words(found)}"
+    return Told(f"Calibration of {found.robot.name}", verdict, None, tuple(str(found).splitlines()))
+
+
+def _range(tensions: object) -> str:
+    values = np.asarray(tensions, dtype=np.float64)
+    known = values[np.isfinite(values)]
+    return f"{n(known.min(), '.4g', 'N')} to {n(known.max(), '.4g', 'N')}" if known.size else "unknown"

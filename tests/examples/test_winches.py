@@ -1,0 +1,70 @@
+"""The example log is what the true robot's sensors read, and a calibration by it finds that robot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import chi2
+
+import sagline as sl
+from sagline.arrays import Array
+from sagline.calibration.screening import screened
+from sagline.calibration.suspicions import suspicions
+from tests.calibration.example_log import EXAMPLES, example_log, example_truth, text_of
+
+DRAWN, LOG, TRUTH = (EXAMPLES / f"winches{end}" for end in ("_robot.yaml", ".csv", "_truth.yaml"))
+
+
+def numbers(robot: sl.Robot) -> Array:
+    """What the default unknowns are of a robot, in their order."""
+    assert robot.winches is not None
+    assert robot.winches.length_zero is not None
+    shared = [robot.cables.axial_stiffness[0], robot.mass]
+    return np.concatenate((robot.frame_anchors.ravel(), robot.winches.length_zero, shared, robot.center_of_mass))
+
+
+def test_the_truth_is_the_drawing_with_errors() -> None:
+    made, drawn = sl.load_robot(TRUTH), sl.load_robot(DRAWN)
+    np.testing.assert_allclose(numbers(made), numbers(example_truth().robot), rtol=1e-12)
+    off = np.linalg.norm(made.frame_anchors - drawn.frame_anchors, axis=1)
+    assert off.min() > 0.02
+    assert off.max() < 0.055
+    assert abs(made.cables.axial_stiffness[0] / drawn.cables.axial_stiffness[0] - 1.1) < 0.01
+
+
+def test_the_log_is_what_the_true_robot_reads(tmp_path: Path) -> None:
+    """To a step of what is written: another machine may round the last digit the other way."""
+    file = tmp_path / "again.csv"
+    file.write_text(text_of(example_log(sl.load_robot(TRUTH)).log))
+    log, again = sl.load_log(LOG), sl.load_log(file)
+    assert file.read_text().splitlines()[:4] == LOG.read_text().splitlines()[:4]
+    assert log.counts is not None
+    assert again.counts is not None
+    assert log.load_cells is not None
+    assert again.load_cells is not None
+    assert log.commanded is not None
+    assert again.commanded is not None
+    np.testing.assert_allclose(again.counts, log.counts, rtol=0.0, atol=1.0)
+    assert np.count_nonzero(again.counts != log.counts) <= 2
+    np.testing.assert_allclose(again.load_cells, log.load_cells, rtol=0.0, atol=0.1 + 1e-9)
+    assert np.count_nonzero(again.load_cells != log.load_cells) <= 2
+    np.testing.assert_allclose(again.commanded.position, log.commanded.position, rtol=0.0, atol=0.01 + 1e-9)
+    np.testing.assert_allclose(again.commanded.quaternion, log.commanded.quaternion, rtol=0.0, atol=2e-3)
+
+
+def test_every_row_is_fit_and_nothing_is_suspected() -> None:
+    robot, log = sl.load_robot(DRAWN), sl.load_log(LOG)
+    assert len(screened(robot, log).log) == len(log) == 60
+    assert suspicions(robot, log) == ()
+
+
+def test_the_calibration_finds_the_truth() -> None:
+    found = sl.calibrate(sl.load_robot(DRAWN), sl.load_log(LOG), folds=0)
+    assert found.status == sl.CalibrationStatus.FOUND
+    off = found.values - numbers(sl.load_robot(TRUTH))
+    assert off @ np.linalg.solve(found.covariance, off) < chi2.ppf(0.99, len(off))
+    assert found.outliers == ()
+    mass, deviation = found.value_of("mass")
+    assert deviation < 0.3
+    assert abs(mass - 91.44) < 3.0 * deviation

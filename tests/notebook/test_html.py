@@ -1,0 +1,240 @@
+"""What Jupyter shows of robots, plans and results: the verdict, a drawing in the page's colors, and never an error."""
+
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from functools import cache
+from html.parser import HTMLParser
+from typing import Any, Literal
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.notebook import figures, html
+from sagline.notebook.html import LARGEST
+from tests.calibration.made_up import made_up
+from tests.effort import least_seconds
+from tests.plot import made
+
+LONGEST = 2.0  # s of the processor of an ordinary machine
+ROBOT = sl.load_robot("article-suspended")
+PATH = sl.article_path(rate=5.0)
+PLAN = sl.inverse(ROBOT, PATH)
+
+
+def shown(thing: Any) -> str:
+    text = thing._repr_html_()
+    assert isinstance(text, str)
+    return text
+
+
+def drawing(text: str) -> ElementTree.Element:
+    found = re.search(r"<svg\b.*</svg>", text, re.DOTALL)
+    assert found is not None
+    return ElementTree.fromstring(found[0])
+
+
+class Balanced(HTMLParser):
+    """Finds tags that are not closed."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag != "img":
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        pass
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+def things() -> dict[str, Any]:
+    far = sl.inverse(ROBOT, sl.Pose([0.0, 0.0, 9.0], np.eye(3)))
+    outside = sl.Pose([[0.0, 0.0, 1.5], [7.3, 0.0, 1.5], [7.3, 0.0, 1.5], [0.0, 0.0, 2.0]], np.eye(3))
+    return {
+        "robot": ROBOT,
+        "robot without a test box": ROBOT.replace(test_box=None),
+        "path": PATH,
+        "plan": PLAN,
+        "plan of one pose": sl.inverse(ROBOT, PATH.pose[0]),
+        "plan of no answer": far,
+        "plan with gaps": sl.inverse(ROBOT, outside),
+        "confirmation": sl.confirm(PLAN),
+        "forward": sl.forward(ROBOT, PLAN.unstrained_length[0], PATH.pose[0]),
+        "workspace": sl.workspace(ROBOT, wrenches=sl.WrenchBox(force=50.0), cells=8),
+        "nowhere": sl.workspace(ROBOT, wrenches=sl.WrenchBox(force=9e4), cells=4),
+        "simulation": made.simulation(20),
+        "vibration": made.vibration(made.state_at(), np.array([1.0, 2.0]), np.array([0.9, 0.1])),
+        "calibration": made_up(count=20),
+    }
+
+
+THINGS = things()
+DRAWN = (
+    *("robot", "path", "plan", "plan of one pose", "plan of no answer", "plan with gaps"),
+    *("confirmation", "workspace", "simulation", "calibration"),
+)
+
+
+@cache
+def once(name: str) -> str:
+    return shown(THINGS[name])
+
+
+@pytest.mark.parametrize("name", THINGS)
+def test_a_page_gets_whole_html_of_reasonable_size_in_reasonable_time(name: str) -> None:
+    thing = THINGS[name]
+    text = once(name)
+    assert Balanced(text).open == []
+    assert len(text.encode()) < LARGEST + 10_000
+    assert ("<svg" in text) == (name in DRAWN)
+    assert least_seconds(lambda: shown(thing), LONGEST) < LONGEST
+    assert not re.search(r"""(?:src|href)=["']?(?!#|data:)\w""", text)  # nothing is loaded from elsewhere
+
+
+def test_verdicts_come_first() -> None:
+    said = {name: re.sub(r"<[^>]+>", "", once(name).split("<svg")[0]) for name in THINGS}
+    assert said["robot"].startswith("article-suspended: held in the middle of its test box by ")
+    assert said["plan"].startswith(f"Plan of article-suspended: all {len(PATH)} poses are feasible")
+    tension = PLAN.chord_tension
+    assert f"chord tensions {tension.min():.4g}\u00a0N to {tension.max():.4g}\u00a0N" in said["plan"]
+    assert said["plan of no answer"].startswith("Plan of article-suspended: no tensions within the limits balance")
+    assert said["plan with gaps"].startswith("Plan of article-suspended: 2 of 4 feasible")
+    short = THINGS["plan with gaps"].shortfall[1]
+    assert f"poses 1 to 2, {short:.1f}\u00a0N short: no tensions" in said["plan with gaps"]
+    assert said["confirmation"].startswith(f"Confirmation of article-suspended: {len(PATH)} of {len(PATH)} planned")
+    assert "limited by" in said["workspace"]
+    assert said["forward"].startswith("Equilibrium of article-suspended: 1 of 1 solved, 1 stable")
+
+
+@pytest.mark.parametrize(("pattern", "freedoms"), [("3T", 3), ("1R2T", 3), ("3R3T", 6)])
+def test_freedoms_are_those_of_the_motion_pattern(pattern: Literal["3T", "1R2T", "3R3T"], freedoms: int) -> None:
+    robot = THINGS["robot"]
+    robot = sl.Robot("any", robot.frame_anchors, robot.platform_anchors, robot.cables, 10.0, robot.inertia,
+                     motion_pattern=pattern, plane_normal=[0, 1, 0] if pattern == "1R2T" else None)  # fmt: skip
+    assert f"8 cables, {freedoms} freedoms ({pattern})" in re.sub(r"<[^>]+>", "", shown(robot))
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_drawings_have_the_colors_of_the_page(name: str) -> None:
+    """So that they are read in Jupyter's dark theme: what is black or gray takes the color of the page's text."""
+    text = once(name)
+    picture = drawing(text)
+    assert "currentColor" in text
+    looks = " ".join(element.get("style", "") for element in picture.iter())
+    for red, green, blue in re.findall(r"#([0-9a-f]{2})([0-9a-f]{2})([0-9a-f]{2})\b", looks):
+        assert not red == green == blue, name
+    assert "style" not in {element.tag.rpartition("}")[2] for element in picture.iter()}  # would hold for all the page
+
+
+def test_names_in_drawings_are_their_own() -> None:
+    texts = [once(name) for name in DRAWN]
+    names = [re.findall(r'\bid="([^"]+)"', text) for text in texts]
+    assert sum(map(len, names)) == len({name for each in names for name in each}) > 0
+    for text, own in zip(texts, names, strict=True):
+        assert set(re.findall(r'(?:href="#|url\(#)([^")]+)', text)) == set(own)
+
+
+def test_what_is_written_is_text() -> None:
+    texts = [element for element in drawing(once("plan")).iter() if element.tag.endswith("text")]
+    words = " ".join("".join(text.itertext()) for text in texts)
+    assert "time [s]" in words
+
+
+def test_names_are_escaped() -> None:
+    text = shown(ROBOT.replace(name="<b>a & b</b>"))
+    assert "&lt;b&gt;a &amp; b&lt;/b&gt;" in text
+    assert "<b>" not in text
+
+
+def test_long_plans_and_many_marks_stay_small() -> None:
+    path = sl.article_path(rate=2000.0)
+    plan = sl.inverse(ROBOT, path)
+    assert plan.status.size > 100_000
+    text = shown(plan)
+    assert len(text.encode()) < 60_000
+    assert least_seconds(lambda: shown(plan), LONGEST) < LONGEST
+    peaks = plan.chord_tension.max(axis=0)
+    figure = figures.figure_of(plan)
+    assert figure is not None
+    drawn = [np.nanmax(np.asarray(line.get_ydata(), dtype=float)) for line in figure.axes[0].get_lines()]
+    np.testing.assert_array_equal(drawn, peaks)  # thinned, but not its peaks
+
+
+def test_what_cannot_be_drawn_is_told_without_a_figure(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(thing: object) -> None:
+        raise RuntimeError("no fonts")
+
+    monkeypatch.setattr(figures, "figure_of", fails)
+    text = shown(PLAN)
+    assert "poses are feasible" in text
+    assert "<svg" not in text
+
+
+def test_what_cannot_be_told_has_its_ordinary_text(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(thing: object) -> None:
+        raise RuntimeError("broken")
+
+    monkeypatch.setattr(html, "told", fails)
+    assert PLAN._repr_html_() is None  # Jupyter shows repr() then
+    monkeypatch.undo()
+    assert PLAN.state.cables._repr_html_() is None
+    broken = replace(PLAN, status=np.full(3, 77, dtype=np.int8))  # no such code, and none of that number
+    assert broken._repr_html_() is None or "<svg" not in shown(broken) or Balanced(shown(broken)).open == []
+
+
+def test_figures_too_large_become_pictures_and_then_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = once("plan")
+    monkeypatch.setattr(html, "LARGEST", len(whole) // 3)
+    assert "<svg" not in shown(PLAN)
+    monkeypatch.setattr(html, "LARGEST", 100)
+    text = shown(PLAN)
+    assert "<svg" not in text
+    assert "<img" not in text
+    assert "poses are feasible" in text
+
+
+WITHOUT = """
+import sys
+{before}
+import numpy as np
+import sagline as sl
+robot = sl.load_robot("article-suspended")
+later = ("matplotlib", "sagline.notebook", "sagline.plot")
+assert not [name for name, module in sys.modules.items() if module and name.startswith(later)], "core"
+text = robot._repr_html_()
+print("<svg" in text, "article-suspended" in text)
+"""
+
+
+@pytest.mark.parametrize(
+    ("before", "said"),
+    [pytest.param("", "True True", marks=pytest.mark.soak), ("sys.modules['matplotlib'] = None", "False True")],
+)
+def test_without_matplotlib_there_is_the_verdict_alone(before: str, said: str) -> None:
+    code = WITHOUT.format(before=before)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == said
+    assert done.stderr == ""
+
+
+@pytest.mark.soak
+def test_a_robot_is_shown_before_anything_is_compiled(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """With straight cables, in seconds, though planning will have to compile first."""
+    folder = tmp_path_factory.mktemp("cold")
+    code = (
+        f"import os, time; os.environ['NUMBA_CACHE_DIR'] = os.environ['XDG_CACHE_HOME'] = {str(folder)!r}\n"
+        "import sagline as sl, matplotlib.figure\n"
+        "text = sl.load_robot('article-suspended')._repr_html_()\n"
+        "print('<svg' in text, 'held' in text, time.process_time() < 30.0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "True False True"
