@@ -60,11 +60,11 @@ def test_what_is_of_the_right_kind_is_taken_as_it_is() -> None:
         (lambda: whole_number(1, "points", 2), "^points is 1; allowed: >= 2. "),
         (lambda: whole_number(1.5, "points", 2), "^points is 1.5; allowed: a whole number, >= 2. "),
         (lambda: whole_number(9, "points", 2, 8), "^points is 9; allowed: 2 to 8. "),
-        (lambda: sl.Break(cable=-1, time=0.0), "^cable is -1; allowed: >= 0. "),
-        (lambda: sl.Brake(winch=-1, time=0.0), "^winch is -1; allowed: >= 0. "),
+        (lambda: sl.Break(cable=-1, time=0.0), "^cable is -1; allowed: 0 to 9999. "),
+        (lambda: sl.Brake(winch=-1, time=0.0), "^winch is -1; allowed: 0 to 9999. "),
     ],
 )
-def test_a_range_without_an_end_has_none_in_the_message(call: Any, words: str) -> None:
+def test_a_range_is_told_with_its_end_where_it_has_one(call: Any, words: str) -> None:
     with pytest.raises(InvalidValueError, match=words):
         call()
 

@@ -15,6 +15,9 @@ DECLARED = {  # each result's save, the one lazy call outward
     ("sagline.optimization.front", "sagline.files.design_folder"),
     ("sagline.workspaces.space", "sagline.files.workspace_file"),
     ("sagline.workspaces.surface", "sagline.files.surface_file"),
+    ("sagline.calibration.log", "sagline.files.log_file"),
+    ("sagline.calibration.chosen_poses", "sagline.files.calibration_poses_file"),
+    ("sagline.calibration.result", "sagline.files.calibration_file"),
 }
 
 

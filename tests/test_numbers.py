@@ -6,7 +6,7 @@ from decimal import Decimal
 import numpy as np
 import pytest
 
-from sagline.numbers import n
+from sagline.numbers import n, plus_minus
 
 PREFIX = {"f": -15, "p": -12, "n": -9, "µ": -6, "m": -3, "": 0, "k": 3, "M": 6, "G": 9}
 UNITS = ("m", "mm", "N", "kN", "kg", "kg/m", "N m", "m/s²", "rad", "s", "N/s", "mm/m", "m²/s⁴", "%", "°", "")
@@ -139,3 +139,26 @@ def test_rounding_is_told_as_such() -> None:
     assert n(4.2e-11, ".3g", "mm", size=16e3) == "0 (rounding)"
     assert n(1e-6, ".3g", "N", size=490.5) == "1\u00a0µN"  # small, but no rounding
     assert n(0.0, ".3g", "N", size=490.5) == "0\u00a0N"  # exactly
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "unit", "text"),
+    [
+        (511_880.0, 12_300.0, "N", "512 ± 12 kN"),
+        (-7.17611, 0.00123, "m", "−7.1761 ± 0.0012 m"),
+        (0.0123, 0.00096, "m", "12.30 ± 0.96 mm"),
+        (0.0004, 0.0196, "m", "0 ± 20 mm"),
+        (1.0, 0.0995, "", "1.00 ± 0.10"),  # 0.0995 is written 0.10, of two digits
+        (1.0, 3456.0, "s", "0 ± 3,500 s"),
+        (5.0, float("inf"), "kg", "5 kg, not told"),
+        (5.0, 0.0, "kg", "5 kg ± 0"),
+    ],
+)
+def test_a_number_with_its_error_is_rounded_to_the_error(value: float, error: float, unit: str, text: str) -> None:
+    assert plus_minus(value, error, unit) == text.replace(" ", "\u00a0") or (
+        plus_minus(value, error, unit).replace("\u00a0", " ") == text
+    )
+
+
+def test_in_a_column_no_number_has_a_prefix() -> None:
+    assert plus_minus(0.0123, 0.00096, prefixed=False) == "0.01230\u00a0±\u00a00.00096"

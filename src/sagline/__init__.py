@@ -18,6 +18,15 @@ if TYPE_CHECKING:
     from sagline.cables.parabolic import Parabolic
     from sagline.cables.status import CableStatus
     from sagline.cables.straight import Straight
+    from sagline.calibration.calibrate import calibrate
+    from sagline.calibration.chosen_poses import CalibrationPoses
+    from sagline.calibration.log import WinchLog
+    from sagline.calibration.pose_error import PoseError
+    from sagline.calibration.poses import calibration_poses
+    from sagline.calibration.result import Calibration
+    from sagline.calibration.sensors import Sensors
+    from sagline.calibration.status import CalibrationStatus, Omission
+    from sagline.calibration.unknowns import Unknown
     from sagline.dynamics.cable_dynamics import dynamic_stiffness
     from sagline.dynamics.damping import Damping
     from sagline.dynamics.drives import SecondOrder
@@ -38,10 +47,12 @@ if TYPE_CHECKING:
     from sagline.dynamics.vibration_status import VibrationStatus
     from sagline.errors import CableGeometryError, FileError, InvalidValueError, SaglineError, SaglineWarning
     from sagline.files.c_source import export_c
+    from sagline.files.calibration_file import load_calibration
     from sagline.files.caspr import load_caspr
     from sagline.files.design_file import load_design
     from sagline.files.execution_file import load_execution
     from sagline.files.imported import Imported
+    from sagline.files.log_file import load_log
     from sagline.files.measurements import load_measurements
     from sagline.files.mesh_file import load_mesh
     from sagline.files.mjcf import dump_mjcf
@@ -151,6 +162,9 @@ __all__ = [
     "CableModel",
     "CableState",
     "CableStatus",
+    "Calibration",
+    "CalibrationPoses",
+    "CalibrationStatus",
     "Capsule",
     "Catenary",
     "Centroid",
@@ -205,6 +219,7 @@ __all__ = [
     "Modes",
     "MovingAnchors",
     "Occurrence",
+    "Omission",
     "Orientations",
     "PNorm",
     "Parabolic",
@@ -214,6 +229,7 @@ __all__ = [
     "PolygonWalk",
     "Pose",
     "PoseBox",
+    "PoseError",
     "PoseStatus",
     "PositionError",
     "Proof",
@@ -225,6 +241,7 @@ __all__ = [
     "SaglineError",
     "SaglineWarning",
     "SecondOrder",
+    "Sensors",
     "Shaper",
     "Side",
     "Simulation",
@@ -237,10 +254,12 @@ __all__ = [
     "TensionMethod",
     "TensionPolygon",
     "Tilts",
+    "Unknown",
     "Vibration",
     "VibrationStatus",
     "Winch",
     "WinchDrive",
+    "WinchLog",
     "WinchRates",
     "Workspace",
     "WrenchBox",
@@ -250,6 +269,8 @@ __all__ = [
     "__version__",
     "article_balance",
     "article_path",
+    "calibrate",
+    "calibration_poses",
     "capacity_margin",
     "clearance",
     "confirm",
@@ -276,9 +297,11 @@ __all__ = [
     "lengths_from_counts",
     "limit_margin",
     "linearized",
+    "load_calibration",
     "load_caspr",
     "load_design",
     "load_execution",
+    "load_log",
     "load_measurements",
     "load_mesh",
     "load_path",
@@ -333,6 +356,9 @@ _HOMES = {
     "CableModel": "sagline.cables.model",
     "CableState": "sagline.cables.model",
     "CableStatus": "sagline.cables.status",
+    "Calibration": "sagline.calibration.result",
+    "CalibrationPoses": "sagline.calibration.chosen_poses",
+    "CalibrationStatus": "sagline.calibration.status",
     "Capsule": "sagline.interference.obstacles",
     "Catenary": "sagline.cables.catenary",
     "Centroid": "sagline.tension.centroid",
@@ -388,6 +414,7 @@ _HOMES = {
     "Modes": "sagline.statics.stiffness",
     "MovingAnchors": "sagline.optimization.moving",
     "Occurrence": "sagline.dynamics.simulation",
+    "Omission": "sagline.calibration.status",
     "Orientations": "sagline.workspaces.orientations",
     "PNorm": "sagline.tension.p_norm",
     "Parabolic": "sagline.cables.parabolic",
@@ -397,6 +424,7 @@ _HOMES = {
     "PolygonWalk": "sagline.tension.polygon_walk",
     "Pose": "sagline.robot.pose",
     "PoseBox": "sagline.robot.pose_box",
+    "PoseError": "sagline.calibration.pose_error",
     "PoseStatus": "sagline.kinematics.status",
     "PositionError": "sagline.workspaces.criteria.position_error",
     "Proof": "sagline.workspaces.proof",
@@ -408,6 +436,7 @@ _HOMES = {
     "SaglineError": "sagline.errors",
     "SaglineWarning": "sagline.errors",
     "SecondOrder": "sagline.dynamics.drives",
+    "Sensors": "sagline.calibration.sensors",
     "Shaper": "sagline.dynamics.shapers",
     "Side": "sagline.tension.polygon",
     "Simulation": "sagline.dynamics.simulation",
@@ -420,10 +449,12 @@ _HOMES = {
     "TensionMethod": "sagline.tension.method",
     "TensionPolygon": "sagline.tension.polygon",
     "Tilts": "sagline.workspaces.orientations",
+    "Unknown": "sagline.calibration.unknowns",
     "Vibration": "sagline.dynamics.vibration",
     "VibrationStatus": "sagline.dynamics.vibration_status",
     "Winch": "sagline.robot.winch",
     "WinchDrive": "sagline.robot.winch_drives",
+    "WinchLog": "sagline.calibration.log",
     "WinchRates": "sagline.kinematics.winch_rates",
     "Workspace": "sagline.workspaces.space",
     "WrenchBox": "sagline.workspaces.wrench_sets",
@@ -434,6 +465,8 @@ _HOMES = {
     "ZVD": "sagline.dynamics.shapers",
     "article_balance": "sagline.statics.balance",
     "article_path": "sagline.motion.planar",
+    "calibrate": "sagline.calibration.calibrate",
+    "calibration_poses": "sagline.calibration.poses",
     "capacity_margin": "sagline.tension.margin",
     "clearance": "sagline.interference.clearance",
     "confirm": "sagline.kinematics.confirm",
@@ -460,9 +493,11 @@ _HOMES = {
     "lengths_from_counts": "sagline.kinematics.encoder",
     "limit_margin": "sagline.tension.margin",
     "linearized": "sagline.dynamics.linearized",
+    "load_calibration": "sagline.files.calibration_file",
     "load_caspr": "sagline.files.caspr",
     "load_design": "sagline.files.design_file",
     "load_execution": "sagline.files.execution_file",
+    "load_log": "sagline.files.log_file",
     "load_measurements": "sagline.files.measurements",
     "load_mesh": "sagline.files.mesh_file",
     "load_path": "sagline.files.path_file",

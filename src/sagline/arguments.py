@@ -17,7 +17,7 @@ from typing import Any, Final, TypeVar
 
 import numpy as np
 
-from sagline.errors import FileError, InvalidValueError, printable
+from sagline.errors import FileError, InvalidValueError, nearest, printable
 
 T = TypeVar("T")
 
@@ -31,6 +31,7 @@ HOW_TO_GET: Final = MappingProxyType(
         "Cable": "Give Cable(linear_density, axial_stiffness).",
         "CableModel": "Give one of the models, Catenary() for instance.",
         "CableState": "Take that of a model: Catenary().from_tension(...).",
+        "Calibration": "Make one: calibrate(robot, log).",
         "Confirmation": "Make one of a plan: confirm(plan).",
         "Creep": "Give Creep(axial_stiffness, time), or None.",
         "Criterion": "Give one of the criteria, MaximumSag(0.05) for instance.",
@@ -44,13 +45,16 @@ HOW_TO_GET: Final = MappingProxyType(
         "Plan": "Make one: inverse(robot, motion).",
         "Pose": "Make one: Pose.from_euler(position, 0, 0, 0).",
         "PoseBox": "Give PoseBox(low, high, tilt).",
+        "Provenance": "Take that of a calibrated robot, or None: robot.calibration.",
         "Robot": 'Load one by its name or file: load_robot("cogiro").',
         "Simulation": "Make one: simulate(plan).",
+        "Sensors": "Give Sensors(length_deviation, tension_deviation), 5e-4 m and 5 N for instance.",
         "Shaper": "Make one, for a frequency: ZV(2.0), ZVD(2.0) or EI(2.0).",
         "TensionMethod": "Give one of the methods, MinimumNorm() for instance.",
         "TensionPolygon": "Make one: tension_polygon(robot, pose).",
         "Vibration": "Make one: vibration(state, up_to=20.0).",
         "Workspace": "Make one: workspace(robot).",
+        "WinchLog": 'Read one: load_log("winches.csv").',
         "Winch": "Give Winch(pulley_radius, dead_cable=...), or None.",
     }
 )
@@ -146,7 +150,9 @@ def choice(value: Any, item: str, allowed: Iterable[str]) -> Any:
     words = tuple(allowed)
     if isinstance(value, str) and value in words:
         return str(value)  # numpy has a kind of its own
-    raise InvalidValueError(item, brief(value), ", ".join(words), f"Choose one of them as {item}.")
+    near = nearest(value, words) if isinstance(value, str) else None
+    step = f"Choose one of them as {item}." if near is None else f"Did you mean {near}?"
+    raise InvalidValueError(item, brief(value), ", ".join(words), step)
 
 
 def text(value: Any, item: str) -> str:

@@ -89,6 +89,20 @@ class FileError(SaglineError):
         """
         return cls(path, f"{error.item} is {error.value}; allowed: {error.allowed}", error.next_step)
 
+    @classmethod
+    def not_installed(cls, package: str | None, needed: str, extra: str) -> FileError:
+        """A package that is not there, and how to have it.
+
+        Args:
+            package: Its name.
+            needed: By whom, "Meshes need it" for instance.
+            extra: The extra of sagline that brings it.
+
+        Returns:
+            The error, to be raised.
+        """
+        return cls(f"package {package}", "is not installed", f'{needed}: pip install "sagline[{extra}]"')
+
     def __str__(self) -> str:
         """One line: file, reason, next step."""
         path, reason, next_step = shortened((str(self.path), self.reason, self.next_step), room=MOST - len(": . "))

@@ -64,6 +64,29 @@ def n(
     return f"{digits}{'' if symbol in TIGHT else SPACE}{symbol}".replace(" ", SPACE)
 
 
+def plus_minus(value: SupportsFloat, error: SupportsFloat, unit: str = "", *, prefixed: bool = True) -> str:
+    """A number with its standard error, both to the two digits of the error that count: "512 ± 12 kN".
+
+    Args:
+        value: The number, in the unit.
+        error: Its standard error, in the unit; one that is not finite is told as "not told by anything".
+        unit: Its unit; "" for none.
+        prefixed: Whether the unit takes the prefix it reads best with; in a column of a table none does.
+
+    Returns:
+        The text.
+    """
+    number, own = float(value), float(error)
+    if not (isfinite(number) and isfinite(own) and own > 0.0):
+        text = n(number, ".6g", unit if prefixed else "")
+        return f"{text} ± 0" if own == 0.0 else f"{text}, not told"
+    power, symbol = _prefixed(max(abs(number), own), ".15g", unit) if prefixed else (0, "")
+    places = 1 - int(f"{own * 10.0**power:.1e}".partition("e")[2])
+    both = (round(each * 10.0**power, places) for each in (number, own))
+    digits = " ± ".join(_digits(each, f",.{max(places, 0)}f") for each in both)
+    return f"{digits}{'' if symbol in TIGHT else SPACE}{symbol}".replace(" ", SPACE)
+
+
 def counted(count: int, noun: str) -> str:
     """A number of things, "1 pose" or "1,200 poses".
 

@@ -24,6 +24,7 @@ from sagline.statics.balance import article_balance, structure_matrix
 from sagline.tension.analytic_center import AnalyticCenter
 from sagline.tension.broken import without_cables
 from sagline.tension.closest import Closest
+from sagline.tension.lowest_sum import LowestSum
 from sagline.tension.method import Variable
 from sagline.tension.minimum_norm import MinimumNorm
 from tests.tension.reference import nearest, needed, planar, random_poses, structure, unbalanced
@@ -131,6 +132,22 @@ def test_limits_at_the_frame_end_are_met_exactly(model: CableModel, variable: Va
     assert tension.min() == pytest.approx(25.0, abs=1e-9)
     assert (np.abs(tension - 25.0) < 1e-9).sum() > 50
     assert tension.max() <= 2000.0 + 1e-9
+
+
+@pytest.mark.parametrize("share", np.linspace(0.2, 1.5, 14))
+def test_limits_at_the_frame_end_near_the_least_that_hanging_cables_have(share: float) -> None:
+    robot = load_robot("ipanema-1").replace(cables=Cable(0.07, 24e3), tension_limits_of="frame_end", tension_min=0.0)
+    pose = Pose([0.0, 0.0, 1.2], LEVEL)
+    chord = np.linalg.norm(pose.transform(robot.platform_anchors) - robot.frame_anchors, axis=1)
+    limit = share * 0.5 * 0.07 * robot.gravity * chord
+    floor = robot.frame_anchors[:, 2] < 1.0
+    low = inverse(robot.replace(tension_min=limit), pose)
+    assert low.feasible
+    assert (low.state.cables.frame_end_tension >= limit - 1e-9).all()
+    # an upper limit that no hanging cable keeps is kept by no plan
+    high = inverse(robot.replace(tension_max=np.where(floor, limit, 720.0)), pose)
+    assert high.feasible == (share > 1.05)
+    assert high.feasible or high.status == PoseStatus.INFEASIBLE
 
 
 def test_article_bound_keeps_the_lowest_point_outside_the_span() -> None:
@@ -289,3 +306,16 @@ def test_empirical_model_below_its_range_is_told_and_not_changed() -> None:
     assert exact.at_border is not None
     # one pose was found by searching at the border, which is all that is told of the exact model
     assert [text.split(" are at")[0] for text in exact.warnings] == [f"{exact.at_border.sum()} of 50 poses"]
+
+
+def test_tensions_continue_as_their_plan_does() -> None:
+    robot = load_robot("cogiro")
+    poses = Pose.from_euler([[0.0, 0.0, 2.0], [0.4, 0.1, 2.1]], 0.0, 0.0, 0.0)
+    before = inverse(robot, poses[0], tension=LowestSum())
+    continued = inverse(robot, poses[1], previous=before)
+    again = inverse(robot, poses[1], previous=before.chord_tension.tolist())
+    np.testing.assert_array_equal(continued.chord_tension, again.chord_tension)
+    assert not np.allclose(continued.chord_tension, inverse(robot, poses[1]).chord_tension, rtol=1e-3)
+    for wrong in (before.chord_tension[:7], 3.0, "closest", [np.nan] * 8):
+        with pytest.raises(InvalidValueError, match="previous"):
+            inverse(robot, poses[1], previous=wrong)

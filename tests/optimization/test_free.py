@@ -107,7 +107,7 @@ REFUSED: dict[str, tuple[Callable[[], object], str | None]] = {
     "unknown goal": (
         lambda: asked(goals=["workspace"]),
         "goal is 'workspace'; allowed: workspace_share, mean_margin, least_margin, largest_tension, largest_sag, "
-        "least_stiffness, cable_cost. Choose one of them as goal.",
+        "least_stiffness, cable_cost. Did you mean workspace_share?",
     ),
     "crossed bounds": (
         lambda: sl.FreeAnchors("frame", 0.5, -0.5, along=[0, 0, 1]),

@@ -10,7 +10,7 @@ import numpy as np
 
 import sagline as sl
 from sagline.arrays import Array
-from sagline.kernels.workspaces.bands import LOOSEST
+from sagline.kernels.cable.pulls import LOOSEST
 
 GRID = 4000
 Support = Callable[[Array], Array]  # of normals (F, 6): the largest -y . w over a set, (F,)

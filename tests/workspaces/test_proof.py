@@ -129,6 +129,18 @@ def test_a_planar_platform_turns_in_its_plane_alone() -> None:
         sl.prove(robot.replace(motion_pattern="2T"), sl.PoseBox(middle, middle, tilt=0.1))
 
 
+def test_cables_may_be_stretched_to_more_than_twice_their_length() -> None:
+    # nobody's robots, but within their limits: the inverse finds tensions above EA
+    soft = sl.load_robot("ipanema-1").replace(cables=sl.Cable(0.0185, 36.8), tension_max=225.0)
+    _, outside, wrong = contradictions(soft, 180, np.random.default_rng(18))
+    assert wrong == 0
+    assert outside > 100
+    softer = sl.load_robot("article-mixed").replace(cables=sl.Cable(0.095, 1240.0), tension_max=np.inf)
+    inside, _, wrong = contradictions(softer, 180, np.random.default_rng(18))
+    assert wrong == 0
+    assert inside > 100
+
+
 @pytest.mark.parametrize("tilt", [0.0, 0.1])
 def test_the_budget_ends_in_open_cells(tilt: float) -> None:
     robot = sl.load_robot("cogiro")

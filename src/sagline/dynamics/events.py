@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any, Final, TypeAlias
 
 from sagline.arguments import brief, whole_number
 from sagline.arrays import number
 from sagline.errors import InvalidValueError
 from sagline.robot.robot import Robot
+
+LAST: Final = 9_999  # cable or winch; no robot has more
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +28,7 @@ class Break:
 
     def __post_init__(self) -> None:
         """Check the values."""
-        object.__setattr__(self, "cable", whole_number(self.cable, "cable", 0))
+        object.__setattr__(self, "cable", whole_number(self.cable, "cable", 0, LAST))
         object.__setattr__(self, "time", number(self.time, "time", "s"))
 
 
@@ -44,7 +46,7 @@ class Stall:
 
     def __post_init__(self) -> None:
         """Check the values."""
-        object.__setattr__(self, "winch", whole_number(self.winch, "winch", 0))
+        object.__setattr__(self, "winch", whole_number(self.winch, "winch", 0, LAST))
         object.__setattr__(self, "time", number(self.time, "time", "s"))
 
 
@@ -68,7 +70,7 @@ class Brake:
         """Check the values."""
         object.__setattr__(self, "time", number(self.time, "time", "s"))
         if self.winch is not None:
-            object.__setattr__(self, "winch", whole_number(self.winch, "winch", 0))
+            object.__setattr__(self, "winch", whole_number(self.winch, "winch", 0, LAST))
         object.__setattr__(self, "duration", number(self.duration, "duration", "s", above=0.0))
 
 

@@ -32,6 +32,8 @@ class Run:
         courses: Courses,
         every: int,
         steps: int,
+        events: tuple[Event, ...] = (),
+        said: dict[str, Any] | None = None,
     ) -> None:
         """Look at the start.
 
@@ -42,7 +44,10 @@ class Run:
             courses: Of set points, wrenches and the wind.
             every: After how many steps one is recorded.
             steps: How many there are.
+            events: What happens on the way, in order.
+            said: What else the simulation is told of itself.
         """
+        self._events, self._said = list(events), said or {}
         self.plant, self.every, self.steps = plant, every, steps
         self._rules, self._numbers, self._courses = rules, numbers, courses
         self._all = plant.records(-(-steps // every) + 1)  # the last step too
@@ -120,7 +125,7 @@ class Run:
             event: No earlier than those before.
         """
         plant = self.plant
-        self._go(math.ceil((event.time - plant.audit[d.BEGIN]) / self.step - 1e-9))
+        self._go(self._step_of(event))
         time, before = self._time(int(plant.counters[k.STEPS])), _energy(self._look())
         cable = cable_of(event)
         places = plant.cables == cable if cable is not None else np.ones(len(plant.cables), dtype=np.bool_)
@@ -172,25 +177,50 @@ class Run:
         Returns:
             The whole run.
         """
-        self._go(self.steps)
+        return self.until(math.inf)
+
+    def until(self, time: float) -> Simulation:
+        """Go on, and look back.
+
+        Args:
+            time: How far to go [s], at least: to the first record that is not earlier; the end at most.
+
+        Returns:
+            The run so far: its samples, and what they say, are those of the whole run.
+        """
+        ahead = (time - float(self.plant.audit[d.BEGIN])) / self.step
+        records = math.ceil(min(ahead, self.steps) / self.every - 1e-9)
+        last = max(min(records * self.every, self.steps), int(self.plant.counters[k.STEPS]))
+        while self._events and self._step_of(self._events[0]) <= last:
+            self.happen(self._events.pop(0))
+        self._go(last)
         self._close()
-        plant, states = self.plant, self._all.states
-        kinetic, potential, supplied, lost = (column.copy() for column in self._all.energies.T)
-        steps = np.minimum(self.every * np.arange(len(states)), self.steps)
+        return self._seen(-(-last // self.every) + 1)
+
+    def _step_of(self, event: Event) -> int:
+        """The first step that is not earlier than an event."""
+        return math.ceil((event.time - float(self.plant.audit[d.BEGIN])) / self.step - 1e-9)
+
+    def _seen(self, count: int) -> Simulation:
+        """So many of the records."""
+        plant, states, removed = self.plant, self._all.states[:count], self._removed[:count]
+        kinetic, potential, supplied, lost = (column.copy() for column in self._all.energies[:count].T)
+        steps = np.minimum(self.every * np.arange(count), self.steps)
         pose, velocity, spin = plant.poses(states), states[:, body.VELOCITY : body.MOMENTUM], states[:, body.MOMENTUM :]
         return Simulation(
             robot=plant.robot,
             time=locked(plant.audit[d.BEGIN] + steps * self.step),
             pose=pose,
             twist=twist_of_origin(plant.robot, pose, velocity, spin),
-            tensions=locked(self._all.tensions),
-            length=locked(self._all.lengths),
-            energy=energy_balance(kinetic, potential, supplied, lost - self._removed, self._removed),
+            tensions=locked(self._all.tensions[:count].copy()),
+            length=locked(self._all.lengths[:count].copy()),
+            energy=energy_balance(kinetic, potential, supplied, lost - removed, removed.copy()),
             events=tuple(sorted(self._occurrences, key=lambda event: event.time)),
             cable_mass=plant.cable_mass,
             step=self.step,
-            nodes=None if self._all.points is None else locked(self._all.points),
-            largest_tension=locked(self._largest),
+            nodes=None if self._all.points is None else locked(self._all.points[:count].copy()),
+            largest_tension=locked(self._largest.copy()),
+            **self._said,
         )
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 from typing import Any, Final, Literal, get_args
 
 import numpy as np
@@ -122,7 +121,53 @@ def simulate(
         refuse_with_modes([name for name, asked in others.items() if asked])
         written = RECORD if record is None else number(record, "record", "s", above=0.0)
         return modal_simulation(given, optional(damping, Damping, "damping") or Damping(), step, written)
-    elements = elements if cable_mass == "lumped" else 0
+    return run_of(
+        given,
+        elements if cable_mass == "lumped" else 0,
+        step=step,
+        integrator=integrator,
+        winches=winches,
+        winding=winding,
+        events=events,
+        wind=wind,
+        damping=damping,
+        record=record,
+    ).finish()
+
+
+def run_of(
+    given: Beginning,
+    elements: int = 0,
+    *,
+    step: float | None = None,
+    integrator: Integrator | None = None,
+    winches: Winches = "ideal",
+    winding: Winding = "constant",
+    events: Event | Iterable[Event] = (),
+    wind: TableInTime | None = None,
+    damping: Damping | None = None,
+    record: float | None = None,
+) -> Run:
+    """A simulation that has begun, and can be looked at on its way.
+
+    Args:
+        given: The beginning.
+        elements: Of each cable where it has mass; 0 where it has none.
+        step: As in `simulate`, like all that follow.
+        integrator: Which.
+        winches: Which kind.
+        winding: What lies on the drums.
+        events: What happens on the way.
+        wind: Velocity of the air.
+        damping: What takes energy out of the cables.
+        record: How often the motion is written down.
+
+    Returns:
+        Run, at its start.
+
+    Raises:
+        InvalidValueError: As `simulate`.
+    """
     if elements:
         check_lumped(given)
     kind, losses = kind_of(winches), checked_damping(damping)
@@ -140,11 +185,10 @@ def simulate(
     check_memory("record", 8.0 * numbers_each * (count / every), "Record less often.")
     rules = (code, kind, int(winding == "remembered"), work, round(d.LOOP_PERIOD / size) if kind == d.DRUMS else 1)
     numbers = (size, losses.loss_time, losses.air_damping, 1.0)
-    run = Run(plant, rules, numbers, (set_points(given, plant, kind), given.wrench, air), every, count)
-    for event in happening:
-        run.happen(event)
-    asked = get_args(Integrator)[code]
-    return replace(run.finish(), integrator=asked, winches=winches, winding=winding, damping=losses)
+    said = {"integrator": get_args(Integrator)[code], "winches": winches, "winding": winding, "damping": losses}
+    return Run(
+        plant, rules, numbers, (set_points(given, plant, kind), given.wrench, air), every, count, happening, said
+    )
 
 
 def set_points(given: Beginning, plant: Plant, kind: int) -> Course:

@@ -9,8 +9,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import brief, callback, choice, instance, optional
-from sagline.arrays import Array, locked
+from sagline.arguments import brief, callback, choice, instance
+from sagline.arrays import Array, exactly, locked
 from sagline.blocks import Progress
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
@@ -46,7 +46,7 @@ def inverse(
     model: CableModel = _CATENARY,
     tension: TensionMethod = _CLOSEST,
     wrench: ArrayLike | None = None,
-    previous: Plan | None = None,
+    previous: Plan | ArrayLike | None = None,
     *,
     winding: Winding | None = None,
     progress: Progress | None = None,
@@ -62,7 +62,8 @@ def inverse(
             path only; in a batch of poses each stands alone.
         wrench: External wrench on the platform about its center of mass in world axes, without gravity and
             inertia: force [N], then moment [N m], shape (6,) or (N, 6). None for none.
-        previous: A plan that this one continues: `Closest` starts from its last feasible tensions.
+        previous: A plan that this one continues: `Closest` starts from its last feasible tensions. Or such tensions,
+            in the variable of the sharing [N], shape (m,).
         winding: Which way the drums turn, for the friction of pulleys and guides: +1 winding in, -1 paying out, 0
             standing, shape (m,) or (N, m); or "path", the way the lengths go along the path without friction. It
             changes lengths behind the pulleys alone. None: nothing rubs.
@@ -91,7 +92,7 @@ def inverse(
         >>> print(plan.feasible, plan.unstrained_length.round(3))
         True [11.049 10.542  9.674  9.829  8.49   7.85   9.453  9.402]
     """
-    _check_kinds(motion, model, tension, previous)
+    _check_kinds(motion, model, tension)
     callback(progress, "progress")
     turning = _turning(winding, motion)
     method = tension if isinstance(motion, Path) or previous is not None else tension.alone
@@ -158,13 +159,12 @@ def _wound_along(plan: Plan) -> Plan:
     return replace(plan, state=with_behind(plan.state, locked(np.where(still, 0.0, -np.sign(rate)))))
 
 
-def _check_kinds(motion: object, model: object, tension: object, previous: object) -> None:
+def _check_kinds(motion: object, model: object, tension: object) -> None:
     if not isinstance(motion, Path | Pose):
         step = "Give Pose.from_euler(position, 0, 0, 0), or quintic_path(waypoints, speed=1.0)."
         raise InvalidValueError("motion", brief(motion), "a Pose or a Path", step)
     instance(model, CableModel, "model")
     instance(tension, TensionMethod, "tension")
-    optional(previous, Plan, "previous")
 
 
 def _in_world(components: Array, robot: Robot) -> Array:
@@ -173,10 +173,12 @@ def _in_world(components: Array, robot: Robot) -> Array:
     return wrench
 
 
-def _reference(robot: Robot, previous: Plan | None, variable: Variable) -> Array:
-    """Tensions to start from, in the sharing's variable (m,): the last feasible ones of a plan, or NaN."""
+def _reference(robot: Robot, previous: Plan | ArrayLike | None, variable: Variable) -> Array:
+    """Tensions to start from, in the sharing's variable (m,): as given, the last feasible ones of a plan, or NaN."""
     if previous is None:
         return np.full(robot.cable_count, np.nan)
+    if not isinstance(previous, Plan):
+        return exactly(previous, "previous", "N", (robot.cable_count,)).copy()
     cables = previous.state.cables
     if cables.shape[-1] != robot.cable_count:
         raise InvalidValueError(

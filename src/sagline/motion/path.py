@@ -11,10 +11,11 @@ from sagline.arguments import instance
 from sagline.arrays import Array, checked
 from sagline.errors import InvalidValueError
 from sagline.robot.pose import Pose
+from sagline.shown import Shown
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Path:
+class Path(Shown):
     """The motion of the platform frame over time, in N samples; no two at the same time.
 
     Attributes:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from sagline.arguments import brief, integer
-from sagline.arrays import Array, Indices, locked
+from sagline.arrays import Array, Indices
 from sagline.errors import InvalidValueError
+from sagline.results import ByFields
 from sagline.robot.robot import Robot
 
 
@@ -45,14 +45,10 @@ class Bound(Protocol):
         """Change cable tables (N, m, CABLE_COLUMNS) in place, by the parts' values (N, K)."""
 
 
-class Free:
+class Free(ByFields):
     """A part of a robot that may change: `FreeAnchors`, `FreeCable` or `FreeLimit`."""
 
     __slots__ = ()
-
-    def __reduce__(self) -> tuple[Any, tuple[type[Free], dict[str, Any]]]:
-        """Pickle by fields, so that the arrays of a loaded part are locked too."""
-        return _again, (type(self), {field.name: getattr(self, field.name) for field in fields(self)})  # type: ignore[arg-type]
 
     def bound(self, robot: Robot, item: str) -> Bound:
         """What it means for a robot.
@@ -65,13 +61,6 @@ class Free:
             InvalidValueError: If the robot does not have it, or not within the bounds.
         """
         raise NotImplementedError
-
-
-def _again(kind: type[Free], values: dict[str, Any]) -> Free:
-    part = object.__new__(kind)
-    for name, value in values.items():
-        object.__setattr__(part, name, locked(value) if isinstance(value, np.ndarray) else value)
-    return part
 
 
 def check_order(low: Array, high: Array, unit: str, *, strictly: bool = False) -> None:

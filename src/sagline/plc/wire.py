@@ -89,8 +89,7 @@ def needed() -> Iterator[None]:
     try:
         yield
     except ModuleNotFoundError as error:
-        package = f"package {str(error.name).partition('.')[0]}"
-        raise FileError(package, "is not installed", 'PLCs need it: pip install "sagline[plc]"') from None
+        raise FileError.not_installed(str(error.name).partition(".")[0], "PLCs need it", "plc") from None
 
 
 def refused(error: BaseException | None, speaks: str) -> Refusal:

@@ -23,7 +23,7 @@ MOST_CELLS: Final = 128  # along an axis
 MOST_HALVED: Final = 256  # along an axis: 17 million nodes, half a gigabyte
 MOST_HALVINGS: Final = 3
 AT_NODE: Final = 1e-10  # of an edge of the grid: a vertex so near to its node is at it
-_FACES: Final = ("x low", "x high", "y low", "y high", "z low", "z high")
+FACES: Final = ("x low", "x high", "y low", "y high", "z low", "z high")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,10 +105,10 @@ def boundary(
     first = grid = sampled(counted, *corners, numbers)
     for _ in range(halvings):
         grid = refined(grid, counted)
-    net, vertices, slope = _placed(net_of(grid.inside), grid, counted)
+    net, vertices, slope = placed(net_of(grid.inside), grid, counted)
     surface = Surface(locked(vertices), locked(net.faces))
-    on_box = _on_box(surface, grid)
-    open_faces = tuple(name for name, flat in zip(_FACES, on_box, strict=True) if flat.any())
+    on_box = faces_on_box(surface, grid)
+    open_faces = tuple(name for name, flat in zip(FACES, on_box, strict=True) if flat.any())
     curved = np.flatnonzero(~np.logical_or.reduce(on_box))
     faces = net.faces[curved]
     between = bulge(counted, surface.vertices, faces, _slopes(surface.vertices, faces, net, slope), grid)
@@ -129,13 +129,27 @@ def _cells_of(cells: int | tuple[int, int, int], size: Array) -> tuple[int, int,
     return x, y, z
 
 
-def _placed(net: Net, grid: Grid, level: Level) -> tuple[Net, Array, Array]:
-    """Vertices on the exact boundary, and how fast the function falls along the edge of each."""
+def placed(
+    net: Net, grid: Grid, level: Level, *, precision: float = 1e-10, narrow: float = 1e-12
+) -> tuple[Net, Array, Array]:
+    """Vertices on the exact boundary.
+
+    Args:
+        net: Triangles between the nodes of the grid.
+        grid: The function there.
+        level: The function.
+        precision: As of `crossings`.
+        narrow: Likewise.
+
+    Returns:
+        The net, in which vertices at one node are one; where its vertices are [m], shape (V, 3); and how fast the
+        function falls along the edge of each [1/m], shape (V,), NaN where that is not known.
+    """
     inner, outer = grid.positions(net.inner), grid.positions(net.outer)
     at_inner, at_outer = grid.values[tuple(net.inner.T)], grid.values[tuple(net.outer.T)]
     k = np.flatnonzero((net.inner != net.outer).any(axis=1))
     share, slope = np.zeros(len(inner)), np.full(len(inner), np.nan)
-    share[k] = crossings(level, inner[k], outer[k], at_inner[k], at_outer[k])
+    share[k] = crossings(level, inner[k], outer[k], at_inner[k], at_outer[k], precision=precision, narrow=narrow)
     slope[k] = (at_inner[k] - at_outer[k]) / np.linalg.norm(outer[k] - inner[k], axis=1)
     at_node = share <= AT_NODE
     vertices = inner + np.where(at_node, 0.0, share)[:, None] * (outer - inner)
@@ -161,7 +175,15 @@ def _slopes(vertices: Array, faces: Indices, net: Net, slope: Array) -> Array:
     return found
 
 
-def _on_box(surface: Surface, grid: Grid) -> list[NDArray[np.bool_]]:
-    """Which triangles lie on each face of the box."""
+def faces_on_box(surface: Surface, grid: Grid) -> list[NDArray[np.bool_]]:
+    """Which triangles lie on each face of the box.
+
+    Args:
+        surface: The triangles.
+        grid: The grid that fills the box.
+
+    Returns:
+        Masks of shape (F,), one for each of `FACES`.
+    """
     corners = surface.vertices[surface.faces]
     return [(corners[:, :, k] == axis[end]).all(axis=1) for k, axis in enumerate(grid.axes) for end in (0, -1)]

@@ -50,8 +50,7 @@ def net_of(inside: Mask) -> Net:
     try:
         from skimage.measure import marching_cubes
     except ModuleNotFoundError:
-        step = 'Workspaces need it: pip install "sagline[workspace]"'
-        raise FileError("package scikit-image", "is not installed", step) from None
+        raise FileError.not_installed("scikit-image", "Workspaces need it", "workspace") from None
     padded = np.pad(np.where(inside, np.float32(1.0), np.float32(-1.0)), 1, constant_values=-1.0)
     # the older table knows only signs, and no vertices but those on edges
     middle, faces, _, _ = marching_cubes(  # type: ignore[no-untyped-call]

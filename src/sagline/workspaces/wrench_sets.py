@@ -6,8 +6,8 @@ here is a sum of four kinds, whose support functions add: segments, ellipsoids, 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from typing import Any, Final
+from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,11 +15,12 @@ from numpy.typing import ArrayLike
 from sagline.arguments import brief
 from sagline.arrays import Array, Indices, checked, exactly, locked, number
 from sagline.errors import InvalidValueError
+from sagline.results import ByFields
 from sagline.workspaces.words import in_words
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class WrenchSet:
+class WrenchSet(ByFields):
     """A set of wrenches on the platform: force and moment about the center of mass in world axes, without gravity.
 
     Made by `WrenchBox`, `WrenchEllipsoid`, `WrenchPolytope` and `Accelerations`, and by adding two sets with `+`: the
@@ -63,10 +64,6 @@ class WrenchSet:
     def __repr__(self) -> str:
         """Its kind, and the line."""
         return f"<{type(self).__name__}: {self}>"
-
-    def __reduce__(self) -> tuple[Any, tuple[type[WrenchSet], dict[str, Any]]]:
-        """Pickle by fields, so that the arrays of a loaded set are locked too."""
-        return _again, (type(self), {field.name: getattr(self, field.name) for field in fields(WrenchSet)})
 
     def _fill(self, **parts: Array) -> None:
         """Let the set be these parts and no others."""
@@ -226,12 +223,6 @@ def load_of(value: object) -> WrenchSet:
         step = "Give WrenchBox(force=100.0, moment=20.0) for instance; a single wrench is WrenchPolytope([wrench])."
         raise InvalidValueError("wrenches", brief(value), "a WrenchSet, or None", step)
     return value
-
-
-def _again(kind: type[WrenchSet], values: dict[str, Any]) -> WrenchSet:
-    made = object.__new__(kind)
-    made._fill(**values)
-    return made
 
 
 def _center(center: ArrayLike | None) -> Array:

@@ -1,0 +1,180 @@
+"""Wheel and source distribution: built, looked into, installed in an empty environment, and used there."""
+
+import email
+import os
+import subprocess
+import sys
+import sysconfig
+import tarfile
+import tomllib
+import venv
+import zipfile
+from email.message import Message
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+NAME = f"sagline-{PROJECT['version']}"
+INFO = {"METADATA", "RECORD", "WHEEL", "entry_points.txt", "licenses/LICENSE"}
+EXTRA_PACKAGES = (
+    *("bokeh", "cma", "dask", "distributed", "fcl", "foxglove_schemas_protobuf", "mcap", "mcap_protobuf"),
+    *("pymodbus", "pymoo", "skimage", "snap7", "trimesh", "viser", "zarr", "zstandard"),
+)
+MADE_FOR_EXTRAS = (
+    *("sagline.viewer", "sagline.cli.readings", "sagline.plc.modbus_wire", "sagline.plc.s7_wire"),
+    *("sagline.twin.modbus_mirrors", "sagline.twin.s7_mirrors", "sagline.share.log_course"),
+)
+USED = """
+import sys
+from importlib.resources import files
+import sagline as sl
+robots = [sl.load_robot(name) for name in sl.robot_names()]
+sl.export_c(robots[0], "robot.c")
+for asset in sys.argv[1:]:
+    assert files("sagline").joinpath(asset).is_file(), asset
+print(len(robots), sl.__version__, sl.__file__)
+"""
+
+
+class Built(NamedTuple):
+    """Where they are."""
+
+    wheel: Path
+    source: Path
+
+
+def run(*words: str | Path, folder: Path) -> str:
+    """What a program prints that knows nothing of this source tree."""
+    clean = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "PYTHONSAFEPATH")}
+    done = subprocess.run([str(word) for word in words], cwd=folder, env=clean, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def build(tree: Path, folder: Path, *targets: str) -> None:
+    """Run the build of pyproject.toml, which needs no network where hatchling is installed."""
+    where = [path for path in sys.path if path]
+    code = f"import sys; sys.path[:] = {where!r}; from hatchling.cli import hatchling; hatchling()"
+    chosen = [word for target in targets for word in ("-t", target)]
+    run(sys.executable, "-c", code, "build", "-d", folder, *chosen, folder=tree)
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Built:
+    folder = tmp_path_factory.mktemp("dist")
+    build(ROOT, folder, "wheel", "sdist")
+    return Built(folder / f"{NAME}-py3-none-any.whl", folder / f"{NAME}.tar.gz")
+
+
+@pytest.fixture(scope="module")
+def unpacked(built: Built, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("source")
+    with tarfile.open(built.source) as archive:
+        archive.extractall(folder, filter="data")
+    return folder / NAME
+
+
+def sources(folder: Path) -> set[str]:
+    """The files of a folder that are nobody's cache: not below __pycache__, .ruff_cache and their like."""
+    found = {path.relative_to(folder) for path in folder.rglob("*") if path.is_file()}
+    return {path.as_posix() for path in found if not any("cache" in part and part[0] in "_." for part in path.parts)}
+
+
+def contents(wheel: Path) -> dict[str, bytes]:
+    with zipfile.ZipFile(wheel) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+def test_the_wheel_has_the_package_its_data_and_examples_and_nothing_else(built: Built) -> None:
+    package = {f"sagline/{name}" for name in sources(ROOT / "src" / "sagline")}
+    examples = {f"sagline/examples/{name}" for name in sources(ROOT / "examples")}
+    info = {f"{NAME}.dist-info/{name}" for name in INFO}
+    assert set(contents(built.wheel)) == package | examples | info
+    assert {"sagline/py.typed", "sagline/robot/presets/cogiro.yaml", "sagline/files/c/sagline.c"} < package
+
+
+def test_the_source_distribution_has_all_that_the_work_needs(unpacked: Path) -> None:
+    top = {path.name for path in unpacked.iterdir()}
+    folders = {"src", "tests", "docs", "examples", "benchmarks"}
+    files = {"CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "Makefile", "README.md", "mkdocs.yml"}
+    assert top == folders | files | {"pyproject.toml", "PKG-INFO", ".gitignore"}
+    for folder in sorted(folders):
+        assert sources(unpacked / folder) == sources(ROOT / folder), folder
+
+
+def test_the_wheel_of_the_source_distribution_is_the_same(built: Built, unpacked: Path, tmp_path: Path) -> None:
+    build(unpacked, tmp_path, "wheel")
+    assert contents(tmp_path / built.wheel.name) == contents(built.wheel)
+
+
+def metadata(wheel: Path) -> Message:
+    return email.message_from_bytes(contents(wheel)[f"{NAME}.dist-info/METADATA"])
+
+
+def test_what_an_index_would_show(built: Built) -> None:
+    told = metadata(built.wheel)
+    assert (told["Name"], told["Version"]) == ("sagline", PROJECT["version"])
+    assert (told["License-Expression"], told["License-File"]) == ("MIT", "LICENSE")
+    assert told["Requires-Python"] == PROJECT["requires-python"]
+    assert told["Description-Content-Type"] == "text/markdown"
+    assert told["Keywords"].split(",") == sorted(set(PROJECT["keywords"]))
+    assert told.get_all("Classifier") == PROJECT["classifiers"]  # hatchling refuses what is none
+    assert set(told.get_all("Provides-Extra", [])) == set(PROJECT["optional-dependencies"])
+    needed = [line for line in told.get_all("Requires-Dist", []) if "extra ==" not in line]
+    assert needed == PROJECT["dependencies"]
+
+
+def test_the_wheel_works_in_an_environment_of_its_own(built: Built, tmp_path: Path) -> None:
+    """Only sagline is installed; what it needs is lent by the environment of the tests, whose sagline is not seen."""
+    venv.create(tmp_path / "new", symlinks=True)
+    binaries = tmp_path / "new" / "bin"
+    offline = ("install", "--no-index", "--no-deps", "--quiet", "--no-compile", "--disable-pip-version-check")
+    run(sys.executable, "-m", "pip", "--python", binaries / "python", *offline, built.wheel, folder=tmp_path)
+    place = Path(sysconfig.get_path("purelib", vars={"base": str(tmp_path / "new")}))
+    (place / "lent.pth").write_text(f"{sysconfig.get_path('purelib')}\n")
+    assets = [name for name in sources(ROOT / "src" / "sagline") if not name.endswith(".py")]
+    assert {"report/page.css", "article/data/table2.csv", "files/scl/sagline_plc.scl", "py.typed"} < set(assets)
+    # no kernel is asked for: all would be compiled anew, for this place
+    count, version, file = run(binaries / "python", "-W", "error", "-c", USED, *assets, folder=tmp_path).split()
+    assert (int(count), version) == (16, PROJECT["version"])
+    assert Path(file).is_relative_to(place)
+    listed = run(binaries / "sagline", "robots", folder=tmp_path)
+    assert "cogiro" in listed
+    run(binaries / "sagline", "examples", "--out", "mine", folder=tmp_path)
+    assert (tmp_path / "mine" / "own_robot.yaml").is_file()
+
+
+def test_nothing_but_what_is_made_for_an_extra_needs_one() -> None:
+    """Every module loads while the packages of all extras are hidden, but for the viewer and the wires to PLCs."""
+    code = f"""
+import importlib, pkgutil, sys
+class Hidden:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in {EXTRA_PACKAGES!r}:
+            raise ModuleNotFoundError(name=name)
+sys.meta_path.insert(0, Hidden())
+import sagline
+for module in pkgutil.walk_packages(sagline.__path__, "sagline."):
+    if not module.name.startswith({MADE_FOR_EXTRAS!r}) and not module.name.endswith("__main__"):
+        try:
+            importlib.import_module(module.name)
+        except ModuleNotFoundError as error:
+            print(module.name, "needs", error.name)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == ""
+
+
+@pytest.mark.soak
+def test_the_wheel_works_with_what_it_asks_for_alone(built: Built, tmp_path: Path) -> None:
+    """From an index, as a user installs it; the kernels compile anew."""
+    venv.create(tmp_path / "new", symlinks=True, with_pip=True)
+    binaries = tmp_path / "new" / "bin"
+    run(binaries / "python", "-m", "pip", "install", "--quiet", built.wheel, folder=tmp_path)
+    run(binaries / "sagline", "examples", "--out", "mine", folder=tmp_path)
+    told = run(binaries / "sagline", "track", "cogiro", "mine/own_path.yaml", "--out", "made", folder=tmp_path)
+    assert "cogiro" in told
+    assert (tmp_path / "made").is_dir()

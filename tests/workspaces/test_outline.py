@@ -1,0 +1,106 @@
+"""Outlines: their vertices are on the boundary by margins worked out another way, and what they hold can be held."""
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.arrays import Array, locked
+from sagline.tension.minimum_norm import MinimumNorm
+from sagline.workspaces.criteria.margin import LeastMargin
+from sagline.workspaces.levels import Levels
+from sagline.workspaces.orientations import Orientations
+from sagline.workspaces.outline import Outline, outline
+from sagline.workspaces.region import Region, region_of
+from sagline.workspaces.surface import Surface
+from sagline.workspaces.wrench_sets import NO_LOAD, WrenchSet
+from tests.workspaces.all_facets import all_facets, mean_arm, no_load, pulls_on_a_grid
+
+ROBOTS = ("cogiro", "falcon-7", "fast")
+SEEN = 5e-3  # of a cell of the grid: what a vertex may be beside the boundary
+
+
+def made(robot: sl.Robot, cells: int, wrenches: WrenchSet = NO_LOAD) -> tuple[Outline, Region]:
+    region = region_of(robot, None, cells)
+    return outline_of(robot, wrenches, region), region
+
+
+def outline_of(robot: sl.Robot, wrenches: WrenchSet, region: Region) -> Outline:
+    turned, margin = Orientations(np.eye(3)), (LeastMargin(),)
+    return outline(Levels(robot, wrenches, turned, margin, sl.Catenary(), MinimumNorm(), None, None), region)
+
+
+def slowly(robot: sl.Robot, place: Array) -> float:
+    """The margin at a position [N], over normals by singular values, pulls by trying."""
+    pose = sl.Pose(place, np.eye(3))
+    return all_facets(robot, pose, pulls_on_a_grid(robot, pose, sl.Catenary()), no_load, mean_arm(robot)).value
+
+
+def turns_around(surface: Surface, places: Array) -> Array:
+    """How many times a surface winds around positions: van Oosterom & Strackee 1983."""
+    found = np.empty(len(places))
+    for k, place in enumerate(places):
+        a, b, c = (surface.vertices[surface.faces[:, i]] - place for i in range(3))
+        x, y, z = (np.linalg.norm(one, axis=1) for one in (a, b, c))
+        dots = (np.einsum("fi,fi->f", *pair) for pair in ((a, b), (b, c), (c, a)))
+        ab, bc, ca = dots
+        volume = np.einsum("fi,fi->f", a, np.cross(b, c))
+        found[k] = 2.0 * np.arctan2(volume, x * y * z + ab * z + bc * x + ca * y).sum() / (4.0 * np.pi)
+    return found
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_vertices_are_where_the_margin_is_zero_by_all_facets(name: str) -> None:
+    robot = sl.load_robot(name)
+    found, _ = made(robot, 20)
+    wall = np.setdiff1d(found.surface.faces[~found.on_box], found.surface.faces[found.on_box])
+    chosen = np.random.default_rng(16).choice(wall, 12, replace=False)
+    step = found.grid.step.max()
+    for k in chosen.tolist():
+        place = found.surface.vertices[k]
+        here = slowly(robot, place)
+        assert here == pytest.approx(float(found.margin[k]), abs=1e-9 * float(robot.tension_max.max()))
+        around = [slowly(robot, place + SEEN * step * way) for way in np.vstack((np.eye(3), -np.eye(3)))]
+        assert min(around) < 0.0 < max(around)  # the boundary is nearer than that
+    assert found.cable.max() < robot.cable_count
+
+
+@pytest.mark.parametrize(
+    ("name", "count"),
+    [("cogiro", 150), *(pytest.param(name, 600, marks=pytest.mark.soak) for name in sl.robot_names())],
+)
+def test_what_it_holds_can_be_held_and_nothing_else(name: str, count: int) -> None:
+    robot = sl.load_robot(name)
+    found, region = made(robot, 30)
+    places = np.random.default_rng(17).uniform(region.low, region.high, (count, 3))
+    away = np.linalg.norm(places[:, None] - found.surface.vertices, axis=2).min(axis=1)
+    clear = places[away > found.grid.step.max()]
+    assert len(clear) > 0.5 * count
+    turns = turns_around(found.surface, clear)
+    np.testing.assert_allclose(turns, np.rint(turns), atol=1e-6)  # closed
+    status = sl.margin(robot, sl.Pose(clear, np.stack([np.eye(3)] * len(clear)))).status
+    sure = status != sl.MarginStatus.OPEN
+    np.testing.assert_array_equal((turns > 0.5)[sure], (status == sl.MarginStatus.FEASIBLE)[sure])
+    there = status != sl.MarginStatus.NO_CHORD  # elsewhere nothing can be asked
+    plan = sl.inverse(robot, sl.Pose(clear[there], np.stack([np.eye(3)] * np.count_nonzero(there))))
+    assert np.mean(plan.feasible != (turns > 0.5)[there]) < 0.01  # what the cables' sag leaves open
+
+
+def test_it_holds_and_is_limited_as_the_workspace_is() -> None:
+    robot, loads = sl.load_robot("article-suspended"), sl.WrenchBox(force=30.0)
+    found, region = made(robot, 16, loads)
+    space = sl.workspace(robot, wrenches=loads, cells=16, refine=False)
+    assert found.volume == pytest.approx(space.volume, rel=0.03)  # without what bulges
+    assert found.parts == space.components.count
+    assert found.open_faces == space.open_faces
+    shares = {limit.cable: limit.share for limit in space.limits}
+    assert found.shares == pytest.approx(shares, abs=0.01)
+    assert list(found.shares.values()) == sorted(found.shares.values(), reverse=True)
+    smaller = region._replace(low=locked(region.low + 0.5))
+    assert "z low" not in outline_of(robot, loads, smaller).open_faces  # a face of its own box is none of the robot's
+
+
+def test_an_empty_one_has_no_faces() -> None:
+    found, _ = made(sl.load_robot("cogiro"), 6, sl.WrenchBox(force=1e6))
+    assert found.surface.faces.shape == (0, 3)
+    assert found.shares == {}
+    assert (found.volume, found.parts, found.open_faces) == (0.0, 0, ())
