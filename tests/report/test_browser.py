@@ -1,8 +1,6 @@
 """The report in headless Chromium: read in the light and in the dark, on a phone, on a desk and on paper."""
 
-import os
 import re
-import shutil
 import zlib
 from collections.abc import Iterator
 from io import BytesIO
@@ -12,15 +10,15 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from PIL import Image
-from playwright.sync_api import Browser, Locator, Page, sync_playwright
+from playwright.sync_api import Browser, Locator, Page
 
 from sagline.report.article import ArticleReport
+from tests.chromium import NEEDED, launched
 
-CHROMIUM = shutil.which("chromium")
-FLAGS = "--headless --no-sandbox --disable-quic --no-first-run --disable-background-networking --disable-gpu"
+FLAGS = "--disable-quic --disable-gpu"
 WIDTHS, THEMES = (390, 768, 1440), ("light", "dark")
 
-pytestmark = pytest.mark.skipif(CHROMIUM is None and not os.environ.get("CI"), reason="Chromium is not installed")
+pytestmark = NEEDED
 
 # color and ground of every text outside drawings, and of every drawing against its card
 CONTRASTS = """() => {
@@ -51,11 +49,7 @@ CONTRASTS = """() => {
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    assert CHROMIUM is not None, "install Debian's chromium: apt-get install chromium"
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS.split())
-        yield chromium
-        chromium.close()
+    yield from launched(FLAGS)
 
 
 def opened(browser: Browser, report: ArticleReport, width: int, theme: str, height: int = 900) -> Page:

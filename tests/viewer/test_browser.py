@@ -1,43 +1,32 @@
 """The page in headless Chromium: it loads, a slider changes it, a run plays, and the console does not complain."""
 
-import os
-import re
-import shutil
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from io import BytesIO
 from pathlib import Path as FilePath
 from typing import Literal
 
 import numpy as np
 import pytest
 import trimesh
-from PIL import Image, ImageSequence
-from playwright.sync_api import Browser, ConsoleMessage, Error, Page, sync_playwright
+from playwright.sync_api import Browser, ConsoleMessage, Error, Page
 
 import sagline as sl
-from sagline.viewer import film
 from sagline.viewer.run import Run
 from sagline.viewer.server import started, stop
 from sagline.viewer.viewer import Viewer
+from tests.calibration.made_up import made_up
+from tests.chromium import NEEDED, launched
 
-CHROMIUM = shutil.which("chromium")
 FLAGS = (
-    "--headless --no-sandbox --disable-quic --no-first-run --disable-background-networking --disable-component-update "
-    "--disable-sync --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader --disable-gpu-rasterization"
+    "--disable-quic --disable-component-update --disable-sync --use-gl=angle --use-angle=swiftshader "
+    "--enable-unsafe-swiftshader --disable-gpu-rasterization"
 )
 CONTRAST = FilePath(__file__).with_name("contrast.js").read_text()
 BACKGROUND = "getComputedStyle(document.querySelector('div:has(> div > [data-dock-root])')).backgroundColor"
 OVERFLOWING = """() => [...document.querySelectorAll(".sagline, .sagline td, .mantine-NumberInput-input")]
     .filter((each) => each.scrollWidth > each.clientWidth + 1).map((each) => each.outerHTML.slice(0, 200))"""
-KEEP_NOTES = """() => {
-    window.notes = new Set()
-    new MutationObserver(() => {
-        for (const [note] of document.body.innerText.matchAll(/Picture \\d of \\d/g)) window.notes.add(note)
-    }).observe(document.body, { subtree: true, childList: true, characterData: true })
-}"""
 # ten pictures a second will do: without a graphics card each is work for all cores
 FEWER_PICTURES = """(() => {
     window.requestAnimationFrame = (draw) => setTimeout(() => draw(performance.now()), 100)
@@ -45,16 +34,12 @@ FEWER_PICTURES = """(() => {
 })()"""
 PATIENCE = 240.0  # s: the picture is computed without a graphics card
 
-pytestmark = pytest.mark.skipif(CHROMIUM is None and not os.environ.get("CI"), reason="Chromium is not installed")
+pytestmark = NEEDED
 
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    assert CHROMIUM is not None, "install Debian's chromium: apt-get install chromium"
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS.split())
-        yield chromium
-        chromium.close()
+    yield from launched(FLAGS)
 
 
 @contextmanager
@@ -66,10 +51,11 @@ def opened(
     width: int = 1000,
     theme: Literal["light", "dark"] = "light",
     complains: bool = False,
+    found: sl.Calibration | None = None,
 ) -> Iterator[tuple[Page, Viewer]]:
     """A page on a viewer; whatever the console complains of fails the test, unless it has reason to."""
     server = started(port=0, title=robot.name)
-    viewer = Viewer(server, robot, run)
+    viewer = Viewer(server, robot, run, found=found)
     thread = threading.Thread(target=viewer.serve)
     thread.start()
     complaints: list[str] = []
@@ -131,7 +117,7 @@ def test_a_run_plays_in_the_page(browser: Browser) -> None:
         page.get_by_role("button", name="Play").wait_for()
 
 
-def test_scene_and_picture_can_be_taken_away(browser: Browser, tmp_path: FilePath) -> None:
+def test_the_scene_can_be_taken_away(browser: Browser, tmp_path: FilePath) -> None:
     with opened(browser, sl.load_robot("cogiro")) as (page, _):
         page.get_by_text("Take away").click()
         with page.expect_download() as download:
@@ -140,36 +126,6 @@ def test_scene_and_picture_can_be_taken_away(browser: Browser, tmp_path: FilePat
         scene = trimesh.load(tmp_path / "scene.glb")
         assert isinstance(scene, trimesh.Scene)
         assert len(scene.geometry) == 11
-        with page.expect_download() as download:
-            page.get_by_role("button", name="Picture (PNG)").click()
-        download.value.save_as(tmp_path / "picture.png")
-        with Image.open(tmp_path / "picture.png") as picture:
-            assert np.asarray(picture.convert("L")).std() > 2.0  # not blank
-
-
-def test_a_film_shows_the_run_and_leaves_the_scene_as_it_was(
-    browser: Browser, tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(film, "FRAMES", 3)
-    robot = sl.load_robot("article-suspended")
-    ends = sl.Pose(np.array([[-4.0, 0.0, 1.5], [4.0, 0.0, 1.5]]), np.stack([np.eye(3)] * 2))
-    run = Run.of(sl.inverse(robot, sl.quintic_path(ends, durations=[2.0], rate=20)))
-    with opened(browser, robot, run) as (page, viewer):
-        page.get_by_text("Take away").click()
-        page.evaluate(KEEP_NOTES)  # a fast machine shows one for less time than it takes to ask
-        with page.expect_download(timeout=1e3 * PATIENCE) as download:
-            page.get_by_role("button", name="Film of the run (GIF)").click()
-            page.wait_for_function("window.notes.size > 0", timeout=1e3 * PATIENCE)
-        download.value.save_as(tmp_path / "film.gif")
-        assert page.get_by_label("Follow the run").is_checked()
-        page.get_by_text(re.compile(r"Picture \d of 3")).wait_for(state="detached")
-        with Image.open(tmp_path / "film.gif") as gif:
-            pictures = [np.asarray(frame.convert("RGB"), dtype=float) for frame in ImageSequence.Iterator(gif)]
-        assert len(pictures) == 3
-        cables = [np.argwhere((p[..., 0] > 150.0) & (p[..., 1] < 120.0) & (p[..., 2] > 120.0)) for p in pictures]
-        across = np.array([where[:, 1].mean() for where in cables]) / pictures[0].shape[1]
-        assert np.all(np.diff(across) > 0.015)  # they lead to the platform, which goes to the right
-        assert not next(iter(viewer._server.get_clients().values())).scene._handle_from_node_name
 
 
 def least_contrast(page: Page) -> float:
@@ -270,7 +226,7 @@ def test_nothing_overflows_its_panel(browser: Browser, name: str) -> None:
 def test_a_frequency_that_is_clicked_moves(browser: Browser) -> None:
     with opened(browser, sl.load_robot("article-suspended")) as (page, viewer):
         page.get_by_role("tab", name="Modes").click()
-        page.locator("tr[data-mode='2']").click()
+        page.locator("tr[data-send='mode'][data-value='2']").click()
         await_that(page, lambda: viewer._modes.moving)
         page.get_by_text("Hz, with cable mass").wait_for()
         swing = viewer._modes.swing
@@ -282,20 +238,23 @@ def test_a_frequency_that_is_clicked_moves(browser: Browser) -> None:
         before = page.locator("canvas[data-engine]").screenshot()
         await_that(page, lambda: page.locator("canvas[data-engine]").screenshot() != before)  # without anybody's doing
         assert page.locator("tr.chosen").count() == 1
-        mark = page.locator("svg.response g[data-mode='1'] rect")
+        mark = page.locator("svg.response g[data-send='mode'][data-value='1'] rect")
         mark.click()
         await_that(page, lambda: viewer._modes.swing is not None and viewer._modes.swing.mode.name == "1")
-        page.locator("tr[data-mode='massless 1']").click()
+        page.locator("tr[data-send='mode'][data-value='massless 1']").hover()
+        page.mouse.down()
+        page.evaluate("(() => { const list = document.querySelector('.modes'); list.innerHTML += ''; })()")
+        page.mouse.up()  # on what was written anew in between
         page.get_by_text(f"{found.massless_frequency[0]:.3f} Hz, massless").wait_for()
         assert page.evaluate(OVERFLOWING) == []
-        page.locator("tr[data-mode='massless 1']").click()  # once more: at rest
+        page.locator("tr[data-send='mode'][data-value='massless 1']").click()  # once more: at rest
         await_that(page, lambda: not viewer._modes.moving)
 
 
 def test_the_modes_can_be_read_in_the_light_and_in_the_dark_on_a_small_screen(browser: Browser) -> None:
     with opened(browser, sl.load_robot("cogiro")) as (page, _):
         page.get_by_role("tab", name="Modes").click()
-        page.locator("tr[data-mode='1']").click()
+        page.locator("tr[data-send='mode'][data-value='1']").click()
         page.get_by_text("Hz, with cable mass").wait_for()
         least_contrast(page)
         assert page.evaluate(OVERFLOWING) == []
@@ -314,28 +273,29 @@ def test_a_cable_is_cut_and_the_break_is_played(browser: Browser) -> None:
         page.get_by_text("Cut a cable").click()
         page.get_by_role("button", name="Cut", exact=True).click()
         page.get_by_text("Simulated", exact=True).wait_for()
-        page.get_by_text("break of cable 0 at 0.250 s").wait_for()
-        assert viewer._played is not None
-        await_that(page, lambda: viewer._clock.time == viewer._played.duration)  # type: ignore[union-attr]
+        page.get_by_text("break of cable 0 at 0.000 s").wait_for()
+        assert viewer._player.played is not None
+        await_that(page, lambda: viewer._player.clock.time == viewer._player.played.duration)  # type: ignore[union-attr]
         page.get_by_role("button", name="Play").wait_for()
         least_contrast(page)
         assert page.evaluate(OVERFLOWING) == []
 
 
-@pytest.mark.parametrize(("width", "theme"), [(1400, "light"), pytest.param(420, "dark", marks=pytest.mark.soak)])
-def test_hull_slice_and_ways_are_drawn_and_told(browser: Browser, width: int, theme: Literal["light", "dark"]) -> None:
-    with opened(browser, sl.load_robot("article-suspended"), width=width, theme=theme) as (page, viewer):
-        page.get_by_role("tab", name="Workspace").click()
-        page.get_by_text("Nothing is computed until something is asked for.").wait_for()
-        before = Image.open(BytesIO(page.screenshot()))
-        for name in ("Hull", "Slice", "Where can I go"):
-            page.get_by_label(name, exact=True).click()
-        page.get_by_text("m³").wait_for()
-        page.get_by_text("Boundary", exact=True).wait_for()
-        page.get_by_text("Margin [N]").wait_for()
-        await_that(page, lambda: viewer._space._drawn is not None)
-        page.wait_for_timeout(1500)
-        after = Image.open(BytesIO(page.screenshot()))
-        scene = np.array(after.convert("RGB"), dtype=int) - np.array(before.convert("RGB"), dtype=int)
-        assert np.mean(np.abs(scene[:350]).max(axis=2) > 8) > 0.04  # of the upper half: what is drawn is seen
+@pytest.mark.soak
+@pytest.mark.parametrize(("theme", "width"), [("dark", 390), ("light", 1000), ("light", 390), ("dark", 1000)])
+def test_a_calibration_can_be_read_and_its_rows_be_clicked(
+    browser: Browser, theme: Literal["light", "dark"], width: int
+) -> None:
+    found = made_up(count=20)
+    with opened(browser, found.robot, width=width, theme=theme, found=found) as (page, viewer):
+        page.get_by_role("tab", name="Calibration").click()
+        page.locator("button[data-send='row'][data-value='17']").click()
+        page.get_by_text("Row 17", exact=True).wait_for()
+        await_that(
+            page,
+            lambda: (
+                viewer.view is not None and np.allclose(viewer.view.snapshot.pose.position, found.poses.position[17])
+            ),
+        )
+        least_contrast(page)
         assert page.evaluate(OVERFLOWING) == []

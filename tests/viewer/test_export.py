@@ -5,10 +5,9 @@ from io import BytesIO
 import numpy as np
 import pytest
 import trimesh
-from PIL import Image
 
 import sagline as sl
-from sagline.viewer.export import picture_as_png, pictures_as_gif, scene_as_glb
+from sagline.viewer.export import scene_as_glb
 from sagline.viewer.settings import Settings
 from sagline.viewer.snapshot import taken_at
 from sagline.viewer.tension_scale import TensionScale
@@ -28,19 +27,6 @@ def test_glb_holds_the_scene_in_meters_with_y_up() -> None:
     place, _ = scene.graph["platform"]
     corners = trimesh.transform_points(scene.geometry["platform"].vertices, place)
     assert corners.mean(axis=0) == pytest.approx([1.0, 2.0, -0.5], abs=1e-5)
-
-
-def test_pictures_become_png_and_gif() -> None:
-    clear = np.zeros((20, 30, 4), dtype=np.uint8)
-    clear[5:10, 5:10] = (255, 0, 0, 255)
-    with Image.open(BytesIO(picture_as_png(clear))) as image:
-        assert image.size == (30, 20)
-        assert image.getpixel((0, 0)) == (255, 255, 255)
-        assert image.getpixel((7, 7)) == (255, 0, 0)
-    frames = [np.full((20, 30, 3), shade, dtype=np.uint8) for shade in (0, 120, 240)]
-    with Image.open(BytesIO(pictures_as_gif(frames, 0.1))) as film:
-        assert getattr(film, "n_frames", 1) == 3
-        assert film.info["duration"] == 100
 
 
 def test_glb_holds_pulleys_as_they_have_turned_and_what_is_behind() -> None:

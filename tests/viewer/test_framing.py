@@ -1,6 +1,7 @@
 """Where the camera stands."""
 
 import time
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -65,5 +66,45 @@ def test_the_box_stays_in_the_picture_until_someone_looks_from_elsewhere() -> No
             look([np.nan] * 3, 400)  # nonsense harms nobody
             look(narrow, 401)
             await_that(lambda: at(camera, fitted(low, high, 401 / 600, 1.0)[0]))
+    finally:
+        stop(server)
+
+
+def test_a_camera_that_a_link_has_put_is_let_be_whatever_its_page_still_tells() -> None:
+    low, high = np.zeros(3), np.ones(3)
+    server = started(port=0)
+    try:
+        framing = Framing(server, low, high)
+        with Client(server.get_port()) as client:
+            await_that(lambda: any(framing._places.values()))
+            (handle,) = server.get_clients().values()
+            own = np.array(framing._places[handle.client_id][-1])
+            framing.look(handle.client_id, np.array([3.0, 4.0, 5.0, 0.5, 0.5, 0.5]))
+            assert at(handle.camera, [3.0, 4.0, 5.0])
+            client.look(own, [0.5, 0.5, 0.5], width=300)  # sent before it has heard of that
+            await_that(lambda: handle.camera.image_width == 300)
+            aimed = [m["position"] for m in client.heard(0.5) if m["type"] == "SetCameraPositionMessage"]
+            fit = fitted(low, high, 300 / 600, 1.0)[0]
+            assert aimed
+            assert not any(np.allclose(place, fit) for place in aimed)
+    finally:
+        stop(server)
+
+
+def test_a_camera_that_is_just_being_put_somewhere_has_not_been_moved_by_hand() -> None:
+    server = started(port=0)
+    try:
+        framing = Framing(server, np.zeros(3), np.ones(3))
+        with Client(server.get_port()) as client, ThreadPoolExecutor(1) as other:
+            await_that(lambda: any(framing._places.values()))
+            (handle,) = server.get_clients().values()
+            client.look([9.0, 8.0, 7.0], [0.5, 0.5, 0.5], width=300)
+            await_that(lambda: framing.moved(handle.client_id) is not None)
+            with framing._lock:  # as while the box is fitted
+                asked = other.submit(framing.moved, handle.client_id)
+                time.sleep(0.2)
+                handle.camera.position = np.array([3.0, 4.0, 5.0])
+                framing._places[handle.client_id].append(np.array([3.0, 4.0, 5.0]))
+            assert asked.result() is None
     finally:
         stop(server)

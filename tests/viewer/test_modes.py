@@ -10,35 +10,28 @@ import numpy as np
 import pytest
 
 import sagline as sl
+from sagline.dynamics.mode_list import listed_modes
 from sagline.dynamics.vibrating import vibration
 from sagline.errors import InvalidValueError
-from sagline.viewer import dynamics, lines, moment_words
+from sagline.viewer import dynamics, lines, moment_words, readout
 from sagline.viewer.aside import Aside
 from sagline.viewer.playback import Playback
-from sagline.viewer.server import Server, started, stop
+from sagline.viewer.settings import Settings
+from sagline.viewer.snapshot import taken_at
 from sagline.viewer.swing import PERIOD
 from sagline.viewer.tension_scale import TensionScale
-from sagline.viewer.viewer import Viewer
+from sagline.viewer.viewer import Viewer, home_pose
 from tests.effort import best_rate
 from tests.plot import made
-from tests.viewer.client import PATIENCE, Client, await_that
-from tests.viewer.test_viewer import ROBOT, Shown, handle
+from tests.viewer.client import Client, await_that
+from tests.viewer.test_viewer import ROBOT, Shown, handle, shown
 
 POSE = sl.Pose([3.0, 2.0, 1.5], np.eye(3))
 
 
 @pytest.fixture(scope="module")
 def page() -> Iterator[Shown]:
-    server: Server = started(port=0)
-    viewer = Viewer(server, ROBOT, pose=POSE, mode="2")
-    thread = threading.Thread(target=viewer.serve)
-    thread.start()
-    await_that(lambda: viewer.view is not None)
-    yield Shown(server, viewer, thread)
-    viewer.stop()
-    thread.join(timeout=PATIENCE)
-    stop(server)
-    assert not thread.is_alive()
+    yield from shown(lambda server: Viewer(server, ROBOT, pose=POSE, mode="2"))
 
 
 def heard_for(client: Client, seconds: float) -> list[Any]:
@@ -87,12 +80,12 @@ def test_the_list_says_what_every_frequency_is(page: Shown) -> None:
         await_that(lambda: page.viewer._modes.moving)
         await_that(lambda: page.viewer._modes._panel._list.content.count("chosen") == 1)
         assert "massless</b>" in page.viewer._modes._panel._told.content
-        rows = re.findall(r"<tr data-mode.*?</tr>", page.viewer._modes._panel._list.content)
+        rows = re.findall(r"<tr data-send.*?</tr>", page.viewer._modes._panel._list.content)
         found = vibration(page.viewer._modes.swing.state, up_to=20.0)  # type: ignore[union-attr]
         assert len(rows) == found.frequency.size + 6
-        assert all(("with cable mass" in row) != ("massless" in re.sub('data-mode="[^"]*"', "", row)) for row in rows)
-        await_that(lambda: "data-mode" in page.viewer._modes._panel._response.content)
-        marks = re.findall(r'data-mode="(\d+)"', page.viewer._modes._panel._response.content)
+        assert all(("with cable mass" in row) != ("massless" in re.sub('data-value="[^"]*"', "", row)) for row in rows)
+        await_that(lambda: 'data-send="mode"' in page.viewer._modes._panel._response.content)
+        marks = re.findall(r'data-send="mode" data-value="(\d+)"', page.viewer._modes._panel._response.content)
         assert marks == [str(k + 1) for k in range(found.frequency.size)]
         client.set(handle(page, "Mode")._impl.uuid, "<b>nothing</b>")
         await_that(lambda: not page.viewer._modes.moving)
@@ -121,22 +114,22 @@ def test_while_the_platform_is_dragged_nothing_swings_and_then_its_new_modes_do(
 def test_a_cut_cable_is_simulated_and_played_as_a_run_is(page: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[Any] = []
 
-    def cut(state: sl.Equilibrium, cable: int, cable_mass: str) -> sl.Simulation:
+    def cut(state: sl.Equilibrium, cable: int, cable_mass: str) -> Iterator[sl.Simulation]:
         asked.append((state.pose.position.tolist(), cable, cable_mass))
-        return made.simulation()
+        yield made.simulation()
 
     monkeypatch.setattr(dynamics, "cut", cut)
     with Client(page.port) as client:
         client.drag([1.0, 0.0, 2.0])
         await_that(lambda: page.position[0] == 1.0)
         client.set(handle(page, "Cable to cut")._impl.uuid, "3")
-        client.set(handle(page, "Cut")._impl.uuid, True)
-        await_that(lambda: page.viewer._played is not None)
+        client.set(page.viewer._cuts._panel._button._impl.uuid, True)
+        await_that(lambda: page.viewer._player.played is not None)
         assert asked == [([1.0, 0.0, 2.0], 3, "none")]
         await_that(lambda: "break of cable 3 at 1.000 s" in page.viewer._panel._verdict.content)
         assert "massless cables" in page.viewer._panel._verdict.content
         assert not page.viewer._modes.moving
-        await_that(lambda: page.viewer._clock.time == 2.0)
+        await_that(lambda: page.viewer._player.clock.time == 2.0)
         client.grab()
         client.drag([0.5, 0.0, 2.0])
         await_that(lambda: page.position[0] == 0.5)
@@ -191,3 +184,18 @@ def test_of_work_aside_the_latest_alone_counts() -> None:
     await_that(lambda: bool(tasks))
     with pytest.raises(ZeroDivisionError):  # a mistake is none of the user's
         tasks.pop()()
+
+
+@pytest.mark.parametrize("name", ["falcon-7", "cogiro", "fast"])
+def test_every_natural_frequency_among_the_readings_is_pressed_to_see_its_mode(name: str) -> None:
+    robot = sl.load_robot(name)
+    seen = taken_at(robot, home_pose(robot), Settings(robot.mass), None)
+    assert seen.plan is not None
+    frequency = sl.modes(seen.plan.state).frequency
+    text = readout.numbers(seen, TensionScale.of(robot), np.append(frequency, [0.0, np.nan]))
+    pressed = re.findall(r'<button class="shake" data-send="mode" data-value="([^"]*)"[^>]*>([^<]*)</button>', text)
+    listed = {mode.name: mode.frequency for mode in listed_modes(vibration(seen.plan.state, up_to=1.0))}
+    assert len(pressed) == len(frequency) == 6
+    for what, told in pressed:
+        assert told == f"{listed[what]:.2f}"
+    assert f"{frequency[-1]:.2f}, 0.00, – Hz" in re.sub("<[^>]*>", "", text)

@@ -4,6 +4,8 @@ import logging
 import warnings
 
 from sagline.viewer.server import LOUD, started, stop
+from tests.viewer.client import await_that
+from tests.viewer.test_linking import a_page, asking, view
 
 
 def test_after_the_last_server_logging_and_warnings_are_as_before() -> None:
@@ -17,3 +19,10 @@ def test_after_the_last_server_logging_and_warnings_are_as_before() -> None:
     assert state() != before  # the second is still running
     stop(second)
     assert state() == before
+
+
+def test_a_platform_on_end_is_no_news_to_the_terminal() -> None:
+    with a_page() as page, asking(page) as here:
+        assert "refused" not in here.ask("pose", "0,0,2.6,20,90,0")
+        await_that(lambda: abs(view(page).snapshot.pose.matrix[2, 0]) > 0.999)
+        assert here.link().endswith("pose=0,0,2.6,20,90,0")

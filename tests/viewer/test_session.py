@@ -127,7 +127,7 @@ def test_the_page_shows_three_platforms_and_goes_on_with_the_log(tmp_path: Path,
     server = started(port=0)
     try:
         viewer = Viewer(server, ROBOT, session)
-        viewer._clock = viewer._clock.scrubbed(session.duration)
+        viewer._player.scrub_to(session.duration)
         viewer._update()
         assert viewer.view is not None
         assert isinstance(viewer.view.snapshot, SessionMoment)
@@ -143,8 +143,7 @@ def test_the_page_shows_three_platforms_and_goes_on_with_the_log(tmp_path: Path,
         viewer._work_off()
         viewer._update()
         assert viewer.view.snapshot.index == 200  # who looked at the end sees the new end
-        assert viewer._run_panel is not None
-        assert viewer._run_panel.time == pytest.approx(2.0)
+        assert viewer._player.clock.time == pytest.approx(2.0)
     finally:
         stop(server)
 
@@ -186,5 +185,5 @@ def test_before_the_place_is_known_the_platform_is_shown_in_the_middle(log: Path
     later[100:120] = [0.1, 0.2, 1.4]
     known = Session(**parts | {"position": later, "planned": unknown})
     assert np.array_equal(known.sight(1.5).pose.position, [0.1, 0.2, 1.4])  # the last that was known
-    assert known.figures()
+    assert known.track().spans == ()
     assert known.traces(50, 1.0)[1].shape == (50, 3)

@@ -4,19 +4,19 @@ import numpy as np
 import pytest
 
 from sagline.viewer.margin_scale import MarginScale
-from sagline.viewer.slice_picture import FINER, INSIDE_OPACITY, OUTSIDE_OPACITY, picture_of
+from sagline.viewer.slice_picture import APART, FINER, INSIDE_OPACITY, OUTSIDE_OPACITY, picture_of
 from sagline.viewer.wording import ForceUnit
 from sagline.workspaces.slice import Plane, slice_of
 from tests.viewer.analytic import PER_METER, RADIUS, WALL, ball
 
 LOW, HIGH = np.array([-2.0, -1.8, -1.9]), np.array([0.9, 2.0, 2.0])
-SCALE = MarginScale(25.0)
+SCALE, UNIT = MarginScale(25.0), ForceUnit("N", 1.0, ".1f")
 
 
 @pytest.mark.parametrize("normal", [0, 1, 2])
 def test_lines_are_where_the_margin_is_round(normal: int) -> None:
     cut = slice_of(ball, Plane(normal, 0.3), LOW, HIGH, (40, 40))
-    picture = picture_of(cut, SCALE)
+    picture = picture_of(cut, SCALE, UNIT)
     assert np.all(picture.boundary[..., normal] == 0.3)
     np.testing.assert_allclose(np.linalg.norm(picture.boundary, axis=-1), RADIUS, atol=5e-3)
     steps = PER_METER * (RADIUS - np.linalg.norm(picture.lines, axis=-1)) / SCALE.step
@@ -26,9 +26,20 @@ def test_lines_are_where_the_margin_is_round(normal: int) -> None:
     assert lengths.max() < 0.2  # nothing joins the end of a line to the begin of the next
 
 
+def test_each_line_says_its_margin_apart_from_the_others() -> None:
+    cut = slice_of(ball, Plane(2, 0.0), LOW, HIGH, (60, 60))
+    marks = picture_of(cut, SCALE, UNIT).marks
+    assert [mark.text for mark in marks] == ["0 N", "−25 N", "25 N", "50 N", "75 N"]
+    places = np.array([mark.place for mark in marks])
+    margins = ball(places).margin
+    np.testing.assert_allclose(margins, [float(mark.text[:-2].replace("−", "-")) for mark in marks], atol=1.0)
+    away = np.linalg.norm(places[:, None] - places, axis=2)[np.triu_indices(len(places), 1)]
+    assert away.min() >= APART * 3.8
+
+
 def test_each_pixel_has_the_color_of_its_margin() -> None:
     cut = slice_of(ball, Plane(2, 0.0), LOW, HIGH, (30, 30))
-    image = picture_of(cut, SCALE).image
+    image = picture_of(cut, SCALE, UNIT).image
     count = FINER * 29
     assert image.shape == (count, count, 4)
     x = LOW[0] + (np.arange(count) + 0.5) / count * (HIGH[0] - LOW[0])
@@ -43,13 +54,13 @@ def test_each_pixel_has_the_color_of_its_margin() -> None:
 def test_where_the_robot_is_singular_it_is_outside() -> None:
     cut = slice_of(ball, Plane(2, 0.0), LOW, np.array([1.9, 2.0, 2.0]), (60, 60))
     assert np.isinf(cut.margin).any()
-    picture = picture_of(cut, SCALE)
+    picture = picture_of(cut, SCALE, UNIT)
     assert np.isfinite(picture.boundary).all()
     assert picture.boundary[..., 0].max() == pytest.approx(WALL, abs=0.07)  # within a cell
 
 
 def test_a_slice_outside_has_no_boundary() -> None:
-    picture = picture_of(slice_of(ball, Plane(2, 1.8), LOW, HIGH, (10, 10)), SCALE)
+    picture = picture_of(slice_of(ball, Plane(2, 1.8), LOW, HIGH, (10, 10)), SCALE, UNIT)
     assert picture.boundary.shape == (0, 2, 3)
     assert np.all(picture.image[..., 3] == OUTSIDE_OPACITY)
 

@@ -10,43 +10,40 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.viewer import hull as hulls
-from sagline.viewer.hull import Asked, Hull, hull_of
-from sagline.viewer.margin_scale import MarginScale
+from sagline.errors import SaglineError
+from sagline.viewer.cable_colors import cable_color
+from sagline.viewer.hull import Asked, Hull
+from sagline.viewer.reading import Reading
 from sagline.viewer.server import Server, started, stop
 from sagline.viewer.space_show import SpaceShow, planes_of
-from sagline.viewer.viewer import Reading, Viewer
+from sagline.viewer.viewer import Viewer
 from tests.effort import best_rate
 from tests.kinematics.test_many_robots import planar
 from tests.viewer.client import PATIENCE, Client, await_that
-from tests.viewer.test_viewer import ROBOT, Shown, handle
+from tests.viewer.test_viewer import ROBOT, Shown, handle, shown
 
 POSE = sl.Pose([1.0, 0.5, 2.0], np.eye(3))
 LOADS = sl.WrenchBox(force=50.0)
 
 
-def ball(asked: Asked, told: Callable[[int, int], None]) -> Hull:
+def ball(asked: Asked, rough: bool, told: Callable[[int, int], None]) -> Hull:
     """A tetrahedron, at once; two of its corners are cable 1's."""
     told(1, 2)
     corners = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0], [0.0, 0.0, 2.0]])
     faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
-    return Hull(corners, faces, np.array([0.0, 0.0, 150.0, 150.0]), np.array([0, 1, 1, -1]), f"{asked.robot.mass:g} kg")
+    margin, cable = np.array([0.0, 0.0, 150.0, 150.0]), np.array([0, 1, 1, -1])
+    words = f"{asked.robot.mass:g} kg{', roughly' * rough}"
+    return Hull.of(corners, faces, margin, cable, np.zeros(4, dtype=bool), words)
 
 
 @pytest.fixture(scope="module")
 def page() -> Iterator[Shown]:
-    server: Server = started(port=0)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sagline.viewer.viewer.hull_of", ball)
-        viewer = Viewer(server, ROBOT, pose=POSE)
-    thread = threading.Thread(target=viewer.serve)
-    thread.start()
-    await_that(lambda: viewer.view is not None)
-    yield Shown(server, viewer, thread)
-    viewer.stop()
-    thread.join(timeout=PATIENCE)
-    stop(server)
-    assert not thread.is_alive()
+    def made(server: Server) -> Viewer:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("sagline.viewer.viewer.hull_of", ball)
+            return Viewer(server, ROBOT, pose=POSE)
+
+    yield from shown(made)
 
 
 def show_of(page: Shown) -> SpaceShow:
@@ -56,7 +53,7 @@ def show_of(page: Shown) -> SpaceShow:
 def choose(page: Shown, client: Client, **values: Any) -> None:
     """Set what has these names, and wait until it has been shown."""
     labels = {
-        "hull": "Hull", "by": "Hull colored by", "slice": "Slice", "plane": "Plane", "ways": "Where can I go",
+        "hull": "Region", "by": "Region colored by", "slice": "Slice", "plane": "Plane", "ways": "Where can I go",
         "force": "Force ± [N]", "moment": "Moment ± [N m]",
     }  # fmt: skip
     for name, value in values.items():
@@ -136,13 +133,14 @@ def test_ways_end_where_the_robot_can_no_more(page: Shown, client: Client) -> No
 def test_the_hull_comes_when_it_is_asked_for_and_is_colored_as_told(page: Shown, client: Client) -> None:
     show = show_of(page)
     choose(page, client, hull=True)
-    await_that(lambda: "50 kg" in show._panel._told.content)  # said once the hull is drawn
-    assert len(show._stage._meshes) == 2
-    assert [name.text for name in show._stage._hull_names] == ["cable 0", "cable 1"]
+    await_that(lambda: "50 kg<" in show._panel._told.content)  # said once the hull in full is drawn
+    drawn_hull = show._stage._hull
+    assert len(drawn_hull.meshes) == 2
+    assert [mesh.color for mesh in drawn_hull.meshes] == [cable_color(0), cable_color(1)]
     choose(page, client, by="margin")
-    await_that(lambda: len(show._stage._hull_names) == 0 and len(show._stage._meshes) == 2)
+    await_that(lambda: drawn_hull.meshes[0].color == tuple(show._scale.colors(np.array(0.0)).tolist()))
     choose(page, client, slice=True)
-    assert {mesh.side for mesh in show._stage._meshes} == {"back"}
+    assert {mesh.side for mesh in drawn_hull.meshes} == {"back"}
     drawn = show._drawn
     client.drag([2.0, 0.5, 2.0])
     await_that(lambda: page.position[0] == 2.0)
@@ -151,7 +149,81 @@ def test_the_hull_comes_when_it_is_asked_for_and_is_colored_as_told(page: Shown,
     client.drag([2.0, 0.5, 2.0], [np.cos(half), 0.0, 0.0, np.sin(half)])
     await_that(lambda: show._drawn not in (drawn, None))  # how it is turned does
     choose(page, client, hull=False, by="limiting cable")
-    assert show._stage._meshes == []
+    assert drawn_hull.meshes == []
+
+
+def test_a_hull_follows_a_slider_and_the_one_before_stays_until_it_is_there(
+    page: Shown, client: Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    show, going, ended = show_of(page), threading.Event(), list[str]()
+
+    def slow(asked: Asked, rough: bool, told: Callable[[int, int], None]) -> Hull:
+        if asked.robot.mass == 60.0 and not rough:
+            assert going.wait(PATIENCE)
+            try:
+                told(1, 2)
+            except SaglineError:
+                ended.append("given up")
+                raise
+        return ball(asked, rough, told)
+
+    monkeypatch.setattr(show, "_make", slow)
+    mass = handle(page, "Platform + load [kg]")._impl.uuid
+    choose(page, client, hull=True)
+    await_that(lambda: "50 kg<" in show._panel._told.content)
+    client.set(mass, 60.0)
+    await_that(lambda: "60 kg, roughly" in show._panel._told.content)  # nothing was asked for again
+    assert len(show._stage._hull.meshes) == 2
+    client.set(mass, 70.0)
+    await_that(lambda: page.viewer.view is not None and page.viewer.view.snapshot.robot.mass == 70.0)
+    assert "60 kg, roughly" in show._panel._told.content
+    going.set()
+    await_that(lambda: "70 kg<" in show._panel._told.content)
+    assert ended == ["given up"]  # what nobody waits for any more is not worked out
+    client.set(mass, 50.0)
+    await_that(lambda: "50 kg<" in show._panel._told.content)
+
+
+def test_a_wall_lights_up_near_the_platform_and_says_what_is_left(page: Shown, client: Client) -> None:
+    show = show_of(page)
+    choose(page, client, hull=True, force=50.0)
+    await_that(lambda: show._made is not None and not show._made.rough and show._made.key == show._key)
+    for place in ([1.0, 0.5, 2.0], [0.3, 0.3, 1.4]):  # the ball's tetrahedron ends at z = 1
+        client.drag(place)
+        await_that(partial(lambda where: np.array_equal(page.position, where), place))
+        found = sl.margin(ROBOT, sl.Pose(place, np.eye(3)), LOADS)
+        text = f"{found.value:.1f} N left, cable {found.limiting_cable}"
+        await_that(partial(lambda said: show._stage._left.text == said, text))
+        assert text in show._panel._left.content
+    assert {mesh.color for mesh in show._stage._wall.meshes} <= {cable_color(0), cable_color(1)}
+    assert len(show._stage._wall.meshes) > 0
+    client.drag([-4.0, -3.0, 3.0])
+    await_that(lambda: show._stage._wall.meshes == [])
+    choose(page, client, hull=False)
+    assert not show._stage._left.visible
+
+
+def test_thirty_updates_a_second_while_a_slider_is_dragged_that_a_region_follows() -> None:
+    robot = sl.load_robot("cogiro")
+    for page in shown(lambda server: Viewer(server, robot)):
+        show, mass = show_of(page), handle(page, "Platform + load [kg]")._impl.uuid
+
+        def rate(client: Client, page: Shown = page, mass: str = mass) -> float:
+            list(client.heard(0.5))
+            start, before = time.monotonic(), page.viewer.updates
+            while (after := time.monotonic() - start) < 2.0:
+                client.set(mass, float(robot.mass * (1.1 + 0.2 * np.sin(3.0 * after))))
+                time.sleep(0.01)
+            heard = [
+                m for m in client.heard(0.5) if "points" in m.get("updates", {}) or "vertices" in m.get("updates", {})
+            ]
+            assert any(m["name"].startswith("/hull/") for m in heard)  # it follows while the slider moves
+            return float(min(page.viewer.updates - before, sum(m["name"] == "/cables" for m in heard))) / 2.0
+
+        with Client(page.port) as client:
+            client.set(handle(page, "Region")._impl.uuid, True)
+            await_that(lambda show=show: show._made is not None)  # type: ignore[misc]
+            assert best_rate(lambda client=client: rate(client), 30.0) >= 30.0  # type: ignore[misc]
 
 
 def test_a_hull_that_takes_long_shows_how_far_it_is(
@@ -159,10 +231,10 @@ def test_a_hull_that_takes_long_shows_how_far_it_is(
 ) -> None:
     going, seen = threading.Event(), show_of(page)
 
-    def slow(asked: Asked, told: Callable[[int, int], None]) -> Hull:
+    def slow(asked: Asked, rough: bool, told: Callable[[int, int], None]) -> Hull:
         told(1, 4)
         assert going.wait(PATIENCE)
-        return ball(asked, told)
+        return ball(asked, rough, told)
 
     monkeypatch.setattr(seen, "_make", slow)
     monkeypatch.setattr("sagline.viewer.aside.PATIENCE", 0.1)
@@ -170,8 +242,8 @@ def test_a_hull_that_takes_long_shows_how_far_it_is(
     await_that(lambda: "25 %" in seen._panel._told.content)
     choose(page, client, force=8.0)  # another is wanted meanwhile
     going.set()
-    await_that(lambda: seen._hull is not None and seen._hull[0] == seen._key)
-    await_that(lambda: len(seen._stage._meshes) == 2)
+    await_that(lambda: seen._made is not None and seen._made.key == seen._key and not seen._made.rough)
+    await_that(lambda: len(seen._stage._hull.meshes) == 2)
 
 
 @pytest.mark.parametrize("load", [-1.0, float("nan"), 1e300])
@@ -183,31 +255,6 @@ def test_loads_that_are_none_are_refused_in_words(page: Shown, client: Client, l
     choose(page, client, force=10.0)
     await_that(lambda: show_of(page)._stage._slice != [])
     assert "Type a load" not in show_of(page)._panel._told.content
-
-
-def test_a_hull_is_that_of_the_workspace(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(hulls, "CELLS", 8)
-    shares: list[float] = []
-    turned = sl.Pose.from_euler(np.zeros(3), 0.1, 0.0, 0.0)
-    asked = Asked(ROBOT, turned.quaternion, sl.Catenary(), LOADS)
-    found = hull_of(asked, lambda done, total: shares.append(done / total))
-    space = sl.workspace(ROBOT, wrenches=LOADS, orientations=sl.Orientations(turned.matrix), cells=8, refine=False)
-    np.testing.assert_array_equal(found.vertices, space.surface.vertices)
-    assert f"{space.volume:.0f}" in found.told
-    assert "±50\xa0N" in found.told
-    assert shares
-    patches = found.patches(None)
-    assert sum(len(patch.faces) for patch in patches) == len(space.surface.faces)
-    assert {patch.name for patch in patches} <= {"", *(f"cable {k}" for k in range(8))}
-    on_margin = found.patches(MarginScale(10.0))
-    assert sum(len(patch.faces) for patch in on_margin) == len(space.surface.faces)
-
-
-def test_a_hull_that_is_empty_says_what_is_nearest(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(hulls, "CELLS", 6)
-    found = hull_of(Asked(ROBOT, POSE.quaternion, sl.Catenary(), sl.WrenchBox(1e5)), lambda *_: None)
-    assert found.patches(None) == []
-    assert "empty" in found.told
 
 
 def test_a_planar_robot_is_sliced_in_its_plane() -> None:

@@ -1,9 +1,10 @@
 """The viewer with clients that drag, set, leave and talk nonsense."""
 
+import json
 import re
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from html import unescape
 from typing import Any, NamedTuple
 
@@ -11,11 +12,12 @@ import numpy as np
 import pytest
 
 import sagline as sl
+from sagline.viewer.reading import Reading
 from sagline.viewer.run import Run
 from sagline.viewer.server import Server, started, stop
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.stage import Stage
-from sagline.viewer.viewer import Reading, Viewer
+from sagline.viewer.viewer import Viewer
 from tests.effort import best_rate
 from tests.viewer.client import PATIENCE, Client, await_that, clients
 
@@ -40,9 +42,10 @@ class Shown(NamedTuple):
         return self.viewer.view.snapshot.pose.position
 
 
-def shown(run: Run | None) -> Iterator[Shown]:
+def shown(made: Callable[[Server], Viewer]) -> Iterator[Shown]:
+    """A page of a viewer made for a server, while it is served."""
     server = started(port=0)
-    viewer = Viewer(server, ROBOT, run)
+    viewer = made(server)
     thread = threading.Thread(target=viewer.serve)
     thread.start()
     await_that(lambda: viewer.view is not None)
@@ -55,18 +58,25 @@ def shown(run: Run | None) -> Iterator[Shown]:
 
 @pytest.fixture(scope="module")
 def page() -> Iterator[Shown]:
-    yield from shown(None)
+    yield from shown(lambda server: Viewer(server, ROBOT))
 
 
 @pytest.fixture(scope="module")
 def film() -> Iterator[Shown]:
-    yield from shown(Run.of(sl.inverse(ROBOT, PATH, model=sl.Empirical())))
+    run = Run.of(sl.inverse(ROBOT, PATH, model=sl.Empirical()))
+    yield from shown(lambda server: Viewer(server, ROBOT, run))
 
 
 def handle(page: Shown, label: str) -> Any:
     found = [each for each in page.server.gui._gui_input_handle_from_uuid.values() if each.label == label]
     assert len(found) == 1
     return found[0]
+
+
+def tell(page: Shown, client: Client, topic: str, value: Any) -> None:
+    """What a page says through browser/channel.js."""
+    text = json.dumps({"topic": topic, "value": value, "count": time.monotonic()})
+    client.set(handle(page, "sagline")._impl.uuid, text)
 
 
 def test_it_listens_on_the_loopback_address_alone(page: Shown) -> None:
@@ -232,31 +242,43 @@ def test_a_pose_that_is_none_is_refused_and_forgotten(page: Shown) -> None:
         await_that(lambda: page.position[1] == 0.4)
 
 
+def test_what_a_slider_does_not_reach_is_refused_once_and_not_asked_again() -> None:
+    server = started(port=0)
+    try:
+        viewer = Viewer(server, ROBOT)
+        viewer._panel._mass.value = 1e9  # after the settings were read
+        viewer._panel.show_what_if("")
+        assert not viewer._panel._forgetting.visible
+    finally:
+        stop(server)
+
+
 def test_a_run_plays_pauses_and_is_left_by_a_drag(film: Shown) -> None:
-    play, follow = handle(film, "Play"), handle(film, "Follow the run")
+    player = film.viewer._player
     with Client(film.port) as client:
         assert np.array_equal(film.position, PATH.pose.position[0])
-        client.set(play._impl.uuid, True)
+        tell(film, client, "play", True)
         await_that(lambda: film.position[0] > 0.5)
         assert film.viewer.view is not None
         index = int(np.argmin(np.abs(PATH.pose.position[:, 0] - film.position[0])))
         assert np.array_equal(film.position, PATH.pose.position[index])
-        await_that(lambda: play.label == "Play" and film.position[0] == 2.0)
-        scrubbed = handle(film, "Time [s]")
-        client.set(scrubbed._impl.uuid, 1.0)
+        await_that(lambda: not player.clock.playing and film.position[0] == 2.0)
+        tell(film, client, "scrub", 1.0)
         await_that(lambda: np.array_equal(film.position, PATH.pose.position[50]))
         client.grab()
         client.drag([0.0, 0.8, 2.0])
         await_that(lambda: film.position[1] == 0.8)
-        assert follow.value is False
-        client.set(play._impl.uuid, True)
-        await_that(lambda: follow.value and film.position[2] == 1.5)
+        assert player.following is False
+        tell(film, client, "play", True)
+        await_that(lambda: player.following and film.position[2] == 1.5)
+        tell(film, client, "play", False)
+        await_that(lambda: not player.clock.playing)
 
 
 def test_a_run_is_named_once_and_cannot_be_changed(film: Shown) -> None:
     model, mass = handle(film, "Cable model"), handle(film, "Platform + load [kg]")
     with Client(film.port) as client:
-        client.set(handle(film, "Follow the run")._impl.uuid, True)
+        tell(film, client, "follow", True)
         await_that(lambda: "empirical (the article's)" in unescape(film.viewer._panel._numbers.content))
         await_that(lambda: not model.visible)
         assert not mass.visible
@@ -264,30 +286,6 @@ def test_a_run_is_named_once_and_cannot_be_changed(film: Shown) -> None:
         client.drag([0.1, 0.8, 2.0])
         await_that(lambda: film.position[1] == 0.8 and bool(model.visible) and bool(mass.visible))
         await_that(lambda: f"</b> {model.value}" in unescape(film.viewer._panel._numbers.content))
-
-
-def test_a_film_is_a_matter_of_its_client(film: Shown) -> None:
-    """One client films, gives its pictures slowly, and leaves in the middle; another drags meanwhile."""
-    button = handle(film, "Film of the run (GIF)")
-    with Client(film.port) as filming, Client(film.port) as other:
-        list(other.heard(0.5))
-        filming.set(button._impl.uuid, True)
-        asked = next(m for m in filming.heard(PATIENCE) if m["type"] == "GetRenderRequestMessage")
-        assert asked["width"] <= 720
-        assert film.viewer._export._filming
-        other.grab()
-        other.drag([0.3, 0.7, 2.0])
-        await_that(lambda: film.position[1] == 0.7)
-        assert film.viewer._export._filming  # still: the drag has not waited for the film
-        heard = []
-        for message in other.heard(PATIENCE):
-            heard.append(message)
-            if message.get("name") == "/cables" and "points" in message.get("updates", {}):
-                break
-        heard += other.heard(0.5)
-        assert any(m.get("name") == "/cables" and "points" in m.get("updates", {}) for m in heard)
-        assert not any(m["type"] == "NotificationShowMessage" for m in heard)
-    await_that(lambda: not film.viewer._export._filming)
 
 
 def test_cables_verdict_and_table_come_before_what_is_not_ready(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -327,7 +325,7 @@ def test_cables_verdict_and_table_come_before_what_is_not_ready(monkeypatch: pyt
             assert viewer.view.snapshot.rest is None
         for reading, text in (
             (Reading.MARGIN, "in any direction"),
-            (Reading.FREQUENCIES, " Hz</div>"),
+            (Reading.FREQUENCIES, " Hz</span></div>"),
             (Reading.POLYGON, "<polygon"),
             (Reading.REST, "Really rests"),
         ):

@@ -1,14 +1,11 @@
-"""What one takes away: the scene as GLB, a picture as PNG, a run as GIF. Bytes in memory, no browser."""
+"""What one takes away to other programs: the scene as GLB. Bytes in memory, no browser."""
 
 from __future__ import annotations
 
-from io import BytesIO
 from typing import Any
 
 import numpy as np
 import trimesh
-from numpy.typing import NDArray
-from PIL import Image
 from trimesh.transformations import compose_matrix, quaternion_matrix
 
 from sagline.robot.several import pulleys_of
@@ -17,8 +14,6 @@ from sagline.viewer.drawn import Drawn
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.stage import DRUM, INFEASIBLE, PLATFORM, STEEL
 from sagline.viewer.tension_scale import TensionScale
-
-Picture = NDArray[np.uint8]
 
 _CABLE_RADIUS = 0.0012  # of the robot's size: real cables would not be seen
 _DEAD_RADIUS = 0.0006  # the same of what runs guided behind the pulleys
@@ -55,25 +50,6 @@ def scene_as_glb(snapshot: Snapshot | Drawn, scale: TensionScale, sag_scale: flo
     scene.apply_transform(_Z_UP_TO_Y_UP)
     glb: bytes = scene.export(file_type="glb")
     return glb
-
-
-def picture_as_png(picture: Picture) -> bytes:
-    """A rendered picture (h, w, 3 or 4) on white."""
-    image = Image.fromarray(picture)
-    white = Image.new("RGBA", image.size, "white")
-    buffer = BytesIO()
-    Image.alpha_composite(white, image.convert("RGBA")).convert("RGB").save(buffer, "PNG", optimize=True)
-    return buffer.getvalue()
-
-
-def pictures_as_gif(pictures: list[Picture], seconds: float) -> bytes:
-    """Pictures of one size as a GIF that repeats, each shown for a while [s]."""
-    frames = [Image.fromarray(picture).convert("RGB").quantize(128, dither=Image.Dither.NONE) for picture in pictures]
-    buffer = BytesIO()
-    frames[0].save(
-        buffer, "GIF", save_all=True, append_images=frames[1:], duration=max(20, round(1000 * seconds)), loop=0
-    )
-    return buffer.getvalue()
 
 
 def _add(scene: Any, name: str, solid: solids.Solid, color: tuple[int, ...], place: Any = None) -> None:

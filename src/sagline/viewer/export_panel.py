@@ -2,76 +2,109 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import viser
 
+from sagline.arrays import Array
+from sagline.errors import SaglineError
 from sagline.files.names import file_stem
-from sagline.viewer.export import picture_as_png, pictures_as_gif, scene_as_glb
-from sagline.viewer.film import FRAME_TIME, PATIENCE, filmed, fitting
+from sagline.viewer.channel import Channel, Told
+from sagline.viewer.film import TOPIC as FILM
+from sagline.viewer.film import filmed
 from sagline.viewer.played import Played
+from sagline.viewer.still import PAPERS, pictured
 from sagline.viewer.view import View
 
-Send = Callable[[viser.ClientHandle], None]
 
-WIDTH, HEIGHT = 1600, 1000  # px, of a picture
+class Visitor:
+    """Who takes something away: one thing at a time."""
+
+    def __init__(self, client: viser.ClientHandle) -> None:
+        """Begin with nothing."""
+        self.client = client
+        self.told = Told(client.gui)
+        self.taking = threading.Lock()
+        self.cancelled = threading.Event()
+
+
+Send = Callable[[Visitor], None]
 
 
 class ExportPanel:
     """Buttons for a picture, the scene, and a film of the run; who asks waits in a thread of viser, others do not."""
 
     def __init__(
-        self, server: viser.ViserServer, view: Callable[[], View | None], played: Callable[[], Played | None]
+        self,
+        server: viser.ViserServer,
+        channel: Channel,
+        view: Callable[[], View | None],
+        played: Callable[[], tuple[Played | None, float]],
+        extent: tuple[Array, Array],
     ) -> None:
         """Build the panel.
 
         Args:
             server: The server.
+            channel: Where pages tell that they do not want a film any more.
             view: What is shown now.
-            played: What is played now, if anything is.
+            played: What is played now, if anything is, and its time a second.
+            extent: Lowest and highest corner of what there is to see [m].
         """
-        self._server = server
-        self._view = view
-        self._played = played
-        self._filming: set[int] = set()  # clients
-        with server.gui.add_folder("Take away", expand_by_default=False):
+        self._server, self._view, self._played, self._extent = server, view, played, extent
+        self._visitors: dict[int, Visitor] = {}
+        gui = server.gui
+        with gui.add_folder("Take away", expand_by_default=False):
+            self._paper = gui.add_dropdown("Picture for", tuple(PAPERS))
+            self._strip = gui.add_checkbox("With legend", True, hint="The robot's name and the colors of tensions.")
             buttons = [
-                (server.gui.add_button("Picture (PNG)", icon=viser.Icon.CAMERA), self._send_picture),
-                (server.gui.add_button("Scene (GLB)", icon=viser.Icon.BOX), self._send_scene),
+                (gui.add_button("Picture (PNG)", icon=viser.Icon.CAMERA), self._send_picture),
+                (gui.add_button("Scene (GLB)", icon=viser.Icon.BOX), self._send_scene),
             ]
-            self._film: Any = server.gui.add_button("Film", icon=viser.Icon.MOVIE, visible=False)
+            self._film: Any = gui.add_button("Film", icon=viser.Icon.MOVIE, visible=False)
             buttons.append((self._film, self._send_film))
         for button, send in buttons:
             button.on_click(partial(self._sent, send))
+        channel.on(FILM, self._cancel)
+        server.on_client_disconnect(self._part)
 
     def offer_film(self, of: str | None) -> None:
         """Offer a film of what is played, or none."""
         self._film.visible = of is not None
-        self._film.label = f"Film of the {of} (GIF)"
+        self._film.label = f"Film of the {of}"
 
-    def _send_picture(self, client: viser.ClientHandle) -> None:
-        height, width = fitting(client, WIDTH, HEIGHT)
-        picture = client.get_render(height, width, transport_format="png", timeout=PATIENCE)
-        client.send_file_download(f"{self._name()}.png", picture_as_png(picture), save_immediately=True)
+    def _send_picture(self, visitor: Visitor) -> None:
+        view, paper = self._view(), PAPERS.get(self._paper.value)
+        if view is not None and paper is not None:
+            told, strip = visitor.told, bool(self._strip.value)
+            pictured(visitor.client, self._server, told, view, paper, self._name(), self._extent, strip=strip)
 
-    def _send_scene(self, client: viser.ClientHandle) -> None:
+    def _send_scene(self, visitor: Visitor) -> None:
+        from sagline.viewer.export import scene_as_glb  # trimesh: a fifth of what starts the viewer
+
         view = self._view()
         if view is not None:
             glb = scene_as_glb(view.snapshot, view.scale, view.settings.sag_scale)
-            client.send_file_download(f"{self._name()}.glb", glb, save_immediately=True)
+            visitor.client.send_file_download(f"{self._name()}.glb", glb, save_immediately=True)
 
-    def _send_film(self, client: viser.ClientHandle) -> None:
-        view, played = self._view(), self._played()
-        if played is None or view is None or client.client_id in self._filming:
-            return
-        self._filming.add(client.client_id)
-        try:
-            film = pictures_as_gif(filmed(client, played, view), FRAME_TIME)
-        finally:
-            self._filming.discard(client.client_id)
-        client.send_file_download(f"{self._name()}.gif", film, save_immediately=True)
+    def _send_film(self, visitor: Visitor) -> None:
+        view, (played, speed) = self._view(), self._played()
+        if played is not None and view is not None:
+            visitor.cancelled.clear()
+            client, name = visitor.client, f"{self._name()}-{played.name}"
+            told, cancelled = visitor.told, visitor.cancelled.is_set
+            filmed(client, self._server, told, played, view, speed, name, self._extent, cancelled)
+
+    def _cancel(self, _: Any, client: int) -> None:
+        """A page does not want its film any more."""
+        if client in self._visitors:
+            self._visitors[client].cancelled.set()
+
+    def _part(self, client: viser.ClientHandle) -> None:
+        self._visitors.pop(client.client_id, None)
 
     def _name(self) -> str:
         view = self._view()
@@ -82,10 +115,21 @@ class ExportPanel:
         client = event.client
         if client is None:
             return
+        visitor = self._visitors.setdefault(client.client_id, Visitor(client))
+        if not visitor.taking.acquire(blocking=False):
+            return  # pressed twice
         try:
-            send(client)
-        except (RuntimeError, TimeoutError) as error:
+            send(visitor)
+        except (RuntimeError, TimeoutError, SaglineError) as error:
             if client.client_id in self._server.get_clients():
                 client.add_notification(
-                    "Nothing to take away", str(error), with_close_button=True, auto_close_seconds=8.0
+                    "Nothing to take away", _why(error), with_close_button=True, auto_close_seconds=8.0
                 )
+        finally:
+            visitor.taking.release()
+
+
+def _why(error: Exception) -> str:
+    if isinstance(error, TimeoutError):
+        return "The page gave no picture for too long: keep it in view until the pictures are taken."
+    return str(error)

@@ -67,7 +67,10 @@ class Framing:
         self._low, self._high = low, high
         size = float(np.linalg.norm(high - low))
         self._near = _MOVED * size
+        self.farthest = 100.0 * size + float(np.abs([low, high]).max())  # m: no camera is asked for there
         self._places: dict[int, list[Array]] = {}  # where each client's camera has been put
+        self._wanted: dict[int, Array] = {}  # what each client that is not known yet looks from and at
+        self._led: set[int] = set()  # clients that look from where they were asked to, and are let be
         self._lock = threading.Lock()  # clients' cameras are heard in a pool of threads
         camera = server.initial_camera
         self._first, camera.look_at = fitted(low, high, _USUAL)
@@ -77,6 +80,33 @@ class Framing:
         server.on_client_connect(self._meet)
         server.on_client_disconnect(self._part)
 
+    def look(self, client: int, camera: Array) -> None:
+        """Have a client look from a place at another, as if its camera had been moved by hand.
+
+        Args:
+            client: Number of the client; one that is not known yet looks from there as soon as it is.
+            camera: Both places [m], shape (6,).
+        """
+        with self._lock:
+            self._wanted[client] = camera
+            known = self._server.get_clients().get(client)
+        if known is not None:
+            self._follow(known.camera)
+
+    def moved(self, client: int) -> Array | None:
+        """What a client looks from and at [m], shape (6,), if its camera has been moved; None if it has not."""
+        known = self._server.get_clients().get(client)
+        if known is None:
+            return None
+        with self._lock:  # a camera that is just being put somewhere has not been moved by hand
+            try:
+                camera = np.array([known.camera.position, known.camera.look_at], dtype=np.float64).reshape(6)
+            except (TypeError, ValueError):
+                return None  # nonsense
+            places = np.array([self._first, *self._places.get(client, [])])
+        still = len(places) == 1 or np.linalg.norm(places - camera[:3], axis=1).min() < self._near
+        return None if still or not np.all(np.abs(camera) <= self.farthest) else camera
+
     def _meet(self, client: viser.ClientHandle) -> None:
         client.camera.on_update(self._follow)
         self._follow(client.camera)
@@ -84,6 +114,8 @@ class Framing:
     def _part(self, client: viser.ClientHandle) -> None:
         with self._lock:
             self._places.pop(client.client_id, None)
+            self._wanted.pop(client.client_id, None)
+            self._led.discard(client.client_id)
 
     def _follow(self, camera: viser.CameraHandle) -> None:
         """Fit the box anew when the picture has other proportions, unless someone looks from elsewhere."""
@@ -99,12 +131,25 @@ class Framing:
 
     def _fit(self, camera: viser.CameraHandle, place: Array, aspect: float, field: float) -> None:
         places = self._places.setdefault(camera.client.client_id, [])
+        wanted = self._wanted.pop(camera.client.client_id, None)
+        if wanted is not None:
+            places.append(self._first)  # from now on it is where nobody has put it
+            self._led.add(camera.client.client_id)
+            with camera.client.atomic():
+                camera.position, camera.look_at = wanted[:3], wanted[3:]
+            return
+        if camera.client.client_id in self._led:
+            return  # whatever a page that has not heard yet still tells of its camera
         known = np.array([self._first, *places])
         if places and not np.linalg.norm(known - place, axis=1).min() < self._near:
             return
         position, target = fitted(self._low, self._high, aspect, field)
-        if np.linalg.norm(position - place) < self._near or camera.client.client_id not in self._server.get_clients():
+        if camera.client.client_id not in self._server.get_clients():
             return
-        places.append(position)
+        stands = bool(np.linalg.norm(position - place) < self._near)
+        if not (stands and places):
+            places.append(position)
+        if stands:
+            return
         with camera.client.atomic():
             camera.position, camera.look_at = position, target

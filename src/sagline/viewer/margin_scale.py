@@ -55,7 +55,7 @@ class MarginScale:
 
     def key(self, unit: ForceUnit) -> str:
         """HTML that says which color is which margin."""
-        edges = [f"{edge / unit.newtons:g}".replace("-", "−") for edge in self.edges]
+        edges = [bare(edge, unit) for edge in self.edges]
         between = [f"{low} to {high}" for low, high in pairwise(edges)]
         names = [f"below {edges[0]}", *between, f"above {edges[-1]}"]
         marks = "".join(
@@ -63,3 +63,8 @@ class MarginScale:
             for color, name in zip(_COLORS, names, strict=True)
         )
         return block(f"<b>Margin [{unit.name}]</b> &nbsp;{marks}")
+
+
+def bare(edge: float, unit: ForceUnit) -> str:
+    """A margin between bands [N], without its unit."""
+    return f"{edge / unit.newtons:g}".replace("-", "−")

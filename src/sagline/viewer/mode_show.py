@@ -12,9 +12,12 @@ from sagline.dynamics.vibration import Vibration
 from sagline.dynamics.vibration_status import VibrationStatus
 from sagline.robot.equilibrium import Equilibrium
 from sagline.viewer.aside import Aside
+from sagline.viewer.drawn import Drawn
 from sagline.viewer.modes_panel import ModesPanel
+from sagline.viewer.reading import Reading
 from sagline.viewer.stage import Stage
 from sagline.viewer.swing import PERIOD, Swing, mode_of
+from sagline.viewer.view import View
 
 Vibrate = Callable[[Equilibrium, float], Vibration]
 
@@ -24,7 +27,14 @@ RESTED = 0.25  # s without a change: what is dragged is not worked out on its wa
 class ModeShow:
     """Follows what is shown; all of it belongs to the thread that serves."""
 
-    def __init__(self, panel: ModesPanel, stage: Stage, aside: Aside, vibrate: Vibrate) -> None:
+    def __init__(
+        self,
+        panel: ModesPanel,
+        stage: Stage,
+        aside: Aside,
+        vibrate: Vibrate,
+        ready: Callable[[Reading], bool],
+    ) -> None:
         """Begin with nothing.
 
         Args:
@@ -32,8 +42,9 @@ class ModeShow:
             stage: Where they move.
             aside: What works them out.
             vibrate: Gives the vibration of a state up to a frequency [Hz].
+            ready: Whether a reading can be had without waiting.
         """
-        self._panel, self._stage, self._aside, self._vibrate = panel, stage, aside, vibrate
+        self._panel, self._stage, self._aside, self._vibrate, self._ready = panel, stage, aside, vibrate, ready
         self._key: Hashable = None
         self._state: Equilibrium | None = None
         self._due: float | None = None
@@ -51,8 +62,9 @@ class ModeShow:
         """Whether something is to come without anybody's doing."""
         return self._due is not None or self._aside.busy
 
-    def follow(self, state: Equilibrium | None, key: Hashable) -> None:
-        """A state is shown, or what is none; the same key is the same state."""
+    def follow(self, view: View) -> None:
+        """Something is shown; what hangs at rest can vibrate."""
+        state, key = self._at_rest(view)
         key = (key, self._panel.up_to)
         if state is None or key != self._key:
             self._still()
@@ -74,6 +86,24 @@ class ModeShow:
         if self.swing is not None:
             phase = 2.0 * np.pi * now / PERIOD
             self._stage.swing(self.swing.state.pose, self.swing.pose(phase), self.swing.courses(phase))
+
+    def _at_rest(self, view: View) -> tuple[Equilibrium | None, Hashable]:
+        """The state whose modes are asked for, if there is one, and what tells it from others."""
+        snapshot, settings = view.snapshot, view.settings
+        if isinstance(snapshot, Drawn) or snapshot.plan is None or not snapshot.feasible:
+            return None, None
+        if view.playing or not self._ready(Reading.MODES):
+            return None, None
+        place = snapshot.pose.position.tobytes() + snapshot.pose.quaternion.tobytes()
+        return snapshot.plan.state, (
+            place,
+            settings.mass,
+            settings.density,
+            settings.stiffness,
+            settings.model,
+            settings.tension,
+            id(view.played),
+        )
 
     def _found(self, vibration: Vibration) -> None:
         if vibration.state is self._state:

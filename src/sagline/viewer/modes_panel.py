@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from html import escape
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import viser
@@ -13,6 +13,7 @@ from sagline.dynamics.mode_list import MASSLESS, ListedMode, listed_modes
 from sagline.dynamics.response_curves import MOTIONS, ResponseCurves
 from sagline.dynamics.vibration import Vibration
 from sagline.dynamics.vibration_status import VibrationStatus
+from sagline.viewer.channel import Channel, chosen_by
 from sagline.viewer.readout import block, refused, sentence, waiting
 from sagline.viewer.response_figure import response_figure
 from sagline.viewer.swing import Swing
@@ -20,13 +21,16 @@ from sagline.viewer.wording import number
 
 UP_TO = 20.0  # Hz, at first
 HIGHEST = 200.0  # Hz
-FIELD = "Mode"  # page.js writes into the field of this label what is clicked
+FIELD = "Mode"
+TOPIC: Final = "mode"  # that a page tells the name of a mode under that is clicked
 
 
 class ModesPanel:
     """A tab: which mode moves, up to which frequency, the list and the response."""
 
-    def __init__(self, gui: viser.GuiApi, readings: Any, changed: Callable[[], None], mode: str = "") -> None:
+    def __init__(
+        self, gui: viser.GuiApi, readings: Any, changed: Callable[[], None], channel: Channel, mode: str = ""
+    ) -> None:
         """Build the tab; `changed` is called, from any thread, when something is chosen."""
         self._vibration: Vibration | None = None
         self._shown: tuple[object, ...] = ()
@@ -41,6 +45,7 @@ class ModesPanel:
             self._response = gui.add_html("")
         for handle in (self._mode, self._up_to, self._force):
             handle.on_update(lambda _: changed())
+        channel.on(TOPIC, lambda name, _: self._toggle(name))
 
     @property
     def chosen(self) -> str:
@@ -57,6 +62,10 @@ class ModesPanel:
     def force(self) -> str:
         """Whose response is drawn: one of `MOTIONS`."""
         return self._force.value if self._force.value in MOTIONS else MOTIONS[0]
+
+    def _toggle(self, name: Any) -> None:
+        """A page tells a mode: it moves, or no more if it did."""
+        self._mode.value = "" if str(name) == self.chosen else str(name)
 
     def wait(self, seconds: float) -> None:
         """Say for how long the modes have been worked out."""
@@ -123,7 +132,8 @@ def _listed(vibration: Vibration, modes: list[ListedMode], chosen: str) -> str:
 def _row(mode: ListedMode, chosen: str) -> str:
     looks = " ".join(["chosen"] * (mode.name == chosen) + ["light"] * (mode.kind == MASSLESS))
     return (
-        f'<tr data-mode="{mode.name}" class="{looks}"><td><button data-mode="{mode.name}">{mode.number}</button></td>'
+        f'<tr {chosen_by(TOPIC, mode.name)} class="{looks}"><td>'
+        f"<button {chosen_by(TOPIC, mode.name)}>{mode.number}</button></td>"
         f"<td>{mode.frequency:.3f}</td><td>{mode.kind}</td><td>{100.0 * mode.platform_share:.0f} %</td>"
         f"<td>{mode.swings}</td><td>{number(100.0 * mode.loss, '.2g')} %</td></tr>"
     )

@@ -1,4 +1,4 @@
-"""The page: viser's client with a title, an icon, styles and a small script of our own in its head.
+"""The page: viser's client with a title, an icon, styles and scripts of our own in its head.
 
 viser has no setting for any of these. Its web server reads the client from a folder, and this stands in that folder's
 place; nothing is written to disk, and the client itself stays what it is.
@@ -12,11 +12,19 @@ from dataclasses import dataclass
 from html import escape
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, Final, cast
 from urllib.parse import quote
 
 from viser import infra
 
+STYLES: Final = ("page.css", "state.css", "keys.css", "balance.css", "film.css", "timeline.css")
+SCRIPTS: Final = (  # in the order in which they run, before viser's client
+    "theme.js", "channel.js", "choices.js", "dress.js", "dialog.js",
+    "pose.js", "copies.js", "link.js", "names.js", "said.js", "keys.js",
+    "dot.js", "hand.js",
+    "strip.js", "pictures.js", "mp4.js", "recorder.js", "film.js",
+    "timeline_plot.js", "timeline.js",
+)  # fmt: skip
 _STOCK = infra.WebsockServer
 _ICON = (  # a platform on two cables that sag
     '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 32 32"><rect width="32" height="32" rx="7" fill="#10335c"/>'
@@ -53,8 +61,9 @@ class Page:
 
 
 def dressed(html: str, title: str) -> str:
-    """A page with our title, icon, styles and script at the end of its head: what comes last holds."""
-    style, script = (files("sagline.viewer").joinpath(name).read_text("utf-8") for name in ("page.css", "page.js"))
+    """A page with our title, icon, styles and scripts at the end of its head: what comes last holds."""
+    ours = files("sagline.viewer").joinpath("browser")
+    style, script = ("".join(ours.joinpath(name).read_text("utf-8") for name in names) for names in (STYLES, SCRIPTS))
     html = html.replace("<title>Viser</title>", f"<title>{escape(title)}</title>", 1).replace('rel="icon"', "", 1)
     icon = f'<link rel="icon" href="data:image/svg+xml,{quote(_ICON)}">'
     before, after = html.split("</head>", 1)

@@ -10,7 +10,9 @@ import viser
 
 from sagline.errors import InvalidValueError
 from sagline.robot.robot import Robot
+from sagline.tension.method import TensionMethod
 from sagline.viewer import readout
+from sagline.viewer.by_hand import BY_HAND, ByHand
 from sagline.viewer.settings import METHODS, MODELS, Settings
 from sagline.viewer.tension_scale import TensionScale
 from sagline.viewer.wording import remembers
@@ -34,6 +36,8 @@ class Panel:
         self._gui = server.gui
         self._changed = changed
         self._forget = forget
+        self._way = next(iter(METHODS))
+        self._by_hand: ByHand | None = None
         self._gui.main_panel.dock_left()
         self._gui.main_panel.set_width(LEFT_WIDTH)
         self._build_what_if(robot)
@@ -41,6 +45,7 @@ class Panel:
         readings = self.readings = self._gui.add_panel()
         with readings.add_tab("Readings"):
             self._verdict = self._gui.add_html(readout.waiting())
+            self._explained = self._gui.add_html("", visible=False)
             self._gui.add_html(readout.legend(scale, robot))
             self._numbers = self._gui.add_html("")
             with self._gui.add_folder("Feasible tensions"):
@@ -60,15 +65,23 @@ class Panel:
         Raises:
             InvalidValueError: If a client sent what no slider gives.
         """
+        mass = _slid(self._mass)
         return Settings(
-            mass=_slid(self._mass),
+            mass=self._own_mass if mass == written_mass(self._own_mass) else mass,
             density=_slid(self._density),
             stiffness=_slid(self._stiffness),
             model=MODELS.get(self._model.value, next(iter(MODELS.values()))),
-            tension=METHODS.get(self._method.value, next(iter(METHODS.values()))),
+            tension=self._tension(),
             sag_scale=_slid(self._sag_scale),
             error_scale=_slid(self._error_scale),
         )
+
+    def _tension(self) -> TensionMethod:
+        chosen = self._method.value
+        if chosen == BY_HAND and self._by_hand is not None:
+            return self._by_hand
+        self._way = chosen if chosen in METHODS else next(iter(METHODS))
+        return METHODS[self._way]
 
     def show_what_if(self, still: str) -> None:
         """Show what would change the robot, or in its place why it cannot be changed."""
@@ -77,13 +90,37 @@ class Panel:
             handle.visible = shown
         self._of_run.visible = not shown
         self._of_run.content = readout.block(f'<div class="quiet">{still}</div>')
-        self._forgetting.visible = shown and remembers(self.settings().tension)
+        self._forgetting.visible = shown and remembers(self._tension())
 
-    def read_out(self, verdict: str, numbers: str, polygon: str) -> None:
+    def read_out(self, verdict: str, numbers: str) -> None:
         """Show the readings."""
         self._verdict.content = verdict
         self._numbers.content = numbers
+
+    def explain(self, text: str) -> None:
+        """Say why a pose is not feasible, and what would help; "" for nothing."""
+        self._explained.content, self._explained.visible = text, bool(text)
+
+    def show_polygon(self, polygon: str) -> None:
+        """Show what tensions there are to choose from."""
         self._polygon.content = polygon
+
+    @property
+    def way(self) -> str:
+        """The way of sharing that was chosen last, by its name."""
+        return self._way
+
+    def choose_way(self, name: str) -> None:
+        """Choose a way of sharing, one of `METHODS`."""
+        self._method.value = name
+
+    def choose_by_hand(self, method: ByHand) -> None:
+        """Choose tensions by hand; the list of the ways has them too from then on."""
+        self._by_hand = method
+        if BY_HAND not in self._method.options:
+            self._method.options = (*METHODS, BY_HAND)
+        self._method.value = BY_HAND
+        self._changed()
 
     def wait(self, what: str) -> None:
         """Say what the numbers wait for."""
@@ -103,9 +140,10 @@ class Panel:
         with gui.add_folder("What if"):
             self._of_run = gui.add_html("", visible=False)
             lightest, heaviest, step = mass_range(robot.mass)
+            self._own_mass = robot.mass
             self._mass = self.watched(
                 gui.add_slider(
-                    "Platform + load [kg]", lightest, heaviest, step, robot.mass,
+                    "Platform + load [kg]", lightest, heaviest, step, written_mass(robot.mass),
                     hint="Mass of the platform with its load; the inertia grows with it.",
                 )
             )  # fmt: skip
@@ -157,6 +195,11 @@ def _slid(slider: Any) -> float:
     if not low <= value <= high:
         raise InvalidValueError(slider.label, value, f"{low:g} to {high:g}", "Move the slider.")
     return value
+
+
+def written_mass(mass: float) -> float:
+    """A mass [kg] to as many digits as its field has room for; one that a calibration has found has more."""
+    return float(f"{mass:.5g}")
 
 
 def mass_range(mass: float) -> tuple[float, float, float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -10,10 +11,14 @@ from sagline.arrays import Array
 from sagline.dynamics.simulation import Simulation
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.viewer.course_figure import CourseFigure
 from sagline.viewer.moment import Moment
-from sagline.viewer.readout import block, force_unit
-from sagline.viewer.stage import ACTUAL, stroke
+from sagline.viewer.moment_words import happened
+from sagline.viewer.readout import force_unit
+from sagline.viewer.stage import ACTUAL
+from sagline.viewer.timeline_spans import outside
+from sagline.viewer.timeline_track import Chart, Mark, Track, cable_names, tension_limits
+
+FAILURES: Final = ("break", "stall", "slack", "saturate")  # of what can happen
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,17 +65,30 @@ class Playback:
         actual = self.simulation.pose.position[rows]
         return np.full_like(actual, np.nan), actual
 
-    def figures(self) -> tuple[CourseFigure, ...]:
-        """Tensions at the frame ends, and how far the platform is from where it began."""
-        unit = force_unit(self.robot)
-        away = 1e3 * (self.simulation.pose.position - self.simulation.pose.position[0])
-        return (
-            CourseFigure.of(f"Tension at the winch [{unit.name}]", self.time, self.simulation.tensions / unit.newtons),
-            CourseFigure.of("Motion along x, y, z [mm]", self.time, away),
+    def track(self) -> Track:
+        """Tensions at the frame ends, how far the platform is from where it began, and what happened."""
+        simulation, robot, unit = self.simulation, self.robot, force_unit(self.robot)
+        limits = tension_limits(robot, unit.newtons, at="frame_end")
+        held = self._held()
+        cables = cable_names(robot)
+        tension = Chart(
+            "Tension at the winch", unit.name, unit.decimals, cables, lambda rows: held[rows] / unit.newtons, limits
         )
+        position = simulation.pose.position
+        away = Chart(
+            "Motion along x, y, z", "mm", 1, ("x", "y", "z"), lambda rows: 1e3 * (position[rows] - position[0])
+        )
+        began = float(simulation.time[0])
+        marks = tuple(
+            Mark(event.time - began, happened(event, unit), bad=event.kind in FAILURES) for event in simulation.events
+        )
+        spans = outside(robot, self.time, held, unit)
+        return Track(self.time, (tension, away), spans, marks, (("actual", ACTUAL),))
 
-    def key(self) -> str:
-        """Which line is which cable."""
-        count = self.robot.cable_count
-        path = block(f"path &nbsp;{stroke(ACTUAL)} actual")
-        return CourseFigure.key(range(count)) + CourseFigure.key("xyz", "motion along") + path
+    def _held(self) -> Array:
+        """The tensions, of broken cables until they broke (N, m)."""
+        simulation, held = self.simulation, self.simulation.tensions.copy()
+        for event in simulation.events:
+            if event.kind == "break":
+                held[simulation.time >= event.time, event.cable] = np.nan
+        return held

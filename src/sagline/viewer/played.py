@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from sagline.arrays import Array
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.viewer.course_figure import CourseFigure
 from sagline.viewer.drawn import Drawn
 from sagline.viewer.snapshot import Snapshot
+from sagline.viewer.timeline_track import Track
 
 
 class Played(Protocol):
@@ -41,8 +41,17 @@ class Played(Protocol):
     def traces(self, most: int, error_scale: float) -> tuple[Array, Array]:
         """Desired and actual positions (n, 3), n <= most, the error drawn some times as large; NaN in gaps."""
 
-    def figures(self) -> tuple[CourseFigure, ...]:
-        """What there is over time."""
+    def track(self) -> Track:
+        """What the timeline shows of it."""
 
-    def key(self) -> str:
-        """HTML that says which line is which."""
+
+class Beside(NamedTuple):
+    """Another run beside what is played, with the same clock.
+
+    Attributes:
+        played: The other one.
+        names: What both are called on the timeline, what is played first.
+    """
+
+    played: Played
+    names: tuple[str, str]

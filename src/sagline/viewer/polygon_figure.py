@@ -1,36 +1,50 @@
-"""The feasible tensions of one pose as a small drawing (SVG) in the null space of two redundant cables."""
+"""The feasible tensions of one pose as a small drawing (SVG) in the null space of its redundant cables."""
 
 from __future__ import annotations
 
+from html import escape
+from typing import Final
+
 import numpy as np
 
-from sagline.arrays import Array
 from sagline.errors import InvalidValueError
-from sagline.kinematics.polygon import tension_polygon
+from sagline.kinematics.polygon import polygon_at, tension_polygon
+from sagline.tension.minimum_norm import MinimumNorm
+from sagline.tension.options import kernel_options
 from sagline.tension.polygon import TensionPolygon
+from sagline.viewer.by_hand import BY_HAND, ByHand
+from sagline.viewer.channel import chosen_by
+from sagline.viewer.dot_field import WIDTH, DotField
+from sagline.viewer.dot_marks import Mark, grouped
 from sagline.viewer.readout import LATER, block, force_unit, sentence
 from sagline.viewer.snapshot import Snapshot
-from sagline.viewer.wording import ForceUnit, number
+from sagline.viewer.wording import method_name, number
 
-MOST_REDUNDANT = 2  # dimensions of a drawing
-WIDTH, HEIGHT, BORDER = 340, 190, 26  # px
+MOST_REDUNDANT: Final = 2  # dimensions of a drawing
+SHARING: Final = "sharing"  # topic of a way of sharing that is chosen
 
 
-def polygon_figure(snapshot: Snapshot) -> str:
-    """HTML: the polygon with the chosen tensions in it; for one redundant cable the interval; else a sentence."""
-    redundant = snapshot.robot.cable_count - snapshot.robot.degrees_of_freedom
-    if redundant > MOST_REDUNDANT:
-        return sentence(f"{redundant} redundant cables: their feasible tensions have no picture in a plane.")
-    if redundant == 0:
-        return sentence("As many cables as freedoms: the balance leaves nothing to choose.")
-    polygon = _polygon(snapshot)
-    if polygon is None or not len(polygon.vertices):
+def polygon_figure(
+    snapshot: Snapshot, marks: tuple[Mark, ...] = (), field: DotField | None = None, back: str = ""
+) -> str:
+    """HTML: the polygon with the chosen tensions in it; for one redundant cable the interval; else a sentence.
+
+    Args:
+        snapshot: What is shown.
+        marks: What ways of sharing would choose; they can be chosen there.
+        field: What can be chosen by hand; None where nothing can.
+        back: The way of sharing that a button leads back to; "" for no button.
+    """
+    if remark := why_none(snapshot):
+        return sentence(remark)
+    drawn = field_of(snapshot) if field is None else field
+    if drawn is None:
         return sentence("No tensions within the limits balance the platform: there is nothing to choose from.")
-    point = polygon.coordinates(snapshot.tension)
-    unit = force_unit(snapshot.robot)
-    if redundant == 1:
-        return _interval(polygon.vertices[:, 0], float(point[0]))
-    return _drawing(polygon, point, unit)
+    return (
+        block(_drawing(snapshot, drawn, marks, movable=field is not None))
+        + sentence(_told(snapshot, drawn, movable=field is not None))
+        + _key(snapshot, marks, back)
+    )
 
 
 def polygon_later() -> str:
@@ -38,45 +52,136 @@ def polygon_later() -> str:
     return sentence(LATER.capitalize())
 
 
-def _polygon(snapshot: Snapshot) -> TensionPolygon | None:
-    if snapshot.plan is None:
+def why_none(snapshot: Snapshot) -> str:
+    """Why the feasible tensions of a robot have no drawing; "" where they have."""
+    redundant = snapshot.robot.cable_count - snapshot.robot.degrees_of_freedom
+    if redundant > MOST_REDUNDANT:
+        return f"{redundant} redundant cables: their feasible tensions have no picture in a plane."
+    return "As many cables as freedoms: the balance leaves nothing to choose." if redundant == 0 else ""
+
+
+def field_of(snapshot: Snapshot, before: DotField | None = None) -> DotField | None:
+    """What there is to choose from, with the pulls of the cables as they hang; None where there is nothing.
+
+    Args:
+        snapshot: A robot with one or two redundant cables.
+        before: A field of the same pose, whose place in the drawing it keeps; None for none.
+    """
+    polygon = _polygon(snapshot)
+    if polygon is None or not len(polygon.vertices):
         return None
-    state = snapshot.plan.state
+    return DotField.of(polygon, polygon.coordinates(snapshot.tension), before)
+
+
+def _polygon(snapshot: Snapshot) -> TensionPolygon | None:
+    plan = snapshot.plan
+    if plan is None:
+        return None
+    robot, state = snapshot.robot, plan.state
+    if snapshot.feasible:
+        options = kernel_options(robot, state.cables.model, MinimumNorm())
+        return polygon_at(robot, snapshot.pose, options, state.wrench, state.chord_tension, state.pull, feasible=True)
     try:
-        return tension_polygon(snapshot.robot, snapshot.pose, state.cables.model, state.wrench)
+        return tension_polygon(robot, snapshot.pose, state.cables.model, state.wrench)
     except InvalidValueError:  # a pose without a balance
         return None
 
 
-def _drawing(polygon: TensionPolygon, point: Array, unit: ForceUnit) -> str:
-    corners = polygon.vertices
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    scale = float(np.min((np.array([WIDTH, HEIGHT]) - 2 * BORDER) / np.maximum(high - low, 1e-9)))
-    middle = 0.5 * (low + high)
-
-    def place(at: Array) -> tuple[float, float]:
-        x, y = scale * (at - middle)
-        return 0.5 * WIDTH + float(x), 0.5 * HEIGHT - float(y)
-
-    outline = " ".join(f"{x:.1f},{y:.1f}" for x, y in map(place, corners))
-    sides = "".join(
-        _side(polygon, k, place(corners[k]), place(corners[(k + 1) % len(corners)])) for k in range(len(corners))
+def _drawing(snapshot: Snapshot, field: DotField, marks: tuple[Mark, ...], *, movable: bool) -> str:
+    corners, places = field.corners, [field.place(corner) for corner in field.corners]
+    outline = " ".join(f"{x:.1f},{y:.1f}" for x, y in places)
+    if field.redundant == 2:
+        area = f'<polygon points="{outline}" class="polygon"/>'
+        names = "".join(_side(field, k, places[k], places[(k + 1) % len(corners)]) for k in range(len(corners)))
+    else:
+        area = f'<polyline points="{outline}" class="interval"/>'
+        names = "".join(_end(field, k, places[k], places[1 - k]) for k in range(2))
+    where = f' data-scale="{field.scale!r}" data-middle="{" ".join(map(repr, field.middle.tolist()))}"'
+    kind = f'class="field" data-dot=""{where}' if movable else 'role="img" aria-label="feasible tensions"'
+    return (
+        f'<svg viewBox="0 0 {WIDTH} {field.height}" {kind}>{area}{names}{_marks(field, marks)}'
+        f"{_dot(snapshot, field, movable=movable)}</svg>"
     )
-    dot = ""
-    if np.isfinite(point).all():  # no tensions were chosen where the way of sharing found none
-        x, y = place(point)
-        dot = f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4.5" class="dot"/>'
-    drawing = (
-        f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="polygon of feasible tensions">'
-        f'<polygon points="{outline}" class="polygon"/>{sides}{dot}</svg>'
+
+
+def _dot(snapshot: Snapshot, field: DotField, *, movable: bool) -> str:
+    """The chosen tensions, where there are any: what is dragged, with room for a finger."""
+    point = field.polygon.coordinates(snapshot.tension)
+    if not np.isfinite(point).all():  # no tensions were chosen where the way of sharing found none
+        return ""
+    x, y = field.place(point)
+    dot = f'<circle cx="{x:.1f}" cy="{y:.1f}" r="5.5" class="dot"/>'
+    if not movable:
+        return dot
+    unit, tension, plan = force_unit(snapshot.robot), snapshot.tension, snapshot.plan
+    told = f"{unit.bare(tension.min())} to {unit.written(tension.max())}"
+    told += "" if plan is None else f", {method_name(plan.tension)}"
+    share = (point[0] - field.low[0]) / max(float(field.high[0] - field.low[0]), 1e-9)
+    return (
+        '<g class="handle" tabindex="0" role="slider" aria-label="Tensions, in the field of all that are feasible" '
+        f'aria-roledescription="slider of {field.redundant} dimensions" aria-valuemin="0" aria-valuemax="100" '
+        f'aria-valuenow="{100.0 * share:.0f}" aria-valuetext="{escape(told)}">'
+        f'<circle cx="{x:.1f}" cy="{y:.1f}" r="18" class="reach"/>{dot}</g>'
     )
-    extent = f"Width {unit.written(high[0] - low[0])}, height {unit.written(high[1] - low[1])}."
-    return block(drawing) + sentence(f"Dot: the chosen tensions. Sides: the limit that each is. {extent}")
 
 
-def _side(polygon: TensionPolygon, k: int, start: tuple[float, float], end: tuple[float, float]) -> str:
+def _marks(field: DotField, marks: tuple[Mark, ...]) -> str:
+    """A small mark for each way of sharing, with its letter; those in one place share it."""
+    parts = []
+    for (x, y), group in grouped(marks, field):
+        letters, names = "".join(mark.letter for mark in group), ", ".join(mark.name for mark in group)
+        right, above = x < 0.7 * WIDTH, 5.0 if field.redundant == 2 else 10.0
+        parts.append(
+            f'<g class="way" {chosen_by(SHARING, group[0].name)}><title>{escape(names)}</title>'
+            f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3"/>'
+            f'<text x="{x + (6 if right else -6):.1f}" y="{y - above:.1f}" class="letter" '
+            f'text-anchor="{"start" if right else "end"}">{letters}</text></g>'
+        )
+    return "".join(parts)
+
+
+def _told(snapshot: Snapshot, field: DotField, *, movable: bool) -> str:
+    unit = force_unit(snapshot.robot)
+    how = "Drag the dot, or move it with the arrow keys." if movable else "Dot: the chosen tensions."
+    if field.redundant == 1:
+        ends = field.polygon.vertices[:, 0]
+        point = float(field.polygon.coordinates(snapshot.tension)[0])
+        span = f"{ends.min():.4g} to {ends.max():.4g} N" if np.isfinite(ends).all() else "without an end"
+        told = f"One redundant cable: λ may be {span}; chosen: {number(point, '.4g')} N."
+        return f"{told} {how}" if movable else told
+    if not field.polygon.bounded:
+        return f"{how} Sides: the limit that each is; one without a name is none, there it goes on."
+    width, height = np.ptp(field.corners, axis=0)
+    return f"{how} Sides: the limit that each is. Width {unit.written(width)}, height {unit.written(height)}."
+
+
+def _key(snapshot: Snapshot, marks: tuple[Mark, ...], back: str) -> str:
+    """The ways of sharing by their letters, to choose; and what is chosen by hand, and how to take it back."""
+    if not marks:
+        return ""
+    by_hand = snapshot.plan is not None and isinstance(snapshot.plan.tension, ByHand)
+    parts = []
+    for mark in marks:
+        name = escape(mark.name)
+        if mark.missing:
+            parts.append(f'<span class="quiet" title="{escape(mark.missing)}">{mark.letter} {name}: none here</span>')
+            continue
+        chosen = mark.name == back and not by_hand
+        parts.append(
+            f'<button {chosen_by(SHARING, mark.name)} aria-pressed="{str(chosen).lower()}">'
+            f"<b>{mark.letter}</b> {name}</button>"
+        )
+    remark = ""
+    if by_hand:
+        again = f" <button {chosen_by(SHARING, back)}>Back to {escape(back)}</button>" if back else ""
+        kept = "where the platform is dragged, the tensions stay as near to these as balance and limits allow"
+        remark = f'<div class="hand"><b>{BY_HAND.capitalize()}</b>: {kept}.{again}</div>'
+    return block(f'{remark}<div class="ways">{"".join(parts)}</div>')
+
+
+def _side(field: DotField, k: int, start: tuple[float, float], end: tuple[float, float]) -> str:
     """The name of a side, outside of it; none for a side that is too short to name, or no limit."""
-    side = polygon.sides[k]
+    side = field.sides[k]
     if side is None or np.hypot(end[0] - start[0], end[1] - start[1]) < 22.0:
         return ""
     x, y = 0.5 * (start[0] + end[0]), 0.5 * (start[1] + end[1])
@@ -87,6 +192,11 @@ def _side(polygon: TensionPolygon, k: int, start: tuple[float, float], end: tupl
     return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{side.cable} {side.limit}</text>'
 
 
-def _interval(ends: Array, point: float) -> str:
-    low, high = float(ends.min()), float(ends.max())
-    return sentence(f"One redundant cable: λ may be {low:.4g} to {high:.4g} N; chosen: {number(point, '.4g')} N.")
+def _end(field: DotField, k: int, at: tuple[float, float], other: tuple[float, float]) -> str:
+    """The name of an end of an interval, below it; of one that is none, an arrow head."""
+    side, (x, y) = field.sides[k], at
+    if side is None:
+        back = 8.0 if other[0] > x else -8.0
+        return f'<path d="M{x + back:.1f} {y - 5:.1f}L{x:.1f} {y:.1f}L{x + back:.1f} {y + 5:.1f}" class="interval"/>'
+    tick = f'<line x1="{x:.1f}" x2="{x:.1f}" y1="{y - 8:.1f}" y2="{y + 8:.1f}" class="interval"/>'
+    return f'{tick}<text x="{x:.1f}" y="{y + 22:.1f}" text-anchor="middle">{side.cable} {side.limit}</text>'

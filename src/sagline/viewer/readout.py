@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 from html import escape
+from typing import Final
 
 import numpy as np
 
 from sagline.arrays import Array
+from sagline.dynamics.mode_list import MASSLESS
 from sagline.kinematics.status import PoseStatus
 from sagline.numbers import n
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.robot.several import pulleys_of
 from sagline.tension.margin import capacity_margin
+from sagline.viewer.channel import chosen_by
 from sagline.viewer.lines import dead_runs
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.tension_scale import TensionScale
 from sagline.viewer.wording import ForceUnit, number
 
 LATER = "compiling …"
+EXACT: Final = 1e-9  # m: nearer than that a platform rests where it is wanted; the rest is rounding
 _ALONE = 1e-9  # of a robot's highest tension: a tension this near to its limit is at it
 
 
@@ -88,7 +92,7 @@ def legend(scale: TensionScale, robot: Robot) -> str:
     marks = "".join(
         f'<span style="position:absolute;left:{100 * place:.1f}%;transform:translateX(-{100 * place:.0f}%)">'
         f"{tick / unit.newtons:g}</span>"
-        for tick, place in _spaced(scale)
+        for tick, place in spaced(scale)
     )
     return block(
         f"<b>Chord tension [{unit.name}]</b>"
@@ -111,7 +115,7 @@ def box(kind: str, head: str, text: str) -> str:
     )
 
 
-def _spaced(scale: TensionScale) -> list[tuple[float, float]]:
+def spaced(scale: TensionScale) -> list[tuple[float, float]]:
     """The ticks and their places, without those that would run into the one before."""
     kept: list[tuple[float, float]] = []
     for tick in scale.ticks():
@@ -133,7 +137,8 @@ def _summary(snapshot: Snapshot, *, capacity: bool) -> str:
         extra = unit.written(float(capacity_margin(snapshot.plan.state))) if capacity else LATER
         rows.append(("Spare force", f"{extra}, in any direction, the load shared anew" if capacity else extra))
     if (error := snapshot.error) is not None:
-        rows.append(("Really rests", f"{n(np.linalg.norm(error), unit='m')} off"))
+        away = float(np.linalg.norm(error))
+        rows.append(("Really rests", f"{n(away, unit='m')} off" if away > EXACT else "where it is wanted"))
     return "<dl>" + "".join(f"<dt>{name}</dt><dd>{text}</dd>" for name, text in rows) + "</dl>"
 
 
@@ -217,7 +222,20 @@ def _pulley_line(robot: Robot) -> str:
 def _listed(frequencies: Array | None) -> str:
     if frequencies is None or not np.isfinite(frequencies).any():
         return ""
-    return _frequency_line(", ".join(number(value, ".2f") for value in frequencies) + " Hz")
+    words = [_pressed(k, value) for k, value in enumerate(frequencies)]
+    ends = [*[","] * (len(words) - 1), " Hz"]  # stay with the number before
+    return _frequency_line(
+        " ".join(f'<span class="whole">{word}{end}</span>' for word, end in zip(words, ends, strict=True))
+    )
+
+
+def _pressed(mode: int, frequency: float) -> str:
+    """A frequency [Hz] that is pressed to see its mode move, where it has one."""
+    text = number(frequency, ".2f")
+    if not frequency > 0.0:  # NaN neither
+        return text
+    name = f"{MASSLESS} {mode + 1}"
+    return f'<button class="shake" {chosen_by("mode", name)} aria-label="{text} Hz: move mode {name}">{text}</button>'
 
 
 def _frequency_line(text: str) -> str:

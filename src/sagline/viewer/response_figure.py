@@ -10,6 +10,7 @@ import numpy as np
 from sagline.arrays import Array
 from sagline.dynamics.mode_list import ListedMode
 from sagline.dynamics.response_curves import ResponseCurves
+from sagline.viewer.channel import chosen_by
 from sagline.viewer.readout import block
 
 Place = Callable[[Array], Array]
@@ -47,7 +48,7 @@ def response_figure(curves: ResponseCurves, modes: list[ListedMode], words: str,
     )
     foot = HEIGHT - BOTTOM
     marks = "".join(
-        f'<g class="mark{" chosen" if mode.name == chosen else ""}" data-mode="{mode.name}">'
+        f'<g class="mark{" chosen" if mode.name == chosen else ""}" {chosen_by("mode", mode.name)}>'
         f'<rect x="{x - 3.0:.1f}" y="{foot - MARK}" width="6" height="{MARK + 2}"/>'
         f'<line x1="{x:.1f}" x2="{x:.1f}" y1="{foot}" y2="{foot - 2 - (MARK - 2) * mode.platform_share:.1f}"/></g>'
         for mode, x in zip(modes, across(np.array([each.frequency for each in modes])), strict=True)

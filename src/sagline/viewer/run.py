@@ -13,11 +13,11 @@ from sagline.kinematics.confirm import Confirmation, confirm
 from sagline.kinematics.plan import Plan
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.viewer.course_figure import CourseFigure
-from sagline.viewer.readout import block
-from sagline.viewer.run_figures import run_figures
+from sagline.viewer.readout import force_unit
 from sagline.viewer.snapshot import Snapshot
-from sagline.viewer.stage import ACTUAL, WANTED, stroke
+from sagline.viewer.stage import ACTUAL, WANTED
+from sagline.viewer.timeline_spans import infeasible
+from sagline.viewer.timeline_track import Chart, Track, cable_names, tension_limits
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,14 +84,18 @@ class Run:
         """The sample at or before a time [s]."""
         return self.snapshot(self.index_at(time))
 
-    def figures(self) -> tuple[CourseFigure, ...]:
-        """Tensions and lengths over time."""
-        return run_figures(self.plan, self.time)
-
-    def key(self) -> str:
-        """HTML that says which line is which cable, and which path is which."""
-        paths = block(f"path &nbsp;{stroke(WANTED)} desired {stroke(ACTUAL)} actual")
-        return CourseFigure.key(range(self.plan.unstrained_length.shape[-1])) + paths
+    def track(self) -> Track:
+        """The tensions that are limited and the lengths, and where there are none."""
+        plan, robot, unit = self.plan, self.robot, force_unit(self.robot)
+        name = "Chord tension" if robot.tension_limits_of == "chord" else "Tension at the winch"
+        limits = tension_limits(robot, unit.newtons, at=robot.tension_limits_of)
+        cables = cable_names(robot)
+        tension = Chart(
+            name, unit.name, unit.decimals, cables, lambda rows: plan.state.limited_tension[rows] / unit.newtons, limits
+        )
+        length = Chart("Unstrained length", "m", 4, cables, lambda rows: plan.unstrained_length[rows])
+        paths = (("desired", WANTED), ("actual", ACTUAL))
+        return Track(self.time, (tension, length), infeasible(plan, self.time, unit), (), paths)
 
     def traces(self, most: int, error_scale: float) -> tuple[Array, Array]:
         """Desired and actual positions (n, 3), n <= most, the error drawn some times as large; NaN in gaps."""

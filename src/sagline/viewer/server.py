@@ -77,19 +77,25 @@ def url(server: Server, host: str) -> str:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """A client that says nonsense is cut off or not heard, one that leaves gets no more; neither is news to anybody."""
+    """A client that says nonsense is cut off or not heard, one that leaves gets no more; neither is news to anybody.
+
+    Nor is it that a platform which stands on end has many triples of angles: one of them is shown.
+    """
     levels = {name: logging.getLogger(name).level for name in LOUD}
     for name in LOUD:
         logging.getLogger(name).setLevel(logging.CRITICAL)
-    warnings.filterwarnings("ignore", message="Queued a .* on a closed connection")
-    ours = warnings.filters[0]
+    ours = []
+    for message in ("Queued a .* on a closed connection", "Gimbal lock detected"):
+        warnings.filterwarnings("ignore", message=message)
+        ours.append(warnings.filters[0])
     try:
         yield
     finally:
         for name, level in levels.items():
             logging.getLogger(name).setLevel(level)
-        with suppress(ValueError):  # somebody may have taken it away
-            warnings.filters.remove(ours)  # type: ignore[attr-defined]
+        for each in ours:
+            with suppress(ValueError):  # somebody may have taken it away
+                warnings.filters.remove(each)  # type: ignore[attr-defined]
 
 
 def _check(host: str, port: int) -> None:

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from sagline.arrays import Array, Codes
-from sagline.control.events import Event
+from sagline.control.events import Event, EventKind
 from sagline.control.states import State
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.viewer.course_figure import CourseFigure
 from sagline.viewer.drawn import Drawn
-from sagline.viewer.readout import block, force_unit
-from sagline.viewer.stage import ACTUAL, TRUTH, WANTED, stroke
+from sagline.viewer.readout import force_unit
+from sagline.viewer.stage import ACTUAL, TRUTH, WANTED
+from sagline.viewer.timeline_spans import outside, spans_of
+from sagline.viewer.timeline_track import Chart, Mark, Span, Track, cable_names, tension_limits
 
 PER_METER = 1e3  # mm
 WRONG = (State.FAULT, State.EMERGENCY)
@@ -103,27 +105,40 @@ class Session:
         away = actual - planned
         return planned, np.where(np.isfinite(away), planned + error_scale * away, actual)
 
-    def figures(self) -> tuple[CourseFigure, ...]:
-        """Tensions, what they are off, the lengths' error, and where the platform is less where it was to be."""
-        unit, count = force_unit(self.robot), self.robot.cable_count
-        off = self.tension - self.planned_tension
-        pairs = [
-            (f"Tension, measured [{unit.name}]", self.tension / unit.newtons),
-            ("Tension less the planned one [N]", off),
-            ("Length set less measured [mm]", PER_METER * (self.set_length - self.length)),
-            ("Estimated less planned x, y, z [mm]", PER_METER * (self.position - self.planned)),
-        ]
-        if self.true is not None:
-            pairs.append(("True less planned x, y, z [mm]", PER_METER * (self.true - self.planned)))
-        assert all(values.shape[1] in (3, count) for _, values in pairs)
-        return tuple(CourseFigure.of(title, self.time, values) for title, values in pairs)
+    def track(self) -> Track:
+        """Tensions, what they are off, what lengths and platform are off, and what happened."""
+        unit, cables, axes = force_unit(self.robot), cable_names(self.robot), ("x", "y", "z")
+        limits = tension_limits(self.robot, unit.newtons, at="frame_end")
 
-    def key(self) -> str:
-        """Which line is which cable, and which platform is which."""
-        marks = f"{stroke(WANTED)} planned {stroke(ACTUAL)} estimated"
-        marks += f" {stroke(TRUTH)} true" if self.true is not None else ""
-        keys = CourseFigure.key(range(self.robot.cable_count)) + CourseFigure.key("xyz", "along")
-        return keys + block(f"platform &nbsp;{marks}")
+        def off(value: Array, wanted: Array, scale: float = PER_METER) -> Callable[[slice], Array]:
+            return lambda rows: scale * (value[rows] - wanted[rows])
+
+        name, decimals, newtons = unit.name, unit.decimals, unit.newtons
+        charts = [
+            Chart("Tension, measured", name, decimals, cables, lambda rows: self.tension[rows] / newtons, limits),
+            Chart("Tension less the planned one", "N", 1, cables, off(self.tension, self.planned_tension, 1.0)),
+            Chart("Length set less measured", "mm", 2, cables, off(self.set_length, self.length)),
+            Chart("Estimated less planned", "mm", 2, axes, off(self.position, self.planned)),
+        ]
+        paths = [("planned", WANTED), ("estimated", ACTUAL)]
+        if self.true is not None:
+            charts.append(Chart("True less planned", "mm", 2, axes, off(self.true, self.planned)))
+            paths.append(("true", TRUTH))
+        marks = tuple(
+            Mark(event.time - self.began, f"{event.name}: {event.text}", bad=event.kind is EventKind.FAULT)
+            for event in self.events
+        )
+        return Track(self.time, tuple(charts), self._wrong(), marks, tuple(paths))
+
+    def _wrong(self) -> tuple[Span, ...]:
+        """Where the controller had stopped for a fault, or a tension was beyond its limits."""
+
+        def why(rows: slice) -> str:
+            state = self.state[rows]
+            return State(int(state[np.isin(state, WRONG)][0])).name
+
+        faults = spans_of(self.time, np.isin(self.state, WRONG), why)
+        return tuple(sorted(faults + outside(self.robot, self.time, self.tension, force_unit(self.robot))))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

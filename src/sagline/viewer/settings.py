@@ -9,14 +9,16 @@ from typing import Final
 from sagline.arrays import checked
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
+from sagline.cables.models import MODELS as ALL_MODELS
 from sagline.robot.inertia import with_mass
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 from sagline.tension.methods import METHODS as ALL_METHODS
 from sagline.tension.minimum_norm import MinimumNorm
-from sagline.viewer.wording import MODEL_NAMES, method_name, remembers
+from sagline.viewer.wording import method_name, model_name, remembers
 
-MODELS: Final = MappingProxyType({name: model() for model, name in MODEL_NAMES.items()})
+# the exact one first
+MODELS: Final = MappingProxyType({model_name(make()): make() for make in reversed(ALL_MODELS.values())})
 # those that remember come last: by default what is shown depends on the pose alone
 METHODS: Final = MappingProxyType(
     {method_name(method): method for method in sorted((make() for make in ALL_METHODS.values()), key=remembers)}
@@ -55,6 +57,11 @@ class Settings:
         checked(self.stiffness, "cable stiffness", "times", above=0.0)
         checked(self.sag_scale, "drawn sag", "times", low=0.0)
         checked(self.error_scale, "drawn error", "times", low=0.0)
+
+    @property
+    def changes(self) -> tuple[float, float, float]:
+        """What changes the robot: mass, density and stiffness."""
+        return self.mass, self.density, self.stiffness
 
     def applied(self, robot: Robot) -> Robot:
         """The robot with its load and cables changed.

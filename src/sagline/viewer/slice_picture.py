@@ -9,11 +9,25 @@ from contourpy import LineType, contour_generator
 from numpy.typing import NDArray
 
 from sagline.arrays import Array
-from sagline.viewer.margin_scale import MarginScale
+from sagline.viewer.margin_scale import MarginScale, bare
+from sagline.viewer.wording import ForceUnit
 from sagline.workspaces.slice import Slice
 
+APART = 0.12  # of the slice's longer side: the least distance between two of the margins that stand on its lines
 FINER = 3  # points of the picture for one of the grid, each way
 INSIDE_OPACITY, OUTSIDE_OPACITY = 150, 90  # of 255: the robot behind it is seen
+
+
+class Mark(NamedTuple):
+    """A margin in words, on its line.
+
+    Attributes:
+        text: It.
+        place: Where [m], shape (3,).
+    """
+
+    text: str
+    place: Array
 
 
 class Picture(NamedTuple):
@@ -23,22 +37,41 @@ class Picture(NamedTuple):
         image: Red, green, blue and opacity, the first row the lowest, shape (h, w, 4).
         boundary: Segments of the line where the margin is 0, in the world [m], shape (b, 2, 3).
         lines: Segments between the other bands, shape (s, 2, 3).
+        marks: What stands on the lines.
     """
 
     image: NDArray[np.uint8]
     boundary: Array
     lines: Array
+    marks: list[Mark]
 
 
-def picture_of(cut: Slice, scale: MarginScale) -> Picture:
-    """Colors and lines of a slice."""
+def picture_of(cut: Slice, scale: MarginScale, unit: ForceUnit) -> Picture:
+    """Colors and lines of a slice, each line with its margin."""
     margin = np.clip(cut.margin, scale.edges[0] - scale.step, scale.edges[-1] + scale.step)  # infinite ones have lines
     fine = _finer(_finer(margin).T).T
     opacity = np.where(fine >= 0.0, INSIDE_OPACITY, OUTSIDE_OPACITY).astype(np.uint8)
     found = contour_generator(cut.across, cut.up, margin, line_type=LineType.ChunkCombinedOffset)
-    edges = scale.edges
-    others = [_segments(found.lines(float(edge)), cut) for edge in edges if edge != 0.0]
-    return Picture(np.dstack((scale.colors(fine), opacity)), _segments(found.lines(0.0), cut), np.concatenate(others))
+    lines = [(float(edge), _segments(found.lines(float(edge)), cut)) for edge in scale.edges]
+    boundary = next(own for edge, own in lines if edge == 0.0)
+    others = np.concatenate([own for edge, own in lines if edge != 0.0])
+    marks = _marks(sorted(lines, key=lambda line: abs(line[0])), cut, unit)
+    return Picture(np.dstack((scale.colors(fine), opacity)), boundary, others, marks)
+
+
+def _marks(lines: list[tuple[float, Array]], cut: Slice, unit: ForceUnit) -> list[Mark]:
+    """Where margins stand: each at that end of its line which is farthest in a direction of its own, 0 before all."""
+    room = APART * max(float(np.ptp(cut.across)), float(np.ptp(cut.up)))
+    marks: list[Mark] = []
+    for k, (edge, segments) in enumerate(lines):
+        middles = segments.mean(axis=1)
+        taken = [np.linalg.norm(middles - mark.place, axis=1) < room for mark in marks]
+        free = middles[~np.logical_or.reduce([np.zeros(len(middles), dtype=bool), *taken])]
+        if len(free):
+            way = 2.0 * np.pi * (0.1 + k / len(lines))
+            along = free[:, list(cut.plane.axes)] @ np.array([np.cos(way), np.sin(way)])
+            marks.append(Mark(f"{bare(edge, unit)} {unit.name}", free[along.argmax()]))
+    return marks
 
 
 def _finer(values: Array) -> Array:

@@ -16,6 +16,7 @@ from sagline.kinematics.status import PoseStatus
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.tension.margin import cable_margins
+from sagline.tension.method import TensionMethod, shared_tension
 from sagline.viewer import lines
 from sagline.viewer.settings import Settings
 from sagline.viewer.tension_scale import Colors, TensionScale
@@ -33,6 +34,7 @@ class Snapshot:
         rest: Where the platform would really rest on exact cables of the planned lengths; None where the plan has no
             answer or the model is exact.
         refusal: Which cable over a pulley has no chord, and why; "" where all have.
+        previous: The tensions that a way of sharing that remembers went on from [N], shape (m,); None for none.
     """
 
     robot: Robot
@@ -40,6 +42,7 @@ class Snapshot:
     plan: Plan | None
     rest: Pose | None
     refusal: str = ""
+    previous: Array | None = None
 
     @property
     def feasible(self) -> bool:
@@ -152,10 +155,18 @@ def taken_at(
         confirmed: Whether to find where the platform really rests, if the model is approximate.
         wrench: External wrench, shape (6,), as `inverse` takes it; None for none.
     """
-    reference = previous if remembers(settings.tension) else None
+    reference = _remembered(previous, settings.tension)
     try:
         plan = inverse(robot, pose, settings.model, settings.tension, wrench, reference)
     except CableGeometryError as error:
-        return Snapshot(robot, pose, None, None, "" if robot.winches is None else str(error).removeprefix("pose, "))
+        reason = "" if robot.winches is None else str(error).removeprefix("pose, ")
+        return Snapshot(robot, pose, None, None, reason, reference)
     approximate = confirmed and not isinstance(settings.model, Catenary) and bool(plan.feasible)
-    return Snapshot(robot, pose, plan, confirm(plan).pose if approximate else None)
+    return Snapshot(robot, pose, plan, confirm(plan).pose if approximate else None, "", reference)
+
+
+def _remembered(previous: Plan | None, tension: TensionMethod) -> Array | None:
+    """The tensions that a way of sharing goes on from, in its variable [N], shape (m,); None for none."""
+    if previous is None or not remembers(tension) or not previous.feasible or previous.at_border:
+        return None
+    return shared_tension(previous.state, tension.variable)

@@ -9,7 +9,6 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
-from trimesh.creation import annulus
 
 from sagline.arrays import Array
 from sagline.robot.bounds import bounds as bounds
@@ -90,6 +89,8 @@ def winches(robot: Robot) -> Solid:
 
 def wheel() -> Solid:
     """A pulley of radius 1 as it stands for a cable along x: it is entered at the origin, its middle is at x = 1."""
+    from trimesh.creation import annulus  # of an extra, which figures do without that only ask for sizes here
+
     rim, hub = (annulus(*radii, _WHEEL_WIDTH, sections=_WHEEL_SIDES).triangles.reshape(-1, 3) for radii in _WHEEL)
     spokes = [rod(np.array([inner, outer]), _SPOKE) for inner, outer in _spokes()]
     corners = [Solid(ring, np.arange(len(ring)).reshape(-1, 3)) for ring in (rim, hub)]

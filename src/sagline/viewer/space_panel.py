@@ -38,10 +38,11 @@ class SpacePanel:
                 "Moment ± [N m]", 0.0, min=0.0, hint="The same about each axis, about the center of mass."
             )
             self._hull: Any = gui.add_checkbox(
-                "Hull", False, hint="Where the platform can be held, turned as it is now; takes some seconds."
+                "Region", False, hint="Where the platform may go, turned as it is now, with these loads."
             )
-            self._by: Any = gui.add_dropdown("Hull colored by", (BY_CABLE, BY_MARGIN), visible=False)
+            self._by: Any = gui.add_dropdown("Region colored by", (BY_CABLE, BY_MARGIN), visible=False)
             self._told = gui.add_html("")
+            self._left = gui.add_html("")
             self._slice: Any = gui.add_checkbox("Slice", False, hint="Margins on a plane through the platform.")
             names = tuple(name for name, normal in PLANES.items() if normal in planes)
             self._plane: Any = gui.add_dropdown("Plane", names, visible=False)
@@ -96,7 +97,7 @@ class SpacePanel:
         """Show the choices of what is wanted, and forget what is not."""
         self._by.visible, self._plane.visible = self.hull, self.slice
         if not self.hull:
-            self._told.content = ""
+            self._told.content = self._left.content = ""
         if not self.slice and not (self.hull and not self.by_cable):
             self._key.content = ""
         if not self.ways:
@@ -110,9 +111,13 @@ class SpacePanel:
         """What the hull is, in HTML."""
         self._told.content = block(html)
 
+    def tell_left(self, text: str) -> None:
+        """How much is left where the platform is."""
+        self._left.content = block(f"<b>Here</b> {text}")
+
     def refuse(self, message: str) -> None:
         """Say why there is nothing to see."""
-        self._told.content = refused(message)
+        self._told.content, self._left.content = refused(message), ""
 
     def explain(self, scale: MarginScale, unit: ForceUnit) -> None:
         """Say which color is which margin."""

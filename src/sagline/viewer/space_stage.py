@@ -2,79 +2,66 @@
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 import viser
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from sagline.arrays import Array
+from sagline.viewer.patches import Patch, Patches
 from sagline.viewer.slice_picture import Picture
 from sagline.viewer.stage import INFEASIBLE, PLATFORM, REST
 from sagline.viewer.where_to import NAMES, WhereTo
 from sagline.workspaces.slice import Plane
 
-HULL_OPACITY: Final = 0.35  # the robot inside is seen
 BOUNDARY, BETWEEN = INFEASIBLE, (120, 128, 138)
-BOUNDARY_WIDTH, BETWEEN_WIDTH = 3.0, 1.0  # px
+BOUNDARY_WIDTH, BETWEEN_WIDTH = 4.0, 1.5  # px
+_SMALL, _SAID = 0.7, 0.85  # of what stands on lines, and at the platform
 GO, STOP = PLATFORM, REST  # ways to where it has to stop, and ways back
+_BELOW: Final = 0.04  # of the robot's size, from the platform to what is said under it
 _SHAFT, _HEAD, _LONG = 0.002, 0.009, 0.03  # of an arrow, of the robot's size
 # what lies in x and y of a picture: turned so that they are the two axes of a plane, by its normal
 _TURNS: Final = np.array([[0.5, 0.5, 0.5, 0.5], [np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]])
 
 
-class Patch(NamedTuple):
-    """Faces of one color.
-
-    Attributes:
-        vertices: Corners [m], shape (V, 3).
-        faces: Shape (F, 3).
-        color: Red, green and blue, 0 to 255.
-        name: What stands beside it; "" for nothing.
-    """
-
-    vertices: Array
-    faces: Array
-    color: tuple[int, int, int]
-    name: str
-
-
 class SpaceStage:
     """What is drawn of a workspace; nothing until it is asked for."""
 
-    def __init__(self, scene: viser.SceneApi, size: float) -> None:
+    def __init__(self, server: viser.ViserServer, size: float) -> None:
         """Begin with nothing, for a robot of a size [m]."""
-        self._scene, self._size = scene, size
-        self._meshes: list[Any] = []
-        self._hull_names: list[Any] = []
+        self._server, self._scene, self.size = server, server.scene, size
+        self._hull, self._wall = Patches(server.scene, "/hull"), Patches(server.scene, "/wall")
+        self._left: Any = None
         self._slice: list[Any] = []
+        self._levels: list[Any] = []
         self._plane: tuple[object, ...] = ()
         self._arrows: Any = None
         self._names: list[Any] = []
 
-    def show_hull(self, patches: list[Patch]) -> None:
-        """Draw a hull in place of the one before; none for nothing."""
-        _take_away(self._hull_names)  # before what they hang on
-        _take_away(self._meshes)
-        for k, patch in enumerate(patches):
-            self._meshes.append(
-                self._scene.add_mesh_simple(
-                    f"/hull/{k}", patch.vertices.astype(np.float32), patch.faces.astype(np.uint32), color=patch.color,
-                    opacity=HULL_OPACITY, side="double", cast_shadow=False, receive_shadow=False,
-                )
-            )  # fmt: skip
-            if patch.name:
-                place = _within(patch)
-                name = self._scene.add_label(f"/hull/{k}/name", patch.name, position=place, font_screen_scale=0.8)
-                self._hull_names.append(name)
+    def show_hull(self, patches: list[Patch], *, opened: bool) -> None:
+        """Draw a hull in place of the one before; none for nothing.
 
-    def open_hull(self, *, opened: bool) -> None:
-        """Leave out the faces that are nearer than the robot, which hide a slice; or put them back."""
-        side: Any = "back" if opened else "double"
-        for mesh in self._meshes:
-            if mesh.side != side:
-                mesh.side = side
+        Args:
+            patches: Its faces.
+            opened: Whether those are left out that are nearer than the robot, which hide a slice.
+        """
+        with self._server.atomic():
+            self._hull.show(patches, "back" if opened else "double")
+
+    def show_wall(self, patches: list[Patch], left: str) -> None:
+        """Draw what of the hull is lit in place of what was, and say at the platform how much is left."""
+        with self._server.atomic():
+            self._wall.show(patches)
+            if self._left is None and left:
+                self._left = self._scene.add_label(
+                    "/platform/left",
+                    left,
+                    position=(0.0, 0.0, -_BELOW * self.size),
+                    anchor="top-center",
+                    font_screen_scale=_SAID,
+                )
+            if self._left is not None:
+                self._left.text, self._left.visible = left, bool(left)
 
     def show_slice(self, plane: Plane, low: Array, high: Array, picture: Picture) -> None:
         """Draw a slice of a box in place of the one before."""
@@ -107,9 +94,16 @@ class SpaceStage:
             handle.visible = len(segments) > 0
             if len(segments):
                 handle.points = segments.astype(np.float32)
+        for k, mark in enumerate(picture.marks):
+            if k == len(self._levels):
+                self._levels.append(self._scene.add_label(f"/slice/level{k}", "", font_screen_scale=_SMALL))
+            self._levels[k].text, self._levels[k].position, self._levels[k].visible = mark.text, mark.place, True
+        for handle in self._levels[len(picture.marks) :]:
+            handle.visible = False
 
     def hide_slice(self) -> None:
         """Draw no slice."""
+        _take_away(self._levels)
         _take_away(self._slice)
         self._plane = ()
 
@@ -119,8 +113,8 @@ class SpaceStage:
         if self._arrows is None or len(self._names) != len(ends):
             self.hide_ways()
             self._arrows = self._scene.add_arrows(
-                "/ways", ends, GO, shaft_radius=_SHAFT * self._size, head_radius=_HEAD * self._size,
-                head_length=_LONG * self._size,
+                "/ways", ends, GO, shaft_radius=_SHAFT * self.size, head_radius=_HEAD * self.size,
+                head_length=_LONG * self.size,
             )  # fmt: skip
             self._names = [
                 self._scene.add_label(f"/ways/{NAMES[k]}", "", anchor="bottom-center", font_screen_scale=0.85)
@@ -146,14 +140,3 @@ class SpaceStage:
 def _take_away(handles: list[Any]) -> None:
     while handles:
         handles.pop().remove()
-
-
-def _within(patch: Patch) -> Array:
-    """A corner of the largest piece of the patch, as near to the piece's middle as there is."""
-    ends = np.concatenate([patch.faces[:, [k, k - 1]] for k in range(3)])
-    count = len(patch.vertices)
-    joined = coo_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(count, count))
-    _, piece = connected_components(joined, directed=False)
-    largest = np.bincount(piece[patch.faces[:, 0]]).argmax()
-    own = patch.vertices[(piece == largest) & np.isin(np.arange(count), patch.faces)]
-    return np.asarray(own[np.argmin(np.linalg.norm(own - own.mean(axis=0), axis=1))])

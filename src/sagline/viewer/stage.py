@@ -13,6 +13,7 @@ from sagline.robot.pattern import ROTATING
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.robot.several import pulleys_of
+from sagline.robot.unit import unit
 from sagline.viewer import lines, solids
 from sagline.viewer.drawn import Drawn
 from sagline.viewer.readout import headline
@@ -39,18 +40,26 @@ _GIZMO: Final = (0.09, 0.16)  # smallest and largest reach of the gizmo, of the 
 class Stage:
     """The robot's parts in a scene. Every client of a server's scene sees, and may drag, the same."""
 
-    def __init__(self, scene: viser.SceneApi, robot: Robot, home: Pose, *, draggable: bool = True) -> None:
-        """Build the scene with the platform at home, to be dragged or only to be looked at."""
-        self._scene = scene
+    def __init__(
+        self, scene: viser.SceneApi, robot: Robot, home: Pose, *, live: bool = True, pixel: float = 0.0
+    ) -> None:
+        """Build the scene with the platform at home.
+
+        Args:
+            scene: Where.
+            robot: The robot.
+            home: Where its platform is at first.
+            live: Whether it is dragged and its parts are named, or it is only a picture.
+            pixel: What lines that are wide so many pixels are wide so many of in the scene [m]; 0 for on the screen.
+        """
+        self._scene, self._live, self._pixel = scene, live, pixel
         self._scene.configure_default_lights(cast_shadow=False)  # a small screen has better things to compute
         self._low, self._high = solids.bounds(robot)
         self._size = solids.size_of(robot)
         self._winches = solids.winches(robot)
         self._build_surroundings(robot)
         body = self._body = solids.platform(robot)
-        self._gizmo: Any = (
-            self._build_gizmo(robot, body) if draggable else scene.add_frame("/platform", show_axes=False)
-        )
+        self._gizmo: Any = self._build_gizmo(robot, body) if live else scene.add_frame("/platform", show_axes=False)
         self._traces: list[Any] = []
         self._platform: Any = self._scene.add_mesh_simple("/platform/body", body.vertices, body.faces, color=PLATFORM)
         self._rest_frame = self._scene.add_frame("/rest", show_axes=False, visible=False)
@@ -59,13 +68,9 @@ class Stage:
         self._over_pulleys = pulleys_of(robot).radius > 0.0
         self._wheels = self._build_pulleys(robot, home) if self._over_pulleys.any() else None
         blank = np.zeros((robot.cable_count * (lines.points_per_cable(robot) - 1), 2, 3))
-        self._cables = self._scene.add_line_segments(
-            "/cables", blank, GHOST, thickness=CABLE_WIDTH, thickness_units="screen"
-        )
+        self._cables = self._scene.add_line_segments("/cables", blank, GHOST, **self._wide(CABLE_WIDTH))
         self._cables.colors = np.zeros(blank.shape, dtype=np.uint8)
-        self._ghost = self._scene.add_line_segments(
-            "/chords", blank, GHOST, thickness=GHOST_WIDTH, thickness_units="screen", visible=False
-        )
+        self._ghost = self._scene.add_line_segments("/chords", blank, GHOST, **self._wide(GHOST_WIDTH), visible=False)
         self._notice = self._scene.add_label(
             "/platform/notice", "", position=(0.0, 0.0, 0.13 * self._size), visible=False, anchor="bottom-center"
         )
@@ -91,13 +96,22 @@ class Stage:
         position = np.asarray(self._gizmo.position, dtype=np.float64).reshape(-1)
         wxyz = np.asarray(self._gizmo.wxyz, dtype=np.float64).reshape(-1)
         length = float(np.linalg.norm(wxyz)) if wxyz.size == 4 else 0.0
+        if position.size != 3 or not 0.5 < length < 2.0:
+            position = np.full(3, np.nan)
+        self.check_near(position)
+        return Pose.from_quaternion(position, unit(np.roll(wxyz, -1)))
+
+    def check_near(self, position: Array) -> None:
+        """Refuse what is no position, or one far outside of the robot.
+
+        Raises:
+            InvalidValueError: If it is such a one.
+        """
         far = FAR * self._size
-        middle = 0.5 * (self._low + self._high)
-        if position.size != 3 or not np.all(np.abs(position - middle) < far) or not 0.5 < length < 2.0:
+        if not np.all(np.abs(position - 0.5 * (self._low + self._high)) < far):
             raise InvalidValueError(
                 "platform", "dragged out of sight", f"within {far:.3g} m of the robot", "Drag it back, or reset it."
             )
-        return Pose.from_quaternion(position, np.roll(wxyz, -1) / length)
 
     def place(self, pose: Pose) -> None:
         """Put the platform, and with it its gizmo, at a pose."""
@@ -114,7 +128,7 @@ class Stage:
             turns = solids.turns(snapshot.robot, snapshot.pose)[self._over_pulleys]
             self._wheels.batched_wxyzs = turns.astype(np.float32)
         self._platform.color = PLATFORM if snapshot.feasible else INFEASIBLE
-        self._notice.visible = not snapshot.feasible
+        self._notice.visible = self._live and not snapshot.feasible
         if isinstance(snapshot, Snapshot) and not snapshot.feasible:
             self._notice.text = headline(snapshot)
         elif isinstance(snapshot, Drawn):
@@ -160,9 +174,13 @@ class Stage:
             pairs = np.stack((points[:-1], points[1:]), axis=1)
             known = pairs[np.isfinite(pairs).all(axis=(1, 2))]
             if len(known):
-                self._traces.append(
-                    self._scene.add_line_segments(name, known, color, thickness=TRACE_WIDTH, thickness_units="screen")
-                )
+                self._traces.append(self._scene.add_line_segments(name, known, color, **self._wide(TRACE_WIDTH)))
+
+    def _wide(self, pixels: float) -> dict[str, Any]:
+        """How viser is told the width of lines."""
+        if self._pixel == 0.0:
+            return {"thickness": pixels, "thickness_units": "screen"}
+        return {"thickness": pixels * self._pixel, "thickness_units": "world"}
 
     def _build_surroundings(self, robot: Robot) -> None:
         frame = solids.frame(robot)
@@ -179,7 +197,7 @@ class Stage:
             cell_thickness=0.6, section_thickness=1.0, fade_distance=12.0 * self._size,
         )  # fmt: skip
         self._build_axes()
-        for place, names in _neighbors(robot.frame_anchors, NEAR * self._size):
+        for place, names in _neighbors(robot.frame_anchors, NEAR * self._size) if self._live else ():
             self._scene.add_label(
                 f"/names/{names[0]}",
                 ", ".join(map(str, names)),
@@ -202,14 +220,14 @@ class Stage:
             shown = runs[which & (runs[:, 0, 2] != runs[:, 1, 2])]
             if len(shown):
                 pieces = lines.segments(lines.straight(shown), dashed=name != "/dead")
-                self._scene.add_line_segments(name, pieces, STEEL, thickness=GHOST_WIDTH, thickness_units="screen")
+                self._scene.add_line_segments(name, pieces, STEEL, **self._wide(GHOST_WIDTH))
 
     def _build_axes(self) -> None:
         """The directions of the world at a corner of the floor; their arms of a round length are the scale."""
         arm = solids.round_below(_ARM * self._size)
         corner = self._low - np.array([0.0, 0.06 * self._size, 0.0])
         arms = np.stack((np.zeros((3, 3)), arm * np.eye(3)), axis=1) + corner
-        self._scene.add_line_segments("/axes", arms, STEEL, thickness=ARM_WIDTH, thickness_units="screen")
+        self._scene.add_line_segments("/axes", arms, STEEL, **self._wide(ARM_WIDTH))
         for name, place in zip("xyz", arms[:, 1], strict=True):
             self._scene.add_label(f"/axes/{name}", name, position=place, anchor="bottom-center", font_screen_scale=0.8)
         self._scene.add_label(

@@ -60,12 +60,17 @@ class TensionScale:
 
     def linear_colors(self, tension: Array) -> Colors:
         """The same colors with the sRGB curve undone: viser's client applies it to the colors of line ends."""
-        share = self.colors(tension) / 255.0
-        linear = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
-        return np.rint(255.0 * linear).astype(np.uint8)
+        return linear(self.colors(tension))
 
     def ticks(self) -> tuple[float, ...]:
         """Round tensions to write beside the scale: 1, 2 and 5 times powers of ten within it."""
         decades = range(int(log10(self.low)) - 1, int(log10(self.high)) + 2)
         found = tuple(step * 10.0**decade for decade in decades for step in (1, 2, 5))
         return tuple(tick for tick in found if self.low <= tick <= self.high)
+
+
+def linear(colors: Colors) -> Colors:
+    """Colors with the sRGB curve undone, as viser's client wants those of line ends."""
+    share = colors / 255.0
+    undone = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+    return np.rint(255.0 * undone).astype(np.uint8)

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from sagline.arrays import Array, Flags, Indices, locked
+from sagline.robot.robot import Robot
 from sagline.workspaces.slice import Find
 
 _STEPS: Final = 20  # along each way at first: a gap that is narrower than a step may be passed over
@@ -42,6 +43,22 @@ class WhereTo:
     def ends(self) -> Array:
         """Where the ways end [m], shape (K, 3)."""
         return np.asarray(self.start + self.distance[:, None] * WAYS[self.which])
+
+
+def free_ways(robot: Robot, flat: int | None) -> Indices:
+    """Ways along axes of the world that the platform may move along.
+
+    Args:
+        robot: The robot.
+        flat: An axis along which positions are all the same; None for none.
+
+    Returns:
+        Indices of `WAYS`, shape (K,).
+    """
+    free = np.abs(robot.freedom[:, :3]).max(axis=0) > 0.5
+    if flat is not None:
+        free[flat] = False
+    return np.flatnonzero(np.abs(WAYS) @ free > 0.5)
 
 
 def where_to(find: Find, start: Array, which: Indices, low: Array, high: Array) -> WhereTo:

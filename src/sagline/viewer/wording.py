@@ -9,16 +9,13 @@ from sagline.cables.catenary import Catenary
 from sagline.cables.elastic import Elastic
 from sagline.cables.empirical import Empirical
 from sagline.cables.model import CableModel
-from sagline.cables.parabolic import Parabolic
-from sagline.cables.straight import Straight
 from sagline.tension.method import TensionMethod
+from sagline.viewer.by_hand import BY_HAND, ByHand
 
-MODEL_NAMES: dict[type[CableModel], str] = {
+MODEL_NAMES: dict[type[CableModel], str] = {  # those that say more than the name of their class
     Catenary: "catenary (exact)",
-    Parabolic: "parabolic",
     Empirical: "empirical (the article's)",
     Elastic: "elastic, weightless",
-    Straight: "straight",
 }
 _NONE = "–"
 KILO_FROM = 1e5  # N: forces from here on are written in kilonewtons
@@ -36,6 +33,11 @@ class ForceUnit(NamedTuple):
     name: str
     newtons: float
     form: str
+
+    @property
+    def decimals(self) -> int:
+        """How many decimals."""
+        return int(self.form[1])
 
     @classmethod
     def up_to(cls, highest: float) -> ForceUnit:
@@ -61,12 +63,12 @@ def number(value: float, form: str) -> str:
 
 def model_name(model: CableModel) -> str:
     """What a cable model is called."""
-    return MODEL_NAMES.get(type(model), type(model).__name__)
+    return MODEL_NAMES.get(type(model), type(model).__name__.lower())
 
 
 def method_name(method: TensionMethod) -> str:
     """What a way of sharing the load is called, and that it remembers if it does."""
-    name = type(method).__name__
+    name = BY_HAND if isinstance(method, ByHand) else type(method).__name__
     return f"{name} (remembers the way)" if remembers(method) else name
 
 

@@ -1,0 +1,156 @@
+"""What a page plays: poses, tensions and lengths over time, and what is to say of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sagline.arrays import Array
+from sagline.cables.catenary import Catenary
+from sagline.dynamics.simulation import Simulation
+from sagline.kernels.cable import geometry
+from sagline.kinematics.plan import Gap, Plan
+from sagline.kinematics.status import PoseStatus
+from sagline.numbers import n
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.robot.several import pulleys_of
+from sagline.robot.wheels import dead_cable
+from sagline.statics.chords import chord_geometry
+
+MOST_RATE: Final = 100.0  # samples a second; of twice as many and more a page keeps some: screens show 60
+
+
+class Verdict(NamedTuple):
+    """What is said of a sample.
+
+    Attributes:
+        good: Whether all is well; None where there is nothing to judge.
+        words: The sentence.
+    """
+
+    good: bool | None
+    words: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Course:
+    """N samples of a robot in motion.
+
+    Attributes:
+        robot: The robot.
+        kind: What it is, in a word.
+        time: From 0 on [s], shape (N,).
+        position: Of the platform's origin [m], shape (N, 3); NaN where it is not known.
+        quaternion: Its rotation, scalar last, shape (N, 4).
+        tension: What is told and colored [N], shape (N, m).
+        quantity: Which tension that is.
+        chord_tension: With which cables are drawn [N], shape (N, m); NaN draws a straight line.
+        length: Unstrained, off the drum [m], shape (N, m).
+        verdict: Which of the verdicts, shape (N,).
+        verdicts: All that are said.
+        notes: What is to be known of the page.
+    """
+
+    robot: Robot
+    kind: str
+    time: Array
+    position: Array
+    quaternion: Array
+    tension: Array
+    quantity: str
+    chord_tension: Array
+    length: Array
+    verdict: NDArray[np.intp]
+    verdicts: tuple[Verdict, ...]
+    notes: tuple[str, ...] = ()
+
+    def pose_at(self, index: int) -> Pose | None:
+        """Where the platform is at a sample; None where that is not known."""
+        if not np.isfinite(self.position[index]).all():
+            return None
+        return Pose.from_quaternion(self.position[index], self.quaternion[index])
+
+    def thinned(self) -> Course:
+        """Every so many samples, and the last, where there are more than a screen shows; the notes say so."""
+        count, duration = len(self.time), float(self.time[-1])
+        every = int((count - 1) / (MOST_RATE * duration)) if duration > 0.0 else 1
+        if every <= 1:
+            return self
+        rows = np.unique(np.append(np.arange(0, count, every), count - 1))
+        note = f"One in {every} of {count:,} samples is kept."
+        fields = ("time", "position", "quaternion", "tension", "chord_tension", "length", "verdict")
+        kept = {name: getattr(self, name)[rows] for name in fields}
+        return Course(
+            self.robot, self.kind, quantity=self.quantity, verdicts=self.verdicts, notes=(*self.notes, note), **kept
+        )
+
+
+def of_plan(plan: Plan) -> Course:
+    """A plan of N poses in a row, one second each where they have no times."""
+    count = len(plan.state.pose)
+    time = np.arange(count, dtype=np.float64) if plan.path is None else plan.path.time
+    verdicts = [Verdict(True, "Feasible")]
+    which = np.zeros(count, dtype=np.intp)
+    for gap in plan.gaps:
+        which[gap.first : gap.last + 1] = len(verdicts)
+        verdicts.append(Verdict(False, _why(gap)))
+    notes = ["Poses without times: one a second."] * (plan.path is None)
+    if not isinstance(plan.state.cables.model, Catenary):
+        name = type(plan.state.cables.model).__name__.lower()
+        notes.append(f"Planned with the {name} model; cables are drawn as they hang at these tensions.")
+    return Course(
+        plan.state.one_robot, "run", time - time[0], plan.state.pose.position, plan.state.pose.quaternion,
+        plan.chord_tension, "along the chord", plan.chord_tension, plan.unstrained_length, which, tuple(verdicts),
+        tuple(notes),
+    )  # fmt: skip
+
+
+def _why(gap: Gap) -> str:
+    if gap.status is not PoseStatus.INFEASIBLE:
+        return f"Not feasible: {gap.status.text.partition(';')[0]}"
+    short = (
+        f"short of up to {n(gap.shortfall, '.3g', 'N')}" if np.isfinite(gap.shortfall) else "no force alone would do"
+    )
+    cables = f"; at their limits: cables {', '.join(map(str, gap.cables))}" if gap.cables else ""
+    return f"Not feasible: {short}{cables}"
+
+
+def of_simulation(simulation: Simulation) -> Course:
+    """A simulation; cables with mass are drawn as massless ones of their lengths hang."""
+    robot, time = simulation.robot, simulation.time
+    broken = np.zeros_like(simulation.tensions, dtype=bool)
+    said = [Verdict(None, "Simulated")]
+    which = np.zeros(len(time), dtype=np.intp)
+    for event in simulation.events:
+        of = "" if event.cable is None else f" of cable {event.cable}"
+        which[time >= event.time] = len(said)
+        said.append(Verdict(None, f"{event.kind.capitalize()}{of} at {event.time - time[0]:.3f} s"))
+        if event.kind == "break" and event.cable is not None:
+            broken[time >= event.time, event.cable] = True
+    tension = np.where(broken, np.nan, simulation.tensions)
+    drawn = np.where(broken, np.nan, chord_tension(robot, simulation.pose, simulation.length))
+    notes = ("Cables with mass are drawn as cables of their lengths hang at rest.",) * (simulation.nodes is not None)
+    pose = simulation.pose
+    return Course(
+        robot, "simulation", time - time[0], pose.position, pose.quaternion, tension, "at the frame end", drawn,
+        simulation.length, which, tuple(said), notes,
+    )  # fmt: skip
+
+
+def chord_tension(robot: Robot, pose: Pose, length: Array) -> Array:
+    """Chord tensions of massless cables of these lengths off the drum, (N, m); NaN where a length is none.
+
+    Over a pulley they leave along the chord.
+    """
+    found = chord_geometry(robot, pose)
+    chord, sine, cosine = (np.asarray(found[:, row]) for row in (geometry.CHORD, geometry.SINE, geometry.COSINE))
+    radius, entry = pulleys_of(robot)
+    free = length - radius * np.arctan2(cosine, entry * sine) - dead_cable(robot)
+    known = np.isfinite(chord) & (free > 0.0)
+    span, rise = (np.where(known, chord * part, 1.0) for part in (cosine, sine))
+    cables = Catenary().from_length(robot.cables, span, rise, np.where(known, free, 2.0), robot.gravity)
+    return np.where(known, cables.chord_tension, np.nan)

@@ -1,0 +1,97 @@
+"""A robot as a page knows it: what it calculates with, and what it draws."""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import Any, Final
+
+import numpy as np
+
+from sagline.robot.bounds import bounds
+from sagline.robot.robot import Robot
+from sagline.robot.several import pulleys_of
+from sagline.share.packing import Channel, packed
+from sagline.viewer import solids
+from sagline.viewer.tension_scale import TensionScale
+from sagline.viewer.wording import ForceUnit
+
+DIGITS: Final = 12  # of the numbers a page calculates with
+FINEST: Final = 1e-5  # of the robot's size, to which its solids are drawn
+
+
+def machine(robot: Robot) -> dict[str, Any]:
+    """What docs/model.md calculates with, for page/robot.js; None stands for no upper limit."""
+    radius, entry = pulleys_of(robot)
+    winches = robot.winches
+    nothing = np.zeros(robot.cable_count)
+    dead, rise = (nothing, nothing) if winches is None else (winches.dead_cable, winches.dead_rise)
+    columns = {
+        "frame": robot.frame_anchors,
+        "platform": robot.platform_anchors,
+        "density": robot.cables.linear_density,
+        "stiffness": robot.cables.axial_stiffness,
+        "low": robot.tension_min,
+        "high": robot.tension_max,
+        "radius": radius,
+        "entry": entry,
+        "dead": dead,
+        "rise": rise,
+    }
+    whole = {
+        name: np.broadcast_to(column, (robot.cable_count, *np.shape(column)[1:])) for name, column in columns.items()
+    }
+    return {
+        "mass": robot.mass,
+        "center_of_mass": numbers(robot.center_of_mass),
+        "gravity": robot.gravity,
+        "freedom": numbers(robot.freedom),
+        "limits_of": robot.tension_limits_of,
+        "cables": [{name: numbers(column[i]) for name, column in whole.items()} for i in range(robot.cable_count)],
+    }
+
+
+def picture(robot: Robot) -> dict[str, Any]:
+    """What stands around the cables, for page/scene.js."""
+    low, high = bounds(robot)
+    body, size = solids.platform(robot), solids.size_of(robot)
+    drawn = {"frame": solids.frame(robot), "winches": solids.winches(robot), "platform": body}
+    meshes = {name: _triangles(each, size) for name, each in drawn.items() if len(each.faces)}
+    least, most = body.vertices.min(axis=0), body.vertices.max(axis=0)
+    middle, grip = 0.5 * (least + most), 0.5 * float(np.linalg.norm(most - least))
+    return {"low": numbers(low), "high": numbers(high), "middle": numbers(middle), "grip": numbers(grip), **meshes}
+
+
+def colors(robot: Robot) -> dict[str, Any]:
+    """The colors of tensions, with the numbers beside them."""
+    scale, unit = TensionScale.of(robot), ForceUnit.up_to(float(_highest(robot)))
+    shares = np.linspace(0.0, 1.0, 24)
+    steps = scale.low * (scale.high / scale.low) ** shares
+    ticks = scale.ticks()
+    return {
+        "low": scale.low,
+        "high": scale.high,
+        "steps": scale.colors(steps).tolist(),
+        "ticks": [[float(scale.share(np.array(tick))), f"{tick / unit.newtons:,g}"] for tick in ticks],
+        "unit": unit.name,
+        "newtons": unit.newtons,
+        "digits": 1 if unit.newtons == 1.0 else 2,
+    }
+
+
+def numbers(values: Any) -> Any:
+    """Numbers for JSON, as short as they say the same; None for infinite ones."""
+    if np.ndim(values):
+        return [numbers(each) for each in values]
+    value = float(values)
+    short = float(f"{value:.{DIGITS}g}")
+    return (int(short) if short == int(short) and abs(short) < 1e15 else short) if isfinite(value) else None
+
+
+def _highest(robot: Robot) -> float:
+    limited = robot.tension_max[np.isfinite(robot.tension_max)]
+    return float(limited.max()) if limited.size else robot.mass * robot.gravity
+
+
+def _triangles(solid: solids.Solid, size: float) -> tuple[dict[str, object], str]:
+    """The corners of all triangles, one after the other, packed."""
+    return packed([Channel("corners", solid.vertices[solid.faces].reshape(-1, 3), FINEST * size)])

@@ -1,0 +1,89 @@
+"""States as a page carries them: whole numbers, their differences in time, deflated; page/states.js reads them."""
+
+from __future__ import annotations
+
+import zlib
+from base64 import b64encode
+from collections.abc import Sequence
+from typing import Final, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sagline.arrays import Array
+
+Codes = NDArray[np.int64]
+
+_ORDERS: Final = (0, 1, 2, 3)  # of differences: the one of which least is left is kept
+_LEVEL: Final = 9
+
+
+class Channel(NamedTuple):
+    """Something that a page knows over time.
+
+    Attributes:
+        name: As the page knows it.
+        values: Shape (N,) or (N, k); NaN where there is none.
+        step: Of the numbers that are kept, in the values' unit; relative ones as share of the value.
+        scale: "linear", or "relative" of values above zero.
+    """
+
+    name: str
+    values: Array
+    step: float
+    scale: Literal["linear", "relative"] = "linear"
+
+
+def packed(channels: Sequence[Channel]) -> tuple[dict[str, object], str]:
+    """What a page reads the channels from.
+
+    Args:
+        channels: All of N samples.
+
+    Returns:
+        How to read it, for JSON; and the numbers, deflated, in base64.
+    """
+    described, planes = [], []
+    for channel in channels:
+        values = channel.values.reshape(len(channel.values), -1)
+        codes, nothing = _codes(channel, values)
+        ways = [_least(column) for column in codes.T]
+        planes += [_planes(code, count) for _, count, code in ways]
+        columns = [(order, count) for order, count, _ in ways]
+        described.append(
+            {"name": channel.name, "scale": channel.scale, "step": channel.step, "nothing": nothing, "columns": columns}
+        )
+    text = b64encode(zlib.compress(b"".join(planes), _LEVEL)).decode("ascii")
+    return {"count": len(channels[0].values), "channels": described}, text
+
+
+def _codes(channel: Channel, values: Array) -> tuple[Codes, int | None]:
+    """The nearest whole numbers of steps; and the one that stands for nothing, None where it is not needed."""
+    known = np.isfinite(values)
+    if channel.scale == "relative":
+        known &= values > 0.0
+        steps = np.log(np.where(known, values, 1.0)) / channel.step
+    else:
+        steps = np.where(known, values, 0.0) / channel.step
+    codes = np.rint(steps).astype(np.int64)
+    if known.all():
+        return codes, None
+    nothing = int(codes.max()) + 1
+    return np.where(known, codes, nothing), nothing
+
+
+def _least(column: Codes) -> tuple[int, int, Codes]:
+    """The order of differences of which least is left, how many bytes each takes, and they with the sign below."""
+    found = []
+    for order in _ORDERS:
+        rest = column
+        for _ in range(order):
+            rest = np.diff(rest, prepend=0)
+        found.append(np.where(rest < 0, -2 * rest - 1, 2 * rest))
+    order = int(np.argmin([np.log1p(code).sum() for code in found]))
+    return order, max(1, (int(found[order].max()).bit_length() + 7) // 8), found[order]
+
+
+def _planes(codes: Codes, count: int) -> bytes:
+    """The lowest bytes of all, then the next."""
+    return b"".join((codes >> (8 * plane) & 255).astype(np.uint8).tobytes() for plane in range(count))

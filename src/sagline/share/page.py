@@ -1,0 +1,192 @@
+"""A robot or a run as one HTML page: styles, scripts and numbers are inside, and nothing is fetched."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from html import escape
+from importlib.metadata import version
+from importlib.resources import files
+from typing import Any, Final
+
+import numpy as np
+
+from sagline.arrays import Array
+from sagline.kinematics.inverse import inverse
+from sagline.numbers import n
+from sagline.robot.bounds import bounds, home_pose
+from sagline.robot.robot import Robot
+from sagline.share.course import Course
+from sagline.share.machine import colors, machine, numbers, picture
+from sagline.share.packing import Channel, packed
+from sagline.share.still import still
+from sagline.viewer.wording import number
+
+SCRIPTS: Final = (  # in the order in which they need each other
+    "catenary.js", "sharing.js", "robot.js", "states.js", "theme.js",
+    "renderer.js", "camera.js", "scene.js", "panel.js",
+    "pointers.js", "player.js", "share.js",
+)  # fmt: skip
+MADE: Final = '<meta name="generator" content="sagline'  # by which a page of ours is known
+POSITION, TURN, LENGTH, TENSION, TIME = 1e-5, 1e-6, 1e-5, 1e-4, 1e-6  # steps: m, -, m, share of it, s
+SPEEDS: Final = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)
+RING: Final = '<div class="ring" data-part="ring" aria-hidden="true"></div>'
+HOME: Final = '<button type="button" class="home" data-part="home">Home</button>'
+AROUND: Final = "Drag, or press the arrow keys, to look around; pinch, scroll or press + and − to come nearer."
+
+
+def robot_page(robot: Robot) -> str:
+    """A robot whose platform is dragged; the page finds the tensions itself.
+
+    Args:
+        robot: The robot.
+
+    Returns:
+        The text of an HTML file.
+    """
+    at = home_pose(robot)
+    plan = inverse(robot, at)
+    facts = {**_facts(robot), "home": {"position": numbers(at.position)}}
+    return _filled(
+        title=robot.name,
+        about=_about(robot),
+        plays="lets you drag the platform, and its cables tighten and sag",
+        described=f"{robot.name}: its platform on cables. {AROUND}",
+        hint="Drag the platform; drag beside it to look around.",
+        controlled="Where the platform is",
+        controls=_sliders(robot),
+        over=RING + HOME,
+        quantity="along the chord",
+        robot=robot,
+        still=still(robot, at, plan.chord_tension),
+        table=_table(robot, plan.chord_tension, plan.unstrained_length),
+        notes=("Tensions of least norm within the limits, exact elastic catenaries, the platform at rest.",),
+        facts=facts,
+        states="",
+    )
+
+
+def course_page(course: Course, title: str) -> str:
+    """A run that plays.
+
+    Args:
+        course: What is played.
+        title: Of the page.
+
+    Returns:
+        The text of an HTML file.
+    """
+    robot, kept = course.robot, course.thinned()
+    first = kept.pose_at(0)
+    header, text = packed(
+        [
+            Channel("time", kept.time, TIME),
+            Channel("position", kept.position, POSITION),
+            Channel("quaternion", kept.quaternion, TURN),
+            Channel("tension", kept.tension, TENSION, "relative"),
+            Channel("chord_tension", kept.chord_tension, TENSION, "relative"),
+            Channel("length", kept.length, LENGTH),
+            Channel("verdict", kept.verdict.astype(np.float64), 1.0),
+        ]
+    )
+    facts = {**_facts(robot), "states": header, "verdicts": [each._asdict() for each in kept.verdicts]}
+    about = f"{robot.name}, {kept.kind} of {kept.time[-1]:.4g} s"
+    return _filled(
+        title=title,
+        about=about,
+        plays="plays",
+        described=f"{about}: the platform on its cables. {AROUND}",
+        hint="Drag to look around.",
+        controlled="Clock",
+        controls=_clock(),
+        over=HOME,
+        quantity=kept.quantity,
+        robot=robot,
+        still=still(robot, home_pose(robot) if first is None else first, kept.chord_tension[0]),
+        table=_table(robot, kept.tension[0], kept.length[0]),
+        notes=(*kept.notes, _precision()),
+        facts=facts,
+        states=f'<script type="text/plain" data-part="states">{text}</script>',
+    )
+
+
+def _filled(robot: Robot, facts: dict[str, Any], notes: Sequence[str], **parts: str) -> str:
+    own = files("sagline.share").joinpath("page")
+    scale = facts["colors"]
+    low, high = (f"{scale[end] / scale['newtons']:,.4g}" for end in ("low", "high"))
+    markup = ("over", "still", "table", "controls", "states")
+    words = {name: text if name in markup else escape(text) for name, text in parts.items()}
+    words |= {
+        "version": version("sagline"),
+        "style": own.joinpath("share.css").read_text(encoding="utf-8"),
+        "script": "\n".join(own.joinpath(name).read_text(encoding="utf-8") for name in SCRIPTS),
+        "unit": scale["unit"],
+        "legend": f"Colors of the cables: from {low} to {high} {scale['unit']}",
+        "notes": "".join(f'<p class="notes">{escape(note)}</p>' for note in notes),
+        "facts": json.dumps(facts, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c"),
+    }
+    text = own.joinpath("share.html").read_text(encoding="utf-8")
+    pieces = text.split("{")
+    return pieces[0] + "".join(words[name] + rest for name, _, rest in (piece.partition("}") for piece in pieces[1:]))
+
+
+def _facts(robot: Robot) -> dict[str, Any]:
+    return {"machine": machine(robot), "picture": picture(robot), "colors": colors(robot)}
+
+
+def _about(robot: Robot) -> str:
+    """What kind of robot it is, in a line."""
+    mass = n(robot.mass, ".4g", "kg")
+    return f"{robot.cable_count} cables, {robot.degrees_of_freedom} degrees of freedom, a platform of {mass}"
+
+
+def _sliders(robot: Robot) -> str:
+    """One for each way that the platform is free to go along, and for a turn about the vertical."""
+    (low, high), at, freedom = bounds(robot), home_pose(robot).position, robot.freedom
+    free = np.linalg.norm(freedom.T @ freedom, axis=1) > 1.0 - 1e-9  # the whole axis, and not a part of it
+    found = [
+        _slider(f"<i>{name}</i>", axis, min(low[axis], at[axis]), max(high[axis], at[axis]), 1e-3)
+        for axis, name in enumerate("xyz")
+        if free[axis]
+    ]
+    if free[5]:
+        found.append(_slider("turn", 3, -180.0, 180.0, 1.0))
+    return "".join(found)
+
+
+def _slider(name: str, axis: int, low: float, high: float, step: float) -> str:
+    return (
+        f'<label>{name} <input type="range" data-axis="{axis}" min="{low:.6g}" max="{high:.6g}" step="{step:g}">'
+        f'<span aria-hidden="true"></span></label>'
+    )
+
+
+def _clock() -> str:
+    speeds = "".join(
+        f'<option value="{speed:g}"{" selected" * (speed == 1.0)}>{speed:g} ×</option>' for speed in SPEEDS
+    )
+    return (
+        '<button type="button" class="play" data-part="play" aria-label="Play"></button>'
+        '<span class="time"><input type="range" data-part="time" min="0" value="0" aria-label="Time">'
+        '<span data-part="spans" role="img" aria-label=""></span></span>'
+        '<output data-part="clock" aria-hidden="true"></output>'
+        f'<select data-part="speed" aria-label="Speed">{speeds}</select>'
+    )
+
+
+def _table(robot: Robot, tension: Array, length: Array) -> str:
+    """What a page without JavaScript shows: the cables where it begins."""
+    rows = "".join(
+        f"<tr><td>{i}</td><td>{number(tension[i], ',.1f')}</td><td>{number(length[i], '.4f')}</td></tr>"
+        for i in range(robot.cable_count)
+    )
+    head = "".join(f'<th scope="col">{name}</th>' for name in ("cable", "tension [N]", "length [m]"))
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
+
+
+def _precision() -> str:
+    """How far what a page shows may be from what was computed."""
+    return (
+        f"Kept to {0.5e6 * POSITION:g} µm of positions and lengths, {0.5e6 * TURN:g} µrad of rotations, "
+        f"{50.0 * TENSION:g} % of tensions. Cables are computed here, as they hang."
+    )

@@ -1,0 +1,23 @@
+// What is chosen in a list or a figure of ours: an element with data-send="topic" and data-value.
+(() => {
+  const choiceAt = (element) => element?.closest?.("[data-send]")?.dataset;
+  const choose = ({ send, value }) => window.sagline.send(send, value);
+
+  // Pressed and released on the same choice: a list that is written anew in between gives no click.
+  let pressed;
+  document.addEventListener("pointerdown", (event) => {
+    pressed = event.button === 0 ? choiceAt(event.target) : undefined;
+  });
+  document.addEventListener("pointercancel", () => {
+    pressed = undefined;
+  });
+  document.addEventListener("pointerup", (event) => {
+    const released = choiceAt(document.elementFromPoint(event.clientX, event.clientY));
+    if (pressed && released?.send === pressed.send && released.value === pressed.value) choose(pressed);
+    pressed = undefined;
+  });
+  document.addEventListener("click", (event) => {
+    const choice = event.detail === 0 && choiceAt(event.target); // by the keyboard: no pointer was there
+    if (choice) choose(choice);
+  });
+})();

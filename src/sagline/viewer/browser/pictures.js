@@ -1,0 +1,63 @@
+// Pictures that the server has this page take stay here: it hears a single pixel in place of each.
+// A picture for paper (still.py) is saved at once, with its dots an inch.
+(() => {
+  const PIXEL =
+    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mP8z8BQDwAEhQGAhKmMIQAAAABJRU5ErkJggg==";
+  const pixel = () => Uint8Array.from(atob(PIXEL), (character) => character.charCodeAt(0));
+  let keeper; // given each picture, a blob; says when it is done with it
+
+  window.Worker = class extends window.Worker {
+    postMessage(data, ...rest) {
+      const { message } = data ?? {};
+      if (keeper && message?.type === "GetRenderResponseMessage" && message.payload.length) this.keep(data);
+      else super.postMessage(data, ...rest);
+    }
+    async keep(data) {
+      await keeper(new Blob([data.message.payload])); // the next one is asked for when this one has been dealt with
+      super.postMessage({ ...data, message: { ...data.message, payload: pixel() } });
+    }
+  };
+  // Have someone keep the pictures that are taken, or nobody.
+  window.sagline.keep = (anyone) => {
+    keeper = anyone;
+  };
+  window.sagline.save = (blob, name) => {
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(blob);
+    link.download = name;
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 60_000); // a browser may ask where to, first
+  };
+
+  const crc = (bytes) => {
+    let sum = ~0;
+    for (const byte of bytes) {
+      sum ^= byte;
+      for (let k = 0; k < 8; k += 1) sum = sum & 1 ? (sum >>> 1) ^ 0xedb88320 : sum >>> 1;
+    }
+    return ~sum >>> 0;
+  };
+  // A PNG that says how large it is on paper: a chunk pHYs, dots a meter, behind its head.
+  const sized = async (png, dots) => {
+    const chunk = new DataView(new ArrayBuffer(21));
+    const each = Math.round(dots / 0.0254);
+    chunk.setUint32(0, 9);
+    [..."pHYs"].forEach((letter, i) => chunk.setUint8(4 + i, letter.charCodeAt(0)));
+    chunk.setUint32(8, each);
+    chunk.setUint32(12, each);
+    chunk.setUint8(16, 1);
+    chunk.setUint32(17, crc(new Uint8Array(chunk.buffer, 4, 13)));
+    const head = 33; // signature and IHDR
+    return new Blob([png.slice(0, head), chunk.buffer, png.slice(head)], { type: "image/png" });
+  };
+
+  window.sagline.on("picture", (about) => {
+    if (!about) return window.sagline.keep(undefined);
+    window.sagline.keep(async (blob) => {
+      window.sagline.keep(undefined);
+      const canvas = Object.assign(document.createElement("canvas"), { width: about.width, height: about.height });
+      window.sagline.compose(canvas.getContext("2d"), about, await createImageBitmap(blob));
+      canvas.toBlob(async (png) => window.sagline.save(await sized(png, about.dots), `${about.name}.png`), "image/png");
+    });
+  });
+})();

@@ -1,0 +1,88 @@
+"""What every way of sharing the load would choose, as marks in the drawing of the feasible tensions."""
+
+from __future__ import annotations
+
+from string import ascii_uppercase
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from sagline.arrays import Array
+from sagline.errors import InvalidValueError
+from sagline.kinematics.inverse import inverse
+from sagline.kinematics.plan import Plan
+from sagline.kinematics.status import PoseStatus
+from sagline.tension.options import takes_default_kernel
+from sagline.viewer.dot_field import DotField
+from sagline.viewer.settings import METHODS
+
+NEAR: Final = 10.0  # px: marks that are closer share one
+
+
+class Mark(NamedTuple):
+    """A way of sharing.
+
+    Attributes:
+        name: As it is chosen.
+        letter: That marks it.
+        tension: Its chord tensions [N], shape (m,); NaN where it has none.
+        missing: Why it has none; "" where it has.
+    """
+
+    name: str
+    letter: str
+    tension: Array
+    missing: str = ""
+
+
+class Marks:
+    """The answers of all ways at a pose, kept for as long as nothing but the way changes."""
+
+    def __init__(self) -> None:
+        """Begin with none."""
+        self._key: tuple[object, ...] = ()
+        self._found: tuple[Mark, ...] = ()
+
+    def at(self, plan: Plan, *, further: bool) -> tuple[Mark, ...]:
+        """The answers at the pose of a plan, at rest under its wrench.
+
+        Args:
+            plan: A single pose.
+            further: Whether ways can be had whose kernels are compiled apart.
+        """
+        state = plan.state
+        place = (state.pose.position.tobytes(), state.pose.quaternion.tobytes(), state.wrench.tobytes())
+        key = (id(state.robot), type(state.cables.model), *place, further)
+        if key != self._key:
+            self._key, self._robot = key, state.robot  # and the id stays this robot's
+            self._found = tuple(
+                _mark(plan, name, letter)
+                for (name, method), letter in zip(METHODS.items(), ascii_uppercase, strict=False)
+                if further or takes_default_kernel(method)
+            )
+        return self._found
+
+
+def grouped(marks: tuple[Mark, ...], field: DotField) -> list[tuple[tuple[float, float], list[Mark]]]:
+    """Marks that have an answer, with those that would lie on each other together, each at its place [px]."""
+    groups: list[tuple[tuple[float, float], list[Mark]]] = []
+    for mark in marks:
+        if mark.missing:
+            continue
+        x, y = field.place(field.polygon.coordinates(mark.tension))
+        home = next((group for (u, v), group in groups if np.hypot(u - x, v - y) < NEAR), None)
+        if home is None:
+            groups.append(((x, y), [mark]))
+        else:
+            home.append(mark)
+    return groups
+
+
+def _mark(plan: Plan, name: str, letter: str) -> Mark:
+    state = plan.state
+    try:
+        found = inverse(state.one_robot, state.pose, state.cables.model, METHODS[name], state.wrench)
+    except InvalidValueError as error:
+        return Mark(name, letter, np.full(state.one_robot.cable_count, np.nan), str(error))
+    status = PoseStatus(int(found.status))
+    return Mark(name, letter, found.chord_tension, "" if found.feasible else status.text)

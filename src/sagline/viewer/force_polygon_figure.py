@@ -1,0 +1,137 @@
+"""The forces on the platform head to tail, seen from two sides, and the table of what they are: the proof, drawn."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from sagline.arrays import Array
+from sagline.numbers import n
+from sagline.robot.equilibrium import Equilibrium
+from sagline.viewer.cable_colors import Color
+from sagline.viewer.force_polygon import MISSING, Pull, pulls_of, residual, turns
+from sagline.viewer.readout import block, force_unit, sentence
+from sagline.viewer.wording import number
+
+WIDTH, BORDER = 340.0, 24.0  # px
+HIGHEST: Final = 200.0  # px, of a view
+HEAD: Final = (7.0, 2.8)  # length and half the width of an arrow's head [px]
+SHORT: Final = 3.0  # px: an arrow that is shorter has no number
+SIDES: Final = ((0, 2), (1, 2), (0, 1))  # axes to the right and up: from the front, from the side, from above
+FLAT: Final = 1e-3  # of the largest view: one this small shows nothing
+SHOWN: Final = 2  # of them, those in which most is seen
+
+
+class View(NamedTuple):
+    """The polygon from one side.
+
+    Attributes:
+        names: Of the axes that point to the right and up.
+        points: Corners [N], shape (k + 1, 2): where each force begins and ends.
+    """
+
+    names: str
+    points: Array
+
+
+def force_polygon_figure(state: Equilibrium, missing: Array | None = None) -> str:
+    """HTML: the polygon from two sides with what does not close, and the forces and moments as numbers.
+
+    Args:
+        state: A single pose, in balance; with a missing wrench, if one is.
+        missing: That wrench, shape (6,); the gap in the polygon.
+    """
+    pulls = pulls_of(state, missing)
+    corners = np.vstack((np.zeros(3), np.cumsum([each.force for each in pulls], axis=0)))
+    views = [View("xyz"[right] + "xyz"[up], corners[:, [right, up]]) for right, up in SIDES]
+    areas = [float(np.prod(np.ptp(view.points, axis=0))) for view in views]
+    shown = np.sort(np.argsort(areas)[::-1][:SHOWN])
+    views = [views[k] for k in shown if areas[k] > FLAT * max(areas)] or views[:1]  # a planar robot has one
+    extents = np.array([np.ptp(view.points, axis=0) for view in views])
+    scale = float(min((WIDTH - 2.0 * BORDER) / max(extents[:, 0].max(), 1e-12), HIGHEST / extents[:, 1].max()))
+    drawn = "".join(_drawing(view, pulls, scale) for view in views)
+    return block(drawn) + sentence(_told(state, pulls, missing)) + block(_table(state, pulls))
+
+
+def _drawing(view: View, pulls: tuple[Pull, ...], scale: float) -> str:
+    low, high = view.points.min(axis=0), view.points.max(axis=0)
+    height = scale * float(high[1] - low[1]) + 2.0 * BORDER
+    left = 0.5 * (WIDTH - scale * float(high[0] - low[0]))
+    places = np.column_stack(
+        (left + scale * (view.points[:, 0] - low[0]), height - BORDER - scale * (view.points[:, 1] - low[1]))
+    )
+    arrows = "".join(_arrow(pull, places[k], places[k + 1]) for k, pull in enumerate(pulls))
+    right, up = view.names[0], view.names[1]
+    return (
+        f'<svg viewBox="0 0 {WIDTH:.0f} {height:.0f}" role="img" class="forces" '
+        f'aria-label="forces on the platform head to tail, {right} to the right, {up} up">{arrows}'
+        f'<text x="4" y="12" class="quiet">{up}</text><text x="26" y="{26:.0f}" class="quiet">{right}</text>'
+        '<path d="M8 26V16M8 26H22" class="axes"/></svg>'
+    )
+
+
+def _arrow(pull: Pull, start: Array, end: Array) -> str:
+    """An arrow with its name beside its middle; what is missing is dashed."""
+    way = end - start
+    length = float(np.hypot(*way))
+    if length < 0.5:
+        return ""
+    along = way / length
+    aside = np.array([-along[1], along[0]])
+    head = min(HEAD[0], 0.6 * length)
+    neck = end - head * along
+    wings = [neck + sign * HEAD[1] * head / HEAD[0] * aside for sign in (1.0, -1.0)]
+    kind = ' class="gap"' if pull.name == MISSING else ""
+    name = ""
+    if length >= SHORT:
+        x, y = 0.5 * (start + end) + 8.0 * aside
+        anchor = "start" if aside[0] > 0.35 else "end" if aside[0] < -0.35 else "middle"
+        name = f'<text x="{x:.1f}" y="{y + 3.0:.1f}" text-anchor="{anchor}">{pull.name}</text>'
+    corners = " ".join(f"{x:.1f},{y:.1f}" for x, y in (end, *wings))
+    return (
+        f'<g style="color:{_css(pull.color)}"><line x1="{start[0]:.1f}" y1="{start[1]:.1f}" '
+        f'x2="{neck[0]:.1f}" y2="{neck[1]:.1f}"{kind}/><polygon points="{corners}"/>{name}</g>'
+    )
+
+
+def _told(state: Equilibrium, pulls: tuple[Pull, ...], missing: Array | None) -> str:
+    """What does not close."""
+    force, moment = residual(state, pulls)
+    left = n(force, ".2g", "N")
+    if turns(state):
+        left += f" and {n(moment, '.2g', 'N m')} about the center of mass"
+    if missing is None:
+        return f"Cables as they pull at the platform, weight and load close up to {left}."
+    gap = n(float(np.linalg.norm(missing[:3])), ".4g", "N")
+    if np.linalg.norm(missing[3:]) > 0.0:
+        gap += f", with a moment of {n(float(np.linalg.norm(missing[3:])), '.4g', 'N m')}"
+    return f"The gap is the missing force, {gap}; with it and the cables at their limits the forces close up to {left}."
+
+
+def _table(state: Equilibrium, pulls: tuple[Pull, ...]) -> str:
+    unit, turning = force_unit(state.one_robot), turns(state)
+    forces = "".join(f"<th>F<sub>{axis}</sub></th>" for axis in "xyz")
+    moments = "".join(f"<th>M<sub>{axis}</sub></th>" for axis in "xyz") if turning else ""
+    head = f"<tr><th>[{unit.name}{f', {unit.name} m' if turning else ''}]</th>{forces}{moments}</tr>"
+    numbered = sorted(pulls, key=lambda each: (not each.name.isdigit(), int(each.name) if each.name.isdigit() else 0))
+    rows = "".join(
+        f'<tr><td><span class="swatch" style="background:{_css(each.color)}"></span> {each.name}</td>'
+        + _cells(each.force / unit.newtons, each.moment / unit.newtons, turning=turning)
+        + "</tr>"
+        for each in numbered
+    )
+    force = np.sum([each.force for each in pulls], axis=0) / unit.newtons
+    moment = np.sum([each.moment for each in pulls], axis=0) / unit.newtons
+    whole = _cells(force, moment, turning=turning)
+    return f'<table class="forces">{head}{rows}<tr class="sum"><td>sum</td>{whole}</tr></table>'
+
+
+def _cells(force: Array, moment: Array, *, turning: bool) -> str:
+    parts = np.concatenate((force, moment)) if turning else force
+    cells = [number(part, ".1f") for part in parts]
+    return "".join(f"<td>{cell}</td>" for cell in cells)
+
+
+def _css(color: Color) -> str:
+    return "#{:02x}{:02x}{:02x}".format(*color)

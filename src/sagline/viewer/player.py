@@ -1,0 +1,132 @@
+"""What is played: on which clock, and where on it; or nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from sagline.viewer.drawn import Drawn
+from sagline.viewer.played import Beside, Played
+from sagline.viewer.snapshot import Snapshot
+from sagline.viewer.timeline import Timeline
+
+
+class Kept(NamedTuple):
+    """What was played.
+
+    Attributes:
+        played: What; None for nothing.
+        given: Whether it is what the page was opened with.
+        clock: Where it was.
+        following: Whether it was shown, and not a pose of one's own.
+    """
+
+    played: Played | None
+    given: bool
+    clock: Timeline
+    following: bool
+
+
+class Player:
+    """A run, a simulation or a log, and its clock; all of it belongs to the thread that serves.
+
+    Attributes:
+        played: What is played; None for nothing.
+        clock: Where it is.
+        following: Whether what is played is shown, and not a pose of one's own.
+        speed: Time of what is played a second.
+        number: Of what is played; it stays what it is when that goes on.
+    """
+
+    def __init__(
+        self,
+        given: Played | None,
+        put_on: Callable[[Played | None], None],
+        beside: Beside | None = None,
+    ) -> None:
+        """Put something on, or nothing.
+
+        Args:
+            given: What the page was opened with; None for nothing.
+            put_on: Told what is played whenever something else is put on.
+            beside: What has the same clock as what was given.
+        """
+        self._put_on, self._given, self._beside = put_on, given, beside
+        self.speed, self.number = 1.0, 0
+        self.play(given)
+
+    @property
+    def given(self) -> bool:
+        """Whether what is played is what the page was opened with."""
+        return self.played is self._given
+
+    @property
+    def beside(self) -> Beside | None:
+        """What is played beside it."""
+        return self._beside if self.played is not None and self.played is self._given else None
+
+    def play(self, played: Played | None, *, at_once: bool = False) -> None:
+        """Put something on the timeline in place of what was there, or nothing."""
+        self.played = played
+        self.number += 1
+        self.following = played is not None
+        self.clock = Timeline(self._duration(), 0.0, at_once)
+        self._put_on(played)
+
+    def extend(self, played: Played) -> None:
+        """Have what was given go on; who looks at its end sees the new end."""
+        looked_at = self.played is self._given  # or else at what a cut brought
+        self._given = played
+        if looked_at:
+            self.played = played
+            self.clock = self.clock.extended(self._duration())
+
+    def grow(self, played: Played) -> None:
+        """Have what a cut brought go on; a clock that has come to its end waits for the rest, and goes on."""
+        waits = self.clock.time >= self.clock.duration
+        self.played = played
+        self.clock = Timeline(self._duration(), self.clock.time, self.clock.playing or waits)
+
+    def kept(self) -> Kept:
+        """What is played, to be put back later."""
+        return Kept(self.played, self.played is self._given, self.clock, self.following)
+
+    def put_back(self, kept: Kept) -> None:
+        """Play what was kept, where its clock stood; of what was given as much as there is by now."""
+        self.play(self._given if kept.given else kept.played)
+        self.clock = self.clock.scrubbed(kept.clock.time)
+        if kept.clock.playing:
+            self.clock = self.clock.toggled()
+        self.following = kept.following
+
+    def advance(self, elapsed: float) -> None:
+        """Some real time has passed [s]."""
+        self.clock = self.clock.advanced(elapsed, self.speed)
+
+    def sight(self) -> Snapshot | Drawn:
+        """What there is to see now."""
+        assert self.played is not None
+        return self.played.sight(self.clock.time)
+
+    def leave(self) -> None:
+        """Stop, and show a pose of one's own."""
+        self.clock = self.clock.scrubbed(self.clock.time)
+        self.following = False
+
+    def follow(self) -> None:
+        """Show what is played, if anything is."""
+        self.following = self.played is not None
+
+    def toggle(self) -> None:
+        """Play, or pause."""
+        self.clock = self.clock.toggled()
+        self.follow()
+
+    def scrub_to(self, time: float) -> None:
+        """Look at another time [s], paused."""
+        self.clock = self.clock.scrubbed(time)
+        self.follow()
+
+    def _duration(self) -> float:
+        parts = [part.duration for part in (self.played, self.beside and self.beside.played) if part is not None]
+        return max(parts, default=0.0)

@@ -1,0 +1,169 @@
+"""Where pictures are taken: a scene of a client's own, that hides the server's and that nobody else sees."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from math import atan, tan
+from typing import Final, Literal, NamedTuple
+
+import numpy as np
+import viser
+from scipy.spatial.transform import Rotation
+
+from sagline.arrays import Array
+from sagline.errors import InvalidValueError
+from sagline.viewer.played import Played
+from sagline.viewer.stage import TRACE_POINTS, Stage
+from sagline.viewer.view import View
+
+PATIENCE: Final = 30.0  # s to wait for a picture
+NAMES: Final = ("/names", "/platform/notice")  # nodes that are in no picture
+STILL: Final = ("/hull", "/slice")  # nodes that are the same at any time of what is played
+BORDER: Final = 1.06  # of the robot, to stay off the edges
+SHAPES: Final = 0.8, 2.4  # width over height of a picture, least and most
+DEEPEST: Final = 950.0  # m from the camera: of a picture that is asked for viser's client draws nothing beyond 1000 m
+_FIRST: Final = 32  # px, of a picture that is thrown away
+
+
+class Shot(NamedTuple):
+    """A picture that a client's page is asked for.
+
+    Attributes:
+        height: Its rows.
+        width: Its columns.
+        field: Upright field of view [rad].
+        pixel: Size of its pixels where the robot is [m].
+        forward: How far before the client's camera it is taken, for a robot so large that its end is too far away [m].
+    """
+
+    height: int
+    width: int
+    field: float
+    pixel: float
+    forward: float
+
+    @classmethod
+    def of(cls, camera: viser.CameraHandle, low: Array, high: Array, width: int, height: int = 0) -> Shot:
+        """A picture of as much of a box as a client's window shows, whatever the window's proportions.
+
+        Args:
+            camera: The client's, who may tell anything.
+            low: Lowest corner of the box [m].
+            high: Highest corner [m].
+            width: Columns of the picture.
+            height: Its rows; 0 for as many as the box asks for.
+
+        Raises:
+            InvalidValueError: If the client has told no camera that could be.
+        """
+        right, up, far, forward = _seen(camera, low, high)
+        rows = height or round(width / float(np.clip(right / up, *SHAPES)))
+        slope = BORDER * max(up, right * rows / width)
+        return cls(rows, width, 2.0 * atan(slope), 2.0 * far * slope / rows, forward)
+
+
+def _seen(camera: viser.CameraHandle, low: Array, high: Array) -> tuple[float, float, float, float]:
+    """How far to the side and upward a box is seen [slope], how far away, and from where before the camera [m]."""
+    try:
+        eye = np.array(camera.position, dtype=np.float64).reshape(3)
+        edge = tan(0.5 * float(camera.fov)) * np.array([float(camera.aspect), 1.0])
+        corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
+        place = _turn(camera).inv().apply(corners - eye)
+        if not (np.isfinite(place).all() and np.all((edge > 0.01) & (edge < 100.0))):
+            raise ValueError(edge)
+    except (TypeError, ValueError, ZeroDivisionError):
+        step = "Reload the page."
+        raise InvalidValueError("camera", "nowhere", "a place, a direction and a lens", step) from None
+    depth = place[:, 2]
+    far, forward = float(depth.mean()), max(0.0, float(depth.max()) - DEEPEST)
+    if depth.min() <= forward:  # some of the box is behind the camera
+        return float(edge[0]), float(edge[1]), max(far, 0.1 * float(np.linalg.norm(high - low))), 0.0
+    reach, nearer = (np.abs(place[:, :2] / (depth - nearer)[:, None]).max(axis=0) for nearer in (0.0, forward))
+    right, up = (nearer * np.minimum(1.0, edge / reach)).tolist()  # as much of it as the window shows
+    return right, up, far - forward, forward
+
+
+def _turn(camera: viser.CameraHandle) -> Rotation:
+    """From a camera's axes, right, down and forward, to those of the world."""
+    return Rotation.from_quat(np.array(camera.wxyz, dtype=np.float64).reshape(4), scalar_first=True)
+
+
+class Studio:
+    """A scene of a client's own."""
+
+    def __init__(
+        self,
+        client: viser.ClientHandle,
+        server: viser.ViserServer,
+        shot: Shot,
+        view: View,
+        played: Played | None,
+        line_width: float,
+    ) -> None:
+        """Build the scene of what is played, or else of what is shown."""
+        self._client, self._shot = client, shot
+        snapshot = view.snapshot
+        robot, home = (snapshot.robot, snapshot.pose) if played is None else (played.robot, played.home)
+        self._stage = Stage(client.scene, robot, home, live=False, pixel=line_width * shot.pixel)
+        if played is not None:
+            self._stage.show_traces(*played.traces(TRACE_POINTS, view.settings.error_scale))
+        drawn = set(client.scene._handle_from_node_name)  # viser lists its nodes nowhere else
+        for name in sorted(set(server.scene._handle_from_node_name) - drawn):
+            if name.startswith(NAMES) or (played is not None and not name.startswith(STILL)):
+                client.scene.add_frame(name, show_axes=False, visible=False)
+        self.show(view)
+        self._render(_FIRST, _FIRST, "jpeg")  # names come a picture late
+
+    def show(self, view: View) -> None:
+        """Have something in the picture."""
+        settings = view.settings
+        with self._client.atomic():
+            self._stage.place(view.snapshot.pose)
+            self._stage.show(view.snapshot, view.scale, settings.sag_scale, settings.error_scale, ghost=view.ghost)
+
+    def take(self, kind: Literal["png", "jpeg"]) -> None:
+        """Have the page take a picture, and keep it; returns when it has.
+
+        Raises:
+            RuntimeError: If the client goes, or gives no picture.
+            TimeoutError: If it gives none for too long.
+        """
+        self._render(self._shot.height, self._shot.width, kind)
+
+    def _render(self, height: int, width: int, kind: Literal["png", "jpeg"]) -> None:
+        camera, shot = self._client.camera, self._shot
+        place = camera.position + shot.forward * _turn(camera).apply([0.0, 0.0, 1.0])
+        self._client.get_render(
+            height, width, wxyz=camera.wxyz, position=place, fov=shot.field,
+            transport_format=kind, timeout=PATIENCE,
+        )  # fmt: skip
+
+
+@contextmanager
+def studio(
+    client: viser.ClientHandle,
+    server: viser.ViserServer,
+    shot: Shot,
+    view: View,
+    line_width: float,
+    played: Played | None = None,
+) -> Iterator[Studio]:
+    """A studio while inside.
+
+    Args:
+        client: Who asked.
+        server: Whose scene it hides: names, and with something played all that belongs to the view of the moment.
+        shot: The pictures to come.
+        view: What is shown.
+        line_width: Of lines, for those of a screen.
+        played: What is played in the pictures; None for what is shown.
+
+    Raises:
+        RuntimeError: If the client goes, or gives no picture.
+        TimeoutError: If it gives none for too long.
+    """
+    try:
+        yield Studio(client, server, shot, view, played, line_width)
+    finally:
+        client.scene.reset()

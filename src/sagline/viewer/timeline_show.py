@@ -1,0 +1,156 @@
+"""The timeline across the bottom of the page: told what is played and its clock, hears what is done there."""
+
+from __future__ import annotations
+
+import time
+from math import isfinite
+from typing import Any, Final
+
+from sagline.viewer.channel import Channel
+from sagline.viewer.played import Played
+from sagline.viewer.player import Player
+from sagline.viewer.timeline_columns import told
+from sagline.viewer.timeline_stage import TimelineStage
+from sagline.viewer.timeline_track import Track
+from sagline.viewer.view import View
+
+SPEEDS: Final = (0.25, 1.0, 4.0, 16.0)
+PERIOD: Final = 1.0 / 30.0  # s: the clock is not told more often
+TURN: Final = 0.5  # s: a window that the clock has left follows it not more often
+NARROWEST: Final = 1e-6  # of the whole, that a window is wide
+_MOST_STEPS: Final = 1_000_000
+
+
+class TimelineShow:
+    """Follows a player, and moves it; all of it belongs to the thread that serves."""
+
+    moving = False
+
+    def __init__(self, channel: Channel, player: Player, stage: TimelineStage) -> None:
+        """Begin to speak and to listen.
+
+        Args:
+            channel: To the pages; browser/timeline.js is at its other end.
+            player: What is played.
+            stage: Where what is pointed at, and a second run, are drawn.
+        """
+        self._channel, self._player, self._stage = channel, player, stage
+        self._played: Played | None = None  # of which the track is
+        self._number = player.number
+        self._track: Track | None = None
+        self._other: Track | None = None  # of what is beside
+        self._chart = 0  # which is shown
+        self._window: tuple[float, float] | None = None  # that is looked at [s]; None for the whole
+        self._known: Any = None  # of these the pages know
+        self._clock: Any = None
+        self._when = -PERIOD
+        self._turned = -TURN
+        self._cable: int | None = None  # that is pointed at
+        for topic, heard in (
+            ("scrub", self._scrub), ("step", self._step), ("play", self._play), ("speed", self._speed),
+            ("follow", self._follow), ("chart", self._choose), ("point", self._point), ("window", self._look),
+        ):  # fmt: skip
+            channel.on(topic, heard)
+        self.tick()
+
+    @property
+    def waiting(self) -> bool:
+        """Whether the pages do not know yet where the clock is."""
+        return bool(self._clock != self._now())
+
+    def follow(self, view: View) -> None:
+        """Draw what is beside, and what is pointed at."""
+        beside = self._player.beside if view.played is not None else None
+        other = None if beside is None else beside.played.sight(self._player.clock.time)
+        self._stage.show_beside(other, view.settings.sag_scale)
+        self._stage.emphasize(view.snapshot, self._cable, view.settings.sag_scale)
+
+    def tick(self) -> None:
+        """Tell what has changed, the clock not too often."""
+        if self._player.played is not self._played:
+            self._put_on()
+        if self._window is not None and self._player.clock.playing:
+            self._go_along(*self._window)
+        if self._known != (self._track, self._chart, self._window):
+            self._tell_tracks()
+        if self.waiting and time.monotonic() - self._when >= PERIOD:
+            self._when, self._clock = time.monotonic(), self._now()
+            self._channel.tell("clock", self._clock)
+
+    def _put_on(self) -> None:
+        """Something else is played, or more of it."""
+        played, beside = self._player.played, self._player.beside
+        self._track = None if played is None else played.track()
+        self._other = None if beside is None else self._other or beside.played.track()
+        if self._number != self._player.number:  # it is not only longer
+            self._chart, self._window = 0, None
+        self._played, self._number = played, self._player.number
+
+    def _go_along(self, start: float, end: float) -> None:
+        """Turn the page when the clock has left the window."""
+        clock, width = self._player.clock, end - start
+        if not start <= clock.time <= end and time.monotonic() - self._turned > TURN:
+            self._turned = time.monotonic()
+            first = min(clock.time, clock.duration - width)
+            self._window = (first, first + width)
+
+    def _tell_tracks(self) -> None:
+        played, beside, track = self._player.played, self._player.beside, self._track
+        self._known = (track, self._chart, self._window)
+        if played is None or track is None:
+            self._channel.tell("timeline", None)
+            return
+        tracks = [(played.name if beside is None else beside.names[0], track)]
+        if beside is not None and self._other is not None:
+            tracks.append((beside.names[1], self._other))
+        shown = told(tracks, self._chart, self._player.clock.duration, self._window)
+        self._channel.tell("timeline", {"kind": played.name, "speeds": SPEEDS, **shown})
+
+    def _now(self) -> dict[str, Any]:
+        player = self._player
+        return {
+            "time": player.clock.time,
+            "playing": player.clock.playing,
+            "speed": player.speed,
+            "following": player.following,
+        }
+
+    def _scrub(self, value: Any, _: int) -> None:
+        if self._player.played is not None and _is_number(value):
+            self._player.scrub_to(float(value))
+
+    def _step(self, value: Any, _: int) -> None:
+        if self._track is not None and _is_number(value) and abs(value) <= _MOST_STEPS:
+            self._player.scrub_to(self._track.step_from(self._player.clock.time, int(value)))
+
+    def _play(self, value: Any, _: int) -> None:
+        if self._player.played is not None and isinstance(value, bool) and value != self._player.clock.playing:
+            self._player.toggle()
+
+    def _speed(self, value: Any, _: int) -> None:
+        if _is_number(value) and value in SPEEDS:
+            self._player.speed = float(value)
+
+    def _follow(self, value: Any, _: int) -> None:
+        if isinstance(value, bool):
+            (self._player.follow if value else self._player.leave)()
+
+    def _choose(self, value: Any, _: int) -> None:
+        if self._track is not None and type(value) is int and 0 <= value < len(self._track.charts):
+            self._chart = value
+
+    def _look(self, value: Any, _: int) -> None:
+        duration = self._player.clock.duration
+        if value is None:
+            self._window = None
+        elif isinstance(value, list) and len(value) == 2 and all(map(_is_number, value)):
+            start, end = max(float(value[0]), 0.0), min(float(value[1]), duration)
+            if end - start >= NARROWEST * duration > 0.0:
+                self._window = None if (start, end) == (0.0, duration) else (start, end)
+
+    def _point(self, value: Any, _: int) -> None:
+        self._cable = value if type(value) is int and value >= 0 else None
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e300 and isfinite(value)

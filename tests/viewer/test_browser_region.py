@@ -1,0 +1,100 @@
+"""The region in headless Chromium, by a real mouse: it follows a slider, its wall lights up, and all of it is read."""
+
+from collections.abc import Iterator
+from io import BytesIO
+
+import numpy as np
+import pytest
+from PIL import Image
+from playwright.sync_api import Browser, Page
+
+import sagline as sl
+from sagline.viewer.space_show import SpaceShow
+from sagline.viewer.viewer import Viewer
+from tests.chromium import NEEDED, launched
+from tests.viewer.test_browser import FLAGS, OVERFLOWING, await_that, least_contrast, opened
+
+SCREENS = ((390, 640), (1000, 640), (1440, 900))
+ROBOTS = ("falcon-7", "cogiro", "fast")
+FAST = ("cogiro", (1000, 640))
+
+pytestmark = NEEDED
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    yield from launched(FLAGS)
+
+
+def in_full(show: SpaceShow) -> bool:
+    """Whether the region that is drawn is that of what is shown, and not a rough one."""
+    return show._made is not None and not show._made.rough and show._made.key == show._key
+
+
+def slide(page: Page, label: str, way: float) -> None:
+    """Drag a slider by its thumb, so many pixels, in some steps."""
+    thumb = page.locator(f"//label[contains(., '{label}')]/following::div[@role='slider']").first
+    thumb.scroll_into_view_if_needed()
+    box = thumb.bounding_box()
+    assert box is not None
+    x, y = box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + way, y, steps=4)
+    page.mouse.up()
+
+
+def scene(page: Page) -> np.ndarray:
+    """What is between the panels, or above them, as far as the middle of the screen."""
+    picture = np.array(Image.open(BytesIO(page.screenshot())).convert("RGB"), dtype=int)
+    height, width, _ = picture.shape
+    return picture[: height // 2, width // 3 : 3 * width // 5]
+
+
+def near_the_wall(viewer: Viewer) -> np.ndarray:
+    """A position inside, half a cell from the wall, as high as the platform is."""
+    show = viewer._space
+    assert viewer.view is not None
+    assert show._levels is not None
+    assert show._region is not None
+    home = viewer.view.snapshot.pose.position
+    along = np.linspace(0.0, 1.0, 2000)[:, None] * np.ptp([show._region.low, show._region.high], axis=0) * (0.7, 0.5, 0)
+    first = int(np.argmax(show._levels(home + along) < 0.0))
+    assert first > 3
+    return np.asarray((home + along)[first - 3])
+
+
+@pytest.mark.parametrize(
+    ("name", "screen"),
+    [
+        pytest.param(name, screen, marks=() if (name, screen) == FAST else pytest.mark.soak)
+        for name in ROBOTS
+        for screen in SCREENS
+    ],
+)
+def test_a_region_follows_a_slider_and_lights_up(browser: Browser, name: str, screen: tuple[int, int]) -> None:
+    with opened(browser, sl.load_robot(name), width=screen[0], theme="dark") as (page, viewer):
+        page.set_viewport_size({"width": screen[0], "height": screen[1]})
+        show = viewer._space
+        page.get_by_role("tab", name="Workspace").click()
+        page.get_by_text("Nothing is computed until something is asked for.").wait_for()
+        empty = scene(page)
+        page.get_by_label("Region", exact=True).click()
+        page.get_by_text("Its wall by what limits").wait_for()
+        await_that(page, lambda: in_full(show))
+        before, mass = show._panel._told.content, viewer.view.snapshot.robot.mass  # type: ignore[union-attr]
+        slide(page, "Platform + load", 8.0)
+        await_that(page, lambda: viewer.view is not None and viewer.view.snapshot.robot.mass > mass)
+        await_that(page, lambda: in_full(show) and show._panel._told.content != before)  # nothing was asked for again
+        viewer._stage.place(sl.Pose(near_the_wall(viewer), np.eye(3)))
+        viewer.refresh()
+        await_that(page, lambda: show._stage._wall.meshes != [])
+        page.get_by_text("left, cable").first.wait_for()
+        page.get_by_label("Slice", exact=True).click()
+        page.get_by_label("Where can I go", exact=True).click()
+        page.get_by_text("Boundary", exact=True).wait_for()
+        page.get_by_text("Margin [").wait_for()
+        await_that(page, lambda: len(show._stage._levels) > 0)
+        await_that(page, lambda: np.mean(np.abs(scene(page) - empty).max(axis=2) > 8) > 0.03)  # what is drawn is seen
+        least_contrast(page)
+        assert page.evaluate(OVERFLOWING) == []

@@ -1,0 +1,133 @@
+"""A real mouse that pulls at the platform, cuts a cable and shakes a mode, in headless Chromium."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser, Page
+
+import sagline as sl
+from sagline.viewer.eye import Eye
+from sagline.viewer.viewer import Viewer
+from tests.chromium import NEEDED, launched
+from tests.viewer.test_browser import FLAGS, OVERFLOWING, await_that, opened
+
+pytestmark = NEEDED
+SIZES = ((390, 640), (1000, 640), (1440, 900))
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    yield from launched(FLAGS)
+
+
+def eye_of(viewer: Viewer) -> Eye | None:
+    return next((Eye.of(client.camera) for client in viewer._server.get_clients().values()), None)
+
+
+def on_page(page: Page, viewer: Viewer, points: np.ndarray) -> np.ndarray:
+    """Where points (..., 3) are on the page [px], shape (..., 2)."""
+    box, eye = page.locator("canvas").first.bounding_box(), eye_of(viewer)
+    assert box is not None
+    assert eye is not None
+    share = eye.seen(points)[0] / eye.pixels
+    return np.asarray([box["x"], box["y"]] + share * [box["width"], box["height"]])
+
+
+def settle(page: Page, viewer: Viewer) -> None:
+    """Wait until the camera has been put, and stays there."""
+    places: list[np.ndarray] = []
+
+    def stands() -> bool:
+        page.wait_for_timeout(300)
+        eye = eye_of(viewer)
+        places.append(np.full(3, np.nan) if eye is None else eye.place.copy())
+        return len(places) > 2 and np.array_equal(places[-1], places[-3])
+
+    await_that(page, stands)
+
+
+@pytest.mark.parametrize(
+    ("name", "size"),
+    [
+        ("cogiro", SIZES[1]),
+        *(
+            pytest.param(name, size, marks=pytest.mark.soak)
+            for name in ("falcon-7", "cogiro", "fast")
+            for size in SIZES
+            if (name, size) != ("cogiro", SIZES[1])
+        ),
+    ],
+)
+def test_a_mouse_pulls_cuts_and_shakes(browser: Browser, name: str, size: tuple[int, int]) -> None:
+    with opened(browser, sl.load_robot(name), width=size[0]) as (page, viewer):
+        page.set_viewport_size({"width": size[0], "height": size[1]})
+        settle(page, viewer)
+        start = viewer._stage.dragged_pose()
+        eye = eye_of(viewer)
+        assert eye is not None
+        # pull, at the middle of the platform, where its gizmo has its handles
+        middle = start.transform(viewer._push._stage.body.vertices).mean(axis=0)
+        x, y = on_page(page, viewer, middle)
+        page.mouse.move(x, y)
+        page.keyboard.down("Control")
+        page.mouse.down()
+        page.mouse.move(x + 15, y - 10, steps=3)
+        await_that(page, lambda: viewer._push.pushed is not None)
+        page.mouse.move(x + 30, y - 20, steps=3)
+        away = 0.9 * np.hypot(30.0, 20.0)
+        await_that(page, lambda: pulled(page, viewer) > away)
+        page.mouse.up()
+        page.keyboard.up("Control")
+        await_that(page, lambda: viewer._push.pushed is None)
+        np.testing.assert_array_equal(viewer._stage.dragged_pose().position, start.position)  # the gizmo did not move
+        now = eye_of(viewer)
+        assert now is not None
+        np.testing.assert_array_equal(now.place, eye.place)  # nor did the camera
+        assert page.evaluate(OVERFLOWING) == []
+        # cut, by a click on the cable that is farthest from the others
+        assert viewer.view is not None
+        places = on_page(page, viewer, viewer.view.snapshot.courses(1.0))
+        inside = page.locator("canvas").first.bounding_box()
+        assert inside is not None
+        x, y = free_place(places, inside["x"], inside["x"] + inside["width"], inside["y"] + inside["height"])
+        page.mouse.click(x, y)
+        await_that(page, lambda: viewer._cuts._chosen)
+        page.get_by_role("button", name="Cut cable").click()
+        await_that(page, lambda: viewer._player.played is not None and viewer._player.clock.time > 0.5)
+        page.get_by_text("Simulated", exact=True).wait_for()
+        page.get_by_role("button", name="Calm").click()
+        await_that(page, lambda: viewer._player.played is None)
+        # shake
+        page.locator("button.shake").first.click()
+        await_that(page, lambda: viewer._modes.moving)
+        assert viewer._modes.swing is not None
+        assert viewer._modes.swing.mode.name == "massless 1"
+        page.locator("button.shake").first.click()
+        await_that(page, lambda: not viewer._modes.moving)
+
+
+def pulled(page: Page, viewer: Viewer) -> float:
+    """How long the arrow of the pull is on the page [px]."""
+    found = viewer._push.pushed
+    if found is None:
+        return 0.0
+    grabbed = found.state.pose.transform(found.push.at)
+    ends = np.stack((grabbed, grabbed + found.push.force / viewer._push._stiffness))
+    return float(np.linalg.norm(np.diff(on_page(page, viewer, ends), axis=0)))
+
+
+def free_place(places: np.ndarray, left: float, right: float, low: float) -> tuple[float, float]:
+    """A place of a cable (m, P, 2) far from the others, well within the picture."""
+    best, found = -1.0, (0.0, 0.0)
+    for cable in range(len(places)):
+        others = np.delete(places, cable, axis=0).reshape(-1, 2)
+        for x, y in places[cable, 6:30]:
+            if left + 25 < x < right - 25 and 25 < y < low - 25:
+                away = float(np.linalg.norm(others - [x, y], axis=1).min())
+                if away > best:
+                    best, found = away, (float(x), float(y))
+    assert best > 3.0
+    return found

@@ -1,0 +1,189 @@
+"""A cable that is clicked, cut, and calmed again, by a client without a browser."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.viewer import cut_words, dynamics
+from sagline.viewer.cut_show import Before
+from sagline.viewer.eye import Eye
+from sagline.viewer.moment import Moment
+from sagline.viewer.playback import Playback
+from sagline.viewer.player import Player
+from sagline.viewer.server import started, stop
+from sagline.viewer.viewer import Viewer, home_pose
+from tests.plot import made
+from tests.viewer.client import Client, await_that
+from tests.viewer.test_push_show import POSE, look, tell
+from tests.viewer.test_viewer import ROBOT, Shown, handle, shown
+
+
+@pytest.fixture(scope="module")
+def page() -> Iterator[Shown]:
+    yield from shown(lambda server: Viewer(server, ROBOT, pose=POSE))
+
+
+def seen_at(page: Shown, cable: int) -> list[float]:
+    """Where a client sees a cable with the others farthest away."""
+    (client,) = page.server.get_clients().values()
+    eye = Eye.of(client.camera)
+    assert eye is not None
+    assert page.viewer.view is not None
+    places = eye.seen(page.viewer.view.snapshot.courses(1.0))[0]
+    others = np.delete(places, cable, axis=0).reshape(-1, 2)
+    away = np.linalg.norm(places[cable, :, None] - others, axis=2).min(axis=1)
+    assert away.max() > 5.0
+    return [float(x) for x in places[cable, away.argmax()] / eye.pixels]
+
+
+def test_a_click_marks_the_cable_below_it_and_one_beside_none(page: Shown) -> None:
+    show = page.viewer._cuts
+    with Client(page.port) as client:
+        look(client, page)
+        for cable in (0, 3, 5):
+            tell(client, page, "pick", seen_at(page, cable))
+            await_that(lambda cable=cable: show._panel.cable == cable and show._chosen)  # type: ignore[misc]
+            await_that(lambda: show._stage._line is not None and show._stage._line.visible)
+            view = page.viewer.view
+            assert view is not None
+            tension = view.snapshot.tension[cable]
+            await_that(lambda cable=cable: show._stage._label.text.startswith(f"cable {cable}:"))  # type: ignore[misc]
+            assert show._stage._label.text == f"cable {cable}: {tension:.1f} N"
+            assert show._stage._button.label == f"Cut cable {cable}"
+            np.testing.assert_allclose(show._stage._line.points[0, 0], ROBOT.frame_anchors[cable], atol=1e-5)
+        tell(client, page, "pick", [0.02, 0.98])
+        await_that(lambda: not show._stage._line.visible)
+        strange: list[Any] = [None, [], {}, [1], ["x", 2], [1e300, 1e300], [[0.5, 0.5]], 10**400]
+        for nonsense in strange:
+            tell(client, page, "pick", nonsense)
+        tell(client, page, "pick", seen_at(page, 1))
+        await_that(lambda: show._panel.cable == 1)
+
+
+def test_it_swings_as_simulate_says_and_calm_puts_all_back(page: Shown) -> None:
+    show, player = page.viewer._cuts, page.viewer._player
+    with Client(page.port) as client:
+        look(client, page)
+        tell(client, page, "pick", seen_at(page, 2))
+        await_that(lambda: show._panel.cable == 2 and show._chosen)
+        before = page.viewer.view
+        assert before is not None
+        button = show._stage._button
+        client.set(button._impl.uuid, True)
+        await_that(lambda: player.played is not None and player.played.duration > 4.0)
+        played = player.played
+        assert isinstance(played, Playback)
+        state = sl.inverse(ROBOT, POSE, tension=sl.MinimumNorm()).state
+        by_itself = sl.simulate(
+            state, duration=dynamics.LASTS, events=sl.Break(cable=2, time=0.0), damping=dynamics.LOSSES
+        )
+        np.testing.assert_allclose(played.simulation.tensions, by_itself.tensions, rtol=1e-9)
+        peak = cut_words.peak_of(by_itself, 2)
+        others = np.delete(by_itself.largest_tension, 2)  # type: ignore[arg-type]
+        assert peak.tension == others.max()
+        await_that(lambda: "So far" not in show._panel._told.content)
+        assert f"{peak.tension:.1f} N in cable {peak.cable}" in show._panel._told.content
+        assert f"{peak.tension / ROBOT.tension_max[peak.cable]:.2f} times its limit" in show._panel._told.content
+        await_that(lambda: player.clock.time == player.clock.duration)
+        assert isinstance(page.viewer.view and page.viewer.view.snapshot, Moment)
+        client.set(handle(page, "Calm")._impl.uuid, True)
+        await_that(lambda: player.played is None)
+        await_that(lambda: page.viewer.view is not None and page.viewer.view.played is None)
+        after = page.viewer.view
+        assert after is not None
+        np.testing.assert_array_equal(after.snapshot.pose.position, POSE.position)
+        np.testing.assert_array_equal(after.snapshot.tension, before.snapshot.tension)
+        assert not handle(page, "Calm").visible
+
+
+def test_what_was_put_on_meanwhile_is_not_played_over() -> None:
+    server = started(port=0)
+    try:
+        given, first, second = Playback(made.simulation()), made.simulation(50), made.simulation(60)
+        viewer = Viewer(server, given.robot, given)
+        cuts, player = viewer._cuts, viewer._player
+        cuts._asked, before = 1, Before(given.home, player.kept())
+        cuts._play(1, first, 3, before)
+        cuts._play(1, second, 3, before)
+        assert isinstance(player.played, Playback)
+        assert player.played.simulation is second
+        player.play(given)
+        cuts._play(1, made.simulation(70), 3, before)
+        assert player.played is given
+    finally:
+        stop(server)
+
+
+def test_cut_by_cut_all_is_put_back() -> None:
+    server = started(port=0)
+    try:
+        given = Playback(made.simulation())
+        viewer = Viewer(server, given.robot, given)
+        cuts, player = viewer._cuts, viewer._player
+        for number in (1, 2):
+            cuts._asked = number
+            cuts._play(number, made.simulation(50), 3, Before(given.home, player.kept()))
+        first = cuts._before[-1].kept.played
+        cuts.calm()
+        assert player.played is first
+        assert cuts._panel._calm.visible
+        cuts.calm()
+        assert player.played is given
+        assert not cuts._panel._calm.visible
+    finally:
+        stop(server)
+
+
+@pytest.mark.parametrize("name", ["falcon-7", "cogiro", "fast"])
+def test_the_first_part_is_soon_there_and_begins_what_follows(name: str) -> None:
+    robot = sl.load_robot(name)
+    state = sl.inverse(robot, home_pose(robot), tension=sl.MinimumNorm()).state
+    parts = dynamics.cut(state, 1, "none")
+    first = next(parts)
+    start = time.process_time()
+    again = next(dynamics.cut(state, 1, "none"))
+    assert time.process_time() - start < 0.15  # s, of the 0.3 until something moves
+    second = next(parts)
+    for part in (again, second):
+        np.testing.assert_array_equal(part.tensions[: len(first.time)], first.tensions)
+    kinetic = second.energy.kinetic
+    assert kinetic.max() > 0.0
+    assert np.abs(second.energy.error).max() < 1e-3 * kinetic.max()
+
+
+def test_a_clock_at_the_end_of_what_is_known_waits_and_goes_on() -> None:
+    player = Player(None, lambda played: None)
+    whole = made.simulation()
+    player.play(Playback(whole), at_once=True)
+    player.advance(5.0)
+    ended = player.clock
+    player.grow(Playback(whole))
+    assert (ended.playing, player.clock.playing) == (False, True)
+    assert player.clock.time == player.clock.duration == 2.0
+    player.scrub_to(1.0)
+    player.grow(Playback(whole))
+    assert (player.clock.time, player.clock.playing) == (1.0, False)
+
+
+def test_what_was_played_is_put_back_where_its_clock_stood() -> None:
+    run = Playback(made.simulation())
+    player = Player(run, lambda played: None)
+    player.scrub_to(0.7)
+    player.toggle()
+    kept = player.kept()
+    player.play(Playback(made.simulation(50)), at_once=True)
+    player.advance(0.5)
+    player.put_back(kept)
+    assert player.played is run
+    assert (player.clock.time, player.clock.playing, player.following) == (0.7, True, True)
+    player.leave()
+    kept = player.kept()
+    player.play(Playback(made.simulation(50)), at_once=True)
+    player.put_back(kept)
+    assert (player.clock.time, player.clock.playing, player.following) == (0.7, False, False)

@@ -1,0 +1,283 @@
+"""The dot in the field of feasible tensions: where it can go, what it chooses, and what a page may say of it."""
+
+import json
+import re
+import time
+from collections.abc import Iterator
+from html import unescape
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+import sagline as sl
+from sagline.viewer.by_hand import ByHand
+from sagline.viewer.dot_field import DotField
+from sagline.viewer.dot_marks import Marks, grouped
+from sagline.viewer.polygon_figure import field_of, polygon_figure
+from sagline.viewer.settings import METHODS, Settings
+from sagline.viewer.snapshot import Snapshot, taken_at
+from sagline.viewer.source import Source
+from sagline.viewer.state_code import code_of
+from sagline.viewer.viewer import Viewer, home_pose
+from tests.effort import best_rate
+from tests.viewer.client import Client, await_that
+from tests.viewer.platform_forces import unbalanced
+from tests.viewer.test_viewer import Shown, handle, shown
+
+HEAVY = sl.load_robot("cogiro").replace(
+    cables=sl.Cable(linear_density=0.65, axial_stiffness=700e3), name="heavy cables", tension_max=900.0
+)
+
+
+@pytest.fixture(scope="module")
+def page() -> Iterator[Shown]:
+    yield from shown(lambda server: Viewer(server, HEAVY))
+
+
+def say(page: Shown, client: Client, value: Any, topic: str = "dot") -> None:
+    client.set(handle(page, "sagline")._impl.uuid, json.dumps({"topic": topic, "value": value, "count": time.time()}))
+
+
+def seen(page: Shown) -> Snapshot:
+    view = page.viewer.view
+    assert view is not None
+    assert isinstance(view.snapshot, Snapshot)
+    return view.snapshot
+
+
+def moved(page: Shown, client: Client, value: Any) -> Snapshot:
+    """What is shown when the dot has moved."""
+    panel = page.viewer._panel
+    before = panel._by_hand
+    say(page, client, value)
+    await_that(lambda: panel._by_hand is not before and shown_way(page) is panel._by_hand)
+    return seen(page)
+
+
+def shown_way(page: Shown) -> sl.TensionMethod:
+    view = page.viewer.view
+    assert view is not None
+    return view.settings.tension
+
+
+def nearest_by_program(polygon: sl.TensionPolygon, low: Any, high: Any, at: np.ndarray) -> np.ndarray:
+    """The nearest feasible coordinates, by a general solver from limits alone."""
+    limits = [
+        {"type": "ineq", "fun": lambda x: polygon.origin + x @ polygon.basis - low},
+        {"type": "ineq", "fun": lambda x: high - polygon.origin - x @ polygon.basis},
+    ]
+    size = float(np.abs(polygon.vertices).max())
+    found = minimize(
+        lambda x: ((x - at) ** 2).sum() / size**2, np.zeros(at.size), jac=lambda x: 2.0 * (x - at) / size**2,
+        constraints=limits, method="SLSQP", options={"ftol": 1e-16, "maxiter": 400},
+    )  # fmt: skip
+    return np.asarray(found.x)
+
+
+@pytest.mark.parametrize("name", ["cogiro", "falcon-7", "ipanema-1"])
+def test_dot_stays_at_the_nearest_point_of_the_field(name: str) -> None:
+    robot, generator = sl.load_robot(name), np.random.default_rng(3)
+    field = field_of(taken_at(robot, home_pose(robot), Settings(mass=robot.mass), None))
+    assert field is not None
+    polygon = field.polygon
+    for _ in range(10):
+        at = generator.uniform(-3.0, 3.0, field.redundant) * (field.high - field.low) + field.middle
+        expected = nearest_by_program(polygon, robot.tension_min, robot.tension_max, at)
+        size = float(np.max(field.high - field.low))
+        assert field.nearest(at) == pytest.approx(expected, abs=1e-5 * size)
+        inside = polygon.origin + field.nearest(at) @ polygon.basis
+        assert np.all(inside >= robot.tension_min - 1e-9 * robot.tension_max)
+        assert np.all(inside <= robot.tension_max * (1.0 + 1e-9))
+
+
+def test_a_field_without_an_end_is_drawn_as_far_as_what_is_known() -> None:
+    robot = sl.load_robot("ipanema-1").replace(tension_max=np.inf)
+    snapshot = taken_at(robot, home_pose(robot), Settings(mass=robot.mass), None)
+    field = field_of(snapshot)
+    assert field is not None
+    assert None in field.sides
+    assert np.ptp(field.corners, axis=0).max() < 5e3  # not the 1e5 N that stand in for infinity
+    for corner, side, after in zip(field.corners, field.sides, np.roll(field.corners, -1, axis=0), strict=True):
+        tension = field.polygon.origin + 0.5 * (corner + after) @ field.polygon.basis
+        at_limit = np.isclose(tension, robot.tension_min, atol=1e-6)
+        assert at_limit.any() == (side is not None)
+        if side is not None:
+            assert at_limit[side.cable]
+    one = sl.load_robot("falcon-7").replace(tension_max=np.inf)
+    line = field_of(taken_at(one, home_pose(one), Settings(mass=one.mass), None))
+    assert line is not None
+    assert np.isfinite(line.corners).all()
+
+
+def test_chosen_tensions_balance_with_heavy_cables_and_keep_their_limits(page: Shown) -> None:
+    generator = np.random.default_rng(4)
+    with Client(page.port) as client:
+        field = field_of(seen(page))
+        assert field is not None
+        pulls = []
+        for _ in range(12):
+            at = generator.uniform(field.low, field.high) * 1.3
+            snapshot = moved(page, client, {"at": at.tolist()})
+            plan = snapshot.plan
+            assert plan is not None
+            assert plan.feasible
+            assert isinstance(plan.tension, ByHand)
+            scale = float(snapshot.tension.max())
+            assert float(plan.wrench_residual.max()) < 1e-8 * scale  # N
+            force, moment = unbalanced(plan.state)
+            assert force < 1e-7 * scale
+            assert moment < 1e-7 * scale
+            assert np.all(snapshot.tension >= HEAVY.tension_min - 1e-9 * scale)
+            assert np.all(snapshot.tension <= HEAVY.tension_max + 1e-9 * scale)
+            drawn = field_of(snapshot)
+            assert drawn is not None
+            assert drawn.polygon.coordinates(snapshot.tension) == pytest.approx(drawn.nearest(at), abs=1e-2 * scale)
+            pulls.append(plan.state.pull)
+        assert np.ptp(pulls, axis=0).max() > 0.05  # the weight of the cables does count
+        assert "chosen by hand" in snapshot.origin
+
+
+def test_code_of_what_is_chosen_by_hand_gives_its_tensions(page: Shown) -> None:
+    with Client(page.port) as client:
+        snapshot = moved(page, client, {"at": [120.0, -60.0]})
+        view = page.viewer.view
+        assert view is not None
+        made: dict[str, Any] = {}
+        lines = code_of(view, HEAVY, Source("given"))
+        exec(lines, {"given": HEAVY}, made)
+        np.testing.assert_array_equal(made["tension"], snapshot.tension)
+
+
+def test_steps_add_up_and_stop_at_the_sides(page: Shown) -> None:
+    with Client(page.port) as client:
+        start = moved(page, client, {"at": [0.0, 0.0]})
+        field = field_of(start)
+        assert field is not None
+        for _ in range(5):
+            snapshot = moved(page, client, {"by": [0.01, 0.0]})
+        size = float(np.max(field.high - field.low))
+        assert field.polygon.basis @ (snapshot.tension - start.tension) == pytest.approx([0.05 * size, 0.0], abs=1e-6)
+        for _ in range(3):
+            snapshot = moved(page, client, {"by": [1.0, 0.0]})
+        at_limit = np.minimum(snapshot.tension - HEAVY.tension_min, HEAVY.tension_max - snapshot.tension).min()
+        assert at_limit == pytest.approx(0.0, abs=1e-6)
+        back = moved(page, client, {"by": [-0.02, 0.0]})
+        assert np.linalg.norm(back.tension - snapshot.tension) > 0.015 * size  # it does not stick to the side
+
+
+def test_a_drag_keeps_the_tensions_nearest_to_those_chosen(page: Shown) -> None:
+    with Client(page.port) as client:
+        chosen = moved(page, client, {"at": [150.0, 80.0]}).tension
+        client.grab()
+        for place in ([0.4, 0.3, 2.4], [2.5, 1.0, 1.5]):
+            client.drag(place)
+            await_that(lambda place=place: np.array_equal(page.position, place))  # type: ignore[misc]
+            snapshot = seen(page)
+            assert snapshot.plan is not None
+            assert snapshot.plan.feasible
+            field = field_of(snapshot)
+            assert field is not None
+            wanted = field.polygon.basis @ chosen
+            expected = nearest_by_program(field.polygon, HEAVY.tension_min, HEAVY.tension_max, wanted)
+            assert field.polygon.coordinates(snapshot.tension) == pytest.approx(expected, abs=0.05)
+        client.drag(home_pose(HEAVY).position)
+        await_that(lambda: np.allclose(seen(page).tension, chosen, rtol=0.0, atol=1e-6))  # and back again
+
+
+def test_a_mark_chooses_its_way_and_the_list_says_so(page: Shown) -> None:
+    with Client(page.port) as client:
+        moved(page, client, {"at": [10.0, 10.0]})
+        method = handle(page, "Tensions")
+        assert method.value == "chosen by hand"
+        for name in ("Centroid", "AnalyticCenter", "LowestSum"):
+            say(page, client, name, "sharing")
+            await_that(lambda name=name: shown_way(page) is METHODS[name])  # type: ignore[misc]
+            snapshot = seen(page)
+            assert method.value == name
+            plan = sl.inverse(HEAVY, snapshot.pose, tension=METHODS[name])
+            assert snapshot.tension == pytest.approx(plan.chord_tension, rel=1e-9)
+        client.set(method._impl.uuid, "chosen by hand")  # the list leads back to them
+        await_that(lambda: isinstance(shown_way(page), ByHand))
+        client.set(method._impl.uuid, "MinimumNorm")
+        await_that(lambda: isinstance(shown_way(page), sl.MinimumNorm))
+
+
+@pytest.mark.parametrize(
+    "value",
+    [None, 3, "x", [], {}, {"at": None}, {"at": [1.0]}, {"at": ["a", "b"]}, {"at": [1e300, 0.0]}, {"by": [True, 1]},
+     {"at": [[1.0], 2.0]}, {"by": [float("nan"), 0.0]}, {"at": {"0": 1.0}}],
+)  # fmt: skip
+def test_what_is_no_place_is_not_heard(page: Shown, value: Any) -> None:
+    with Client(page.port) as client:
+        before = moved(page, client, {"at": [5.0, 5.0]}).tension
+        say(page, client, value)
+        say(page, client, value, "sharing")
+        say(page, client, "NoSuchWay", "sharing")
+        after = moved(page, client, {"by": [0.0, 0.0]}).tension
+        np.testing.assert_allclose(after, before, rtol=1e-12)
+    assert page.thread.is_alive()
+
+
+def test_marks_are_where_their_ways_are() -> None:
+    robot = sl.load_robot("article-suspended")
+    pose = sl.Pose([1.0, 0.5, 2.0], np.eye(3))
+    snapshot = taken_at(robot, pose, Settings(mass=50.0), None)
+    field, found = field_of(snapshot), Marks()
+    assert field is not None
+    assert snapshot.plan is not None
+    marks = found.at(snapshot.plan, further=True)
+    assert [mark.name for mark in marks] == list(METHODS)
+    assert found.at(snapshot.plan, further=True) is marks
+    html = polygon_figure(snapshot, marks, field)
+    places = grouped(marks, field)
+    assert sorted(mark.name for _, group in places for mark in group) == sorted(
+        mark.name for mark in marks if not mark.missing
+    )
+    for (x, y), group in places:
+        plan = sl.inverse(robot, pose, tension=METHODS[group[0].name])
+        where = field.polygon.basis @ (plan.chord_tension - field.polygon.origin)
+        assert [x, y] == pytest.approx(field.place(where), abs=1e-6)
+        assert f'data-value="{group[0].name}"' in unescape(html)
+    assert {mark.name for mark in found.at(snapshot.plan, further=False)} < set(METHODS)
+
+
+def test_what_a_way_misses_is_told() -> None:
+    robot = sl.load_robot("article-suspended")
+    pose = sl.Pose([5.0, 3.0, 2.2], np.eye(3))
+    snapshot = taken_at(robot, pose, Settings(mass=50.0), None)
+    assert snapshot.plan is not None
+    assert not sl.inverse(robot, pose, tension=sl.ClosedForm()).feasible
+    marks = Marks().at(snapshot.plan, further=True)
+    missing = {mark.name: mark.missing for mark in marks if mark.missing}
+    assert "ClosedForm" in missing
+    html = polygon_figure(snapshot, marks, field_of(snapshot))
+    assert re.search(r"ClosedForm: none here", html)
+
+
+def test_a_field_keeps_its_place_while_the_dot_moves() -> None:
+    settings = Settings(mass=HEAVY.mass)
+    first = field_of(taken_at(HEAVY, home_pose(HEAVY), settings, None))
+    assert isinstance(first, DotField)
+    hand = ByHand(target=first.tension(first.corners[0]))
+    second = field_of(taken_at(HEAVY, home_pose(HEAVY), Settings(mass=HEAVY.mass, tension=hand), None), first)
+    assert second is not None
+    assert second.scale == first.scale
+    np.testing.assert_array_equal(second.middle, first.middle)
+    assert not np.array_equal(second.corners, first.corners)  # other pulls: another polygon
+
+
+def test_thirty_tensions_a_second_follow_the_dot(page: Shown) -> None:
+    def rate() -> float:
+        with Client(page.port) as client:
+            list(client.heard(1.0))
+            before, start = page.viewer.updates, time.monotonic()
+            while time.monotonic() - start < 2.0:
+                angle = 3.0 * (time.monotonic() - start)
+                say(page, client, {"at": [100.0 * np.cos(angle), 100.0 * np.sin(angle)]})
+                time.sleep(0.01)
+            heard = sum(m.get("name") == "/cables" and "points" in m.get("updates", {}) for m in client.heard(0.5))
+            return float(min(page.viewer.updates - before, heard)) / 2.0
+
+    assert best_rate(rate, 30.0) >= 30.0

@@ -1,0 +1,163 @@
+"""The forces on the platform: those of cables as they hang, that close; what is drawn and told of them."""
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.statics.wrench import external_wrench
+from sagline.viewer.force_polygon import cable_forces, pulls_of, residual
+from sagline.viewer.force_polygon_figure import force_polygon_figure
+from sagline.viewer.missing import missing_of
+from sagline.viewer.settings import Settings
+from sagline.viewer.snapshot import taken_at
+from sagline.viewer.viewer import Viewer, home_pose
+from tests.viewer.client import Client, await_that
+from tests.viewer.platform_forces import pulled
+from tests.viewer.test_dot import HEAVY
+from tests.viewer.test_viewer import Shown, handle, shown
+
+LOAD = external_wrench([60.0, -40.0, -200.0, 5.0, 3.0, -2.0], None)
+ROW = r"<td><span[^>]*></span> (\w+)</td>((?:<td>[^<]*</td>)+)"
+ARROW = r'<line x1="([\d.-]+)" y1="([\d.-]+)" x2="([\d.-]+)" y2="([\d.-]+)"[^>]*/><polygon points="([\d.-]+),([\d.-]+) '
+
+
+def held(robot: sl.Robot, away: tuple[float, float, float] = (0.4, 0.3, -0.3)) -> sl.Equilibrium:
+    pose = sl.Pose.from_euler(home_pose(robot).position + away, 0.05, -0.03, 0.02)
+    plan = sl.inverse(robot, pose, wrench=LOAD)
+    assert plan.feasible
+    return plan.state
+
+
+@pytest.mark.parametrize("robot", [HEAVY, sl.load_robot("cogiro"), sl.load_robot("ipanema-2-pulleys")])
+def test_forces_are_those_of_the_ends_of_the_cables_as_they_hang(robot: sl.Robot) -> None:
+    state = held(robot)
+    expected = pulled(state)
+    np.testing.assert_allclose(cable_forces(state), expected, rtol=0.0, atol=1e-7 * np.abs(expected).max())
+    if robot is HEAVY:  # and not of their chords
+        ends = state.pose.transform(robot.platform_anchors)
+        chords = (state.exit_point - ends) / np.linalg.norm(state.exit_point - ends, axis=1, keepdims=True)
+        assert np.abs(state.chord_tension[:, None] * chords - expected).max() > 10.0
+
+
+def test_they_close_with_weight_and_load() -> None:
+    state = held(HEAVY)
+    pulls = pulls_of(state)
+    assert [each.name for each in pulls][-2:] == ["weight", "load"]
+    assert sorted(each.name for each in pulls[:-2]) == [str(k) for k in range(8)]
+    force, moment = residual(state, pulls)
+    scale = float(state.chord_tension.max())
+    assert force < 1e-9 * scale
+    assert moment < 1e-9 * scale
+    np.testing.assert_allclose(pulls[-1].force, LOAD[:3])
+    np.testing.assert_allclose(pulls[-1].moment, LOAD[3:])
+    center = state.pose.transform(HEAVY.center_of_mass)
+    for each in pulls[:-2]:
+        assert each.moment == pytest.approx(np.cross(each.at - center, each.force))
+    away = pulls_of(state)[:-1]  # without the load they do not
+    assert residual(state, away) == pytest.approx((np.linalg.norm(LOAD[:3]), np.linalg.norm(LOAD[3:])), rel=1e-6)
+
+
+def arrows(html: str) -> list[np.ndarray]:
+    """Starts and ends of the arrows of each view [px], y up, shape (k, 2, 2)."""
+    views = []
+    for svg in re.findall(r"<svg.*?</svg>", html):
+        found = np.array(re.findall(ARROW, svg), dtype=float)
+        views.append(np.stack((found[:, :2], found[:, 4:]), axis=1) * [1.0, -1.0])
+    return views
+
+
+def test_arrows_are_drawn_head_to_tail_as_long_as_the_forces() -> None:
+    state = held(HEAVY)
+    pulls = pulls_of(state)
+    html = force_polygon_figure(state)
+    views = arrows(html)
+    assert len(views) == 2
+    named = re.findall(r'aria-label="forces on the platform head to tail, (\w) to the right, (\w) up"', html)
+    for view, names in zip(views, named, strict=True):
+        axes = ["xyz".index(name) for name in names]
+        forces = np.array([each.force[axes] for each in pulls])
+        forces = forces[np.linalg.norm(forces, axis=1) > 1e-9]  # the weight, from above
+        scale = np.linalg.norm(view[:, 1] - view[:, 0]) / np.linalg.norm(forces)
+        np.testing.assert_allclose(view[1:, 0], view[:-1, 1], atol=0.11)
+        np.testing.assert_allclose(view[-1, 1], view[0, 0], atol=0.11)  # it closes
+        np.testing.assert_allclose(view[:, 1] - view[:, 0], scale * forces, atol=0.2)
+
+
+def test_numbers_are_those_of_the_cables() -> None:
+    state = held(HEAVY)
+    rows = dict(re.findall(ROW, force_polygon_figure(state)))
+    expected, arm = pulled(state), state.pose.rotation.apply(HEAVY.platform_anchors - HEAVY.center_of_mass)
+    for k in range(8):
+        numbers = [float(cell) for cell in re.findall(r"<td>([^<]*)</td>", rows[str(k)])]
+        np.testing.assert_allclose(numbers, [*expected[k], *np.cross(arm[k], expected[k])], atol=0.0501)
+    assert rows["weight"].startswith(f"<td>0.0</td><td>0.0</td><td>{-HEAVY.mass * HEAVY.gravity:.1f}</td>")
+    assert re.search(r"sum</td>(<td>0\.0</td>){6}</tr>", force_polygon_figure(state))
+
+
+def test_the_gap_is_the_missing_force() -> None:
+    robot = sl.load_robot("cogiro")
+    snapshot = taken_at(robot, sl.Pose([6.3, 2.1, 5.4], np.eye(3)), Settings(mass=robot.mass), None)
+    missing = missing_of(snapshot)
+    assert missing is not None
+    pulls = pulls_of(missing.state, missing.wrench)
+    assert [each.name for each in pulls][-2:] == ["weight", "missing"]
+    others = pulled(missing.state).sum(axis=0) - np.array([0.0, 0.0, robot.mass * robot.gravity])
+    np.testing.assert_allclose(pulls[-1].force, -others, atol=1e-6 * missing.state.chord_tension.max())
+    html = force_polygon_figure(missing.state, missing.wrench)
+    assert 'class="gap"' in html
+    told = re.search(r"The gap is the missing force, ([\d.]+).(k?)N", html)
+    assert told is not None
+    size = float(told[1]) * (1e3 if told[2] else 1.0)
+    assert size == pytest.approx(np.linalg.norm(others), rel=6e-4)
+
+
+def test_a_platform_that_cannot_turn_has_no_moments() -> None:
+    robot = sl.load_robot("cogiro").replace(motion_pattern="3T")
+    plan = sl.inverse(robot, home_pose(robot))
+    assert plan.feasible
+    html = force_polygon_figure(plan.state)
+    assert "M<sub>" not in html
+    assert "N m" not in html
+    assert residual(plan.state, pulls_of(plan.state))[0] < 1e-6
+    flat = held_planar()
+    assert len(arrows(force_polygon_figure(flat))) == 1
+
+
+def held_planar() -> sl.Equilibrium:
+    robot = sl.Robot(
+        name="planar", frame_anchors=np.array([[0.0, 0.0, 3.0], [4.0, 0.0, 3.0], [0.0, 0.0, 0.0], [4.0, 0.0, 0.0]]),
+        platform_anchors=np.array([[-0.1, 0.0, 0.1], [0.1, 0.0, 0.1], [-0.1, 0.0, -0.1], [0.1, 0.0, -0.1]]),
+        mass=10.0, cables=sl.Cable(linear_density=0.02, axial_stiffness=1e5), tension_min=5.0, tension_max=300.0,
+        inertia=np.eye(3), motion_pattern="1R2T", plane_normal=[0.0, 1.0, 0.0],
+    )  # fmt: skip
+    return sl.inverse(robot, sl.Pose([2.2, 0.0, 1.4], np.eye(3))).state
+
+
+@pytest.fixture(scope="module")
+def page() -> Iterator[Shown]:
+    yield from shown(lambda server: Viewer(server, sl.load_robot("falcon-7")))
+
+
+def test_arrows_in_the_scene_come_and_go(page: Shown) -> None:
+    wanted = handle(page, "Forces in the scene")
+    with Client(page.port) as client:
+        list(client.heard(1.0))
+        client.set(wanted._impl.uuid, True)
+        await_that(lambda: "/forces" in page.server.scene._handle_from_node_name)
+        arrows_drawn: Any = page.server.scene._handle_from_node_name["/forces"]
+        points = arrows_drawn.points
+        view = page.viewer.view
+        assert view is not None
+        assert isinstance(view.snapshot.robot, sl.Robot)
+        state = view.snapshot.plan.state  # type: ignore[union-attr]
+        forces = np.array([each.force for each in pulls_of(state)])
+        scale = np.linalg.norm(points[:, 1] - points[:, 0]) / np.linalg.norm(forces)
+        np.testing.assert_allclose(points[:, 1] - points[:, 0], scale * forces, atol=1e-5)
+        center = view.snapshot.pose.transform(view.snapshot.robot.center_of_mass)
+        np.testing.assert_allclose(points[-1, 0], center, atol=1e-6)
+        client.set(wanted._impl.uuid, False)
+        await_that(lambda: not page.server.scene._handle_from_node_name["/forces"].visible)

@@ -1,0 +1,255 @@
+"""What is missing where the platform cannot be held, by linear programs; and the nearest pose, by trying many."""
+
+import time
+from collections.abc import Iterator
+from html import unescape
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+import sagline as sl
+from sagline.statics.wrench import external_wrench
+from sagline.viewer.missing import missing_of
+from sagline.viewer.missing_nearest import NearestHeld, nearest_held
+from sagline.viewer.missing_words import explanation, missing_label
+from sagline.viewer.reading import Reading
+from sagline.viewer.readout import force_unit
+from sagline.viewer.server import started, stop
+from sagline.viewer.settings import Settings
+from sagline.viewer.snapshot import Snapshot, taken_at
+from sagline.viewer.viewer import Viewer, home_pose
+from tests.effort import best_rate
+from tests.viewer.client import Client, await_that
+from tests.viewer.platform_forces import unbalanced
+from tests.viewer.test_dot import say
+from tests.viewer.test_viewer import Shown, shown
+
+OUTSIDE = {  # poses that no force within the limits holds, but with another force
+    "cogiro": [[6.3, 2.1, 5.4], [0.0, 0.0, 6.5], [9.5, 0.0, 2.0]],
+    "falcon-7": [[0.6, 0.28, 1.25], [0.0, 0.9, 0.6]],
+    "ipanema-2-pulleys": [[4.5, 0.0, 2.0]],
+}
+CASES = [(name, place) for name, places in OUTSIDE.items() for place in places]
+
+
+def at(robot: sl.Robot, pose: sl.Pose) -> Snapshot:
+    return taken_at(robot, pose, Settings(mass=robot.mass), None)
+
+
+def directions(count: int) -> np.ndarray:
+    """Evenly over all (Fibonacci's lattice), shape (count, 3)."""
+    k = np.arange(count) + 0.5
+    z, turn = 1.0 - 2.0 * k / count, np.pi * (1.0 + np.sqrt(5.0)) * k
+    return np.column_stack((np.sqrt(1.0 - z**2) * np.cos(turn), np.sqrt(1.0 - z**2) * np.sin(turn), z))
+
+
+def least_force(state: sl.Equilibrium, given: np.ndarray, count: int = 1500) -> tuple[float, bool]:
+    """A lower bound of the least force that would do with the cables' pulls as they are, by HiGHS; and if one would."""
+    robot = state.one_robot
+    matrix, m = sl.structure_matrix(robot, state.pose), robot.cable_count
+    supplied = -given
+    supplied[2] += robot.mass * robot.gravity
+    arm = state.pose.rotation.apply(robot.platform_anchors - robot.center_of_mass)
+    down = np.column_stack((np.zeros((m, 2)), -state.pull))
+    supplied -= np.concatenate((down.sum(axis=0), np.cross(arm, down).sum(axis=0)))
+    assert matrix.shape[0] == 6
+    equal = np.hstack((matrix, np.vstack((np.eye(3), np.zeros((3, 3)))), np.zeros((6, 1))))
+    reach = np.hstack((np.zeros((count, m)), directions(count), -np.ones((count, 1))))
+    limits = [*zip(robot.tension_min, robot.tension_max, strict=True), *[(None, None)] * 3, (0.0, None)]
+    cost = np.zeros(m + 4)
+    cost[-1] = 1.0
+    found = linprog(cost, A_ub=reach, b_ub=np.zeros(count), A_eq=equal, b_eq=supplied, bounds=limits, method="highs")
+    return float(found.fun) if found.success else np.inf, bool(found.success)
+
+
+@pytest.mark.parametrize(("name", "place"), CASES)
+def test_missing_force_is_the_least_that_a_linear_program_knows(name: str, place: list[float]) -> None:
+    robot = sl.load_robot(name)
+    snapshot = at(robot, sl.Pose(place, np.eye(3)))
+    missing = missing_of(snapshot)
+    assert missing is not None
+    assert snapshot.plan is not None
+    size = float(np.linalg.norm(missing.force))
+    assert size == pytest.approx(float(snapshot.plan.shortfall), rel=1e-6)
+    bound, found = least_force(missing.state, np.zeros(6))
+    assert found
+    assert bound <= size * (1.0 + 1e-6)
+    assert size <= bound / np.cos(0.06) * 1.001  # directions are that near to each other
+    force, moment = unbalanced(missing.state)  # with it the platform is at rest
+    assert force < 1e-6 * missing.state.chord_tension.max()
+    assert moment < 1e-6 * missing.state.chord_tension.max()
+    np.testing.assert_allclose(missing.state.wrench, missing.wrench)
+    assert f"{force_unit(robot).written(size)} missing" == missing_label(missing, force_unit(robot))
+
+
+@pytest.mark.parametrize(("name", "place"), CASES)
+def test_cables_at_limits_stand_there_and_another_limit_would_help(name: str, place: list[float]) -> None:
+    robot = sl.load_robot(name)
+    snapshot = at(robot, sl.Pose(place, np.eye(3)))
+    missing = missing_of(snapshot)
+    assert missing is not None
+    assert missing.limits
+    before = float(np.linalg.norm(missing.force))
+    for each in missing.limits:
+        limit = (robot.tension_min if each.lower else robot.tension_max)[each.cable]
+        assert missing.state.chord_tension[each.cable] == pytest.approx(limit, rel=2e-3)
+        low, high = robot.tension_min.copy(), robot.tension_max.copy()
+        if each.lower:
+            low[each.cable] *= 0.9
+        else:
+            high[each.cable] *= 1.1
+        wider = missing_of(at(robot.replace(tension_min=low, tension_max=high), snapshot.pose))
+        assert wider is not None
+        assert np.linalg.norm(wider.force) < before
+        assert each.name in (f"{each.cable} at its lower limit", f"{each.cable} at its upper limit")
+
+
+def test_where_no_force_alone_would_do_a_moment_is_told() -> None:
+    robot = sl.load_robot("ipanema-1")
+    pose = sl.Pose.from_euler(home_pose(robot).position, 0.0, np.radians(80.0), np.radians(40.0))
+    snapshot = at(robot, pose)
+    assert snapshot.plan is not None
+    assert np.isinf(snapshot.plan.shortfall)
+    missing = missing_of(snapshot)
+    assert missing is not None
+    assert not least_force(missing.state, np.zeros(6), 50)[1]
+    assert least_force(missing.state, missing.wrench * (1.0 + 1e-7), 50)[0] < 1e-3 * np.linalg.norm(missing.force)
+    force, moment = unbalanced(missing.state)
+    assert max(force, moment) < 1e-6 * missing.state.chord_tension.max()
+    assert "which alone would not do" in explanation(snapshot, missing, None, looking=False)
+
+
+@pytest.mark.parametrize(("name", "place"), [case for case in CASES if "pulleys" not in case[0]])
+def test_nothing_nearer_is_held(name: str, place: list[float]) -> None:
+    robot, generator = sl.load_robot(name), np.random.default_rng(8)
+    pose = sl.Pose(place, np.eye(3))
+    nearest = nearest_held(robot, pose, sl.Catenary(), None)
+    assert nearest is not None
+    assert not nearest.turned
+    assert sl.inverse(robot, nearest.pose).feasible
+    assert nearest.distance == pytest.approx(np.linalg.norm(nearest.pose.position - pose.position))
+    ways = generator.normal(size=(1500, 3))
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    share = 0.97 * generator.uniform(0.0, 1.0, (1500, 1)) ** (1.0 / 3.0)
+    tried = pose.position + nearest.distance * share * ways
+    plan = sl.inverse(robot, sl.Pose(tried, np.broadcast_to(np.eye(3), (1500, 3, 3))), tension=sl.MinimumNorm())
+    assert not plan.feasible.any()
+
+
+def test_a_platform_that_is_turned_too_far_is_turned_back() -> None:
+    robot = sl.load_robot("ipanema-1")
+    pose = sl.Pose.from_euler(home_pose(robot).position, 0.0, np.radians(80.0), np.radians(40.0))
+    assert not at(robot, pose).feasible
+    nearest = nearest_held(robot, pose, sl.Catenary(), None)
+    assert nearest is not None
+    assert nearest.turned
+    assert nearest.distance < 1e-3
+    assert sl.inverse(robot, nearest.pose).feasible
+
+
+def test_a_load_counts() -> None:
+    robot = sl.load_robot("cogiro")
+    load = external_wrench([0.0, 0.0, 1e5, 0.0, 0.0, 0.0], None)
+    pose = sl.Pose([0.0, 0.0, 2.0], np.eye(3))
+    snapshot = taken_at(robot, pose, Settings(mass=robot.mass), None, wrench=load)
+    missing = missing_of(snapshot)
+    assert missing is not None
+    weight = robot.mass * robot.gravity
+    assert -missing.force[2] > 1e5 - 60.0 * weight  # cables from above hardly pull down
+    assert nearest_held(robot, pose, sl.Catenary(), load) is None
+    assert "nowhere" in explanation(snapshot, missing, None, looking=False)
+
+
+def test_a_planar_robot_is_explained_in_its_plane() -> None:
+    robot = sl.Robot(
+        name="planar", frame_anchors=np.array([[0.0, 0.0, 3.0], [4.0, 0.0, 3.0], [0.0, 0.0, 0.0], [4.0, 0.0, 0.0]]),
+        platform_anchors=np.array([[-0.1, 0.0, 0.1], [0.1, 0.0, 0.1], [-0.1, 0.0, -0.1], [0.1, 0.0, -0.1]]),
+        mass=10.0, cables=sl.Cable(linear_density=0.02, axial_stiffness=1e5), tension_min=5.0, tension_max=300.0,
+        inertia=np.eye(3), motion_pattern="1R2T", plane_normal=[0.0, 1.0, 0.0],
+    )  # fmt: skip
+    pose = sl.Pose([2.0, 0.0, 3.5], np.eye(3))
+    missing = missing_of(at(robot, pose))
+    assert missing is not None
+    assert missing.force[1] == 0.0
+    assert missing.force[2] > 0.0
+    nearest = nearest_held(robot, pose, sl.Catenary(), None)
+    assert nearest is not None
+    assert nearest.pose.position[1] == 0.0
+    assert nearest.pose.position[2] < 3.0
+
+
+def test_other_reasons_are_explained_too() -> None:
+    robot = sl.load_robot("article-suspended")
+    far = sl.Pose([5.0, 3.0, 2.2], np.eye(3))
+    settings = Settings(mass=50.0, tension=sl.ClosedForm())
+    html = explanation(taken_at(robot, far, settings, None), None, None, looking=False)
+    assert 'data-send="sharing" data-value="AnalyticCenter"' in html
+    anchor = sl.Pose(robot.frame_anchors[0] - robot.platform_anchors[0], np.eye(3))
+    lost = at(robot, anchor)
+    assert lost.plan is None
+    nearest = nearest_held(robot, anchor, sl.Catenary(), None)
+    assert isinstance(nearest, NearestHeld)
+    assert "Go there" in explanation(lost, missing_of(lost), nearest, looking=False)
+    upside = sl.Pose([1.0, 0.5, 6.0], np.eye(3))  # cables level
+    singular = at(robot, upside)
+    if singular.status is sl.PoseStatus.SINGULAR:
+        assert "No cable resists" in explanation(singular, None, None, looking=True)
+
+
+def test_nobody_says_that_there_is_nowhere_to_go_before_it_was_looked_for() -> None:
+    server = started(port=0)
+    try:
+        pose = sl.Pose(OUTSIDE["cogiro"][0], np.eye(3))
+        viewer = Viewer(
+            server, sl.load_robot("cogiro"), pose=pose, ready=lambda reading: reading is not Reading.WORKSPACE
+        )
+        viewer._update()
+        assert "looked for" in viewer._panel._explained.content
+        assert "nowhere" not in viewer._panel._explained.content
+    finally:
+        stop(server)
+
+
+@pytest.fixture(scope="module")
+def page() -> Iterator[Shown]:
+    yield from shown(lambda server: Viewer(server, sl.load_robot("cogiro")))
+
+
+def test_the_platform_goes_where_it_is_held(page: Shown) -> None:
+    with Client(page.port) as client:
+        client.grab()
+        client.drag([6.3, 2.1, 5.4])
+        await_that(lambda: page.viewer.view is not None and not page.viewer.view.snapshot.feasible)
+        texts: list[str] = []
+        for message in client.heard(20.0):
+            texts += [unescape(str(message.get("updates", {}).get("content", "")))]
+            if "Go there" in texts[-1]:
+                break
+        assert any("Missing force" in text for text in texts)
+        say(page, client, "", "go-there")
+        await_that(lambda: page.viewer.view is not None and page.viewer.view.snapshot.feasible)
+        pose = nearest_held(page.viewer.view.snapshot.robot, sl.Pose([6.3, 2.1, 5.4], np.eye(3)), sl.Catenary(), None)  # type: ignore[union-attr]
+        assert pose is not None
+        assert page.position == pytest.approx(pose.pose.position, abs=1e-9)
+        before = page.position
+        say(page, client, "", "go-there")  # there is nowhere to go from here
+        say(page, client, {"x": 1}, "go-there")
+        time.sleep(0.3)
+        np.testing.assert_array_equal(page.position, before)
+
+
+@pytest.mark.soak
+def test_thirty_explanations_a_second(page: Shown) -> None:
+    def rate() -> float:
+        with Client(page.port) as client:
+            list(client.heard(1.0))
+            before, start = page.viewer.updates, time.monotonic()
+            while time.monotonic() - start < 2.0:
+                angle = 3.0 * (time.monotonic() - start)
+                client.drag([6.3 + 0.3 * np.cos(angle), 2.1 + 0.3 * np.sin(angle), 5.4])
+                time.sleep(0.01)
+            seen = sum(m.get("name") == "/missing" and "points" in m.get("updates", {}) for m in client.heard(0.5))
+            return float(min(page.viewer.updates - before, seen)) / 2.0
+
+    assert best_rate(rate, 30.0) >= 30.0

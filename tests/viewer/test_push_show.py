@@ -1,0 +1,181 @@
+"""A hand that pulls at the platform, told by a client without a browser."""
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.viewer.channel import NAME
+from sagline.viewer.eye import Eye
+from sagline.viewer.push import pushed
+from sagline.viewer.viewer import Viewer
+from tests.viewer.client import Client, await_that
+from tests.viewer.test_viewer import ROBOT, Shown, handle, shown
+
+POSE = sl.Pose([0.5, 0.5, 1.5], np.eye(3))
+WIDE, HIGH, FOV = 800, 600, 1.0
+MET: set[tuple[int, int]] = set()  # clients of ports
+
+
+@pytest.fixture(scope="module")
+def page() -> Iterator[Shown]:
+    yield from shown(lambda server: Viewer(server, ROBOT, pose=POSE))
+
+
+def look(client: Client, page: Shown) -> None:
+    """Stand ten meters before the platform, which is in the middle of the picture."""
+    framing = page.viewer._framing  # puts every camera once
+    await_that(lambda: any(framing._places.get(k) for k in page.server.get_clients() if (page.port, k) not in MET))
+    framing._lock.acquire()  # until it has done so
+    framing._lock.release()
+    mine = next(k for k in page.server.get_clients() if (page.port, k) not in MET)
+    MET.add((page.port, mine))
+    turned = [float(np.sqrt(0.5)), -float(np.sqrt(0.5)), 0.0, 0.0]
+    camera: dict[str, Any] = {"wxyz": turned, "position": [0.5, -9.5, 1.5], "look_at": [0.5, 0.5, 1.5]}
+    lens = {"fov": FOV, "near": 0.1, "far": 100.0, "image_height": HIGH, "image_width": WIDE}
+    client.say(type="ViewerCameraMessage", up_direction=[0, 0, 1], **camera, **lens)
+
+    def stands() -> bool:
+        eye = Eye.of(page.server.get_clients()[mine].camera)
+        return eye is not None and eye.place[1] == -9.5
+
+    await_that(stands)
+
+
+def tell(client: Client, page: Shown, topic: str, value: Any) -> None:
+    client.set(handle(page, NAME)._impl.uuid, json.dumps({"topic": topic, "value": value}))
+
+
+def pull(client: Client, page: Shown, phase: str, x: float, y: float, *, keep: bool = False) -> None:
+    tell(client, page, "pull", {"phase": phase, "at": [x, y], "keep": keep})
+
+
+def test_a_hand_pulls_as_far_as_it_is_away_and_lets_go(page: Shown) -> None:
+    show = page.viewer._push
+    with Client(page.port) as client:
+        look(client, page)
+        pull(client, page, "start", 0.5, 0.5)
+        pull(client, page, "move", 0.55, 0.42)
+        await_that(lambda: show.pushed is not None)
+        found = show.pushed
+        assert found is not None
+        grabbed = POSE.transform(found.push.at)
+        assert grabbed[[0, 2]] == pytest.approx([0.5, 1.5], abs=1e-12)  # in the middle of the picture
+        assert grabbed[1] == pytest.approx(0.5 + show._stage.body.vertices[:, 1].min(), abs=1e-12)  # in front
+        # 0.05 of the picture's width, and 0.08 of its height, that far away from the eye
+        high = 2.0 * np.tan(0.5 * FOV) * (grabbed[1] + 9.5)
+        wanted = show._stiffness * np.array([0.05 * high * WIDE / HIGH, 0.0, 0.08 * high])
+        np.testing.assert_allclose(found.push.force, wanted, atol=1e-9 * float(np.linalg.norm(wanted)))
+        assert handle(page, "Force [N]").value == pytest.approx(np.linalg.norm(wanted), rel=1e-12)
+        stage = show._stage
+        np.testing.assert_allclose(stage._arrow.points[0, 0], grabbed, atol=1e-5)
+        np.testing.assert_allclose(stage._arrow.points[0, 1], grabbed + wanted / show._stiffness, atol=1e-5)
+        assert found.pushed is not None
+        assert stage._ghost.visible
+        np.testing.assert_allclose(stage._ghost.position, found.pushed.pose.position, atol=1e-6)
+        assert stage._tip.text.startswith(f"{np.linalg.norm(wanted):.1f} N: moves")
+        assert np.array_equal(page.position, POSE.position)  # the gizmo is none of a hand's
+        pull(client, page, "end", 0.55, 0.42)
+        await_that(lambda: show.pushed is None)
+        assert not stage._ghost.visible
+        assert not stage._arrow.visible
+        assert handle(page, "Force [N]").value == 0.0
+
+
+def test_who_keeps_it_lets_go_by_the_button(page: Shown) -> None:
+    show = page.viewer._push
+    with Client(page.port) as client:
+        look(client, page)
+        pull(client, page, "start", 0.5, 0.5)
+        pull(client, page, "end", 0.5, 0.4, keep=True)
+        await_that(lambda: show.pushed is not None and show._hold is None)
+        client.drag([0.7, 0.5, 1.5])  # it stays where it acts, and is answered at the new place
+        await_that(lambda: show.pushed is not None and show.pushed.state.pose.position[0] == 0.7)
+        client.set(handle(page, "Let go")._impl.uuid, True)
+        await_that(lambda: show.pushed is None)
+        client.drag(POSE.position)
+        await_that(lambda: np.array_equal(page.position, POSE.position))
+        client.set(handle(page, "Keep after release")._impl.uuid, True)
+        pull(client, page, "start", 0.5, 0.5)
+        pull(client, page, "end", 0.5, 0.4)
+        await_that(lambda: show.pushed is not None and show._hold is None)
+        client.set(handle(page, "Keep after release")._impl.uuid, False)
+        pull(client, page, "start", 0.5, 0.5)
+        pull(client, page, "cancel", 0.5, 0.4)
+        await_that(lambda: show.pushed is None)
+
+
+def test_what_is_behind_the_eye_is_not_held(page: Shown) -> None:
+    show = page.viewer._push
+    body = show._stage.body
+    part = POSE.transform(body.vertices[body.faces[0]].mean(axis=0))
+    axes = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # looks along y
+    for away, held in ((5.0, False), (-5.0, True)):
+        eye = Eye(part + away * axes[:, 2], axes, np.array([0.4, 0.3]), np.array([WIDE, HIGH], dtype=np.float64))
+        await_that(lambda: show._state is not None)
+        show._grab(eye, (0.5, 0.5), 1)
+        assert (show._hold is not None) == held
+    show._hold = None
+
+
+def test_a_force_can_be_typed(page: Shown) -> None:
+    show = page.viewer._push
+    with Client(page.port) as client:
+        look(client, page)
+        client.set(handle(page, "Force [N]")._impl.uuid, 25.0)
+        client.set(handle(page, "Along x, y, z")._impl.uuid, [0.0, 3.0, -4.0])
+        client.set(handle(page, "At x, y, z [m]")._impl.uuid, [0.0, 0.1, 0.2])
+        await_that(lambda: show.pushed is not None and show.pushed.push.at[2] == 0.2)
+        found = show.pushed
+        assert found is not None
+        np.testing.assert_allclose(found.push.force, [0.0, 15.0, -20.0], atol=1e-12)
+        told = show._panel._told.content
+        assert "25.0 N" in told
+        again = pushed(found.state, found.push)
+        np.testing.assert_array_equal(again.moved, found.moved)
+        client.set(handle(page, "Along x, y, z")._impl.uuid, [0.0, 0.0, 0.0])
+        await_that(lambda: "Not possible" in show._panel._told.content and show.pushed is None)
+        client.set(handle(page, "Along x, y, z")._impl.uuid, [0.0, 0.0, -1.0])
+        client.set(handle(page, "Force [N]")._impl.uuid, 0.0)
+        await_that(lambda: "Ctrl-drag" in show._panel._told.content)
+
+
+def test_a_client_that_goes_lets_go(page: Shown) -> None:
+    show = page.viewer._push
+    with Client(page.port) as client:
+        look(client, page)
+        pull(client, page, "start", 0.5, 0.5)
+        pull(client, page, "move", 0.6, 0.5)
+        await_that(lambda: show.pushed is not None)
+    await_that(lambda: show.pushed is None)
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        None,
+        7,
+        "start",
+        [],
+        {"phase": "start"},
+        {"phase": "start", "at": 3},
+        {"phase": "start", "at": [0.5]},
+        {"phase": "start", "at": ["a", "b"]},
+        {"phase": "start", "at": [1e308, 10**400]},
+        {"phase": "move", "at": [0.5, 0.5]},
+        {"phase": ["end"], "at": [0.5, 0.5]},
+        {"phase": "start", "at": [0.01, 0.01]},  # beside the platform
+    ],
+)
+def test_nonsense_holds_nothing(page: Shown, value: Any) -> None:
+    show = page.viewer._push
+    with Client(page.port) as client:
+        look(client, page)
+        before = page.viewer.updates
+        tell(client, page, "pull", value)
+        await_that(lambda: page.viewer.updates > before)
+        assert show._hold is None
+        assert show.pushed is None

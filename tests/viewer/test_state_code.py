@@ -1,0 +1,230 @@
+"""What is copied as code, executed: the numbers on the screen, to the last bit."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.arrays import Array
+from sagline.robot.inertia import with_mass
+from sagline.tension.methods import METHODS as ALL_METHODS
+from sagline.viewer.panel import mass_range
+from sagline.viewer.playback import Playback
+from sagline.viewer.run import Run
+from sagline.viewer.settings import METHODS, MODELS, Settings
+from sagline.viewer.snapshot import Snapshot, taken_at
+from sagline.viewer.source import Source
+from sagline.viewer.state_code import code_of
+from sagline.viewer.tension_scale import TensionScale
+from sagline.viewer.view import View
+from sagline.viewer.viewer import Viewer
+from sagline.viewer.wording import remembers
+from tests.viewer.client import PATIENCE, Client, await_that
+from tests.viewer.test_viewer import Shown, handle, shown
+
+ROBOTS = ("falcon-7", "cogiro", "fast", "ipanema-2-pulleys", "article-suspended")
+
+
+def executed(code: str) -> dict[str, Any]:
+    """The names that lines of Python leave behind."""
+    names: dict[str, Any] = {}
+    exec(compile(code, "copied", "exec"), names)
+    return names
+
+
+def same(code: str, snapshot: Snapshot) -> None:
+    """Executed, the lines give what is shown."""
+    if snapshot.plan is None:
+        with pytest.raises(sl.CableGeometryError):
+            executed(code)
+        return
+    names = executed(code)
+    np.testing.assert_array_equal(names["tension"], snapshot.tension)
+    np.testing.assert_array_equal(names["plan"].unstrained_length, snapshot.plan.unstrained_length)
+    np.testing.assert_array_equal(names["pose"].quaternion, snapshot.pose.quaternion)
+    np.testing.assert_array_equal(names["robot"].inertia, snapshot.robot.inertia)
+    assert (snapshot.rest is None) == ("rest" not in names)
+    if snapshot.rest is not None:
+        np.testing.assert_array_equal(names["rest"].position, snapshot.rest.position)
+
+
+def a_pose(robot: sl.Robot, random: np.random.Generator) -> sl.Pose:
+    """In the middle of where a robot is meant to be, or somewhat beyond, turned if it turns."""
+    box = robot.test_box
+    low, high = (
+        (robot.frame_anchors.min(axis=0), robot.frame_anchors.max(axis=0)) if box is None else (box.low, box.high)
+    )
+    turns = random.uniform(-0.3, 0.3, 3) if robot.motion_pattern == "3R3T" else np.zeros(3)
+    return sl.Pose.from_euler(low + random.uniform(-0.1, 1.1, 3) * (high - low), *turns)
+
+
+def settings(robot: sl.Robot, random: np.random.Generator) -> Settings:
+    """Any that the page's controls give, and ways of sharing with arguments of their own."""
+    lightest, heaviest, step = mass_range(robot.mass)
+    steps = int(random.integers(round((heaviest - lightest) / step)))
+    method = list(METHODS.values())[int(random.integers(len(METHODS)))]
+    own = (
+        sl.QuadraticProgram(weights=random.uniform(0.5, 2.0, robot.cable_count), target=random.uniform(0.0, 9e2)),
+        sl.PNorm(p=float(random.uniform(2.0, 9.0)), lowest_point_margin=0.5),
+        sl.Closest("horizontal"),
+    )
+    return Settings(
+        mass=lightest + steps * step if random.random() < 0.7 else robot.mass,
+        density=float(random.choice([1.0, 0.1 * random.integers(1, 100)])),
+        stiffness=float(random.choice([1.0, 0.1 * random.integers(1, 100)])),
+        model=list(MODELS.values())[int(random.integers(len(MODELS)))],
+        tension=method if random.random() < 0.7 else own[int(random.integers(len(own)))],
+    )
+
+
+def a_case(seed: int) -> None:
+    random = np.random.default_rng([20261122, seed])
+    name = ROBOTS[seed % len(ROBOTS)]
+    own = sl.load_robot(name)
+    loaded = random.random() < 0.3
+    robot = with_mass(own, own.mass + random.uniform(0.1, 2.0) * own.mass) if loaded else own
+    wrench = random.uniform(-0.2, 0.2, 6) * robot.mass * 9.81 if random.random() < 0.4 else None
+    source, previous = Source.of_robot(name, robot.mass if loaded else None), None
+    set_to = settings(robot, random)
+    changed = set_to.applied(robot)
+    for _ in range(3 if remembers(set_to.tension) else 1):
+        try:
+            snapshot = taken_at(changed, a_pose(robot, random), set_to, previous, wrench=wrench)
+        except sl.InvalidValueError:  # this robot cannot be shared so: the page says it, and shows nothing
+            return
+        previous = snapshot.plan if snapshot.feasible else previous
+        same(code_of(View(snapshot, set_to, TensionScale.of(robot), False, wrench), robot, source), snapshot)
+
+
+@pytest.mark.parametrize("count", [40, pytest.param(3000, marks=pytest.mark.soak)])
+def test_code_gives_what_any_setting_shows(count: int) -> None:
+    for seed in range(count):
+        a_case(seed)
+
+
+def test_arguments_are_written_where_they_are_not_usual() -> None:
+    robot = sl.load_robot("cogiro")
+    tension = sl.QuadraticProgram(target=300.0, variable="frame_end")
+    set_to = Settings(robot.mass, model=sl.Empirical(k_h=5.0), tension=tension)
+    snapshot = taken_at(robot, sl.Pose([0.0, 0.0, 2.0], np.eye(3)), set_to, None)
+    code = code_of(View(snapshot, set_to, TensionScale.of(robot), False), robot, Source())
+    assert "model=sl.Empirical(k_h=5.0)," in code
+    assert "tension=sl.QuadraticProgram(variable='frame_end', target=300.0)," in code
+    assert "wrench" not in code
+    assert set(ALL_METHODS) <= set(sl.__all__)  # all can be written so
+    same(code, snapshot)
+
+
+def path_of(robot: sl.Robot) -> sl.Path:
+    ends = sl.Pose(np.array([[0.0, 0.0, 1.5], [2.0, 1.0, 1.5]]), np.stack([np.eye(3)] * 2))
+    return sl.quintic_path(ends, durations=[1.0], rate=20)
+
+
+def test_a_sample_of_a_run_in_a_file(tmp_path: Path) -> None:
+    robot, file = sl.load_robot("article-suspended"), tmp_path / "a 'run'.nc"
+    sl.inverse(robot, path_of(robot), model=sl.Empirical()).save(file)
+    run = Run.of(sl.load_plan(file))
+    for time in (0.0, 0.52, 9.0):
+        view = View(run.sight(time), Settings(robot.mass), TensionScale.of(robot), False, None, run)
+        names = executed(code_of(view, robot, Source.of_plan(file), time))
+        np.testing.assert_array_equal(names["tension"], run.sight(time).tension)
+        np.testing.assert_array_equal(names["pose"].position, run.sight(time).pose.position)
+        rest = run.sight(time).rest
+        assert rest is not None
+        np.testing.assert_array_equal(names["rest"].position, rest.position)
+
+
+def test_beside_a_run_its_robot_is_that_of_the_file(tmp_path: Path) -> None:
+    robot, file = sl.load_robot("article-suspended"), tmp_path / "run.nc"
+    sl.inverse(robot.replace(mass=77.0), path_of(robot)).save(file)
+    set_to = Settings(77.0)
+    snapshot = taken_at(robot.replace(mass=77.0), sl.Pose([0.1, 0.2, 1.6], np.eye(3)), set_to, None)
+    view = View(snapshot, set_to, TensionScale.of(robot), False)
+    same(code_of(view, robot.replace(mass=77.0), Source.of_plan(file)), snapshot)
+
+
+def test_a_moment_of_a_simulation_in_a_file(tmp_path: Path) -> None:
+    robot, file = sl.load_robot("article-suspended"), tmp_path / "cut.nc"
+    state = sl.inverse(robot, sl.Pose([0.0, 0.0, 1.5], np.eye(3))).state
+    sl.simulate(state, duration=0.2, events=(sl.Break(cable=0, time=0.05),)).save(file)
+    playback = Playback(sl.load_simulation(file))
+    moment = playback.sight(0.13)
+    view = View(moment, Settings(robot.mass), TensionScale.of(robot), False, None, playback)
+    names = executed(code_of(view, robot, Source.of_simulation(file), 0.13))
+    assert moment.index > 0
+    np.testing.assert_array_equal(names["tension"][1:], moment.tension[1:])
+    np.testing.assert_array_equal(names["pose"].position, moment.pose.position)
+
+
+@pytest.fixture(scope="module")
+def page() -> Iterator[Shown]:
+    yield from shown(lambda server: Viewer(server, sl.load_robot("cogiro"), source=Source.of_robot("cogiro")))
+
+
+def asked(page: Shown, topic: str, text: Any, name: str = "me-1") -> dict[str, Any]:
+    """What a page is answered."""
+    with Client(page.port) as client:
+        uuid = handle(page, "sagline")._impl.uuid
+        client.set(uuid, json.dumps({"topic": topic, "value": [name, text], "count": 0}))
+        for message in client.heard(PATIENCE):
+            content = str((message.get("props") or message.get("updates") or {}).get("content", ""))
+            start = f"sagline:{topic}-told:"
+            if content.startswith(start) and json.loads(content[len(start) :])["to"] == name:
+                return dict(json.loads(content[len(start) :]))
+    raise AssertionError("no answer")
+
+
+def test_every_control_of_the_robot_is_in_the_code(page: Shown) -> None:
+    def tension() -> Array:
+        assert page.viewer.view is not None
+        assert isinstance(page.viewer.view.snapshot, Snapshot)
+        return page.viewer.view.snapshot.tension
+
+    changes = {"Platform + load [kg]": 123.0, "Cable density ×": 2.3, "Cable stiffness ×": 0.4,
+               "Cable model": "parabolic", "Tensions": "Centroid"}  # fmt: skip
+    for k, (label, value) in enumerate(changes.items()):
+        before = tension()
+        with Client(page.port) as client:
+            client.set(handle(page, label)._impl.uuid, value)
+            await_that(lambda before=before: not np.array_equal(tension(), before))  # type: ignore[misc]
+        names = executed(asked(page, "copy", "code", f"copy-{k}")["text"])
+        np.testing.assert_array_equal(names["tension"], tension())
+
+
+def test_a_pose_that_is_typed_is_gone_to_and_another_is_refused_in_a_line(page: Shown) -> None:
+    assert asked(page, "pose", " 0.5, -0.25,1.75, 10, 0, 0 ", "a") == {"to": "a"}
+    wanted = sl.Pose.from_euler([0.5, -0.25, 1.75], np.radians(10.0), 0.0, 0.0)
+
+    def there() -> bool:
+        assert page.viewer.view is not None
+        pose = page.viewer.view.snapshot.pose
+        return np.array_equal(pose.position, wanted.position) and np.array_equal(pose.quaternion, wanted.quaternion)
+
+    await_that(there)
+    for k, text in enumerate(("", "1,2", "1,2,x", "nan,0,1", "1e9,0,0", "300,0,0", "1,2,3,4,5,6,7", "x" * 9000)):
+        told = asked(page, "pose", text, f"b{k}")
+        assert len(told["refused"]) < 300
+        assert "\n" not in told["refused"]
+        assert there()
+
+
+@pytest.mark.parametrize("value", [None, 3, [], ["a"], ["a", 3], [3, "code"], ["x" * 50, "code"], {"to": "x"}])
+def test_questions_that_are_none_are_not_answered(page: Shown, value: Any) -> None:
+    before = dict(page.viewer._channel._told)
+    with Client(page.port) as client:
+        for topic in ("pose", "copy"):
+            client.set(handle(page, "sagline")._impl.uuid, json.dumps({"topic": topic, "value": value, "count": 0}))
+    assert asked(page, "copy", "other", "z")["refused"].startswith("what to copy is 'other'")
+    assert page.thread.is_alive()
+    assert before.keys() <= page.viewer._channel._told.keys()
+
+
+def test_what_is_in_no_file_is_refused_in_a_line() -> None:
+    robot = sl.load_robot("article-suspended")
+    run = Run.of(sl.inverse(robot, path_of(robot)))
+    for page in shown(lambda server: Viewer(server, robot, run)):
+        assert asked(page, "copy", "code", "c")["refused"].startswith("the run is in no file; ")

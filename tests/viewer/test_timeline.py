@@ -1,0 +1,355 @@
+"""The timeline: what its tracks say, and what is done on it, without a browser."""
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.control import State
+from sagline.viewer.playback import Playback
+from sagline.viewer.played import Beside
+from sagline.viewer.player import Player
+from sagline.viewer.run import Run
+from sagline.viewer.session import Session
+from sagline.viewer.session_log import Follower
+from sagline.viewer.timeline_columns import MOST as MOST_COLUMNS
+from sagline.viewer.timeline_columns import columns, told
+from sagline.viewer.timeline_spans import MOST, outside, spans_of
+from sagline.viewer.timeline_track import Chart, Limit, Mark, Track
+from sagline.viewer.viewer import Viewer
+from sagline.viewer.wording import ForceUnit
+from tests.effort import least_seconds
+from tests.files.executions import events_of, execution
+from tests.viewer.client import Client, await_that
+from tests.viewer.test_viewer import Shown, shown, tell
+
+ROBOT = sl.load_robot("article-mixed")
+PLAN = sl.inverse(ROBOT, sl.quintic_path([(0, 0, 1.5), (7.5, 3.5, 1.5), (0, 0, 1.5)], durations=[4.0, 4.0], rate=10))
+OTHER = sl.inverse(ROBOT, sl.quintic_path([(0, 0, 1.5), (0, 1, 1.5)], durations=[9.0], rate=10))
+UNIT = ForceUnit("N", 1.0, ".1f")
+
+
+@pytest.fixture(scope="module")
+def page() -> Iterator[Shown]:
+    beside = Beside(Run.of(OTHER), ("a.nc", "b.nc"))
+    yield from shown(lambda server: Viewer(server, ROBOT, Run.of(PLAN), beside=beside))
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Session:
+    file = tmp_path_factory.mktemp("log") / "run.mcap"
+    execution().save(file)
+    session = Follower(file).more()
+    assert session is not None
+    return session
+
+
+def changed(session: Session, **changes: Any) -> Session:
+    parts = {name: getattr(session, name) for name in session.__slots__ if name != "shown"}
+    return Session(**parts | changes)
+
+
+@pytest.fixture
+def growing(log: Session) -> Iterator[Shown]:
+    """The first hundred cycles of the log."""
+    cycles = {name: value[:100] for name in log.__slots__ if isinstance(value := getattr(log, name), np.ndarray)}
+    del cycles["shown"]
+    yield from shown(lambda server: Viewer(server, log.robot, changed(log, **cycles)))
+
+
+def said(page: Shown, topic: str) -> Any:
+    """What the pages were told last about a topic."""
+    text = page.viewer._channel._told[topic].content
+    return json.loads(text.split(":", 2)[2])
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_columns_hold_the_extremes_of_their_samples(seed: int) -> None:
+    generator = np.random.default_rng(seed)
+    count, most = int(generator.integers(2, 5000)), int(generator.integers(2, 300))
+    time = np.cumsum(generator.uniform(1e-3, 1.0, count))
+    values = generator.normal(size=(count, 3))
+    values[generator.random((count, 3)) < 0.3] = np.nan
+    found = columns(time, values, most)
+    assert len(found.time) == min(count, most)
+    assert found.time[0] == time[0]
+    ends = [*np.searchsorted(time, found.time), count]
+    for k in range(len(found.time)):
+        for line in range(3):
+            part = values[ends[k] : ends[k + 1], line]
+            known = part[~np.isnan(part)]
+            expected = (known.min(), known.max()) if known.size else (np.nan, np.nan)
+            assert np.array_equal([found.low[k, line], found.high[k, line]], expected, equal_nan=True)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_spans_cover_all_that_is_wrong_and_no_more_than_their_pixels(seed: int) -> None:
+    generator = np.random.default_rng(seed)
+    count = int(generator.integers(2, 4000))
+    time = np.cumsum(generator.uniform(0.01, 0.1, count))
+    wrong = generator.random(count) < generator.uniform(0.0, 0.3)
+    spans = spans_of(time, wrong, lambda rows: f"{rows.start} {rows.stop}")
+    covered = np.zeros(count, dtype=bool)
+    for span in spans:
+        first, stop = map(int, span.why.split())
+        assert wrong[first]
+        assert wrong[stop - 1]
+        assert span.start == time[first]
+        assert span.end == time[min(stop, count - 1)]  # a sample lasts until the next
+        covered[first:stop] = True
+        good = np.flatnonzero(~wrong[first:stop]) + first
+        near = (time[-1] - time[0]) / MOST
+        assert all(time[k + 1] - time[k] <= near for k in good)
+    assert np.all(covered[wrong])
+    assert len(spans) <= MOST + 1
+
+
+def test_a_plan_says_where_it_has_no_answer_and_why() -> None:
+    track = Run.of(PLAN).track()
+    gaps = PLAN.gaps
+    assert len(gaps) == len(track.spans) == 1
+    (gap,), (span,) = gaps, track.spans
+    time = track.time
+    assert (span.start, span.end) == (time[gap.first], time[gap.last + 1])
+    cables = ", ".join(map(str, gap.cables))
+    assert span.why == f"not feasible: short of up to {gap.shortfall:.1f} N; at their limits: cables {cables}"
+
+
+def test_what_a_page_is_told_are_the_numbers_of_the_plan() -> None:
+    track = Run.of(PLAN).track()
+    (part,) = told([("run", track)], 0, 8.0)["tracks"]
+    low = np.array(part["low"], dtype=float)  # None as NaN
+    np.testing.assert_allclose(low.T, PLAN.state.limited_tension, rtol=0.0, atol=0.5001e-2)
+    assert part["high"] is None  # a column a sample
+    assert np.array_equal(part["times"], np.round(PLAN.path.time, 9))  # type: ignore[union-attr]
+    assert [limit[:2] for limit in part["limits"]] == [[25.0, "lowest allowed"], [2000.0, "highest allowed"]]
+    lengths = told([("run", track)], 1, 8.0)["tracks"][0]
+    np.testing.assert_allclose(
+        np.array(lengths["low"], dtype=float).T, PLAN.unstrained_length, rtol=0.0, atol=0.5001e-5
+    )
+    json.dumps(told([("run", track)], 0, 8.0), allow_nan=False)
+
+
+def test_limits_are_drawn_where_they_are_near_and_told_where_not() -> None:
+    time, limits = np.linspace(0.0, 1.0, 11), (Limit(25.0, "lowest", upper=False), Limit(2000.0, "highest", upper=True))
+    chart = Chart("Tension", "N", 1, ("0",), lambda rows: 30.0 + 20.0 * time[rows, None], limits)
+    page = told([("a", Track(time, (chart,)))], 0, 1.0)
+    assert page["range"] == pytest.approx([25.0 - 1.0, 50.0 + 1.0])
+    assert page["tracks"][0]["limits"] == [[25.0, "lowest", False]]
+    assert page["tracks"][0]["far"] == "highest 2000 N"
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_what_is_looked_at_closer_is_all_there_and_finer(seed: int) -> None:
+    generator = np.random.default_rng(seed)
+    time = np.cumsum(generator.uniform(1e-3, 1.0, 4000))
+    time -= time[0]
+    values = generator.normal(size=(4000, 2))
+    track = Track(time, (Chart("x", "N", 5, ("x", "y"), values.__getitem__),))
+    start, end = np.sort(generator.uniform(0.0, time[-1], 2))
+    rows = track.within(start, end)
+    inside = (time >= start) & (time <= end)
+    assert np.all(inside[rows] | (np.arange(4000)[rows] == rows.start) | (np.arange(4000)[rows] == rows.stop - 1))
+    assert np.count_nonzero(inside[rows]) == np.count_nonzero(inside)
+    if rows.start > 0:
+        assert time[rows.start] < start  # the line comes from there, and that sample lasts until the next
+    (part,) = told([("a", track)], 0, float(time[-1]), (start, end))["tracks"]
+    known = values[rows]
+    assert np.min(part["low"], axis=1) == pytest.approx(known.min(axis=0), abs=1e-6)
+    assert np.max(part["high"] or part["low"], axis=1) == pytest.approx(known.max(axis=0), abs=1e-6)
+    assert len(part["times"]) == min(len(known), MOST_COLUMNS)
+
+
+def test_of_two_tracks_both_have_one_axis_and_the_chart_that_was_chosen() -> None:
+    time = np.linspace(0.0, 1.0, 3)
+
+    def track(titles: str, size: float) -> Track:
+        return Track(time, tuple(Chart(each, "N", 1, ("0",), lambda rows: size * time[rows, None]) for each in titles))
+
+    page = told([("a", track("AB", 1.0)), ("b", track("CA", 7.0))], 0, 1.0)
+    assert [part["title"] for part in page["tracks"]] == ["A", "A"]
+    assert page["range"] == pytest.approx([-0.35, 7.35])
+    page = told([("a", track("AB", 1.0)), ("b", track("CA", 7.0))], 1, 1.0)
+    assert [part["title"] for part in page["tracks"]] == ["B", "A"]  # no B: what is in its place
+
+
+def test_a_simulation_says_when_it_broke_and_draws_nothing_of_a_broken_cable() -> None:
+    state = sl.inverse(sl.load_robot("cogiro"), sl.Pose([0.0, 0.0, 2.0], np.eye(3))).state
+    cut = sl.simulate(state, duration=1.0, events=sl.Break(cable=3, time=0.5))
+    track = Playback(cut).track()
+    (event,) = [mark for mark in track.marks if mark.text.startswith("break of cable 3")]
+    assert event.time == pytest.approx(0.5)
+    assert event.bad
+    values = track.charts[0].values(slice(None))
+    assert np.array_equal(np.isnan(values[:, 3]), cut.time >= 0.5)
+    assert np.array_equal(values[:, :3], cut.tensions[:, :3])
+    assert not any(" 3" in span.why.split(" below")[0] for span in track.spans)
+
+
+def test_tensions_beyond_their_limits_are_spans_with_their_worst() -> None:
+    robot = ROBOT.replace(tension_min=20.0, tension_max=500.0)
+    tension = np.full((6, 8), 100.0)
+    tension[1:3, 4], tension[2, 5], tension[4, 0] = [12.0, 14.0], 700.0, np.nan
+    (span,) = outside(robot, np.arange(6.0), tension, UNIT)
+    assert span == (1.0, 3.0, "cable 4 below 20.0 N: 12.0 N at the winch; cable 5 above 500.0 N: 700.0 N at the winch")
+
+
+def test_a_log_marks_its_events_and_shades_its_faults(log: Session) -> None:
+    marks = log.track().marks
+    assert [(mark.time, mark.bad) for mark in marks] == [(0.0, False), (0.5, True)]
+    assert [mark.text for mark in marks] == [f"{event.name}: {event.text}" for event in events_of()]
+    state = np.where((log.time >= 0.8) & (log.time < 1.2), State.FAULT, State.MOVING)
+    (span,) = changed(log, state=state.astype(np.int8)).track().spans
+    assert (span.start, span.end) == pytest.approx((0.8, 1.2))
+    assert span.why == "FAULT"
+
+
+def test_steps_go_from_sample_to_sample() -> None:
+    track = Track(np.array([0.0, 0.1, 0.4, 0.5]), ())
+    assert [track.step_from(0.1, steps) for steps in (1, 2, 9, -1, -9, 0)] == [0.4, 0.5, 0.5, 0.0, 0.0, 0.1]
+    assert track.step_from(0.3, 1) == 0.4
+    assert track.step_from(0.3, -1) == 0.0
+
+
+def test_scrubbing_shows_that_sample_in_both_runs(page: Shown) -> None:
+    with Client(page.port) as client:
+        tell(page, client, "scrub", 1.25)
+        await_that(lambda: np.array_equal(page.position, PLAN.state.pose.position[12]))
+        beside = page.server.scene._handle_from_node_name["/beside"]
+        await_that(lambda: np.array_equal(beside.position, OTHER.state.pose.position[12]))
+        await_that(lambda: said(page, "clock")["time"] == 1.25)
+        tell(page, client, "step", 2)
+        await_that(lambda: np.array_equal(page.position, PLAN.state.pose.position[14]))
+        tell(page, client, "scrub", 9.0)  # the first run has ended, the second has not
+        await_that(lambda: np.array_equal(beside.position, OTHER.state.pose.position[-1]))
+        await_that(lambda: np.array_equal(page.position, PLAN.state.pose.position[-1]))
+        assert said(page, "timeline")["duration"] == 9.0
+        client.grab()
+        client.drag([0.3, 0.0, 1.5])
+        await_that(lambda: said(page, "clock")["following"] is False)
+        assert not beside.visible
+        tell(page, client, "follow", True)
+        await_that(lambda: said(page, "clock")["following"] is True and bool(beside.visible))
+
+
+def test_play_and_speed_are_heard_and_the_clock_is_told_at_most_thirty_times_a_second(page: Shown) -> None:
+    with Client(page.port) as client:
+        tell(page, client, "speed", 4.0)
+        tell(page, client, "scrub", 0.0)
+        await_that(lambda: said(page, "clock") == {"time": 0.0, "playing": False, "speed": 4.0, "following": True})
+        list(client.heard(0.3))
+        tell(page, client, "play", True)
+        tell(page, client, "play", True)  # said twice it plays all the same
+        await_that(lambda: said(page, "clock")["time"] == 9.0)
+        await_that(lambda: not said(page, "clock")["playing"])
+        heard = [str(m.get("updates", {}).get("content", "")) for m in client.heard(0.5)]
+        clocks = [text for text in heard if text.startswith("sagline:clock:")]
+        assert 2 <= len(clocks) <= 30 * 9.0 / 4.0 + 3
+        tell(page, client, "speed", 1.0)
+        await_that(lambda: said(page, "clock")["speed"] == 1.0)
+
+
+def test_a_chart_is_chosen_and_a_cable_that_is_pointed_at_is_bold(page: Shown) -> None:
+    with Client(page.port) as client:
+        tell(page, client, "chart", 1)
+        await_that(lambda: said(page, "timeline")["tracks"][0]["title"] == "Unstrained length")
+        tell(page, client, "chart", 0)
+        tell(page, client, "follow", True)
+        tell(page, client, "scrub", 0.0)
+        tell(page, client, "point", 2)
+        nodes: Any = page.server.scene._handle_from_node_name
+        await_that(lambda: "/pointed" in nodes and bool(nodes["/pointed"].visible))
+        ends = nodes["/pointed"].points[[0, -1], [0, 1]]
+        assert ends[0] == pytest.approx(ROBOT.frame_anchors[2], abs=1e-6)
+        assert ends[1] == pytest.approx(PLAN.state.pose.position[0] + ROBOT.platform_anchors[2], abs=1e-6)
+        tell(page, client, "point", None)
+        await_that(lambda: not nodes["/pointed"].visible)
+
+
+def test_a_window_is_looked_at_and_the_whole_again(page: Shown) -> None:
+    with Client(page.port) as client:
+        tell(page, client, "window", [2.0, 4.0])
+        await_that(lambda: said(page, "timeline")["window"] == [2.0, 4.0])
+        times = said(page, "timeline")["tracks"][0]["times"]
+        assert times == pytest.approx(np.arange(1.9, 4.05, 0.1))  # the one before lasts into it
+        tell(page, client, "window", [-3.0, 1.0])
+        await_that(lambda: said(page, "timeline")["window"] == [0.0, 1.0])
+        tell(page, client, "speed", 16.0)
+        tell(page, client, "scrub", 0.0)
+        tell(page, client, "play", True)
+        await_that(lambda: said(page, "timeline")["window"][0] > 0.0)  # the clock has left it
+        await_that(lambda: not said(page, "clock")["playing"])
+        tell(page, client, "speed", 1.0)
+        tell(page, client, "window", [-1.0, 99.0])
+        await_that(lambda: said(page, "timeline")["window"] == [0.0, 9.0])
+        tell(page, client, "window", [2.0, 4.0])
+        await_that(lambda: said(page, "timeline")["window"] == [2.0, 4.0])
+        tell(page, client, "window", None)
+        await_that(lambda: said(page, "timeline")["window"] == [0.0, 9.0])
+        list(client.heard(0.1))  # who has not heard all takes ten seconds to leave
+
+
+def test_a_log_that_grows_grows_on_the_page_and_who_is_at_its_end_stays_there(growing: Shown, log: Session) -> None:
+    with Client(growing.port) as client:
+        tell(growing, client, "chart", 1)
+        tell(growing, client, "scrub", 99.0)
+        await_that(lambda: said(growing, "clock")["time"] == log.time[99])
+        growing.viewer.extend(log)
+        await_that(lambda: said(growing, "clock")["time"] == log.duration)
+        await_that(lambda: said(growing, "timeline")["duration"] == log.duration)
+        grown = said(growing, "timeline")
+        assert grown["chart"] == 1  # more of the same: what is looked at stays
+        assert grown["tracks"][0]["times"][-1] == log.duration
+
+
+NONSENSE: dict[str, tuple[Any, ...]] = {
+    "scrub": (None, "1", True, [], {}, 1e400, -1e400, 10**400),
+    "step": (None, "1", False, [1], 1e9, -1e9),
+    "play": (None, 1, 0, "true", []),
+    "speed": (None, 0, -1, 3, "1", True, 1e400),
+    "follow": (None, 1, "false", {}),
+    "chart": (None, -1, 2, 1.0, True, "0", 10**30),
+    "window": (0, [], [0.0], [1.0, 0.0], [0.0, 1e400], ["0", "1"], [3.0, 3.0 + 1e-9], {}, True, [0.0, 1.0, 2.0]),
+    "point": ("1", 1.0, [], {}, True, 10**30, -1),
+}
+
+
+def test_nonsense_changes_nothing(page: Shown) -> None:
+    with Client(page.port) as client:
+        tell(page, client, "scrub", 2.0)
+        await_that(lambda: said(page, "clock")["time"] == 2.0)
+        before = said(page, "clock"), said(page, "timeline")
+        for topic, values in NONSENSE.items():
+            for value in values:
+                tell(page, client, topic, value)
+        tell(page, client, "point", None)
+        heard: list[Any] = []
+        page.viewer._channel.on("done", lambda value, _: heard.append(value))
+        tell(page, client, "done", 1)
+        await_that(lambda: bool(heard))
+        assert (said(page, "clock"), said(page, "timeline")) == before
+        assert page.thread.is_alive()
+
+
+def test_what_a_cut_brought_is_played_alone_and_given_back_with_its_second_run() -> None:
+    run, other = Run.of(PLAN), Beside(Run.of(OTHER), ("a", "b"))
+    player = Player(run, lambda *_: None, other)
+    assert (player.beside, player.clock.duration) == (other, 9.0)
+    player.play(Run.of(PLAN))
+    assert (player.beside, player.clock.duration) == (None, 8.0)
+    player.extend(run)
+    player.play(run)
+    assert (player.beside, player.clock.duration) == (other, 9.0)
+
+
+def test_a_long_run_is_told_at_once() -> None:
+    """600,000 samples of eight cables: the page is told in a blink."""
+    time = np.linspace(0.0, 600.0, 600_000)
+    values = np.random.default_rng(1).normal(size=(600_000, 8))
+    marks = tuple(Mark(float(k), "x", bad=False) for k in range(1000))
+    track = Track(time, (Chart("Tension", "N", 1, tuple("01234567"), values.__getitem__),), (), marks)
+    assert least_seconds(lambda: told([("run", track)], 0, 600.0), 0.5) < 0.5
+    assert len(json.dumps(told([("run", track)], 0, 600.0))) < 400_000
