@@ -16,7 +16,10 @@ from matplotlib.figure import Figure
 
 import sagline as sl
 from sagline.control.link import Command, Mode
+from sagline.robot.provenance import Provenance
 from sagline.robot.winch import RULES
+from tests.calibration.made_up import made_up
+from tests.calibration.synthetic import log_of, true_robot, with_drums
 from tests.control.rigs import HOME, at, prototype, rig
 from tests.files.simulations import a_simulation
 from tests.kinematics.winches import wound
@@ -87,6 +90,7 @@ RESULTS = frozenset(
     | {"control.Execution", "control.Gains", "control.Motion", "control.Samples", "twin.Injected"}
     | {"Components", "Front", "Margin", "MovingAnchors", "Proof", "Surface", "Workspace", "WrenchSet", "sweep.Sweep"}
     | {"FrequencyMap", "FrequencyResponse", "TensionPolygon", "Vibration", "WinchRates"}
+    | {"Calibration", "CalibrationPoses", "PoseError"}
 )
 # need a machine at the other end, or are one: tests/plc/test_bad_arguments.py
 LINKS = frozenset({"plc.ModbusLink", "plc.S7Link", "twin.Server", "twin.Server.run"})
@@ -124,6 +128,10 @@ def calls(folder: Path) -> dict[str, Call]:
         _distances,
         _articles,
         _files,
+        _logs,
+        _calibrations,
+        _calibration_files,
+        _calibration_poses,
         _in_time,
         _figures,
         _twins,
@@ -204,6 +212,8 @@ def _robots(given: _Given) -> dict[str, Call]:
         "source": ("text", "a book"),
         "assumed": ("mapping", {"mass": "weighed"}),
         "notes": ("text", "none"),
+        "tolerances": ("mapping", {"mass": 0.5}),
+        "calibration": ("one", Provenance("log.csv", "2026-03-01", {"mass": 0.1}), True),
     }
     flat = sl.Robot(
         "flat",
@@ -796,6 +806,101 @@ def _files(given: _Given) -> dict[str, Call]:
     }
 
 
+def _logs(given: _Given) -> dict[str, Call]:
+    lengths, cells = np.array([[3.0, 2.0], [3.5, 2.5], [4.0, 2.25]]), np.array([[50.0, 60.0], [np.nan, 61.0], [52, 62]])
+    sensors = sl.Sensors(tension_deviation=5.0, position_deviation=1e-3, rotation_deviation=1e-3)
+    quaternion = np.tile([0.0, 0.6, 0.0, 0.8], (3, 1))
+    fields: dict[str, tuple[Any, ...]] = {
+        "load_cells": ("array", np.nan_to_num(cells), True),
+        "position": ("array", np.ones((3, 3)), True),
+        "rotation": ("array", quaternion, True),
+        "time": ("array", [0.0, 1.0, 2.5], True),
+        "commanded": ("one", given.poses, True),
+        "sensors": ("one", sensors),
+        "source": ("text", "a table"),
+    }
+    log = sl.WinchLog(unstrained_length=lengths, load_cells=cells, sensors=sensors)
+    file = given.folder / "winches.csv"
+    log.save(file)
+    return {
+        "WinchLog": Call(sl.WinchLog, _all(unstrained_length=("array", lengths), **fields)),
+        "WinchLog: counts": Call(sl.WinchLog, _all(counts=("array", lengths))),
+        "WinchLog.replace": Call(
+            log.replace, _all(**{name: fields[name] for name in ("load_cells", "time", "source")})
+        ),
+        "WinchLog.rows": Call(log.rows, _all(which=("index", 0))),
+        "WinchLog.save": Call(log.save, _all(file=("file", str(given.folder / "saved.csv")))),
+        "load_log": Call(sl.load_log, _all(file=("file", str(file)), sensors=("one", sensors, True))),
+    }
+
+
+def _calibrations(given: _Given) -> dict[str, Call]:
+    truth = true_robot(with_drums(), {"mass": 0.02})
+    log = log_of(truth, 8).log
+    sensors = {
+        "length_deviation": ("array", np.full(8, 5e-4)),
+        "tension_deviation": ("array", np.full(8, 5.0), True),
+        "position_deviation": ("array", np.full(3, 1e-3), True),
+        "rotation_deviation": ("array", np.full(3, 1e-3), True),
+        "frame": ("one", given.pose, True),
+        "target": ("array", [0.0, 0.0, 0.125]),
+    }
+    return {
+        "Sensors": Call(sl.Sensors, _all(**sensors)),
+        "Sensors.replace": Call(log.sensors.replace, _all(**sensors)),
+        "Unknown": Call(sl.Unknown, _all(name=("word", "mass"), deviation=("number", 0.1, True))),
+        "calibrate": Call(
+            sl.calibrate,
+            _all(
+                robot=("one", with_drums()),
+                log=("one", log),
+                unknowns=("one", ("mass",)),
+                model=("one", sl.Catenary()),
+                folds=("whole", 2),
+                progress=("callback", lambda done, of: None, True),
+            ),
+        ),
+    }
+
+
+def _calibration_files(given: _Given) -> dict[str, Call]:
+    found = made_up(count=4, slipped=())
+    found.save(given.folder / "found.nc")
+    return {
+        "Calibration.save": Call(found.save, _all(file=("file", str(given.folder / "saved.nc")))),
+        "Calibration.value_of": Call(found.value_of, _all(label=("word", "mass"))),
+        "Calibration.pose_error": Call(found.pose_error, _all(pose=("one", found.poses))),
+        "Calibration.forward": Call(
+            found.forward,
+            _all(unstrained_length=("array", found.unstrained_length), start=("one", found.poses, True)),
+        ),
+        "plot.calibration": Call(
+            lambda **a: (sl.plot.calibration(**a), None)[1],
+            _all(found=("one", found), part=("word", "residuals"), height=("number", 2.0, True)),
+        ),
+        "load_calibration": Call(sl.load_calibration, _all(file=("file", str(given.folder / "found.nc")))),
+    }
+
+
+def _calibration_poses(given: _Given) -> dict[str, Call]:
+    few = {"candidates": ("whole", 12), "seed": ("seed", 3), "progress": ("callback", lambda done, of: None, True)}
+    found = sl.calibration_poses(given.robot, 2, ("mass",), candidates=12)
+    return {
+        "calibration_poses": Call(
+            sl.calibration_poses,
+            _all(
+                robot=("one", given.robot),
+                count=("whole", 2),
+                unknowns=("one", ("mass", "center_of_mass")),
+                sensors=("one", sl.Sensors(tension_deviation=4.0), True),
+                box=("one", sl.PoseBox([0, 0, 1], [1, 1, 2], 0.125), True),
+                **few,
+            ),
+        ),
+        "CalibrationPoses.save": Call(found.save, _all(file=("file", str(given.folder / "poses.yaml")))),
+    }
+
+
 def _figures(given: _Given) -> dict[str, Call]:
     from mpl_toolkits.mplot3d.axes3d import Axes3D
 
@@ -833,6 +938,18 @@ def _figures(given: _Given) -> dict[str, Call]:
             sl.plot.robot,
             {"robot": ("one", given.robot), "pose": ("one", given.pose, True), "ax": ("one", deep, True)},
         ),
+        "drawing": (
+            sl.plot.drawing,
+            {
+                "robot": ("one", given.robot),
+                "pose": ("one", given.pose, True),
+                "azimuth": ("number", 0.5),
+                "elevation": ("number", 0.25),
+                "ax": ax,
+            },
+        ),
+        "small_multiples": (sl.plot.small_multiples, {"plan": plan, "quantity": ("word", "vertical_force")}),
+        "style": (sl.plot.style, {"name": ("word", "ieee"), "columns": ("whole", 2)}),
         "response": (
             sl.plot.response,
             {"vibration": ("one", swing), "force": ("word", "about z"), "motion": ("word", "x", True), "ax": ax},

@@ -23,6 +23,7 @@ LINES = {
     "simulate": ["simulate", "cogiro", "--after", "0.1", "--no-figures"],
     "workspace": ["workspace", "cogiro", "--cells", "4", "--no-figures"],
     "sweep": ["sweep", "own_sweep.yaml", "--workers", "1"],
+    "calibrate": ["calibrate", "winches_robot.yaml", "winches.csv", "--folds", "0"],
     "robots": ["robots"],
     "show": ["show", "cogiro"],
     "examples": ["examples"],
@@ -37,6 +38,7 @@ LINES = {
     "log": ["log", "run.mcap"],
     "design": ["design", "own_robot.yaml", "design.yaml", "--evaluations", "40", "--no-figures"],
     "view": ["view", "cogiro", "--no-browser"],
+    "share": ["share", "cogiro"],
 }
 
 VALUES = (

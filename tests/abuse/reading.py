@@ -13,9 +13,9 @@ from typing import Any, Final
 import numpy as np
 
 import sagline as sl
-from sagline.cli.values import pose_of
 from sagline.errors import SaglineError, printable
 from sagline.files.lengths_file import load_counts, load_lengths
+from sagline.files.typed import pose_of
 from tests.effort import least_seconds
 
 SECONDS: Final = 2.0  # of the processor of an ordinary machine
@@ -93,6 +93,15 @@ PATH = "time [s],x [mm],y,z,alpha [deg],beta,gamma\n0,0,0.5,1,0,0,0\n0.5,10,0.5,
 LENGTHS = "time,L0,L1 [mm],L2,L3\n0,2.5,2500,2.75,3\n0.1,2.5,2510.5,2.75,3e0\n"
 COUNTS = "time,C0,C1,C2,C3\n0,-250,2500,2750.5,3e3\n0.1,2500,-2510,2750,3\n"
 MEASURED = "span [m],rise,length [m],tension [kN]\n10,-2.5,10.4,0.1\n12,3.25,12.6,0.2\n"
+LOG = """\
+# length_deviation: 0.5 mm
+# tension_deviation: [5, 5, 0.005 kN]
+# position_deviation: 1 mm
+# frame: {position: [1, 0, 500 mm], euler: {alpha: 90 deg}}
+time [s],count_0,count_1,count_2,load_cell_0 [kN],load_cell_1,load_cell_2,x [mm],y,z,x_commanded,y_commanded,z_commanded
+0,320530,312004.5,-299911,0.41,520,390,1012.5,1,2,1,1.5,2
+30,318112,311870,301442,0.44,,410,,,,1,1.5,2.5
+"""
 WIREX = """<?xml version="1.0" ?>
 <models version="0.32">
   <robot name="shelf" motionpattern="3R3T" generator="by hand">
@@ -163,6 +172,7 @@ READERS: Final = (
     Reader("lengths.csv", LENGTHS, lambda file: load_lengths(file, 4, 5.0)),
     Reader("counts.csv", COUNTS, lambda file: load_counts(file, 4)),
     Reader("cable.csv", MEASURED, sl.load_measurements),
+    Reader("winches.csv", LOG, sl.load_log),
     Reader("shelf.wcrfx", WIREX, sl.load_wirex),
     Reader("gondola_bodies.xml", CASPR_BODIES, _caspr_beside("gondola_cables.xml", CASPR_CABLES)),
     Reader("gondola_cables.xml", CASPR_CABLES, _caspr_beside("gondola_bodies.xml", CASPR_BODIES)),

@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import stat
 import subprocess
 import sys
 import time
-from hashlib import sha256
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -84,12 +84,12 @@ def short_of_work(stocked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def snapshot(folder: Path) -> dict[str, str]:
-    """Everything in a folder, and what is in it."""
+    """Everything in a folder, and since when a file has been as it is."""
     found = {}
     for path in folder.rglob("*"):
-        kind = "file" if path.is_file() and not path.is_symlink() else str(os.lstat(path).st_mode)
-        kind = sha256(path.read_bytes()).hexdigest() if kind == "file" else kind
-        found[str(path.relative_to(folder))] = kind
+        seen = os.lstat(path)
+        since = f"{seen.st_ino} {seen.st_size} {seen.st_mtime_ns}" if stat.S_ISREG(seen.st_mode) else ""
+        found[str(path.relative_to(folder))] = f"{seen.st_mode} {since}"
     return found
 
 
@@ -114,8 +114,8 @@ class Bench:
             self.renew()
         return CliRunner().invoke(app, case.words, input=ANSWERS)
 
-    def faults(self, case: Case) -> list[str]:
-        """What is wrong with how a command line ends."""
+    def faults(self, case: Case, codes: tuple[int, ...] = (0, 1, 2)) -> list[str]:
+        """What is wrong with how a command line ends, which may do so with some exit codes."""
         start = time.process_time()
         result = self.ended(case)
         seconds = time.process_time() - start
@@ -128,7 +128,7 @@ class Bench:
         if result.exit_code == 2:
             found += complaints(result.stdout, result.stderr)
             found += ["writes"] if written else []
-        elif result.exit_code not in (0, 1):
+        if result.exit_code not in codes:
             found.append(f"exit code {result.exit_code}")
         if "Traceback" in result.output:
             found.append("a traceback")
@@ -144,7 +144,7 @@ def complaints(stdout: str, stderr: str) -> list[str]:
     found = [f"stdout {stdout[:80]!r}"] if stdout else []
     lines = stderr.rstrip("\n").split("\n")
     if len(lines) != 1 or not lines[0].startswith("Error: "):
-        found.append(f"{len(lines)} lines")
+        found.append(f"{len(lines)} lines, of which {lines[:2]}")
     if max(map(len, lines)) >= 300:
         found.append(f"{max(map(len, lines))} characters")
     return found
@@ -181,9 +181,7 @@ def test_every_command_and_option_is_tried(stocked: Path, tmp_path: Path) -> Non
     bench, here = Bench(stocked, tmp_path), Path.cwd()
     try:
         for case in lines:  # as they stand they work: what is refused above is refused for what was put in
-            assert bench.faults(case) == []
-            assert CliRunner().invoke(app, case.words, input=ANSWERS).exit_code == 0, case.name
-            bench.renew()
+            assert bench.faults(case, (0,)) == []
     finally:
         os.chdir(here)
 

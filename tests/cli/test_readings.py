@@ -10,7 +10,7 @@ from sagline.cli import readings as module
 from sagline.cli.compiling import Stage
 from sagline.cli.entries import MARGINS, POLYGON, VIBRATION
 from sagline.cli.readings import ENTRY_OF, ORDER, Readings
-from sagline.viewer.viewer import Reading
+from sagline.viewer.reading import Reading
 
 
 class Watched:
@@ -72,10 +72,10 @@ def test_readings_come_one_after_the_other(side: type[FakeSide], monkeypatch: py
             yield Stage(name, 2, 2, finished=True)
 
     monkeypatch.setattr(side, "said", said, raising=False)
-    readings = Readings()
-    assert [readings.ready(each) for each in Reading] == [False, False, *[True] * 5]
+    readings, others = Readings(), [True] * (len(Reading) - 2)
+    assert [readings.ready(each) for each in Reading] == [False, False, *others]
     with readings.compiled_beside(viewer):  # type: ignore[arg-type]
-        for count, expected in ((1, [True, False, *[True] * 5]), (2, [True] * 7)):
+        for count, expected in ((1, [True, False, *others]), (2, [True, True, *others])):
             steps.release()
             while viewer.refreshed < count:
                 threading.Event().wait(0.001)

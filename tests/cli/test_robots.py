@@ -8,6 +8,7 @@ from typer.testing import CliRunner
 
 import sagline as sl
 from sagline.cli.main import app
+from sagline.robot.provenance import Provenance
 
 UNITS = {
     **dict.fromkeys(("frame_anchors", "platform_anchors", "center_of_mass", "platform_size", "frame_size"), "m"),
@@ -72,3 +73,31 @@ def test_a_tilt_is_shown_in_degrees() -> None:
     assert robot.test_box is not None
     assert robot.test_box.tilt > 0.0
     assert f" {180.0 / np.pi * robot.test_box.tilt:.3g}°" in " ".join(shown("cogiro").split())
+
+
+def test_tolerances_and_what_a_calibration_found_are_shown(tmp_path: Path) -> None:
+    made = Provenance(
+        "winches.csv", "2026-03-01", {"mass": 0.08, "frame_anchors": np.arange(24.0).reshape(8, 3)}, "wet"
+    )
+    robot = sl.load_robot("cogiro").replace(
+        tolerances={"mass": 0.5, "center_of_mass": [0.01, 0.02, 0.03]}, calibration=made
+    )
+    (tmp_path / "found.yaml").write_text(sl.dump_robot(robot))
+    record = json.loads(shown(str(tmp_path / "found.yaml"), "--json"))
+    assert record["tolerances"]["mass"] == {"value": 0.5, "unit": "kg"}
+    assert record["tolerances"]["center_of_mass"] == {"value": [0.01, 0.02, 0.03], "unit": "m"}
+    assert {name: record["calibration"][name] for name in ("log", "date", "note")} == {
+        "log": "winches.csv",
+        "date": "2026-03-01",
+        "note": "wet",
+    }
+    assert record["calibration"]["standard_error"]["frame_anchors"]["value"][7] == [21.0, 22.0, 23.0]
+    text = " ".join(shown(str(tmp_path / "found.yaml")).split())
+    for line in (
+        "mass 0.5 kg",
+        "(0.01, 0.02, 0.03) m",
+        "Calibrated on 2026-03-01 from winches.csv: wet",
+        "mass 0.08 kg",
+    ):
+        assert line in text, line
+    assert "(21, 22, 23)" in text

@@ -17,8 +17,8 @@ from typer.testing import CliRunner
 
 import sagline as sl
 from sagline.cli.main import app
+from sagline.cli.played import played_beside, played_in
 from sagline.cli.terminal import notices
-from sagline.cli.view import _played
 from tests.cli import interrupts
 from tests.viewer.client import Client
 
@@ -85,7 +85,7 @@ def test_a_run_from_before_digests_is_played_with_a_note(
     with h5py.File(file, "r+") as content:  # which cuts the digest off
         content.attrs["sagline_format"] = 1
     with notices():  # as around every command
-        assert _played(robot, file).duration == 0.0
+        assert played_in(robot, file).duration == 0.0
     told = (
         f"Note: {file} is from before plans carried a digest: damage to it need not show. Save it again to have one.\n"
     )
@@ -104,7 +104,7 @@ def test_a_simulation_is_played_as_a_run_is(tmp_path: FilePath) -> None:
     state = sl.inverse(sl.load_robot("cogiro"), sl.Pose([0.0, 0.0, 2.0], np.eye(3))).state
     swing = sl.simulate(state, duration=0.5, events=sl.Break(cable=3, time=0.25))
     swing.save(tmp_path / "sim.nc")
-    played = _played(sl.load_robot("cogiro"), tmp_path / "sim.nc")
+    played = played_in(sl.load_robot("cogiro"), tmp_path / "sim.nc")
     assert (played.name, played.duration) == ("simulation", 0.5)
     np.testing.assert_array_equal(played.home.position, swing.pose.position[0])
     assert np.isnan(played.sight(0.5).tension[3])
@@ -118,3 +118,23 @@ def test_modes_that_are_none(wrong: list[str]) -> None:
     result = CliRunner().invoke(app, ["view", "cogiro", *wrong, "--no-browser"])
     assert result.exit_code == 2
     assert "--mode" in result.stderr
+
+
+def test_two_runs_are_named_by_their_files(tmp_path: FilePath) -> None:
+    robot = sl.load_robot("article-mixed")
+    first, second = tmp_path / "a.nc", tmp_path / "b.nc"
+    for file in (first, second):
+        sl.inverse(robot, sl.Pose([[0.0, 0.0, 1.5], [0.1, 0.0, 1.5]], np.stack([np.eye(3)] * 2))).save(file)
+    beside = played_beside(robot, first, second)
+    assert beside.names == ("a.nc", "b.nc")
+    assert beside.played.duration == 1.0
+    with pytest.raises(sl.FileError, match="is a run of article-mixed, not of cogiro"):
+        played_beside(sl.load_robot("cogiro"), first, second)
+
+
+@pytest.mark.parametrize("words", [["cogiro"], ["found.nc"]])
+def test_nothing_is_played_beside_nothing(words: list[str]) -> None:
+    result = CliRunner().invoke(app, ["view", *words, "--beside", "b.nc", "--no-browser"])
+    assert result.exit_code == 2
+    assert "--beside" in result.stderr
+    assert "run_a.nc --beside run_b.nc" in " ".join(result.stderr.split())

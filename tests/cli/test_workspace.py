@@ -127,6 +127,7 @@ def test_nowhere_ends_with_the_nearest_pose(folder: FilePath) -> None:
     ("text", "loads"),
     [
         ("±100 N, ±20 N m", sl.WrenchBox(100.0, 20.0)),
+        ("±100 N, ±20Nm", sl.WrenchBox(100.0, 20.0)),
         ("+-1 N,+/-2 N, ± 3N", sl.WrenchBox([1.0, 2.0, 3.0])),
         ("±0.1 kN, ±2 m/s^2, ±1 rad/s^2", sl.WrenchBox(100.0) + sl.Accelerations(linear=2.0, angular=1.0)),
         ("0,0,-50", sl.WrenchPolytope([[0.0, 0.0, -50.0, 0.0, 0.0, 0.0]])),

@@ -21,16 +21,9 @@ class Model(StrEnum):
 
     def build(self) -> CableModel:
         """The model, with its default constants."""
-        import sagline as sl
+        from sagline.cables.models import MODELS
 
-        models: dict[Model, type[CableModel]] = {
-            Model.CATENARY: sl.Catenary,
-            Model.EMPIRICAL: sl.Empirical,
-            Model.PARABOLIC: sl.Parabolic,
-            Model.ELASTIC: sl.Elastic,
-            Model.STRAIGHT: sl.Straight,
-        }
-        return models[self]()
+        return MODELS[self.value.title().replace("-", "")]()
 
 
 class Direction(StrEnum):

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 from sagline.cli.entries import FORWARD, INVERSE
 from sagline.cli.status_line import PROMPT, StatusLine
 from sagline.cli.terminal import note, show, working
-from sagline.cli.values import middle_of, pose_of, quantity, whole_of
+from sagline.cli.values import middle_of, quantity, whole_of
 from sagline.control.controller import Controller
 from sagline.control.events import Event, EventKind
 from sagline.control.guard import interrupt_calls
@@ -23,6 +23,7 @@ from sagline.control.states import State
 from sagline.errors import InvalidValueError, SaglineError, nearest
 from sagline.files.path_file import load_path
 from sagline.files.robot_file import load_robot
+from sagline.files.typed import pose_of
 from sagline.robot.pose import Pose
 
 if TYPE_CHECKING:

@@ -230,6 +230,42 @@ def _clearances() -> None:
     sl.clearance(_unknown_state())
 
 
+def _readings(name: str = ROBOT) -> None:
+    import numpy as np
+
+    import sagline as sl
+    from sagline.arrays import locked
+    from sagline.calibration.observing import observed
+    from sagline.calibration.parameters import parameters_of
+    from sagline.statics.tables import pose_rows
+
+    state, sensors = _hung_state(name), sl.Sensors()
+    parameters = parameters_of(state.one_robot, ["mass"], sensors, counted=False)
+    lengths = locked(np.atleast_2d(state.unstrained_length))
+    observed(state.one_robot, sl.Catenary(), parameters, sensors, pose_rows(state.pose), lengths)
+
+
+def _readings_over_pulleys() -> None:
+    _readings()
+    _readings(OVER_PULLEYS)
+
+
+def _starting_lengths() -> None:
+    import numpy as np
+
+    import sagline as sl
+    from sagline.arrays import locked
+    from sagline.kernels.calibration.starting_lengths import starting_lengths
+    from sagline.kernels.memory import memory_for
+    from sagline.statics.tables import body_table, cable_table, pose_rows
+
+    robot = sl.load_robot(ROBOT)
+    m = robot.cable_count
+    held = locked(np.full((1, m), 100.0)), memory_for(m), np.empty((1, m))
+    tables = robot.freedom, cable_table(robot)[0], body_table(robot)[0], pose_rows(sl.Pose(PLACE, LEVEL))
+    starting_lengths(sl.Catenary().terms(robot.gravity), *tables, *held)
+
+
 INVERSE, SHARING, VERDICTS = "inverse kinematics", "further ways of sharing", "verdicts of infeasible poses"
 FORWARD, FIT = "forward kinematics", "fit of straight cables"
 MARGINS, POLYGON, VIBRATION = "margins", "tension polygon", "stiffness and vibration"
@@ -239,6 +275,8 @@ LOSSES, ANSWERS, PERIODS = "losses in the cables' stretch", "answers with losses
 FORWARD_OVER_PULLEYS, VIBRATION_OVER_PULLEYS = f"{FORWARD} over pulleys", f"{VIBRATION} over pulleys"
 SIMULATION_OVER_PULLEYS = f"{SIMULATION} over pulleys"
 CLEARANCES = "least distances"
+READINGS, STARTING_LENGTHS = "readings at equilibria", "lengths at tensions that were read"
+READINGS_OVER_PULLEYS = f"{READINGS} over pulleys"
 
 ENTRIES = {
     entry.words: entry
@@ -255,6 +293,9 @@ ENTRIES = {
         Entry(POLYGON, "inverse.queries.polygon_of_pose", 38, 5.0, _polygon),
         Entry(VIBRATION, "forward.sensitivity.describe_states", 57, 6.0, _vibration),
         Entry(CLEARANCES, "interference.hanging_distance.least_distances", 33, 5.0, _clearances),
+        Entry(READINGS, "calibration.observe.observe", 70, 9.0, _readings),
+        Entry(READINGS_OVER_PULLEYS, "calibration.observe.observe", 45, 8.0, _readings_over_pulleys, version=2),
+        Entry(STARTING_LENGTHS, "calibration.starting_lengths.starting_lengths", 30, 4.0, _starting_lengths),
         Entry(MODES, "dynamics.spectral.interpolate", 2, 9.0, _modes),
         Entry(LOSSES, "dynamics.spectral.stretch_matrices", 2, 1.0, _losses),
         Entry(ANSWERS, "dynamics.collocation.dynamic_stiffnesses", 3, 6.0, _answers, version=2),

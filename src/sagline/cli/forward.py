@@ -12,10 +12,11 @@ from sagline.cli.ending import OUTSIDE
 from sagline.cli.entries import FIT, FORWARD
 from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
-from sagline.cli.values import loaded, wrench_of
+from sagline.cli.values import loaded
 from sagline.files.lengths_file import Lengths, load_counts, load_lengths
 from sagline.files.names import file_stem
 from sagline.files.robot_file import load_robot
+from sagline.files.typed import wrench_of
 from sagline.files.whole import check_files, made_folder, write_text
 from sagline.kinematics.encoder import lengths_from_counts
 from sagline.kinematics.forward import forward as solve

@@ -8,6 +8,7 @@ import sys
 import webbrowser
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, NamedTuple
 
 from sagline.arrays import Array
@@ -17,8 +18,13 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
 if TYPE_CHECKING:
-    from sagline.viewer.played import Played
+    from sagline.calibration.result import Calibration
+    from sagline.viewer.played import Beside, Played
+    from sagline.viewer.source import Source
     from sagline.viewer.viewer import Viewer
+
+
+LATER = "trimesh"  # what the viewer loads when somebody asks for it
 
 
 class Start(NamedTuple):
@@ -47,9 +53,9 @@ def check_viewer() -> None:
     try:
         import sagline.viewer.viewer  # noqa: F401
     except ModuleNotFoundError as error:
-        raise FileError(
-            f"package {error.name}", "is not installed", 'The viewer needs it: pip install "sagline[viewer]"'
-        ) from None
+        raise FileError.not_installed(error.name, "The viewer needs it", "viewer") from None
+    if find_spec(LATER) is None:
+        raise FileError.not_installed(LATER, "The viewer needs it", "viewer")
 
 
 def hosted(
@@ -60,6 +66,9 @@ def hosted(
     *,
     browser: bool,
     start: Start = HOME,
+    found: Calibration | None = None,
+    source: Source | None = None,
+    other: Beside | None = None,
     beside: Callable[[Viewer], AbstractContextManager[None]] = lambda _: nullcontext(),
 ) -> int:
     """Serve a robot until Ctrl-C; returns the exit code.
@@ -71,6 +80,9 @@ def hosted(
         port: Port; 0 for any that is free.
         browser: Whether to open one here.
         start: How the robot is shown at first.
+        found: A calibration to show with it; None for none.
+        source: Where all this came from; None if nobody knows.
+        other: What is played with the same clock; None for nothing.
         beside: What goes on beside the viewer, as long as it serves.
     """
     from sagline.cli.readings import Readings
@@ -86,7 +98,9 @@ def hosted(
         if host not in ("127.0.0.1", "::1", "localhost"):
             note("Note: ", "everyone who can reach this machine can look at it and drag it.", style="bold")
         readings = Readings()
-        viewer = Viewer(server, machine, course, readings.ready, start.wrench, start.pose, start.mode)
+        viewer = Viewer(
+            server, machine, course, readings.ready, start.wrench, start.pose, start.mode, found, source, other
+        )
         if browser and has_display():
             webbrowser.open(address)
         with working("") if readings.cold else nullcontext(), readings.compiled_beside(viewer), beside(viewer):

@@ -14,6 +14,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from sagline.cli.commands.article import article, identify
+from sagline.cli.commands.calibrate import calibrate
 from sagline.cli.commands.control import control
 from sagline.cli.commands.design import design
 from sagline.cli.commands.experiment import experiment
@@ -21,6 +22,7 @@ from sagline.cli.commands.log import log
 from sagline.cli.commands.motion import simulate, vibrate
 from sagline.cli.commands.poses import forward, tension
 from sagline.cli.commands.robots import convert, examples, export_c, export_scl, new, robots, show
+from sagline.cli.commands.share import share
 from sagline.cli.commands.sweep import sweep
 from sagline.cli.commands.track import encoder, lengths, run, track
 from sagline.cli.commands.twin import twin
@@ -49,11 +51,13 @@ Start here:
     sagline sweep own_sweep.yaml         robots x poses x loads, on all cores
     sagline article                      the article redone, as one page
     sagline view cogiro                  drag a platform in the browser
+    sagline share cogiro                 one page of it, to give away
     sagline twin article-prototype       a machine to drive, over S7
     sagline control article-prototype --plc ADDRESSES  drive it, line by line
     sagline log run.mcap                 what it did, also after a crash
     sagline new my_robot.yaml            a robot of your own, by questions
     sagline design cogiro design.yaml    a better one, by search
+    sagline calibrate winches_robot.yaml winches.csv  what it really is
 """
 
 
@@ -152,7 +156,7 @@ def sagline(
 
 for command in (
     track, lengths, encoder, run, article, identify, forward, tension, vibrate, simulate, workspace, sweep, design,
-    robots, show, examples, new, convert, export_c, export_scl, view, twin, control, experiment, log,
+    calibrate, robots, show, examples, new, convert, export_c, export_scl, view, share, twin, control, experiment, log,
 ):  # fmt: skip
     text = _help(command.__doc__)
     app.command(cls=Command, help=text, short_help=text.partition("\n\n")[0])(command)

@@ -15,31 +15,36 @@ from sagline.cli.entries import (
     MARGINS,
     MODES,
     POLYGON,
+    SHARING,
     SIGNED_MARGINS,
     SIMULATION,
     VERDICTS,
     VIBRATION,
 )
-from sagline.viewer.viewer import Reading, Viewer
+from sagline.viewer.reading import Reading
+from sagline.viewer.viewer import Viewer
 
 ENTRY_OF = {
     Reading.MARGIN: MARGINS,
     Reading.POLYGON: POLYGON,
+    Reading.SHARING: SHARING,
     Reading.FREQUENCIES: VIBRATION,
     Reading.REST: FORWARD,
     Reading.MODES: ANSWERS,  # the modes, and the response
     Reading.SIMULATION: SIMULATION,
     Reading.WORKSPACE: SIGNED_MARGINS,
+    Reading.VERDICTS: VERDICTS,
 }
 ORDER = (
+    SIGNED_MARGINS,  # where the platform may go is there with its cables
     MARGINS,
     POLYGON,
+    SHARING,
     VIBRATION,
     VERDICTS,
     MODES,
     ANSWERS,
     FORWARD,
-    SIGNED_MARGINS,
     SIMULATION,
 )  # as they are looked at
 PATIENCE = 5.0  # s: how long the end may wait for a compilation

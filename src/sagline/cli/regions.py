@@ -7,9 +7,10 @@ from typing import Final
 
 import numpy as np
 
-from sagline.cli.values import FARTHEST, quantity, wrench_of
+from sagline.cli.values import quantity
 from sagline.errors import InvalidValueError
 from sagline.files.quantity import in_si
+from sagline.files.typed import FARTHEST, wrench_of
 from sagline.robot.pose_box import PoseBox
 from sagline.workspaces.wrench_sets import Accelerations, WrenchBox, WrenchPolytope, WrenchSet
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from sagline.cli.terminal import show, show_json
 from sagline.files.robot_file import load_robot
 from sagline.robot.catalogue import robot_names
 from sagline.robot.robot import Robot
+from sagline.robot.tolerances import UNCERTAIN
 from sagline.robot.winch import RULES, Winch
 
 WHOLE = {  # fields and their units; one value, or one that holds for all cables
@@ -71,6 +73,12 @@ def show_robot(name: str, *, as_json: bool) -> None:
     if robot.winches is not None:
         show_table(_winches(robot, robot.winches))
     show_table(_anchors(robot))
+    if robot.tolerances:
+        show_table(_deviations(robot.tolerances, "tolerance"))
+    if (known := robot.calibration) is not None:
+        source, note = (f" from {known.log}" * bool(known.log), f": {known.note}" * bool(known.note))
+        show(f"Calibrated on {known.date}{source}{note}")
+        show_table(_deviations(known.standard_error, "standard error"))
     for label, text in (("Source", robot.source), ("Notes", robot.notes)):
         if text:
             show(f"{label}:")
@@ -132,7 +140,29 @@ def _record(robot: Robot) -> dict[str, Any]:
     record["winches"] = None if robot.winches is None else {"unit": "", "value": _parts(robot.winches)}
     if robot.winches is not None and "winches" in robot.assumed:
         record["winches"]["assumed"] = robot.assumed["winches"]
+    record["tolerances"] = _parts_of(robot.tolerances) or None
+    record["calibration"] = None
+    if (known := robot.calibration) is not None:
+        errors = _parts_of(known.standard_error)
+        record["calibration"] = {"log": known.log, "date": known.date, "note": known.note, "standard_error": errors}
     return record
+
+
+def _parts_of(deviations: Mapping[str, Array]) -> dict[str, Any]:
+    """Standard deviations, each with its unit."""
+    return {
+        name: {"value": value, "unit": UNCERTAIN[name].unit.replace("^2", "²")} for name, value in deviations.items()
+    }
+
+
+def _deviations(deviations: Mapping[str, Array], head: str) -> Grid:
+    """Standard deviations of numbers: one where all of a field are alike."""
+    rows = []
+    for name, value in deviations.items():
+        alike = bool((value == value.flat[0]).all())
+        text = f"{value.flat[0]:.4g}" if alike else "\n".join(_numbers(row, 4) for row in np.atleast_2d(value))
+        rows.append([name.replace("_", " "), text, UNCERTAIN[name].unit])
+    return Grid(["", head, "unit"], rows, left=frozenset(range(3)), prose=frozenset({1}))
 
 
 def _parts(winches: Winch) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from sagline.cli.results import figure_files, listed, write_figures
 from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.cli.track import check_unit
-from sagline.cli.values import damping_of, loaded, middle_of, quantity, wrench_of
+from sagline.cli.values import damping_of, loaded, middle_of, quantity
 from sagline.dynamics.events import Break
 from sagline.dynamics.shaped import shaped
 from sagline.dynamics.shapers import EI, ZV, ZVD
@@ -25,6 +25,7 @@ from sagline.errors import FileError, InvalidValueError
 from sagline.files.names import file_stem
 from sagline.files.path_file import load_path
 from sagline.files.robot_file import load_robot
+from sagline.files.typed import wrench_of
 from sagline.files.whole import check_files, made_folder
 from sagline.kinematics.inverse import inverse
 from sagline.numbers import n

@@ -14,10 +14,11 @@ from sagline.cli.entries import INVERSE, MARGINS, POLYGON, SHARING
 from sagline.cli.results import figure_files, write_figures
 from sagline.cli.tables import Grid, show_table
 from sagline.cli.terminal import note, show, show_json, working
-from sagline.cli.values import loaded, middle_of, pose_of, wrench_of
+from sagline.cli.values import loaded, middle_of
 from sagline.errors import InvalidValueError
 from sagline.files.names import file_stem
 from sagline.files.robot_file import load_robot
+from sagline.files.typed import pose_of, wrench_of
 from sagline.files.whole import check_files, made_folder
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.polygon import tension_polygon

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from sagline.arrays import Array, checked
+from sagline.arrays import checked
 from sagline.dynamics.damping import Damping
 from sagline.errors import InvalidValueError
-from sagline.files.quantity import in_si, plain_number
+from sagline.files.quantity import in_si
 from sagline.robot.inertia import with_mass
 from sagline.robot.pose import Pose
 
@@ -19,28 +18,7 @@ if TYPE_CHECKING:
     from sagline.robot.robot import Robot
 
 LAST_PORT = 65535
-FARTHEST, STRONGEST, HEAVIEST = 1e6, 1e12, 1e12  # m; N and N m; kg: beyond all machines, far below what overflows
-
-
-def numbers(parts: Sequence[str], item: str, unit: str, largest: float) -> list[float]:
-    """Plain decimal numbers.
-
-    Args:
-        parts: Their texts.
-        item: What they are, for the message.
-        unit: Their unit, for the message.
-        largest: Largest absolute value.
-
-    Raises:
-        InvalidValueError: If one is no such number, or too large.
-    """
-    found = []
-    for part in parts:
-        number = plain_number(part)
-        if number is None or not abs(number) <= largest:  # NaN neither
-            raise InvalidValueError(item, repr(part), f"decimal numbers up to {largest:g} {unit}", f"Correct {item}.")
-        found.append(number)
-    return found
+HEAVIEST = 1e12  # kg: beyond all machines, far below what overflows
 
 
 def quantity(text: str, item: str, unit: str, *, low: float = -np.inf, above: float = -np.inf) -> float:
@@ -128,34 +106,6 @@ def middle_of(robot: Robot) -> Pose:
     return Pose((robot.test_box.low + robot.test_box.high) / 2, np.eye(3))
 
 
-def pose_of(text: str, item: str = "--pose", step: str | None = None) -> Pose:
-    """A pose from X,Y,Z in meters, or X,Y,Z,A,B,C with the angles about z, y and x in degrees.
-
-    Args:
-        text: The text.
-        item: What it is, for the message.
-        step: What a message tells to do; None: that of --pose.
-
-    Raises:
-        InvalidValueError: If it is none.
-    """
-    step = step or "Give meters, and degrees about z, y and x: --pose 1,0,1.5 or --pose 1,0,1.5,10,0,0."
-    place = _three_or_six(text, item, "m or degrees", FARTHEST, step)
-    return Pose.from_euler(place[:3], *np.radians(place[3:]))
-
-
-def wrench_of(text: str | None) -> Array | None:
-    """A wrench from "fx,fy,fz" in N, or "fx,fy,fz,mx,my,mz" with moments in N m; None for none.
-
-    Raises:
-        InvalidValueError: If it is none.
-    """
-    if text is None:
-        return None
-    step = "Give newtons, and newton meters about the center of mass: --wrench 0,0,-50 or --wrench 0,0,-50,0,5,0."
-    return np.array(_three_or_six(text, "--wrench", "N or N m", STRONGEST, step))
-
-
 def loaded(robot: Robot, payload: str | None) -> Robot:
     """A robot whose platform carries a mass besides its own; the inertia grows in proportion.
 
@@ -169,12 +119,3 @@ def loaded(robot: Robot, payload: str | None) -> Robot:
     if payload is None:
         return robot
     return with_mass(robot, robot.mass + quantity(payload, "--payload", "kg", low=0.0))
-
-
-def _three_or_six(text: str, item: str, unit: str, largest: float, step: str) -> list[float]:
-    """Plain numbers between commas; of three, three zeros follow."""
-    parts = text.split(",", maxsplit=6)
-    if len(parts) not in (3, 6):
-        raise InvalidValueError(item, repr(text), "three or six numbers", step)
-    whole = numbers(parts, item, unit, largest)
-    return whole + [0.0] * (6 - len(whole))

@@ -14,7 +14,7 @@ from sagline.cli.maps import counts_of, vibrate_all_over
 from sagline.cli.results import figure_files, listed, write_figures
 from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
-from sagline.cli.values import damping_of, loaded, middle_of, pose_of, quantity, wrench_of
+from sagline.cli.values import damping_of, loaded, middle_of, quantity
 from sagline.dynamics.damping import Damping
 from sagline.dynamics.mode_list import MASSLESS, WITH_MASS, ListedMode, listed_modes, successors
 from sagline.dynamics.vibrating import vibration
@@ -22,6 +22,7 @@ from sagline.dynamics.vibration_status import VibrationStatus
 from sagline.errors import InvalidValueError
 from sagline.files.names import file_stem
 from sagline.files.robot_file import load_robot
+from sagline.files.typed import pose_of, wrench_of
 from sagline.files.whole import check_files, made_folder, write_text
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.status import PoseStatus

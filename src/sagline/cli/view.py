@@ -4,27 +4,25 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from sagline.cli.entries import FORWARD
 from sagline.cli.hosting import HOME, Start, check_viewer, hosted
-from sagline.cli.terminal import working
-from sagline.cli.values import loaded, port_of, pose_of, wrench_of
-from sagline.cli.view_log import LOG, view_log
-from sagline.errors import FileError, InvalidValueError
+from sagline.cli.played import LOG, check_robot, played_beside, played_in
+from sagline.cli.values import loaded, port_of
+from sagline.cli.view_log import view_log
+from sagline.errors import InvalidValueError
+from sagline.files.calibration_file import CONTENT as CALIBRATION
+from sagline.files.calibration_file import load_calibration
 from sagline.files.dataset import is_of
-from sagline.files.plan_file import load_plan
 from sagline.files.robot_file import load_robot
-from sagline.files.simulation_file import CONTENT, load_simulation
+from sagline.files.simulation_file import CONTENT
+from sagline.files.typed import pose_of, wrench_of
 from sagline.robot.robot import Robot
-
-if TYPE_CHECKING:
-    from sagline.viewer.played import Played
 
 
 def view(
     robot: str,
     run: Path | None,
+    beside: Path | None,
     live: bool,
     truth: Path | None,
     pose: str | None,
@@ -46,21 +44,107 @@ def view(
     if log is None and (live or truth is not None):
         item, step = "--live" if live else "--truth", "Give one: sagline view run.mcap."
         raise InvalidValueError(item, "given without a log", "a log in MCAP", step)
+    found = run if run is not None and _is_calibration(run) else None
+    if found is None and Path(robot).suffix.lower() == ".nc":  # no robot has this suffix: its reader says what is wrong
+        found = Path(robot)
     alone = {"--wrench": wrench, "--payload": payload, "--pose": pose, "--mode": mode}
     given = [item for item, value in alone.items() if value is not None]
-    if (run is not None or log is not None) and given:
+    if (run is not None or log is not None or found is not None) and given:
         raise InvalidValueError(given[0], "given with a run", "a robot alone", "A run has its own: leave one out.")
+    if beside is not None and (found is not None or (run is None and log is None)):
+        step = "Give both: sagline view cogiro run_a.nc --beside run_b.nc"
+        raise InvalidValueError("--beside", "given without a run", "two runs of one robot", step)
     if log is not None:
-        return view_log(log, robot if log is run else None, live, truth, host, number, browser=browser)
+        name = robot if log is run else None
+        return view_log(log, name, live, truth, host, number, browser=browser, beside=beside)
+    if found is not None:
+        return view_calibration(found, robot if found is run else None, host, number, browser=browser)
     start = Start(None if pose is None else pose_of(pose), _mode(mode), wrench_of(wrench))
-    return serve(loaded(load_robot(robot), payload), run, host, number, browser=browser, start=start)
+    machine = loaded(load_robot(robot), payload)
+    if run is not None:
+        return view_run(machine, run, host, number, browser=browser, beside=beside)
+    mass = None if payload is None else machine.mass
+    return serve(machine, robot, host, number, browser=browser, start=start, mass=mass)
 
 
-def serve(robot: Robot, run: Path | None, host: str, port: int, *, browser: bool, start: Start = HOME) -> int:
-    """Serve a robot, perhaps with a run, until Ctrl-C; returns the exit code."""
+def serve(
+    robot: Robot,
+    name: str | Path,
+    host: str,
+    port: int,
+    *,
+    browser: bool,
+    start: Start = HOME,
+    mass: float | None = None,
+) -> int:
+    """Serve a robot until Ctrl-C; returns the exit code.
+
+    Args:
+        robot: The robot.
+        name: Its name or file.
+        host: Address to listen on.
+        port: Port to listen on.
+        browser: Whether to open one here.
+        start: How it is shown at first.
+        mass: Its mass with a payload [kg]; None for its own.
+
+    Raises:
+        SaglineError: If nothing can listen there.
+    """
     check_viewer()
-    course = None if run is None else _played(robot, run)
-    return hosted(robot if course is None else course.robot, course, host, port, browser=browser, start=start)
+    from sagline.viewer.source import Source
+
+    return hosted(robot, None, host, port, browser=browser, start=start, source=Source.of_robot(name, mass))
+
+
+def view_run(robot: Robot, file: Path, host: str, port: int, *, browser: bool, beside: Path | None = None) -> int:
+    """Serve a run or a simulation of a robot until Ctrl-C; returns the exit code.
+
+    Args:
+        robot: Whose it should be.
+        file: The run or the simulation.
+        host: Address to listen on.
+        port: Port to listen on.
+        browser: Whether to open one here.
+        beside: What is played beside it; None for nothing.
+
+    Raises:
+        SaglineError: If the file cannot be read, or nothing can listen there.
+    """
+    check_viewer()
+    from sagline.viewer.source import Source
+
+    course = played_in(robot, file)
+    other = None if beside is None else played_beside(course.robot, file, beside)
+    source = Source.of_simulation(file) if is_of(file, CONTENT) else Source.of_plan(file)
+    return hosted(course.robot, course, host, port, browser=browser, source=source, other=other)
+
+
+def view_calibration(file: Path, robot: str | None, host: str, port: int, *, browser: bool) -> int:
+    """Serve a calibrated robot with what was found until Ctrl-C; returns the exit code.
+
+    Args:
+        file: The calibration.
+        robot: Whose it should be; None for whosever it is.
+        host: Address to listen on.
+        port: Port to listen on.
+        browser: Whether to open one here.
+
+    Raises:
+        SaglineError: If a file cannot be read, or nothing can listen there.
+    """
+    check_viewer()
+    found = load_calibration(file)
+    if robot is not None:
+        check_robot(file, "calibration", found.robot, load_robot(robot))
+    from sagline.viewer.source import Source
+
+    source = Source.of_calibration(file)
+    return hosted(found.robot, None, host, port, browser=browser, found=found, source=source)
+
+
+def _is_calibration(file: Path) -> bool:
+    return file.suffix.lower() == ".nc" and is_of(file, CALIBRATION)
 
 
 def _mode(text: str | None) -> str:
@@ -70,26 +154,3 @@ def _mode(text: str | None) -> str:
         step = "The page lists them."
         raise InvalidValueError("--mode", repr(text), "a number from 1 on, or massless 1 and so on", step)
     return words
-
-
-def _played(robot: Robot, file: Path) -> Played:
-    """A run or a simulation, whichever is in the file."""
-    from sagline.viewer.playback import Playback
-    from sagline.viewer.run import Run
-
-    if is_of(file, CONTENT):
-        simulation = load_simulation(file)
-        _check_robot(file, "simulation", simulation.robot, robot)
-        return Playback(simulation)
-    plan = load_plan(file)
-    made_for = plan.state.one_robot
-    _check_robot(file, "run", made_for, robot)
-    count = len(plan.state.pose) if plan.state.pose.shape else 1
-    with working(f"{made_for.name}: confirming {count:,} poses", FORWARD) as line:
-        return Run.of(plan, line.progress)
-
-
-def _check_robot(file: Path, kind: str, made_for: Robot, robot: Robot) -> None:
-    if made_for.name != robot.name:
-        step = f"View it as: sagline view {made_for.name} {file}"
-        raise FileError(file, f"is a {kind} of {made_for.name}, not of {robot.name}", step)

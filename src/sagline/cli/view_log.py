@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from sagline.cli.hosting import check_viewer, hosted
+from sagline.cli.played import no_cycle, played_beside
 from sagline.cli.terminal import note, working
 from sagline.errors import FileError, SaglineError
 from sagline.files.robot_file import load_robot
@@ -20,12 +21,19 @@ if TYPE_CHECKING:
     from sagline.viewer.session_log import Follower
     from sagline.viewer.viewer import Viewer
 
-LOG: Final = ".mcap"
 LOOK: Final = 0.5  # s, between two looks at a file that grows
 
 
 def view_log(
-    file: Path, robot: str | None, live: bool, truth: Path | None, host: str, port: int, *, browser: bool
+    file: Path,
+    robot: str | None,
+    live: bool,
+    truth: Path | None,
+    host: str,
+    port: int,
+    *,
+    browser: bool,
+    beside: Path | None = None,
 ) -> int:
     """Serve a log until Ctrl-C; returns the exit code.
 
@@ -37,23 +45,36 @@ def view_log(
         host: Address to listen on.
         port: Port to listen on.
         browser: Whether to open one here.
+        beside: What is played beside it.
 
     Raises:
         SaglineError: If a file cannot be read, or nothing can listen there.
     """
     check_viewer()
     from sagline.viewer.session_log import Follower
+    from sagline.viewer.source import Source
 
     follower = Follower(file, truth)
     with working(f"waiting for {file.name}" if live else f"reading {file.name}"):
         session = _first(follower, live)
     if robot is not None:
         _check_robot(file, load_robot(robot), session.robot)
+    source = Source.of_log(file)
+    other = None if beside is None else played_beside(session.robot, file, beside)
     if not live:
         if not follower.log.complete:
             note("Note: ", f"{file} was cut off: what was recorded in its last second is not there.", style="bold")
-        return hosted(session.robot, session, host, port, browser=browser)
-    return hosted(session.robot, session, host, port, browser=browser, beside=lambda viewer: _grown(follower, viewer))
+        return hosted(session.robot, session, host, port, browser=browser, source=source, other=other)
+    return hosted(
+        session.robot,
+        session,
+        host,
+        port,
+        browser=browser,
+        source=source,
+        other=other,
+        beside=lambda viewer: _grown(follower, viewer),
+    )
 
 
 def _first(follower: Follower, live: bool) -> Session:
@@ -68,7 +89,7 @@ def _first(follower: Follower, live: bool) -> Session:
         if session is not None:
             return session
         if not live:
-            raise FileError(follower.log.path, "has no cycle", "Nothing was recorded in it, or it was cut off at once.")
+            raise no_cycle(follower.log.path)
         time.sleep(LOOK)
 
 

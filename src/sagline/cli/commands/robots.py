@@ -73,7 +73,7 @@ def new(
         return 0
     from sagline.cli.view import serve
 
-    return serve(machine, None, "127.0.0.1", 8080, browser=True)
+    return serve(machine, file, "127.0.0.1", 8080, browser=True)
 
 
 def convert(

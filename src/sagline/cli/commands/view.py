@@ -16,7 +16,8 @@ def view(
         str,
         typer.Argument(
             metavar="ROBOT",
-            help="A preset (see sagline robots) or a robot file, robot.yaml; or a log of the controller, run.mcap.",
+            help="A preset (see sagline robots) or a robot file, robot.yaml; a log of the controller, run.mcap; or a "
+            "calibration, found.nc.",
             autocompletion=robot_completions,
         ),
     ],
@@ -24,8 +25,13 @@ def view(
         Path | None,
         typer.Argument(
             metavar="RUN",
-            help="To play: a run of this robot, written by sagline track, a simulation, or a log of the controller.",
+            help="To play: a run of this robot, written by sagline track, a simulation, or a log of the controller; "
+            "or a calibration to show.",
         ),
+    ] = None,
+    beside: Annotated[
+        Path | None,
+        typer.Option(metavar="RUN", help="Another run of the same robot beside it, with the same clock, as a ghost."),
     ] = None,
     live: Annotated[bool, typer.Option("--live", help="Follow a log that is still written.")] = False,
     truth: Annotated[
@@ -62,9 +68,11 @@ def view(
         sagline view own_robot.yaml --payload "5 kg" --port 9000
         sagline track article-mixed --model empirical
         sagline view article-mixed output/article-mixed-empirical.nc
+        sagline view article-mixed run_a.nc --beside run_b.nc
+        sagline view found.nc
         sagline view run.mcap --live
         sagline view run.mcap --truth twin.mcap
     """
     from sagline.cli.view import view as serve
 
-    return serve(robot, run, live, truth, pose, mode, wrench, payload, host, port, browser=browser)
+    return serve(robot, run, beside, live, truth, pose, mode, wrench, payload, host, port, browser=browser)

@@ -1,0 +1,255 @@
+"""`sagline calibrate`: a robot's numbers from its readings, or the poses at which to read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+from rich.text import Text
+
+from sagline.calibration import chosen_poses, parameters, words
+from sagline.calibration.calibrate import UNKNOWNS, calibrate
+from sagline.calibration.log import WinchLog
+from sagline.calibration.poses import calibration_poses
+from sagline.calibration.sensors import Sensors
+from sagline.calibration.status import CalibrationStatus
+from sagline.cli.ending import OUTSIDE
+from sagline.cli.entries import FORWARD, INVERSE, READINGS, STARTING_LENGTHS
+from sagline.cli.terminal import note, show, show_json, show_pieces, working
+from sagline.cli.values import quantity
+from sagline.errors import FileError, InvalidValueError, printable
+from sagline.files.log_file import load_log
+from sagline.files.log_sensors import sensors_of_comments
+from sagline.files.robot_file import dump_robot, load_robot
+from sagline.files.table import TABLE_LIMIT
+from sagline.files.text import read_text
+from sagline.files.whole import check_files, made_folder, write_text
+
+if TYPE_CHECKING:
+    from sagline.cables.model import CableModel
+    from sagline.calibration.chosen_poses import CalibrationPoses
+    from sagline.calibration.result import Calibration
+
+ROBOTS: Final = (".yaml", ".yml")
+WHOLE: Final = ".nc"
+FITTING: Final = (FORWARD, STARTING_LENGTHS, READINGS)
+FIGURES: Final = (".png", ".svg", ".pdf")
+
+
+class Deviations(NamedTuple):
+    """Of the sensors, as texts of the command line; None for what the log says."""
+
+    length: str | None
+    tension: str | None
+    position: str | None
+    rotation: str | None
+
+    def given(self) -> dict[str, Any]:
+        """Those that are given, by the names of the sensors' fields.
+
+        Raises:
+            InvalidValueError: If one is no such quantity, or not positive.
+        """
+        units = {"length": "m", "tension": "N", "position": "m", "rotation": "rad"}
+        return {
+            f"{name}_deviation": quantity(text, f"--{name}-deviation", units[name], above=0.0)
+            for name, text in self._asdict().items()
+            if text is not None
+        }
+
+
+class Asked(NamedTuple):
+    """What is wanted, as the command line has it."""
+
+    robot: str
+    unknowns: str | None
+    deviations: Deviations
+    files: tuple[Path, ...]
+    plot: Path | None
+
+    def names(self) -> tuple[str, ...]:
+        """Names of the unknowns."""
+        return UNKNOWNS if self.unknowns is None else tuple(name.strip() for name in self.unknowns.split(","))
+
+    def check_files(self, suffixes: tuple[str, ...]) -> None:
+        """Refuse files that could not be written, before any work is done.
+
+        Raises:
+            FileError: If one is of another kind than these suffixes have, its place is taken, or it is the robot's own.
+        """
+        for file, allowed in [(file, suffixes) for file in self.files] + [(self.plot, FIGURES)] * bool(self.plot):
+            assert file is not None
+            if file.suffix.lower() not in allowed:
+                kinds = ", ".join(allowed)
+                raise FileError(file, f"the suffix is {file.suffix or 'missing'}; allowed: {kinds}", "Choose one.")
+            if file.resolve() == Path(self.robot).resolve():
+                raise FileError(file, "is the robot that is read: its comments would be lost", "Give another name.")
+            check_files(file.parent, [file.name])
+
+
+def fit(asked: Asked, log: Path | None, model: CableModel, folds: int, *, robust: bool, as_json: bool) -> int:
+    """Calibrate, tell, and write; returns the exit code.
+
+    Raises:
+        SaglineError: If an input is wrong or a file cannot be written.
+    """
+    if log is None:
+        step = "Give the readings, or ask where to read: --plan 40."
+        raise InvalidValueError("LOG", "missing", "a CSV file, or --plan", step)
+    if log.suffix.lower() in (*ROBOTS, WHOLE):
+        raise FileError(log, "is no CSV file of readings", "Give what encoders and load cells read, winches.csv.")
+    asked.check_files((*ROBOTS, WHOLE))
+    robot, readings = load_robot(asked.robot), _log(log, asked.deviations)
+    unknowns = parameters.chosen(asked.names())  # before anything is compiled
+    with working(f"{robot.name}: calibrating from {len(readings):,} rows", *FITTING) as line:
+        found = calibrate(robot, readings, unknowns, model=model, robust=robust, folds=folds, progress=line.progress)
+        files = _written(found, asked, line)
+    if as_json:
+        show_json({**_record(found), "files": files})
+    else:
+        _show_lines(lambda width: words.in_words(found, width))
+        _tell_files(files)
+        _tell_offset(found, files)
+    if found.status is CalibrationStatus.FOUND:
+        return 0
+    note(f"{robot.name}: ", found.status.text, style="bold red")
+    if found.status is CalibrationStatus.NOT_CONVERGED and len(files) < len(asked.files):
+        note("", "No robot file is written of numbers that are none.")
+    return OUTSIDE
+
+
+def plan_poses(asked: Asked, count: int, seed: int, log: Path | None, *, as_json: bool) -> int:
+    """Choose poses, tell, and write them; returns the exit code.
+
+    Raises:
+        SaglineError: If an input is wrong or the file cannot be written.
+    """
+    for item, value in (("LOG", log), ("--plot", asked.plot)):
+        if value is not None:
+            step = f"Leave out --plan, or {item}."
+            raise InvalidValueError(item, f"given with --plan: {str(value)!r}", "one of the two", step)
+    asked.check_files(ROBOTS)
+    robot, given = load_robot(asked.robot), asked.deviations.given()
+    unknowns = parameters.chosen(asked.names())  # before anything is compiled
+    with working(f"{robot.name}: choosing {count:,} poses", INVERSE, READINGS) as line:
+        sensors = Sensors(**given) if given else None
+        chosen = calibration_poses(robot, count, unknowns, sensors, seed=seed, progress=line.progress)
+        for file in asked.files:
+            made_folder(file.parent)
+            chosen.save(file)
+    if as_json:
+        show_json({**_record_of_poses(chosen), "files": list(asked.files)})
+        return 0
+    _show_lines(lambda width: f"{chosen_poses.in_words(chosen, width)}\n{chosen_poses.table(chosen, width)}")
+    _tell_files(list(asked.files))
+    return 0
+
+
+def _log(file: Path, deviations: Deviations) -> WinchLog:
+    """The log, its sensors as the command line has them where it says something."""
+    given = deviations.given()
+    if not given:
+        return load_log(file)
+    said, _ = sensors_of_comments(read_text(file, TABLE_LIMIT), file)
+    return load_log(file, said.replace(**given))
+
+
+def _written(found: Calibration, asked: Asked, line: Any) -> list[Path]:
+    """Write what is to be written; a robot only where it was found. Returns the files."""
+    files = []
+    for file in asked.files:
+        made_folder(file.parent)
+        if file.suffix.lower() == WHOLE:
+            found.save(file)
+        elif found.status is not CalibrationStatus.NOT_CONVERGED:
+            write_text(file, dump_robot(found.robot))
+        else:
+            continue
+        files.append(file)
+    if asked.plot is not None:
+        from sagline import plot
+
+        line.stage("drawing")
+        made_folder(asked.plot.parent)
+        plot.save(plot.calibration(found), asked.plot)
+        files.append(asked.plot)
+    return files
+
+
+def _show_lines(text: Callable[[int], str]) -> None:
+    """A text that is written for a width, in that of the terminal where it is narrow."""
+    show_pieces(
+        lambda _, width: [(Text(printable(line)), 0) for line in text(min(width, words.WIDTH)).splitlines()],
+    )
+
+
+def _tell_files(files: list[Path]) -> None:
+    for file in files:
+        show(f"In {file.resolve().parent}: {file.name}", whole=True)
+
+
+def _tell_offset(found: Calibration, files: list[Path]) -> None:
+    """What no robot file keeps: lengths that were read say nothing of the winches' own zeros."""
+    robots = [file.name for file in files if file.suffix.lower() in ROBOTS]
+    if robots and found.length_offset.any():
+        whole = next((file.name for file in files if file.suffix.lower() == WHOLE), None)
+        kept = f"{whole} keeps it" if whole else "--out found.nc does"
+        text = "keeps no length_zero of lengths that were read, which is to be added to what the machine believes"
+        note("Note: ", f"{robots[0]} {text}; {kept}.", style="bold")
+
+
+def _record(found: Calibration) -> dict[str, Any]:
+    numbers, check = found.parameters, found.cross_validation
+    return {
+        "robot": found.robot.name,
+        "status": found.status.name,
+        "log": found.log,
+        "date": found.date,
+        "chi_squared": found.chi_squared,
+        "degrees_of_freedom": found.degrees_of_freedom,
+        "iterations": found.iterations,
+        "numbers": [
+            {"name": label, "value": value, "standard_error": error, "before": before, "unit": unit}
+            for label, value, error, before, unit in zip(
+                numbers.labels, found.values, found.standard_error, numbers.prior, numbers.units, strict=True
+            )
+        ],
+        "rows": len(found.rows),
+        "left_out": {reason.name: rows for reason, rows in found.left_out.items()},
+        "outliers": [
+            {"row": one.row, "cable": one.cable, "quantity": one.quantity, "size": one.size} for one in found.outliers
+        ],
+        "gauge": [{"name": one.name, "step": one.step} for one in found.gauge],
+        "cannot_tell_apart": [
+            {"name": one.name, "known": one.known, "step": one.step} for one in found.cannot_tell_apart
+        ],
+        "cross_validation": None
+        if check is None
+        else {
+            "folds": check.folds,
+            "position_m": check.position,
+            "position_before_m": check.position_before,
+            "tension_n": check.tension,
+            "tension_before_n": check.tension_before,
+        },
+    }
+
+
+def _record_of_poses(chosen: CalibrationPoses) -> dict[str, Any]:
+    numbers = chosen.parameters
+    return {
+        "robot": chosen.robot.name,
+        "position_m": chosen.poses.position,
+        "quaternion": chosen.poses.quaternion,
+        "frame_end_tension_n": chosen.frame_end_tension,
+        "unstrained_length_m": chosen.unstrained_length,
+        "numbers": [
+            {"name": label, "expected_error": error, "random_error": random, "unit": unit}
+            for label, error, random, unit in zip(
+                numbers.labels, chosen.expected_error, chosen.random_error, numbers.units, strict=True
+            )
+        ],
+        "enough": chosen.enough,
+        "most_helpful": chosen.most_helpful,
+    }

@@ -1,0 +1,85 @@
+"""`sagline share`: a robot, or a run of it, as one page to give away."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+from sagline.cli.entries import INVERSE
+from sagline.cli.terminal import show, working
+from sagline.errors import FileError, InvalidValueError
+from sagline.files.calibration_file import CONTENT as CALIBRATION
+from sagline.files.calibration_file import load_calibration
+from sagline.files.dataset import is_of
+from sagline.files.names import file_stem
+from sagline.files.plan_file import load_plan
+from sagline.files.robot_file import load_robot
+from sagline.files.simulation_file import CONTENT as SIMULATION
+from sagline.files.simulation_file import load_simulation
+from sagline.files.whole import check_file, write_text
+from sagline.robot.robot import Robot
+from sagline.share.course import Course, of_plan, of_simulation
+from sagline.share.page import MADE, course_page, robot_page
+
+ENDINGS: Final = (".html", ".htm")
+HEAD: Final = 2000  # bytes of a page, in which it says who made it
+
+
+def share(what: str, out: Path | None) -> None:
+    """Write the page, and tell its size.
+
+    Raises:
+        SaglineError: If what is to be shared cannot be read, or the page cannot be written.
+    """
+    source = Path(what)
+    if out is not None and out.suffix.lower() not in ENDINGS:
+        raise FileError(out, "is no name for a page", "Let it end in .html.")
+    with working(f"reading {source.name}"):
+        found = _found(source)
+    robot = found if isinstance(found, Robot) else found.robot
+    stem = file_stem(robot.name) if source.suffix == "" else source.stem
+    target = _free(Path(f"{stem}.html")) if out is None else check_file(out)
+    with working(f"{robot.name}: page", *[INVERSE] * isinstance(found, Robot)):
+        text = robot_page(found) if isinstance(found, Robot) else course_page(found, source.stem)
+        write_text(target, text)
+    size = len(text.encode())
+    amount = f"{size / 1e3:,.0f} kB" if size < 1e6 else f"{size / 1e6:.1f} MB"
+    show(f"{target.resolve()}: {amount}, opens in any browser, without a network", whole=True)
+
+
+def _found(source: Path) -> Robot | Course:
+    """A robot, or what is to be played."""
+    suffix = source.suffix.lower()
+    if suffix == ".mcap":
+        return _log(source)
+    if suffix != ".nc":
+        return load_robot(str(source))
+    if is_of(source, SIMULATION):
+        return of_simulation(load_simulation(source))
+    if is_of(source, CALIBRATION):
+        return load_calibration(source).robot
+    plan = load_plan(source)
+    if not plan.state.pose.shape:
+        step = "Save a plan of a path, or share the robot."
+        raise InvalidValueError("run", "a plan of a single pose", "a plan of poses in a row", step)
+    return of_plan(plan)
+
+
+def _log(source: Path) -> Course:
+    try:
+        from sagline.share.log_course import of_session
+        from sagline.viewer.session_log import Follower
+    except ModuleNotFoundError as error:
+        raise FileError.not_installed(error.name, "A page of a log needs it", "viewer") from None
+    session = Follower(source).more()
+    if session is None:
+        raise FileError(source, "has no cycle", "Nothing was recorded in it, or it was cut off at once.")
+    return of_session(session)
+
+
+def _free(file: Path) -> Path:
+    """A name that nobody chose is not taken from a page of somebody else's."""
+    check_file(file)
+    if file.exists() and MADE.encode() not in file.read_bytes()[:HEAD]:
+        raise FileError(file, "exists, and is no page of sagline", "Name the page with --out; it may be this one.")
+    return file

@@ -1,0 +1,80 @@
+"""`sagline share`: which pages it makes of what, and what it refuses."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner, Result
+
+import sagline as sl
+from sagline.cli.main import app
+from tests.files.executions import execution
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def shared(*words: str) -> Result:
+    return CliRunner().invoke(app, ["share", *words])
+
+
+def plan(*places: tuple[float, float, float]) -> sl.Plan:
+    pose = sl.Pose(np.array(places), np.stack([np.eye(3)] * len(places)))
+    return sl.inverse(sl.load_robot("cogiro"), pose if len(places) > 1 else pose[0])
+
+
+def test_a_robot_becomes_one_page_and_its_size_is_told(folder: Path) -> None:
+    result = shared("cogiro")
+    assert result.exit_code == 0, result.output
+    page = (folder / "cogiro.html").read_bytes()
+    assert f"cogiro.html: {len(page) / 1e3:,.0f} kB" in result.stdout
+    assert len(page) < 150_000
+    assert b"src=" not in page
+    assert b"default-src 'none'" in page
+
+
+def test_runs_simulations_and_logs_play(folder: Path) -> None:
+    plan((0.0, 0.0, 2.0), (1.0, 0.0, 2.0)).save("run.nc")
+    state = plan((0.0, 0.0, 2.0)).state
+    sl.simulate(state, duration=0.1, events=sl.Break(cable=3, time=0.05)).save("sim.nc")
+    execution().save("log.mcap")
+    for name, kind in (("run.nc", "run of 1 s"), ("sim.nc", "simulation of 0.1 s"), ("log.mcap", "log of ")):
+        result = shared(name)
+        assert result.exit_code == 0, result.output
+        page = (folder / name).with_suffix(".html").read_text(encoding="utf-8")
+        assert f", {kind}" in page
+        assert 'data-part="states"' in page
+    assert "Break of cable 3 at 0.050 s" in (folder / "sim.html").read_text(encoding="utf-8")
+
+
+def test_a_name_nobody_chose_is_not_taken_from_other_pages(folder: Path) -> None:
+    (folder / "cogiro.html").write_text("<p>my notes", encoding="utf-8")
+    result = shared("cogiro")
+    assert result.exit_code == 2
+    assert "exists, and is no page of sagline" in " ".join(result.stderr.split())
+    assert (folder / "cogiro.html").read_text(encoding="utf-8") == "<p>my notes"
+    assert shared("cogiro", "--out", "cogiro.html").exit_code == 0
+    assert shared("cogiro").exit_code == 0  # over a page of its own
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["cogiro", "--out", "cogiro.pdf"], "is no name for a page"),
+        (["missing.nc"], "missing.nc"),
+        (["one.nc"], "a plan of a single pose"),
+        (["cut.mcap"], "cut.mcap"),
+        (["cogiro", "--out", "nowhere/page.html"], "Create the folder"),
+    ],
+)
+def test_what_cannot_be_shared_is_told_and_nothing_is_written(folder: Path, words: list[str], told: str) -> None:
+    plan((0.0, 0.0, 2.0)).save("one.nc")
+    (folder / "cut.mcap").write_bytes(b"\x89MCAP0\r\n")
+    before = set(folder.iterdir())
+    result = shared(*words)
+    assert result.exit_code == 2
+    assert told in " ".join(result.stderr.split())
+    assert set(folder.iterdir()) == before
