@@ -10,7 +10,7 @@ PYTHON ?= $(FOUND)
 
 .DEFAULT_GOAL := help
 unexport PYTHONDONTWRITEBYTECODE # else each of a hundred processes compiles anew all that it imports
-.PHONY: help env run article test coverage check format bench soak docs clean
+.PHONY: help env run article test coverage check format bench soak docs dist clean
 
 help: ## show this list
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{ printf "  make %-8s %s\n", $$1, $$2 }'
@@ -59,6 +59,9 @@ docs: env ## the documentation site, into build/site; warnings are errors
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 	@echo "open build/site/index.html; its search needs a server: $(BIN)/python -m http.server -d build/site"
+
+dist: env ## wheel and source distribution, into dist
+	$(BIN)/python -m hatchling build
 
 clean: ## remove the environment, the folder output and every cache
 	rm -rf $(VENV) output build dist .coverage htmlcov .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

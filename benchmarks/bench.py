@@ -13,7 +13,17 @@ import numpy as np
 from rich.console import Console
 
 import sagline as sl
-from benchmarks import c_source, controller, design, dynamics, experiment, interference, machine, workspaces
+from benchmarks import (
+    c_source,
+    calibration,
+    controller,
+    design,
+    dynamics,
+    experiment,
+    interference,
+    machine,
+    workspaces,
+)
 from benchmarks.formula import algebraic, as_printed
 from benchmarks.links import links
 from benchmarks.measure import (
@@ -186,6 +196,7 @@ def main() -> None:
         *c_source.PARTS,
         *experiment.PARTS,
         *workspaces.PARTS,
+        *calibration.PARTS,
         *design.PARTS,
         *interference.PARTS,
     ):

@@ -15,6 +15,7 @@ from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File, Files
 from running import EXAMPLES, WORK, fresh_folder, ran
+from shown import SHOWN
 
 import sagline as sl
 from sagline.cli.main import app
@@ -24,6 +25,7 @@ RINGS = {  # package -> title and opening line of its page of reference
     "robot": ("Robots", "Where cables are fixed, what they carry, and where the platform is."),
     "motion": ("Motion", "Paths of the platform."),
     "kinematics": ("Kinematics", "From motion to lengths, from lengths to the pose, and the proof of a plan."),
+    "calibration": ("Calibration", "What a robot really is, from its own readings, and where to read them."),
     "dynamics": ("Dynamics", "How the robot vibrates and moves."),
     "workspaces": ("Workspaces", "Where a robot can work: loads, margins, criteria, the boundary, and proofs."),
     "interference": ("Interference", "What comes too near to what."),
@@ -38,15 +40,6 @@ RINGS = {  # package -> title and opening line of its page of reference
     "sweep": ("Sweeps", "`sl.sweep`: every robot at every pose under every wrench, on many cores."),
     "plot": ("Figures", "`sl.plot`: figures for papers, on Matplotlib."),
     "errors": ("Errors", "What sagline raises."),
-}
-DRAWN = {  # command -> what is shown of it
-    "track": "<!-- drawn by: sagline track own_robot.yaml own_path.yaml --model empirical -->",
-    "run": "<!-- drawn by: sagline run -->",
-    "article": "<!-- drawn by: sagline article figures 6-9 -->",
-    "tension": "<!-- drawn by: sagline tension article-mixed --pose 1,0.5,2.5 -->",
-    "vibrate": "<!-- drawn by: sagline vibrate cogiro --pose 0,0,2 --up-to 8 --force z -->",
-    "simulate": "<!-- drawn by: sagline simulate cogiro --break 3@0.5s --loss-time 0.001 -->",
-    "view": "![A robot in the viewer](../images/viewer.png)\n\n![A run in the viewer](../images/viewer-run.png)",
 }
 SCENE = """\
 import numpy as np
@@ -75,9 +68,12 @@ loads = sl.WrenchBox(force=50.0, moment=5.0)
 space = sl.workspace(robot, wrenches=loads, cells=24)
 posts = sl.FreeAnchors("frame", -1.0, 1.0, along=[0, 0, 1], symmetry="xy")
 goals = [sl.Goal("mean_margin"), sl.Goal("largest_tension")]
+calibrated = sl.calibrate(sl.load_robot("winches_robot.yaml"), sl.load_log("winches.csv"))
 better = sl.design(robot, [posts], goals, loads, grid=(3, 3, 3), evaluations=300, optimizer="nsga2")
 """
 FIGURES = {  # function of `sl.plot` -> a call that draws
+    "calibration": "calibration(calibrated)",
+    "drawing": "drawing(robot, pose)",
     "energy": "energy(broken)",
     "error": "error(proof)",
     "errors": "errors(proof, again)",
@@ -95,6 +91,7 @@ FIGURES = {  # function of `sl.plot` -> a call that draws
     "response": "response(swings)",
     "robot": "robot(robot, pose)",
     "slice": 'slice(space, "z", at=2.0)',
+    "small_multiples": "small_multiples(proof.plan)",
     "states": "states(done)",
     "tensions": "tensions(proof.plan)",
     "velocity": "velocity(path)",
@@ -164,7 +161,7 @@ def with_figures(text: str) -> str:
     shown = [f"{head}The figures below are drawn of these:\n{fenced(SCENE, 'python')}"]
     for function in functions:
         name = function.strip().rsplit(".", 1)[1]
-        if name not in (*FIGURES, "film", "save"):
+        if name not in (*FIGURES, "film", "save", "style"):
             raise PluginError(f"sl.plot.{name} has no figure in its reference; give it a call that draws one")
         figure = f"`sl.plot.{FIGURES[name]}`:\n\n![sl.plot.{name}](plot-{name}.svg)\n" if name in FIGURES else ""
         shown.append(f"::: {function.strip()}\n\n{figure}")
@@ -174,10 +171,14 @@ def with_figures(text: str) -> str:
 def gallery(files: Files, config: MkDocsConfig) -> str:
     """Source, output and figures of every example, quickstart first; above them all figures, small."""
     scripts = sorted(EXAMPLES.glob("*.py"), key=lambda script: (script.stem != "quickstart", script.stem))
-    head = "# Gallery\n\nThe scripts are in the folder `examples`; output and figures were made with this page.\n\n"
+    head = (
+        "# Gallery\n\nThe scripts are in the folder `examples`; output and figures were made with this page. "
+        "[Every command](#every-command) comes first, then every script.\n\n"
+    )
     examples = [example(script, files, config) for script in scripts]
     cards = "\n".join(card for card, _ in examples)
-    return f'{head}<div class="cards" markdown>\n{cards}\n</div>\n' + "".join(text for _, text in examples)
+    scripts_shown = "".join(text for _, text in examples)
+    return f'{head}<div class="cards" markdown>\n{cards}\n</div>\n{every_command()}{scripts_shown}'
 
 
 def example(script: Path, files: Files, config: MkDocsConfig) -> tuple[str, str]:
@@ -210,11 +211,30 @@ def command_reference() -> str:
     text = re.sub(r"^\* `--help`: .*\n", "", text, flags=re.MULTILINE)
     text = re.sub(r"\{([A-Z][\w.]*)\}", r"\1", text)  # arguments as the command's own help names them
     text = re.sub(r"^(\* `[A-Z][\w.]*) <[^>]+>`", r"\1`", text, flags=re.MULTILINE)
-    for name, shown in DRAWN.items():
+    for name, shown in _shown("../images/").items():
         text = re.sub(
             rf"(## `sagline {name}`\n.*?)(?=\n## |\Z)", lambda m, what=shown: f"{m[1]}\n{what}\n", text, flags=re.S
         )
     return text
+
+
+def every_command() -> str:
+    """Each command with its picture, its page or what it tells."""
+    commands = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+    shown = _shown("images/")
+    if missing := commands.keys() ^ shown.keys():
+        raise PluginError(f"docs/hooks/shown.py and the commands differ in {', '.join(sorted(missing))}")
+    entries = (
+        f"\n### {name} {{ #sagline-{name} }}\n\n{first_line(command.help)} [More](api/command.md#sagline-{name}).\n"
+        f"\n{shown[name]}\n"
+        for name, command in commands.items()
+    )
+    return "\n## Every command\n\nWhat each of them draws, makes or tells.\n" + "".join(entries)
+
+
+def _shown(images: str) -> dict[str, str]:
+    """What there is of each command, for a page from which the images are there."""
+    return {name: text.replace("{images}", images) for name, text in SHOWN.items()}
 
 
 def first_line(text: str | None) -> str:

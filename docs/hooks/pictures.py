@@ -1,7 +1,8 @@
 """Pictures that commands draw: made with the pages, so that they show what the command draws today.
 
 The line `<!-- drawn by: sagline track cogiro -->` of a page becomes the figures that this command writes, in a folder
-where the page's files (`<!-- file: name -->` before a block of code) and those of the examples are.
+where the page's files (`<!-- file: name -->` before a block of code) and those of the examples are. The line
+`<!-- drawn above: name.svg -->` becomes the figure of that name that the page's own blocks of Python save.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ from running import WORK, ran
 
 MARK = re.compile(r"^<!-- drawn by: sagline (.+?) -->$", re.MULTILINE)
 NAMED = re.compile(r"^<!-- file: (\S+) -->\n+```\w*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+ABOVE = re.compile(r"^<!-- drawn above: (\S+\.svg) -->$", re.MULTILINE)
+PYTHON = re.compile(r"(?<!-->\n\n)^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 NAMESPACE = 'xmlns="http://www.w3.org/2000/svg"'
 _drawn: dict[str, list[File]] = {}
 
@@ -34,7 +37,22 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     """Put the pictures in the place of the lines that ask for them."""
     for name, text in NAMED.findall(markdown):
         (WORK / name).write_text(text, encoding="utf-8")
+    if names := ABOVE.findall(markdown):
+        _run(markdown, names, config, files)
+    markdown = ABOVE.sub(lambda found: _picture(found[1].partition(".")[0], f"pictures/{found[1]}", page), markdown)
     return MARK.sub(lambda found: _shown(found[1], page, config, files), markdown)
+
+
+def _run(markdown: str, names: list[str], config: MkDocsConfig, files: Files) -> None:
+    """Run a page's blocks of Python, and take the figures of these names."""
+    ran("-c", "\n".join(PYTHON.findall(markdown)))
+    for name in names:
+        content = (WORK / name).read_text(encoding="utf-8")
+        files.append(File.generated(config, f"pictures/{name}", content=content))
+
+
+def _picture(title: str, uri: str, page: Page) -> str:
+    return f"![{title}]({relpath(uri, dirname(page.file.src_uri) or '.')})"
 
 
 def _shown(command: str, page: Page, config: MkDocsConfig, files: Files) -> str:

@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from mkdocs.exceptions import PluginError
@@ -24,11 +25,21 @@ def fresh_folder() -> None:
             shutil.copy(file, WORK)
 
 
-def ran(*arguments: str) -> str:
-    """What Python prints with these arguments; a failure stops the build."""
-    environment = {**os.environ, "PYTHONPATH": str(ROOT / "src"), "NO_COLOR": "1"}
-    command = [sys.executable, *arguments]
-    done = subprocess.run(command, cwd=WORK, env=environment, capture_output=True, text=True, check=False)
+def environment() -> dict[str, str]:
+    """Of the programs: they import this tree, and write no colors."""
+    return {**os.environ, "PYTHONPATH": str(ROOT / "src"), "NO_COLOR": "1"}
+
+
+def command_of(arguments: Sequence[str]) -> list[str]:
+    """Python with these arguments."""
+    return [sys.executable, *arguments]
+
+
+def ran(*arguments: str, answers: str | None = None) -> str:
+    """What Python prints with these arguments, perhaps answered on its standard input; a failure stops the build."""
+    done = subprocess.run(
+        command_of(arguments), cwd=WORK, env=environment(), input=answers, capture_output=True, text=True, check=False
+    )
     if done.returncode != 0:
         raise PluginError(f"{' '.join(arguments)} failed:\n{done.stderr}")
     return done.stdout

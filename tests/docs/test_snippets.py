@@ -71,8 +71,9 @@ def test_the_code_runs_and_prints_what_the_page_says(
     page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    for file in (ROOT / "examples").glob("*.yaml"):
-        shutil.copy(file, tmp_path)
+    for suffix in ("yaml", "csv"):
+        for file in (ROOT / "examples").glob(f"*.{suffix}"):
+            shutil.copy(file, tmp_path)
     names: dict[str, Any] = {"__name__": "__main__"}
     for block in blocks(page):
         if block.mark == "file":
@@ -118,7 +119,7 @@ def test_a_list_begins_after_an_empty_line(page: Path) -> None:
     assert [part for part in paragraphs if item.search(part) and not item.match(part)] == []  # else it is no list
 
 
-@pytest.mark.parametrize("file", sorted((ROOT / "examples").iterdir()), ids=name_of)
+@pytest.mark.parametrize("file", sorted(filter(Path.is_file, (ROOT / "examples").iterdir())), ids=name_of)
 def test_no_line_of_an_example_is_wider_than_a_page(file: Path) -> None:
     lines = file.read_text(encoding="utf-8").splitlines() if file.suffix in (".py", ".yaml") else []
     assert [line for line in lines if len(line) > WIDTH] == []

@@ -1,0 +1,77 @@
+"""The numbers of docs/calibration.md that no block of code prints."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.arrays import Array
+from sagline.calibration.observing import observed
+from sagline.calibration.parameters import parameters_of
+from sagline.statics.tables import pose_rows
+from tests.calibration.synthetic import USUAL, log_of, true_robot, with_drums
+
+ROOT = Path(__file__).parents[2]
+PAGE = " ".join((ROOT / "docs" / "calibration.md").read_text(encoding="utf-8").split())
+PLATFORM = ("frame_anchors", "platform_anchors", "length_zero", "linear_density", "axial_stiffness", "mass")
+SENSORS = sl.Sensors(5e-4, 5.0)
+
+
+def gauge_of(*unknowns: str, drums: bool = True) -> tuple[int, list[str]]:
+    """How many numbers are asked for, and which directions a log of encoders and load cells leaves open."""
+    nominal = with_drums() if drums else sl.load_robot("cogiro").replace(winches=sl.Winch(load_cell_gain=1.0))
+    found = sl.calibrate(nominal, log_of(true_robot(nominal, USUAL, seed=1), 32, seed=2).log, unknowns, folds=0)
+    return len(found.values), [way.name for way in found.gauge]
+
+
+def test_of_63_numbers_11_directions_are_open_and_the_scale_is_one() -> None:
+    count, names = gauge_of(*PLATFORM, "center_of_mass", "drum_radius")
+    assert (count, len(names)) == (63, 11)
+    assert sum("scale" in name for name in names) == 1
+    assert "63 numbers asked for, leaves 11 directions open: these 10 and the scale." in PAGE
+
+
+def test_where_the_center_of_mass_is_known_the_platform_cannot_be_shifted() -> None:
+    _, names = gauge_of(*PLATFORM)
+    assert sum("platform" in name and "turned" in name for name in names) == 3
+    assert not any("platform" in name and "shifted" in name for name in names)
+    assert "Where the center of mass is known, the three shifts are not open." in PAGE
+
+
+def test_gains_of_load_cells_are_open_with_all_that_weighs() -> None:
+    heavy = ("length_zero", "load_cell_gain", "linear_density", "axial_stiffness")
+    assert len(gauge_of(*heavy, "mass", drums=False)[1]) == 1
+    assert gauge_of(*heavy, drums=False)[1] == []
+    assert "everything may be heavier by the same share" in PAGE
+
+
+def slopes(unknowns: tuple[str, ...]) -> tuple[Array, tuple[str, ...]]:
+    """Whitened slopes of the page's readings over pulleys, and whose the columns are."""
+    drawn = sl.load_robot("cogiro").replace(winches=sl.Winch(pulley_radius=0.03))
+    names: dict[str, object] = {}
+    code = re.findall(r"^```python\n(.*?)^```$", (ROOT / "docs" / "calibration.md").read_text(), re.M | re.S)[0]
+    exec(code.partition("\n\ndef read")[0], names)  # the places where it stands
+    poses, ways = names["poses"], names["ways"]
+    assert isinstance(poses, sl.Pose)
+    assert isinstance(ways, list)
+    numbers = parameters_of(drawn, unknowns, SENSORS, counted=False)
+    rows = []
+    for way in ways:
+        plan = sl.inverse(drawn, poses[:20], tension=way)
+        said = observed(drawn, sl.Catenary(), numbers, SENSORS, pose_rows(poses[:20]), plan.unstrained_length)
+        rows.append(said.matrix.reshape(-1, len(numbers.names)))
+    return np.concatenate(rows), numbers.names
+
+
+@pytest.mark.parametrize(
+    ("by", "words"), [(("length_zero",), "imitate {} %"), (("length_zero", "frame_anchors"), "together {} %")]
+)
+def test_how_much_of_a_pulley_zeros_and_anchors_imitate(by: tuple[str, ...], words: str) -> None:
+    matrix, names = slopes((*by, "pulley_radius"))
+    own = np.array([name == "pulley_radius" for name in names])
+    pulley, others = matrix[:, own][:, 0], matrix[:, ~own]
+    left = pulley - others @ np.linalg.lstsq(others, pulley, rcond=1e-10)[0]
+    share = 100.0 * (1.0 - np.linalg.norm(left) / np.linalg.norm(pulley))
+    assert words.format(f"{share:.1f}") in PAGE

@@ -1,0 +1,192 @@
+"""docs/explore.md in headless Chromium: its script calculates what the library does, and people can use it."""
+
+import importlib.util
+import re
+import shutil
+from collections.abc import Iterator
+from itertools import product
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser, Page
+
+import sagline as sl
+from tests.chromium import NEEDED, launched
+
+DOCS = Path(__file__).parents[2] / "docs"
+FLAGS = "--disable-gpu --disable-component-update"
+ALL = (
+    "given => given.map(each => { const { at, ...numbers } = cable.%s(each); return { ...numbers, middle: at(0.3) } })"
+)
+NAMES = {
+    "length": "unstrained_length",
+    "sag": "sag",
+    "vertical": "vertical_force",
+    "horizontal": "horizontal_tension",
+    "frameEnd": "frame_end_tension",
+    "platformEnd": "platform_end_tension",
+}
+
+pytestmark = NEEDED
+
+
+@pytest.fixture(scope="module")
+def hook() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("explore", DOCS / "hooks" / "explore.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    yield from launched(FLAGS)
+
+
+@pytest.fixture(scope="module")
+def site(hook: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The page without its theme."""
+    folder = tmp_path_factory.mktemp("site")
+    for file in (DOCS / "explore.js", DOCS / "extra.css", hook.CATENARY):
+        shutil.copy(file, folder)
+    head = '<!doctype html><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
+    made = hook.on_page_markdown((DOCS / "explore.md").read_text(encoding="utf-8"))
+    (folder / "explore.html").write_text(f'{head}<link rel="stylesheet" href="extra.css">{made}', encoding="utf-8")
+    return folder / "explore.html"
+
+
+@pytest.fixture
+def page(browser: Browser, site: Path) -> Iterator[Page]:
+    """Opened from the disk; it complains of nothing and asks for nothing but its own three files."""
+    complaints: list[str] = []
+    asked: list[str] = []
+    page = browser.new_page(viewport={"width": 390, "height": 844})
+    page.on("console", lambda message: complaints.append(message.text))
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto(site.as_uri())
+    yield page
+    page.close()
+    assert complaints == []
+    assert asked == [
+        site.with_name(name).as_uri() for name in ("explore.html", "extra.css", "catenary.js", "explore.js")
+    ]
+
+
+def grid(hook: ModuleType) -> list[dict[str, float]]:
+    """Cables from end to end of every slider and beyond, level ones too."""
+    rises, densities = (-5.0, -4.0, -0.1, 0.0, 3.0), (1e-4, 0.01, 0.067, 0.5)
+    every = product(rises, densities, (5e3, 44e3, 5e6), (20.0, 100.0, 2000.0))
+    fixed = {"span": hook.SPAN, "gravity": hook.GRAVITY, "kh": 4.845, "kp": 4.385}
+    return [fixed | dict(zip(("rise", "density", "stiffness", "tension"), one, strict=True)) for one in every]
+
+
+@pytest.mark.parametrize(("function", "model"), [("exact", sl.Catenary()), ("empirical", sl.Empirical())])
+def test_the_script_calculates_what_the_library_does(
+    page: Page, hook: ModuleType, function: str, model: sl.CableModel
+) -> None:
+    given = grid(hook)
+    found: list[dict[str, Any]] = page.evaluate(ALL % function, given)
+    column = {name: np.array([one[name] for one in given]) for name in given[0]}
+    cable = sl.Cable(column["density"], column["stiffness"])
+    state = model.from_tension(cable, column["span"], column["rise"], column["tension"], hook.GRAVITY)
+    for name, field in NAMES.items():
+        scale = column["tension"] if name not in ("length", "sag") else column["span"]
+        error = np.abs([one[name] for one in found] - getattr(state, field)) / scale
+        assert error.max() < 1e-9, name
+    middle = state.points(11)[:, 3]
+    np.testing.assert_allclose([(one["middle"]["x"], one["middle"]["z"]) for one in found], middle, atol=1e-8)
+    if function == "empirical":
+        assert [one["valid"] for one in found] == list(state.status == sl.CableStatus.SOLVED)
+
+
+def table(page: Page) -> dict[str, list[str]]:
+    rows = page.locator("tr[data-row]").all()
+    return {str(row.get_attribute("data-row")): row.locator("td").all_text_contents() for row in rows}
+
+
+def told(slider: Any) -> float:
+    return float(slider.get_attribute("aria-valuetext").split()[0].replace("−", "-"))
+
+
+def test_sliders_move_by_keyboard_and_every_number_follows(page: Page, hook: ModuleType) -> None:
+    weight, stiffness = page.get_by_label("Weight"), page.get_by_label("Stiffness EA")
+    tension, height = page.get_by_label("Tension along the chord"), page.get_by_label("Height of the platform end")
+    assert [told(each) for each in (weight, stiffness, tension, height)] == [67.0, 44.0, 100.0, -4.0]
+    for slider, keys in ((weight, "ArrowRight"), (stiffness, "ArrowLeft"), (tension, "PageDown"), (height, "End")):
+        slider.focus()
+        page.keyboard.press(keys)
+    values = [told(each) for each in (weight, stiffness, tension, height)]
+    assert values[:2] == [70.4, 40.0]  # a step up by 5 %, one down by 10 %
+    assert values[2] < 65.0
+    assert values[3] == 3.0
+    cable = sl.Cable(1e-3 * values[0], 1e3 * values[1])
+    exact, closed = (m.from_tension(cable, 12.0, values[3], values[2]) for m in (sl.Catenary(), sl.Empirical()))
+    shown = table(page)
+    more = 1e3 * (closed.unstrained_length - exact.unstrained_length)
+    assert shown["length"] == [
+        f"{exact.unstrained_length:.4f}",
+        f"{closed.unstrained_length:.4f}",
+        f"{more:+.1f} mm".replace("-", "−"),
+    ]
+    assert shown["sag"][:2] == [f"{1e3 * exact.sag:.1f}", f"{1e3 * closed.sag:.1f}"]
+    assert shown["vertical"][0] == f"{exact.vertical_force:.2f}".replace("-", "−")
+    assert shown["frameEnd"][0] == f"{exact.frame_end_tension:.2f}"
+    assert shown["platformEnd"][1] == f"{closed.platform_end_tension:.2f}"
+    said = page.get_by_role("status").text_content() or ""
+    assert f"Exact length {exact.unstrained_length:.3f} m" in said
+
+
+def test_the_pictures_follow(page: Page) -> None:
+    pictures = page.locator("svg[data-picture]")
+    before = [picture.inner_html() for picture in pictures.all()]
+    assert len(before) == 2
+    page.get_by_role("button", name="Heavy and slack").click()
+    assert all(now.inner_html() != then for now, then in zip(pictures.all(), before, strict=True))
+    page.get_by_role("button", name="The article’s cable").click()
+    assert [picture.inner_html() for picture in pictures.all()] == before
+
+
+def test_what_the_page_says_of_its_cables(page: Page, hook: ModuleType) -> None:
+    """Slack and heavy decimeters too short, out of range; taut half the weight's stretch too long; level always out."""
+    note = page.get_by_text(hook.NOTE)
+    assert not note.is_visible()
+    page.get_by_role("button", name="Heavy and slack").click()
+    assert note.is_visible()
+    assert re.search(r"is [1-9]\d\d\.\d mm shorter. It is outside", page.get_by_role("status").text_content() or "")
+    page.get_by_role("button", name="The article’s cable").click()
+    assert not note.is_visible()
+    slider = page.get_by_label("Tension along the chord")
+    slider.focus()
+    page.keyboard.press("End")
+    # the force at the lower end is smaller by half the weight along the slope, and stretches it by so much less
+    chord, less = 160**0.5, 0.5 * 0.067 * hook.GRAVITY * 4.0 / 44e3
+    assert table(page)["length"][2] == f"+{1e3 * chord * less / (1.0 + told(slider) / 44e3) ** 2:.1f} mm"
+    page.get_by_label("Height of the platform end").fill("0")
+    assert note.is_visible()
+
+
+def test_nothing_is_wider_than_the_screen(page: Page) -> None:
+    page.get_by_role("button", name="Heavy and slack").click()
+    parts = "[...document.querySelectorAll('.explore, .explore *')]"
+    over = f"{parts}.filter(each => each.getBoundingClientRect().right > innerWidth).map(each => each.outerHTML)"
+    for width in (320, 390, 820, 1440):
+        page.set_viewport_size({"width": width, "height": 800})
+        assert page.evaluate(over) == []
+
+
+def test_without_javascript_there_is_a_picture_and_a_table(browser: Browser, site: Path, hook: ModuleType) -> None:
+    context = browser.new_context(java_script_enabled=False)
+    page = context.new_page()
+    page.goto(site.as_uri())
+    assert page.get_by_role("slider").count() == 0
+    assert page.get_by_text("The sliders of this page need JavaScript").is_visible()
+    assert page.locator("[data-still] path").count() == 2 * len(hook.STANDING)
+    state = sl.Catenary().from_tension(sl.Cable(0.067, 44e3), 12.0, -4.0, 30.0)
+    assert f"| 30 | {state.unstrained_length:.4f} |" in hook.standing()
+    context.close()

@@ -1,0 +1,57 @@
+"""The gallery shows every command, by lines that other hooks make figures, pages and texts of."""
+
+import importlib.util
+import shlex
+from pathlib import Path
+
+import pytest
+import typer
+
+from sagline.cli.examples import example_files
+from tests.abuse.command_lines import commands
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+def shown() -> dict[str, str]:
+    spec = importlib.util.spec_from_file_location("shown", DOCS / "hooks" / "shown.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    found: dict[str, str] = module.SHOWN
+    return found
+
+
+def lines_of(text: str) -> list[list[str]]:
+    """The command lines in a mark, as words."""
+    _, _, asked = text.removesuffix(" -->").partition(" by: ")
+    return [shlex.split(line)[1:] for line in asked.split(" && ") if line]
+
+
+def test_the_gallery_shows_every_command_and_no_other() -> None:
+    assert shown().keys() == commands().keys()
+
+
+@pytest.mark.parametrize("name", sorted(commands()))
+def test_what_is_shown_is_of_that_command(name: str) -> None:
+    text = shown()[name]
+    if text.startswith("<!-- told of a machine: "):
+        assert text == f"<!-- told of a machine: {name} -->"
+        return
+    if name == "view":
+        images = [part.partition("}")[2].partition(")")[0] for part in text.split("![")[1:]]
+        assert len(images) == 2
+        assert all((DOCS / "images" / image).is_file() for image in images)
+        return
+    lines = lines_of(text)
+    assert lines[-1][0] == name
+    files = {file.name for file in example_files()}
+    for words in lines:  # each is one that the command takes, of files that are there
+        context = typer.Context(commands()[words[0]], info_name=words[0])
+        commands()[words[0]].parse_args(context, list(words[1:]))
+        assert {word for word in words if word.endswith((".yaml", ".csv"))} - files <= {"hall.yaml"}
+
+
+def test_the_front_page_has_a_robot_to_drag() -> None:
+    assert "<!-- shared by: sagline share cogiro -->" in (DOCS / "index.md").read_text(encoding="utf-8")
