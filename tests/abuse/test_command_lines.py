@@ -65,8 +65,8 @@ def short_of_work(stocked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sagline.cli.run.CELLS", 4)
     monkeypatch.setattr("sagline.cli.run._figures", lambda *_: ())
     monkeypatch.setattr("sagline.report.parts.Part.build", lambda part: Chapter(part.key, part.key, "", ()))
-    monkeypatch.setattr("sagline.cli.tension.write_figures", lambda figures, folder: [])
-    monkeypatch.setattr("sagline.cli.track.write_figures", lambda figures, folder: [])
+    for module in ("run", "tension", "track"):
+        monkeypatch.setattr(f"sagline.cli.{module}.write_figures", lambda figures, folder: [])
 
     def started(host: str, port: int, title: str) -> Any:
         server._check(host, port)

@@ -104,8 +104,8 @@ def test_lines_carry_their_names_at_their_ends() -> None:
         assert names[name].get_color() == line.get_color()
         assert boxes[name].x0 > ax.bbox.x1  # beside the axes, not on the lines
     middles = {name: 0.5 * (box.y0 + box.y1) for name, box in boxes.items() if name != "cable"}
-    last = {name: float(np.asarray(line.get_ydata())[-1]) for name, line in lines.items()}
-    assert sorted(middles, key=middles.__getitem__) == sorted(last, key=last.__getitem__)
+    last = [float(np.asarray(lines[name].get_ydata())[-1]) for name in sorted(middles, key=middles.__getitem__)]
+    assert np.diff(last).min() > -1e-9 * last[-1]  # in the order of the lines; cables 0 and 4 end alike
     assert np.diff(sorted(middles.values())).min() > 0.9 * 8.0 * figure_of(ax).dpi / 72.0  # apart by their height
 
 

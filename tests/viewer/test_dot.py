@@ -24,7 +24,7 @@ from sagline.viewer.viewer import Viewer, home_pose
 from tests.effort import best_rate
 from tests.viewer.client import Client, await_that
 from tests.viewer.platform_forces import unbalanced
-from tests.viewer.test_viewer import Shown, handle, shown
+from tests.viewer.test_viewer import Shown, handle, shown, updates_a_second
 
 HEAVY = sl.load_robot("cogiro").replace(
     cables=sl.Cable(linear_density=0.65, axial_stiffness=700e3), name="heavy cables", tension_max=900.0
@@ -269,15 +269,7 @@ def test_a_field_keeps_its_place_while_the_dot_moves() -> None:
 
 
 def test_thirty_tensions_a_second_follow_the_dot(page: Shown) -> None:
-    def rate() -> float:
-        with Client(page.port) as client:
-            list(client.heard(1.0))
-            before, start = page.viewer.updates, time.monotonic()
-            while time.monotonic() - start < 2.0:
-                angle = 3.0 * (time.monotonic() - start)
-                say(page, client, {"at": [100.0 * np.cos(angle), 100.0 * np.sin(angle)]})
-                time.sleep(0.01)
-            heard = sum(m.get("name") == "/cables" and "points" in m.get("updates", {}) for m in client.heard(0.5))
-            return float(min(page.viewer.updates - before, heard)) / 2.0
+    def move(client: Client, angle: float) -> None:
+        say(page, client, {"at": [100.0 * np.cos(angle), 100.0 * np.sin(angle)]})
 
-    assert best_rate(rate, 30.0) >= 30.0
+    assert best_rate(lambda: updates_a_second(page, move), 30.0) >= 30.0

@@ -16,6 +16,7 @@ from sagline.viewer.settings import Settings
 from sagline.viewer.snapshot import taken_at
 from sagline.viewer.viewer import Viewer, home_pose
 from tests.viewer.client import Client, await_that
+from tests.viewer.planar import PLANAR
 from tests.viewer.platform_forces import pulled
 from tests.viewer.test_dot import HEAVY
 from tests.viewer.test_viewer import Shown, handle, shown
@@ -127,14 +128,23 @@ def test_a_platform_that_cannot_turn_has_no_moments() -> None:
     assert len(arrows(force_polygon_figure(flat))) == 1
 
 
-def held_planar() -> sl.Equilibrium:
-    robot = sl.Robot(
-        name="planar", frame_anchors=np.array([[0.0, 0.0, 3.0], [4.0, 0.0, 3.0], [0.0, 0.0, 0.0], [4.0, 0.0, 0.0]]),
-        platform_anchors=np.array([[-0.1, 0.0, 0.1], [0.1, 0.0, 0.1], [-0.1, 0.0, -0.1], [0.1, 0.0, -0.1]]),
-        mass=10.0, cables=sl.Cable(linear_density=0.02, axial_stiffness=1e5), tension_min=5.0, tension_max=300.0,
-        inertia=np.eye(3), motion_pattern="1R2T", plane_normal=[0.0, 1.0, 0.0],
+def test_forces_that_are_all_level_are_drawn_from_above() -> None:
+    anchors = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [4.0, 4.0, 0.0], [0.0, 4.0, 0.0]])
+    level = sl.Robot(
+        name="level", frame_anchors=anchors, platform_anchors=(anchors - [2.0, 2.0, 0.0]) * [-0.1, 0.1, 0.0], mass=10.0,
+        cables=sl.Cable(linear_density=0.02, axial_stiffness=1e5), tension_min=5.0, tension_max=300.0, gravity=0.0,
+        inertia=np.eye(3), motion_pattern="1R2T", plane_normal=[0.0, 0.0, 1.0],
     )  # fmt: skip
-    return sl.inverse(robot, sl.Pose([2.2, 0.0, 1.4], np.eye(3))).state
+    plan = sl.inverse(level, sl.Pose([2.0, 2.0, 0.0], np.eye(3)))
+    assert plan.feasible
+    html = force_polygon_figure(plan.state)
+    (places,) = {html.split('aria-label="')[1].split('"')[0]}
+    assert places.endswith("x to the right, y up")
+    assert all(np.isfinite([float(x) for x in each]).all() for each in re.findall(ARROW, html))
+
+
+def held_planar() -> sl.Equilibrium:
+    return sl.inverse(PLANAR, sl.Pose([2.2, 0.0, 1.4], np.eye(3))).state
 
 
 @pytest.fixture(scope="module")

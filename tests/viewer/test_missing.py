@@ -21,9 +21,10 @@ from sagline.viewer.snapshot import Snapshot, taken_at
 from sagline.viewer.viewer import Viewer, home_pose
 from tests.effort import best_rate
 from tests.viewer.client import Client, await_that
+from tests.viewer.planar import PLANAR
 from tests.viewer.platform_forces import unbalanced
 from tests.viewer.test_dot import say
-from tests.viewer.test_viewer import Shown, shown
+from tests.viewer.test_viewer import Shown, shown, updates_a_second
 
 OUTSIDE = {  # poses that no force within the limits holds, but with another force
     "cogiro": [[6.3, 2.1, 5.4], [0.0, 0.0, 6.5], [9.5, 0.0, 2.0]],
@@ -162,18 +163,12 @@ def test_a_load_counts() -> None:
 
 
 def test_a_planar_robot_is_explained_in_its_plane() -> None:
-    robot = sl.Robot(
-        name="planar", frame_anchors=np.array([[0.0, 0.0, 3.0], [4.0, 0.0, 3.0], [0.0, 0.0, 0.0], [4.0, 0.0, 0.0]]),
-        platform_anchors=np.array([[-0.1, 0.0, 0.1], [0.1, 0.0, 0.1], [-0.1, 0.0, -0.1], [0.1, 0.0, -0.1]]),
-        mass=10.0, cables=sl.Cable(linear_density=0.02, axial_stiffness=1e5), tension_min=5.0, tension_max=300.0,
-        inertia=np.eye(3), motion_pattern="1R2T", plane_normal=[0.0, 1.0, 0.0],
-    )  # fmt: skip
     pose = sl.Pose([2.0, 0.0, 3.5], np.eye(3))
-    missing = missing_of(at(robot, pose))
+    missing = missing_of(at(PLANAR, pose))
     assert missing is not None
     assert missing.force[1] == 0.0
     assert missing.force[2] > 0.0
-    nearest = nearest_held(robot, pose, sl.Catenary(), None)
+    nearest = nearest_held(PLANAR, pose, sl.Catenary(), None)
     assert nearest is not None
     assert nearest.pose.position[1] == 0.0
     assert nearest.pose.position[2] < 3.0
@@ -241,15 +236,7 @@ def test_the_platform_goes_where_it_is_held(page: Shown) -> None:
 
 @pytest.mark.soak
 def test_thirty_explanations_a_second(page: Shown) -> None:
-    def rate() -> float:
-        with Client(page.port) as client:
-            list(client.heard(1.0))
-            before, start = page.viewer.updates, time.monotonic()
-            while time.monotonic() - start < 2.0:
-                angle = 3.0 * (time.monotonic() - start)
-                client.drag([6.3 + 0.3 * np.cos(angle), 2.1 + 0.3 * np.sin(angle), 5.4])
-                time.sleep(0.01)
-            seen = sum(m.get("name") == "/missing" and "points" in m.get("updates", {}) for m in client.heard(0.5))
-            return float(min(page.viewer.updates - before, seen)) / 2.0
+    def move(client: Client, angle: float) -> None:
+        client.drag([6.3 + 0.3 * np.cos(angle), 2.1 + 0.3 * np.sin(angle), 5.4])
 
-    assert best_rate(rate, 30.0) >= 30.0
+    assert best_rate(lambda: updates_a_second(page, move, "/missing"), 30.0) >= 30.0

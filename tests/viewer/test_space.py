@@ -20,7 +20,7 @@ from sagline.viewer.viewer import Viewer
 from tests.effort import best_rate
 from tests.kinematics.test_many_robots import planar
 from tests.viewer.client import PATIENCE, Client, await_that
-from tests.viewer.test_viewer import ROBOT, Shown, handle, shown
+from tests.viewer.test_viewer import ROBOT, Shown, handle, shown, updates_a_second
 
 POSE = sl.Pose([1.0, 0.5, 2.0], np.eye(3))
 LOADS = sl.WrenchBox(force=50.0)
@@ -104,17 +104,10 @@ def test_the_slice_follows_the_platform_and_ends_where_the_margin_does(page: Sho
 def test_a_slice_follows_a_drag_thirty_times_a_second(page: Shown, client: Client) -> None:
     choose(page, client, slice=True, ways=True, force=50.0)
 
-    def rate() -> float:
-        list(client.heard(0.5))
-        start, before = time.monotonic(), page.viewer.updates
-        while time.monotonic() - start < 2.0:
-            angle = 3.0 * (time.monotonic() - start)
-            client.drag([np.cos(angle), np.sin(angle), 2.0 + 0.5 * np.sin(angle)])
-            time.sleep(0.01)
-        seen = sum(m.get("name") == "/slice/picture" and "_data" in m.get("updates", {}) for m in client.heard(0.5))
-        return float(min(page.viewer.updates - before, seen)) / 2.0
+    def move(client: Client, angle: float) -> None:
+        client.drag([np.cos(angle), np.sin(angle), 2.0 + 0.5 * np.sin(angle)])
 
-    assert best_rate(rate, 30.0) >= 30.0
+    assert best_rate(lambda: updates_a_second(page, move, "/slice/picture", "_data"), 30.0) >= 30.0
 
 
 def test_ways_end_where_the_robot_can_no_more(page: Shown, client: Client) -> None:

@@ -28,7 +28,8 @@ def best_step(problem: Problem, state: State, normal: Normal) -> tuple[Array, fl
     room = (problem.least - state.numbers) / scale
     if (step < room).any():
         step = _lowest_within(matrix, downhill, room)
-    return scale * step, float(2.0 * step @ downhill - step @ matrix @ step)
+    promised = float(2.0 * step @ downhill - step @ matrix @ step)
+    return np.where(step <= room, problem.least - state.numbers, scale * step), promised
 
 
 def _lowest(matrix: Array, downhill: Array, *, positive: bool) -> Array:
@@ -49,7 +50,7 @@ def _lowest_within(matrix: Array, downhill: Array, room: Array) -> Array:
     values, vectors = _told(matrix)
     root = np.sqrt(values)
     found = lsq_linear(root[:, None] * vectors.T, vectors.T @ downhill / root, (room, np.inf), method="bvls")
-    return np.asarray(found.x)
+    return np.where(found.active_mask < 0, room, found.x)  # there, not near there
 
 
 def _told(matrix: Array) -> tuple[Array, Array]:

@@ -62,6 +62,7 @@ class Channel(Told):
         super().__init__(gui)
         self._soon = soon
         self._heard: dict[str, Heard] = {}
+        self._clients: dict[int, Told] = {}  # by number
         self._field = gui.add_text(NAME, "", visible=False)
 
         @self._field.on_update
@@ -77,9 +78,20 @@ class Channel(Told):
         """
         self._heard[topic] = heard
 
+    def answer(self, client: int, topic: str, value: Any) -> None:
+        """Tell one client something about a topic; one that has left hears it no more."""
+        told = self._clients.get(client)
+        if told is not None:
+            told.tell(topic, value)
+
     def welcome(self, client: viser.ClientHandle) -> None:
         """Tell a client that it is heard from now on; what it says earlier, viser hands to nobody."""
-        Told(client.gui).tell("welcome", True)
+        told = self._clients[client.client_id] = Told(client.gui)
+        told.tell("welcome", True)
+
+    def part(self, client: viser.ClientHandle) -> None:
+        """Forget a client that has left."""
+        self._clients.pop(client.client_id, None)
 
     def _hear(self, text: Any, client: int | None) -> None:
         """Leave something said to the serving thread; what is no message of ours is not heard."""

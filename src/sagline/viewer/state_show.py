@@ -61,18 +61,18 @@ class StateShow:
     def tick(self) -> None:
         """Nothing comes of time."""
 
-    def _hear_pose(self, value: Any, _: int) -> None:
+    def _hear_pose(self, value: Any, client: int) -> None:
         """Go to a pose that was typed."""
 
         def go(text: str) -> dict[str, str]:
             self._go(pose_of(text, "the pose", STEP))
             return {}
 
-        self._answer("pose-told", value, go)
+        self._answer(client, "pose-told", value, go)
 
     def _hear_copy(self, value: Any, client: int) -> None:
         """Give what was asked for as text."""
-        self._answer("copy-told", value, lambda what: self._copy(what, client))
+        self._answer(client, "copy-told", value, lambda what: self._copy(what, client))
 
     def _hear_link(self, value: Any, client: int) -> None:
         """Follow a link."""
@@ -81,7 +81,7 @@ class StateShow:
             self._linking.follow(text, client)
             return {}
 
-        self._answer("link-told", value, follow)
+        self._answer(client, "link-told", value, follow)
 
     def _copy(self, what: str, client: int) -> dict[str, str]:
         if self._view is None:
@@ -95,8 +95,8 @@ class StateShow:
             raise InvalidValueError(f"the {self._view.played.name}", "in no file", "what lines can load", step)
         return {"text": code_of(self._view, self._robot, self._source, self._time)}
 
-    def _answer(self, topic: str, value: Any, done: Callable[[str], dict[str, str]]) -> None:
-        """Do what a page asks, [name of the question, text], and answer it: {"to": name, ...}, refused or not."""
+    def _answer(self, client: int, topic: str, value: Any, done: Callable[[str], dict[str, str]]) -> None:
+        """Do what a page asks, [name of the question, text], and answer it alone: {"to": name, ...}, refused or not."""
         if not isinstance(value, list) or len(value) != 2 or not all(isinstance(each, str) for each in value):
             return
         name, text = value
@@ -106,4 +106,4 @@ class StateShow:
             answer = done(text)
         except SaglineError as error:
             answer = {"refused": str(error)}
-        self._channel.tell(topic, {"to": name, **answer})
+        self._channel.answer(client, topic, {"to": name, **answer})

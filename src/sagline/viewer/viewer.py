@@ -110,6 +110,7 @@ class Viewer:
         self._scale = TensionScale.of(robot)
         self._channel = Channel(server.gui, self._soon)
         server.on_client_connect(self._channel.welcome)
+        server.on_client_disconnect(self._channel.part)
         home = home_pose(robot) if played is None else played.home
         self._home = home if pose is None else pose
         self._panel = Panel(server, robot, self._scale, self._wake.set, lambda: self._soon(self._forget))

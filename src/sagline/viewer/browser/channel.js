@@ -15,7 +15,7 @@
   const handlers = new Map(); // of topics
   const told = new Map(); // the last value of each topic: who asks later hears it at once
   const topics = new Map(); // by the uuid of the element that brings them
-  const unsent = [];
+  const unsent = new Map(); // by topic: the last of what is not told yet
   let count = 0;
   let worker, uuid; // the client speaks to its server through a worker; uuid of the field that says what we say
 
@@ -24,7 +24,9 @@
   const post = (value) =>
     worker.postMessage({ type: "send", message: { type: "GuiUpdateMessage", uuid, updates: { value } } });
   const flush = () => {
-    if (welcome && uuid !== undefined) for (const text of unsent.splice(0)) post(text);
+    if (!welcome || uuid === undefined) return;
+    unsent.forEach(post);
+    unsent.clear();
   };
   const tell = (topic, value) => {
     told.set(topic, value);
@@ -32,10 +34,11 @@
   };
 
   window.sagline = {
-    // Tell the server something; what is told before the connection stands is told then.
+    // Tell the server something; what is told last before the connection stands is told then.
     send(topic, value) {
       const text = JSON.stringify({ topic, value, count: (count += 1) }); // the same twice is said twice
-      unsent.push(text);
+      unsent.delete(topic); // topics go in the order in which they were told
+      unsent.set(topic, text);
       flush();
     },
     // Hear what the server tells about a topic, the last that it has told first.
