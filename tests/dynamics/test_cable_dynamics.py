@@ -63,7 +63,7 @@ def test_component_modes_against_the_exact_stiffness(name: str) -> None:
     state = middle(name)
     components = component_modes(strings_of(state), 0, 80.0)
     static = sl.stiffness(state).cable_stiffness
-    for frequency in (1.0, 7.0, 13.0, 19.9):
+    for frequency in (1.0, 8.0, 16.0, 19.5):  # none near a motion of a cable, which would magnify rounding
         exact = sl.dynamic_stiffness(state, frequency).real - static
         size = np.abs(exact).max(axis=(1, 2))[:, None, None] + np.abs(static).max(axis=(1, 2))[:, None, None]
         assert (np.abs(_of_modes(components, 2.0 * np.pi * frequency) - exact) <= 1e-8 * size).all()

@@ -66,7 +66,8 @@ def test_a_robot_at_rest_stays_there(integrator: Code) -> None:
         lopsided("article-suspended"), sl.Pose.from_euler([0.5, 0.3, 1.5], 0.1, 0, 0), tension=LIFT
     ).state
     run = sl.simulate(state, duration=10.0, integrator=integrator)
-    assert np.abs(run.pose.position - state.pose.position).max() < 2e-14
+    walk = np.sqrt(10.0 / run.step) * np.spacing(1.5)  # m: of places that are rounded in every step
+    assert np.abs(run.pose.position - state.pose.position).max() < 5.0 * walk
     assert np.abs(run.twist).max() < 1e-11
 
 
