@@ -9,15 +9,19 @@ import pytest
 
 import sagline as sl
 from sagline.control import State
+from sagline.viewer.channel import Channel
 from sagline.viewer.playback import Playback
 from sagline.viewer.played import Beside
 from sagline.viewer.player import Player
 from sagline.viewer.run import Run
+from sagline.viewer.server import started, stop
 from sagline.viewer.session import Session
 from sagline.viewer.session_log import Follower
 from sagline.viewer.timeline_columns import MOST as MOST_COLUMNS
 from sagline.viewer.timeline_columns import columns, told
+from sagline.viewer.timeline_show import TimelineShow
 from sagline.viewer.timeline_spans import MOST, outside, spans_of
+from sagline.viewer.timeline_stage import TimelineStage
 from sagline.viewer.timeline_track import Chart, Limit, Mark, Track
 from sagline.viewer.viewer import Viewer
 from sagline.viewer.wording import ForceUnit
@@ -290,6 +294,32 @@ def test_a_window_is_looked_at_and_the_whole_again(page: Shown) -> None:
         tell(page, client, "window", None)
         await_that(lambda: said(page, "timeline")["window"] == [0.0, 9.0])
         list(client.heard(0.1))  # who has not heard all takes ten seconds to leave
+
+
+def test_a_window_follows_a_clock_to_its_end_however_long_nobody_looked() -> None:
+    player = Player(Run.of(PLAN), lambda *_: None)
+    server = started(port=0)
+    try:
+        channel = Channel(server.gui, lambda task: task())
+        show = TimelineShow(channel, player, TimelineStage(server.scene, ROBOT))
+
+        def window() -> Any:
+            show.tick()
+            return json.loads(channel._told["timeline"].content.split(":", 2)[2])["window"]
+
+        channel._heard["window"]([1.0, 3.0], 0)
+        player.scrub_to(2.5)
+        channel._heard["play"](True, 0)
+        assert window() == [1.0, 3.0]
+        player.advance(1.0)
+        assert window() == [3.5, 5.5]  # it turned the page
+        player.advance(100.0)  # just after that
+        assert not player.clock.playing
+        assert window() == [6.0, 8.0]
+        player.scrub_to(0.0)
+        assert window() == [6.0, 8.0]  # who looks elsewhere does so by hand
+    finally:
+        stop(server)
 
 
 def test_a_log_that_grows_grows_on_the_page_and_who_is_at_its_end_stays_there(growing: Shown, log: Session) -> None:

@@ -45,6 +45,7 @@ class TimelineShow:
         self._clock: Any = None
         self._when = -PERIOD
         self._turned = -TURN
+        self._played_on = False  # whether the clock went on when it was looked at last
         self._cable: int | None = None  # that is pointed at
         for topic, heard in (
             ("scrub", self._scrub), ("step", self._step), ("play", self._play), ("speed", self._speed),
@@ -69,8 +70,7 @@ class TimelineShow:
         """Tell what has changed, the clock not too often."""
         if self._player.played is not self._played:
             self._put_on()
-        if self._window is not None and self._player.clock.playing:
-            self._go_along(*self._window)
+        self._go_along()
         if self._known != (self._track, self._chart, self._window):
             self._tell_tracks()
         if self.waiting and time.monotonic() - self._when >= PERIOD:
@@ -86,13 +86,17 @@ class TimelineShow:
             self._chart, self._window = 0, None
         self._played, self._number = played, self._player.number
 
-    def _go_along(self, start: float, end: float) -> None:
-        """Turn the page when the clock has left the window."""
-        clock, width = self._player.clock, end - start
-        if not start <= clock.time <= end and time.monotonic() - self._turned > TURN:
+    def _go_along(self) -> None:
+        """Turn the page when the clock has left the window; at once when it has come to its end."""
+        clock = self._player.clock
+        ended, self._played_on = self._played_on and clock.time >= clock.duration, clock.playing
+        if self._window is None or not (clock.playing or ended):
+            return
+        start, end = self._window
+        if not start <= clock.time <= end and (ended or time.monotonic() - self._turned > TURN):
             self._turned = time.monotonic()
-            first = min(clock.time, clock.duration - width)
-            self._window = (first, first + width)
+            first = min(clock.time, clock.duration - (end - start))
+            self._window = (first, first + end - start)
 
     def _tell_tracks(self) -> None:
         played, beside, track = self._player.played, self._player.beside, self._track
