@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from sagline.viewer.state_link import name_of
 from sagline.viewer.view import View
 from sagline.viewer.viewer import Viewer
 from tests.viewer.client import PATIENCE, Client, await_that
+from tests.viewer.test_framing import put
 from tests.viewer.test_viewer import Shown, handle, shown
 
 ROBOT = sl.load_robot("cogiro")
@@ -54,6 +56,10 @@ class Asking:
         name = f"{id(self)}-{self._count}"
         uuid = handle(self._page, "sagline")._impl.uuid
         self.client.set(uuid, json.dumps({"topic": topic, "value": [name, text], "count": self._count}))
+        return self.answered(topic, name)
+
+    def answered(self, topic: str, name: str) -> dict[str, Any]:
+        """What a question is answered."""
         start = f"sagline:{topic}-told:"
         for message in self.client.heard(PATIENCE):
             self.seen.append(message)
@@ -152,6 +158,22 @@ def test_all_controls_of_the_page_are_in_it(one: Shown, other: Shown) -> None:
         assert handle(other, "Mode").value == ""
 
 
+def test_a_link_is_of_all_that_was_set_before_it_was_asked_for(one: Shown) -> None:
+    mass = handle(one, "Platform + load [kg]")
+    usual = mass.value
+    with asking(one) as here:
+        number = put(here.client, one.server, one.viewer._framing).client.client_id
+
+        def set_and_ask() -> None:
+            mass.value = 120.0
+            one.viewer._channel._heard["copy"](["both", "link"], number)
+
+        one.viewer._soon(set_and_ask)  # before what is set is shown
+        assert "&platform-load=120" in here.answered("copy", "both")["text"]
+        here.client.set(mass._impl.uuid, usual)
+        await_that(lambda: view(one).snapshot.robot.mass == usual)
+
+
 def test_controls_of_one_name_are_told_apart(one: Shown, other: Shown) -> None:
     values = {"Force": "about z", "Force ± [N]": 12.5, "Force [N]": 3.25}
     usual = {label: handle(one, label).value for label in values}
@@ -174,18 +196,19 @@ def test_a_page_as_it_was_opened_tells_its_pose_alone() -> None:
 
 def test_the_camera_of_who_asks_comes_with_it(one: Shown, other: Shown) -> None:
     with asking(one) as here, asking(other) as there:
+        put(here.client, one.server, one.viewer._framing)
         assert "camera" not in here.link()
         here.client.look([1.0, 2.0, 30.0], [0.5, 0.25, 0.0])
         await_that(lambda: "camera=1,2,30,0.5,0.25,0" in here.link())
         assert "refused" not in there.ask("link", here.link())
-        aimed = [
-            message
-            for message in (*there.seen, *there.client.heard(1.0))
-            if message["type"] in ("SetCameraPositionMessage", "SetCameraLookAtMessage")
-        ]
-        places: dict[str, Any] = {each["type"]: each.get("position", each.get("look_at")) for each in aimed}
-        assert tuple(places["SetCameraPositionMessage"]) == pytest.approx((1.0, 2.0, 30.0))
-        assert tuple(places["SetCameraLookAtMessage"]) == pytest.approx((0.5, 0.25, 0.0))
+        wanted = {"SetCameraPositionMessage": (1.0, 2.0, 30.0), "SetCameraLookAtMessage": (0.5, 0.25, 0.0)}
+        places: dict[str, Any] = {}
+        for message in chain(there.seen, there.client.heard()):
+            if message["type"] in wanted:
+                places[message["type"]] = tuple(message.get("position") or message["look_at"])
+            if all(places.get(kind) == pytest.approx(place) for kind, place in wanted.items()):
+                return
+        raise AssertionError(places)
 
 
 def test_payload_wrench_and_tensions_by_hand_come_with_it() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from typing import Any
 
@@ -49,6 +50,7 @@ class StateShow:
         self._channel, self._player, self._robot, self._source, self._go = channel, player, robot, source, go
         self._view: View | None = None
         self._time = 0.0
+        self._asked: deque[tuple[Any, int]] = deque()  # what is to be given as text, and to whom
         channel.on("pose", self._hear_pose)
         channel.on("copy", self._hear_copy)
         channel.on("link", self._hear_link)
@@ -59,7 +61,9 @@ class StateShow:
         self._channel.tell("pose", pose_text(view.snapshot.pose))
 
     def tick(self) -> None:
-        """Nothing comes of time."""
+        """Give what was asked for, now that all that was said before is shown."""
+        while self._asked:
+            self._give(*self._asked.popleft())
 
     def _hear_pose(self, value: Any, client: int) -> None:
         """Go to a pose that was typed."""
@@ -71,6 +75,10 @@ class StateShow:
         self._answer(client, "pose-told", value, go)
 
     def _hear_copy(self, value: Any, client: int) -> None:
+        """Note what is asked for as text."""
+        self._asked.append((value, client))
+
+    def _give(self, value: Any, client: int) -> None:
         """Give what was asked for as text."""
         self._answer(client, "copy-told", value, lambda what: self._copy(what, client))
 
