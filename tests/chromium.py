@@ -6,11 +6,14 @@ from collections.abc import Iterator
 from typing import Final
 
 import pytest
-from playwright.sync_api import Browser, sync_playwright
+from playwright.sync_api import Browser, expect, sync_playwright
 
 CHROMIUM: Final = shutil.which("chromium")
 NEEDED: Final = pytest.mark.skipif(CHROMIUM is None and not os.environ.get("CI"), reason="Chromium is not installed")
+PATIENCE: Final = 240.0  # s: far more than anything takes; pictures are computed without a graphics card
 QUIET: Final = "--headless --no-sandbox --no-first-run --disable-background-networking"  # asks nobody for anything
+
+expect.set_options(timeout=1e3 * PATIENCE)
 
 
 def launched(flags: str) -> Iterator[Browser]:
@@ -21,6 +24,7 @@ def launched(flags: str) -> Iterator[Browser]:
     """
     assert CHROMIUM is not None, "install Debian's chromium: apt-get install chromium"
     with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=[*QUIET.split(), *flags.split()])
+        words = [*QUIET.split(), *flags.split()]
+        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=words, timeout=1e3 * PATIENCE)
         yield chromium
         chromium.close()

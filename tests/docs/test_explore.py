@@ -14,7 +14,7 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 import sagline as sl
-from tests.chromium import NEEDED, launched
+from tests.chromium import NEEDED, PATIENCE, launched
 
 DOCS = Path(__file__).parents[2] / "docs"
 FLAGS = "--disable-gpu --disable-component-update"
@@ -66,6 +66,7 @@ def page(browser: Browser, site: Path) -> Iterator[Page]:
     complaints: list[str] = []
     asked: list[str] = []
     page = browser.new_page(viewport={"width": 390, "height": 844})
+    page.set_default_timeout(1e3 * PATIENCE)
     page.on("console", lambda message: complaints.append(message.text))
     page.on("pageerror", lambda error: complaints.append(str(error)))
     page.on("request", lambda request: asked.append(request.url))
@@ -183,6 +184,7 @@ def test_nothing_is_wider_than_the_screen(page: Page) -> None:
 def test_without_javascript_there_is_a_picture_and_a_table(browser: Browser, site: Path, hook: ModuleType) -> None:
     context = browser.new_context(java_script_enabled=False)
     page = context.new_page()
+    page.set_default_timeout(1e3 * PATIENCE)
     page.goto(site.as_uri())
     assert page.get_by_role("slider").count() == 0
     assert page.get_by_text("The sliders of this page need JavaScript").is_visible()

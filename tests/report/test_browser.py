@@ -13,7 +13,7 @@ from PIL import Image
 from playwright.sync_api import Browser, Locator, Page
 
 from sagline.report.article import ArticleReport
-from tests.chromium import NEEDED, launched
+from tests.chromium import NEEDED, PATIENCE, launched
 
 FLAGS = "--disable-quic --disable-gpu"
 WIDTHS, THEMES = (390, 768, 1440), ("light", "dark")
@@ -54,6 +54,7 @@ def browser() -> Iterator[Browser]:
 
 def opened(browser: Browser, report: ArticleReport, width: int, theme: str, height: int = 900) -> Page:
     page = browser.new_page(viewport={"width": width, "height": height}, color_scheme=theme)  # type: ignore[arg-type]
+    page.set_default_timeout(1e3 * PATIENCE)
     page.goto(report.page.as_uri())
     return page
 

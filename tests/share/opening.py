@@ -7,11 +7,12 @@ from typing import Any, Literal
 
 from playwright.sync_api import Browser, Page
 
+from tests.chromium import PATIENCE
+
 FLAGS = (
     "--disable-component-update --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader "
     "--disable-gpu-rasterization"
 )
-PATIENCE = 240.0  # s: the picture is computed without a graphics card
 
 
 @contextmanager

@@ -70,7 +70,8 @@ def check_look(page: Page) -> None:
 
 
 def pixels(page: Page) -> bytes:
-    page.wait_for_timeout(100)
+    """The picture, once what was asked for is in it: a page draws with its next frame."""
+    page.evaluate("new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn)))")
     return page.locator("canvas").screenshot()
 
 
@@ -128,9 +129,9 @@ def test_a_robot_is_dragged(
     with opened(browser, tmp_path / "robot.html", width=size[0], height=size[1], theme=theme) as page:
         check_look(page)
         start = np.array(asking(page, "it.moment().pose.position"))
-        ring = page.locator("[data-part=ring]").bounding_box()
+        before, ring = pixels(page), page.locator("[data-part=ring]").bounding_box()
         assert ring is not None
-        before, x, y = pixels(page), ring["x"] + ring["width"] / 2, ring["y"] + ring["height"] / 2
+        x, y = ring["x"] + ring["width"] / 2, ring["y"] + ring["height"] / 2
         page.mouse.move(x, y)
         page.mouse.down()
         page.mouse.move(x + 12, y + 5, steps=4)

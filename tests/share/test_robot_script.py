@@ -14,7 +14,7 @@ from sagline.robot.wheels import wheel_centers
 from sagline.share.machine import machine
 from sagline.statics.chords import chord_geometry
 from sagline.viewer.snapshot import Snapshot
-from tests.chromium import NEEDED, launched
+from tests.chromium import NEEDED, PATIENCE, launched
 
 SCRIPTS = ("catenary.js", "sharing.js", "robot.js")
 EVERY = """([machine, poses]) => poses.map(({ position, quaternion }) => {
@@ -39,6 +39,7 @@ def with_scripts(browser: Browser) -> Page:
     folder = files("sagline.share").joinpath("page")
     text = "\n".join(folder.joinpath(name).read_text(encoding="utf-8") for name in SCRIPTS)
     page = browser.new_page()
+    page.set_default_timeout(1e3 * PATIENCE)
     page.set_content(f"<script>{text}</script>")
     return page
 

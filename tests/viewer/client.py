@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from itertools import count
 from types import TracebackType
 from typing import Any
 
@@ -15,6 +16,7 @@ from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
 PATIENCE = 300.0  # s: far more than anything takes, kernels that are compiled first on a busy machine included
+_MARKS = count(1)
 
 
 def await_that(done: Callable[[], bool]) -> None:
@@ -29,6 +31,7 @@ class Client:
     """Connects, drags, sets, and hears what is sent."""
 
     def __init__(self, port: int) -> None:
+        self.far = 100.0 + next(_MARKS)  # m: by which a server knows it from others
         protocol = Subprotocol(f"viser-v{viser.__version__}")
         self._socket = connect(f"ws://127.0.0.1:{port}", subprotocols=[protocol], compression=None, max_size=None)
         self.look([0, -10, 3], [0, 0, 0])
@@ -51,7 +54,7 @@ class Client:
         """Tell where the camera is, in a picture 600 px high."""
         eye: dict[str, Any] = {"wxyz": [1, 0, 0, 0], "up_direction": [0, 0, 1]}
         eye |= {"position": [float(x) for x in position], "look_at": [float(x) for x in look_at]}
-        lens = {"fov": 1.0, "near": 0.1, "far": 100.0, "image_height": 600, "image_width": width}
+        lens = {"fov": 1.0, "near": 0.1, "far": self.far, "image_height": 600, "image_width": width}
         self.say(type="ViewerCameraMessage", **eye, **lens)
 
     def grab(self) -> None:
@@ -69,7 +72,27 @@ class Client:
     def set(self, uuid: str, value: Any) -> None:
         self.say(type="GuiUpdateMessage", uuid=uuid, updates={"value": value})
 
-    def heard(self, timeout: float) -> Iterator[dict[str, Any]]:
+    def met(self, server: viser.ViserServer) -> viser.ClientHandle:
+        """What a server has of this client, as soon as it has it."""
+        found: list[viser.ClientHandle] = []
+
+        def known() -> bool:
+            found[:] = [each for each in server.get_clients().values() if each.camera.far == self.far]
+            return bool(found)
+
+        await_that(known)
+        return found[0]
+
+    def replayed(self) -> list[dict[str, Any]]:
+        """Whatever a server tells to who comes later, all of it."""
+        messages: list[dict[str, Any]] = []
+        for message in self.heard():
+            if message["type"] == "ReplayDoneMessage":
+                return messages
+            messages.append(message)
+        raise AssertionError("not told all")
+
+    def heard(self, timeout: float = PATIENCE) -> Iterator[dict[str, Any]]:
         """Messages, until none has come for a while [s]."""
         while True:
             try:

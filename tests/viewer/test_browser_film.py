@@ -17,8 +17,8 @@ from sagline.viewer.run import Run
 from sagline.viewer.solids import size_of
 from sagline.viewer.tension_scale import TensionScale
 from sagline.viewer.viewer import home_pose
-from tests.chromium import NEEDED, launched
-from tests.viewer.test_browser import FLAGS, PATIENCE, await_that, opened
+from tests.chromium import NEEDED, PATIENCE, launched
+from tests.viewer.test_browser import FLAGS, await_that, opened
 
 KEEP_NOTES = """() => {
     window.notes = new Set()

@@ -7,7 +7,7 @@ import pytest
 from playwright.sync_api import Browser
 
 import sagline as sl
-from tests.chromium import NEEDED, launched
+from tests.chromium import NEEDED, PATIENCE, launched
 from tests.viewer.reach import broken_rules
 from tests.viewer.test_browser import FEWER_PICTURES, FLAGS, await_that, opened
 from tests.viewer.test_state_code import executed
@@ -43,7 +43,7 @@ def test_a_pose_is_typed_and_taken_elsewhere(browser: Browser) -> None:
         names = executed(page.locator("dialog textarea").input_value())
         assert viewer.view is not None
         np.testing.assert_array_equal(names["tension"], viewer.view.snapshot.tension)
-        assert page.locator("dialog [role=status]").inner_text() != ""
+        await_that(page, lambda: page.locator("dialog [role=status]").inner_text() != "")
         assert page.evaluate("getSelection().toString() || document.activeElement.selectionEnd") not in ("", 0)
         assert broken_rules(page) == {}
         page.get_by_role("dialog").get_by_role("button", name="Close").press("Enter")
@@ -58,7 +58,7 @@ def test_a_pose_is_typed_and_taken_elsewhere(browser: Browser) -> None:
         await_that(page, lambda: np.array_equal(place(), viewer._home.position))
 
         elsewhere = browser.new_page(viewport={"width": 1000, "height": 640})
-        elsewhere.set_default_timeout(240e3)
+        elsewhere.set_default_timeout(1e3 * PATIENCE)
         elsewhere.add_init_script(FEWER_PICTURES)
         elsewhere.goto(link)
         await_that(elsewhere, lambda: np.allclose(place(), wanted, atol=1e-12))

@@ -11,12 +11,11 @@ from playwright.sync_api import Browser, Page
 import sagline as sl
 from sagline.viewer.run import Run
 from sagline.viewer.viewer import Viewer
-from tests.chromium import NEEDED, launched
+from tests.chromium import NEEDED, PATIENCE, launched
 from tests.viewer.reach import broken_rules, walked
 from tests.viewer.test_browser import BACKGROUND, FLAGS, OVERFLOWING, await_that, least_contrast, opened
 
 SIZES = ((390, 640), (1000, 640), (1440, 900))
-DRESSED = 20.0  # s: within which names come onto what is new, on a machine that has other things to do
 FOLDED = "div[data-pressed][aria-expanded=false]:visible"
 
 pytestmark = NEEDED
@@ -39,7 +38,7 @@ def unfold(page: Page) -> None:
 def check(page: Page) -> None:
     """All rules for what is open now, once it is dressed."""
     unfold(page)
-    end = time.monotonic() + DRESSED
+    end = time.monotonic() + PATIENCE  # names come onto what is new
     while (broken := broken_rules(page)) and time.monotonic() < end:
         page.wait_for_timeout(200)
     assert broken == {}
@@ -132,6 +131,7 @@ def test_all_is_reached_named_and_said(browser: Browser) -> None:
 
 def test_rules_find_what_is_wrong(browser: Browser) -> None:
     page = browser.new_page()
+    page.set_default_timeout(1e3 * PATIENCE)
     page.set_content(
         "<main><button></button><button>a</button><div role=button>b</div><input><svg width=9 height=9></svg>"
         "<button>c<input aria-label=d></button><p tabindex=0 aria-labelledby=none>e</p>"

@@ -6,17 +6,19 @@ from typing import Literal
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser, Page
+from playwright.sync_api import Browser, FloatRect, Page
 
 import sagline as sl
 from sagline.viewer.run import Run
 from sagline.viewer.viewer import Viewer
 from tests.chromium import NEEDED, launched
-from tests.viewer.test_browser import FLAGS, OVERFLOWING, await_that, least_contrast, opened
+from tests.viewer.test_browser import FLAGS, OVERFLOWING, SCENE, await_that, box, least_contrast, opened
 
 ROBOTS = ("falcon-7", "cogiro", "fast")
 SIZES = ((390, 640), (1000, 640), (1440, 900))
 THEMES: tuple[Literal["light", "dark"], ...] = ("light", "dark")
+
+STRIP = "#sagline-timeline"
 
 pytestmark = NEEDED
 
@@ -37,9 +39,8 @@ def run_of(robot: sl.Robot) -> Run:
 
 def at(page: Page, share: float) -> tuple[float, float]:
     """A point in the middle of the timeline's height, at a share of its time."""
-    box = page.locator("#sagline-timeline [role=slider]").bounding_box()
-    assert box is not None
-    return box["x"] + share * box["width"], box["y"] + 0.5 * box["height"]
+    slider = box(page, f"{STRIP} [role=slider]")
+    return slider["x"] + share * slider["width"], slider["y"] + 0.5 * slider["height"]
 
 
 def scrubbed(page: Page, viewer: Viewer, run: Run) -> None:
@@ -74,9 +75,7 @@ def scrubbed(page: Page, viewer: Viewer, run: Run) -> None:
     await_that(page, lambda: shows(79))
     page.keyboard.press("Home")
     await_that(page, lambda: shows(0))
-    text = slider.get_attribute("aria-valuetext")
-    assert text is not None
-    assert text.startswith("0.000 s; run, ")
+    await_that(page, lambda: (slider.get_attribute("aria-valuetext") or "").startswith("0.000 s; run, "))
     page.keyboard.press("Space")
     await_that(page, lambda: shows(80))
     page.get_by_role("button", name="Play").wait_for()
@@ -108,19 +107,18 @@ def test_so_on_every_screen(
     with opened(browser, run.robot, run, width=width, theme=theme) as (page, viewer):
         page.set_viewport_size({"width": width, "height": height})
         scrubbed(page, viewer, run)
-        scene = page.locator("canvas[data-engine]").bounding_box()
-        strip = page.locator("#sagline-timeline").bounding_box()
-        assert scene is not None
-        assert strip is not None
+
+        def over(scene: FloatRect, strip: FloatRect) -> bool:
+            return scene["y"] + scene["height"] > strip["y"] + 1.0
+
+        await_that(page, lambda: not over(box(page, SCENE), box(page, STRIP)))  # it has made room below itself
+        scene, strip = box(page, SCENE), box(page, STRIP)
         assert strip["width"] == width
         assert strip["y"] + strip["height"] == pytest.approx(height, abs=1.0)
-        assert scene["y"] + scene["height"] <= strip["y"] + 1.0  # below the scene, not over it
         assert scene["height"] > 180.0
         page.mouse.move(*at(page, 0.5))
         page.locator("#sagline-timeline .tip").wait_for()
         least_contrast(page)
         page.get_by_role("button", name="Fold the timeline").click()
         page.get_by_role("button", name="Unfold the timeline").wait_for()
-        folded = page.locator("#sagline-timeline").bounding_box()
-        assert folded is not None
-        assert folded["height"] < strip["height"]
+        assert box(page, STRIP)["height"] < strip["height"]

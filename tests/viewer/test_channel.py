@@ -47,7 +47,7 @@ def test_who_comes_later_is_told_the_last_word(page: Shown) -> None:
     with Client(page.port) as client:
         contents = [
             m.get("props", m.get("updates", {})).get("content", "")
-            for m in client.heard(1.0)
+            for m in client.replayed()
             if isinstance(m.get("props", m.get("updates")), dict)
         ]
     assert [text for text in contents if str(text).startswith("sagline:news:")][-1] == 'sagline:news:{"a":2}'

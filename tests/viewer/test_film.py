@@ -15,6 +15,7 @@ from sagline.viewer.run import Run
 from sagline.viewer.studio import Shot
 from sagline.viewer.viewer import Viewer
 from tests.viewer.client import PATIENCE, Client, await_that
+from tests.viewer.test_framing import put
 from tests.viewer.test_viewer import PATH, ROBOT, Shown, handle, shown
 
 
@@ -36,7 +37,7 @@ def pixel() -> bytes:
 
 
 def taking(page: Shown) -> bool:
-    return any(visitor.taking.locked() for visitor in page.viewer._export._visitors.values())
+    return any(visitor.taking.locked() for visitor in tuple(page.viewer._export._visitors.values()))
 
 
 def said(messages: Iterable[dict[str, Any]], topic: str) -> list[Any]:
@@ -50,7 +51,7 @@ def test_a_film_is_a_matter_of_its_client(film: Shown) -> None:
     """One client films, gives its pictures slowly, and leaves in the middle; another drags meanwhile."""
     button = handle(film, "Film of the run")
     with Client(film.port) as filming, Client(film.port) as other:
-        list(other.heard(0.5))
+        other.replayed()
         filming.set(button._impl.uuid, True)
         first = next(m for m in filming.heard(PATIENCE) if m["type"] == "GetRenderRequestMessage")
         assert (first["width"], first["height"]) == (32, 32)  # names come a picture late
@@ -67,8 +68,9 @@ def test_a_film_is_a_matter_of_its_client(film: Shown) -> None:
             heard.append(message)
             if message.get("name") == "/cables" and "points" in message.get("updates", {}):
                 break
+        else:
+            raise AssertionError("the drag is not seen")
         heard += other.heard(0.5)
-        assert any(m.get("name") == "/cables" and "points" in m.get("updates", {}) for m in heard)
         assert not said(heard, "film")
         assert not any(m["type"] == "GetRenderRequestMessage" for m in heard)
     await_that(lambda: not taking(film))
@@ -77,7 +79,7 @@ def test_a_film_is_a_matter_of_its_client(film: Shown) -> None:
 def test_a_film_is_told_picture_by_picture_and_can_be_cancelled(film: Shown) -> None:
     button, length = handle(film, "Film of the run"), PATH.time[-1]
     with Client(film.port) as client:
-        list(client.heard(0.5))
+        client.replayed()
         client.set(button._impl.uuid, True)
         heard: list[dict[str, Any]] = []
         asked = 0
@@ -102,7 +104,7 @@ def test_a_film_is_told_picture_by_picture_and_can_be_cancelled(film: Shown) -> 
         scene = [m for m in heard if m.get("name") == "/names/0"]
         assert [m["type"] for m in scene][:1] == ["FrameMessage"]  # hidden
         await_that(lambda: not taking(film))
-        await_that(lambda: not film.server.get_clients()[max(film.server.get_clients())].scene._handle_from_node_name)
+        assert not client.met(film.server).scene._handle_from_node_name
 
 
 def test_a_film_longer_than_a_browser_can_keep_is_refused() -> None:
@@ -116,7 +118,7 @@ def test_a_film_longer_than_a_browser_can_keep_is_refused() -> None:
 def test_a_picture_is_asked_for_as_large_as_its_paper(film: Shown) -> None:
     paper, strip, button = handle(film, "Picture for"), handle(film, "With legend"), handle(film, "Picture (PNG)")
     with Client(film.port) as client:
-        list(client.heard(0.5))
+        client.replayed()
         client.set(paper._impl.uuid, "Page, 182 mm at 300 dpi")
         client.set(strip._impl.uuid, False)
         client.set(button._impl.uuid, True)
@@ -146,10 +148,10 @@ def test_a_picture_is_asked_for_as_large_as_its_paper(film: Shown) -> None:
 )
 def test_a_client_with_a_camera_that_cannot_be_gets_no_picture(film: Shown, camera: dict[str, Any]) -> None:
     with Client(film.port) as client:
-        client.look([0, -20, 3], [0, 0, 0])
+        put(client, film.server, film.viewer._framing)
         eye: dict[str, Any] = {"wxyz": [1, 0, 0, 0], "up_direction": [0, 0, 1], "position": [0, -20, 3], "fov": 1.0}
-        eye |= {"look_at": [0, 0, 0], "near": 0.1, "far": 100.0, "image_height": 600, "image_width": 800}
-        list(client.heard(0.3))
+        eye |= {"look_at": [0, 0, 0], "near": 0.1, "far": client.far, "image_height": 600, "image_width": 800}
+        client.replayed()
         client.say(type="ViewerCameraMessage", **{**eye, **camera})
         client.set(handle(film, "Picture (PNG)")._impl.uuid, True)
         messages = client.heard(PATIENCE)

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import viser
 
 import sagline as sl
 from sagline.viewer import solids
@@ -34,6 +35,14 @@ def test_every_robot_fills_the_picture_and_no_more(name: str, aspect: float) -> 
     assert np.abs(places).max() <= 1.0 + 1e-6
     assert np.abs(places).max() > 0.9
     assert places.max(axis=0) == pytest.approx(-places.min(axis=0), abs=1e-6)  # in the middle
+
+
+def put(client: Client, server: viser.ViserServer, framing: Framing) -> viser.CameraHandle:
+    """The camera of a client, once it has been put to where it sees all."""
+    met = client.met(server)
+    await_that(lambda: bool(framing._places.get(met.client_id)))
+    with framing._lock:  # until it has done so
+        return met.camera
 
 
 def at(camera: Any, position: Any) -> bool:
@@ -76,16 +85,21 @@ def test_a_camera_that_a_link_has_put_is_let_be_whatever_its_page_still_tells() 
     try:
         framing = Framing(server, low, high)
         with Client(server.get_port()) as client:
-            await_that(lambda: any(framing._places.values()))
-            (handle,) = server.get_clients().values()
-            own = np.array(framing._places[handle.client_id][-1])
-            framing.look(handle.client_id, np.array([3.0, 4.0, 5.0, 0.5, 0.5, 0.5]))
-            assert at(handle.camera, [3.0, 4.0, 5.0])
+            camera = put(client, server, framing)
+            number, own = camera.client.client_id, np.array(camera.position)
+            framing.look(number, np.array([3.0, 4.0, 5.0, 0.5, 0.5, 0.5]))
+            assert at(camera, [3.0, 4.0, 5.0])
             client.look(own, [0.5, 0.5, 0.5], width=300)  # sent before it has heard of that
-            await_that(lambda: handle.camera.image_width == 300)
-            aimed = [m["position"] for m in client.heard(0.5) if m["type"] == "SetCameraPositionMessage"]
+            await_that(lambda: camera.image_width == 300)
+            framing._follow(camera)  # as a thread of viser does, now or soon
+            framing.look(number, np.array([6.0, 4.0, 5.0, 0.5, 0.5, 0.5]))  # the last word
+            aimed: list[Any] = []
+            for message in client.heard():
+                if message["type"] == "SetCameraPositionMessage":
+                    aimed.append(message["position"])
+                    if np.allclose(aimed[-1], [6.0, 4.0, 5.0]):
+                        break
             fit = fitted(low, high, 300 / 600, 1.0)[0]
-            assert aimed
             assert not any(np.allclose(place, fit) for place in aimed)
     finally:
         stop(server)
@@ -96,15 +110,15 @@ def test_a_camera_that_is_just_being_put_somewhere_has_not_been_moved_by_hand() 
     try:
         framing = Framing(server, np.zeros(3), np.ones(3))
         with Client(server.get_port()) as client, ThreadPoolExecutor(1) as other:
-            await_that(lambda: any(framing._places.values()))
-            (handle,) = server.get_clients().values()
+            camera = put(client, server, framing)
+            number = camera.client.client_id
             client.look([9.0, 8.0, 7.0], [0.5, 0.5, 0.5], width=300)
-            await_that(lambda: framing.moved(handle.client_id) is not None)
+            await_that(lambda: framing.moved(number) is not None)
             with framing._lock:  # as while the box is fitted
-                asked = other.submit(framing.moved, handle.client_id)
+                asked = other.submit(framing.moved, number)
                 time.sleep(0.2)
-                handle.camera.position = np.array([3.0, 4.0, 5.0])
-                framing._places[handle.client_id].append(np.array([3.0, 4.0, 5.0]))
+                camera.position = np.array([3.0, 4.0, 5.0])
+                framing._places[number].append(np.array([3.0, 4.0, 5.0]))
             assert asked.result() is None
     finally:
         stop(server)

@@ -6,18 +6,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+from viser import CameraHandle
 
 import sagline as sl
 from sagline.viewer.channel import NAME
 from sagline.viewer.eye import Eye
-from sagline.viewer.push import pushed
+from sagline.viewer.push import Push, pushed
 from sagline.viewer.viewer import Viewer
 from tests.viewer.client import Client, await_that
+from tests.viewer.test_framing import put
 from tests.viewer.test_viewer import ROBOT, Shown, handle, shown
 
 POSE = sl.Pose([0.5, 0.5, 1.5], np.eye(3))
 WIDE, HIGH, FOV = 800, 600, 1.0
-MET: set[tuple[int, int]] = set()  # clients of ports
 
 
 @pytest.fixture(scope="module")
@@ -25,24 +26,20 @@ def page() -> Iterator[Shown]:
     yield from shown(lambda server: Viewer(server, ROBOT, pose=POSE))
 
 
-def look(client: Client, page: Shown) -> None:
-    """Stand ten meters before the platform, which is in the middle of the picture."""
-    framing = page.viewer._framing  # puts every camera once
-    await_that(lambda: any(framing._places.get(k) for k in page.server.get_clients() if (page.port, k) not in MET))
-    framing._lock.acquire()  # until it has done so
-    framing._lock.release()
-    mine = next(k for k in page.server.get_clients() if (page.port, k) not in MET)
-    MET.add((page.port, mine))
+def look(client: Client, page: Shown) -> CameraHandle:
+    """Stand ten meters before the platform, which is in the middle of the picture; the camera that does so."""
+    seen = put(client, page.server, page.viewer._framing)
     turned = [float(np.sqrt(0.5)), -float(np.sqrt(0.5)), 0.0, 0.0]
     camera: dict[str, Any] = {"wxyz": turned, "position": [0.5, -9.5, 1.5], "look_at": [0.5, 0.5, 1.5]}
-    lens = {"fov": FOV, "near": 0.1, "far": 100.0, "image_height": HIGH, "image_width": WIDE}
+    lens = {"fov": FOV, "near": 0.1, "far": client.far, "image_height": HIGH, "image_width": WIDE}
     client.say(type="ViewerCameraMessage", up_direction=[0, 0, 1], **camera, **lens)
 
     def stands() -> bool:
-        eye = Eye.of(page.server.get_clients()[mine].camera)
+        eye = Eye.of(seen)
         return eye is not None and eye.place[1] == -9.5
 
     await_that(stands)
+    return seen
 
 
 def tell(client: Client, page: Shown, topic: str, value: Any) -> None:
@@ -116,9 +113,13 @@ def test_what_is_behind_the_eye_is_not_held(page: Shown) -> None:
     for away, held in ((5.0, False), (-5.0, True)):
         eye = Eye(part + away * axes[:, 2], axes, np.array([0.4, 0.3]), np.array([WIDE, HIGH], dtype=np.float64))
         await_that(lambda: show._state is not None)
-        show._grab(eye, (0.5, 0.5), 1)
+        show._grab(eye, (0.5, 0.5), -1)  # nobody, whose leaving would let it go
         assert (show._hold is not None) == held
     show._hold = None
+
+
+def pushes(push: Push, at: list[float], force: list[float]) -> bool:
+    return np.array_equal(push.at, at) and np.allclose(push.force, force, rtol=0.0, atol=1e-12)
 
 
 def test_a_force_can_be_typed(page: Shown) -> None:
@@ -128,10 +129,10 @@ def test_a_force_can_be_typed(page: Shown) -> None:
         client.set(handle(page, "Force [N]")._impl.uuid, 25.0)
         client.set(handle(page, "Along x, y, z")._impl.uuid, [0.0, 3.0, -4.0])
         client.set(handle(page, "At x, y, z [m]")._impl.uuid, [0.0, 0.1, 0.2])
-        await_that(lambda: show.pushed is not None and show.pushed.push.at[2] == 0.2)
+        place, force = [0.0, 0.1, 0.2], [0.0, 15.0, -20.0]
+        await_that(lambda: show.pushed is not None and pushes(show.pushed.push, place, force))
         found = show.pushed
         assert found is not None
-        np.testing.assert_allclose(found.push.force, [0.0, 15.0, -20.0], atol=1e-12)
         told = show._panel._told.content
         assert "25.0 N" in told
         again = pushed(found.state, found.push)
