@@ -57,9 +57,10 @@ def settle(page: Page, viewer: Viewer, size: tuple[int, int]) -> None:
     (client,) = viewer._server.get_clients().values()
     client._websock_connection.register_handler(ViewerCameraMessage, hear)
     for height in (size[1] - 20, size[1]):  # the first is other than it was: there is something to tell
+        before = box(page, SCENE)["height"]
         page.set_viewport_size({"width": size[0], "height": height})
+        await_that(page, lambda before=before: box(page, SCENE)["height"] != before)  # type: ignore[misc]
         await_that(page, stands)
-        told.clear()
 
 
 @pytest.mark.parametrize(

@@ -155,7 +155,7 @@ def page() -> Iterator[Shown]:
 def test_arrows_in_the_scene_come_and_go(page: Shown) -> None:
     wanted = handle(page, "Forces in the scene")
     with Client(page.port) as client:
-        list(client.heard(1.0))
+        client.replayed()
         client.set(wanted._impl.uuid, True)
         await_that(lambda: "/forces" in page.server.scene._handle_from_node_name)
         arrows_drawn: Any = page.server.scene._handle_from_node_name["/forces"]

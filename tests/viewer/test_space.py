@@ -210,7 +210,8 @@ def test_thirty_updates_a_second_while_a_slider_is_dragged_that_a_region_follows
             heard = [
                 m for m in client.heard(0.5) if "points" in m.get("updates", {}) or "vertices" in m.get("updates", {})
             ]
-            assert any(m["name"].startswith("/hull/") for m in heard)  # it follows while the slider moves
+            if not any(m["name"].startswith("/hull/") for m in heard):
+                return 0.0  # it is to follow while the slider moves
             return float(min(page.viewer.updates - before, sum(m["name"] == "/cables" for m in heard))) / 2.0
 
         with Client(page.port) as client:
