@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import trimesh
 from playwright.sync_api import Browser, ConsoleMessage, Error, FloatRect, Page
+from viser._messages import ViewerCameraMessage
 
 import sagline as sl
 from sagline.viewer.run import Run
@@ -49,12 +50,19 @@ def opened(
     run: Run | None = None,
     *,
     width: int = 1000,
+    height: int = 640,
     theme: Literal["light", "dark"] = "light",
     complains: bool = False,
     found: sl.Calibration | None = None,
+    cameras: list[ViewerCameraMessage] | None = None,
 ) -> Iterator[tuple[Page, Viewer]]:
-    """A page on a viewer; whatever the console complains of fails the test, unless it has reason to."""
+    """A page on a viewer; whatever the console complains of fails the test, unless it has reason to.
+
+    All that it tells of its camera is kept, if it is to be.
+    """
     server = started(port=0, title=robot.name)
+    if cameras is not None:
+        server._websock_server.register_handler(ViewerCameraMessage, lambda _, message: cameras.append(message))
     viewer = Viewer(server, robot, run, found=found)
     thread = threading.Thread(target=viewer.serve)
     thread.start()
@@ -67,7 +75,7 @@ def opened(
     def fail(error: Error) -> None:
         complaints.append(str(error))
 
-    page = browser.new_page(viewport={"width": width, "height": 640}, color_scheme=theme)
+    page = browser.new_page(viewport={"width": width, "height": height}, color_scheme=theme)
     page.set_default_timeout(1e3 * PATIENCE)
     page.add_init_script(FEWER_PICTURES)
     page.on("console", hear)

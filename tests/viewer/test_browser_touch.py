@@ -17,6 +17,10 @@ from tests.chromium import NEEDED, launched
 from tests.viewer.test_browser import FLAGS, OVERFLOWING, SCENE, await_that, box, opened
 
 pytestmark = NEEDED
+UNCOVERED = """([x, y]) => {
+    document.querySelectorAll("[role=alert].mantine-Notification-root button").forEach((each) => each.click())
+    return document.elementFromPoint(x, y) instanceof HTMLCanvasElement
+}"""
 SIZES = ((390, 640), (1000, 640), (1440, 900))
 
 
@@ -37,30 +41,24 @@ def on_page(page: Page, viewer: Viewer, points: np.ndarray) -> np.ndarray:
     return np.asarray([scene["x"], scene["y"]] + share * [scene["width"], scene["height"]])
 
 
-def settle(page: Page, viewer: Viewer, size: tuple[int, int]) -> None:
-    """Make the page so large, and wait until it tells that its camera stands where it is to."""
-    told: list[ViewerCameraMessage] = []
-
-    async def hear(_: int, message: ViewerCameraMessage) -> None:
-        told.append(message)
+def settle(page: Page, viewer: Viewer, told: list[ViewerCameraMessage]) -> None:
+    """Wait until the page tells that its camera stands where it is to, in a scene as large as it is."""
 
     def stands() -> bool:
         if not told:
             return False
         last, scene, framing = told[-1], box(page, SCENE), viewer._framing
-        if (last.image_width, last.image_height) != (round(scene["width"]), round(scene["height"])):
+        if (last.image_width, last.image_height) != (int(scene["width"]), int(scene["height"])):
             return False
         wanted = fitted(framing._low, framing._high, last.image_width / last.image_height, last.fov)[0]
         return bool(np.linalg.norm(wanted - last.position) < framing._near)
 
-    await_that(page, lambda: len(viewer._server.get_clients()) == 1)
-    (client,) = viewer._server.get_clients().values()
-    client._websock_connection.register_handler(ViewerCameraMessage, hear)
-    for height in (size[1] - 20, size[1]):  # the first is other than it was: there is something to tell
-        before = box(page, SCENE)["height"]
-        page.set_viewport_size({"width": size[0], "height": height})
-        await_that(page, lambda before=before: box(page, SCENE)["height"] != before)  # type: ignore[misc]
-        await_that(page, stands)
+    await_that(page, stands)
+
+
+def uncovered(page: Page, x: float, y: float) -> None:
+    """Close the notices of the browser's client, and wait until nothing is before a place of the scene."""
+    await_that(page, lambda: bool(page.evaluate(UNCOVERED, [x, y])))
 
 
 @pytest.mark.parametrize(
@@ -76,14 +74,16 @@ def settle(page: Page, viewer: Viewer, size: tuple[int, int]) -> None:
     ],
 )
 def test_a_mouse_pulls_cuts_and_shakes(browser: Browser, name: str, size: tuple[int, int]) -> None:
-    with opened(browser, sl.load_robot(name), width=size[0]) as (page, viewer):
-        settle(page, viewer, size)
+    told: list[ViewerCameraMessage] = []
+    with opened(browser, sl.load_robot(name), width=size[0], height=size[1], cameras=told) as (page, viewer):
+        settle(page, viewer, told)
         start = viewer._stage.dragged_pose()
         eye = eye_of(viewer)
         assert eye is not None
         # pull, at the middle of the platform, where its gizmo has its handles
         middle = start.transform(viewer._push._stage.body.vertices).mean(axis=0)
         x, y = on_page(page, viewer, middle)
+        uncovered(page, x, y)
         page.mouse.move(x, y)
         page.keyboard.down("Control")
         page.mouse.down()
@@ -105,6 +105,7 @@ def test_a_mouse_pulls_cuts_and_shakes(browser: Browser, name: str, size: tuple[
         places = on_page(page, viewer, viewer.view.snapshot.courses(1.0))
         inside = box(page, SCENE)
         x, y = free_place(places, inside["x"], inside["x"] + inside["width"], inside["y"] + inside["height"])
+        uncovered(page, x, y)
         page.mouse.click(x, y)
         await_that(page, lambda: viewer._cuts._chosen)
         page.get_by_role("button", name="Cut cable").click()
