@@ -17,13 +17,18 @@ from rich.console import Console
 from sagline.cli import cold_start
 from sagline.cli.compiling import Stage, first_run_text, heard
 from sagline.cli.entries import (
+    ANSWERS,
     ENTRIES,
     FIT,
     FORWARD,
     FORWARD_OVER_PULLEYS,
     INVERSE,
+    LOSSES,
     MARGINS,
+    MODES,
+    PERIODS,
     SHARING,
+    STARTING_LENGTHS,
     VIBRATION,
 )
 from sagline.cli.examples import write_examples
@@ -78,13 +83,50 @@ def test_two_cores_share_the_work_and_second_versions_follow_their_first() -> No
         [FORWARD_OVER_PULLEYS],
         [INVERSE],
     )  # its first is here
+    assert cold_start.shares([ANSWERS, INVERSE]) == ([ANSWERS], [INVERSE])
+    assert cold_start.shares([MODES, ANSWERS, INVERSE]) == ([MODES, ANSWERS], [INVERSE])  # where vibration is
+    assert cold_start.shares([MARGINS, VIBRATION, MODES]) == ([VIBRATION, MODES], [MARGINS])
     here, beside = cold_start.shares(tuple(ENTRIES))
     assert sorted(here + beside) == sorted(ENTRIES)
-    for first, second in ((INVERSE, SHARING), (FORWARD, FORWARD_OVER_PULLEYS)):
-        (share,) = [each for each in (here, beside) if first in each]
-        assert share.index(first) + 1 == share.index(second)
+    for entry in ENTRIES.values():
+        (share,) = [each for each in (here, beside) if entry.words in each]
+        if entry.after is not None:
+            assert share.index(entry.after) < share.index(entry.words)
     times = [sum(ENTRIES[name].seconds for name in each) for each in (here, beside)]
     assert times[0] == pytest.approx(times[1], rel=0.2)
+
+
+COMPILED_FOR = """
+import os
+import sys
+import sagline
+from sagline.cli.entries import ENTRIES
+
+paths = {entry.path: entry.function for entry in ENTRIES.values()}  # of all: a fork has them at once
+for words in sys.argv[1:]:
+    print(words, end="", flush=True)
+    if os.fork() == 0:
+        ENTRIES[words].compile()
+        print("", *(path for path, each in paths.items() if each.overloads), sep="\\t", flush=True)
+        os._exit(0)
+    assert os.wait()[1] == 0
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="asks processes that begin with nothing loaded")
+@pytest.mark.parametrize("names", [[LOSSES, PERIODS], pytest.param(list(ENTRIES), marks=pytest.mark.soak)])
+def test_no_entry_is_compiled_for_one_that_does_not_come_after_it(names: list[str]) -> None:
+    """Else two processes would compile the same."""
+    code = [sys.executable, "-c", COMPILED_FOR, *names]
+    lines = subprocess.run(code, capture_output=True, text=True, check=True).stdout.splitlines()
+    found = {words: set(paths) for words, *paths in (line.split("\t") for line in lines)}
+    assert list(found) == names
+    for words in names:
+        paths, after = {ENTRIES[words].path}, ENTRIES[words].after
+        while after is not None:
+            paths.add(ENTRIES[after].path)
+            after = ENTRIES[after].after
+        assert found[words] - {ENTRIES[ANSWERS].path} == paths - {ENTRIES[ANSWERS].path}, words
 
 
 def test_what_is_compiled_is_named_and_counted() -> None:
@@ -153,7 +195,7 @@ def test_on_a_terminal_the_line_lives() -> None:
 class Counted:
     """An entry that only counts."""
 
-    version = 1
+    after = None
 
     def __init__(self, words: str, seconds: float) -> None:
         self.words, self.path, self.seconds = words, words, seconds
@@ -197,7 +239,7 @@ with heard(say):
 
 
 def test_two_processes_compile_what_this_one_then_loads(tmp_path: FilePath) -> None:
-    names = [FIT, VIBRATION]
+    names = [FIT, STARTING_LENGTHS]
     code = COMPILE.format(names=names)
     first, second = (process(code, tmp_path).communicate(timeout=600)[0] for _ in range(2))
     assert second == ""  # nothing is compiled twice
@@ -209,7 +251,7 @@ def test_two_processes_compile_what_this_one_then_loads(tmp_path: FilePath) -> N
 
 
 @pytest.mark.soak
-@pytest.mark.parametrize("name", [name for name in ENTRIES if name not in (FIT, VIBRATION)])
+@pytest.mark.parametrize("name", [name for name in ENTRIES if name not in (FIT, STARTING_LENGTHS)])
 def test_as_many_kernels_are_compiled_as_the_table_says(name: str, tmp_path: FilePath) -> None:
     said, _ = process(COMPILE.format(names=[name]), tmp_path).communicate(timeout=900)
     ends = {line.split("\t")[0]: line.split("\t")[1:] for line in said.splitlines() if line.endswith("\t1")}

@@ -39,11 +39,12 @@ def cores() -> int:
 def shares(names: Sequence[str]) -> tuple[list[str], list[str]]:
     """What to compile here, and what beside: about the same time for both.
 
-    Versions of an entry stay together; where one is compiled already, here is the file that the next is written into.
+    An entry stays with the one that it comes after, or that would be compiled twice; where that is compiled already,
+    here it is found, and here is the file that another version is written into.
     """
     groups: dict[str, list[str]] = {}
     for name in names:
-        groups.setdefault(ENTRIES[name].path, []).append(name)
+        groups.setdefault(_root(name), []).append(name)
     here: list[str] = []
     beside: list[str] = []
     for group in sorted(groups.values(), key=lambda group: (_begins(group), -_seconds(group))):
@@ -181,9 +182,15 @@ def _end_with_parent() -> None:
     os._exit(1)
 
 
+def _root(name: str) -> str:
+    """The first of the entries that are compiled for one."""
+    after = ENTRIES[name].after
+    return name if after is None else _root(after)
+
+
 def _begins(group: Sequence[str]) -> bool:
-    """Whether the first version is among those of an entry."""
-    return any(ENTRIES[name].version == 1 for name in group)
+    """Whether what each comes after is to be compiled as well."""
+    return all(ENTRIES[name].after in (None, *group) for name in group)
 
 
 def _seconds(names: Sequence[str]) -> float:

@@ -27,6 +27,7 @@ class Entry(NamedTuple):
         seconds: How long that takes one core of an ordinary machine [s]; only the proportions matter.
         solve: Solves as little as can be, for which it must be compiled.
         version: Which of the versions for different types: the second is compiled after the first.
+        after: Words of the entry that is compiled for it first, if any; its time is not in `seconds`.
     """
 
     words: str
@@ -35,6 +36,7 @@ class Entry(NamedTuple):
     seconds: float
     solve: Callable[[], object]
     version: int = 1
+    after: str | None = None
 
     @property
     def function(self) -> Callable[..., object]:
@@ -277,35 +279,34 @@ SIMULATION_OVER_PULLEYS = f"{SIMULATION} over pulleys"
 CLEARANCES = "least distances"
 READINGS, STARTING_LENGTHS = "readings at equilibria", "lengths at tensions that were read"
 READINGS_OVER_PULLEYS = f"{READINGS} over pulleys"
+DESCRIBE = "forward.sensitivity.describe_states"
 
 ENTRIES = {
     entry.words: entry
     for entry in (
         Entry(INVERSE, "inverse.poses.inverse_poses", 39, 18.0, _inverse),
-        Entry(SHARING, "inverse.poses.inverse_poses", 39, 49.0, _other_sharing, version=2),
+        Entry(SHARING, "inverse.poses.inverse_poses", 39, 49.0, _other_sharing, 2, INVERSE),
         Entry(VERDICTS, "inverse.verdicts.decide_poses", 56, 40.0, _verdicts),
         Entry(FORWARD, "forward.forward.forward_poses", 82, 14.0, _forward),
-        Entry(FORWARD_OVER_PULLEYS, "forward.forward.forward_poses", 41, 14.0, _forward_over_pulleys, version=2),
+        Entry(FORWARD_OVER_PULLEYS, "forward.forward.forward_poses", 41, 14.0, _forward_over_pulleys, 2, FORWARD),
         Entry(FIT, "forward.fit.fit_poses", 30, 5.0, lambda: _forward(straight=True)),
         Entry(MARGINS, "inverse.queries.margins_of_poses", 33, 9.0, _margins),
         Entry(SIGNED_MARGINS, "workspaces.signed_margin.signed_margins", 48, 16.0, _signed_margins),
         Entry(PROOFS, "workspaces.pose_box_proof.prove_boxes", 66, 17.0, _proofs),
         Entry(POLYGON, "inverse.queries.polygon_of_pose", 38, 5.0, _polygon),
-        Entry(VIBRATION, "forward.sensitivity.describe_states", 57, 6.0, _vibration),
+        Entry(VIBRATION, DESCRIBE, 57, 6.0, _vibration),
+        Entry(VIBRATION_OVER_PULLEYS, DESCRIBE, 39, 4.0, _vibration_over_pulleys, 2, VIBRATION),
         Entry(CLEARANCES, "interference.hanging_distance.least_distances", 33, 5.0, _clearances),
         Entry(READINGS, "calibration.observe.observe", 70, 9.0, _readings),
-        Entry(READINGS_OVER_PULLEYS, "calibration.observe.observe", 45, 8.0, _readings_over_pulleys, version=2),
+        Entry(READINGS_OVER_PULLEYS, "calibration.observe.observe", 45, 8.0, _readings_over_pulleys, 2, READINGS),
         Entry(STARTING_LENGTHS, "calibration.starting_lengths.starting_lengths", 30, 4.0, _starting_lengths),
-        Entry(MODES, "dynamics.spectral.interpolate", 2, 9.0, _modes),
-        Entry(LOSSES, "dynamics.spectral.stretch_matrices", 2, 1.0, _losses),
-        Entry(ANSWERS, "dynamics.collocation.dynamic_stiffnesses", 3, 6.0, _answers, version=2),
-        Entry(PERIODS, "dynamics.period.begin_period", 1, 1.0, _periods),
+        Entry(MODES, "dynamics.spectral.interpolate", 2, 9.0, _modes, after=VIBRATION),
+        Entry(LOSSES, "dynamics.spectral.stretch_matrices", 2, 1.0, _losses, after=MODES),
+        Entry(ANSWERS, "dynamics.collocation.dynamic_stiffnesses", 3, 6.0, _answers, 2, MODES),
         Entry(SIMULATION, "dynamics.motion.run", 65, 16.0, _simulation),
-        Entry(SIMULATION_OVER_PULLEYS, "dynamics.motion.run", 33, 14.0, _simulation_over_pulleys, version=2),
+        Entry(SIMULATION_OVER_PULLEYS, "dynamics.motion.run", 33, 14.0, _simulation_over_pulleys, 2, SIMULATION),
+        Entry(PERIODS, "dynamics.period.begin_period", 1, 1.0, _periods, after=SIMULATION),
         Entry(CHAINS, "dynamics.chains.run_chains", 44, 17.0, _chains),
-        Entry(
-            VIBRATION_OVER_PULLEYS, "forward.sensitivity.describe_states", 39, 4.0, _vibration_over_pulleys, version=2
-        ),
     )
 }
 
