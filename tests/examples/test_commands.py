@@ -110,6 +110,7 @@ def test_a_printed_command_runs(words: list[str], folder: Path, monkeypatch: pyt
     monkeypatch.setattr("sagline.cli.run.FIGURES", ())
     monkeypatch.setattr("sagline.cli.run.CELLS", 4)
     monkeypatch.setattr("sagline.cli.run._figures", lambda *_: ())
+    monkeypatch.setattr("sagline.plot.sheet.RESOLUTION", 50)  # dots an inch: nobody looks at them
     instead_of_machines(monkeypatch)
     if words[0] == "twin":
         words = [*words, "--port", "0"]  # another twin may have the usual ones

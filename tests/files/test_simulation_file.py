@@ -1,4 +1,5 @@
 import re
+import shutil
 from dataclasses import fields, replace
 from pathlib import Path as FilePath
 from typing import Any, cast
@@ -17,11 +18,25 @@ from tests.files.simulations import ROBOT, a_simulation, assert_same
 SEAL = len("\nsagline sha256 \n") + 64  # bytes at the end
 
 
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> FilePath:
+    """A simulation's file, to be copied."""
+    file = tmp_path_factory.mktemp("simulation") / "sim.nc"
+    a_simulation().save(file)
+    return file
+
+
+@pytest.fixture(scope="module")
+def data(whole: FilePath) -> xr.Dataset:
+    """What is in it."""
+    with xr.open_dataset(whole, engine="h5netcdf", decode_times=False, mask_and_scale=False) as data:
+        return data.load()
+
+
 @pytest.fixture
-def saved(tmp_path: FilePath) -> FilePath:
-    """A simulation's file, to be spoilt."""
-    a_simulation().save(tmp_path / "sim.nc")
-    return tmp_path / "sim.nc"
+def saved(tmp_path: FilePath, whole: FilePath) -> FilePath:
+    """A copy of it, to be spoilt."""
+    return FilePath(shutil.copy(whole, tmp_path))
 
 
 @pytest.mark.parametrize("nodes", [True, False])
@@ -98,11 +113,6 @@ def test_what_another_program_has_changed_is_told(saved: FilePath) -> None:
         sl.load_simulation(saved)
 
 
-def data_of(file: FilePath) -> xr.Dataset:
-    with xr.open_dataset(file, engine="h5netcdf", decode_times=False, mask_and_scale=False) as data:
-        return data.load()
-
-
 def edited(data: xr.Dataset, name: str, index: Any, value: Any) -> xr.Dataset:
     values = data[name].values.copy()
     values[index] = value
@@ -142,8 +152,10 @@ def edited(data: xr.Dataset, name: str, index: Any, value: Any) -> xr.Dataset:
         ("axis", 0, "q", "axis is .*; allowed: x, y, z"),
     ],
 )
-def test_values_that_no_simulation_has(saved: FilePath, name: str, index: Any, value: Any, told: str) -> None:
-    assert_refused(saved, edited(data_of(saved), name, index, value), told)
+def test_values_that_no_simulation_has(
+    tmp_path: FilePath, data: xr.Dataset, name: str, index: Any, value: Any, told: str
+) -> None:
+    assert_refused(tmp_path / "sim.nc", edited(data, name, index, value), told)
 
 
 @pytest.mark.parametrize(
@@ -177,15 +189,24 @@ def test_values_that_no_simulation_has(saved: FilePath, name: str, index: Any, v
         (lambda data: data.assign(length=data["length"].T), "length: shape is 8 cable × 7 time; allowed: 7 time × 8"),
     ],
 )
-def test_files_that_were_written_by_others(saved: FilePath, edit: Any, told: str) -> None:
-    assert_refused(saved, edit(data_of(saved)), told)
+def test_files_that_were_written_by_others(tmp_path: FilePath, data: xr.Dataset, edit: Any, told: str) -> None:
+    assert_refused(tmp_path / "sim.nc", edit(data), told)
 
 
-def assert_refused(file: FilePath, data: xr.Dataset, told: str) -> None:
+def test_what_is_edited_above_would_be_read_as_it_is(tmp_path: FilePath, data: xr.Dataset) -> None:
+    sealed(tmp_path / "sim.nc", data)
+    assert_same(a_simulation(), sl.load_simulation(tmp_path / "sim.nc"))
+
+
+def sealed(file: FilePath, data: xr.Dataset) -> None:
     """A file with the digest that belongs to it, as one who means it would write."""
     encoding = {str(name): {"_FillValue": None} for name in data.variables}
     data.to_netcdf(file, engine="h5netcdf", encoding=encoding)
     seal(file)
+
+
+def assert_refused(file: FilePath, data: xr.Dataset, told: str) -> None:
+    sealed(file, data)
     with pytest.raises(sl.FileError, match=told) as caught:
         sl.load_simulation(file)
     assert re.match(r".{,299}$", str(caught.value).replace(str(file), file.name))
