@@ -151,8 +151,15 @@ def exactly(value: ArrayLike, item: str, unit: str, shape: tuple[int, ...], **li
 
 def kernel_input(value: ArrayLike, shape: tuple[int, ...]) -> Array:
     """Broadcast to a shape and lay out as kernels expect; copies only where it must."""
-    array = np.asarray(np.broadcast_to(np.asarray(value, dtype=np.float64), shape), order="C")
+    array = np.asarray(value, dtype=np.float64, order="C")
+    if array.shape != shape:
+        array = np.asarray(np.broadcast_to(array, shape), order="C")
     return array if not array.flags.writeable else locked(array.view())
+
+
+def spread(array: Array, shape: tuple[int, ...]) -> Array:
+    """An array of `checked` as it is where it has a shape, else its values spread over that, write-locked."""
+    return array if array.shape == shape else locked(np.array(np.broadcast_to(array, shape), order="C"))
 
 
 def broadcast_shape(item: str, *shapes: tuple[int, ...]) -> tuple[int, ...]:

@@ -7,11 +7,16 @@ from scipy.optimize import least_squares
 import sagline as sl
 from sagline.arrays import Array
 from sagline.calibration.calibrate import readings_of, sensors_there
-from sagline.calibration.least_squares import passed, solve
+from sagline.calibration.least_squares import moved, passed, solve
+from sagline.calibration.observing import NO_LOAD
 from sagline.calibration.parameters import external, parameters_of, robot_with
-from sagline.calibration.problem import Fit, Problem
+from sagline.calibration.problem import Fit, Log, Problem, State, machine_at, said_lengths
+from sagline.calibration.sensors import load_cells_of
 from sagline.calibration.start import start_of
+from sagline.kinematics.forward_rows import solve_rows
 from sagline.robot.drum import drums_of
+from sagline.statics.tables import pose_rows
+from tests.calibration.machines import robots, standing
 from tests.calibration.synthetic import Synthetic, log_of, true_robot, usual_sensors, with_drums
 
 NOMINAL = with_drums(pulley_radius=0.04, dead_cable=2.0)
@@ -119,3 +124,46 @@ def test_lengths_follow_their_readings_as_far_as_these_are_trusted() -> None:
     fit = fitted(problem_of(made, UNKNOWNS), made)
     assert np.abs(fit.state.lengths - made.length).max() < 1e-4
     assert fit.normal.squares.sum() < 3.0 * made.log.readings.size
+
+
+ALL = (
+    "frame_anchors",
+    "platform_anchors",
+    "length_zero",
+    "linear_density",
+    "axial_stiffness",
+    "mass",
+    "center_of_mass",
+)
+
+
+def missed_after(name: str, share: float) -> tuple[float, float]:
+    """How far platforms move by a share of a step of all numbers, and are then from where they were looked for [m]."""
+    machine, pose, lengths = standing(robots()[name])
+    robot, model = machine.robot, sl.Catenary()
+    given = sl.Sensors(length_deviation=5e-4, tension_deviation=5.0)
+    gain, bias = load_cells_of(robot)
+    cells = gain * sl.forward(robot, lengths, pose).state.cables.frame_end_tension + bias  # what is not off stays so
+    silent = np.full((len(lengths), 3), np.nan), np.full((len(lengths), 4), np.nan)
+    problem = Problem(
+        robot,
+        model,
+        given,
+        parameters_of(robot, ALL, given, counted=False),
+        Log(None, lengths, cells, *silent),
+    )
+    before = State(problem.prior, machine_at(problem, problem.prior), lengths, pose_rows(pose))
+    step = share * 0.02 * problem.scale * np.cos(np.arange(len(problem.prior)))
+    after, part = machine_at(problem, problem.prior + step), slice(0, len(lengths))
+    found, starts = moved(problem, before, None, step, after, said_lengths(problem, after, part), part)
+    rest = solve_rows(after.robot, model, found, starts, NO_LOAD)
+    assert rest.stable.all()
+    far, left = rest.poses - before.poses, rest.poses - starts
+    return float(np.abs(far).max()), float(np.abs(left).max())
+
+
+@pytest.mark.parametrize("name", ["cogiro", "article-suspended", "planar", "point", "pulleys"])
+def test_a_step_looks_for_the_platform_where_the_slopes_have_it(name: str) -> None:
+    moves, misses = zip(*(missed_after(name, share) for share in (1.0, 0.5)), strict=True)
+    assert misses[0] < 0.15 * moves[0]
+    assert 3.5 < misses[0] / misses[1] < 4.5  # what is left is of second order

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sagline.arguments import choice
-from sagline.arrays import Array, broadcast_shape, checked, locked
+from sagline.arrays import Array, broadcast_shape, checked, locked, spread
 from sagline.memory import check_memory
 
 
@@ -76,8 +76,7 @@ class Cable:
         check_memory(item, 8.0 * len(values) * math.prod(shape), "Give fewer cables.")
         for name in self.__slots__:
             field = values.get(name)
-            whole = None if field is None else locked(np.array(np.broadcast_to(field, shape), order="C"))
-            object.__setattr__(self, name, whole)
+            object.__setattr__(self, name, None if field is None else spread(field, shape))
 
     @classmethod
     def from_material(

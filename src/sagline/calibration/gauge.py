@@ -165,14 +165,13 @@ def _possible(frame: Frame, where: Indices, known: Symmetries) -> tuple[Array, A
     """
     free = np.isin(where, frame.free)
     conditions = [known.table[known.matters & ~free], known.lengths]
+    single = np.zeros((len(frame.scale), known.table.shape[-1]))
     for index in frame.free:
         same = known.table[where == index]
         conditions.append(same[1:] - same[0])
+        single[index] = same[0] / frame.scale[index]
     condition = np.vstack(conditions)
     combined = _null(condition / np.maximum(np.abs(condition).max(axis=1, keepdims=True), _TINY))
-    single = np.zeros((len(frame.scale), known.table.shape[-1]))
-    for index in frame.free:
-        single[index] = known.table[where == index][0] / frame.scale[index]
     vectors = single @ combined
     _, size, rows = np.linalg.svd(vectors, full_matrices=False)
     kept = rows[size > _SAME * max(size.max(initial=0.0), _TINY)].T

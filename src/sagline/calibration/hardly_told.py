@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, Indices, locked
+from sagline.arrays import Array, Flags, Indices, locked
 from sagline.calibration.findings import Direction
 from sagline.calibration.gauge import Frame, frame_of
 from sagline.calibration.steps import easiest, easy_place
@@ -86,10 +86,12 @@ def _little(
     sizes = np.concatenate((sizes, np.zeros(len(rows) - len(sizes))))
     left = 1.0 / np.hypot(1.0, sizes)
     vectors = complement @ rows.T
+    kinds = np.array([easy_place(name) for name in parameters.names])
+    member = np.array([np.isin(np.arange(len(kinds)), group.members) for group in groups], dtype=np.float64)
     alike: dict[tuple[str, ...], list[int]] = {}
     for index in map(int, np.argsort(-left, kind="stable")):
         if left[index] > LITTLE:
-            alike.setdefault(_words(vectors[:, index], parameters, groups), []).append(index)
+            alike.setdefault(_words(vectors[:, index], parameters, groups, kinds, member), []).append(index)
     found = []
     for names, each in alike.items():
         alone = len(names) == 1 and names[0] in parameters.labels
@@ -102,10 +104,19 @@ def _little(
     return found
 
 
-def _words(vector: Array, parameters: Parameters, groups: list[Group]) -> tuple[str, ...]:
-    """What a direction changes most: kinds of numbers, or their axis or the single one that has nearly all of it."""
+def _words(
+    vector: Array, parameters: Parameters, groups: list[Group], kinds: Indices, member: Array
+) -> tuple[str, ...]:
+    """What a direction changes most: kinds of numbers, or their axis or the single one that has nearly all of it.
+
+    Args:
+        vector: The direction, (P,).
+        parameters: The unknowns.
+        groups: Of these, g.
+        kinds: Place of each one's kind, (P,).
+        member: One where a group has a number, else zero, (g, P).
+    """
     square = vector**2
-    kinds = np.array([easy_place(name) for name in parameters.names])
     shares = np.bincount(kinds, square, minlength=kinds.max() + 1)
     order = np.argsort(-shares, kind="stable")
     needed = int(np.searchsorted(np.cumsum(shares[order]), _MOST * shares.sum())) + 1
@@ -113,7 +124,7 @@ def _words(vector: Array, parameters: Parameters, groups: list[Group]) -> tuple[
     for kind in np.sort(order[: min(needed, _NAMES)]):
         own = np.where(kinds == kind, square, 0.0)
         largest = int(np.argmax(own))
-        group = max(groups, key=lambda one: own[one.members].sum())
+        group = groups[int(np.argmax(member @ own))]
         if own[largest] > _MOST * own.sum():
             names.append(parameters.labels[largest])
         elif own[group.members].sum() > _MOST * own.sum():
@@ -152,6 +163,7 @@ def _alike(
     size = np.sqrt(np.maximum(scatter.diagonal(), _TINY))
     likeness = np.abs(scatter) / np.outer(size, size)
     np.fill_diagonal(likeness, 0.0)
+    imitated = {many.name: _imitated(scatter, many.members) for many in groups if len(many.members) > 1}
     found = []
     for first, one in enumerate(groups):
         for other in groups[first:]:
@@ -161,7 +173,7 @@ def _alike(
                 found.append(_widest(scatter, np.array(pair), names, frame))
             elif min(len(one.members), len(other.members)) == 1 and one is not other:
                 single, many = (one, other) if len(one.members) == 1 else (other, one)
-                if len(many.members) > 1 and _imitated(scatter, int(single.members[0]), many.members):
+                if len(many.members) > 1 and imitated[many.name][single.members[0]]:
                     members = np.concatenate((single.members, many.members))
                     found.append(_widest(scatter, members, (single.name, many.name), frame))
     return sorted(found, key=lambda one: -one.known)
@@ -174,12 +186,13 @@ def _pair(likeness: Array, one: Group, other: Group) -> tuple[int, int] | None:
     return (int(one.members[row]), int(other.members[column])) if block[row, column] > ALIKE else None
 
 
-def _imitated(scatter: Array, single: int, many: Indices) -> bool:
-    """Whether what the numbers of many cables do is all but what a single one does: their multiple correlation."""
-    within, between = scatter[np.ix_(many, many)], scatter[many, single]
+def _imitated(scatter: Array, many: Indices) -> Flags:
+    """Whether what the numbers of many cables do is all but what each does, (P,): their multiple correlation."""
+    within, between = scatter[np.ix_(many, many)], scatter[many]
     ridge = (_SINGULAR * float(np.trace(within)) + _TINY) * np.eye(len(many))
-    share = between @ np.linalg.solve(within + ridge, between) / max(scatter[single, single], _TINY)
-    return bool(share > ALIKE**2)
+    share = np.sum(between * np.linalg.solve(within + ridge, between), axis=0)
+    imitated: Flags = share > ALIKE**2 * np.maximum(scatter.diagonal(), _TINY)
+    return imitated
 
 
 def _widest(scatter: Array, members: Indices, names: tuple[str, ...], frame: Frame) -> Direction:

@@ -12,9 +12,10 @@ import numpy as np
 
 from sagline.arrays import Array, Flags, Indices, locked
 from sagline.blocks import Progress, blocks
+from sagline.calibration.carried import carried
 from sagline.calibration.chi_squared import exceeded_with
 from sagline.calibration.gauss_newton import best_step
-from sagline.calibration.observing import BLOCK, NO_LOAD, Observed, observed_rows
+from sagline.calibration.observing import BLOCK, NO_LOAD, Machine, Observed, observed_rows
 from sagline.calibration.paid import counts_of, paid_slopes
 from sagline.calibration.problem import Begun, Fit, Normal, Problem, State, machine_at, said_lengths
 from sagline.calibration.sensors import Sensors, reading_deviations
@@ -107,24 +108,29 @@ def misfit(normal: Normal) -> float:
     return float(np.median(normal.squares[there] / usual))
 
 
-def moved(problem: Problem, before: State, known: Observed | None, step: Array, said: Array, part: slice) -> Array:
-    """True lengths [m] of some poses after a step of the numbers, to first order.
+def moved(
+    problem: Problem, before: State, known: Observed | None, step: Array, machine: Machine, said: Array, part: slice
+) -> tuple[Array, Array]:
+    """True lengths [m] of some poses after a step of the numbers, to first order, and pose rows near those there.
 
     Args:
         problem: The problem.
         before: The state to step from.
         known: What all readings say there, where it was kept.
         step: Of the numbers, internal (P,).
+        machine: With the numbers after it.
         said: What the winches say after it [m], (n, m).
         part: Which poses.
     """
     if known is not None:
-        rows, along = known, known.matrix @ step
-    else:
-        rows = rows_at(problem, before, said_lengths(problem, before.machine, part), part, step)
-        along = rows.matrix[..., 0]
-    lengths: Array = said + np.einsum("nij,nj->ni", rows.back, rows.misfit - along)
-    return lengths
+        off = np.einsum("nij,nj->ni", known.back, known.misfit - known.matrix @ step)
+        return said + off, before.poses[part]
+    was = said_lengths(problem, before.machine, part)
+    rows = rows_at(problem, before, was, part, step)
+    off = np.einsum("nij,nj->ni", rows.back, rows.misfit - rows.matrix[..., 0])
+    more = off - (before.lengths[part] - was)
+    motion = rows.motion[:, -1] + np.einsum("ni,nik->nk", more, rows.motion[:, :-1])
+    return said + off, carried(before.machine.robot, machine.robot, before.poses[part], motion)
 
 
 def passed(
@@ -153,17 +159,18 @@ def passed(
     numbers = before.numbers if step is None else np.maximum(before.numbers + step, problem.least)
     machine = before.machine if step is None else machine_at(problem, numbers)
     count, width = len(before.poses), len(numbers)
-    after = State(numbers, machine, before.lengths.copy(), before.poses.copy())
+    room = before.lengths if step is None else np.empty(before.lengths.shape)
+    after = State(numbers, machine, room, before.poses.copy())
     matrix, gradient = np.zeros((width, width)), np.zeros(width)
     squares, readings, weights = np.full(count, np.inf), np.zeros(count, dtype=np.int64), np.zeros(count)
     for part in blocks(count, BLOCK, progress):
-        said = said_lengths(problem, machine, part)
+        said, starts = said_lengths(problem, machine, part), before.poses[part]
         if step is not None:
-            after.lengths[part] = moved(problem, before, known, step, said, part)
+            after.lengths[part], starts = moved(problem, before, known, step, machine, said, part)
         lengths = after.lengths[part]
         lost = ~(kept[part] & np.isfinite(lengths).all(axis=1) & (lengths > 0.0).all(axis=1))
         asked = locked(np.where(lost[:, None], np.nan, lengths))
-        solved = solve_rows(machine.robot, problem.model, asked, locked(before.poses[part].copy()), NO_LOAD)
+        solved = solve_rows(machine.robot, problem.model, asked, locked(starts.copy()), NO_LOAD)
         there = solved.stable & ~lost
         after.poses[part][there] = solved.poses[there]
         rows = rows_at(problem, after, said, part)

@@ -29,18 +29,23 @@ NO_LOAD: Final = locked(np.zeros((1, 6)))  # nothing pulls at the platform but i
 class Observed(NamedTuple):
     """What N equilibria tell, whitened: every row one standard deviation, independent of the others.
 
+    R is m + 6, or m where no system measures positions or rotations.
+
     Attributes:
         matrix: Slopes of what the readings say by the internal parameters (logarithms where `logarithmic`), with the
-            lengths following, (N, m + 6, P); rows without a reading are zero.
-        misfit: Readings less predictions, (N, m + 6).
+            lengths following, (N, R, P); rows without a reading are zero.
+        misfit: Readings less predictions, (N, R).
         residual: As they are [N, m, rad], at the lengths given, (N, m + 6); NaN for none.
-        back: What a misfit changes of the true lengths [m], (N, m, m + 6).
+        back: What a misfit changes of the true lengths [m], (N, m, R).
+        motion: Of the platform about its center of mass [m, rad], world axes: by each true length, the last row by the
+            step along a direction, lengths following, (N, m + 1, 6); of no rows without a direction.
     """
 
     matrix: Array
     misfit: Array
     residual: Array
     back: Array
+    motion: Array
 
 
 def locked_view(array: Array) -> Array:
@@ -159,9 +164,15 @@ def observed_rows(
     if direction is not None:
         factor, width = factor * direction, 1
         where = locked(np.minimum(where, 0))
-    rows = m + BESIDE
+    given = machine.sensors
+    measured = given.position_deviation is not None or given.rotation_deviation is not None
+    rows = m + BESIDE if measured else m
     found = Observed(
-        np.empty((count, rows, width)), np.empty((count, rows)), np.empty((count, rows)), np.empty((count, m, rows))
+        np.empty((count, rows, width)),
+        np.empty((count, rows)),
+        np.empty((count, m + BESIDE)),
+        np.empty((count, m, rows)),
+        np.empty((0 if direction is None else count, m + 1, 6)),
     )
     observe(
         machine.terms,
@@ -175,7 +186,7 @@ def observed_rows(
         ),
         (where, table_of_kinds(parameters, factor), locked_view(paid)),
         memory_for(m),
-        (*found, np.empty((rows, width))),
+        (*found, np.empty((rows + 6, width))),
     )
     return found
 

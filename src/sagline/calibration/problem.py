@@ -83,7 +83,7 @@ class Problem(NamedTuple):
     @property
     def least(self) -> Array:
         """The least that each number may be, internally (P,)."""
-        return np.where(np.isin(self.parameters.names, _AT_LEAST_NONE), 0.0, -np.inf)
+        return np.array([0.0 if name in _AT_LEAST_NONE else -np.inf for name in self.parameters.names])
 
 
 class State(NamedTuple):

@@ -48,6 +48,8 @@ def anchors(frame: ArrayLike, platform: ArrayLike) -> tuple[Array, Array]:
 
 
 def _refuse_twins(ends: Array) -> None:
+    if len({row.tobytes() for row in ends + 0.0}) == len(ends):  # no -0.0
+        return
     _, first, which = np.unique(ends, axis=0, return_index=True, return_inverse=True)
     twin_of = first[which.reshape(-1)]
     twins = np.flatnonzero(twin_of != np.arange(len(ends)))
@@ -83,7 +85,7 @@ def cables(given: Cable, count: int) -> Cable:
             "> 0 kg/m",
             "Give the cable's mass per length; to leave its weight out, compute with the model Elastic or Straight.",
         )
-    return given.replace(**fields)
+    return given if given.linear_density.shape == (count,) else given.replace(**fields)
 
 
 def winches(given: Winch | None, frame: Array) -> Winch | None:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sagline.arguments import choice, whole_number
-from sagline.arrays import SMALLEST, Array, checked, locked
+from sagline.arrays import SMALLEST, Array, checked, locked, spread
 from sagline.errors import InvalidValueError
 from sagline.memory import check_memory
 from sagline.robot.unit import unit
@@ -249,11 +249,10 @@ class Winch:
         shapes = {name: value.shape for name, value in values.items()} | {"swivel_axis": axis.shape[:-1]}
         shape = _shape(shapes if points is None else shapes | {"guides": points.shape[:-2]})
         for name in RULES:
-            value = None if name not in values else locked(np.array(np.broadcast_to(values[name], shape)))
-            object.__setattr__(self, name, value)
-        object.__setattr__(self, "swivel_axis", locked(np.array(np.broadcast_to(axis, (*shape, 3)))))
+            object.__setattr__(self, name, spread(values[name], shape) if name in values else None)
+        object.__setattr__(self, "swivel_axis", spread(axis, (*shape, 3)))
         if points is not None:
-            points = locked(np.array(np.broadcast_to(points, (*shape, *points.shape[-2:]))))
+            points = spread(points, (*shape, *points.shape[-2:]))
         object.__setattr__(self, "guides", points)
         _check_rise(self.dead_cable, self.dead_rise)
         _check_rolling(self.rolling_friction)
@@ -391,7 +390,9 @@ def _checked(value: ArrayLike, name: str) -> Array:
     rule, item = RULES[name], f"winches: {name}"
     low, above = (-np.inf if bound is None else bound for bound in (rule.low, rule.above))
     array = checked(value, item, rule.unit, low=low, above=above)
-    wrong = array != np.floor(array) if name == "layers" else array == 0.0 if name == "gear" else np.zeros(array.shape)
+    if name not in ("layers", "gear"):
+        return array
+    wrong = array != np.floor(array) if name == "layers" else array == 0.0
     if wrong.any():
         index = tuple(int(i) for i in np.argwhere(wrong)[0])
         if index:
@@ -454,7 +455,9 @@ def _vertical(given: ArrayLike) -> Array:
             "A pulley that swivels about a slanted axis, or that does not swivel, is not modeled: its cable leaves the "
             "vertical plane. Give [0, 0, 1] or [0, 0, -1].",
         )
-    return np.stack((np.zeros_like(axis[..., 2]), np.zeros_like(axis[..., 2]), np.sign(axis[..., 2])), axis=-1)
+    upright = np.zeros(axis.shape)
+    upright[..., 2] = np.sign(axis[..., 2])
+    return locked(upright)
 
 
 def _check_rolling(rolling_friction: Array) -> None:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from sagline.arrays import Array
-from sagline.kernels.algebra.cholesky import solve_lower, solve_upper
-from sagline.kernels.balance.freedom import components_along, spread, turns
+from sagline.kernels.balance.freedom import turns
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.over_pulleys import material_at
@@ -13,8 +12,9 @@ from sagline.kernels.cable.slopes import Pair, force_slopes, slopes_over
 from sagline.kernels.cable.stiffness import force_of, plane_of
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.calibration import kinds
+from sagline.kernels.calibration.motion import fill_length, respond
 from sagline.kernels.calibration.tension_slopes import share_of, tension_slopes
-from sagline.kernels.calibration.terms import BESIDE, Sensing, Sought, Space
+from sagline.kernels.calibration.terms import Sensing, Slopes, Sought, Space
 from sagline.kernels.calibration.vectors import column_of, cross, into, opposite, plus, scaled, unit_vector
 from sagline.kernels.forward.platform import Triple, end_stiffness
 from sagline.kernels.jit import formula, glue, kernel
@@ -66,31 +66,31 @@ def turned_out(rows: Array, i: int, pair: Pair) -> Triple:
     return pair.x * rows[g.AZIMUTH_X, i], pair.x * rows[g.AZIMUTH_Y, i], pair.z
 
 
-@kernel
-def column(work: Array, moved: Array, at: int, scale: float, force: Triple, moment: Triple) -> None:
-    """Add to a column what a change of the cables' wrench does to the readings, by the platform's motion."""
-    for j in range(work.shape[0]):
-        by_force = moved[j, 0] * force[0] + moved[j, 1] * force[1] + moved[j, 2] * force[2]
-        by_moment = moved[j, 3] * moment[0] + moved[j, 4] * moment[1] + moved[j, 5] * moment[2]
-        work[j, at] -= scale * (by_force + by_moment)
+@formula
+def pull_column(slopes: Slopes, at: int, scale: float, force: Triple, moment: Triple) -> None:
+    """Add to a column a change of the wrench on the platform."""
+    for k in range(3):
+        slopes.pull[k, at] += scale * force[k]
+        slopes.pull[3 + k, at] += scale * moment[k]
 
 
-@kernel
-def own_column(work: Array, space: Space, i: int, at: int, scale: float, force: Triple, direct: float) -> None:
+@formula
+def own_column(slopes: Slopes, space: Space, i: int, at: int, scale: float, force: Triple, direct: float) -> None:
     """Add to a column what a change of one cable's force does, which also changes its own reading directly."""
-    column(work, space.moved, at, scale, force, cross(lever_of(space.rows, i), force))
-    work[i, at] += scale * direct
+    pull_column(slopes, at, scale, force, cross(lever_of(space.rows, i), force))
+    slopes.work[i, at] += scale * direct
 
 
 @kernel
 def datum_column(
-    sought: Sought, row: int, i: int, gain: float, pair: Pair, alone: float, space: Space, work: Array
+    sought: Sought, row: int, i: int, gain: float, pair: Pair, alone: float, space: Space, slopes: Slopes
 ) -> None:
     """Add to a column what a datum of cable i does: to the force on its platform end, and to its tension alone."""
     at = sought.where[row, i]
     if at >= 0:
         change = turned_out(space.rows, i, pair)
-        own_column(work, space, i, at, sought.scale[row, i], change, gain * (share_at(space.shares, i, change) + alone))
+        direct = gain * (share_at(space.shares, i, change) + alone)
+        own_column(slopes, space, i, at, sought.scale[row, i], change, direct)
 
 
 @glue
@@ -109,7 +109,7 @@ def fill_ends(model: Model, cables: Array, space: Space) -> None:
 @glue
 def fill_moved(sensing: Sensing, free: Array, m: int, reach: Triple, space: Space) -> None:
     """Fill what a wrench on the platform changes of every reading, by the motion it causes; needs the factor."""
-    for j in range(m + BESIDE):
+    for j in range(space.moved.shape[0]):
         six = space.six
         if j < m:
             own = plus(resisted_back(space.ends, j, space.shares), (0.0, 0.0, space.shares[j, 3]))
@@ -123,15 +123,12 @@ def fill_moved(sensing: Sensing, free: Array, m: int, reach: Triple, space: Spac
             moment = column_of(space.axes, j - m - 3)
         six[0], six[1], six[2] = force
         six[3], six[4], six[5] = moment
-        components_along(free, six, space.part)
-        solve_lower(space.factor, space.part)
-        solve_upper(space.factor, space.part)
-        spread(free, space.part, space.moved[j])
+        respond(free, six, space, space.moved[j])
 
 
 @glue
 def fill_cable(
-    model: Model, cables: Array, gain: float, sought: Sought, p: int, i: int, space: Space, work: Array
+    model: Model, cables: Array, gain: float, sought: Sought, p: int, i: int, space: Space, slopes: Slopes
 ) -> None:
     """Add to the columns what is unknown of cable i, and fill what its length changes."""
     where, scale, rows, ends, shares = sought.where, sought.scale, space.rows, space.ends, space.shares
@@ -142,16 +139,16 @@ def fill_cable(
             change = opposite(resisted(ends, i, unit_vector(axis)))
             fall = shares[i, 3] if axis == 2 else 0.0
             direct = gain * (share_at(shares, i, change) - fall)
-            own_column(work, space, i, at, scale[kinds.FRAME + axis, i], change, direct)
+            own_column(slopes, space, i, at, scale[kinds.FRAME + axis, i], change, direct)
         at = where[kinds.PLATFORM + axis, i]
         if at >= 0:
             moved = column_of(space.rotation, axis)
             change = resisted(ends, i, moved)
             moment = plus(cross(moved, force), cross(lever, change))
-            column(work, space.moved, at, scale[kinds.PLATFORM + axis, i], change, moment)
+            pull_column(slopes, at, scale[kinds.PLATFORM + axis, i], change, moment)
             direct = gain * (share_at(shares, i, change) + shares[i, 3] * moved[2])
-            work[i, at] += scale[kinds.PLATFORM + axis, i] * direct
-    slopes = tension_slopes(model, cables, rows, i)
+            slopes.work[i, at] += scale[kinds.PLATFORM + axis, i] * direct
+    by = tension_slopes(model, cables, rows, i)
     span, rise, length = rows[g.SPAN, i], rows[g.RISE, i], rows[t.LENGTH, i]
     material, pulled, plane = material_at(cables, i), force_of(rows, i), plane_of(rows, i)
     if model.behind is None:
@@ -159,27 +156,22 @@ def fill_cable(
     else:
         free = rows[t.FREE_LENGTH, i]
         own, machine = slopes_over(model, material, pulley_at(cables, i), free, pulled, plane)
-        datum_column(sought, kinds.RADIUS, i, gain, machine.by_radius, slopes.by_radius, space, work)
-        datum_column(sought, kinds.DEAD, i, gain, machine.by_dead, slopes.by_dead, space, work)
-    datum_column(sought, kinds.DENSITY, i, gain, own.by_density, slopes.by_density, space, work)
-    datum_column(sought, kinds.STIFFNESS, i, gain, own.by_stiffness, slopes.by_stiffness, space, work)
+        datum_column(sought, kinds.RADIUS, i, gain, machine.by_radius, by.by_radius, space, slopes)
+        datum_column(sought, kinds.DEAD, i, gain, machine.by_dead, by.by_dead, space, slopes)
+    datum_column(sought, kinds.DENSITY, i, gain, own.by_density, by.by_density, space, slopes)
+    datum_column(sought, kinds.STIFFNESS, i, gain, own.by_stiffness, by.by_stiffness, space, slopes)
     change = turned_out(rows, i, own.by_length)
-    moment = cross(lever, change)
-    for j in range(work.shape[0]):
-        by_force = space.moved[j, 0] * change[0] + space.moved[j, 1] * change[1] + space.moved[j, 2] * change[2]
-        by_moment = space.moved[j, 3] * moment[0] + space.moved[j, 4] * moment[1] + space.moved[j, 5] * moment[2]
-        space.by_length[i, j] = -(by_force + by_moment)
-    space.by_length[i, i] += gain * (share_at(shares, i, change) + slopes.by_length)
+    direct = gain * (share_at(shares, i, change) + by.by_length)
+    fill_length(space, i, change, cross(lever, change), direct)
     for k in range(3):
         row = kinds.STIFFNESS if k == 2 else kinds.ZERO + k
         at = where[row, i]
         if at >= 0:
-            for j in range(work.shape[0]):
-                work[j, at] += scale[row, i] * sought.paid[k, p, i] * space.by_length[i, j]
+            own_column(slopes, space, i, at, scale[row, i] * sought.paid[k, p, i], change, direct)
     if where[kinds.GAIN, i] >= 0:
-        work[i, where[kinds.GAIN, i]] += scale[kinds.GAIN, i] * slopes.tension
+        slopes.work[i, where[kinds.GAIN, i]] += scale[kinds.GAIN, i] * by.tension
     if where[kinds.BIAS, i] >= 0:
-        work[i, where[kinds.BIAS, i]] += scale[kinds.BIAS, i]
+        slopes.work[i, where[kinds.BIAS, i]] += scale[kinds.BIAS, i]
 
 
 @formula
@@ -195,7 +187,7 @@ def allowed(free: Array, vector: Triple) -> Triple:
 
 @glue
 def fill_center(
-    cables: Array, sensing: Sensing, sought: Sought, free: Array, axis: int, space: Space, work: Array
+    cables: Array, sensing: Sensing, sought: Sought, free: Array, axis: int, space: Space, slopes: Slopes
 ) -> None:
     """Add to the columns what a center of mass does that is elsewhere in the platform: the platform moves about it.
 
@@ -207,12 +199,14 @@ def fill_center(
     for i in range(m):
         change = resisted(space.ends, i, back)
         moment = plus(cross(back, force_at(space.rows, i)), cross(lever_of(space.rows, i), change))
-        column(work, space.moved, at, scale, change, moment)
+        pull_column(slopes, at, scale, change, moment)
         own = share_at(space.shares, i, change) + space.shares[i, 3] * back[2]
-        work[i, at] += scale * sensing.gain[i] * own
+        slopes.work[i, at] += scale * sensing.gain[i] * own
+    if slopes.work.shape[0] == m:
+        return
     shifted = into(space.axes, back)
     for k in range(3):
-        work[m + k, at] += scale * shifted[k]
+        slopes.work[m + k, at] += scale * shifted[k]
 
 
 @glue
@@ -224,28 +218,30 @@ def fill_platform(
     free: Array,
     from_system: Triple,
     space: Space,
-    work: Array,
+    slopes: Slopes,
 ) -> None:
     """Add to the columns what is unknown of the platform and of the measuring system."""
     m = cables.shape[0]
     where, scale = sought.where, sought.scale
     if where[kinds.MASS, 0] >= 0:
         none = (0.0, 0.0, 0.0)
-        column(work, space.moved, where[kinds.MASS, 0], scale[kinds.MASS, 0], (0.0, 0.0, model.gravity), none)
+        pull_column(slopes, where[kinds.MASS, 0], scale[kinds.MASS, 0], (0.0, 0.0, model.gravity), none)
     for axis in range(3):
         if where[kinds.CENTER + axis, 0] >= 0:
-            fill_center(cables, sensing, sought, free, axis, space, work)
+            fill_center(cables, sensing, sought, free, axis, space, slopes)
+        if slopes.work.shape[0] == m:
+            continue
         unit = unit_vector(axis)
         shifted, around = into(space.axes, unit), into(space.axes, cross(from_system, unit))
         outward = into(space.axes, column_of(space.rotation, axis))
         for k in range(3):
             at = where[kinds.SHIFT + axis, 0]
             if at >= 0:
-                work[m + k, at] -= scale[kinds.SHIFT + axis, 0] * shifted[k]
+                slopes.work[m + k, at] -= scale[kinds.SHIFT + axis, 0] * shifted[k]
             at = where[kinds.TURN + axis, 0]
             if at >= 0:
-                work[m + k, at] += scale[kinds.TURN + axis, 0] * around[k]
-                work[m + 3 + k, at] -= scale[kinds.TURN + axis, 0] * shifted[k]
+                slopes.work[m + k, at] += scale[kinds.TURN + axis, 0] * around[k]
+                slopes.work[m + 3 + k, at] -= scale[kinds.TURN + axis, 0] * shifted[k]
             at = where[kinds.TARGET + axis, 0]
             if at >= 0:
-                work[m + k, at] += scale[kinds.TARGET + axis, 0] * outward[k]
+                slopes.work[m + k, at] += scale[kinds.TARGET + axis, 0] * outward[k]

@@ -15,6 +15,7 @@ from sagline.kernels.balance.freedom import symmetric_part
 from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.calibration.columns import fill_cable, fill_ends, fill_moved, fill_platform
+from sagline.kernels.calibration.motion import add_motion, fill_motion
 from sagline.kernels.calibration.terms import (
     BESIDE,
     Observed,
@@ -23,6 +24,7 @@ from sagline.kernels.calibration.terms import (
     Readings,
     Sensing,
     SensingArrays,
+    Slopes,
     Sought,
     SoughtArrays,
     Space,
@@ -102,8 +104,8 @@ def observe(
     code, k_h, k_p, behind = model
     count, m = batch.lengths.shape
     free = batch.freedom
-    space = new_space(Memory(*room), m, free.shape[0])
-    work = answer.work
+    space = new_space(Memory(*room), m, free.shape[0], answer.work.shape[0] - 6)
+    slopes = Slopes(answer.work[:-6], answer.work[-6:])
     for axis in range(3):
         unit = unit_vector(axis)
         x, y, z = turned(sensors.frame, unit[0], unit[1], unit[2])
@@ -122,6 +124,8 @@ def observe(
             answer.misfit[p] = math.nan
             answer.residual[p] = math.nan
             answer.back[p] = math.nan
+            if answer.motion.shape[0] > 0:
+                answer.motion[p] = math.nan
             continue
         center = turned(pose, body[tables.CENTER_X], body[tables.CENTER_Y], body[tables.CENTER_Z])
         target = turned(pose, sensors.target[0], sensors.target[1], sensors.target[2])
@@ -130,12 +134,15 @@ def observe(
         from_system = plus(plus((pose[0], pose[1], pose[2]), target), opposite(shift))
         fill_ends(placed, cables, space)
         fill_moved(sensors, free, m, reach, space)
-        for j in range(work.shape[0]):
-            for q in range(work.shape[1]):
-                work[j, q] = 0.0
+        for j in range(answer.work.shape[0]):
+            for q in range(answer.work.shape[1]):
+                answer.work[j, q] = 0.0
         for i in range(m):
-            fill_cable(placed, cables, sensors.gain[i], sought, p, i, space, work)
-        fill_platform(placed, cables, sensors, sought, free, from_system, space, work)
+            fill_cable(placed, cables, sensors.gain[i], sought, p, i, space, slopes)
+        fill_platform(placed, cables, sensors, sought, free, from_system, space, slopes)
+        if answer.motion.shape[0] > 0:
+            fill_motion(free, space, slopes, answer.motion[p])
+        add_motion(space, slopes)
         fill_residual(sensors, readings, p, pose, from_system, space, answer.residual[p])
-        whiten(sensors, answer.residual[p], space, work)
+        whiten(sensors, answer.residual[p], space, slopes.work)
         store(sensors, answer, p, readings.lengths[p], batch.lengths[p], space)

@@ -14,7 +14,7 @@ BESIDE = 6  # readings of a pose beside its load cells: position and rotation in
 SensingArrays = tuple[Array, Array, Array, Array, Array, Array, Array, Array]
 ReadingArrays = tuple[Array, Array, Array, Array]
 SoughtArrays = tuple[Indices, Array, Array]
-ObservedArrays = tuple[Array, Array, Array, Array, Array]
+ObservedArrays = tuple[Array, Array, Array, Array, Array, Array]
 
 
 class Sensing(NamedTuple):
@@ -74,19 +74,36 @@ class Sought(NamedTuple):
 class Observed(NamedTuple):
     """What is filled; rows of a pose are its load cells, three of its position and three of its rotation.
 
+    R is m + 6, or m where no system measures positions or rotations.
+
     Attributes:
-        matrix: Whitened slopes, (N, m + 6, P); rows without a reading are zero.
-        misfit: Whitened residuals, (N, m + 6).
+        matrix: Whitened slopes, (N, R, P); rows without a reading are zero.
+        misfit: Whitened residuals, (N, R).
         residual: As they are, readings less predictions at the lengths given [N, m, rad], (N, m + 6); NaN for none.
-        back: What a whitened residual changes of the true lengths [m], (N, m, m + 6).
-        work: To work in, (m + 6, P).
+        back: What a whitened residual changes of the true lengths [m], (N, m, R).
+        motion: Of the platform about its center of mass [m, rad], world axes: by each cable's length, and in the last
+            row by the first of the P, (N, m + 1, 6); (0, m + 1, 6) where it is not wanted.
+        work: To work in, slopes of the readings and of the wrench on the platform, (R + 6, P).
     """
 
     matrix: Array
     misfit: Array
     residual: Array
     back: Array
+    motion: Array
     work: Array
+
+
+class Slopes(NamedTuple):
+    """What the P numbers change at one pose.
+
+    Attributes:
+        work: Of the readings, first with the platform held, (R, P).
+        pull: Of the wrench on the held platform about its center of mass, (6, P).
+    """
+
+    work: Array
+    pull: Array
 
 
 class Space(NamedTuple):
@@ -100,19 +117,20 @@ class Space(NamedTuple):
     matrix: Array  # (n, n)
     part: Array  # (n,)
     six: Array  # (6,)
-    moved: Array  # change of the readings by a wrench on the platform, (m + 6, 6)
+    moved: Array  # change of the readings by a wrench on the platform, (R, 6)
     ends: Array  # stiffness of the platform ends, (m, 9)
     shares: Array  # of the frame ends' tensions: by the forces on the platform ends, by height; and they, (m, 5)
-    by_length: Array  # change of the readings by the lengths, A, (m, m + 6)
-    whole: Array  # covariance, then the inverse of its factor, (m + 6, m + 6)
-    own: Array  # (m + 6, m + 6)
+    by_wrench: Array  # change of the wrench on the platform by the lengths, (m, 6)
+    by_length: Array  # change of the readings by the lengths, A, (m, R)
+    whole: Array  # covariance, then the inverse of its factor, (R, R)
+    own: Array  # (R, R)
     deviation: Array  # (m + 6,)
 
 
 @glue
-def new_space(memory: Memory, m: int, n: int) -> Space:
-    """Working memory for m cables and n free motions."""
-    numbers, readings = memory.numbers, m + BESIDE
+def new_space(memory: Memory, m: int, n: int, readings: int) -> Space:
+    """Working memory for m cables, n free motions and so many readings."""
+    numbers = memory.numbers
     rows, at = block(numbers, 0, CABLE_ROWS, m)
     rotation, at = block(numbers, at, 3, 3)
     axes, at = block(numbers, at, 3, 3)
@@ -122,12 +140,13 @@ def new_space(memory: Memory, m: int, n: int) -> Space:
     moved, at = block(numbers, at, readings, 6)
     ends, at = block(numbers, at, m, 9)
     shares, at = block(numbers, at, m, 5)
+    by_wrench, at = block(numbers, at, m, 6)
     by_length, at = block(numbers, at, m, readings)
     whole, at = block(numbers, at, readings, readings)
     own, at = block(numbers, at, readings, readings)
     part, six = numbers[at : at + n], numbers[at + n : at + n + 6]
     at += n + 6
-    deviation = numbers[at : at + readings].reshape((readings,))  # which tells when there is too little memory
+    deviation = numbers[at : at + m + BESIDE].reshape((m + BESIDE,))  # which tells when there is too little memory
     return Space(
         rows,
         rotation,
@@ -140,6 +159,7 @@ def new_space(memory: Memory, m: int, n: int) -> Space:
         moved,
         ends,
         shares,
+        by_wrench,
         by_length,
         whole,
         own,

@@ -13,10 +13,12 @@ from sagline.kernels.jit import glue
 @glue
 def whiten(sensing: Sensing, residual: Array, space: Space, work: Array) -> None:
     """Leave out what was not read, and fill W with W^T W the inverse of the covariance: the inverse of its factor."""
-    readings, m = residual.size, residual.size - BESIDE
-    for j in range(readings):
+    readings, m = work.shape[0], residual.size - BESIDE
+    for j in range(residual.size):
         if not (abs(residual[j]) < math.inf and space.deviation[j] < math.inf):
             residual[j] = math.nan
+            if j >= readings:
+                continue
             for i in range(m):
                 space.by_length[i, j] = 0.0
             for q in range(work.shape[1]):
@@ -46,7 +48,7 @@ def whiten(sensing: Sensing, residual: Array, space: Space, work: Array) -> None
 def store(sensing: Sensing, answer: Observed, p: int, read: Array, lengths: Array, space: Space) -> None:
     """Write what one pose says."""
     residual, matrix, whole = answer.residual[p], answer.matrix[p], space.whole
-    readings, m = residual.size, lengths.size
+    readings, m = matrix.shape[0], lengths.size
     for j in range(readings):
         total = residual[j]
         for i in range(m):
