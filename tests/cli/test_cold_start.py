@@ -52,6 +52,24 @@ def compiling(function: Any, types: Any = ()) -> Any:
     return event.trigger_event("numba:compile", data={"dispatcher": function, "args": types})
 
 
+def test_nothing_is_told_to_be_finished_before_its_machine_code_is_written(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def solve() -> None:
+        for function in (inverse_poses, forward_poses):
+            with compiling(function, ("int64", "none")):
+                pass
+            print(f"{function.__name__} written")  # numba saves what it has compiled when it has told of the end
+
+    monkeypatch.setattr(cold_start, "_end_with_parent", lambda: None)
+    monkeypatch.setitem(ENTRIES, INVERSE, ENTRIES[INVERSE]._replace(solve=solve))
+    cold_start.main([INVERSE])
+    lines = [line.split("\t") for line in capsys.readouterr().out.splitlines()]
+    assert [line[0] + line[-1] if len(line) > 1 else line[0] for line in lines] == [
+        f"{INVERSE}0", "inverse_poses written", f"{INVERSE}1", f"{FORWARD}0", "forward_poses written", f"{FORWARD}1",
+    ]  # fmt: skip
+
+
 def test_an_entry_is_compiled_when_its_machine_code_is_there(
     tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch
 ) -> None:

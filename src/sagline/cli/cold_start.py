@@ -163,9 +163,23 @@ class Side:
 def main(names: Sequence[str]) -> None:
     """Compile entries and say how far it is, a line for every kernel; what the other process runs."""
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    with heard(_say):
+    ended: list[Stage] = []  # numba tells of an end before it writes the machine code, which is taken over on our word
+
+    def tell(stage: Stage) -> None:
+        written()
+        if stage.finished:
+            ended.append(stage)
+        else:
+            _say(stage)
+
+    def written() -> None:
+        while ended:
+            _say(ended.pop())
+
+    with heard(tell):
         for name in names:
             ENTRIES[name].compile()
+            written()
 
 
 def _say(stage: Stage) -> None:
