@@ -14,10 +14,10 @@ from sagline.viewer.missing import missing_of
 from sagline.viewer.missing_nearest import NearestHeld, nearest_held
 from sagline.viewer.missing_words import explanation, missing_label
 from sagline.viewer.reading import Reading
-from sagline.viewer.readout import force_unit
 from sagline.viewer.server import started, stop
 from sagline.viewer.settings import Settings
 from sagline.viewer.snapshot import Snapshot, taken_at
+from sagline.viewer.tension_scale import force_unit
 from sagline.viewer.viewer import Viewer, home_pose
 from tests.effort import best_rate
 from tests.viewer.client import Client, await_that

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
+from sagline.viewer.readout import legend
 from sagline.viewer.settings import Settings
 from sagline.viewer.snapshot import taken_at
 from sagline.viewer.tension_scale import TensionScale
@@ -72,11 +73,20 @@ def test_infeasible_pose_says_by_how_much_and_which_cables() -> None:
     snapshot = taken_at(ROBOT, outside, Settings(mass=50.0), None)
     plan = sl.inverse(ROBOT, outside)
     assert not snapshot.feasible
-    assert f"short of {float(plan.shortfall):,.1f} N" in snapshot.reason
+    assert f"short of {float(plan.shortfall):.1f} N;" in snapshot.reason
     assert snapshot.reason.endswith("cables " + ", ".join(str(i) for i in np.flatnonzero(plan.blocking)))
     assert np.isnan(snapshot.tension).all()
     sizes = np.linalg.norm(np.diff(snapshot.cable_segments(1.0), axis=1), axis=2)
     assert np.count_nonzero(sizes) == sizes.size // 2  # dashed
+
+
+def test_what_is_missing_is_told_in_the_unit_of_the_readings() -> None:
+    heavy, outside = sl.load_robot("fast"), sl.Pose([100.0, 0.0, 200.0], np.eye(3))
+    snapshot = taken_at(heavy, outside, Settings(mass=heavy.mass), None)
+    missing = 1e-3 * float(sl.inverse(heavy, outside).shortfall)
+    assert missing > 1.0
+    assert snapshot.reason.startswith(f"short of {missing:.2f} kN;")
+    assert "<b>Chord tension [kN]</b>" in legend(TensionScale.of(heavy), heavy)
 
 
 def test_platform_on_an_anchor_is_no_accident() -> None:

@@ -9,7 +9,8 @@ import numpy as np
 from sagline.dynamics.simulation import Simulation
 from sagline.numbers import n
 from sagline.robot.equilibrium import Equilibrium
-from sagline.viewer.readout import box, force_unit
+from sagline.viewer.readout import box
+from sagline.viewer.tension_scale import force_unit
 
 
 class Peak(NamedTuple):

@@ -11,7 +11,8 @@ from sagline.numbers import n
 from sagline.robot.equilibrium import Equilibrium
 from sagline.viewer.cable_colors import Color
 from sagline.viewer.force_polygon import MISSING, Pull, pulls_of, residual, turns
-from sagline.viewer.readout import block, force_unit, sentence
+from sagline.viewer.readout import block, sentence
+from sagline.viewer.tension_scale import force_unit
 from sagline.viewer.wording import number
 
 WIDTH, BORDER = 340.0, 24.0  # px

@@ -12,10 +12,9 @@ from sagline.viewer import lines, solids
 from sagline.viewer.missing import Missing
 from sagline.viewer.missing_nearest import NearestHeld
 from sagline.viewer.missing_words import distance_of, missing_label
-from sagline.viewer.readout import force_unit
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.stage import INFEASIBLE
-from sagline.viewer.tension_scale import TensionScale
+from sagline.viewer.tension_scale import TensionScale, force_unit
 
 HELD: Final = (28, 140, 92)  # the platform where it would be held
 WIDTH, WAY_WIDTH = 5.0, 2.0  # px

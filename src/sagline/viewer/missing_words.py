@@ -15,8 +15,9 @@ from sagline.viewer.channel import chosen_by
 from sagline.viewer.missing import Missing
 from sagline.viewer.missing_nearest import NearestHeld
 from sagline.viewer.polygon_figure import SHARING
-from sagline.viewer.readout import block, force_unit
+from sagline.viewer.readout import block
 from sagline.viewer.snapshot import Snapshot
+from sagline.viewer.tension_scale import force_unit
 from sagline.viewer.wording import ForceUnit, method_name, number
 
 GO: Final = "go-there"  # topic of the button that puts the platform to the nearest pose

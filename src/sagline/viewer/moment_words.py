@@ -7,8 +7,8 @@ import numpy as np
 from sagline.dynamics.simulation import Occurrence
 from sagline.numbers import n
 from sagline.viewer.moment import Moment
-from sagline.viewer.readout import block, box, css_color, force_unit, pose_line, sentence
-from sagline.viewer.tension_scale import TensionScale
+from sagline.viewer.readout import block, box, css_color, pose_line, sentence
+from sagline.viewer.tension_scale import TensionScale, force_unit
 from sagline.viewer.wording import ForceUnit, number
 
 CABLES = {

@@ -13,8 +13,8 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.viewer.moment import Moment
 from sagline.viewer.moment_words import happened
-from sagline.viewer.readout import force_unit
 from sagline.viewer.stage import ACTUAL
+from sagline.viewer.tension_scale import force_unit
 from sagline.viewer.timeline_spans import outside
 from sagline.viewer.timeline_track import Chart, Mark, Track, cable_names, tension_limits
 

@@ -16,8 +16,9 @@ from sagline.viewer.by_hand import BY_HAND, ByHand
 from sagline.viewer.channel import chosen_by
 from sagline.viewer.dot_field import WIDTH, DotField
 from sagline.viewer.dot_marks import Mark, grouped
-from sagline.viewer.readout import LATER, block, force_unit, sentence
+from sagline.viewer.readout import LATER, block, sentence
 from sagline.viewer.snapshot import Snapshot
+from sagline.viewer.tension_scale import force_unit
 from sagline.viewer.wording import method_name, number
 
 MOST_REDUNDANT: Final = 2  # dimensions of a drawing

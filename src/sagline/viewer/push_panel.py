@@ -12,7 +12,8 @@ from sagline.arrays import Array
 from sagline.errors import InvalidValueError
 from sagline.robot.robot import Robot
 from sagline.viewer.push import Push
-from sagline.viewer.readout import force_unit, refused, sentence
+from sagline.viewer.readout import refused, sentence
+from sagline.viewer.tension_scale import force_unit
 
 FARTHEST: Final = 1e4  # m: a place of the platform that is farther from its frame is a slip
 HOW: Final = "Ctrl-drag the platform, or type a force."

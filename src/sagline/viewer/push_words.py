@@ -6,7 +6,8 @@ import numpy as np
 
 from sagline.numbers import n
 from sagline.viewer.push import Pushed, Reserve, radii
-from sagline.viewer.readout import LATER, box, force_unit
+from sagline.viewer.readout import LATER, box
+from sagline.viewer.tension_scale import force_unit
 from sagline.viewer.wording import ForceUnit
 
 

@@ -18,7 +18,7 @@ from sagline.tension.margin import capacity_margin
 from sagline.viewer.channel import chosen_by
 from sagline.viewer.lines import dead_runs
 from sagline.viewer.snapshot import Snapshot
-from sagline.viewer.tension_scale import TensionScale
+from sagline.viewer.tension_scale import TensionScale, force_unit
 from sagline.viewer.wording import ForceUnit, number
 
 LATER = "compiling …"
@@ -100,11 +100,6 @@ def legend(scale: TensionScale, robot: Robot) -> str:
         f'<div style="position:relative;height:17px">{marks}</div>'
         f'<div class="quiet">{_ends(robot)}</div>'
     )
-
-
-def force_unit(robot: Robot) -> ForceUnit:
-    """How the forces of a robot are written: by its highest tension, so that nothing changes its unit in a drag."""
-    return ForceUnit.up_to(TensionScale.of(robot).high)
 
 
 def box(kind: str, head: str, text: str) -> str:

@@ -13,9 +13,9 @@ from sagline.kinematics.confirm import Confirmation, confirm
 from sagline.kinematics.plan import Plan
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.viewer.readout import force_unit
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.stage import ACTUAL, WANTED
+from sagline.viewer.tension_scale import force_unit
 from sagline.viewer.timeline_spans import infeasible
 from sagline.viewer.timeline_track import Chart, Track, cable_names, tension_limits
 

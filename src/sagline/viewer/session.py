@@ -13,8 +13,8 @@ from sagline.control.states import State
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.viewer.drawn import Drawn
-from sagline.viewer.readout import force_unit
 from sagline.viewer.stage import ACTUAL, TRUTH, WANTED
+from sagline.viewer.tension_scale import force_unit
 from sagline.viewer.timeline_spans import outside, spans_of
 from sagline.viewer.timeline_track import Chart, Mark, Span, Track, cable_names, tension_limits
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from sagline.control.events import Event
 from sagline.numbers import n
-from sagline.viewer.readout import block, box, css_color, force_unit, pose_line, sentence
+from sagline.viewer.readout import block, box, css_color, pose_line, sentence
 from sagline.viewer.session import PER_METER, SessionMoment
-from sagline.viewer.tension_scale import TensionScale
+from sagline.viewer.tension_scale import TensionScale, force_unit
 from sagline.viewer.wording import number
 
 MOST_EVENTS = 8  # that are told, the newest

@@ -19,7 +19,7 @@ from sagline.tension.margin import cable_margins
 from sagline.tension.method import TensionMethod, shared_tension
 from sagline.viewer import lines
 from sagline.viewer.settings import Settings
-from sagline.viewer.tension_scale import Colors, TensionScale
+from sagline.viewer.tension_scale import Colors, TensionScale, force_unit
 from sagline.viewer.wording import method_name, model_name, remembers
 
 
@@ -64,7 +64,8 @@ class Snapshot:
         if self.status is not PoseStatus.INFEASIBLE:
             return self.status.text
         shortfall = float(self.plan.shortfall)
-        short = f"short of {shortfall:,.1f} N" if np.isfinite(shortfall) else "no force alone would do"
+        missing = force_unit(self.robot).written(shortfall)
+        short = f"short of {missing}" if np.isfinite(shortfall) else "no force alone would do"
         blocking = ", ".join(str(i) for i in np.flatnonzero(self.plan.blocking))
         return f"{short}; at their limits: cables {blocking}" if blocking else short
 

@@ -20,10 +20,11 @@ from sagline.viewer.aside import Aside
 from sagline.viewer.hull import CELLS, Asked, Hull
 from sagline.viewer.margin_scale import MarginScale
 from sagline.viewer.reading import Reading
-from sagline.viewer.readout import LATER, force_unit
+from sagline.viewer.readout import LATER
 from sagline.viewer.slice_picture import picture_of
 from sagline.viewer.space_panel import SpacePanel
 from sagline.viewer.space_stage import SpaceStage
+from sagline.viewer.tension_scale import force_unit
 from sagline.viewer.view import View
 from sagline.viewer.wall import REACH, left, lit
 from sagline.viewer.where_to import free_ways, where_to

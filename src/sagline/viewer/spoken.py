@@ -10,7 +10,8 @@ from sagline.arrays import Array
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.viewer.drawn import Drawn
-from sagline.viewer.readout import force_unit, headline
+from sagline.viewer.readout import headline
+from sagline.viewer.tension_scale import force_unit
 from sagline.viewer.view import View
 from sagline.viewer.wording import number
 

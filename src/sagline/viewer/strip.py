@@ -9,7 +9,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from sagline.viewer.readout import force_unit, spaced
+from sagline.viewer.readout import spaced
+from sagline.viewer.tension_scale import force_unit
 from sagline.viewer.view import View
 
 HEIGHT: Final = 4.0  # of the size of its text

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from sagline.arrays import Array
 from sagline.robot.robot import Robot
+from sagline.viewer.wording import ForceUnit
 
 Colors = NDArray[np.uint8]
 
@@ -67,6 +68,11 @@ class TensionScale:
         decades = range(int(log10(self.low)) - 1, int(log10(self.high)) + 2)
         found = tuple(step * 10.0**decade for decade in decades for step in (1, 2, 5))
         return tuple(tick for tick in found if self.low <= tick <= self.high)
+
+
+def force_unit(robot: Robot) -> ForceUnit:
+    """How the forces of a robot are written: by its highest tension, so that nothing changes its unit in a drag."""
+    return ForceUnit.up_to(TensionScale.of(robot).high)
 
 
 def linear(colors: Colors) -> Colors:
