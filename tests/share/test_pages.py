@@ -11,9 +11,11 @@ from playwright.sync_api import Browser, Page, expect
 
 import sagline as sl
 from sagline.arrays import Array
+from sagline.robot.bounds import home_pose
 from sagline.share.course import of_plan
 from sagline.share.page import LENGTH, POSITION, TENSION, TIME, TURN, course_page, robot_page
 from sagline.viewer import lines
+from sagline.viewer.solids import platform
 from tests.chromium import NEEDED, launched
 from tests.share.opening import FLAGS, asking, opened
 
@@ -151,6 +153,17 @@ def test_a_robot_is_dragged(
         page.keyboard.press("ArrowLeft")
         assert pixels(page) != turned
         check_look(page)
+
+
+@pytest.mark.parametrize("height", [640, 844])
+def test_a_platform_that_stands_out_of_its_frame_is_seen_whole(browser: Browser, tmp_path: Path, height: int) -> None:
+    robot = sl.load_robot("falcon-7")
+    corners = home_pose(robot).transform(platform(robot).vertices)
+    assert corners[:, 2].max() > 1.2 * robot.frame_anchors[:, 2].max()
+    (tmp_path / "robot.html").write_text(robot_page(robot), encoding="utf-8")
+    with opened(browser, tmp_path / "robot.html", width=390, height=height) as page:
+        seen = asking(page, "given.map((each) => it.view.seen(each))", corners.tolist())
+        assert all(0.0 < each[side] < 1.0 for each in seen for side in ("x", "y"))
 
 
 def check_balance(page: Page, robot: sl.Robot, position: Array) -> None:

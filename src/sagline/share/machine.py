@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from sagline.robot.bounds import bounds
+from sagline.robot.bounds import bounds, home_pose
 from sagline.robot.robot import Robot
 from sagline.robot.several import pulleys_of
 from sagline.share.packing import Channel, packed
@@ -58,7 +58,10 @@ def picture(robot: Robot) -> dict[str, Any]:
     meshes = {name: _triangles(each, size) for name, each in drawn.items() if len(each.faces)}
     least, most = body.vertices.min(axis=0), body.vertices.max(axis=0)
     middle, grip = 0.5 * (least + most), 0.5 * float(np.linalg.norm(most - least))
-    return {"low": numbers(low), "high": numbers(high), "middle": numbers(middle), "grip": numbers(grip), **meshes}
+    there = np.vstack((low, high, home_pose(robot).transform(body.vertices)))  # a platform may stand out of its frame
+    seen = [numbers(there.min(axis=0)), numbers(there.max(axis=0))]
+    box = {"low": numbers(low), "high": numbers(high), "seen": seen}
+    return {**box, "middle": numbers(middle), "grip": numbers(grip), **meshes}
 
 
 def colors(robot: Robot) -> dict[str, Any]:

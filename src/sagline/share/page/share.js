@@ -146,7 +146,7 @@ const share = (() => {
     }
 
     function home() {
-      view.show(picture.low, picture.high);
+      view.show(...picture.seen);
       redraw();
     }
 
