@@ -238,6 +238,8 @@ def heard_or_cut_off(page: Shown, client: int, heard: list[int]) -> bool:
 
 
 def test_a_pose_that_is_none_is_refused_and_forgotten(page: Shown) -> None:
+    asked: list[int] = []
+    page.viewer._channel.on("asked", lambda _, number: asked.append(number))
     for position, wxyz in (
         ([np.nan, 0.0, 2.0], [1, 0, 0, 0]),
         ([1e9, 0.0, 2.0], [1, 0, 0, 0]),
@@ -245,9 +247,8 @@ def test_a_pose_that_is_none_is_refused_and_forgotten(page: Shown) -> None:
         ([0.0, 0.0], [1, 0, 0, 0]),
         ([0.0, 0.0, 2.0], [1, 0]),
     ):
-        client, asked = Client(page.port), list[int]()
+        client = Client(page.port)
         mine = client.met(page.server).client_id
-        page.viewer._channel.on("asked", lambda _, number, asked=asked: asked.append(number))
         client.drag(position, wxyz)
         tell(page, client, "asked", 1)  # heard after that, unless that has cut it off
         await_that(partial(heard_or_cut_off, page, mine, asked))
