@@ -135,7 +135,7 @@ def updates_a_second(
             move(client, 3.0 * after)
             time.sleep(0.01)
         seen = sum(m.get("name") == node and part in m.get("updates", {}) for m in client.heard(0.5))
-        return min(page.viewer.updates - before, seen) / 2.0
+        return float(min(page.viewer.updates - before, seen)) / 2.0
 
 
 def test_thirty_updates_a_second_reach_a_client(page: Shown) -> None:

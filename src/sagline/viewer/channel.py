@@ -84,12 +84,15 @@ class Channel(Told):
         if told is not None:
             told.tell(topic, value)
 
-    def welcome(self, client: viser.ClientHandle) -> None:
-        """Tell a client that it is heard from now on; what it says earlier, viser hands to nobody."""
+    async def welcome(self, client: viser.ClientHandle) -> None:
+        """Tell a client that it is heard from now on; what it says earlier, viser hands to nobody.
+
+        Awaits nothing: viser calls it before it hears what the client says next, as its threads would not.
+        """
         told = self._clients[client.client_id] = Told(client.gui)
         told.tell("welcome", True)
 
-    def part(self, client: viser.ClientHandle) -> None:
+    async def part(self, client: viser.ClientHandle) -> None:
         """Forget a client that has left."""
         self._clients.pop(client.client_id, None)
 
