@@ -64,6 +64,7 @@ def short_of_work(stocked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sagline.cli.run.FIGURES", ())
     monkeypatch.setattr("sagline.cli.run.CELLS", 4)
     monkeypatch.setattr("sagline.cli.run._figures", lambda *_: ())
+    monkeypatch.setattr("sagline.workspaces.nearest._EVALUATIONS", 30)
     monkeypatch.setattr("sagline.report.parts.Part.build", lambda part: Chapter(part.key, part.key, "", ()))
     for module in ("run", "tension", "track"):
         monkeypatch.setattr(f"sagline.cli.{module}.write_figures", lambda figures, folder: [])
