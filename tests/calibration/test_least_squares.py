@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import least_squares
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.arrays import Array, locked
 from sagline.calibration.calibrate import readings_of, sensors_there
 from sagline.calibration.least_squares import moved, passed, solve
 from sagline.calibration.observing import NO_LOAD
@@ -156,7 +156,7 @@ def missed_after(name: str, share: float) -> tuple[float, float]:
     step = share * 0.02 * problem.scale * np.cos(np.arange(len(problem.prior)))
     after, part = machine_at(problem, problem.prior + step), slice(0, len(lengths))
     found, starts = moved(problem, before, None, step, after, said_lengths(problem, after, part), part)
-    rest = solve_rows(after.robot, model, found, starts, NO_LOAD)
+    rest = solve_rows(after.robot, model, locked(found), locked(starts), NO_LOAD)
     assert rest.stable.all()
     far, left = rest.poses - before.poses, rest.poses - starts
     return float(np.abs(far).max()), float(np.abs(left).max())

@@ -269,7 +269,9 @@ def test_a_field_keeps_its_place_while_the_dot_moves() -> None:
 
 
 def test_thirty_tensions_a_second_follow_the_dot(page: Shown) -> None:
-    def move(client: Client, angle: float) -> None:
-        say(page, client, {"at": [100.0 * np.cos(angle), 100.0 * np.sin(angle)]})
+    with Client(page.port) as client:
 
-    assert best_rate(lambda: updates_a_second(page, move), 30.0) >= 30.0
+        def move(angle: float) -> None:
+            say(page, client, {"at": [100.0 * np.cos(angle), 100.0 * np.sin(angle)]})
+
+        assert best_rate(lambda: updates_a_second(page, client, move), 30.0) >= 30.0

@@ -236,7 +236,9 @@ def test_the_platform_goes_where_it_is_held(page: Shown) -> None:
 
 @pytest.mark.soak
 def test_thirty_explanations_a_second(page: Shown) -> None:
-    def move(client: Client, angle: float) -> None:
-        client.drag([6.3 + 0.3 * np.cos(angle), 2.1 + 0.3 * np.sin(angle), 5.4])
+    with Client(page.port) as client:
 
-    assert best_rate(lambda: updates_a_second(page, move, "/missing"), 30.0) >= 30.0
+        def move(angle: float) -> None:
+            client.drag([6.3 + 0.3 * np.cos(angle), 2.1 + 0.3 * np.sin(angle), 5.4])
+
+        assert best_rate(lambda: updates_a_second(page, client, move, "/missing"), 30.0) >= 30.0

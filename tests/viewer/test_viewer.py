@@ -5,6 +5,7 @@ import re
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from functools import partial
 from html import unescape
 from pkgutil import resolve_name
@@ -12,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from websockets.exceptions import ConnectionClosed
 
 import sagline as sl
 from sagline.viewer.reading import Reading
@@ -125,24 +127,34 @@ def test_everything_follows_a_drag(page: Shown) -> None:
 
 
 def updates_a_second(
-    page: Shown, move: Callable[[Client, float], None], node: str = "/cables", part: str = "points"
+    page: Shown,
+    client: Client,
+    move: Callable[[float], None],
+    node: str = "/cables",
+    part: str = "points",
 ) -> float:
     """How often a page is drawn anew, and a part of a node of it arrives, while a client moves by an angle [rad]."""
-    with Client(page.port) as client:
-        list(client.heard(1.0))
-        before, start = page.viewer.updates, time.monotonic()
-        while (after := time.monotonic() - start) < 2.0:
-            move(client, 3.0 * after)
-            time.sleep(0.01)
-        seen = sum(m.get("name") == node and part in m.get("updates", {}) for m in client.heard(0.5))
-        return float(min(page.viewer.updates - before, seen)) / 2.0
+    list(client.heard(0.5))
+    before, start = page.viewer.updates, time.monotonic()
+    while (after := time.monotonic() - start) < 2.0:
+        move(3.0 * after)
+        time.sleep(0.01)
+    seen = sum(m.get("name") == node and part in m.get("updates", {}) for m in client.heard(0.5))
+    return float(min(page.viewer.updates - before, seen)) / 2.0
+
+
+def asked_beside(plain: float) -> float:
+    """How often a page is to be drawn that has more to do: 30 of the 60 that there can be, or half of what is here."""
+    return min(30.0, 0.5 * plain)
 
 
 def test_thirty_updates_a_second_reach_a_client(page: Shown) -> None:
-    def move(client: Client, angle: float) -> None:
-        client.drag([np.cos(angle), np.sin(angle), 2.0])
+    with Client(page.port) as client:
 
-    assert best_rate(lambda: updates_a_second(page, move), 30.0) >= 30.0
+        def move(angle: float) -> None:
+            client.drag([np.cos(angle), np.sin(angle), 2.0])
+
+        assert best_rate(lambda: updates_a_second(page, client, move), 30.0) >= 30.0
 
 
 def test_infeasible_pose_turns_the_platform_red_and_back(page: Shown) -> None:
@@ -250,7 +262,8 @@ def test_a_pose_that_is_none_is_refused_and_forgotten(page: Shown) -> None:
         client = Client(page.port)
         mine = client.met(page.server).client_id
         client.drag(position, wxyz)
-        tell(page, client, "asked", 1)  # heard after that, unless that has cut it off
+        with suppress(ConnectionClosed):  # this may have cut it off
+            tell(page, client, "asked", 1)  # heard after that, unless it has
         await_that(partial(heard_or_cut_off, page, mine, asked))
         client.break_off()
         assert page.thread.is_alive()
