@@ -178,3 +178,11 @@ def test_the_wheel_works_with_what_it_asks_for_alone(built: Built, tmp_path: Pat
     told = run(binaries / "sagline", "track", "cogiro", "mine/own_path.yaml", "--out", "made", folder=tmp_path)
     assert "cogiro" in told
     assert (tmp_path / "made").is_dir()
+
+
+def test_the_viewer_brings_what_its_region_is_made_of() -> None:
+    """The readme installs this extra alone."""
+    extras = PROJECT["optional-dependencies"]
+    surface = {line for line in extras["workspace"] if line.startswith(("scikit-image", "trimesh"))}
+    assert len(surface) == 2
+    assert surface <= set(extras["viewer"])
