@@ -1,7 +1,6 @@
 """The workspace in the page: nothing until it is asked for, then a slice, ways and a hull that follow."""
 
 import threading
-import time
 from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
@@ -202,28 +201,16 @@ def test_thirty_updates_a_second_while_a_slider_is_dragged_that_a_region_follows
     for page in shown(lambda server: Viewer(server, robot)):
         show, mass = show_of(page), handle(page, "Platform + load [kg]")._impl.uuid
 
-        def rate(client: Client, page: Shown = page, mass: str = mass) -> float:
-            list(client.heard(0.5))
-            start, before = time.monotonic(), page.viewer.updates
-            while (after := time.monotonic() - start) < 2.0:
-                client.set(mass, float(robot.mass * (1.1 + 0.2 * np.sin(3.0 * after))))
-                time.sleep(0.01)
-            heard = [
-                m for m in client.heard(0.5) if "points" in m.get("updates", {}) or "vertices" in m.get("updates", {})
-            ]
-            if not any(m["name"].startswith("/hull/") for m in heard):
-                return 0.0  # it is to follow while the slider moves
-            return float(min(page.viewer.updates - before, sum(m["name"] == "/cables" for m in heard))) / 2.0
-
         with Client(page.port) as client:
 
             def move(angle: float, client: Client = client, mass: str = mass) -> None:
                 client.set(mass, float(robot.mass * (1.1 + 0.2 * np.sin(angle))))
 
-            asked = asked_beside(updates_a_second(page, client, move))
+            rate = partial(updates_a_second, page, client, move)
+            asked = asked_beside(rate())
             client.set(handle(page, "Region")._impl.uuid, True)
             await_that(lambda show=show: show._made is not None)  # type: ignore[misc]
-            assert best_rate(lambda client=client: rate(client), asked) >= asked  # type: ignore[misc]
+            assert best_rate(partial(rate, along="/hull/"), asked) >= asked  # it is to follow while the slider moves
 
 
 def test_a_hull_that_takes_long_shows_how_far_it_is(

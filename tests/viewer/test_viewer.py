@@ -132,14 +132,21 @@ def updates_a_second(
     move: Callable[[float], None],
     node: str = "/cables",
     part: str = "points",
+    along: str = "",
 ) -> float:
-    """How often a page is drawn anew, and a part of a node of it arrives, while a client moves by an angle [rad]."""
+    """How often a page is drawn anew, and a part of a node of it arrives, while a client moves by an angle [rad].
+
+    Never, if no node follows whose name begins with `along`.
+    """
     list(client.heard(0.5))
     before, start = page.viewer.updates, time.monotonic()
     while (after := time.monotonic() - start) < 2.0:
         move(3.0 * after)
         time.sleep(0.01)
-    seen = sum(m.get("name") == node and part in m.get("updates", {}) for m in client.heard(0.5))
+    heard = [m for m in client.heard(0.5) if {part, "points", "vertices"} & m.get("updates", {}).keys()]
+    if not any(m["name"].startswith(along) for m in heard):
+        return 0.0
+    seen = sum(m["name"] == node and part in m["updates"] for m in heard)
     return float(min(page.viewer.updates - before, seen)) / 2.0
 
 
