@@ -16,7 +16,6 @@ import numpy as np
 
 ORDINARY = 0.1  # s, that the piece of work takes where the limits were set
 AGAIN = 3
-ALONE = "from tests.effort import piece; import time; print(piece(time.perf_counter))"
 
 
 def piece(clock: Callable[[], float] = time.thread_time) -> float:
@@ -34,7 +33,7 @@ def slowness() -> float:
 
 def slowness_of_waiting() -> float:
     """As `slowness`, by the clock on the wall: of another process, which no thread of this one holds up."""
-    done = subprocess.run([sys.executable, "-c", ALONE], capture_output=True, text=True, check=True)
+    done = subprocess.run([sys.executable, "-P", __file__], stdout=subprocess.PIPE, text=True, check=True)
     return max(1.0, float(done.stdout) / ORDINARY)
 
 
@@ -71,3 +70,7 @@ def best_rate(measure: Callable[[], float], wanted: float) -> float:
             break
         best = max(best, measure() * slowness_of_waiting())
     return best
+
+
+if __name__ == "__main__":
+    print(piece(time.perf_counter))

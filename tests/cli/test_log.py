@@ -17,6 +17,7 @@ import sagline as sl
 from sagline.cli import view_log
 from sagline.cli.main import app
 from sagline.files.mcap_log import Recorder
+from sagline.files.mcap_reader import MAGIC
 from sagline.kinematics.plan import Plan
 from tests.files.executions import cycles_of, events_of, execution, plan_of
 from tests.files.test_mcap_log import assert_same
@@ -127,6 +128,36 @@ def test_what_cannot_be_is_one_line(log: Path, words: list[str], said: str, monk
     assert result.exit_code == 2
     assert re.search(said, result.stderr), result.stderr
     assert len(result.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize("there", [None, b"", MAGIC[:3]])
+@pytest.mark.parametrize("name", ["run.mcap", "twin.mcap"])
+def test_a_growing_log_is_waited_for_until_its_first_bytes_are_there(
+    log: Path, name: str, there: bytes | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with Recorder(log.parent / "twin.mcap", ROBOT) as recorder:
+        recorder.truth(0.0, np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
+    file = log.parent / name
+    whole, looks = file.read_bytes(), []
+    file.unlink() if there is None else file.write_bytes(there)
+
+    def sleep(seconds: float) -> None:
+        looks.append(seconds)
+        if len(looks) == 3:
+            file.write_bytes(whole)
+
+    monkeypatch.setattr(view_log.time, "sleep", sleep)  # type: ignore[attr-defined]
+    monkeypatch.setattr(view_log, "hosted", lambda robot, session, *_, **__: len(session.time))
+    assert view_log.view_log(log, None, True, log.parent / "twin.mcap", "", 0, browser=False) == 201
+    assert looks == [view_log.LOOK] * 3
+
+
+@pytest.mark.parametrize("said", [b"no log at all", b"no", None])
+def test_what_is_no_log_is_not_waited_for(tmp_path: Path, said: bytes | None) -> None:
+    file = tmp_path / "run.mcap"
+    file.mkdir() if said is None else file.write_bytes(said)
+    with pytest.raises(sl.FileError, match="is a folder" if said is None else "no log in MCAP"):
+        view_log.view_log(file, None, True, None, "", 0, browser=False)
 
 
 def test_a_growing_log_is_followed_from_before_it_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
@@ -198,18 +199,18 @@ def test_a_wall_lights_up_near_the_platform_and_says_what_is_left(page: Shown, c
 
 def test_thirty_updates_a_second_while_a_slider_is_dragged_that_a_region_follows() -> None:
     robot = sl.load_robot("cogiro")
-    for page in shown(lambda server: Viewer(server, robot)):
+    with contextmanager(shown)(lambda server: Viewer(server, robot)) as page:
         show, mass = show_of(page), handle(page, "Platform + load [kg]")._impl.uuid
 
         with Client(page.port) as client:
 
-            def move(angle: float, client: Client = client, mass: str = mass) -> None:
+            def move(angle: float) -> None:
                 client.set(mass, float(robot.mass * (1.1 + 0.2 * np.sin(angle))))
 
             rate = partial(updates_a_second, page, client, move)
             asked = asked_beside(rate())
             client.set(handle(page, "Region")._impl.uuid, True)
-            await_that(lambda show=show: show._made is not None)  # type: ignore[misc]
+            await_that(lambda: show._made is not None)
             assert best_rate(partial(rate, along="/hull/"), asked) >= asked  # it is to follow while the slider moves
 
 

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -226,5 +227,5 @@ def test_questions_that_are_none_are_not_answered(page: Shown, value: Any) -> No
 def test_what_is_in_no_file_is_refused_in_a_line() -> None:
     robot = sl.load_robot("article-suspended")
     run = Run.of(sl.inverse(robot, path_of(robot)))
-    for page in shown(lambda server: Viewer(server, robot, run)):
+    with contextmanager(shown)(lambda server: Viewer(server, robot, run)) as page:
         assert asked(page, "copy", "code", "c")["refused"].startswith("the run is in no file; ")

@@ -53,10 +53,12 @@ def shown(made: Callable[[Server], Viewer]) -> Iterator[Shown]:
     thread = threading.Thread(target=viewer.serve)
     thread.start()
     await_that(lambda: viewer.view is not None)
-    yield Shown(server, viewer, thread)
-    viewer.stop()
-    thread.join(timeout=PATIENCE)
-    stop(server)
+    try:
+        yield Shown(server, viewer, thread)
+    finally:
+        viewer.stop()
+        thread.join(timeout=PATIENCE)
+        stop(server)
     assert not thread.is_alive()
 
 

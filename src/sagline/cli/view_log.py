@@ -56,6 +56,7 @@ def view_log(
 
     follower = Follower(file, truth)
     with working(f"waiting for {file.name}" if live else f"reading {file.name}"):
+        _wait([log for log in (file, truth) if live and log is not None])
         session = _first(follower, live)
     if robot is not None:
         _check_robot(file, load_robot(robot), session.robot)
@@ -77,20 +78,21 @@ def view_log(
     )
 
 
+def _wait(logs: list[Path]) -> None:
+    """Until all have been begun."""
+    from sagline.files.mcap_reader import begun
+
+    while not all(map(begun, logs)):
+        time.sleep(LOOK)
+
+
 def _first(follower: Follower, live: bool) -> Session:
-    """What is there at first; of a log that grows, as soon as there is something."""
-    while True:
-        try:
-            session = follower.more()
-        except FileError:
-            if not live or follower.log.path.exists():
-                raise
-            session = None
-        if session is not None:
-            return session
+    """What is there at first; of a log that grows, as soon as there is a cycle."""
+    while (session := follower.more()) is None:
         if not live:
             raise no_cycle(follower.log.path)
         time.sleep(LOOK)
+    return session
 
 
 @contextmanager

@@ -279,3 +279,25 @@ def read_log(file: os.PathLike[str] | str) -> Log:
     if log.robot is None:
         raise FileError(log.path, "was cut off before it says of what robot it is", "Nothing of it can be read.")
     return log
+
+
+def begun(file: os.PathLike[str] | str) -> bool:
+    """Whether there is anything to read of a log that somebody is to write.
+
+    Args:
+        file: The file.
+
+    Returns:
+        False while it is missing, or not even its first bytes are whole; of what is no log, reading says so.
+    """
+    try:
+        path = file_path(file)
+        if kind_of(path.stat().st_mode):
+            return True
+        with path.open("rb") as stream:
+            first = stream.read(len(MAGIC))
+    except FileNotFoundError:
+        return False
+    except (OSError, ValueError):
+        return True
+    return first == MAGIC or not MAGIC.startswith(first)

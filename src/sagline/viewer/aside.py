@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import os
+import sys
 import threading
 import time
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Final, TypeVar
 
 from sagline.errors import SaglineError
 
 T = TypeVar("T")
 
 PATIENCE = 2.0  # s: what takes longer is told how long it has taken
+NICENESS: Final = 10  # a drag comes first where both want a processor: it is then drawn up to twice as often
 
 
 class Aside:
@@ -55,6 +58,7 @@ class Aside:
                 start()
 
         def work() -> None:
+            _give_way()
             try:
                 result = task()
             except SaglineError as error:
@@ -79,3 +83,9 @@ class Aside:
             start()
         else:
             self._next = start
+
+
+def _give_way() -> None:
+    """Let this thread have a processor where no other wants it."""
+    if sys.platform == "linux":  # elsewhere this would be the whole process
+        os.nice(NICENESS)
