@@ -14,6 +14,7 @@ from sagline.viewer.force_polygon_figure import force_polygon_figure
 from sagline.viewer.missing import missing_of
 from sagline.viewer.settings import Settings
 from sagline.viewer.snapshot import taken_at
+from sagline.viewer.tension_scale import force_unit
 from sagline.viewer.viewer import Viewer, home_pose
 from tests.viewer.client import Client, await_that
 from tests.viewer.planar import PLANAR
@@ -88,6 +89,28 @@ def test_arrows_are_drawn_head_to_tail_as_long_as_the_forces() -> None:
         np.testing.assert_allclose(view[:, 1] - view[:, 0], scale * forces, atol=0.2)
 
 
+def names_in(html: str) -> Iterator[list[np.ndarray]]:
+    """The boxes of the names of arrows in each view [px], as large as a wide font has them: low and high corner."""
+    for svg in re.findall(r"<svg.*?</svg>", html):
+        found = re.findall(r'<text x="([\d.-]+)" y="([\d.-]+)" text-anchor="middle">(\w+)</text>', svg)
+        middles = [np.array([float(x), float(y) - 4.0]) for x, y, _ in found]
+        halves = [np.array([3.7 * len(name), 5.4]) for *_, name in found]
+        yield [np.array([middle - half, middle + half]) for middle, half in zip(middles, halves, strict=True)]
+
+
+@pytest.mark.parametrize("name", sl.robot_names())
+def test_names_of_arrows_stand_beside_each_other(name: str) -> None:
+    robot = sl.load_robot(name)
+    plan = sl.inverse(robot, home_pose(robot))
+    for boxes in names_in(force_polygon_figure(plan.state)):
+        assert len(boxes) > 3
+        for k, (low, high) in enumerate(boxes):
+            assert low[0] >= -0.1
+            assert high[0] <= 340.1
+            for other in boxes[:k]:
+                assert (np.minimum(high, other[1]) - np.maximum(low, other[0])).min() <= 0.0
+
+
 def test_numbers_are_those_of_the_cables() -> None:
     state = held(HEAVY)
     rows = dict(re.findall(ROW, force_polygon_figure(state)))
@@ -97,6 +120,17 @@ def test_numbers_are_those_of_the_cables() -> None:
         np.testing.assert_allclose(numbers, [*expected[k], *np.cross(arm[k], expected[k])], atol=0.0501)
     assert rows["weight"].startswith(f"<td>0.0</td><td>0.0</td><td>{-HEAVY.mass * HEAVY.gravity:.1f}</td>")
     assert re.search(r"sum</td>(<td>0\.0</td>){6}</tr>", force_polygon_figure(state))
+
+
+@pytest.mark.parametrize("name", sl.robot_names())
+def test_the_largest_force_has_three_digits_at_least(name: str) -> None:
+    robot = sl.load_robot(name)
+    state = sl.inverse(robot, home_pose(robot)).state
+    rows = re.findall(ROW, force_polygon_figure(state))
+    forces = np.array([[float(cell) for cell in re.findall(r"<td>([^<]*)</td>", cells)][:3] for _, cells in rows])
+    expected = np.array([each.force for each in sorted(pulls_of(state), key=lambda each: each.name)])
+    expected /= force_unit(robot).newtons
+    np.testing.assert_allclose(forces, expected, rtol=0.0, atol=6e-4 * np.abs(expected).max())
 
 
 def test_the_gap_is_the_missing_force() -> None:

@@ -201,6 +201,8 @@ def decide_rows(
     verdicts = Verdicts.empty(count, m, n)
     verdicts.brackets[found.pose_status == codes.POSE_SOLVED] = 0.0
     which = locked(np.flatnonzero(np.isin(found.pose_status, UNDECIDED)))
+    if not which.size:
+        return verdicts
     given = (options.model, options.limits, robot_terms(robot), rows, loads)
     how = (covers_all(options.sharing[0], m - n), memory_for(m), found.answers, verdicts.answers)
     for part in blocks(which.size, DECIDED):

@@ -12,6 +12,7 @@ MotionPattern = Literal["3R3T", "3T", "1R2T", "2T"]
 MOTION_PATTERNS: Final[tuple[str, ...]] = get_args(MotionPattern)
 PLANAR: Final = frozenset({"1R2T", "2T"})
 ROTATING: Final = frozenset({"3R3T", "1R2T"})
+_SPATIAL: Final = {"3R3T": locked(np.eye(6)), "3T": locked(np.eye(3, 6))}
 
 
 def freedom_matrix(pattern: MotionPattern, plane_normal: Array | None) -> Array:
@@ -26,7 +27,7 @@ def freedom_matrix(pattern: MotionPattern, plane_normal: Array | None) -> Array:
         e1 x e2 = plane_normal, e1 horizontal and e2 as far up as the plane allows, then the rotation about the normal.
     """
     if plane_normal is None:
-        return locked(np.eye(6 if pattern == "3R3T" else 3, 6))
+        return _SPATIAL[pattern]
     rows = np.zeros((3, 6))
     rows[:2, :3] = _plane_axes(plane_normal)
     rows[2, 3:] = plane_normal

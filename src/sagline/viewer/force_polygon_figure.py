@@ -18,7 +18,10 @@ from sagline.viewer.wording import number
 WIDTH, BORDER = 340.0, 24.0  # px
 HIGHEST: Final = 200.0  # px, of a view
 HEAD: Final = (7.0, 2.8)  # length and half the width of an arrow's head [px]
-SHORT: Final = 3.0  # px: an arrow that is shorter has no number
+SHORT: Final = 3.0  # px: an arrow that is shorter has no name
+LETTER: Final = (7.5, 11.0)  # px: how wide and high a letter of a name is at most
+BESIDE: Final = 3.0  # px, between an arrow and its name
+SHARES: Final = (0.5, 0.35, 0.65, 0.2, 0.8)  # of an arrow, where its name may stand; the middle first
 SIDES: Final = ((0, 2), (1, 2), (0, 1))  # axes to the right and up: from the front, from the side, from above
 FLAT: Final = 1e-3  # of the largest view: one this small shows nothing
 SHOWN: Final = 2  # of them, those in which most is seen
@@ -34,6 +37,27 @@ class View(NamedTuple):
 
     names: str
     points: Array
+
+
+class Box(NamedTuple):
+    """Where a name stands.
+
+    Attributes:
+        x: Of its middle [px].
+        y: Of its middle, down [px].
+        across: Half its width [px].
+        up: Half its height [px].
+    """
+
+    x: float
+    y: float
+    across: float
+    up: float
+
+    def shared(self, other: Box) -> float:
+        """The area that both cover [px^2]."""
+        wide = self.across + other.across - abs(self.x - other.x)
+        return max(wide, 0.0) * max(self.up + other.up - abs(self.y - other.y), 0.0)
 
 
 def force_polygon_figure(state: Equilibrium, missing: Array | None = None) -> str:
@@ -62,7 +86,8 @@ def _drawing(view: View, pulls: tuple[Pull, ...], scale: float) -> str:
     places = np.column_stack(
         (left + scale * (view.points[:, 0] - low[0]), height - BORDER - scale * (view.points[:, 1] - low[1]))
     )
-    arrows = "".join(_arrow(pull, places[k], places[k + 1]) for k, pull in enumerate(pulls))
+    taken: list[Box] = []
+    arrows = "".join(_arrow(pull, places[k], places[k + 1], taken) for k, pull in enumerate(pulls))
     right, up = view.names[0], view.names[1]
     return (
         f'<svg viewBox="0 0 {WIDTH:.0f} {height:.0f}" role="img" class="forces" '
@@ -72,8 +97,8 @@ def _drawing(view: View, pulls: tuple[Pull, ...], scale: float) -> str:
     )
 
 
-def _arrow(pull: Pull, start: Array, end: Array) -> str:
-    """An arrow with its name beside its middle; what is missing is dashed."""
+def _arrow(pull: Pull, start: Array, end: Array, taken: list[Box]) -> str:
+    """An arrow with its name beside it, where none stands yet of those taken; what is missing is dashed."""
     way = end - start
     length = float(np.hypot(*way))
     if length < 0.5:
@@ -86,14 +111,29 @@ def _arrow(pull: Pull, start: Array, end: Array) -> str:
     kind = ' class="gap"' if pull.name == MISSING else ""
     name = ""
     if length >= SHORT:
-        x, y = 0.5 * (start + end) + 8.0 * aside
-        anchor = "start" if aside[0] > 0.35 else "end" if aside[0] < -0.35 else "middle"
-        name = f'<text x="{x:.1f}" y="{y + 3.0:.1f}" text-anchor="{anchor}">{pull.name}</text>'
+        box = _beside(pull.name, start, way, aside, taken)
+        taken.append(box)
+        name = f'<text x="{box.x:.1f}" y="{box.y + 4.0:.1f}" text-anchor="middle">{pull.name}</text>'
     corners = " ".join(f"{x:.1f},{y:.1f}" for x, y in (end, *wings))
     return (
         f'<g style="color:{_css(pull.color)}"><line x1="{start[0]:.1f}" y1="{start[1]:.1f}" '
         f'x2="{neck[0]:.1f}" y2="{neck[1]:.1f}"{kind}/><polygon points="{corners}"/>{name}</g>'
     )
+
+
+def _beside(name: str, start: Array, way: Array, aside: Array, taken: list[Box]) -> Box:
+    """Where the name of an arrow stands: of the places beside it the first that is free, or covers others least."""
+    across, up = 0.5 * LETTER[0] * len(name), 0.5 * LETTER[1]
+    (x, y), (along, down) = start.tolist(), way.tolist()
+    right, below = ((BESIDE + abs(aside[0]) * across + abs(aside[1]) * up) * aside).tolist()
+    found = []
+    for share in SHARES:
+        for side in (1.0, -1.0):
+            place = min(max(x + share * along + side * right, across), WIDTH - across)
+            found.append(Box(place, y + share * down + side * below, across, up))
+            if not any(map(found[-1].shared, taken)):
+                return found[-1]
+    return min(found, key=lambda box: sum(map(box.shared, taken)))
 
 
 def _told(state: Equilibrium, pulls: tuple[Pull, ...], missing: Array | None) -> str:
@@ -112,25 +152,31 @@ def _told(state: Equilibrium, pulls: tuple[Pull, ...], missing: Array | None) ->
 
 def _table(state: Equilibrium, pulls: tuple[Pull, ...]) -> str:
     unit, turning = force_unit(state.one_robot), turns(state)
+    decimals = _decimals(max(float(np.abs(each.force).max()) for each in pulls) / unit.newtons)
     forces = "".join(f"<th>F<sub>{axis}</sub></th>" for axis in "xyz")
     moments = "".join(f"<th>M<sub>{axis}</sub></th>" for axis in "xyz") if turning else ""
     head = f"<tr><th>[{unit.name}{f', {unit.name} m' if turning else ''}]</th>{forces}{moments}</tr>"
     numbered = sorted(pulls, key=lambda each: (not each.name.isdigit(), int(each.name) if each.name.isdigit() else 0))
     rows = "".join(
         f'<tr><td><span class="swatch" style="background:{_css(each.color)}"></span> {each.name}</td>'
-        + _cells(each.force / unit.newtons, each.moment / unit.newtons, turning=turning)
+        + _cells(each.force / unit.newtons, each.moment / unit.newtons, decimals, turning=turning)
         + "</tr>"
         for each in numbered
     )
     force = np.sum([each.force for each in pulls], axis=0) / unit.newtons
     moment = np.sum([each.moment for each in pulls], axis=0) / unit.newtons
-    whole = _cells(force, moment, turning=turning)
+    whole = _cells(force, moment, decimals, turning=turning)
     return f'<table class="forces">{head}{rows}<tr class="sum"><td>sum</td>{whole}</tr></table>'
 
 
-def _cells(force: Array, moment: Array, *, turning: bool) -> str:
+def _decimals(largest: float) -> int:
+    """How many decimals show a thousandth of a force of that size, as far as the table is wide enough."""
+    return 1 if largest >= 99.95 else 2 if largest >= 9.995 else 3
+
+
+def _cells(force: Array, moment: Array, decimals: int, *, turning: bool) -> str:
     parts = np.concatenate((force, moment)) if turning else force
-    cells = [number(part, ".1f") for part in parts]
+    cells = [number(part, f".{decimals}f") for part in parts]
     return "".join(f"<td>{cell}</td>" for cell in cells)
 
 

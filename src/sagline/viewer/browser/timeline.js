@@ -279,7 +279,7 @@
   for (const [keys, words] of [
     ["On the timeline"],
     ["← →", "the sample before, the next one; with Shift ten, with Ctrl from event to event"],
-    ["Page Up, Page Down", "a tenth of the time"],
+    ["Page Up, Page Down", "a tenth of the time on, or back"],
     ["Space", "play, pause"],
     ["+ − 0", "look closer, from farther, at the whole"],
   ]) window.sagline.key(keys, words);
