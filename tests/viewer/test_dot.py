@@ -243,6 +243,45 @@ def test_marks_are_where_their_ways_are() -> None:
     assert {mark.name for mark in found.at(snapshot.plan, further=False)} < set(METHODS)
 
 
+def changed(name: str) -> sl.Robot:
+    """A preset, another object each time; "guides" has some behind its anchors."""
+    if name != "guides":
+        return sl.load_robot(name).replace(notes="")
+    robot = sl.load_robot("cogiro")
+    guide = np.broadcast_to([[0.1, 0.0, -0.6]], (8, 1, 3)) + robot.frame_anchors[:, None]
+    return robot.replace(winches=sl.Winch(guides=guide))
+
+
+@pytest.mark.parametrize("name", ["cogiro", "ipanema-2-pulleys", "article-suspended", "guides"])
+def test_marks_of_a_robot_that_is_moved_are_those_of_one_that_is_not(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From the second pose on solvers answer, which know no guides; another robot has none at first."""
+    robot, moved, calls = changed(name), Marks(), list[sl.Pose]()
+
+    def counted(*arguments: Any) -> sl.Plan:
+        calls.append(arguments[1])
+        return sl.inverse(*arguments)
+
+    monkeypatch.setattr("sagline.viewer.dot_marks.inverse", counted)
+    home, load = home_pose(robot), np.array([30.0, -20.0, -50.0, 4.0, 2.0, -1.0])
+    for k, away in enumerate(([0.0, 0.0, 0.0], [0.4, 0.1, 0.2], [-0.5, 0.3, -0.1], [2.4, 1.3, 0.6])):
+        pose = sl.Pose.from_euler(home.position + away, 0.02 * k, -0.03, 0.05)
+        plan = sl.inverse(robot, pose, wrench=load)
+        calls.clear()
+        marks = moved.at(plan, further=True)
+        assert len(calls) == (0 if k and name != "guides" else len(METHODS))
+        for mark, expected in zip(marks, Marks().at(plan, further=True), strict=True):
+            assert (mark.name, mark.letter, mark.missing) == (expected.name, expected.letter, expected.missing)
+            np.testing.assert_array_equal(mark.tension, expected.tension)
+    other = sl.inverse(changed(name), home)
+    calls.clear()
+    moved.at(other, further=True)
+    assert len(calls) == len(METHODS)
+    moved.at(sl.inverse(other.state.one_robot, pose), further=True, verdicts=False)
+    assert len(calls) == 2 * len(METHODS)
+
+
 def test_what_a_way_misses_is_told() -> None:
     robot = sl.load_robot("article-suspended")
     pose = sl.Pose([5.0, 3.0, 2.2], np.eye(3))

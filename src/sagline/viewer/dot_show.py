@@ -69,7 +69,8 @@ class DotShow:
             self._key = key
             if self._field is not None and self._aim is None:
                 self._aim = self._field.polygon.coordinates(snapshot.tension)
-            marks = self._marks.at(snapshot.plan, further=self._ready(Reading.SHARING)) if self._field else ()
+            further, verdicts = self._ready(Reading.SHARING), self._ready(Reading.VERDICTS)
+            marks = self._marks.at(snapshot.plan, further=further, verdicts=verdicts) if self._field else ()
             self._panel.show_polygon(polygon_figure(snapshot, marks, self._field, self._panel.way))
 
     def tick(self) -> None:
