@@ -16,6 +16,7 @@ from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
 PATIENCE = 300.0  # s: far more than anything takes, kernels that are compiled first on a busy machine included
+LEAVING = 0.5  # s to hear farewell: behind all that was not read it never comes
 _MARKS = count(1)
 
 
@@ -33,7 +34,13 @@ class Client:
     def __init__(self, port: int) -> None:
         self.far = 100.0 + next(_MARKS)  # m: by which a server knows it from others
         protocol = Subprotocol(f"viser-v{viser.__version__}")
-        self._socket = connect(f"ws://127.0.0.1:{port}", subprotocols=[protocol], compression=None, max_size=None)
+        self._socket = connect(
+            f"ws://127.0.0.1:{port}",
+            subprotocols=[protocol],
+            compression=None,
+            max_size=None,
+            close_timeout=LEAVING,
+        )
         self.look([0, -10, 3], [0, 0, 0])
 
     def __enter__(self) -> Client:

@@ -4,18 +4,21 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path as FilePath
 from typing import Literal
 
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image
 from playwright.sync_api import Browser, ConsoleMessage, Error, FloatRect, Page
 from viser._messages import ViewerCameraMessage
 
 import sagline as sl
 from sagline.viewer.run import Run
 from sagline.viewer.server import started, stop
+from sagline.viewer.stage import PLATFORM
 from sagline.viewer.viewer import Viewer
 from tests.calibration.made_up import made_up
 from tests.chromium import NEEDED, PATIENCE, launched
@@ -29,6 +32,15 @@ SCENE = "canvas[data-engine]"
 BACKGROUND = "getComputedStyle(document.querySelector('div:has(> div > [data-dock-root])')).backgroundColor"
 OVERFLOWING = """() => [...document.querySelectorAll(".sagline, .sagline td, .mantine-NumberInput-input")]
     .filter((each) => each.scrollWidth > each.clientWidth + 1).map((each) => each.outerHTML.slice(0, 200))"""
+# what is drawn for no screen, as a picture of surroundings is for its light to be taken from
+OFF_SCREEN = """(() => {
+    window.offScreen = 0
+    const drawn = WebGL2RenderingContext.prototype.drawArrays
+    WebGL2RenderingContext.prototype.drawArrays = function (...what) {
+        window.offScreen += this.getParameter(this.FRAMEBUFFER_BINDING) !== null
+        return drawn.apply(this, what)
+    }
+})()"""
 # ten pictures a second will do: without a graphics card each is work for all cores
 FEWER_PICTURES = """(() => {
     window.requestAnimationFrame = (draw) => setTimeout(() => draw(performance.now()), 100)
@@ -78,6 +90,7 @@ def opened(
     page = browser.new_page(viewport={"width": width, "height": height}, color_scheme=theme)
     page.set_default_timeout(1e3 * PATIENCE)
     page.add_init_script(FEWER_PICTURES)
+    page.add_init_script(OFF_SCREEN)
     page.on("console", hear)
     page.on("pageerror", fail)
     try:
@@ -119,6 +132,24 @@ def test_a_slider_changes_cables_and_numbers(browser: Browser) -> None:
         type_in(page, "Cable density", "10")
         await_that(page, lambda: viewer.view is not None and viewer.view.settings.density == 10.0)
         page.get_by_text("650 g/m").wait_for()
+
+
+def test_the_platform_is_lit_without_a_picture_of_surroundings(browser: Browser) -> None:
+    """Which a machine without a graphics card works at for five seconds; without light the platform would be black."""
+    with opened(browser, sl.load_robot("falcon-7"), width=1300) as (page, _):
+        found: list[np.ndarray] = []
+
+        def lit() -> bool:
+            with Image.open(BytesIO(page.locator(SCENE).screenshot())) as picture:
+                colors = np.asarray(picture.convert("RGB"), dtype=np.float64).reshape(-1, 3)
+            blue = colors[(colors[:, 2] > colors[:, 0] + 90.0) & (colors[:, 1] > colors[:, 0] + 40.0)]
+            found[:] = [blue]
+            return len(blue) > 200
+
+        await_that(page, lit)  # the lighter sides and the darker ones
+        assert np.linalg.norm(np.median(found[0], axis=0) - PLATFORM) < 60.0
+        page.wait_for_timeout(1000)
+        assert page.evaluate("window.offScreen") == 0
 
 
 def test_a_run_plays_in_the_page(browser: Browser) -> None:

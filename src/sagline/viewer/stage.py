@@ -24,6 +24,7 @@ from sagline.viewer.tension_scale import TensionScale
 STEEL, DRUM, FLOOR, SECTION = (120, 128, 138), (104, 112, 122), (172, 178, 186), (132, 138, 146)
 PLATFORM, INFEASIBLE, REST = (58, 134, 201), (220, 56, 48), (200, 118, 16)
 TRUTH = (150, 90, 190)
+SKY, GROUND, SKYLIGHT = (255, 255, 255), (130, 130, 130), 3.5  # light from above and from below, and its intensity
 WANTED, ACTUAL = PLATFORM, REST  # the paths of these two platforms
 GHOST = (128, 134, 142)
 CABLE_WIDTH, GHOST_WIDTH, TRACE_WIDTH, ARM_WIDTH = 3.5, 1.5, 2.5, 3.0  # px
@@ -53,7 +54,7 @@ class Stage:
             pixel: What lines that are wide so many pixels are wide so many of in the scene [m]; 0 for on the screen.
         """
         self._scene, self._live, self._pixel = scene, live, pixel
-        self._scene.configure_default_lights(cast_shadow=False)  # a small screen has better things to compute
+        self._build_lights()
         self._low, self._high = solids.bounds(robot)
         self._size = solids.size_of(robot)
         self._winches = solids.winches(robot)
@@ -181,6 +182,17 @@ class Stage:
         if self._pixel == 0.0:
             return {"thickness": pixels, "thickness_units": "screen"}
         return {"thickness": pixels * self._pixel, "thickness_units": "world"}
+
+    def _build_lights(self) -> None:
+        """Light from the sky, and a little from below, without shadows: a page may have no graphics card.
+
+        There the picture of surroundings that viser takes its light from is five seconds of work; nothing moves then.
+        """
+        self._scene.configure_environment_map(hdri=None)
+        self._scene.configure_default_lights(cast_shadow=False)
+        self._scene.add_light_hemisphere(
+            "/sky", sky_color=SKY, ground_color=GROUND, intensity=SKYLIGHT, position=(0.0, 0.0, 1.0)
+        )
 
     def _build_surroundings(self, robot: Robot) -> None:
         frame = solids.frame(robot)
