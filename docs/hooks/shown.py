@@ -46,7 +46,7 @@ SHOWN: Final = {
     "robots": told("robots"),
     "show": told("show falcon-7"),
     "examples": told("examples --out files"),
-    "new": told("new hall.yaml"),
+    "new": told("new shed.yaml"),
     "convert": told("convert robot.wcrfx"),
     "export-c": told("export-c cogiro"),
     "export-scl": told("export-scl article-prototype"),
