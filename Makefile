@@ -10,11 +10,12 @@ PYTHON ?= $(FOUND)
 
 .DEFAULT_GOAL := help
 unexport PYTHONDONTWRITEBYTECODE # else each of a hundred processes compiles anew all that it imports
-.PHONY: help env run article test coverage check format bench soak docs dist clean
+.PHONY: help env run article test test-all test-extended coverage check format messages record mutants bench soak docs dist clean
 
 help: ## show this list
-	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{ printf "  make %-8s %s\n", $$1, $$2 }'
-	@echo "  PYTHON=... names the interpreter (Python 3.11 or newer), OUT=... the folder of make run"
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{ printf "  make %-13s %s\n", $$1, $$2 }'
+	@echo "  PYTHON=... names the interpreter (Python 3.11 or newer), OUT=... the folder of make run,"
+	@echo "  FOLDER=... one folder of tests for make test, test-extended and mutants: FOLDER=calibration"
 
 env: $(STAMP) ## create .venv with everything in it (again only when pyproject.toml changes)
 
@@ -31,13 +32,29 @@ run: env ## the main job: the article's test, its table, runs and figures in OUT
 article: env ## the article's figures, tables and errata redone, as one page in OUT
 	$(BIN)/sagline article --out $(OUT)
 
-test coverage: export OPENBLAS_NUM_THREADS := 1 # a worker has a core
+test test-extended coverage record mutants: export OPENBLAS_NUM_THREADS := 1 # a worker has a core
+PYTEST = $(BIN)/python -m pytest $(addprefix tests/,$(FOLDER))
+PARALLEL := --numprocesses auto --dist worksteal
 
-test: env check ## all checks, then the whole test suite
-	$(BIN)/python -m pytest --numprocesses auto --dist worksteal
+test: env ## the first tier of the tests: minutes
+	$(PYTEST) -m "not extended and not soak" $(PARALLEL)
 
-coverage: env ## the test suite again, and which lines it runs
-	$(BIN)/python -m pytest --cov --numprocesses auto --dist worksteal
+test-extended: env ## the second tier: browsers, processes, wide parameters, other programs, documentation
+	$(PYTEST) -m "extended and not soak" $(PARALLEL)
+
+test-all: check test test-extended ## style and types, then both tiers
+
+coverage: env ## both tiers again, and which lines they run
+	$(PYTEST) --cov $(PARALLEL)
+
+messages: env ## renew the snapshots of messages; read the diff before you commit it
+	$(BIN)/python -m pytest --snapshot-update --quiet
+
+record: env ## renew the record of behavior in tests/record; read the diff before you commit it
+	$(BIN)/python -m tests.record
+
+mutants: env ## apply plausible mistakes one by one and list which tests catch them
+	$(BIN)/python -m tests.mutants $(FOLDER)
 
 check: env ## style, types and the direction of imports
 	$(BIN)/ruff check .

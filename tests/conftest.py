@@ -1,35 +1,144 @@
-"""What kernels several workers need is compiled once, before they start, on two cores, and loaded by each."""
+"""Rules for all tests: kernels are compiled once before the workers start, and the first tier stays fast.
+
+See `tests.tiers` for the two tiers.
+"""
 
 from __future__ import annotations
 
+import os
+import re
+from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import suppress
-from typing import Any
+from pathlib import Path
+from typing import Any, Final
 
 import pytest
+from numba.core import event
 
+from sagline.cli import entries
 from sagline.cli.cold_start import cold, compile_all
 from sagline.cli.entries import ENTRIES
+from tests.effort import slowness
+from tests.tiers import FILE_LIMIT, TEST_LIMIT
+
+# Compiled versions that only tests of the second tier use: they double the time that the others take to compile.
+SECOND_TIER_ENTRIES: Final = (
+    entries.CHAINS,
+    entries.FORWARD_OVER_PULLEYS,
+    entries.PROOFS,
+    entries.READINGS_OVER_PULLEYS,
+    entries.SIMULATION_OVER_PULLEYS,
+    entries.VIBRATION_OVER_PULLEYS,
+)
+ALL_EXTENDED: Final = re.compile(r"^pytestmark = (extended|\[extended\b)", re.MULTILINE)
+CPU: Final = "cpu"  # property of a report: processor time of the test [s], compilation excluded
+
+
+def first_tier_alone(config: pytest.Config) -> bool:
+    """Whether only tests of the first tier run."""
+    return "not extended" in str(config.getoption("markexpr"))
+
+
+def needed_entries(config: pytest.Config) -> list[str]:
+    """Names of the kernel entries that the selected tiers use."""
+    return [name for name in ENTRIES if not (first_tier_alone(config) and name in SECOND_TIER_ENTRIES)]
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_setupnodes(config: pytest.Config, specs: Any) -> None:
-    """Compile before there are workers; what does not compile is for the tests to tell."""
-    if waiting := cold(tuple(ENTRIES)):
+    """Compile kernels before the workers start; a kernel that does not compile is left to the tests."""
+    names = needed_entries(config)
+    if waiting := cold(names):
         config.get_terminal_writer().line(f"compiling {', '.join(waiting)} ...")
     with suppress(Exception):
         compile_all(waiting, lambda stage: None)
-        for entry in ENTRIES.values():  # loads it, or compiles it where what is on disk is of older times
-            entry.compile()
+        for name in names:  # loads it, or compiles it again if the file on disk is stale
+            ENTRIES[name].compile()
 
 
 @pytest.fixture(scope="session", autouse=True)
 def no_entry_is_compiled_by_a_test(request: pytest.FixtureRequest) -> Iterator[None]:
-    """No test of a worker finds an entry in a version that `ENTRIES` does not list, of which no command would tell.
+    """Fail if a test compiled an entry for argument types that `ENTRIES` does not list.
 
-    Mostly an argument is not read-only that is elsewhere, and every user would wait for what is the same twice.
+    The usual reason is an argument that is not read-only. A user would wait for the same compilation twice. In the
+    first tier the reason may be an entry that belongs to the second.
     """
     yield
     if hasattr(request.config, "workerinput"):
         functions: list[Any] = [entry.function for entry in ENTRIES.values()]
         assert {each.__qualname__: list(each.stats.cache_misses) for each in functions if each.stats.cache_misses} == {}
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Do not import a file whose tests all belong to the second tier when only the first runs."""
+    if first_tier_alone(config) and collection_path.name.startswith("test_") and collection_path.suffix == ".py":
+        return True if ALL_EXTENDED.search(collection_path.read_text(encoding="utf-8")) else None
+    return None
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Renew snapshots by the tests that compare one, and by no others."""
+    if config.getoption("update_snapshots", default=False):
+        items[:] = [item for item in items if "snapshot" in getattr(item, "fixturenames", ())]
+
+
+class _Compilation(event.Listener):
+    """Number of kernels compiled so far in this process."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.count = 0
+
+    def on_start(self, event: Any) -> None:
+        self.count += 1
+
+    def on_end(self, event: Any) -> None:
+        """Count the start only."""
+
+
+_compilation: Final = _Compilation()
+event.register("numba:compile", _compilation)
+
+
+def processor_time() -> float:
+    """Processor time of this process and its finished children [s]."""
+    used = os.times()
+    return used.user + used.system + used.children_user + used.children_system
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Iterator[None]:
+    """Measure a test of the first tier; fail it if it takes too long with compiled kernels."""
+    if not first_tier_alone(item.config):
+        return (yield)
+    start, before = processor_time(), _compilation.count
+    result = yield
+    used = processor_time() - start
+    if _compilation.count == before:
+        item.user_properties.append((CPU, used))
+        if used > TEST_LIMIT and used > TEST_LIMIT * slowness():
+            pytest.fail(f"{used:.1f} s of processor time; a test of the first tier may use {TEST_LIMIT:g} s")
+    return result
+
+
+_used_by_file: Final[dict[str, float]] = defaultdict(float)
+
+
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    """Add up the processor time of the tests of each file."""
+    if report.when == "call":
+        _used_by_file[report.nodeid.partition("::")[0]] += float(dict(report.user_properties).get(CPU, 0.0))
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Fail the run if the tests of a file took too long together."""
+    if hasattr(session.config, "workerinput") or not first_tier_alone(session.config):
+        return
+    slow = {file: used for file, used in _used_by_file.items() if used > FILE_LIMIT}
+    slow = slow and {file: used for file, used in slow.items() if used > FILE_LIMIT * slowness()}
+    for file, used in slow.items():
+        line = f"{file}: {used:.1f} s of processor time; a file may use {FILE_LIMIT:g} s in the first tier"
+        session.config.get_terminal_writer().line(line, red=True)
+    if slow and session.exitstatus == pytest.ExitCode.OK:
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED

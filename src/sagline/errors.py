@@ -65,16 +65,22 @@ class FileError(SaglineError):
 
     Attributes:
         path: The file or folder.
-        reason: What is wrong with it.
-        next_step: What to do about it.
+        reason: Description of the problem.
+        next_step: Action that solves it.
+        item: Part of the file that is wrong ("cable 3: linear_density", "line 12"); the path if it is the whole file.
+        value: Value of the item, as text with its unit; the reason if the value is not known.
+        allowed: Allowed values of the item; empty if not known.
     """
 
-    def __init__(self, path: Path | str, reason: str, next_step: str) -> None:
+    def __init__(self, path: Path | str, reason: str, next_step: str, *, item: str | None = None) -> None:
         """Compose the message from its three parts."""
         super().__init__(path, reason, next_step)
         self.path = Path(path)
         self.reason = reason
         self.next_step = next_step
+        self.item = str(path) if item is None else item
+        self.value = reason
+        self.allowed = ""
 
     @classmethod
     def of(cls, path: Path | str, error: InvalidValueError) -> FileError:
@@ -87,7 +93,9 @@ class FileError(SaglineError):
         Returns:
             The error, to be raised.
         """
-        return cls(path, f"{error.item} is {error.value}; allowed: {error.allowed}", error.next_step)
+        found = cls(path, f"{error.item} is {error.value}; allowed: {error.allowed}", error.next_step)
+        found.item, found.value, found.allowed = str(error.item), str(error.value), str(error.allowed)
+        return found
 
     @classmethod
     def not_installed(cls, package: str | None, needed: str, extra: str) -> FileError:

@@ -125,12 +125,13 @@ class RefusedError(SaglineError):
         what: What was asked for.
         reason: Why not.
         next_step: What to do about it.
+        item: The same as `what`, under the name that all errors have.
     """
 
     def __init__(self, what: str, reason: str, next_step: str) -> None:
         """Compose the message from its three parts."""
         super().__init__(what, reason, next_step)
-        self.what = what
+        self.what = self.item = what
         self.reason = reason
         self.next_step = next_step
 

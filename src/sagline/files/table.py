@@ -87,7 +87,8 @@ class Table:
         except csv.Error as error:
             raise line_error(path, reader.line_num, f"it is no CSV ({error})") from None
         if not found:
-            raise FileError(path, f"no columns; allowed: {', '.join(units)}", "Give the names of the columns first.")
+            reason, step = f"no columns; allowed: {', '.join(units)}", "Give the names of the columns first."
+            raise FileError(path, reason, step, item="columns")
         values = np.array(numbers).reshape(len(lines), len(found))
         factors = [1.0 if factor is None else factor for factor in found.values()]
         with np.errstate(over="ignore"):  # what is too large is told below
@@ -198,4 +199,6 @@ def line_error(path: FilePath, line: int, reason: str) -> FileError:
     Returns:
         The error, to be raised.
     """
-    return FileError(path, f"line {line}: {reason}", f"Correct line {line}.")
+    found = FileError(path, f"line {line}: {reason}", f"Correct line {line}.", item=f"line {line}")
+    found.value, _, found.allowed = reason.partition("; allowed: ")
+    return found
