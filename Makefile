@@ -4,13 +4,14 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 OUT ?= output
+SEED ?= $(shell date +%s)
 FOUND = $(shell for p in python3 python3.13 python3.12 python3.11 python3.14; do \
 	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 && { echo $$p; break; }; done)
 PYTHON ?= $(FOUND)
 
 .DEFAULT_GOAL := help
 unexport PYTHONDONTWRITEBYTECODE # else each of a hundred processes compiles anew all that it imports
-.PHONY: help env run article test test-all test-extended coverage check format messages record mutants bench soak docs dist clean
+.PHONY: help env run article test test-all test-extended coverage check format messages record mutants size bench soak docs dist clean
 
 help: ## show this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{ printf "  make %-13s %s\n", $$1, $$2 }'
@@ -32,7 +33,7 @@ run: env ## the main job: the article's test, its table, runs and figures in OUT
 article: env ## the article's figures, tables and errata redone, as one page in OUT
 	$(BIN)/sagline article --out $(OUT)
 
-test test-extended coverage record mutants: export OPENBLAS_NUM_THREADS := 1 # a worker has a core
+test test-extended coverage record mutants soak: export OPENBLAS_NUM_THREADS := 1 # a worker has a core
 PYTEST = $(BIN)/python -m pytest $(addprefix tests/,$(FOLDER))
 PARALLEL := --numprocesses auto --dist worksteal
 
@@ -59,18 +60,22 @@ mutants: env ## apply plausible mistakes one by one and list which tests catch t
 check: env ## style, types and the direction of imports
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy --num-workers 2 src $(wildcard tests examples benchmarks)
+	$(BIN)/mypy --num-workers 2 src $(wildcard tests examples benchmarks tools)
 	$(BIN)/lint-imports
 
 format: env ## put the source in shape
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
+size: env ## counts of the source: lines, files, names, imports
+	$(BIN)/python tools/size.py
+
 bench: env ## one table of times and ratios, on one core
 	$(BIN)/python -m benchmarks.bench
 
-soak: env ## the long tests that make test leaves out
+soak: env ## the long tests that test-all leaves out, then all others in a random order
 	$(BIN)/python -m pytest -m soak
+	$(PYTEST) --random-order=$(SEED) $(PARALLEL)
 
 docs: env ## the documentation site, into build/site; warnings are errors
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'

@@ -6,6 +6,7 @@ See `tests.tiers` for the two tiers.
 from __future__ import annotations
 
 import os
+import random
 import re
 from collections import defaultdict
 from collections.abc import Iterator
@@ -77,10 +78,19 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
     return None
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the option for a random order."""
+    parser.addoption(
+        "--random-order", type=int, metavar="SEED", help="shuffle all tests; the same seed, the same order"
+    )
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Renew snapshots by the tests that compare one, and by no others."""
+    """Renew snapshots by the tests that compare one, and by no others; shuffle the tests if asked for."""
     if config.getoption("update_snapshots", default=False):
         items[:] = [item for item in items if "snapshot" in getattr(item, "fixturenames", ())]
+    if (seed := config.getoption("--random-order")) is not None:
+        random.Random(seed).shuffle(items)
 
 
 class _Compilation(event.Listener):

@@ -1,0 +1,83 @@
+"""Rules for the tests themselves: parts of errors instead of sentences, public names instead of inner modules."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+TESTS = Path(__file__).parent
+LETTERS = re.compile(r"[A-Za-z]{2}")
+SENTENCES = 100  # literal sentences that may be left, outside the snapshots
+# Folders whose tests look at kernels by themselves, or at every module.
+OF_ALL_MODULES = {"kernels", "abuse", "docs", ""}
+
+
+@cache
+def trees() -> dict[Path, ast.Module]:
+    return {file: ast.parse(file.read_text(encoding="utf-8")) for file in sorted(TESTS.rglob("*.py"))}
+
+
+def is_sentence(node: ast.AST) -> bool:
+    """Whether a literal has three words or more, as the messages of sagline have."""
+    if isinstance(node, ast.JoinedStr):
+        text = "".join(str(part.value) for part in node.values if isinstance(part, ast.Constant))
+    else:
+        text = node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else ""
+    return sum(1 for word in text.split(" ") if LETTERS.search(word)) >= 3
+
+
+def sentences(tree: ast.Module) -> Iterator[int]:
+    """Lines of the sentences that are compared: in an assertion, or as `match` of `pytest.raises`."""
+    for node in ast.walk(tree):
+        looked_at = node.test if isinstance(node, ast.Assert) else None
+        if isinstance(node, ast.keyword) and node.arg == "match":
+            looked_at = node.value
+        if looked_at is not None:
+            inside = {
+                id(part) for each in ast.walk(looked_at) if isinstance(each, ast.JoinedStr) for part in each.values
+            }
+            yield from (
+                each.lineno
+                for each in ast.walk(looked_at)
+                if isinstance(each, ast.Constant | ast.JoinedStr) and id(each) not in inside and is_sentence(each)
+            )
+
+
+def test_few_tests_compare_a_literal_sentence() -> None:
+    found = [f"{file.relative_to(TESTS)}:{line}" for file, tree in trees().items() for line in sentences(tree)]
+    assert len(found) <= SENTENCES, f"{len(found)} sentences; compare parts of an error, or a snapshot: {found}"
+
+
+def foreign_modules(file: Path, tree: ast.Module) -> Iterator[str]:
+    """Inner modules of another folder of the source that a test imports."""
+    parts = file.relative_to(TESTS).parts
+    folder = parts[0] if len(parts) > 1 else ""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            names = node.module.split(".")
+            if names[0] == "sagline" and len(names) > 2 and names[1] != folder:
+                yield f"{file.relative_to(TESTS)}:{node.lineno} {node.module}"
+
+
+def test_tests_import_public_names_or_their_own_folder() -> None:
+    found = [
+        line
+        for file, tree in trees().items()
+        if file.relative_to(TESTS).parts[0] not in OF_ALL_MODULES
+        for line in foreign_modules(file, tree)
+    ]
+    assert found == []
+
+
+def test_a_sentence_is_told_from_a_name_and_from_a_number_with_its_unit() -> None:
+    code = """
+assert "mass is not positive" in text
+assert error.item == "cable 3: linear_density"
+assert f"{value} of the poses cannot be reached" in text
+with pytest.raises(ValueError, match="the pose is singular"): pass
+assert value == "25 N"
+"""
+    assert sorted(sentences(ast.parse(code))) == [2, 4, 5]

@@ -1,0 +1,117 @@
+"""Size of the source: `make size` prints one table of counts, so that a change can be compared with the state before.
+
+Code lines are lines with a token that is neither a comment nor part of a docstring. A record type is a NamedTuple, a
+dataclass or an attrs class. A public-looking name is that of a function or class at the top of a module that does not
+begin with an underscore.
+"""
+
+from __future__ import annotations
+
+import ast
+import io
+import re
+import sys
+import tokenize
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+ROOT: Final = Path(__file__).parents[1]
+LONG_FUNCTION, LONG_FILE = 60, 400  # code lines of a function, lines of a file
+LAYOUT: Final = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENCODING}
+CLAUSE: Final = re.compile(r"(What|How|Whether|Where|Which|Who|Whatever)\b")
+Function = ast.FunctionDef | ast.AsyncFunctionDef
+
+
+def docstring_lines(tree: ast.Module) -> set[int]:
+    """Numbers of the lines of all docstrings of a module."""
+    found: set[int] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | Function) and ast.get_docstring(node, clean=False) is not None:
+            text = node.body[0]
+            found.update(range(text.lineno, (text.end_lineno or text.lineno) + 1))
+    return found
+
+
+def code_lines(source: str, docstrings: set[int]) -> set[int]:
+    """Numbers of the lines with code."""
+    found: set[int] = set()
+    for token in tokenize.generate_tokens(io.StringIO(source).readline):
+        if token.type not in LAYOUT and token.type != tokenize.ENDMARKER:
+            found.update(range(token.start[0], token.end[0] + 1))
+    return found - docstrings
+
+
+def is_record(node: ast.ClassDef) -> bool:
+    """Whether a class is a NamedTuple, a dataclass or an attrs class."""
+    words = " ".join(ast.unparse(each) for each in (*node.bases, *node.decorator_list))
+    return bool(re.search(r"NamedTuple|dataclass|attrs\.|\bdefine\b|\bfrozen\b", words))
+
+
+def top_names(tree: ast.Module) -> Iterator[str]:
+    """Names of functions and classes at the top of a module."""
+    for node in tree.body:
+        if isinstance(node, Function | ast.ClassDef):
+            yield node.name
+
+
+def import_lines(tree: ast.Module) -> int:
+    """Number of lines of import statements."""
+    found = (node for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom))
+    return sum((node.end_lineno or node.lineno) - node.lineno + 1 for node in found)
+
+
+def counts() -> tuple[Counter[str], Counter[str]]:
+    """Counts of the whole source, and code lines of each folder."""
+    total: Counter[str] = Counter()
+    folders: Counter[str] = Counter()
+    modules: defaultdict[str, set[str]] = defaultdict(set)
+    package = ROOT / "src" / "sagline"
+    for file in sorted(package.rglob("*.py")):
+        source = file.read_text(encoding="utf-8")
+        tree = ast.parse(source)
+        docstrings = docstring_lines(tree)
+        code = code_lines(source, docstrings)
+        parts = file.relative_to(package).parts
+        folders[parts[0] if len(parts) > 1 else "(top)"] += len(code)
+        total["files"] += 1
+        total["code lines"] += len(code)
+        total["docstring lines"] += len(docstrings)
+        total["import lines"] += import_lines(tree)
+        total[f"files of more than {LONG_FILE} lines"] += source.count("\n") > LONG_FILE
+        for name in top_names(tree):
+            modules[name].add(str(file))
+            total["public-looking names"] += not name.startswith("_")
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ClassDef):
+                total["record types"] += is_record(node)
+            if isinstance(node, Function):
+                inside = code & set(range(node.lineno, (node.end_lineno or node.lineno) + 1))
+                total[f"functions of more than {LONG_FUNCTION} code lines"] += len(inside) > LONG_FUNCTION
+            if isinstance(node, ast.ClassDef | Function | ast.Module) and (text := ast.get_docstring(node)):
+                total["docstrings"] += 1
+                total["docstrings that open with a clause"] += bool(CLAUSE.match(text))
+    total["names in more than one module"] = sum(len(files) > 1 for name, files in modules.items() if name[0] != "_")
+    return total, folders
+
+
+def main() -> int:
+    """Print both tables."""
+    sys.path.insert(0, str(ROOT / "src"))
+    import sagline
+
+    total, folders = counts()
+    total["public names"] = len(sagline.__all__)
+    for name, count in total.items():
+        print(f"{name:45s} {count:7,d}")
+    print(f"{'public-looking names for a public one':45s} {total['public-looking names'] / total['public names']:7.1f}")
+    print(f"{'import lines, share of the code':45s} {100.0 * total['import lines'] / total['code lines']:6.1f}%")
+    print("\ncode lines of the folders")
+    for name, count in folders.most_common():
+        print(f"{name:45s} {count:7,d}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
