@@ -11,11 +11,13 @@ import re
 from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
 import pytest
 from numba.core import event
+from typer.main import get_command
 
 from sagline.cli import entries
 from sagline.cli.cold_start import cold, compile_all
@@ -71,6 +73,25 @@ def no_entry_is_compiled_by_a_test(request: pytest.FixtureRequest) -> Iterator[N
         assert {each.__qualname__: list(each.stats.cache_misses) for each in functions if each.stats.cache_misses} == {}
 
 
+@pytest.fixture(scope="session", autouse=True)
+def libraries_are_loaded(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Load large libraries before the first test, so that no test is charged with their import."""
+    import xarray
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    xarray.Dataset({"x": ("row", [1.0])}).to_netcdf(tmp_path_factory.mktemp("load") / "x.nc", engine="h5netcdf")
+    FigureCanvasAgg(Figure()).draw()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def command_built_once() -> Iterator[None]:
+    """Keep the command that `CliRunner` would build again for every command line, which takes 40 ms."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("typer.testing._get_command", cache(get_command))
+        yield
+
+
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
     """Do not import a file whose tests all belong to the second tier when only the first runs."""
     if first_tier_alone(config) and collection_path.name.startswith("test_") and collection_path.suffix == ".py":
@@ -79,7 +100,8 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the option for a random order."""
+    """Add options for the order and the limits of time."""
+    parser.addoption("--no-limits", action="store_true", help="do not limit the processor time of the first tier")
     parser.addoption(
         "--random-order", type=int, metavar="SEED", help="shuffle all tests; the same seed, the same order"
     )
@@ -127,7 +149,7 @@ def pytest_runtest_call(item: pytest.Item) -> Iterator[None]:
     used = processor_time() - start
     if _compilation.count == before:
         item.user_properties.append((CPU, used))
-        if used > TEST_LIMIT and used > TEST_LIMIT * slowness():
+        if used > TEST_LIMIT and not item.config.getoption("--no-limits") and used > TEST_LIMIT * slowness():
             pytest.fail(f"{used:.1f} s of processor time; a test of the first tier may use {TEST_LIMIT:g} s")
     return result
 
@@ -143,7 +165,8 @@ def pytest_runtest_logreport(report: pytest.TestReport) -> None:
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
     """Fail the run if the tests of a file took too long together."""
-    if hasattr(session.config, "workerinput") or not first_tier_alone(session.config):
+    unlimited = session.config.getoption("--no-limits") or not first_tier_alone(session.config)
+    if unlimited or hasattr(session.config, "workerinput"):
         return
     slow = {file: used for file, used in _used_by_file.items() if used > FILE_LIMIT}
     slow = slow and {file: used for file, used in slow.items() if used > FILE_LIMIT * slowness()}

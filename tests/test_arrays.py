@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sagline import InvalidValueError
 from sagline.arrays import checked, kernel_input, locked, number
-from sagline.errors import InvalidValueError
+from tests.refusal import refused
 
 
 def test_a_callers_array_is_copied_and_locked() -> None:
@@ -55,19 +56,19 @@ def test_kernel_input_keeps_the_shape_of_a_single_value() -> None:
 
 
 @pytest.mark.parametrize(
-    ("value", "limits", "words"),
+    ("value", "limits", "parts"),
     [
-        ([1.0, np.nan], {}, r"x\[1\] is nan m; allowed: finite"),
-        ([1.0, np.inf], {}, r"x\[1\] is inf m"),
-        (-np.inf, {"infinite": True, "low": 0.0}, "x is -inf m; allowed: >= 0 m"),
-        ([[0.0, -1.0]], {"low": 0.0}, r"x\[0, 1\] is -1 m; allowed: >= 0 m, finite"),
-        (0.0, {"above": 0.0}, "x is 0 m; allowed: > 0 m, finite"),
-        ([1.0, 2.0], {"shape": (3,)}, r"x is of shape \(2,\); allowed: shape \(..., 3\)"),
-        ("near", {}, "x is 'near'; allowed: numbers"),
+        ([1.0, np.nan], {}, ("x[1]", "nan m", "finite")),
+        ([1.0, np.inf], {}, ("x[1]", "inf m", "finite")),
+        (-np.inf, {"infinite": True, "low": 0.0}, ("x", "-inf m", ">= 0 m")),
+        ([[0.0, -1.0]], {"low": 0.0}, ("x[0, 1]", "-1 m", ">= 0 m, finite")),
+        (0.0, {"above": 0.0}, ("x", "0 m", "> 0 m, finite")),
+        ([1.0, 2.0], {"shape": (3,)}, ("x", "of shape (2,)", "shape (..., 3)")),
+        ("near", {}, ("x", "'near'", "numbers")),
     ],
 )
-def test_what_is_wrong_is_named(value: object, limits: dict[str, object], words: str) -> None:
-    with pytest.raises(InvalidValueError, match=words):
+def test_what_is_wrong_is_named(value: object, limits: dict[str, object], parts: tuple[str, ...]) -> None:
+    with refused(*parts, kind=InvalidValueError):
         checked(value, "x", "m", **limits)  # type: ignore[arg-type]
 
 
@@ -76,22 +77,22 @@ def test_infinity_may_pass_where_it_means_no_limit() -> None:
 
 
 @pytest.mark.parametrize(
-    ("value", "words"),
+    ("value", "parts"),
     [
-        ([1.0 + 2.0j], "complex"),
-        (np.array([1.0 + 0.0j]), "complex"),
-        (["1.5"], "allowed: numbers"),
-        ([None, 1.0], "None"),
-        ([[1.0], [1.0, 2.0]], "inhomogeneous"),
-        (np.array(["2020-01-01"], dtype="datetime64[D]"), "dates"),
-        (np.ma.MaskedArray([1.0, 2.0], mask=[False, True]), r"x\[1\] is masked"),
-        (10**400, "too large"),
-        (1e60, "up to 1e\\+50 m"),
-        (np.broadcast_to(1.0, 10**13), "is 8e\\+04 GB; allowed: <= "),
+        ([1.0 + 2.0j], ("x", "complex: (1+2j)", "numbers, real ones")),
+        (np.array([1.0 + 0.0j]), ("x", "complex: (1+0j)", "numbers, real ones")),
+        (["1.5"], ("x", "'1.5'", "numbers")),
+        ([None, 1.0], ("x", "None", "numbers")),
+        ([[1.0], [1.0, 2.0]], ("x", "[[1.0], [1.0, 2.0]]", "numbers")),
+        (np.array(["2020-01-01"], dtype="datetime64[D]"), ("x", "dates: datetime.date(2020, 1, 1)")),
+        (np.ma.MaskedArray([1.0, 2.0], mask=[False, True]), ("x[1]", "masked", "a number")),
+        (10**400, ("x", "100000000000000000...0000000000000000000", "numbers")),
+        (1e60, ("x", "1e+60 m", "up to 1e+50 m either way, finite")),
+        (np.broadcast_to(1.0, 10**13), ("the memory for x", "8e+04 GB")),
     ],
 )
-def test_what_is_no_plain_number_is_refused(value: object, words: str) -> None:
-    with pytest.raises(InvalidValueError, match=words):
+def test_what_is_no_plain_number_is_refused(value: object, parts: tuple[str, ...]) -> None:
+    with refused(*parts, kind=InvalidValueError):
         checked(value, "x", "m")  # type: ignore[arg-type]
 
 
@@ -103,18 +104,18 @@ class InMillimeters:
 
 
 def test_a_unit_of_its_own_is_taken_only_where_it_is_ours() -> None:
-    with pytest.raises(InvalidValueError, match="x is in mm, a unit of its own; allowed: numbers in m"):
+    with refused("x", allowed="numbers in m", kind=InvalidValueError):
         checked(InMillimeters(), "x", "m")
     np.testing.assert_array_equal(checked(InMillimeters(), "x", "mm"), [1.0])
 
 
 def test_what_one_divides_by_is_not_next_to_nothing() -> None:
-    with pytest.raises(InvalidValueError, match="mass is 1e-60 kg; allowed: > 0 kg, 1e-50 to"):
+    with refused("mass", "1e-60 kg", "> 0 kg, 1e-50 to 1e+50 kg, finite", kind=InvalidValueError):
         number(1e-60, "mass", "kg", above=0.0)
     assert number(1e-60, "force", "N", low=0.0) == 1e-60
 
 
 def test_missing_numbers_pass_where_they_may() -> None:
     np.testing.assert_array_equal(checked([1.0, np.nan], "x", "m", missing=True), [1.0, np.nan])
-    with pytest.raises(InvalidValueError, match=r"x\[1\] is inf m"):
+    with refused("x[1]", "inf m", "finite", kind=InvalidValueError):
         checked([np.nan, np.inf], "x", "m", missing=True)

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.tiers import extended
+
 DECLARED = {  # each result's save, the one lazy call outward
     ("sagline.kinematics.plan", "sagline.files.plan_file"),
     ("sagline.dynamics.frequency_map", "sagline.files.frequency_map_file"),
@@ -77,12 +79,14 @@ def graph() -> dict[str, set[str]]:
     return {name: set(imported(ast.parse(file.read_text()), set(files))) for name, file in files.items()}
 
 
+@extended
 def test_no_module_leads_back_to_itself(graph: dict[str, set[str]]) -> None:
     assert len(graph) > 200
     kept = {name: {to for to in targets if (name, to) not in DECLARED} for name, targets in graph.items()}
     assert circles(kept) == []
 
 
+@extended
 def test_what_is_declared_is_there_and_closes_a_circle(graph: dict[str, set[str]]) -> None:
     for outward, target in DECLARED:
         assert target in graph[outward]

@@ -15,6 +15,10 @@ from typing import NamedTuple
 
 import pytest
 
+from tests.tiers import extended
+
+pytestmark = extended
+
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 NAME = f"sagline-{PROJECT['version']}"
@@ -98,7 +102,7 @@ def test_the_wheel_has_the_package_its_data_and_examples_and_nothing_else(built:
 
 def test_the_source_distribution_has_all_that_the_work_needs(unpacked: Path) -> None:
     top = {path.name for path in unpacked.iterdir()}
-    folders = {"src", "tests", "docs", "examples", "benchmarks"}
+    folders = {"src", "tests", "docs", "examples", "benchmarks", "tools"}
     files = {"CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "Makefile", "README.md", "mkdocs.yml"}
     assert top == folders | files | {"pyproject.toml", "PKG-INFO", ".gitignore"}
     for folder in sorted(folders):

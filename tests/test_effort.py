@@ -6,6 +6,7 @@ from itertools import count
 import pytest
 
 from tests import effort
+from tests.tiers import extended
 
 
 def busy(seconds: float) -> None:
@@ -14,6 +15,7 @@ def busy(seconds: float) -> None:
         pass
 
 
+@extended
 def test_work_that_takes_too_long_is_found_and_what_was_disturbed_is_not() -> None:
     assert effort.least_seconds(lambda: busy(0.8), 0.05) > 0.05
     assert effort.least_seconds(lambda: None, 0.05, seen=9.0) < 0.05  # it was something else, once
@@ -28,7 +30,7 @@ def test_what_is_quick_enough_is_not_done_again() -> None:
 
 def test_a_machine_of_half_the_speed_has_twice_the_time(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(effort, "piece", lambda: 2.0 * effort.ORDINARY)
-    assert effort.least_seconds(lambda: busy(0.3), 0.2) == pytest.approx(0.15, rel=0.2)
+    assert effort.least_seconds(lambda: busy(0.15), 0.1) == pytest.approx(0.075, rel=0.2)
     monkeypatch.setattr(effort, "slowness_of_waiting", lambda: 2.0)
     assert effort.best_rate(lambda: 20.0, 30.0) == 40.0
 

@@ -7,7 +7,8 @@ import pickle
 import numpy as np
 import pytest
 
-from sagline.errors import MOST, FileError, InvalidValueError, nearest, printable, shortened
+from sagline import FileError, InvalidValueError
+from sagline.errors import MOST, nearest, printable, shortened
 
 SEED = 7
 
@@ -27,9 +28,10 @@ def test_an_error_is_one_short_line_whatever_is_in_it() -> None:
 
 
 def test_what_is_short_stays_when_something_long_is_cut() -> None:
-    text = str(FileError("robot.yaml", "name is " + "y" * 1000 + "; allowed: a word", "Correct name."))
-    assert text.startswith("robot.yaml: name is yyy")
-    assert text.endswith("yyy; allowed: a word. Correct name.")
+    begin, end, step = "name is ", "; allowed: a word", "Correct name."
+    text = str(FileError("robot.yaml", begin + "y" * 1000 + end, step))
+    assert text.startswith(f"robot.yaml: {begin}yyy")
+    assert text.endswith(f"yyy{end}. {step}")
     assert len(text) == MOST
     assert str(InvalidValueError("a", "b", "c", "D.")) == "a is b; allowed: c. D."
 
@@ -48,7 +50,7 @@ def test_a_long_part_loses_its_middle_and_the_others_nothing(long: int) -> None:
 
 def test_texts_of_any_length_fit_together() -> None:
     generator = np.random.default_rng(SEED)
-    for _ in range(2000):
+    for _ in range(400):
         parts = ["x" * int(size) for size in generator.integers(0, 400, size=generator.integers(1, 5))]
         fitted = shortened(parts, room=280)
         assert sum(map(len, fitted)) == min(280, sum(map(len, parts)))
@@ -61,7 +63,7 @@ def test_errors_keep_their_data_whole() -> None:
     assert error.value == "z" * 1000
     again = pickle.loads(pickle.dumps(FileError.of("a.yaml", error)))
     assert (again.path.name, again.next_step) == ("a.yaml", "Correct mass.")
-    assert again.reason.endswith("zz; allowed: > 0 kg")
+    assert (again.item, again.value, again.allowed) == ("mass", error.value, "> 0 kg")
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,8 @@ import pytest
 import sagline as sl
 from sagline import memory
 from sagline.memory import check_memory, free_memory
+from tests.refusal import refused
+from tests.tiers import wide
 
 
 def test_free_memory_is_that_of_the_machine() -> None:
@@ -27,9 +29,9 @@ def test_the_limit_of_the_process_counts(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_what_does_not_fit_is_said_with_its_size(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(memory, "free_memory", lambda: 3e9)
     check_memory("a path", 2.9e9, "Check the units.")
-    with pytest.raises(sl.InvalidValueError) as caught:
+    with refused("the memory for a path", "6 GB", next_step="Check the units.", kind=sl.InvalidValueError) as caught:
         check_memory("a path", 6e9, "Check the units.")
-    assert str(caught.value) == ("the memory for a path is 6 GB; allowed: <= 3 GB, which are free. Check the units.")
+    assert caught.value.allowed.startswith("<= 3 GB")
 
 
 @pytest.mark.parametrize(("size", "free"), [(24.01e9, 24e9), (24e9 + 1024, 24e9), (5.1e12, 5.0e12), (1e8, 0.0)])
@@ -37,7 +39,7 @@ def test_what_is_asked_and_what_is_free_differ_as_printed(
     monkeypatch: pytest.MonkeyPatch, size: float, free: float
 ) -> None:
     monkeypatch.setattr(memory, "free_memory", lambda: free)
-    with pytest.raises(sl.InvalidValueError, match="the memory for position is ") as caught:
+    with refused("the memory for position", kind=sl.InvalidValueError) as caught:
         check_memory("position", size, "Give fewer poses.")
     wanted, left = (float(number) for number in re.findall(r"(\S+) GB", str(caught.value)))
     assert wanted > left
@@ -57,14 +59,15 @@ def test_paths_and_batches_ask_before_they_take(monkeypatch: pytest.MonkeyPatch)
         lambda: sl.inverse(robot, poses),
         lambda: sl.forward(robot, lengths, start=poses[0]),
     ):
-        with pytest.raises(sl.InvalidValueError, match=r"(samples|poses) is "):
+        with pytest.raises(sl.InvalidValueError) as caught:
             call()
+        assert re.search("(samples|poses)$", caught.value.item)
     assert tracemalloc.get_traced_memory()[1] < 60e6
     tracemalloc.stop()
 
 
-@pytest.mark.parametrize("winches", [None, sl.Winch(0.05, dead_cable=4.0)])
-@pytest.mark.parametrize("cable_count", [7, 8])
+@pytest.mark.parametrize("winches", wide([None, sl.Winch(0.05, dead_cable=4.0)]))
+@pytest.mark.parametrize("cable_count", wide([8, 7]))
 def test_a_pose_needs_no_more_than_is_reckoned(cable_count: int, winches: sl.Winch | None) -> None:
     robot = sl.load_robot("falcon-7" if cable_count == 7 else "cogiro").replace(winches=winches)
     assert robot.test_box is not None

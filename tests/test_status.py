@@ -23,5 +23,5 @@ def test_a_status_for_every_code_and_a_sentence_for_every_status(kind: type[Stat
     for status in kind:
         assert len(status.text) > 5
         assert pickle.loads(pickle.dumps(status)) is status
-    with pytest.raises(ValueError, match="99 is not a valid"):
+    with pytest.raises(ValueError, match="99"):
         kind(99)

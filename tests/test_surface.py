@@ -4,6 +4,7 @@ import sys
 import pytest
 
 import sagline as sl
+from tests.tiers import extended
 
 # yaml is no matter: numba loads it
 PACKAGES = ("matplotlib", "xarray", "h5netcdf", "h5py", "pint", "pydantic", "typer", "rich", "scipy.spatial")
@@ -16,10 +17,11 @@ def test_every_public_name_is_there() -> None:
 
 
 def test_an_unknown_name_is_an_attribute_error() -> None:
-    with pytest.raises(AttributeError, match="module 'sagline' has no attribute 'solve'"):
+    with pytest.raises(AttributeError, match="'solve'"):
         _ = sl.solve
 
 
+@extended
 def test_import_loads_the_core_alone() -> None:
     code = f"import sys, sagline; print([name for name in {HEAVY} if name in sys.modules])"
     out = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout

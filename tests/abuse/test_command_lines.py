@@ -25,6 +25,9 @@ from tests.effort import least_seconds
 from tests.files.executions import execution
 from tests.kinematics.winches import wound
 from tests.stand_ins import instead_of_machines
+from tests.tiers import extended
+
+pytestmark = extended
 
 SHORT = "durations: 1\nrate: 4\nwaypoints: [{position: [0, 0, 1.5]}, {position: [1, 0, 1.5]}]\n"
 SHARE = 250  # of all, in make test

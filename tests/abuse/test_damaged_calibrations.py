@@ -9,6 +9,7 @@ import sagline as sl
 from tests.abuse.damage import DAMAGES, Damage, unlike_after
 from tests.calibration.made_up import made_up
 from tests.files.test_calibration_file import assert_same
+from tests.tiers import wide
 
 
 @pytest.fixture(scope="module")
@@ -19,7 +20,7 @@ def content(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 
 @pytest.mark.parametrize("count", [10, pytest.param(1000, marks=pytest.mark.soak)])
-@pytest.mark.parametrize("damage", DAMAGES, ids=lambda damage: damage.__name__)
+@pytest.mark.parametrize("damage", wide(DAMAGES), ids=lambda damage: damage.__name__)
 def test_damage_does_not_change_a_value_silently(content: bytes, tmp_path: Path, damage: Damage, count: int) -> None:
     same = partial(assert_same, made_up())
     assert unlike_after(damage, count, content, tmp_path / "found.nc", sl.load_calibration, same) == []

@@ -8,6 +8,7 @@ import pytest
 import sagline as sl
 from tests.abuse.damage import DAMAGES, Damage, unlike_after
 from tests.files.plans import a_plan, assert_same
+from tests.tiers import wide
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +24,7 @@ def content(plan: sl.Plan, tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 
 @pytest.mark.parametrize("count", [30, pytest.param(2000, marks=pytest.mark.soak)])
-@pytest.mark.parametrize("damage", DAMAGES, ids=lambda damage: damage.__name__)
+@pytest.mark.parametrize("damage", wide(DAMAGES), ids=lambda damage: damage.__name__)
 def test_damage_does_not_change_a_value_silently(
     plan: sl.Plan, content: bytes, tmp_path: Path, damage: Damage, count: int
 ) -> None:

@@ -8,6 +8,7 @@ import pytest
 import sagline as sl
 from tests.abuse.damage import DAMAGES, Damage, unlike_after
 from tests.files.simulations import a_simulation, assert_same
+from tests.tiers import wide
 
 
 @pytest.fixture(scope="module")
@@ -18,7 +19,7 @@ def content(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 
 @pytest.mark.parametrize("count", [10, pytest.param(2000, marks=pytest.mark.soak)])
-@pytest.mark.parametrize("damage", DAMAGES, ids=lambda damage: damage.__name__)
+@pytest.mark.parametrize("damage", wide(DAMAGES), ids=lambda damage: damage.__name__)
 def test_damage_does_not_change_a_value_silently(content: bytes, tmp_path: Path, damage: Damage, count: int) -> None:
     same = partial(assert_same, a_simulation())
     assert unlike_after(damage, count, content, tmp_path / "sim.nc", sl.load_simulation, same) == []

@@ -22,6 +22,9 @@ from sagline.errors import printable
 from tests.abuse.bad_values import REFUSED, SAME, Bad, bad_values
 from tests.abuse.calls import INTERNAL, LINKS, Call, calls, public_names
 from tests.effort import least_seconds
+from tests.tiers import extended
+
+pytestmark = extended
 
 SLOWEST = 2.0  # s of the processor of an ordinary machine
 LONGEST = 300  # characters

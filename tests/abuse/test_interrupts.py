@@ -17,6 +17,9 @@ from pathlib import Path
 import pytest
 
 from sagline.cli.examples import write_examples
+from tests.tiers import extended
+
+pytestmark = extended
 
 Whole = Callable[[tuple[str, ...]], tuple[float, set[str]]]
 SHARE, ALL = 2, 200  # moments, over all commands

@@ -13,6 +13,9 @@ import pytest
 from sagline.files.whole import write_text
 from tests.abuse.commands import COMMANDS, Written, prepare, tree
 from tests.cli.interrupts import heard
+from tests.tiers import extended
+
+pytestmark = extended
 
 NAMES = ("track", "article", "forward", "convert")
 PATIENCE = 120.0  # s

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sagline.errors import SaglineError
+from sagline import SaglineError
 from tests.abuse.reading import READERS, judged, sound
 
 Change = Callable[[np.random.Generator, bytes], bytes]

@@ -7,11 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from sagline.errors import SaglineError
+from sagline import SaglineError
 from tests.abuse.reading import LENGTHS, PATH, READERS, ROBOT, WAYPOINTS, Reader, judged
+from tests.tiers import wide
 
 FILES = [reader for reader in READERS if not reader.name.endswith(".txt")]
-BY_FILE = pytest.mark.parametrize("reader", FILES, ids=lambda reader: reader.name)
+BY_FILE = pytest.mark.parametrize("reader", wide(FILES), ids=lambda reader: reader.name)
 
 
 def _pipe(path: Path) -> None:
@@ -70,34 +71,36 @@ def lines(head: str, line: str, size: int) -> tuple[str, str, int]:
 
 @pytest.mark.parametrize(
     ("name", "text"),
-    [
-        ("robot.yaml", lines(ROBOT, "# nothing but a remark\n", 2_000_000)),
-        ("robot.yaml", lines(ROBOT + "x:\n", "- 1\n", 900_000)),
-        ("robot.yaml", lines(ROBOT + "x: [", "1,", 900_000)),
-        ("robot.yaml", lines("", "k: v\n", 900_000)),
-        ("robot.yaml", lines("", " ", 900_000)),
-        ("robot.yaml", lines("a: ", "x", 900_000)),
-        ("robot.yaml", lines("a: '", "''", 900_000)),
-        ("robot.yaml", lines("a: |\n", "  x\n", 900_000)),
-        ("robot.yaml", lines("", "&a ", 900_000)),
-        ("robot.yaml", lines("", "--- a\n", 900_000)),
-        ("robot.yaml", lines("", "%YAML 1.1\n", 900_000)),
-        ("robot.yaml", lines("", '"a": {', 900_000)),
-        ("robot.yaml", lines("a: &a [x]\n", "b: *a\n", 900_000)),
-        ("tour.yaml", lines(WAYPOINTS, "  - {position: [0, 0, 1.5]}\n", 900_000)),
-        ("tour.csv", lines("", ",", 4_000_000)),
-        ("tour.csv", lines(PATH, "x", 1_000_000)),
-        ("tour.csv", lines(PATH, '"', 1_000_000)),
-        ("tour.csv", lines("time,x,y,z\n", "0,0,0,0\n", 2_000_000)),
-        ("lengths.csv", lines("L0,", "L0,", 1_000_000)),
-        ("lengths.csv", lines(LENGTHS, "1,2,3\n", 70_000_000)),
-        ("shelf.wcrfx", lines("", "<a>", 3_900_000)),
-        ("shelf.wcrfx", lines("<a ", "b='c' ", 3_900_000)),
-        ("shelf.wcrfx", lines("<models version='0.32'>", "<robot/>", 2_000_000)),
-        ("gondola_bodies.xml", lines("<links>", "<link_rigid/>", 2_000_000)),
-        ("gondola_cables.xml", lines("<cables>", "<cable_set id='a'/>", 2_000_000)),
-        ("gondola_cables.xml", lines("<!DOCTYPE a [", "<!ENTITY b 'c'>", 1_000_000)),
-    ],
+    wide(
+        [
+            ("tour.csv", lines("", ",", 4_000_000)),
+            ("robot.yaml", lines(ROBOT, "# nothing but a remark\n", 2_000_000)),
+            ("robot.yaml", lines(ROBOT + "x:\n", "- 1\n", 900_000)),
+            ("robot.yaml", lines(ROBOT + "x: [", "1,", 900_000)),
+            ("robot.yaml", lines("", "k: v\n", 900_000)),
+            ("robot.yaml", lines("", " ", 900_000)),
+            ("robot.yaml", lines("a: ", "x", 900_000)),
+            ("robot.yaml", lines("a: '", "''", 900_000)),
+            ("robot.yaml", lines("a: |\n", "  x\n", 900_000)),
+            ("robot.yaml", lines("", "&a ", 900_000)),
+            ("robot.yaml", lines("", "--- a\n", 900_000)),
+            ("robot.yaml", lines("", "%YAML 1.1\n", 900_000)),
+            ("robot.yaml", lines("", '"a": {', 900_000)),
+            ("robot.yaml", lines("a: &a [x]\n", "b: *a\n", 900_000)),
+            ("tour.yaml", lines(WAYPOINTS, "  - {position: [0, 0, 1.5]}\n", 900_000)),
+            ("tour.csv", lines(PATH, "x", 1_000_000)),
+            ("tour.csv", lines(PATH, '"', 1_000_000)),
+            ("tour.csv", lines("time,x,y,z\n", "0,0,0,0\n", 2_000_000)),
+            ("lengths.csv", lines("L0,", "L0,", 1_000_000)),
+            ("lengths.csv", lines(LENGTHS, "1,2,3\n", 70_000_000)),
+            ("shelf.wcrfx", lines("", "<a>", 3_900_000)),
+            ("shelf.wcrfx", lines("<a ", "b='c' ", 3_900_000)),
+            ("shelf.wcrfx", lines("<models version='0.32'>", "<robot/>", 2_000_000)),
+            ("gondola_bodies.xml", lines("<links>", "<link_rigid/>", 2_000_000)),
+            ("gondola_cables.xml", lines("<cables>", "<cable_set id='a'/>", 2_000_000)),
+            ("gondola_cables.xml", lines("<!DOCTYPE a [", "<!ENTITY b 'c'>", 1_000_000)),
+        ]
+    ),
 )
 @pytest.mark.parametrize("share", [0.2, pytest.param(1.0, marks=pytest.mark.soak)])
 def test_files_that_never_seem_to_end(name: str, text: tuple[str, str, int], share: float, tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sagline.errors import SaglineError
+from sagline import SaglineError
 from tests.abuse.reading import READERS, Reader, judged, sound
 
 NUMBER = re.compile(r"(?<![\w.\"-])-?\d+(?:\.\d+)?(?:e-?\d+)?(?![\w.])|(?<=\")-?\d+(?:\.\d+)?(?:e\d+)?(?=\")")

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 import yaml
 
-from sagline.errors import SaglineError
+from sagline import SaglineError
 from tests.abuse.reading import LENGTHS, MEASURED, PATH, READERS, ROBOT, WAYPOINTS, Reader, judged, sound
+from tests.tiers import wide
 
 STRANGE: tuple[Any, ...] = (
     *(None, True, False, "", " ", "x", 0, -1, 1e-300, 1e49, float("inf"), float("nan"), 10**40, "5 m", "1:30", "yes"),
@@ -77,7 +78,7 @@ def repeated(rng: np.random.Generator, holder: Any, key: Any, tree: Any) -> None
 TREE_CHANGES: tuple[Callable[..., None], ...] = (dropped, replaced, replaced, renamed, nested, swapped, repeated)
 
 
-@pytest.mark.parametrize("count", [120, pytest.param(2000, marks=pytest.mark.soak)])
+@pytest.mark.parametrize("count", wide([20, 120, pytest.param(2000, marks=pytest.mark.soak)]))
 def test_trees_in_yaml(count: int, tmp_path: Path) -> None:
     rng = np.random.default_rng(20260112)
     trees = {"robot.yaml": yaml.safe_load(ROBOT), "tour.yaml": yaml.safe_load(WAYPOINTS)}
@@ -95,7 +96,7 @@ def test_trees_in_yaml(count: int, tmp_path: Path) -> None:
         _check(reader, text.encode("utf-8", "surrogatepass"), f"case {k}: {reader.name}, {', '.join(done)}", tmp_path)
 
 
-@pytest.mark.parametrize("count", [100, pytest.param(2000, marks=pytest.mark.soak)])
+@pytest.mark.parametrize("count", wide([20, 100, pytest.param(2000, marks=pytest.mark.soak)]))
 def test_elements_of_xml(count: int, tmp_path: Path) -> None:
     rng = np.random.default_rng(20260113)
     readers = [reader for reader in READERS if reader.sample.startswith("<")]
@@ -134,7 +135,7 @@ def _change_element(rng: np.random.Generator, root: ElementTree.Element, words: 
             holder.append(wrapped)
 
 
-@pytest.mark.parametrize("count", [100, pytest.param(2000, marks=pytest.mark.soak)])
+@pytest.mark.parametrize("count", wide([20, 100, pytest.param(2000, marks=pytest.mark.soak)]))
 def test_rows_and_columns_of_tables(count: int, tmp_path: Path) -> None:
     rng = np.random.default_rng(20260114)
     samples = {"tour.csv": PATH, "lengths.csv": LENGTHS, "cable.csv": MEASURED}

@@ -9,6 +9,9 @@ import pytest
 
 import sagline as sl
 from tests.abuse.commands import COMMANDS, MIXED, ROBOT, ended, prepare, tree
+from tests.tiers import extended
+
+pytestmark = extended
 
 LONGEST = 300  # letters of a line
 PIECES = ("..", "/", "\\", ".", "-", "~", "$HOME", "con", "NUL", "com1", "evil", "机", "ü", " ", ":", "*", "|", "%2e")

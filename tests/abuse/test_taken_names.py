@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.abuse.commands import COMMANDS, Written, ended, prepare, tree
+from tests.tiers import wide
 
 LONGEST = 300  # letters of a line
 
@@ -56,7 +57,7 @@ if hasattr(os, "getuid") and os.getuid() == 0:
 
 
 @pytest.mark.parametrize("kinds", [1, pytest.param(len(KINDS), marks=pytest.mark.soak)])
-@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize("name", wide(reversed(COMMANDS)))
 def test_a_taken_name_is_told_and_nothing_has_changed(
     tmp_path: Path, written: Written, monkeypatch: pytest.MonkeyPatch, name: str, kinds: int
 ) -> None:

@@ -13,7 +13,10 @@ import sagline as sl
 from sagline.viewer.run import Run
 from sagline.viewer.server import started, stop
 from sagline.viewer.viewer import Viewer
+from tests.tiers import extended
 from tests.viewer.client import PATIENCE, Client
+
+pytestmark = extended
 
 ROBOT = sl.load_robot("article-suspended")
 BATCH = 20  # odd messages between two that make sense

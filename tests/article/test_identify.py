@@ -4,6 +4,8 @@ import scipy.stats
 
 import sagline as sl
 from tests.article.hanging import end_of
+from tests.refusal import refused
+from tests.tiers import extended
 
 CABLE = sl.Cable.from_material(0.067, 2e9, 22e-6)
 SPANS, RISES, TENSIONS = np.linspace(2.0, 12.0, 6), np.linspace(-4.0, 3.0, 5), np.linspace(20.0, 400.0, 39)
@@ -75,7 +77,7 @@ def test_a_tolerance_out_of_reach_has_no_limit(fit: sl.EmpiricalFit) -> None:
 
 
 def test_a_weightless_cable_has_no_empirical_model() -> None:
-    with pytest.raises(sl.InvalidValueError, match="one cable, > 0 kg/m"):
+    with refused("cable", allowed="one cable, > 0 kg/m", kind=sl.InvalidValueError):
         sl.identify_empirical(sl.Cable(0.0, 1e4), SPANS, RISES, TENSIONS)
 
 
@@ -105,6 +107,7 @@ def test_exact_measurements_give_the_cable_back() -> None:
     assert shifted.values == pytest.approx([0.067, 44e3, 0.02], rel=1e-5)
 
 
+@extended
 def test_standard_errors_are_the_scatter_of_repeated_measurements() -> None:
     fits = [sl.identify_cable(*measured(20.0, 600.0, seed=k)[0]) for k in range(40)]
     values, errors = np.array([f.values for f in fits]), np.array([f.standard_error for f in fits])
@@ -134,17 +137,18 @@ def test_a_stiffness_and_a_zero_of_lengths_cannot_be_told_apart_at_one_tension()
         unknowns=("axial_stiffness", "length_offset"),
         start=sl.Cable(0.067, 4e4),
     )
-    assert any("cannot be told apart" in warning for warning in fit.warnings)
     assert abs(fit.correlation[0, 1]) > 0.99
+    assert any(all(name in warning for name in fit.names) for warning in fit.warnings)
 
 
 def test_bad_measurements_are_refused() -> None:
     data, _ = measured(20.0, 600.0)
-    with pytest.raises(sl.InvalidValueError, match="at least 2"):
+    shapes = "four arrays of one length, at least 2"
+    with refused("the measurements", "of shapes [(1,)]", shapes, kind=sl.InvalidValueError):
         sl.identify_cable(*(values[:1] for values in data))
-    with pytest.raises(sl.InvalidValueError, match="of one length"):
+    with refused("the measurements", "of shapes [(5,), (40,)]", shapes, kind=sl.InvalidValueError):
         sl.identify_cable(data[0][:5], *data[1:])
-    with pytest.raises(sl.InvalidValueError, match="unknowns"):
+    with refused("unknowns", "'mass'", kind=sl.InvalidValueError):
         sl.identify_cable(*data, unknowns=("mass",))
-    with pytest.raises(sl.InvalidValueError, match="tension_at"):
+    with refused("tension_at", "'winch'", kind=sl.InvalidValueError):
         sl.identify_cable(*data, tension_at="winch")  # type: ignore[arg-type]

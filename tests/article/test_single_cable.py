@@ -1,15 +1,16 @@
 import numpy as np
 import pytest
 
+from sagline import Cable, InvalidValueError
 from sagline.article.constants import constants, constants_study, published_range, published_sampling
 from sagline.article.feasible_sets import End, feasible_sets
 from sagline.article.fits import fit_factor, fit_line
 from sagline.article.intercept import intercept_studies
 from sagline.article.sag_constant import sag_study, stretch_study
 from sagline.article.sampling import Sampling, article_sampling
-from sagline.cables.cable import Cable
-from sagline.errors import InvalidValueError
 from tests.article.hanging import GRAVITY, end_of, length_and_force
+from tests.refusal import refused
+from tests.tiers import extended
 
 CABLE = Cable.from_material(0.067, 2e9, 22e-6)
 END = End(7.0, 6.0)
@@ -48,7 +49,7 @@ def test_the_projected_curve_is_nearly_the_line_pi() -> None:
     assert study.line.slope == pytest.approx(study.tangent, rel=1e-3)
     assert study.line.intercept == pytest.approx(study.half_weight, rel=0.02)
     assert study.line.deviation < 0.02
-    with pytest.raises(InvalidValueError, match="multiple of 4"):
+    with refused("points", "10", "a multiple of 4", kind=InvalidValueError):
         feasible_sets(CABLE, END, 1e-3, np.array([50.0, 60.0]), np.array([80.0]), points=10)
 
 
@@ -91,6 +92,7 @@ def test_the_published_constants_come_from_tensions_of_97_n_to_12_900_n() -> Non
     assert found.k_h_platform == pytest.approx(5.0234, abs=1e-4)
 
 
+@extended
 def test_the_constants_depend_on_the_tensions_and_tend_to_their_limits() -> None:
     sampling = published_sampling()
     assert constants(sampling.between(40.0, 12_900.0)).k_p == pytest.approx(6.62, abs=0.01)
@@ -103,8 +105,21 @@ def test_the_constants_depend_on_the_tensions_and_tend_to_their_limits() -> None
     assert study.scaled[0].k_p > study.scaled[1].k_p > taut.k_p
 
 
+def test_the_sag_of_a_taut_cable_is_proportional_to_the_fourth_power_of_the_cosine() -> None:
+    """d = D (w D cos(phi))^2/(24 tau^2) with tau = T_x/cos(phi), the limit of the textbook catenary."""
+    taut = published_sampling().between(10_000.0, 100_000.0)
+    study = sag_study(taut)
+    limit = (GRAVITY * taut.densities) ** 2 / 24.0 * np.cos(taut.angles[:, None]) ** 4
+    cubes = limit[:, None] * taut.chords[:, None] ** 3
+    # what rounding leaves of a difference of lengths, and the next term of the series
+    np.testing.assert_allclose(study.q_a, limit, rtol=1e-3)
+    np.testing.assert_allclose(study.fitted_q_a, limit, rtol=1e-3)
+    np.testing.assert_allclose(study.fitted_a_d, cubes, rtol=1e-3)
+    np.testing.assert_allclose(study.fitted_length[..., 0], cubes / 10_000.0**2, rtol=1e-3)
+
+
 def test_no_range_gives_the_published_constants_for_light_cables() -> None:
-    with pytest.raises(InvalidValueError, match="no range of tensions"):
+    with refused("the sampled cables", kind=InvalidValueError):
         published_range(Sampling([0.754], [2.0], [0.01], np.linspace(100.0, 1000.0, 10)))
 
 

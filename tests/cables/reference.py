@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from sagline import Cable
 from sagline.arrays import Array
-from sagline.cables.cable import Cable
 
 FILE = Path(__file__).parents[1] / "data" / "cables.csv"
 GRAVITY = 9.81

@@ -3,22 +3,18 @@
 import pickle
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 import pytest
 
-from sagline.article.identify_cable import identify_cable
+from sagline import Cable, Catenary, InvalidValueError, Robot, dump_robot, identify_cable, load_robot, without_cables
 from sagline.article.machine import PARAMETERS, Parameter, machine
-from sagline.cables.cable import Cable
-from sagline.cables.catenary import Catenary
 from sagline.cables.rope import ROPES
-from sagline.errors import InvalidValueError
-from sagline.files.robot_file import dump_robot, load_robot, parse_robot
-from sagline.robot.inertia import with_mass
-from sagline.robot.robot import Robot
-from sagline.tension.broken import without_cables
 from sagline.viewer.settings import Settings
+from tests.refusal import refused
 
 FIELDS = ("linear_density", "axial_stiffness", "diameter", "expansion")
 THICKNESS, GROWTH = np.linspace(0.003, 0.01, 8), np.linspace(-1.2e-5, 1.2e-5, 8)
@@ -45,24 +41,24 @@ def test_from_material_knows_them_too() -> None:
 
 
 @pytest.mark.parametrize(
-    ("field", "value", "message"),
+    ("field", "value", "parts"),
     [
-        ("linear_density", -1.0, r"linear_density is -1 kg/m; allowed: >= 0 kg/m"),
-        ("axial_stiffness", 0.0, r"axial_stiffness is 0 N; allowed: > 0 N"),
-        ("diameter", 0.0, r"diameter is 0 m; allowed: > 0 m"),
-        ("diameter", [0.004, -0.004], r"diameter\[1\] is -0.004 m; allowed: > 0 m"),
-        ("diameter", [0.004, np.nan], r"diameter\[1\] is nan m"),
-        ("diameter", "4 mm", "diameter is '4 mm'; allowed: numbers"),
-        ("expansion", np.inf, "expansion is inf 1/K; allowed: finite"),
-        ("expansion", {}, "expansion is {}; allowed: numbers"),
-        ("expansion", [1e-5, 1e-5, 1e-5], "expansion is not of one shape, but"),
+        ("linear_density", -1.0, ("linear_density", "-1 kg/m", ">= 0 kg/m, finite")),
+        ("axial_stiffness", 0.0, ("axial_stiffness", "0 N", "> 0 N, finite")),
+        ("diameter", 0.0, ("diameter", "0 m", "> 0 m, finite")),
+        ("diameter", [0.004, -0.004], ("diameter[1]", "-0.004 m", "> 0 m, finite")),
+        ("diameter", [0.004, np.nan], ("diameter[1]", "nan m", "> 0 m, finite")),
+        ("diameter", "4 mm", ("diameter", "'4 mm'", "numbers")),
+        ("expansion", np.inf, ("expansion", "inf 1/K", "finite")),
+        ("expansion", {}, ("expansion", "{}", "numbers")),
+        ("expansion", [1e-5, 1e-5, 1e-5], (" and ".join(FIELDS), "not of one shape, but (2,) and (3,)")),
     ],
 )
-def test_what_no_cable_is_made_of(field: str, value: Any, message: str) -> None:
+def test_values_that_no_cable_can_have_are_refused(field: str, value: Any, parts: tuple[str, ...]) -> None:
     good = Cable([0.1, 0.2], 1e4, diameter=0.004, expansion=0.0)
-    with pytest.raises(InvalidValueError, match=message):
+    with refused(*parts, kind=InvalidValueError):
         good.replace(**{field: value})
-    with pytest.raises(InvalidValueError, match=message):
+    with refused(*parts, kind=InvalidValueError):
         Cable(**{**good.known(), field: value})
 
 
@@ -72,7 +68,7 @@ def test_replace_leaves_the_original() -> None:
     assert stiff.expansion is None
     assert THICK.axial_stiffness.tolist() == [44e3] * 8
     np.testing.assert_array_equal(stiff.known()["diameter"], THICKNESS)
-    with pytest.raises(InvalidValueError, match="field is 'thickness'; allowed: linear_density, axial_stiffness, diam"):
+    with refused("field", "'thickness'", ", ".join(FIELDS), kind=InvalidValueError):
         THICK.replace(thickness=1.0)
 
 
@@ -80,12 +76,18 @@ def changed(parameter: Parameter, robot: Robot) -> Robot:
     return machine(robot, {parameter.name: parameter.typical})
 
 
+def saved_and_loaded(robot: Robot) -> Robot:
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "robot.yaml"
+        file.write_text(dump_robot(robot), encoding="utf-8")
+        return load_robot(file)
+
+
 PROTOTYPE = load_robot("article-prototype").replace(cables=THICK)
 # every way to make cables of others, and which of them are left
 WAYS: dict[str, Callable[[Robot], Robot]] = {
-    "a file": lambda robot: parse_robot(dump_robot(robot), "robot.yaml"),
+    "a file": saved_and_loaded,
     "a pickle": lambda robot: pickle.loads(pickle.dumps(robot)),
-    "another mass": lambda robot: with_mass(robot, 60.0),
     "the viewer's sliders": Settings(mass=50.0, density=1.5, stiffness=0.5).applied,
     "broken cables": lambda robot: without_cables(robot, 3),
     **{f"another {parameter.name}": partial(changed, parameter) for parameter in PARAMETERS},

@@ -10,15 +10,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from sagline.cables.cable import Cable
-from sagline.cables.catenary import Catenary
-from sagline.cables.elastic import Elastic
-from sagline.cables.empirical import Empirical
-from sagline.cables.model import CableModel, CableState
-from sagline.cables.parabolic import Parabolic
-from sagline.cables.status import CableStatus
-from sagline.cables.straight import Straight
-from sagline.errors import CableGeometryError, InvalidValueError
+from sagline import (
+    Cable,
+    CableGeometryError,
+    CableModel,
+    CableState,
+    CableStatus,
+    Catenary,
+    Elastic,
+    Empirical,
+    InvalidValueError,
+    Parabolic,
+    Straight,
+)
+from tests.refusal import refused
 
 CABLE = Cable(linear_density=0.067, axial_stiffness=44e3)  # the article's simulation
 WEIGHTED = [Empirical(), Parabolic(), Catenary()]
@@ -242,32 +247,36 @@ def test_a_batch_solves_ordinary_and_odd_cables_alike() -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "error", "words"),
+    ("change", "error", "parts"),
     [
-        ({"span": -1.0}, CableGeometryError, "span is -1 m"),
-        ({"span": 0.0, "rise": 0.0}, CableGeometryError, "both 0 m"),
-        ({"chord_tension": [1.0, math.nan]}, InvalidValueError, r"chord_tension\[1\] is nan N"),
-        ({"chord_tension": -3.0}, InvalidValueError, "chord_tension is -3 N"),
-        ({"rise": math.inf}, InvalidValueError, "rise is inf m"),
-        ({"gravity": -9.81}, InvalidValueError, r"gravity is -9.81 m/s\^2"),
-        ({"span": [1.0, 2.0], "rise": [1.0, 2.0, 3.0]}, InvalidValueError, "not of one shape"),
-        ({"span": "far"}, CableGeometryError, "numbers"),
+        ({"span": -1.0}, CableGeometryError, ("span", "-1 m", ">= 0 m, finite")),
+        ({"span": 0.0, "rise": 0.0}, CableGeometryError, ("span and rise", "both 0 m")),
+        ({"chord_tension": [1.0, math.nan]}, InvalidValueError, ("chord_tension[1]", "nan N")),
+        ({"chord_tension": -3.0}, InvalidValueError, ("chord_tension", "-3 N", ">= 0 N, finite")),
+        ({"rise": math.inf}, InvalidValueError, ("rise", "inf m", "finite")),
+        ({"gravity": -9.81}, InvalidValueError, ("gravity", "-9.81 m/s^2", ">= 0 m/s^2, finite")),
+        (
+            {"span": [1.0, 2.0], "rise": [1.0, 2.0, 3.0]},
+            InvalidValueError,
+            ("span, rise, tension or length, and cable", "not of one shape, but (2,) and (3,) and ()"),
+        ),
+        ({"span": "far"}, CableGeometryError, ("span", "'far'", "numbers")),
     ],
 )
-def test_bad_arguments_are_named(change: dict[str, object], error: type[Exception], words: str) -> None:
+def test_bad_arguments_are_named(change: dict[str, object], error: type[Exception], parts: tuple[str, ...]) -> None:
     arguments: dict[str, object] = {"span": 3.0, "rise": 4.0, "chord_tension": 100.0}
-    with pytest.raises(error, match=words):
+    with refused(*parts, kind=error):
         Catenary().from_tension(CABLE, **{**arguments, **change})  # type: ignore[arg-type]
 
 
 def test_bad_material_is_named() -> None:
-    with pytest.raises(InvalidValueError, match=r"axial_stiffness is 0 N; allowed: > 0 N"):
+    with refused("axial_stiffness", "0 N", "> 0 N, finite", kind=InvalidValueError):
         Cable(0.1, 0.0)
-    with pytest.raises(InvalidValueError, match=r"linear_density\[1\] is -0.1 kg/m"):
+    with refused("linear_density[1]", "-0.1 kg/m", kind=InvalidValueError):
         Cable([0.1, -0.1], 1e4)
-    with pytest.raises(InvalidValueError, match="unstrained_length is 0 m"):
+    with refused("unstrained_length", "0 m", kind=InvalidValueError):
         Catenary().from_length(CABLE, 3.0, 4.0, 0.0)
-    with pytest.raises(InvalidValueError, match="k_p"):
+    with refused("k_p", "-1 m^2/s^4", kind=InvalidValueError):
         Empirical(k_p=-1.0)
 
 

@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sagline.cables.cable import Cable
-from sagline.cables.catenary import Catenary
-from sagline.cables.status import CableStatus
+from sagline import Cable, CableStatus, Catenary
 from tests.cables.reference import Reference, load_reference
 
 LIMIT = 4e-15  # of a length, or of the larger end tension

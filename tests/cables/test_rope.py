@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from sagline import InvalidValueError
 from sagline.cables.rope import ROPES
-from sagline.errors import InvalidValueError
+from tests.refusal import refused
 
 
 def test_steel_ropes_of_10_mm_by_the_factors_of_en_12385_4() -> None:
@@ -29,5 +30,5 @@ def test_a_braid_is_two_thirds_fiber_at_half_its_modulus(name: str, modulus: flo
 
 def test_a_diameter_is_one_positive_number() -> None:
     for wrong in (0.0, -1.0, np.nan):
-        with pytest.raises(InvalidValueError, match="diameter"):
+        with refused("diameter", f"{wrong:g} m", "> 0 m, finite", kind=InvalidValueError):
             ROPES["steel-6x19"].cable(wrong)

@@ -14,7 +14,6 @@ import sagline as sl
 from sagline.arrays import Array, locked
 from sagline.calibration.findings import CrossValidation, Direction, Outlier
 from sagline.calibration.unknowns import KINDS, Parameters
-from sagline.kernels.calibration.kinds import KIND_ROWS
 
 NAMES = ("frame_anchors", "length_zero", "axial_stiffness", "mass", "center_of_mass")
 SENSORS = sl.Sensors(length_deviation=5e-4, tension_deviation=5.0, position_deviation=1e-3)
@@ -28,7 +27,7 @@ def parameters(robot: sl.Robot, names: tuple[str, ...] = NAMES) -> Parameters:
     """The numbers of these kinds, with the usual priors."""
     rows: list[tuple[str, str, str, int, float, float, bool]] = []
     m = robot.cable_count
-    where = np.full((KIND_ROWS, m), -1, dtype=np.int64)
+    where = np.full((max(kind.first + len(kind.axes) for kind in KINDS.values()), m), -1, dtype=np.int64)
     for name in names:
         kind = KINDS[name]
         own = kind.each and not kind.shared

@@ -9,7 +9,7 @@ import numpy as np
 
 import sagline as sl
 from sagline.arrays import Array
-from sagline.robot.drum import drums_of
+from tests.calibration.reference import counts_of
 
 
 class Mistake(NamedTuple):
@@ -91,10 +91,9 @@ def far_zero(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> Mis
         read[:, i] -= off
         read[:, i] += 2.0 * off if read[:, i].min() < 0.1 else 0.0
     else:
-        drums = drums_of(robot)
-        length = drums.lengths_at(read)
+        length = sl.lengths_from_counts(robot, read).copy()
         length[:, i] += off
-        read = drums.counts(length)
+        read = counts_of(robot, length)
     return Mistake(log.replace(**{_column(log): read}), ("lengths have a zero far off", f"on cable {i};"))
 
 

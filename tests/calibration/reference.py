@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.arrays import Array, locked
 from sagline.calibration.unknowns import KINDS, Parameters
 from sagline.kernels.calibration import kinds
 from sagline.robot.drum import drums_of
@@ -54,8 +54,7 @@ class Machine:
         """Counts, not rounded, or lengths as the machine has them, where true lengths are (N, m)."""
         if not self.counting:
             return lengths - self.offset
-        drums = drums_of(self.robot)
-        return drums.counts(lengths * (1.0 + drums.rest_strain))
+        return counts_of(self.robot, lengths)
 
     def lengths(self, believed: Array) -> Array:
         """True lengths (N, m) of counts or lengths."""
@@ -101,6 +100,17 @@ class Machine:
         """Of the load cells, (m,)."""
         winches = self.robot.winches
         return (1.0, 0.0) if winches is None else (winches.load_cell_gain, winches.load_cell_bias)
+
+
+def counts_of(robot: sl.Robot, lengths: Array) -> Array:
+    """Counts at unstrained lengths (N, m), not rounded as those of `encoder_counts` are."""
+    drums = drums_of(robot)
+    return drums.counts(lengths * (1.0 + drums.rest_strain))
+
+
+def pose_rows(pose: sl.Pose) -> Array:
+    """Positions and quaternions, (N, 7)."""
+    return locked(np.hstack((np.atleast_2d(pose.position), np.atleast_2d(pose.quaternion))))
 
 
 def _added(value: Array, index: int, by: float) -> Array:

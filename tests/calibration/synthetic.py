@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 import sagline as sl
 from sagline.arrays import Array
 from sagline.calibration.unknowns import KINDS
-from sagline.robot.drum import drums_of
+from tests.calibration.reference import counts_of
 from tests.kinematics.feasible import box_poses
 
 LENGTH_NOISE: Final = 5e-4  # m
@@ -164,8 +164,7 @@ def log_of(
     position, rotation = _measured(truth.sensors, pose, positions, rotations, noise, rng)
     counted = winches is not None and winches.counts_per_turn is not None
     if counted:
-        drums = drums_of(truth.robot)
-        believed = drums.counts(believed * (1.0 + drums.rest_strain))
+        believed = counts_of(truth.robot, believed)
     log = sl.WinchLog(
         counts=believed if counted else None,
         unstrained_length=None if counted else believed,

@@ -6,6 +6,7 @@ import pytest
 import sagline as sl
 from sagline.arrays import Array, Flags
 from tests.calibration.synthetic import Synthetic, log_of, true_robot, usual_sensors
+from tests.tiers import wide
 
 UNKNOWNS = ("frame_anchors", "length_zero", "axial_stiffness", "mass")
 COUNT, FOLDS = 30, 4
@@ -32,7 +33,7 @@ def root(values: list[Array]) -> float:
     return float(np.sqrt(np.mean(np.concatenate(values) ** 2)))
 
 
-@pytest.mark.parametrize("name", ["cogiro", "article-suspended"])
+@pytest.mark.parametrize("name", wide(["cogiro", "article-suspended"]))
 def test_calibrations_without_the_poses_that_they_predict(name: str) -> None:
     robot = sl.load_robot(name)
     made = synthetic(robot)

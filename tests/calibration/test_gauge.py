@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -13,10 +13,10 @@ from sagline.calibration.findings import Direction
 from sagline.calibration.gauge import folded, frame_of, gauge_of, told
 from sagline.calibration.observing import observed
 from sagline.calibration.unknowns import KINDS, Parameters
-from sagline.statics.tables import pose_rows
 from tests.calibration import reference
 from tests.calibration.machines import Standing, robots, standing, with_drums
-from tests.calibration.reference import Machine
+from tests.calibration.reference import Machine, pose_rows
+from tests.tiers import extended
 
 POSES = 16
 ANCHORS = ("frame_anchors", "platform_anchors", "length_zero")
@@ -89,7 +89,9 @@ CASES = {
         ),
     ),
 }
-QUICK = ("63 of the CoGiRo", "2 points", "plane")  # the others take a second of differences each
+ANCHOR_FIXED = CASES["one anchor fixed"]
+# the others take a second of differences each
+TIER: dict[str, Any] = {"plane": (), "63 of the CoGiRo": extended, "2 points": extended}
 
 
 @cache
@@ -180,7 +182,7 @@ def triangle_of(case: Case) -> Array:
     return triangle
 
 
-SLOW = [pytest.param(name, marks=() if name in QUICK else pytest.mark.soak) for name in CASES]
+SLOW = [pytest.param(name, marks=TIER.get(name, pytest.mark.soak)) for name in CASES]
 
 
 def directions(case: Case) -> tuple[Direction, ...]:
@@ -188,7 +190,7 @@ def directions(case: Case) -> tuple[Direction, ...]:
     return gauge_of(triangle_of(case), parameters, parameters.prior, machine.robot, sensors_of(case))
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=extended if name == "pulleys" else ()) for name in CASES])
 def test_directions_left_open(name: str) -> None:
     left = [one.name for one in directions(CASES[name])]
     assert len(left) == len(CASES[name].names)
@@ -223,7 +225,7 @@ def test_an_anchor_stated_to_be_known_is_fixed() -> None:
     first = np.array([label.startswith("frame_anchors[0]") for label in parameters.labels])
     stated = replace(parameters, stated=first, prior_deviation=np.where(first, 1e-6, parameters.prior_deviation))
     found = gauge_of(triangle_of(case), stated, stated.prior, machine.robot, sensors_of(case))
-    assert sorted(one.name for one in found) == sorted(CASES["one anchor fixed"].names)
+    assert sorted(one.name for one in found) == sorted(ANCHOR_FIXED.names)
     assert all(not one.vector[first].any() for one in found)
 
 

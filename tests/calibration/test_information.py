@@ -7,6 +7,7 @@ import pytest
 
 from sagline.arrays import Array, Indices
 from sagline.calibration.information import Information, deviations_of, ground, most_telling
+from tests.tiers import wide
 
 SURELY = 1.0 - np.exp(-1.0)  # of the best log det, which a greedy choice never misses
 NEAR = 0.97  # of the best, in all cases below
@@ -25,7 +26,7 @@ def log_det(rows: Array, which: tuple[int, ...] | Indices) -> float:
     return float(np.linalg.slogdet(np.eye(rows.shape[-1]) + flat.T @ flat)[1])
 
 
-@pytest.mark.parametrize("count", [1, 2, 3, 4])
+@pytest.mark.parametrize("count", wide([3, 1, 2, 4]))
 def test_choice_against_an_exhaustive_search(count: int) -> None:
     shares = []
     for seed in range(25):

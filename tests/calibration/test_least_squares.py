@@ -5,26 +5,24 @@ import pytest
 from scipy.optimize import least_squares
 
 import sagline as sl
-from sagline.arrays import Array, locked
+from sagline.arrays import Array
 from sagline.calibration.calibrate import readings_of, sensors_there
 from sagline.calibration.least_squares import moved, passed, solve
-from sagline.calibration.observing import NO_LOAD
 from sagline.calibration.parameters import external, parameters_of, robot_with
 from sagline.calibration.problem import Fit, Log, Problem, State, machine_at, said_lengths
 from sagline.calibration.sensors import load_cells_of
 from sagline.calibration.start import start_of
-from sagline.kinematics.forward_rows import solve_rows
-from sagline.robot.drum import drums_of
-from sagline.statics.tables import pose_rows
+from tests.calibration import reference
 from tests.calibration.machines import robots, standing
 from tests.calibration.synthetic import Synthetic, log_of, true_robot, usual_sensors, with_drums
+from tests.tiers import extended, wide
 
-NOMINAL = with_drums(pulley_radius=0.04, dead_cable=2.0)
+NOMINAL = {"drums": with_drums(), "drums behind pulleys": with_drums(pulley_radius=0.04, dead_cable=2.0)}
 ERRORS = {"frame_anchors": 0.02, "axial_stiffness": 0.05, "mass": 0.02}
 UNKNOWNS = [sl.Unknown(name, deviation=error) for name, error in ERRORS.items()]
 
 
-def problem_of(made: Synthetic, unknowns: list[sl.Unknown], nominal: sl.Robot = NOMINAL) -> Problem:
+def problem_of(made: Synthetic, unknowns: list[sl.Unknown], nominal: sl.Robot) -> Problem:
     sensors = sensors_there(made.log)
     parameters = parameters_of(nominal, unknowns, sensors, counted=made.log.counts is not None)
     return Problem(nominal, sl.Catenary(), sensors, parameters, readings_of(made.log))
@@ -53,9 +51,8 @@ def plainly(problem: Problem, made: Synthetic, fit: Fit) -> Array:
 
     def misses(x: Array) -> Array:
         numbers, lengths = x[:width], x[width:].reshape(cells.shape)
-        robot = robot_with(NOMINAL, problem.parameters, external(problem.parameters, numbers))
-        drums = drums_of(robot)
-        said = drums.lengths_at(counts) / (1.0 + drums.rest_strain)
+        robot = robot_with(problem.robot, problem.parameters, external(problem.parameters, numbers))
+        said = sl.lengths_from_counts(robot, counts)
         found = sl.forward(robot, lengths, poses)
         assert found.solved.all()
         return np.concatenate(
@@ -73,9 +70,10 @@ def plainly(problem: Problem, made: Synthetic, fit: Fit) -> Array:
     return found
 
 
-def test_the_minimum_is_that_of_a_plain_least_squares_with_all_lengths_as_unknowns() -> None:
-    made = log_of(true_robot(NOMINAL, ERRORS, 3), 4, 3, sets=4)
-    problem = problem_of(made, UNKNOWNS)
+@pytest.mark.parametrize("name", wide(NOMINAL))
+def test_the_minimum_is_that_of_a_plain_least_squares_with_all_lengths_as_unknowns(name: str) -> None:
+    made = log_of(true_robot(NOMINAL[name], ERRORS, 3), 4, 3, sets=4)
+    problem = problem_of(made, UNKNOWNS, NOMINAL[name])
     fit = fitted(problem, made)
     assert fit.converged
     width = len(problem.prior)
@@ -85,6 +83,7 @@ def test_the_minimum_is_that_of_a_plain_least_squares_with_all_lengths_as_unknow
     assert np.abs(plain[width:] - fit.state.lengths.ravel()).max() < 1e-6  # of 0.5 mm that a length may be off
 
 
+@extended
 def test_no_number_falls_below_the_least_that_it_may_be_and_the_others_fit_best_beside_it() -> None:
     """No pulleys, and lengths that want some of less than none: the conditions of Karush, Kuhn and Tucker."""
     small = with_drums(pulley_radius=0.001)
@@ -104,24 +103,25 @@ def test_no_number_falls_below_the_least_that_it_may_be_and_the_others_fit_best_
     assert np.abs(downhill[~at_least] * errors_of(problem, fit)[~at_least]).max() < 0.01
 
 
+@pytest.mark.parametrize("name", wide(NOMINAL))
 @pytest.mark.parametrize("seed", range(3))
-def test_a_pose_that_does_not_fit_counts_less_and_changes_little(seed: int) -> None:
-    true = true_robot(NOMINAL, ERRORS, seed)
+def test_a_pose_that_does_not_fit_counts_less_and_changes_little(seed: int, name: str) -> None:
+    nominal = NOMINAL[name]
+    true = true_robot(nominal, ERRORS, seed)
     honest = log_of(true, 40, seed)
     slipped = log_of(true, 40, seed, slips={(7, 2): 0.02})
-    fits = [fitted(problem_of(made, UNKNOWNS), made, robust=True) for made in (honest, slipped)]
+    fits = [fitted(problem_of(made, UNKNOWNS, nominal), made, robust=True) for made in (honest, slipped)]
     assert fits[1].normal.weights[7] < 0.3
     assert np.delete(fits[1].normal.weights, 7).min() > 0.6
-    error = np.sqrt(
-        np.diag(np.linalg.inv(fits[0].normal.matrix + np.diag(problem_of(honest, UNKNOWNS).prior_deviation ** -2.0)))
-    )
+    error = errors_of(problem_of(honest, UNKNOWNS, nominal), fits[0])
     assert (np.abs(fits[1].state.numbers - fits[0].state.numbers) / error).max() < 1.5
 
 
-def test_lengths_follow_their_readings_as_far_as_these_are_trusted() -> None:
-    true = true_robot(NOMINAL, {}, 0, usual_sensors(length_deviation=1e-6))
+@pytest.mark.parametrize("name", wide(NOMINAL))
+def test_lengths_follow_their_readings_as_far_as_these_are_trusted(name: str) -> None:
+    true = true_robot(NOMINAL[name], {}, 0, usual_sensors(length_deviation=1e-6))
     made = log_of(true, 8, 2)
-    fit = fitted(problem_of(made, UNKNOWNS), made)
+    fit = fitted(problem_of(made, UNKNOWNS, NOMINAL[name]), made)
     assert np.abs(fit.state.lengths - made.length).max() < 1e-4
     assert fit.normal.squares.sum() < 3.0 * made.log.readings.size
 
@@ -152,17 +152,18 @@ def missed_after(name: str, share: float) -> tuple[float, float]:
         parameters_of(robot, ALL, given, counted=False),
         Log(None, lengths, cells, *silent),
     )
-    before = State(problem.prior, machine_at(problem, problem.prior), lengths, pose_rows(pose))
+    before = State(problem.prior, machine_at(problem, problem.prior), lengths, reference.pose_rows(pose))
     step = share * 0.02 * problem.scale * np.cos(np.arange(len(problem.prior)))
     after, part = machine_at(problem, problem.prior + step), slice(0, len(lengths))
     found, starts = moved(problem, before, None, step, after, said_lengths(problem, after, part), part)
-    rest = solve_rows(after.robot, model, locked(found), locked(starts), NO_LOAD)
+    rest = sl.forward(after.robot, found, sl.Pose.from_quaternion(starts[:, :3], starts[:, 3:]), model)
     assert rest.stable.all()
-    far, left = rest.poses - before.poses, rest.poses - starts
+    ended = reference.pose_rows(rest.pose)
+    far, left = ended - before.poses, ended - starts
     return float(np.abs(far).max()), float(np.abs(left).max())
 
 
-@pytest.mark.parametrize("name", ["cogiro", "article-suspended", "planar", "point", "pulleys"])
+@pytest.mark.parametrize("name", wide(["cogiro", "article-suspended", "planar", "point", "pulleys"], first=4))
 def test_a_step_looks_for_the_platform_where_the_slopes_have_it(name: str) -> None:
     moves, misses = zip(*(missed_after(name, share) for share in (1.0, 0.5)), strict=True)
     assert misses[0] < 0.15 * moves[0]

@@ -1,6 +1,7 @@
 """What readings tell of the unknowns, block by block, against differences of forward solutions."""
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,10 +10,10 @@ import sagline as sl
 from sagline.arrays import Array
 from sagline.calibration.observing import observed
 from sagline.calibration.unknowns import KINDS
-from sagline.statics.tables import pose_rows
 from tests.calibration import reference
 from tests.calibration.machines import Standing, robots, sensors, standing
-from tests.calibration.reference import Machine
+from tests.calibration.reference import Machine, pose_rows
+from tests.tiers import extended
 
 ROBOTS = robots()
 WITHOUT_WINCHES = ("cogiro", "article-suspended", "planar", "point")
@@ -20,9 +21,22 @@ WITH = {"pulley_radius": ("pulleys", "layers"), "dead_cable": ("pulleys", "layer
 WITH |= {"load_cell_gain": ("pulleys", "drums"), "load_cell_bias": ("pulleys", "drums")}
 POSE_ONLY = ("measuring_frame", "target")
 CELL_ONLY = ("load_cell_gain", "load_cell_bias")
-CELLS = [(robot, kind) for kind in KINDS if kind not in POSE_ONLY for robot in WITH.get(kind, tuple(ROBOTS))]
-POSES = [(robot, kind) for kind in KINDS if kind not in CELL_ONLY for robot in WITH.get(kind, tuple(ROBOTS))]
 LENGTH = 5e-4  # m
+OVER_PULLEYS = ("pulleys", "layers")
+
+
+def cases(other_kinds: tuple[str, ...]) -> list[Any]:
+    """Robots and kinds; in the first tier all kinds of one robot, and one kind of each without pulleys."""
+    found = [(robot, kind) for kind in KINDS if kind not in other_kinds for robot in WITH.get(kind, tuple(ROBOTS))]
+    return [
+        pytest.param(
+            robot,
+            kind,
+            id=f"{kind}-{robot}",
+            marks=() if robot == "drums" or (kind == "frame_anchors" and robot not in OVER_PULLEYS) else extended,
+        )
+        for robot, kind in found
+    ]
 
 
 @cache
@@ -70,24 +84,26 @@ def agree(found: Array, wanted: Array) -> None:
     np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-7 * largest)
 
 
-@pytest.mark.parametrize(("robot", "kind"), CELLS, ids=[f"{kind}-{robot}" for robot, kind in CELLS])
+@pytest.mark.parametrize(("robot", "kind"), cases(POSE_ONLY))
 def test_load_cells_by(robot: str, kind: str) -> None:
     m = ROBOTS[robot].cable_count
     agree(told(robot, kind)[:, :m], differences(robot, kind)[:, :m])
 
 
-@pytest.mark.parametrize(("robot", "kind"), POSES, ids=[f"{kind}-{robot}" for robot, kind in POSES])
+@pytest.mark.parametrize(("robot", "kind"), cases(CELL_ONLY))
 def test_positions_by(robot: str, kind: str) -> None:
     rows = slice(ROBOTS[robot].cable_count, -3)
     agree(told(robot, kind)[:, rows], differences(robot, kind)[:, rows])
 
 
-@pytest.mark.parametrize(("robot", "kind"), POSES, ids=[f"{kind}-{robot}" for robot, kind in POSES])
+@pytest.mark.parametrize(("robot", "kind"), cases(CELL_ONLY))
 def test_rotations_by(robot: str, kind: str) -> None:
     agree(told(robot, kind)[:, -3:], differences(robot, kind)[:, -3:])
 
 
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize(
+    "robot", [pytest.param(robot, marks=extended if robot in OVER_PULLEYS else ()) for robot in ROBOTS]
+)
 def test_whitening_by_what_lengths_are_off(robot: str) -> None:
     machine, pose, lengths = stand(robot)
     loose = machine.sensors.replace(length_deviation=LENGTH)
@@ -121,6 +137,7 @@ def test_a_sensor_that_is_not_there_tells_nothing(robot: str, absent: str) -> No
     )
 
 
+@extended
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if KINDS[kind].each])
 def test_a_number_of_all_cables_is_the_sum_of_theirs(kind: str) -> None:
     machine, pose, lengths = stand("layers")
@@ -131,6 +148,7 @@ def test_a_number_of_all_cables_is_the_sum_of_theirs(kind: str) -> None:
     agree(seen.matrix * deviations(machine)[:, None], wanted)
 
 
+@extended
 def test_the_reference_itself_with_half_the_step(monkeypatch: pytest.MonkeyPatch) -> None:
     wide = {(name, kind): differences(name, kind) for name in ("layers", "planar") for kind in ("mass", "length_zero")}
     monkeypatch.setattr(reference, "STEPS", {row: 0.5 * step for row, step in reference.STEPS.items()})

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 import sagline as sl
+from sagline import InvalidValueError
 from sagline.calibration.parameters import parameters_of
 from sagline.calibration.unknowns import Parameters
-from sagline.errors import InvalidValueError
 from tests.calibration.synthetic import usual_sensors, with_drums
+from tests.refusal import refused
 
 COGIRO = with_drums(pulley_radius=0.04)
 
@@ -47,14 +48,14 @@ def test_cables_share_a_number_only_where_it_is_equal_and_as_well_known(name: st
     apart = asked(COGIRO.replace(tolerances={name: each}), name)
     assert apart.labels == tuple(f"{name}[{k}]" for k in range(8))
     np.testing.assert_array_equal(apart.prior_deviation, each)
-    with pytest.raises(InvalidValueError, match=f"unknown: {name} is shared; allowed: equal and as well known"):
+    with refused(f"unknown: {name}", "shared", kind=InvalidValueError):
         asked(COGIRO.replace(tolerances={name: each}), sl.Unknown(name, shared=True))
 
 
 @pytest.mark.parametrize("name", ["load_cell_gain", "load_cell_bias"])
 def test_what_no_sensor_sees_is_refused_unless_somebody_knows_it(name: str) -> None:
     blind = sl.Sensors(position_deviation=1e-3)
-    with pytest.raises(InvalidValueError, match=f"unknown: {name} is seen by no reading.*Add load cells"):
+    with refused(f"unknown: {name}", "seen by no reading", "load cells in the log", kind=InvalidValueError):
         asked(COGIRO, name, sensors=blind)
     assert asked(COGIRO, sl.Unknown(name, deviation=0.2), sensors=blind).prior_deviation[0] == 0.2
     assert asked(COGIRO.replace(tolerances={name: 0.1}), name, sensors=blind).prior_deviation[0] == 0.1

@@ -6,12 +6,15 @@ from scipy.spatial.transform import Rotation
 
 import sagline as sl
 from tests.calibration.synthetic import log_of, true_robot, usual_sensors
+from tests.tiers import wide
 
 ASKED = ("frame_anchors", "length_zero", "mass", "measuring_frame")
 ERRORS = {"frame_anchors": 0.02, "length_zero": 0.02, "mass": 0.02}
 
 
-@pytest.mark.parametrize("vector", [(0.0, 0.0, np.pi), (2.0, -2.0, 0.5), (-1.2, 0.0, 1.2)])
+@pytest.mark.parametrize(
+    "vector", wide([pytest.param(vector) for vector in ((2.0, -2.0, 0.5), (0.0, 0.0, np.pi), (-1.2, 0.0, 1.2))])
+)
 @pytest.mark.parametrize(("positions", "rotations"), [(0, 20), (20, 0), (1, 20), (20, 20)])
 def test_a_measuring_system_turned_by_anything_is_found(
     vector: tuple[float, float, float], positions: int, rotations: int
@@ -47,5 +50,5 @@ def test_points_on_a_line_say_nothing_of_a_turn_about_it_and_warn_of_nothing() -
         sensors=usual_sensors(position_deviation=1e-3),
     )
     found = sl.calibrate(robot, log, ("mass", "measuring_frame"), folds=0)
-    assert any("measuring_frame.about x" in one.name for one in found.gauge)
+    assert any("about x" in one.name for one in found.gauge)
     assert found.value_of("mass")[0] == pytest.approx(robot.mass, rel=1e-6)

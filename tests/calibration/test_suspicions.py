@@ -25,6 +25,8 @@ from tests.calibration.mistakes import (
     swapped_encoders,
 )
 from tests.calibration.synthetic import USUAL, log_of, true_robot, usual_sensors, with_drums
+from tests.refusal import refused
+from tests.tiers import extended, wide
 
 SENSORS = usual_sensors(position_deviation=1e-3)
 ROBOTS = (
@@ -60,8 +62,8 @@ def honest(count: int, anchors: float) -> Iterator[Honest]:
 @pytest.mark.parametrize(
     ("count", "anchors"),
     [
-        (10, 0.05),
         (2, 0.5),
+        pytest.param(10, 0.05, marks=extended),
         pytest.param(100, 0.05, marks=pytest.mark.soak),
         pytest.param(100, 0.5, marks=pytest.mark.soak),
     ],
@@ -93,7 +95,7 @@ def test_the_units_of_readings_are_told() -> None:
     assert told_wrongly((*units, far_zero), range(4)) == []
 
 
-@pytest.mark.parametrize("make", MISTAKES[:5], ids=lambda make: make.__name__)
+@pytest.mark.parametrize("make", wide(MISTAKES[:5]), ids=lambda make: make.__name__)
 def test_a_mistake_is_told_by_what_it_is(make: Maker) -> None:
     assert told_wrongly((make,), range(1, 2)) == []
 
@@ -114,6 +116,7 @@ def test_mistakes_are_told_without_commanded_poses(make: Maker) -> None:
     assert all(words in told for words in made.told), told
 
 
+@extended
 def test_a_mistake_is_told_of_a_log_with_rows_that_are_not_fit() -> None:
     """Rows keep their numbers: cells that are late are late in the whole log."""
     robot = ROBOTS[0]
@@ -145,5 +148,5 @@ def test_what_is_none_is_refused() -> None:
     ):
         with pytest.raises(sl.InvalidValueError):
             suspicions(robot, given, model)
-    with pytest.raises(sl.InvalidValueError, match="log is of 8 cables"):
+    with refused("log", "of 8 cables", kind=sl.InvalidValueError):
         suspicions(sl.load_robot("falcon-7"), log)

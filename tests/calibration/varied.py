@@ -5,8 +5,7 @@ from typing import Final
 import numpy as np
 
 import sagline as sl
-from sagline.calibration.paid import counts_of, paid_out
-from sagline.robot.drum import drums_of
+from tests.calibration.reference import counts_of
 from tests.calibration.synthetic import Synthetic, Truth, log_of
 from tests.kinematics.feasible import box_poses
 
@@ -58,7 +57,7 @@ def at_chosen(truth: Truth, chosen: sl.CalibrationPoses, seed: int, positions: i
         at = np.linspace(0, len(rows) - 1, positions).round().astype(int)
         read[at] = pose.position[at] + POINT * rng.normal(size=(positions, 3))
     log = sl.WinchLog(
-        counts=counts_of(drums_of(true), believed), load_cells=cells, position=read, commanded=pose, sensors=sensors
+        counts=counts_of(true, believed), load_cells=cells, position=read, commanded=pose, sensors=sensors
     )
     return Synthetic(log, pose, lengths, tensions)
 
@@ -76,8 +75,8 @@ def left_error(believed: sl.Robot, true: sl.Robot, seed: int, *, own: bool, scal
     poses = box_poses(believed, 60, seed + 100)
     plan = sl.inverse(believed, poses)
     sent = poses[np.flatnonzero(plan.feasible)]
-    counts = counts_of(drums_of(believed), plan.unstrained_length[plan.feasible])
-    stood = sl.forward(true, paid_out(drums_of(true), counts), sent).pose.position
+    counts = counts_of(believed, plan.unstrained_length[plan.feasible])
+    stood = sl.forward(true, sl.lengths_from_counts(true, counts), sent).pose.position
     if not own:
         return float(np.sqrt(np.mean(np.sum((stood - sent.position) ** 2, axis=1))))
     asked, there = sent.position - sent.position.mean(axis=0), stood - stood.mean(axis=0)

@@ -38,6 +38,7 @@ from sagline.kernels.inverse.poses import inverse_poses, measure_balance
 from sagline.kernels.jit import FOLDER, is_compiled
 from sagline.kernels.sharing.nearest import new_nearness
 from tests.cli import interrupts
+from tests.tiers import extended
 
 
 def process(code: str, folder: FilePath) -> "subprocess.Popen[str]":
@@ -131,6 +132,7 @@ for words in sys.argv[1:]:
 """
 
 
+@extended
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="asks processes that begin with nothing loaded")
 @pytest.mark.parametrize("names", [[LOSSES, PERIODS], pytest.param(list(ENTRIES), marks=pytest.mark.soak)])
 def test_no_entry_is_compiled_for_one_that_does_not_come_after_it(names: list[str]) -> None:
@@ -176,19 +178,19 @@ def test_what_is_compiled_is_named_and_counted() -> None:
     assert len(stages) == 6  # nobody listens any more
 
 
-def test_the_line_says_how_far_it_is() -> None:
-    assert first_run_text([Stage("a", 0, 9), Stage("b", 0, 0)]) == "First run: compiling a and b ..."
-    assert first_run_text([Stage("a", 3, 9), Stage("b", 12, 9)]) == "First run: compiling a 3 of 9, b 12 kernels ..."
+def test_the_line_says_how_far_it_is(snapshot: Any) -> None:
+    assert first_run_text([Stage("a", 0, 9), Stage("b", 0, 0)]) == snapshot(name="beginning")
+    assert first_run_text([Stage("a", 3, 9), Stage("b", 12, 9)]) == snapshot(name="counts")
 
 
-def test_in_a_file_each_entry_is_told_once() -> None:
+def test_in_a_file_each_entry_is_told_once(snapshot: Any) -> None:
     text = StringIO()
     with shown(Console(file=text), "working") as line:
         for done in range(3):
             line.hear(Stage("one", done, 3, done == 2))
             line.hear(Stage("other", done, 3, done == 2))
         line.progress(1, 2)
-    assert text.getvalue() == "First run: compiling one ...\nFirst run: compiling other ...\n"
+    assert text.getvalue() == snapshot
 
 
 def test_on_a_terminal_the_line_lives() -> None:
@@ -204,7 +206,7 @@ def test_on_a_terminal_the_line_lives() -> None:
         line._bar.tasks[0].start_time = time.monotonic() - 60.0
         line.progress(5, 10)
         line._bar.refresh()
-    assert "First run: compiling one 31 of 42 kernels ..." in soon
+    assert " one 31 of 42 " in soon
     assert "working" in soon.rpartition("kernels")[2]
     assert "━" not in soon
     assert "━" in text.getvalue()[len(soon) :]
@@ -256,6 +258,7 @@ with heard(say):
 """
 
 
+@extended
 def test_two_processes_compile_what_this_one_then_loads(tmp_path: FilePath) -> None:
     names = [FIT, STARTING_LENGTHS]
     code = COMPILE.format(names=names)
@@ -285,6 +288,7 @@ def is_running(pid: str) -> bool:
         return False
 
 
+@extended
 @pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 @pytest.mark.parametrize("way", [signal.SIGINT, signal.SIGKILL])
 def test_however_the_command_ends_the_other_process_ends_too(way: signal.Signals, tmp_path: FilePath) -> None:
@@ -327,6 +331,7 @@ print(*silent, sep="\\n", end="")
 """
 
 
+@extended
 @pytest.mark.parametrize(
     "words",
     [

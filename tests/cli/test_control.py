@@ -1,6 +1,7 @@
 """The operator's place: lines from a pipe against a machine in the same process, where nobody waits for a clock."""
 
 import io
+import re
 import sys
 from typing import Any
 
@@ -11,6 +12,7 @@ from sagline.cli.control import Session
 from sagline.cli.status_line import StatusLine
 from sagline.control.states import State
 from tests.control.rigs import rig
+from tests.tiers import wide
 
 
 def session(monkeypatch: pytest.MonkeyPatch, lines: str) -> tuple[Session, Any]:
@@ -25,36 +27,38 @@ def test_lines_from_a_pipe_are_done_one_after_the_other(
     place, machine = session(monkeypatch, "home 0,0,1.5; goto 0.05,0,1.5\n# a word\n\njog 3 +2mm\njog z -5 mm\nstate\n")
     assert place.run() == 0
     out = capsys.readouterr().out
-    order = ["READY: all groups agree", "> home", "IDLE: the tensions agree", "> goto", "IDLE: the end of the plan",
-             "> jog 3 +2mm", "JOGGING: winch 3 by +2 mm", "> jog z", "JOGGING: the platform", "> state",
-             "OFF: the operator"]  # fmt: skip
-    places = [out.index(words) for words in order]
-    assert places == sorted(places)
+    steps = ["READY:", "> home", "IDLE:", "> goto", "IDLE:", "> jog 3 +2mm", "JOGGING: winch 3", "> jog z", "JOGGING:",
+             "> state", "OFF:"]  # fmt: skip
+    assert re.search(".*".join(map(re.escape, steps)), out, re.DOTALL)
     assert place.control.state is State.OFF
     assert abs(machine.reading.position - [0.05, 0.0, 1.495]).max() < 3e-3
 
 
 @pytest.mark.parametrize(
-    ("line", "why"),
-    [
-        ("gotto 0,0,1", "Did you mean goto"),
-        ("goto 1,2", "three or six numbers"),
-        ("goto", "without a pose"),
-        ("goto 0,0,9", "its status is"),
-        ("jog 8 +5mm", "from 0 to 7"),
-        ("jog 3 5 kg", "m"),
-        ("run nowhere.yaml", "nowhere.yaml"),
-        ("stop now", "that word alone"),
-        ("resume", "no path was paused"),
-        ("ack", "nothing to acknowledge"),
-    ],
+    "line",
+    wide(
+        [
+            "gotto 0,0,1",
+            "goto 1,2",
+            "goto",
+            "jog 8 +5mm",
+            "jog 3 5 kg",
+            "run nowhere.yaml",
+            "stop now",
+            "resume",
+            "ack",
+            "goto 0,0,9",
+        ],
+        first=9,
+    ),
 )
 def test_a_line_that_is_refused_ends_it_and_the_machine_is_given_back(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], line: str, why: str
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], line: str, snapshot: Any
 ) -> None:
     place, _ = session(monkeypatch, f"home\n{line}\ngoto 0.05,0,1.5\n")
-    with pytest.raises(sl.SaglineError, match=why) as caught:
+    with pytest.raises(sl.SaglineError) as caught:
         place.run()
+    assert str(caught.value) == snapshot
     assert len(str(caught.value)) < 300
     assert place.control.state is State.OFF
     assert "MOVING" not in capsys.readouterr().out

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import subprocess
 import sys
 from io import BytesIO, StringIO, TextIOWrapper
 from pathlib import Path
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner
@@ -16,6 +18,7 @@ import sagline as sl
 from sagline.cli.ending import ended
 from sagline.cli.main import app
 from sagline.cli.terminal import show_data
+from tests.tiers import extended, wide
 
 COMMAND = [sys.executable, "-m", "sagline.cli"]
 needs_full = pytest.mark.skipif(not Path("/dev/full").exists(), reason="no disk that is always full")
@@ -29,33 +32,30 @@ def broken(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
 
 
 @pytest.mark.parametrize(
-    ("error", "code", "told"),
+    ("error", "code"),
     [
-        (
-            RuntimeError("boom\nbang"),
-            70,
-            "Unexpected error: RuntimeError: boom\\nbang. This is a mistake in sagline: please",
-        ),
-        (KeyError(), 70, "Unexpected error: KeyError. This is a mistake in sagline: please report it to the authors"),
-        (AssertionError("x" * 5000), 70, "with the command and its files; the option --debug shows where it happened."),
-        (RecursionError("deep"), 70, "Unexpected error: RecursionError: deep"),
-        (MemoryError("Unable to allocate 15 TiB"), 2, "Error: there is not enough memory (Unable to allocate 15 TiB)."),
-        (OSError(36, "File name too long", "x" * 400), 2, "File name too long. Check its name, its permissions and"),
-        (PermissionError(13, "Permission denied", "a.nc"), 2, "Error: a.nc: Permission denied. Check its name"),
-        (sl.InvalidValueError("pose", "x" * 9000, "numbers", "Correct it."), 2, "; allowed: numbers. Correct it."),
-        (sl.FileError("\x1b[2J.yaml", "is\nodd", "Rename it."), 2, "Error: \\x1b[2J.yaml: is\\nodd. Rename it."),
-        (KeyboardInterrupt(), 130, "Interrupted. What has been written is whole."),
+        (RuntimeError("boom\nbang"), 70),
+        (KeyError(), 70),
+        (AssertionError("x" * 5000), 70),
+        (RecursionError("deep"), 70),
+        (MemoryError("Unable to allocate 15 TiB"), 2),
+        (OSError(36, "File name too long", "x" * 400), 2),
+        (PermissionError(13, "Permission denied", "a.nc"), 2),
+        (sl.InvalidValueError("pose", "x" * 9000, "numbers", "Correct it."), 2),
+        (sl.FileError("\x1b[2J.yaml", "is\nodd", "Rename it."), 2),
+        (KeyboardInterrupt(), 130),
     ],
+    ids=lambda value: str(value) if isinstance(value, int) else type(value).__name__,
 )
 def test_whatever_goes_wrong_is_told_in_one_line(
-    error: BaseException, code: int, told: str, monkeypatch: pytest.MonkeyPatch
+    error: BaseException, code: int, monkeypatch: pytest.MonkeyPatch, snapshot: Any
 ) -> None:
     broken(monkeypatch, error)
     result = CliRunner().invoke(app, ["robots"])
     assert (result.exit_code, result.stdout) == (code, "")
-    assert told in result.stderr
     assert result.stderr.count("\n") == 1
     assert len(result.stderr) <= 300
+    assert result.stderr == snapshot
 
 
 @pytest.mark.parametrize("words", [["--debug", "robots"], ["robots", "--debug"]])
@@ -63,9 +63,9 @@ def test_the_traceback_comes_only_if_asked_for(words: list[str], monkeypatch: py
     broken(monkeypatch, RuntimeError("boom"))
     result = CliRunner().invoke(app, words)
     assert result.exit_code == 70
-    assert result.stderr.startswith("Traceback (most recent call last):")
+    assert result.stderr.startswith("Traceback ")
     assert "in fail" in result.stderr
-    assert "Unexpected error: RuntimeError: boom." in result.stderr
+    assert "RuntimeError: boom." in result.stderr.splitlines()[-1]
 
 
 def test_what_was_written_before_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -80,8 +80,9 @@ def test_what_was_written_before_is_named(tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.setattr("sagline.cli.track.write_figures", fail)
     result = CliRunner().invoke(app, ["track", "cogiro", "short.yaml"])
     assert result.exit_code == 2
-    assert "Error: figure.png: cannot be written (No space left on device). Make room." in result.stderr
-    assert "Written before, and whole: cogiro-catenary.nc in output" in result.stderr
+    error, written = result.stderr.splitlines()
+    assert error.startswith("Error: figure.png: ")
+    assert written.endswith(" cogiro-catenary.nc in output")
     assert os.listdir("output") == ["cogiro-catenary.nc"]
 
 
@@ -99,7 +100,7 @@ def test_an_error_is_cut_once_and_its_line_stays_short(length: int, capsys: pyte
     assert line.count("…") == (length > 292)
 
 
-@pytest.mark.parametrize("command", ["show", "tension", "track", "forward"])
+@pytest.mark.parametrize("command", wide(["show", "forward", "tension", "track"], first=2))
 def test_no_name_from_a_file_gives_orders_to_the_terminal(
     command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -149,33 +150,7 @@ def test_a_file_on_stdout_is_to_the_letter_but_for_a_terminal(monkeypatch: pytes
     assert raw.getvalue() == text.encode()
 
 
-@pytest.mark.parametrize(
-    ("words", "told"),
-    [
-        (["show", ""], "Invalid value for 'ROBOT': it is empty. Give ROBOT."),
-        (["track", "cogiro", ""], "'PATH': it is empty. Give PATH."),
-        (["track", "cogiro", "--out", ""], "'--out': it is empty. Give DIR."),
-        (["article", "--out="], "'--out': it is empty. Give DIR."),
-        (["article", "errata", " "], "it is empty. Give PART."),
-        (["convert", "cogiro", "--out", ""], "'--out': it is empty. Give FILE."),
-        (["convert", "cogiro", "--at", "1", "", "2"], "'--at': it is empty. Give X Y Z."),
-        (["tension", "cogiro", "--variable", "foo"], "'--variable': 'foo' is not one of 'chord'"),
-        (["track", "cogiro", "--model", "Straight"], "Did you mean straight?"),
-        (["track", "cogiro", "--tension", "minimum_norm"], "Did you mean minimum-norm?"),
-        (["tension", "cogiro", "--variable", "frame-end"], "Did you mean frame_end?"),
-    ],
-)
-def test_an_argument_is_told_by_its_name(
-    words: list[str], told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    result = CliRunner().invoke(app, words)
-    assert (result.exit_code, result.stdout, os.listdir(tmp_path)) == (2, "", [])
-    assert told in result.stderr
-    assert "Value error" not in result.stderr
-    assert result.stderr.count("\n") == 1
-
-
+@extended
 @needs_full
 @pytest.mark.parametrize(
     "words", [["robots"], ["robots", "--json"], ["--help"], ["--version"], ["show", "--help"], ["convert", "cogiro"]]
@@ -184,10 +159,12 @@ def test_a_full_disk_behind_stdout(words: list[str]) -> None:
     with open("/dev/full", "w") as full:
         done = subprocess.run([*COMMAND, *words], stdout=full, stderr=subprocess.PIPE, text=True)
     assert done.returncode == 2
-    assert done.stderr.startswith("Error: standard output: cannot be written (No space left on device). Give it a file")
+    assert "standard output" in done.stderr
+    assert os.strerror(errno.ENOSPC) in done.stderr
     assert done.stderr.count("\n") == 1
 
 
+@extended
 @pytest.mark.parametrize("words", [["robots", "--json"], ["--help"], ["convert", "cogiro"]])
 def test_nobody_reads_any_more(words: list[str]) -> None:
     reader, writer = os.pipe()
@@ -197,17 +174,20 @@ def test_nobody_reads_any_more(words: list[str]) -> None:
     assert (done.returncode, done.stderr) == (141, "")  # as of a command that SIGPIPE ends
 
 
+@extended
 def test_stdout_and_stderr_may_be_closed() -> None:
     line = f'"{sys.executable}" -m sagline.cli'
     for words in ("robots", "robots --json", "--help", "--version", "show --help", "convert cogiro"):
         done = subprocess.run(["sh", "-c", f"{line} {words} >&-"], stderr=subprocess.PIPE, text=True)
         assert done.returncode == 2
-        assert done.stderr.startswith("Error: standard output: cannot be written (it is closed). Give it a file")
+        assert "standard output" in done.stderr
+        assert "closed" in done.stderr
         assert done.stderr.count("\n") == 1
     done = subprocess.run(["sh", "-c", f"{line} show nothing 2>&-"], stdout=subprocess.PIPE, text=True)
     assert (done.returncode, done.stdout) == (2, "")
 
 
+@extended
 def test_any_encoding_of_the_output_will_do() -> None:
     environment = {**os.environ, "PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"}
     done = subprocess.run([*COMMAND, "robots"], capture_output=True, env=environment)
@@ -217,6 +197,7 @@ def test_any_encoding_of_the_output_will_do() -> None:
     assert json.loads(done.stdout.decode("ascii"))["inertia"]["unit"] == "kg m²"
 
 
+@extended
 def test_what_libraries_warn_of_is_not_told() -> None:
     code = (
         "import logging, sys, warnings\n"
@@ -234,6 +215,7 @@ def test_what_libraries_warn_of_is_not_told() -> None:
     assert "of a library" in done.stderr
 
 
+@extended
 def test_a_thread_that_fails_says_so_in_one_line() -> None:
     code = (
         "import threading\n"
@@ -246,7 +228,7 @@ def test_a_thread_that_fails_says_so_in_one_line() -> None:
         "start.app_entry()\n"
     )
     done = subprocess.run([sys.executable, "-c", code, "robots"], capture_output=True, text=True)
-    assert done.stderr.startswith("Unexpected error: ZeroDivisionError: division by zero.")
+    assert "ZeroDivisionError" in done.stderr
     assert done.stderr.count("\n") == 1
 
 
@@ -259,6 +241,7 @@ def test_the_end_of_the_input_is_no_answer() -> None:
     assert ended(asks) == 2
 
 
+@extended
 def test_loading_takes_no_time_that_is_not_needed() -> None:
     """Before the first line of the command's own nothing of weight is loaded: until then nobody hears Ctrl-C."""
     heavy = ("numpy", "numba", "typer", "rich", "yaml", "matplotlib")

@@ -12,7 +12,6 @@ from typer.testing import CliRunner
 
 import sagline as sl
 from sagline.cli.main import app
-from sagline.files.lengths_file import load_lengths
 
 ROBOT = "article-suspended"
 
@@ -67,29 +66,3 @@ def test_lengths_too_short_to_meet_are_told_and_end_with_1(tmp_path: Path, plan:
     assert f"{len(plan.unstrained_length)} of {len(plan.unstrained_length)} samples" in done.output
     with (tmp_path / "out" / f"{ROBOT}-poses.csv").open(newline="") as stream:
         assert {row["status"] for row in csv.DictReader(stream)} == {"OVERSTRETCHED"}
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("L0,L1\n1,2\n", "line 1: missing column L2, L3, L4, L5, L6, L7; the robot has 8 cables"),
-        ("L0,L1,L2,L3,L4,L5,L6,L7\n1,1,1,1,-2,1,1,1\n", "line 2: L4 is -2 m; allowed: > 0 m"),
-        ("L0,L1,L2,L3,L4,L5,L6,L7\n1,1,1,1,nan,1,1,1\n", "line 2: L4 is nan m; allowed: a finite number"),
-        ("L0,L1,L2,L3,L4,L5,L6,L8\n1,1,1,1,1,1,1,1\n", "unknown column 'L8'"),
-        (
-            "L0 [kg],L1,L2,L3,L4,L5,L6,L7\n1,1,1,1,1,1,1,1\n",
-            "the unit of L0 is [kg]; allowed: a unit that converts to m",
-        ),
-        ("L0,L1,L2,L3,L4,L5,L6,L7\n", "no rows below"),
-        ("time,L0,L1,L2,L3,L4,L5,L6,L7\n1,1,1,1,1,1,1,1,1\n1,1,1,1,1,1,1,1,1\n", "line 3: time is 1 s"),
-    ],
-)
-def test_a_wrong_file_is_named_with_its_line(tmp_path: Path, text: str, words: str) -> None:
-    file = tmp_path / "lengths.csv"
-    file.write_text(text)
-    with pytest.raises(sl.FileError) as caught:
-        load_lengths(file, 8)
-    assert words in str(caught.value)
-    done = CliRunner().invoke(app, ["forward", ROBOT, str(file), "--out", str(tmp_path / "out")])
-    assert done.exit_code == 2
-    assert not (tmp_path / "out").exists()

@@ -14,13 +14,14 @@ import xarray as xr
 from typer.testing import CliRunner
 
 import sagline as sl
+from sagline import Plan
 from sagline.cli import view_log
 from sagline.cli.main import app
 from sagline.files.mcap_log import Recorder
-from sagline.files.mcap_reader import MAGIC
-from sagline.kinematics.plan import Plan
 from tests.files.executions import cycles_of, events_of, execution, plan_of
 from tests.files.test_mcap_log import assert_same
+from tests.refusal import refused
+from tests.tiers import extended, wide
 
 ROBOT = sl.load_robot("article-prototype")
 
@@ -35,12 +36,12 @@ def test_it_tells_states_largest_errors_lateness_and_events(log: Path) -> None:
     result = CliRunner().invoke(app, ["log", str(log)])
     assert result.exit_code == 0, result.output
     done, text = execution(), " ".join(result.stdout.split())
-    assert "article-prototype: 201 cycles in 2 s, 4 of them without an answer." in text
-    assert "DONE: the end of the plan" in text
+    assert re.match(r"article-prototype: 201 .*\b2 s, 4 ", text)
+    assert "DONE: " in text
     assert re.search(r"MOVING 2\.01 201", text)
     off = np.abs(done.tension - done.planned_tension)
     row, cable = np.unravel_index(int(np.nanargmax(off)), off.shape)
-    assert f"tension error {off[row, cable]:.3g} N {cable} {0.01 * row:.2f}" in text
+    assert f" error {off[row, cable]:.3g} N {cable} {0.01 * row:.2f}" in text
     late = int(np.count_nonzero(done.late <= 1e-4))
     assert late == 201  # none of them is later than 0.1 ms
     assert re.search(rf"up to 100 µs {late} █{{30}}", text)
@@ -48,7 +49,7 @@ def test_it_tells_states_largest_errors_lateness_and_events(log: Path) -> None:
         assert event.text in text
 
 
-@pytest.mark.parametrize("width", [60, 80, 120])
+@pytest.mark.parametrize("width", wide([60, 80, 120]))
 def test_it_fits_a_terminal(log: Path, width: int, monkeypatch: pytest.MonkeyPatch) -> None:
     from rich.console import Console
 
@@ -68,6 +69,7 @@ def test_numbers_for_a_program(log: Path) -> None:
     assert [event["text"] for event in said["events"]] == [event.text for event in events_of()]
 
 
+@extended
 def test_a_data_set_has_every_number_and_the_plan(log: Path, tmp_path: Path) -> None:
     assert CliRunner().invoke(app, ["log", str(log), "--to", str(tmp_path / "run.nc")]).exit_code == 0
     done = execution()
@@ -82,7 +84,7 @@ def test_a_data_set_has_every_number_and_the_plan(log: Path, tmp_path: Path) -> 
         assert isinstance(done.plan, Plan)
         assert np.array_equal(data.unstrained_length, done.plan.unstrained_length)
         assert np.array_equal(data.horizontal_tension, done.plan.horizontal_tension)
-    with pytest.raises(sl.FileError, match="is an execution of sagline, no plan"):
+    with refused(kind=sl.FileError, file=tmp_path / "run.nc"):
         sl.load_plan(tmp_path / "run.nc")
 
 
@@ -91,46 +93,14 @@ def test_a_log_without_its_end_is_told_and_mended(log: Path, tmp_path: Path) -> 
     killed.write_bytes(log.read_bytes()[:-20_000])
     result = CliRunner().invoke(app, ["log", str(killed), "--to", str(tmp_path / "mended.mcap")])
     assert result.exit_code == 0, result.output
-    assert "was cut off: what was recorded in its last second is not there" in result.stderr
+    assert str(killed) in result.stderr
     mended = sl.load_execution(tmp_path / "mended.mcap")  # no warning, which would be an error here
     with pytest.warns(sl.SaglineWarning):
         assert_same(mended, sl.load_execution(killed))
     assert len(mended) == 100
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["log", "missing.mcap"], r"missing\.mcap: does not exist\."),
-        (["log", "run.mcap", "--plan", "1"], r"plan is 1; allowed: -1 to 0\."),
-        (["log", "run.mcap", "--plan", "x"], r"--plan is 'x'; allowed: a whole number"),
-        (["log", "run.mcap", "--to", "run.csv"], r"run\.csv: is no name for an execution\. Let it end in \.mcap"),
-        (["log", "plan.nc"], r"plan\.nc: is another kind of file, no log in MCAP\."),
-        (["log", "."], r"is a folder"),
-        (["log", "empty.mcap"], r"empty\.mcap: is empty\."),
-        (["view", "missing.mcap"], r"missing\.mcap: does not exist\."),
-        (["view", "cogiro", "--live"], r"--live is given without a log; allowed: a log in MCAP\."),
-        (["view", "cogiro", "--truth", "run.mcap"], r"--truth is given without a log"),
-        (["view", "cogiro", "run.mcap"], r"run\.mcap: is a log of article-prototype, not of cogiro\."),
-        (["view", "run.mcap", "--pose", "0,0,1"], r"--pose is given with a run"),
-        (["view", "twin.mcap"], r"twin\.mcap: has no cycle\."),
-    ],
-)
-def test_what_cannot_be_is_one_line(log: Path, words: list[str], said: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(log.parent)
-    Path("empty.mcap").touch()
-    if "plan.nc" in words:
-        plan_of().save("plan.nc")
-    if "twin.mcap" in words:
-        with Recorder("twin.mcap", ROBOT) as recorder:
-            recorder.truth(0.0, np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
-    result = CliRunner().invoke(app, words)
-    assert result.exit_code == 2
-    assert re.search(said, result.stderr), result.stderr
-    assert len(result.stderr.splitlines()) == 1
-
-
-@pytest.mark.parametrize("there", [None, b"", MAGIC[:3]])
+@pytest.mark.parametrize("there", [None, b"", b"\x89MC"])
 @pytest.mark.parametrize("name", ["run.mcap", "twin.mcap"])
 def test_a_growing_log_is_waited_for_until_its_first_bytes_are_there(
     log: Path, name: str, there: bytes | None, monkeypatch: pytest.MonkeyPatch
@@ -156,10 +126,11 @@ def test_a_growing_log_is_waited_for_until_its_first_bytes_are_there(
 def test_what_is_no_log_is_not_waited_for(tmp_path: Path, said: bytes | None) -> None:
     file = tmp_path / "run.mcap"
     file.mkdir() if said is None else file.write_bytes(said)
-    with pytest.raises(sl.FileError, match="is a folder" if said is None else "no log in MCAP"):
+    with refused(kind=sl.FileError, file=file):
         view_log.view_log(file, None, True, None, "", 0, browser=False)
 
 
+@extended
 def test_a_growing_log_is_followed_from_before_it_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In place of the page: what it would be given."""
     monkeypatch.setattr("sagline.cli.view_log.LOOK", 0.05)

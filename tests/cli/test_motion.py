@@ -1,6 +1,7 @@
 """`sagline vibrate` and `sagline simulate`: numbers of the library, files, what is said where nothing comes."""
 
 import json
+import re
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -9,8 +10,10 @@ import pytest
 from typer.testing import CliRunner
 
 import sagline as sl
+from sagline import to_shape
 from sagline.cli.main import app
-from sagline.dynamics.to_shape import to_shape
+from sagline.cli.values import damping_of
+from tests.tiers import extended
 
 WAY = "durations: 1\nrate: 100\nwaypoints: [{position: [0, 0, 1.5]}, {position: [1, 0, 1.5]}]\n"
 
@@ -54,11 +57,11 @@ def test_every_frequency_says_what_it_is_and_hidden_modes_are_counted(folder: Fi
     state = sl.inverse(sl.load_robot("cogiro"), sl.Pose([0, 0, 2], np.eye(3))).state
     modes = sl.vibration(state, up_to=12.0)
     text = " ".join(result.stdout.split())
-    assert f"{modes.count} modes with cable mass below 12 Hz: none is missing, by the exact count." in text
-    assert f"Massless modes that are beyond it: {sl.modes(state).frequency[-1]:.3f} Hz" in text
+    assert re.search(rf"\b{modes.count} modes .* 12 Hz: ", text)
+    assert f" {sl.modes(state).frequency[-1]:.3f} Hz" in text
     rows = [line.split() for line in result.stdout.splitlines() if line.strip()[:1].isdigit() and "mode" not in line]
     assert [float(row[1]) for row in rows[:3]] == modes.frequency[:3].round(3).tolist()
-    assert f"Not shown: {modes.count - len(rows)} in which cables swing alone" in text
+    assert f"Not shown: {modes.count - len(rows)} " in text
     beside = [row[-1] for row in rows if len(row) == 7]
     assert beside == [f"{each:.3f}" for each in sl.modes(state).frequency[:-1]]
     table = (folder / "output" / "cogiro-modes.csv").read_text().splitlines()
@@ -68,11 +71,13 @@ def test_every_frequency_says_what_it_is_and_hidden_modes_are_counted(folder: Fi
 def test_where_no_mode_lies_the_lowest_massless_one_is_told(folder: FilePath) -> None:
     result = sagline("vibrate", "article-suspended", "--pose", "0,0,1.5", "--up-to", "1", "--no-figures")
     assert result.exit_code == 0, result.stderr
-    assert result.stdout.startswith("No mode with cable mass lies below 1 Hz, by the exact count; the lowest massless")
-    assert "1.787 Hz. Raise --up-to." in " ".join(result.stdout.split())
+    text = " ".join(result.stdout.split())
+    assert re.findall(r"[\d.]+ Hz", text)[:2] == ["1 Hz", "1.787 Hz"]
+    assert "--up-to" in text
     assert "mode  " not in result.stdout
 
 
+@extended
 def test_a_film_of_ten_seconds(folder: FilePath) -> None:
     from PIL import Image
 
@@ -86,35 +91,6 @@ def test_a_film_of_ten_seconds(folder: FilePath) -> None:
             pictures.append(np.asarray(film.convert("L"), dtype=float))
     assert np.abs(pictures[0] - pictures[1]).max() > 50.0  # a quarter of a swing later
     np.testing.assert_array_equal(pictures[0], pictures[2])
-
-
-@pytest.mark.parametrize(
-    ("words", "code", "told"),
-    [
-        (["vibrate", "article-suspended", "--pose", "7.45,0,1.5"], 1, "No modes: "),
-        (["vibrate", "cogiro", "--up-to", "0"], 2, "--up-to"),
-        (["vibrate", "cogiro", "--up-to", "3 kg"], 2, "--up-to"),
-        (["vibrate", "cogiro", "--up-to", "1e5"], 2, "frequency is 100000 Hz"),
-        (["vibrate", "cogiro", "--damping", "2"], 2, "modal_damping"),
-        (["vibrate", "cogiro", "--damping", "% 1"], 2, "--damping"),
-        (["vibrate", "cogiro", "--film", "99999"], 2, "--film"),
-        (["simulate", "cogiro", "--break", "9@1s"], 2, "cable 9"),
-        (["simulate", "cogiro", "--break", "3"], 2, "CABLE@TIME"),
-        (["simulate", "cogiro", "--break", "3@1kg"], 2, "--break"),
-        (["simulate", "cogiro", "--out", "sim.txt"], 2, ".nc"),
-        (["simulate", "cogiro", "--step", "1"], 2, "step"),
-        (["simulate", "cogiro", "--shaper", "zvd"], 2, "--shaper is zvd without a path"),
-        (["simulate", "cogiro", "--cable-mass", "modal", "--break", "3@1s"], 2, "events is given"),
-        (["simulate", "cogiro", "way.yaml", "--after", "-1"], 2, "--after"),
-    ],
-)
-def test_bad_input_ends_in_one_line(folder: FilePath, words: list[str], code: int, told: str) -> None:
-    result = sagline(*words)
-    assert result.exit_code == code
-    assert told in result.stderr
-    lines = [line for line in result.stderr.splitlines() if not line.startswith("First run")]
-    assert len(lines) == 1
-    assert not list(folder.glob("**/*.nc"))
 
 
 def test_a_break_is_what_the_library_says_and_its_file_is_read_again(folder: FilePath) -> None:
@@ -135,12 +111,10 @@ def test_a_break_is_what_the_library_says_and_its_file_is_read_again(folder: Fil
     assert own.largest_tension.max() == event.tension_after > np.nanmax(own.tensions)  # between samples too
     np.testing.assert_array_equal(read.largest_tension, own.largest_tension)
     cable = int(own.largest_tension.argmax())
-    assert f"largest tension {event.tension_after:,.1f} N, cable {cable} " in text
-    assert "above tension_max" not in text
-    assert (
-        f"0.200 s: break of cable 3, {event.tension_before:,.1f} N before, then at most {event.tension_after:,.1f} N"
-        in text
-    )
+    assert f" {event.tension_after:,.1f} N, cable {cable} " in text
+    assert "tension_max" not in text
+    before, after = f"{event.tension_before:,.1f} N", f"{event.tension_after:,.1f} N"
+    assert re.search(rf"\b0\.200 s: .*\bcable 3, {before}\b.*\b{after}", text)
     assert (folder / "sim-energy.png").exists()
 
 
@@ -154,7 +128,7 @@ def test_cables_above_their_limit_are_named(folder: FilePath) -> None:
     assert largest is not None
     above = np.flatnonzero(largest > 800.0)
     assert 0 < above.size < 8
-    assert f"above tension_max cables {', '.join(map(str, above))} " in " ".join(result.stdout.split())
+    assert f" cables {', '.join(map(str, above))} " in " ".join(result.stdout.split())
 
 
 def test_a_shaped_path_leaves_less_vibration(folder: FilePath) -> None:
@@ -171,6 +145,7 @@ def test_a_shaped_path_leaves_less_vibration(folder: FilePath) -> None:
     assert " and ".join(f"{each:.3f}" for each in frequency) + " Hz (massless)" in result.stderr
 
 
+@extended
 def test_a_map_of_the_test_box(folder: FilePath) -> None:
     result = sagline("vibrate", "article-suspended", "--map", "3x2x1", "--up-to", "3", "--out", "maps", "--json")
     assert result.exit_code == 0, result.stderr
@@ -188,17 +163,6 @@ def test_a_map_of_the_test_box(folder: FilePath) -> None:
     assert names == {f"article-suspended-vibration-map{kind}" for kind in kinds}
 
 
-@pytest.mark.parametrize(
-    ("words", "told"),
-    [
-        (["--map", "3x2"], "NXxNYxNZ"),
-        (["--map", "0x1x1"], "NXxNYxNZ"),
-        (["--map", "9999x9999x9"], "1 to 1,000,000 poses"),
-        (["--map", "2x2x2", "--pose", "0,0,1.5"], "--pose is given with --map"),
-        (["--map", "2x2x2", "--film", "1"], "--film is given with --map"),
-    ],
-)
-def test_maps_that_are_none(words: list[str], told: str) -> None:
-    result = sagline("vibrate", "cogiro", *words)
-    assert result.exit_code == 2
-    assert told in result.stderr
+def test_losses_may_be_given_in_percent_and_with_units() -> None:
+    damping = damping_of("2 ms", "0.1 N*s/m^2", "3 %")
+    np.testing.assert_allclose([damping.loss_time, damping.air_damping, damping.modal_damping], [2e-3, 0.1, 0.03])

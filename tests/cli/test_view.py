@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path as FilePath
+from typing import Any
 from urllib.request import urlopen
 
 import h5py
@@ -20,6 +21,8 @@ from sagline.cli.main import app
 from sagline.cli.played import played_beside, played_in
 from sagline.cli.terminal import notices
 from tests.cli import interrupts
+from tests.refusal import refused
+from tests.tiers import extended
 from tests.viewer.client import Client
 
 
@@ -39,6 +42,7 @@ def viewing(*words: str) -> Iterator[tuple[subprocess.Popen[str], int]]:
         process.communicate()
 
 
+@extended
 def test_it_serves_a_page_and_stops_at_ctrl_c_mid_drag() -> None:
     with viewing("article-suspended") as (process, port):
         with urlopen(f"http://127.0.0.1:{port}") as page:
@@ -64,21 +68,13 @@ def test_a_taken_port_is_told() -> None:
         port = str(taken.getsockname()[1])
         result = CliRunner().invoke(app, ["view", "article-suspended", "--port", port, "--no-browser"])
     assert result.exit_code == 2
-    assert f"port {port} is in use" in result.stderr
+    assert f" {port} " in result.stderr
     assert "--port 0" in result.stderr
 
 
-def test_a_run_of_another_robot_is_refused(tmp_path: FilePath) -> None:
-    robot = sl.load_robot("article-mixed")
-    poses = sl.Pose(np.array([[0.0, 0.0, 1.5], [0.1, 0.0, 1.5]]), np.stack([np.eye(3)] * 2))
-    sl.inverse(robot, poses).save(tmp_path / "run.nc")
-    result = CliRunner().invoke(app, ["view", "cogiro", str(tmp_path / "run.nc"), "--port", "0", "--no-browser"])
-    assert result.exit_code == 2
-    assert "sagline view article-mixed" in " ".join(result.stderr.split())
-
-
+@extended
 def test_a_run_from_before_digests_is_played_with_a_note(
-    tmp_path: FilePath, capsys: pytest.CaptureFixture[str]
+    tmp_path: FilePath, capsys: pytest.CaptureFixture[str], snapshot: Any
 ) -> None:
     robot, file = sl.load_robot("article-mixed"), tmp_path / "run.nc"
     sl.inverse(robot, sl.Pose([[0.0, 0.0, 1.5]], np.eye(3))).save(file)
@@ -86,18 +82,9 @@ def test_a_run_from_before_digests_is_played_with_a_note(
         content.attrs["sagline_format"] = 1
     with notices():  # as around every command
         assert played_in(robot, file).duration == 0.0
-    told = (
-        f"Note: {file} is from before plans carried a digest: damage to it need not show. Save it again to have one.\n"
-    )
-    assert capsys.readouterr().err.startswith(told)  # what is compiled may be told as well
-    assert CliRunner().invoke(app, ["lengths", str(file)]).stderr.startswith(told)
-
-
-@pytest.mark.parametrize("wrong", [["nothing-like-it"], ["cogiro", "missing.nc"], ["cogiro", "--port", "99999"]])
-def test_bad_input_ends_with_a_message(wrong: list[str]) -> None:
-    result = CliRunner().invoke(app, ["view", *wrong, "--no-browser"])
-    assert result.exit_code == 2
-    assert "Error:" in result.stderr
+    told = capsys.readouterr().err.splitlines()[0]  # what is compiled may be told as well
+    assert CliRunner().invoke(app, ["lengths", str(file)]).stderr.splitlines()[0] == told
+    assert told.replace(str(file), "FILE") == snapshot
 
 
 def test_a_simulation_is_played_as_a_run_is(tmp_path: FilePath) -> None:
@@ -108,18 +95,9 @@ def test_a_simulation_is_played_as_a_run_is(tmp_path: FilePath) -> None:
     assert (played.name, played.duration) == ("simulation", 0.5)
     np.testing.assert_array_equal(played.home.position, swing.pose.position[0])
     assert np.isnan(played.sight(0.5).tension[3])
-    result = CliRunner().invoke(app, ["view", "fast", str(tmp_path / "sim.nc"), "--port", "0", "--no-browser"])
-    assert result.exit_code == 2
-    assert "is a simulation of cogiro, not of fast" in " ".join(result.stderr.split())
 
 
-@pytest.mark.parametrize("wrong", [["--mode", "0"], ["--mode", "light 1"], ["--mode", "1", "run.nc"]])
-def test_modes_that_are_none(wrong: list[str]) -> None:
-    result = CliRunner().invoke(app, ["view", "cogiro", *wrong, "--no-browser"])
-    assert result.exit_code == 2
-    assert "--mode" in result.stderr
-
-
+@extended
 def test_two_runs_are_named_by_their_files(tmp_path: FilePath) -> None:
     robot = sl.load_robot("article-mixed")
     first, second = tmp_path / "a.nc", tmp_path / "b.nc"
@@ -128,13 +106,5 @@ def test_two_runs_are_named_by_their_files(tmp_path: FilePath) -> None:
     beside = played_beside(robot, first, second)
     assert beside.names == ("a.nc", "b.nc")
     assert beside.played.duration == 1.0
-    with pytest.raises(sl.FileError, match="is a run of article-mixed, not of cogiro"):
+    with refused(kind=sl.FileError, file=second):
         played_beside(sl.load_robot("cogiro"), first, second)
-
-
-@pytest.mark.parametrize("words", [["cogiro"], ["found.nc"]])
-def test_nothing_is_played_beside_nothing(words: list[str]) -> None:
-    result = CliRunner().invoke(app, ["view", *words, "--beside", "b.nc", "--no-browser"])
-    assert result.exit_code == 2
-    assert "--beside" in result.stderr
-    assert "run_a.nc --beside run_b.nc" in " ".join(result.stderr.split())

@@ -26,17 +26,22 @@ from sagline.cli.main import app
 from sagline.cli.tables import Grid
 from tests.abuse.command_lines import LINES
 from tests.kinematics.winches import wound
+from tests.tiers import extended, wide
 
 WIDTHS = (60, 80, 120)
 SHORT = "durations: 1\nrate: 4\nwaypoints: [{position: [0, 0, 1.5]}, {position: [1, 0, 1.5]}]\n"
 # paths, or on stderr
 WHOLE = r"In |Try: |Written: |Look at it: |Every value: |Advice: |[\w-]+: the path|The file keeps|Nowhere: "
 COMMANDS = (
+    ["forward", "cogiro", "lengths.csv"],
+    ["show", "many.yaml"],
+    ["track", "--help"],
+    # the second tier
+    ["robots"],
     ["track", "cogiro", "short.yaml", "--no-figures"],
     ["track", "article-suspended", "far.yaml", "--no-figures"],
     ["run"],
     ["identify", "cable.csv"],
-    ["forward", "cogiro", "lengths.csv"],
     ["forward", "wound.yaml", "counts.csv", "--counts"],
     ["tension", "cogiro", "--no-figures"],
     ["tension", "many.yaml", "--pose", "0,0,2", "--no-figures"],
@@ -44,13 +49,11 @@ COMMANDS = (
     ["simulate", "cogiro", "--break", "3@0.1s", "--after", "0.2", "--no-figures"],
     ["workspace", "cogiro", "--cells", "6", "--no-figures"],
     ["workspace", "cogiro", "--wrench", "±9 kN, ±20 N m", "--max-sag", "5 cm", "--cells", "4"],
-    ["robots"],
     ["show", "cogiro"],
-    ["show", "many.yaml"],
     ["show", "expo2015-lucia"],
     ["new", "my_robot.yaml", "--force"],
     ["examples", "--force"],
-    *([name, "--help"] for name in LINES),
+    *([name, "--help"] for name in LINES if name != "track"),
     ["--help"],
 )
 
@@ -109,7 +112,7 @@ def words_of(text: str) -> Counter[str]:
     return Counter(word for word in whole.split() if not set(word) <= set("─"))
 
 
-@pytest.mark.parametrize("words", COMMANDS, ids=" ".join)
+@pytest.mark.parametrize("words", wide(COMMANDS, first=3), ids=" ".join)
 def test_no_number_and_no_word_is_cut(words: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
     wide = words_of(printed(words, None, monkeypatch))
     assert sum(wide.values()) > 10
@@ -160,6 +163,7 @@ def on_terminal(width: int, *words: str) -> str:
     return re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", text.decode()).replace("\r", "")
 
 
+@extended
 def test_on_a_real_terminal_and_in_a_real_pipe() -> None:
     command = ("forward", "cogiro", "lengths.csv")
     piped = subprocess.run([sys.executable, "-m", "sagline.cli", *command], capture_output=True, text=True, check=True)

@@ -1,18 +1,19 @@
 """`sagline workspace`: the library's numbers, its files, what is said of an empty one; loads and boxes as texts."""
 
 import json
+import re
 from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
 import pytest
-import trimesh
 from typer.testing import CliRunner
 
 import sagline as sl
 from sagline.cli.main import app
 from sagline.cli.regions import box_of, wrenches_of
 from sagline.errors import MOST
+from tests.tiers import extended
 
 
 @pytest.fixture(autouse=True)
@@ -26,7 +27,10 @@ def sagline(*words: str) -> Any:
     return CliRunner().invoke(app, ["workspace", *words])
 
 
+@extended
 def test_the_volume_of_the_article(folder: FilePath) -> None:
+    import trimesh
+
     result = sagline("article-suspended", "--no-figures", "--json")
     assert result.exit_code == 0, result.stderr
     found = json.loads(result.stdout)
@@ -40,6 +44,7 @@ def test_the_volume_of_the_article(folder: FilePath) -> None:
     assert np.ptp(hull.vertices, axis=0).max() == pytest.approx(np.ptp(space.surface.vertices, axis=0).max(), rel=1e-6)
 
 
+@extended
 def test_options_are_arguments() -> None:
     words = ["--wrench", "±50 N, ±5 N m, ±0.5 m/s^2", "--tilt", "5deg", "--max-sag", "30 cm", "--clearance", "1 mm"]
     words.append("--no-figures")  # of 27 rotations and all criteria: most of a minute
@@ -69,7 +74,7 @@ def test_options_are_arguments() -> None:
     found = json.loads(result.stdout)
     assert found["volume_m3"] == pytest.approx(space.volume, rel=1e-9)
     assert found["criteria"] == [str(one) for one in space.criteria]
-    assert found["orientations"] == "all of 27 sampled rotations, by up to 5°"
+    assert re.search(r"\b27 sampled\b.* 5°$", found["orientations"])
 
 
 def test_what_is_told(folder: FilePath) -> None:
@@ -78,11 +83,12 @@ def test_what_is_told(folder: FilePath) -> None:
     lines = [" ".join(line.split()) for line in result.stdout.splitlines()]
     space = sl.load_workspace(folder / "output" / "article-suspended-workspace.nc")
     assert f"volume {space.volume:.1f} ± {space.volume_error:.1f} m³" in lines
-    assert "open it reaches the box at z low: this is what there is in this box" in lines
+    assert any(line.startswith("open ") and "z low" in line for line in lines)
     first = space.limits[0]
     assert f"{100.0 * first.share:.1f} margin {first.cable}" in lines
 
 
+@extended
 def test_what_is_proved_and_what_is_not() -> None:
     words = ["--cells", "4", "--no-figures", "--json", "--prove"]
     inside = sagline("article-suspended", *words, "-1..1, -1..1, 2..2.5 m")
@@ -95,6 +101,7 @@ def test_what_is_proved_and_what_is_not() -> None:
     assert json.loads(outside.stdout)["proof"]["share_inside"] == 0.0
 
 
+@extended
 def test_what_stands_around(folder: FilePath) -> None:
     (folder / "own.yaml").write_text(
         sl.dump_robot(sl.load_robot("article-suspended"))
@@ -107,16 +114,13 @@ def test_what_stands_around(folder: FilePath) -> None:
     )
     volumes = [len(json.loads(result.stdout)["components_m3"]) for result in (own, other, none)]
     assert volumes == [2, 2, 1]
-    alone = sagline("cogiro", "--scene", "own.yaml")
-    assert alone.exit_code == 2
-    assert "without --clearance" in alone.stderr
 
 
 def test_nowhere_ends_with_the_nearest_pose(folder: FilePath) -> None:
     result = sagline("article-suspended", "--wrench", "±5 kN", "--cells", "4", "--json")
     assert result.exit_code == 1
     assert "Nowhere: " in result.stderr
-    assert "% of the loads" in result.stderr
+    assert re.search(r"\b\d+ % .*\bkN\b", result.stderr)
     found = json.loads(result.stdout)
     assert found["volume_m3"] == 0.0
     assert found["nearest"]["cables"]
@@ -182,9 +186,3 @@ def test_what_is_refused(words: list[str], folder: FilePath) -> None:
     assert len(result.stderr.splitlines()) == 1
     assert len(result.stderr) < MOST + 10
     assert not (folder / "output").exists()
-
-
-def test_an_angle_without_a_unit_is_told_how_to_write_it() -> None:
-    result = sagline("cogiro", "--tilt", "10", "--no-figures")
-    assert result.exit_code == 2
-    assert "--tilt is '10'; allowed: 0 to 180deg. Give its unit, --tilt 10deg" in result.stderr

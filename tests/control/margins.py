@@ -8,7 +8,6 @@ import numpy as np
 
 import sagline as sl
 from sagline.arrays import Array, Indices
-from sagline.statics.stiffness import mass_matrix
 
 DELAY = 1.5e-3  # s: half a period of the drives, and one to work in
 # Hz; a platform's mode is a percent wide
@@ -77,7 +76,7 @@ def axis(state: sl.Equilibrium, damping: sl.Damping) -> Axis:
     inertia = float((winch.inertia * (winch.gear / winch.drum_radius) ** 2)[0])
     linear = sl.linearized(state, sl.Damping(loss_time=damping.loss_time), "speeds")
     slowed = linear.A.copy()
-    slowed[6:12, 6:12] -= np.linalg.solve(mass_matrix(state), _air(state, damping.air_damping))
+    slowed[6:12, 6:12] -= linear.B[6:12, m:] @ _air(state, damping.air_damping)
     system = (slowed, linear.B[:, :m], linear.C[6 : 6 + m], linear.D[6 : 6 + m, :m])
     return Axis(inertia, position, speed, integral, system, np.arange(12, 12 + m), linear.B[:, m:])
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -65,12 +66,12 @@ class Spy:
 
     def __init__(self, link: Any) -> None:
         """Stand before a link."""
-        self._link, self.groups, self.period = link, link.groups, link.period
+        self.link, self.groups, self.period = link, link.groups, link.period
         self.commands: list[Command | None] = []
         self.answers: list[Sample | Missing] = []
 
     def exchange(self, command: Command | None) -> Sample | Missing:
-        answer: Sample | Missing = self._link.exchange(command)
+        answer: Sample | Missing = self.link.exchange(command)
         self.commands.append(command)
         self.answers.append(answer)
         return answer
@@ -123,11 +124,15 @@ class Watcher:
         self.told.append(("event", len(self.cycles), event))
 
 
+SPIES: WeakKeyDictionary[Controller, Spy] = WeakKeyDictionary()  # of the controllers of `rig`
+
+
 def rig(true: sl.Robot | None = None, home: bool = True, seed: int = 1, **settings: Any) -> tuple[Controller, Machine]:
     """A controller that is connected, and homed, and its machine."""
     machine = Machine(true or prototype(), nominal=prototype(), start=HOME, seed=seed)
     link = Spy(machine.link())
     control = Controller(prototype(), link, seed=2, **settings)
+    SPIES[control] = link
     if home:
         control.connect()
         control.home(HOME)
@@ -135,10 +140,8 @@ def rig(true: sl.Robot | None = None, home: bool = True, seed: int = 1, **settin
 
 
 def spy_of(control: Controller) -> Spy:
-    """The link that keeps what goes through it."""
-    link: Any = control._link
-    assert isinstance(link, Spy)
-    return link
+    """Link of a controller of `rig`, which keeps what goes through it."""
+    return SPIES[control]
 
 
 def state_of(control: Controller) -> State:

@@ -1,4 +1,4 @@
-"""The prototype's home and ten stops, and what else the tests of control share."""
+"""The prototype, its home position and the ten positions of the article's Table 2, with the plan of all of them."""
 
 from __future__ import annotations
 
@@ -10,11 +10,15 @@ import sagline as sl
 from sagline.article.table2 import table2
 from sagline.article.ten_poses import HOME
 
+TEN_POSES = table2().desired  # m, shape (10, 3)
 PROTOTYPE = sl.load_robot("article-prototype")
+
+
+__all__ = ["HOME", "PROTOTYPE", "TEN_POSES", "stops"]
 
 
 @cache
 def stops() -> sl.Plan:
     """The prototype at rest at home and at the ten poses of the article."""
-    places = np.vstack((HOME, table2().desired))
+    places = np.vstack((HOME, TEN_POSES))
     return sl.inverse(PROTOTYPE, sl.Pose(places, np.broadcast_to(np.eye(3), (len(places), 3, 3))))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -33,33 +34,33 @@ def agreeing() -> Sample:
 
 
 LOCKED = int(GroupStatus.READY | GroupStatus.LOCKED)
-BAD: list[tuple[str, int, float, str, str]] = [
-    ("age", 2, 0.04, "group 2: silent for 0.04 s", "network"),
-    ("age", 2, np.nan, "group 2: silent", "network"),
-    ("owner", 1, 5, "group 1: belongs to another controller, 5", "Stop that one"),
-    ("owner", 1, 0, "group 1: nobody has the grant", "Connect again"),
-    ("status", 3, LOCKED, "group 3: the drums are locked", "Let the drums go at the machine"),
-    ("status", 3, int(GroupStatus.EMERGENCY), "group 3: the emergency stop is pressed", "release it"),
-    ("status", 0, int(GroupStatus.BRAKED), "group 0: a drive is not ready", "reset it at the machine"),
-    ("fault", 0, 3, r"group 0: it stopped by itself: a drive lagged too far", "Mend the cause"),
-    ("winch_fault", 4, 1, "group 2: a drive has tripped", "reset it at the machine"),
-    ("state", 7, int(WinchState.FAULT), "group 3: a drive has tripped", "reset it at the machine"),
-    ("echo", 1, COUNTER - 11, "group 1: does not take commands", "PLC's program"),
-]
+BAD: dict[str, tuple[str, int, float, int]] = {
+    "old": ("age", 2, 0.04, 2),
+    "without an age": ("age", 2, np.nan, 2),
+    "of another owner": ("owner", 1, 5, 1),
+    "of no owner": ("owner", 1, 0, 1),
+    "locked": ("status", 3, LOCKED, 3),
+    "emergency": ("status", 3, int(GroupStatus.EMERGENCY), 3),
+    "not ready": ("status", 0, int(GroupStatus.BRAKED), 0),
+    "stopped": ("fault", 0, 3, 0),
+    "drive fault": ("winch_fault", 4, 1, 2),
+    "drive state": ("state", 7, int(WinchState.FAULT), 3),
+    "without an echo": ("echo", 1, COUNTER - 11, 1),
+}
 
 
-@pytest.mark.parametrize(("field", "index", "value", "reason", "step"), BAD)
-def test_each_thing_that_is_wrong_is_named_with_its_group(
-    field: str, index: int, value: float, reason: str, step: str
-) -> None:
+@pytest.mark.parametrize("name", BAD)
+def test_each_disagreement_is_refused_with_its_group_cause_and_next_step(name: str, snapshot: Any) -> None:
+    field, index, value, group = BAD[name]
     assert trouble(agreeing(), OWN, COUNTER, GROUPS) is None
     wrong = getattr(agreeing(), field).copy()
     wrong[index] = value
     found = trouble(agreeing()._replace(**{field: wrong}), OWN, COUNTER, GROUPS)
     assert found is not None
-    with pytest.raises(RefusedError, match=rf"^it is refused: {reason}.*{step}") as caught:
-        raise found.refusal("it")
-    assert len(str(caught.value)) < 300
+    error = found.refusal("it")
+    assert (error.item, error.reason.partition(":")[0]) == ("it", f"group {group}")
+    assert str(error) == snapshot
+    assert len(str(error)) < 300
 
 
 def test_an_echo_may_be_ten_commands_old_across_the_end_of_the_counters() -> None:
@@ -69,8 +70,8 @@ def test_an_echo_may_be_ten_commands_old_across_the_end_of_the_counters() -> Non
 
 
 MISHAPS = [
-    ("servo 2 trips", "group 1: a drive has tripped"),
-    ("group 1 is taken", "group 1: belongs to another controller"),
+    ("servo 2 trips", "group 1: .*drive"),
+    ("group 1 is taken", "group 1: .*controller"),
 ]
 
 
@@ -112,7 +113,7 @@ def test_nothing_moves_while_a_group_does_not_agree(begin: Callable[[Controller]
     control, _ = rig()
     assert control.sample is not None
     control.sample = control.sample._replace(age=np.array([0.01, 0.01, 0.05, 0.01]))
-    with pytest.raises(RefusedError, match=r"group 2: silent for 0\.05 s"):
+    with pytest.raises(RefusedError, match=r"group 2: .*0\.05 s"):
         begin(control)
     assert state_of(control) is State.IDLE
 
@@ -125,7 +126,7 @@ def test_drums_that_are_locked_are_let_go_before_it_connects() -> None:
     assert state_of(control) is State.EMERGENCY
     control.off()
     began = machine.time
-    with pytest.raises(RefusedError, match=r"group 0, 1, 2, 3: the drums are locked.*Let the drums go at the machine"):
+    with pytest.raises(RefusedError, match=r"group 0, 1, 2, 3: .*locked"):
         control.connect()
     assert state_of(control) is State.OFF
     assert machine.time - began < 0.3  # no use in waiting
@@ -135,13 +136,14 @@ def test_drums_that_are_locked_are_let_go_before_it_connects() -> None:
 
 
 def owners(machine: Machine) -> set[int]:
-    return {program.owner for program in machine._programs}
+    """Owners of the groups, as their blocks have them."""
+    return {report.owner for group in range(4) if (report := machine.report(group)) is not None}
 
 
 def test_who_is_refused_has_given_back_what_he_had() -> None:
     machine = Machine(prototype(), start=HOME, seed=1, faults=["group 2 is taken"])
     control = Controller(prototype(), machine.link(), seed=2)
-    with pytest.raises(RefusedError, match="group 2: belongs to another controller"):
+    with pytest.raises(RefusedError, match=r"group 2: .*controller"):
         control.connect()
     assert control.owner not in owners(machine)
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import sagline as sl
+from sagline import Path
 from sagline.arrays import Array
 from sagline.control.checks import motion_along
 from sagline.control.link import PERIOD
 from sagline.control.states import RefusedError
-from sagline.motion.path import Path
 from tests.control.rigs import HOME, at, prototype, rig, state_of
 
 RATE = 100.0
@@ -45,11 +45,10 @@ def test_a_pose_that_jumps_while_its_twist_does_not_is_refused(jump: float | Non
     control, _ = rig()
     with pytest.raises(RefusedError) as caught:
         control.execute(moved(path, shift))
-    line = str(caught.value)
-    found = re.search(r"from ([\d.]+) s to ([\d.]+) s the length of cable (\d) is off its rate by ([\d.]+) mm", line)
+    line = caught.value.reason
+    found = re.search(r"([\d.]+) s to ([\d.]+) s .*cable (\d) .* ([\d.]+) mm; allowed: 0\.0", line)
     assert found is not None, line
-    assert "allowed: 0.0" in line
-    assert line.endswith("use path_from_samples.")
+    assert "path_from_samples" in caught.value.next_step
     if jump is not None:
         assert float(found[2]) == pytest.approx(path.time[half], abs=1e-9)
         plan = sl.inverse(prototype(), sl.Pose.from_quaternion(path.pose.position[half], path.pose.quaternion[half]))
@@ -69,11 +68,11 @@ def test_winches_that_a_jump_would_make_too_fast_are_named() -> None:
     path = way()
     shift = np.zeros((len(path.time), 3))
     shift[len(path.time) // 2 :, 2] = 0.02
-    with pytest.raises(RefusedError, match=r"the motor of winch \d would turn at \d+ rad/s; allowed: 314 rad/s"):
+    with pytest.raises(RefusedError, match=r"winch \d .* 314 rad/s"):
         planned(robot, moved(path, shift))
     fastest = 0.9 * float((limit * winches.drum_radius / np.abs(winches.gear)).min()) * PERIOD
     shift *= fastest / 0.02  # of the platform, slower than of a winch: refused by the other check
-    with pytest.raises(RefusedError, match="is off its rate"):
+    with pytest.raises(RefusedError, match=r"cable \d .* mm"):
         planned(robot, moved(path, shift))
 
 
@@ -124,10 +123,10 @@ def test_a_motion_of_another_period_or_robot_is_refused() -> None:
     """Of 100 ms a row, followed in cycles of 10 ms, it was ten times as fast."""
     control, _ = rig()
     slow = motion_along(prototype(), way(rate=10.0), 0.1, sl.Catenary(), sl.Closest())
-    with pytest.raises(RefusedError, match="planned for cycles of 100 ms; they take 10 ms"):
+    with pytest.raises(RefusedError, match=r"100 ms.* 10 ms"):
         control.start(slow)
     heavy = prototype().replace(mass=prototype().mass + 1.0)
-    with pytest.raises(RefusedError, match="planned for another robot"):
+    with pytest.raises(RefusedError, match="another robot"):
         control.start(motion_along(heavy, way(), PERIOD, sl.Catenary(), sl.Closest()))
     own = control.plan(way())
     assert own.robot is control.robot

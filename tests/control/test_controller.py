@@ -1,6 +1,7 @@
 """The controller against a machine in the same process: what it does, what it refuses, what it sends."""
 
 import gc
+import re
 import signal
 from itertools import pairwise
 from typing import Any
@@ -30,6 +31,7 @@ from tests.control.rigs import (
     state_of,
     with_zero_errors,
 )
+from tests.refusal import refused
 
 
 def sent(control: Controller) -> list[Command]:
@@ -88,10 +90,10 @@ def test_every_command_has_the_next_counter_and_set_points_that_a_winch_can_foll
 
 def test_nothing_is_followed_before_homing_and_the_ways_that_there_are_are_named() -> None:
     control, _ = rig(home=False)
-    with pytest.raises(RefusedError, match="OFF does not lead to MOVING"):
+    with pytest.raises(RefusedError, match=r"OFF.*MOVING"):
         control.execute(sl.quintic_path([(0, 0, 1.5), (0, 0, 1.6)], speed=0.1))
     control.connect()
-    with pytest.raises(RefusedError, match=r"READY does not lead to MOVING.*HOMING"):
+    with pytest.raises(RefusedError, match=r"READY.*MOVING.*HOMING"):
         control.execute(sl.quintic_path([(0, 0, 1.5), (0, 0, 1.6)], speed=0.1))
     assert not any(command.mode is Mode.FOLLOW for command in sent(control))
 
@@ -100,12 +102,20 @@ def _sliding() -> sl.Pose:
     return sl.Pose.from_euler([[0, 0, 1.5], [0, 0, 1.501], [0, 0, 1.502]], 0.0, 0.0, 0.0)
 
 
+def _ends_at_full_speed() -> sl.Path:
+    path = sl.quintic_path([(0, 0, 1.5), (0, 0, 1.6)], speed=0.1)
+    half = slice(len(path.time) // 2)
+    assert path.twist_rate is not None
+    return sl.Path(path.time[half], path.pose[half], path.twist[half], path.twist_rate[half])
+
+
 REFUSED: list[tuple[Any, str]] = [
-    (lambda: sl.quintic_path([(0, 0.01, 1.5), (0, 0, 1.6)], speed=0.1), "begins 10 mm from"),
-    (lambda: sl.quintic_path([(0, 0, 1.5), (0, 0, 5.0)], speed=0.1), "status is"),
-    (lambda: sl.septic_path([(0, 0, 1.5), (0, 1.3, 1.2)], speed=0.6), "the motor of winch"),
-    (lambda: sl.quintic_path([(0, 0, 1.5), (0, 0, 1.6)], speed=0.1, rate=70.0), "no sample at"),
-    (lambda: sl.path_from_samples([0.0, 0.01, 0.02], _sliding()), "begins at 0.1 m/s"),
+    (lambda: sl.quintic_path([(0, 0.01, 1.5), (0, 0, 1.6)], speed=0.1), r" 10 mm .*allowed: 2 mm"),
+    (lambda: sl.quintic_path([(0, 0, 1.5), (0, 0, 5.0)], speed=1.0), r"INFEASIBLE, cables 0, 1"),
+    (lambda: sl.septic_path([(0, 0, 1.5), (0, 1.3, 1.2)], speed=0.6), r"winch \d .* rad/s"),
+    (lambda: sl.quintic_path([(0, 0, 1.5), (0, 0, 1.6)], speed=0.1, rate=70.0), r" 0\.01 s;.* 10 ms"),
+    (lambda: sl.path_from_samples([0.0, 0.01, 0.02], _sliding()), r" 0\.1 m/s .*allowed: 0\.001"),
+    (_ends_at_full_speed, r" 0\.1 m/s .*allowed: 0\.001"),
 ]  # fmt: skip
 
 
@@ -113,8 +123,9 @@ REFUSED: list[tuple[Any, str]] = [
 def test_a_path_that_fails_a_check_is_refused_whole_in_one_line(path: Any, why: str) -> None:
     control, _ = rig()
     before = control.state, len(sent(control))
-    with pytest.raises(RefusedError, match=why) as caught:
+    with refused("the path", kind=RefusedError) as caught:
         control.execute(path())
+    assert re.search(why, caught.value.reason)
     assert len(str(caught.value)) < 300
     assert (control.state, len(sent(control))) == before
 
@@ -177,11 +188,11 @@ def test_an_emergency_stop_locks_the_drums_and_only_off_leads_on() -> None:
         with pytest.raises(RefusedError):
             call()
     control.off()
-    with pytest.raises(RefusedError, match="group 0, 1, 2, 3: the emergency stop is pressed"):
+    with pytest.raises(RefusedError, match=r"group 0, 1, 2, 3: .*emergency"):
         control.connect()
     machine.reset()
     control.connect()
-    with pytest.raises(RefusedError, match="READY does not lead to MOVING"):
+    with pytest.raises(RefusedError, match=r"READY.*MOVING"):
         control.go_to(HOME)
 
 
@@ -191,7 +202,7 @@ def test_after_a_fault_the_operator_acknowledges_and_the_place_is_still_known() 
     done = control.go_to(at(0.1, 0.1, 1.5))
     assert (done.status, control.state) == (ExecutionStatus.FAULT, State.FAULT)
     assert "group 1" in done.reason
-    with pytest.raises(RefusedError, match="FAULT does not lead to MOVING"):
+    with pytest.raises(RefusedError, match=r"FAULT.*MOVING"):
         control.go_to(HOME)
     for _ in range(60):
         control.cycle()
@@ -202,7 +213,8 @@ def test_after_a_fault_the_operator_acknowledges_and_the_place_is_still_known() 
 
 def test_a_second_controller_is_refused_and_the_first_goes_on() -> None:
     first, machine = rig()
-    second = Controller(prototype(), machine.link(moves=False), seed=3)
+    link = Spy(machine.link(moves=False))
+    second = Controller(prototype(), link, seed=3)
     first.start(first.path_to(at(0.05, 0.0, 1.5)))
     second.claim()
     while first.moving:
@@ -214,9 +226,9 @@ def test_a_second_controller_is_refused_and_the_first_goes_on() -> None:
         first.cycle()
         second.cycle()
     assert second.state is State.OFF
-    assert f"belongs to another controller, {first.owner}" in second.events[-1].text
+    assert f"controller, {first.owner}" in second.events[-1].text
     first.off()
-    second._link = machine.link()
+    link.link = machine.link()
     second.connect()
     assert state_of(second) is State.READY
 
@@ -242,12 +254,13 @@ def test_of_two_that_each_have_some_groups_one_gets_all() -> None:
 def test_one_who_only_reads_sends_nothing_and_sees_where_the_platform_is() -> None:
     control, machine = rig()
     watcher = Watcher()
-    shadow = Controller(prototype(), Spy(machine.link(moves=False)), shadow=True, record=watcher, seed=4)
+    spy = Spy(machine.link(moves=False))
+    shadow = Controller(prototype(), spy, shadow=True, record=watcher, seed=4)
     control.start(control.path_to(at(0.05, 0.0, 1.5)))
     while control.moving:
         control.cycle()
         shadow.cycle()
-    assert all(command is None for command in spy_of(shadow).commands)
+    assert all(command is None for command in spy.commands)
     assert shadow.state is State.OFF
     assert np.linalg.norm(watcher.cycles[-1].position - [0.05, 0.0, 1.5]) < 1e-4
     with pytest.raises(RefusedError, match="only reads"):
@@ -259,8 +272,10 @@ def test_homing_names_a_jog_where_tensions_are_off_and_ends_where_they_agree() -
     tight = -6e-3 * sl.stiffness(sl.inverse(prototype(), HOME).state).null_lengths[:, 0]
     control, _ = rig(with_zero_errors(prototype(), tight), home=False)
     control.connect()
-    with pytest.raises(RefusedError, match=r"tensions are off the plan.*Try jog \d [+-]\d+\.\dmm") as caught:
+    with refused("homing", kind=RefusedError) as caught:
         control.home(HOME)
+    assert re.search(r"\d by [+-]\d+\.\d N.* allowed: 11\.2 N", caught.value.reason)
+    assert re.search(r"jog \d [+-]\d+\.\dmm", caught.value.next_step)
     assert len(str(caught.value)) < 300
     assert state_of(control) is State.HOMING
     for winch, by in enumerate(tight):
@@ -285,34 +300,22 @@ def test_a_jog_in_homing_ends_where_a_tension_passes_its_limit() -> None:
     control.begin_homing(HOME)
     control.jog(0, -0.05)
     assert state_of(control) is State.HOMING
-    assert "the jog ended: cable" in control.events[-1].text
+    assert control.events[-1].name == "jog"
+    assert re.search(r"cable \d", control.events[-1].text)
     assert control.sample is not None
     planned = sl.inverse(prototype(), HOME).state.cables.frame_end_tension
     assert (control.sample.tension / planned).max() < 1.4  # it took the PLC's ramp to stand
 
 
-def refused_jog(control: Controller) -> str | None:
-    """Why a jog is refused, in one line; None where it is done."""
-    try:
-        control.jog(0, -0.1)
-    except RefusedError as error:
-        return str(error)
-    return None
-
-
 def test_a_jog_that_would_leave_the_limits_is_refused() -> None:
     control, _ = rig()
-    wide = 0
-    while wide < 9 and refused_jog(control) is None:
-        wide += 1
-    assert 0 < wide < 9
-    line = refused_jog(control)
-    assert line is not None
-    assert line.startswith("a jog of winch 0 by -100 mm is refused: cable ")
-    assert "its tension_m" in line
-    with pytest.raises(sl.InvalidValueError, match=r"by is 0\.2 m"):
+    control.jog(0, -0.05)
+    with refused("a jog of winch 0 by -100 mm", kind=RefusedError) as caught:
+        control.jog(0, -0.1)
+    assert re.match(r"cable \d .* tension_m", caught.value.reason)
+    with refused("by", "0.2 m", kind=sl.InvalidValueError):
         control.start_jog(0, 0.2)
-    with pytest.raises(sl.InvalidValueError, match="winch"):
+    with refused("winch", "8", kind=sl.InvalidValueError):
         control.start_jog(8, 0.01)
     assert state_of(control) is State.IDLE
 
@@ -374,12 +377,12 @@ def test_one_who_looks_on_is_told_of_the_plan_before_its_first_cycle_and_of_its_
 
 
 def test_a_log_that_stops_is_an_event_and_the_motion_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    watcher = Watcher(30, lambda: setattr(Watcher, "stopped", "the disk is full"))
+    watcher = Watcher(30, lambda: setattr(Watcher, "stopped", "disk full"))
     monkeypatch.setattr(Watcher, "stopped", "")
     control, _ = rig(record=watcher)
     done = control.go_to(at(0.05, 0.0, 1.5))
     assert done.status is ExecutionStatus.DONE
-    assert any("the disk is full" in event.text for event in control.events)
+    assert any("disk full" in event.text for event in control.events)
 
 
 def test_a_robot_without_redundancy_moves_with_the_tension_loop_off() -> None:
@@ -409,7 +412,7 @@ def test_a_robot_without_redundancy_moves_with_the_tension_loop_off() -> None:
 
 def test_a_link_of_another_robot_is_refused() -> None:
     machine = Machine(prototype(), start=HOME, seed=1)
-    with pytest.raises(sl.InvalidValueError, match="link is of 6 winches"):
+    with refused("link", "of 6 winches", kind=sl.InvalidValueError):
         Controller(prototype(), _short(machine), seed=2)
     with pytest.raises(sl.InvalidValueError, match="drum_radius"):
         Controller(sl.load_robot("cogiro"), machine.link(), seed=2)
@@ -419,8 +422,9 @@ def test_a_link_of_another_robot_is_refused() -> None:
 def test_plcs_of_another_period_are_refused(period: float) -> None:
     """At 5 ms the platform went through a path of 10 ms a row at double speed."""
     machine = Machine(prototype(), start=HOME, seed=1, period=period)
-    with pytest.raises(sl.InvalidValueError, match=rf"a period of {1e3 * period:g} ms; allowed: 10 ms"):
+    with refused("link", f"of PLCs with a period of {1e3 * period:g} ms", kind=sl.InvalidValueError) as caught:
         Controller(prototype(), machine.link(), seed=2)
+    assert "10 ms" in caught.value.allowed
     control = Controller(prototype(), machine.link(), seed=2, pace=Pace(period))
     assert control.period == period
 

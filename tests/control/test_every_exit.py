@@ -12,6 +12,9 @@ from sagline.control.events import EventKind
 from sagline.control.states import TABLE, RefusedError, State
 from sagline.twin.machine import Machine
 from tests.control.rigs import HOME, at, rig
+from tests.tiers import extended
+
+pytestmark = extended  # the table itself is tested in test_states.py
 
 Drive = Callable[[Controller, Machine], object]
 

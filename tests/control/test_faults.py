@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -16,9 +17,13 @@ from sagline.control.fault import Reaction
 from sagline.control.faults import FAULT_TABLE, FAULTS, faults_of
 from sagline.control.link import GroupFault, GroupStatus, Mode, Sample, WinchState
 from tests.control.lockstep import OWNER, ROBOT, Change, course, cycles, one, told, with_sample
+from tests.refusal import refused
+from tests.tiers import extended, wide
 
 START = 40  # cycle; the prototype moves
 FALLING = -1.0  # N m at a motor: 667 N that its cable pulls
+# names of faults, as events and logs have them
+DEAD_CELL, GROUP_ACTS, NOT_FOLLOWING = "cell zero or saturated", "group acts by itself", "group does not follow"
 
 
 def since(alter: Callable[[int, Cycle], Cycle], start: int = START, end: int = 10**9) -> Change:
@@ -164,7 +169,7 @@ class Case(NamedTuple):
         names: What is told, in order, each once.
         reaction: The largest of it.
         cycles: How many cycles later the last of it is told, at most and at least.
-        words: What its line says among other things.
+        words: Pattern of the item and the numbers in its line.
     """
 
     change: Change
@@ -176,33 +181,31 @@ class Case(NamedTuple):
 
 EVENT, DEGRADED, STOPPING, EMERGENCY = Reaction.EVENT, Reaction.DEGRADED, Reaction.STOPPING, Reaction.EMERGENCY
 CASES = {
-    "group late": Case(silent(2, 5), ("group stale",), DEGRADED, (2, 2), "group 2: its newest sample is 34 ms old"),
-    "group gone": Case(silent(1, 10**6), ("group stale", "group silent"), STOPPING, (9, 9), "group 1: its newest"),
-    "block discarded": Case(field("discarded", 3, 1), ("block discarded",), EVENT, (0, 0), "group 3: a block"),
+    "group late": Case(silent(2, 5), ("group stale",), DEGRADED, (2, 2), r"^group 2\b.* 34 ms"),
+    "group gone": Case(silent(1, 10**6), ("group stale", "group silent"), STOPPING, (9, 9), r"^group 1\b.* ms"),
+    "block discarded": Case(field("discarded", 3, 1), ("block discarded",), EVENT, (0, 0), r"^group 3\b"),
     "grant taken": Case(
         field("owner", 1, 99),
         ("owner lost",),
         STOPPING,
         (0, 0),
-        "group 1: controller 99 has its grant, not this one, 4711",
+        r"^group 1\b.*\b99\b.*\b4711\b",
     ),
-    "grant lost": Case(field("owner", 3, 0), ("owner lost",), STOPPING, (0, 0), "group 3: nobody has its grant"),
+    "grant lost": Case(field("owner", 3, 0), ("owner lost",), STOPPING, (0, 0), r"^group 3\b"),
     "PLC stopped": Case(
         field("fault", 0, GroupFault.HEARTBEAT),
         ("group acts by itself",),
         STOPPING,
         (0, 0),
-        "no command came for 100 ms",
+        r"^group 0\b.*\b100 ms",
     ),
     "PLC locked": Case(
-        field("status", 2, int(GroupStatus.LOCKED)), ("group acts by itself",), STOPPING, (0, 0), "drums are locked"
+        field("status", 2, int(GroupStatus.LOCKED)), ("group acts by itself",), STOPPING, (0, 0), r"^group 2\b.*locked"
     ),
-    "drive": Case(
-        drive_trips, ("group acts by itself",), STOPPING, (0, 0), "group 2 stopped by itself: drive 5 tripped"
-    ),
-    "emergency stop": Case(emergency, ("emergency stop",), EMERGENCY, (0, 0), "reported by group 0, 1, 2, 3"),
+    "drive": Case(drive_trips, ("group acts by itself",), STOPPING, (0, 0), r"^group 2\b.*drive 5\b.*\b17\b"),
+    "emergency stop": Case(emergency, ("emergency stop",), EMERGENCY, (0, 0), r"group 0, 1, 2, 3\b"),
     "tight": Case(
-        cell(3, lambda k, t: 1850.0 if k < 5 else t, -2.8), ("over-tension",), STOPPING, (4, 4), "cable 3 pulls 1850 N"
+        cell(3, lambda k, t: 1850.0 if k < 5 else t, -2.8), ("over-tension",), STOPPING, (4, 4), r"^cable 3\b.* 1850 N"
     ),
     "too tight": Case(
         since(
@@ -216,75 +219,75 @@ CASES = {
         ("over-tension",),
         STOPPING,
         (0, 0),
-        "2000 N for an instant",
+        r"^cable 3\b.* 2000 N",
     ),
-    "slack": Case(slackens(4), ("slack",), STOPPING, (2, 30), "cable 4 is slack"),
-    "broken": Case(broken(4), ("cable broken",), EMERGENCY, (2, 2), "cable 4 is broken: 2.2 N after "),
-    "cell zero": Case(cell(5, lambda k, t: 0.0), ("cell zero or saturated",), DEGRADED, (2, 2), "cell 5 reads 0.0"),
+    "slack": Case(slackens(4), ("slack",), STOPPING, (2, 30), r"^cable 4\b"),
+    "broken": Case(broken(4), ("cable broken",), EMERGENCY, (2, 2), r"^cable 4\b.* 2\.2 N after "),
+    "cell zero": Case(cell(5, lambda k, t: 0.0), ("cell zero or saturated",), DEGRADED, (2, 2), r"^cell 5 reads 0\.0"),
     "cell negative": Case(
-        cell(0, lambda k, t: -300.0), ("cell zero or saturated",), DEGRADED, (0, 0), "cell 0 reads -300"
+        cell(0, lambda k, t: -300.0), ("cell zero or saturated",), DEGRADED, (0, 0), r"^cell 0 reads -300"
     ),
     "cell at full scale": Case(
         cell(7, lambda k, t: 2000.0),
         ("cell zero or saturated",),
         DEGRADED,
         (0, 0),
-        "cell 7 reads 2000 N while its motor",
+        r"^cell 7 reads 2000 N .*motor",
     ),
     "cell without a number": Case(
-        cell(6, lambda k, t: np.nan), ("cell zero or saturated",), DEGRADED, (0, 0), "cell 6 reads nan"
+        cell(6, lambda k, t: np.nan), ("cell zero or saturated",), DEGRADED, (0, 0), r"^cell 6 reads nan"
     ),
-    "cell stuck": Case(stuck(2), ("cell stuck",), DEGRADED, (49, 49), "cell 2 has read "),
-    "cell wrong": Case(cell(1, lambda k, t: t + 25.0), ("cell wrong",), DEGRADED, (35, 49), "cell 1 is off by about "),
-    "encoder jump": Case(jump(1, 0.002), ("encoder jump",), STOPPING, (0, 0), "encoder 1 jumped by 1.98"),
-    "encoder jumps far": Case(jump(6, -0.5), ("encoder jump",), STOPPING, (0, 0), "encoder 6 jumped by 500 mm"),
-    "encoder without a number": Case(jump(2, np.nan), ("encoder jump",), STOPPING, (0, 0), "encoder 2 reads no number"),
-    "encoder beyond numbers": Case(jump(2, np.inf), ("encoder jump",), STOPPING, (0, 0), "encoder 2 reads no number"),
-    "drum lags": Case(lags(7, 0.05), ("following error",), STOPPING, (9, 16), "winch 7 is 5."),
+    "cell stuck": Case(stuck(2), ("cell stuck",), DEGRADED, (49, 49), r"^cell 2\b.* N in 50 samples"),
+    "cell wrong": Case(cell(1, lambda k, t: t + 25.0), ("cell wrong",), DEGRADED, (35, 49), r"^cell 1\b.* \d+ N"),
+    "encoder jump": Case(jump(1, 0.002), ("encoder jump",), STOPPING, (0, 0), r"^encoder 1\b.* 1\.98"),
+    "encoder jumps far": Case(jump(6, -0.5), ("encoder jump",), STOPPING, (0, 0), r"^encoder 6\b.* 500 mm"),
+    "encoder without a number": Case(jump(2, np.nan), ("encoder jump",), STOPPING, (0, 0), r"^encoder 2\b"),
+    "encoder beyond numbers": Case(jump(2, np.inf), ("encoder jump",), STOPPING, (0, 0), r"^encoder 2\b"),
+    "drum lags": Case(lags(7, 0.05), ("following error",), STOPPING, (9, 16), r"^winch 7\b.* 5\."),
     "servo": Case(
         field("state", 3, WinchState.SATURATED),
         ("servo at its limit",),
         STOPPING,
         (19, 19),
-        "drive 3 has been at its limit",
+        r"^drive 3\b",
     ),
     "correction": Case(
         since(lambda k, cycle: cycle._replace(correction=one(np.zeros(8), 2, -5e-3))),
         ("correction at its limit",),
         STOPPING,
         (0, 0),
-        "length 2 by -5.0 mm",
+        r"\b2 by -5\.0 mm",
     ),
     "echo stands": Case(
         field("echo", 2, START - 1),
         ("group does not follow",),
         STOPPING,
         (10, 10),
-        "group 2 has taken no command for 11",
+        r"^group 2\b.* 11\b",
     ),
-    "echo of nothing": Case(field("echo", 0, 0), ("group does not follow",), STOPPING, (0, 0), "group 0 has taken no"),
+    "echo of nothing": Case(field("echo", 0, 0), ("group does not follow",), STOPPING, (0, 0), r"^group 0\b"),
     "follows nothing": Case(
         field("status", 1, int(GroupStatus.READY | GroupStatus.BRAKED)),
         ("group does not follow",),
         STOPPING,
         (3, 3),
-        "group 1 does not follow its set points",
+        r"^group 1\b",
     ),
-    "late once": Case(late((0, 0.021)), ("cycle late",), EVENT, (0, 0), "a cycle was 21 ms late; allowed: 20 ms."),
+    "late once": Case(late((0, 0.021)), ("cycle late",), EVENT, (0, 0), r" 21 ms .*allowed: 20 ms\."),
     "late often": Case(
         late((0, 0.006), (40, 0.013), (99, 0.006)),
         ("cycle late",),
         EVENT,
         (99, 99),
-        "3 of the last 100 cycles were more than 5 ms late, by up to 13 ms; allowed: 2.",
+        r"^3 .* 100 cycles .* 5 ms .* 13 ms; allowed: 2\.",
     ),
-    "stood still": Case(late((0, 0.15)), ("cycle lost",), STOPPING, (0, 0), "began 150 ms late"),
+    "stood still": Case(late((0, 0.15)), ("cycle lost",), STOPPING, (0, 0), r" 150 ms late"),
     "disk full": Case(
         since(lambda k, cycle: cycle._replace(recording="no space left on device")),
         ("recording stopped",),
         EVENT,
         (0, 0),
-        "no space left on device",
+        r"no space left on device",
     ),
 }
 
@@ -298,7 +301,7 @@ def test_a_fault_is_told_once_in_time_and_alone(name: str) -> None:
     assert case.cycles[0] <= after <= case.cycles[1]
     kinds = {kind.name: kind for kind in FAULTS}
     assert max(kinds[each.name].reaction for each in found) == case.reaction
-    assert case.words in found[-1].line
+    assert re.search(case.words, found[-1].line)
     for each in found:
         assert len(each.line) < 250
         assert each.line.isprintable()
@@ -356,9 +359,9 @@ def test_less_than_that_is_no_fault(name: str) -> None:
 @pytest.mark.parametrize(
     ("options", "count"),
     [
-        ({}, 1200),
-        ({"unsteady": True, "more_mass": 2.0}, 1200),
         ({"unsteady": True, "more_mass": -8.0, "delay": 5}, 1200),
+        pytest.param({}, 1200, marks=extended),
+        pytest.param({"unsteady": True, "more_mass": 2.0}, 1200, marks=extended),
         pytest.param({"unsteady": True, "more_mass": 2.0, "delay": 2}, 84_000, marks=pytest.mark.soak),
     ],
 )
@@ -368,19 +371,20 @@ def test_a_good_machine_is_left_alone(options: dict[str, Any], count: int) -> No
 
 
 @pytest.mark.parametrize("index", range(8))
-@pytest.mark.parametrize("error", [-25.0, 25.0])
+@pytest.mark.parametrize("error", wide([-25.0, 25.0]))
 def test_a_cell_that_is_off_is_named_whatever_the_load_weighs(index: int, error: float) -> None:
     found = told(cell(index, lambda k, t: t + error), 150, seed=index, more_mass=2.0)
     assert [each.name for each in found] == ["cell wrong"]
-    assert found[0].line.startswith(f"cell {index} is off by about ")
-    assert float(found[0].line.split("about ")[1].split(" N")[0]) == pytest.approx(error, abs=8.0)
+    told_error = re.match(rf"cell {index}\b\D*?(-?\d+) N", found[0].line)
+    assert told_error is not None
+    assert float(told_error[1]) == pytest.approx(error, abs=8.0)
     assert found[0].cycle - START < 50
 
 
 def test_two_cells_that_die_are_told_one_by_one_and_no_cable_is_slack() -> None:
     second = since(lambda k, cycle: with_sample(cycle, tension=one(cycle.sample.tension, 2, 0.0)), START + 60)
     found = told(both(cell(5, lambda k, t: 0.0), second), 145)
-    assert [each.name for each in found] == ["cell zero or saturated"] * 2
+    assert [each.name for each in found] == [DEAD_CELL] * 2
     assert [each.line[:6] for each in found] == ["cell 5", "cell 2"]
 
 
@@ -425,7 +429,7 @@ def test_without_a_plan_tensions_are_held_against_nothing() -> None:
 def test_what_is_wrong_from_the_first_look_on_is_told_then() -> None:
     """Rules begin to look when the connection has seen all groups agree, or the operator's word was taken for it."""
     left = field("fault", 1, GroupFault.HEARTBEAT, start=0, end=30)
-    assert [(each.name, each.cycle) for each in told(left, 60)] == [("group acts by itself", 0)]
+    assert [(each.name, each.cycle) for each in told(left, 60)] == [(GROUP_ACTS, 0)]
     taken = told(field("owner", 2, 99, start=0), 60)
     assert [(each.name, each.cycle) for each in taken] == [("owner lost", 1)]  # there is a command from then on
 
@@ -479,10 +483,10 @@ def test_what_a_late_group_has_not_said_yet_is_no_command_it_has_not_taken() -> 
     assert [each.name for each in told(silent(1, 8), 145, delay=5)] == ["group stale"]
 
 
-def test_a_group_that_stops_by_itself_with_locked_drums_says_both() -> None:
+def test_a_group_that_stops_by_itself_with_locked_drums_says_both(snapshot: Any) -> None:
     locked = int(GroupStatus.READY | GroupStatus.LOCKED | GroupStatus.BRAKED)
     found = told(both(field("status", 2, locked), field("fault", 2, GroupFault.FOLLOWING_ERROR)), 60)
-    assert "a drive lagged too far behind its set points, and drums are locked." in found[0].line
+    assert found[0].line == snapshot
 
 
 def test_two_bursts_of_bad_blocks_are_two_events() -> None:
@@ -501,12 +505,12 @@ def test_it_is_present_as_long_as_its_rule_holds_and_a_lasting_one_from_then_on(
         cycle = change(k, good)._replace(before=before)
         for rule in rules.values():
             rule.look(cycle)
-        seen.append((rules["group stale"].present, rules["cell zero or saturated"].present))
+        seen.append((rules["group stale"].present, rules[DEAD_CELL].present))
         before = cycle.sample
     stale, dead = np.array(seen).T
     assert np.flatnonzero(stale).tolist() == [START + 2, START + 3, START + 4]
     assert np.flatnonzero(dead).tolist() == list(range(np.flatnonzero(dead)[0], 200))
-    assert not next(rule for rule in faults_of(ROBOT) if rule.name == "cell zero or saturated").present
+    assert not next(rule for rule in faults_of(ROBOT) if rule.name == DEAD_CELL).present
 
 
 def test_nonsense_neither_raises_nor_warns() -> None:
@@ -529,11 +533,14 @@ def test_nonsense_neither_raises_nor_warns() -> None:
     assert all(len(each.line) < 300 and each.line.isprintable() for each in found)
 
 
+OF_OTHERS = ["controller dead", "foreign block", "second controller", "set point infeasible"]
+
+
 def test_the_table_has_every_rule_and_what_others_look_after() -> None:
     names = [row.name for row in FAULT_TABLE]
     assert len(set(names)) == len(names)
     assert [row.name for row in FAULT_TABLE if row.by == "the controller"] == [kind.name for kind in FAULTS]
-    assert {"controller dead", "foreign block", "second controller", "set point infeasible"} <= set(names)
+    assert [row.name for row in FAULT_TABLE if row.by != "the controller"] == OF_OTHERS
     assert all(row.rule and row.to for row in FAULT_TABLE)
     for one_row, other in pairwise(row for row in FAULT_TABLE if row.by == "the controller"):
         assert one_row.rule != other.rule
@@ -555,7 +562,7 @@ def test_what_follows_from_a_stop_is_not_told_again_but_for_lengths_in_doubt() -
     later = both(late_jump, field("state", 3, WinchState.SATURATED))
     found = told(both(drive_trips, later), 145)
     assert [(each.name, each.cycle) for each in found] == [
-        ("group acts by itself", START),
+        (GROUP_ACTS, START),
         ("encoder jump", START + 20),
     ]
 
@@ -566,8 +573,8 @@ def test_several_groups_that_stop_at_once_are_one_event_and_once() -> None:
         return with_sample(cycle, fault=np.full(4, int(GroupFault.HEARTBEAT))) if acting else cycle
 
     found = told(stops, 145)
-    assert [each.name for each in found] == ["group acts by itself"]
-    assert found[0].line.startswith("group 0, 1, 2, 3 stopped by itself: no command came")
+    assert [each.name for each in found] == [GROUP_ACTS]
+    assert re.match(r"group 0, 1, 2, 3\b.* 100 ms", found[0].line)
 
 
 def test_drums_that_are_stopped_dead_have_not_jumped() -> None:
@@ -600,7 +607,7 @@ def test_a_rate_that_comes_from_the_encoder_itself_does_not_hide_its_jump() -> N
 def test_set_points_that_a_plc_does_not_follow_are_no_following_error() -> None:
     ramping = int(GroupStatus.READY | GroupStatus.RAMPING)
     found = told(both(lags(7, 0.05), field("status", 3, ramping)), 145)
-    assert [each.name for each in found] == ["group does not follow"]
+    assert [each.name for each in found] == [NOT_FOLLOWING]
 
 
 OF_TENSIONS = [
@@ -616,13 +623,13 @@ OF_TENSIONS = [
 
 
 @pytest.mark.parametrize("name", OF_TENSIONS)
-@pytest.mark.parametrize("reading", [np.nan, np.inf])
+@pytest.mark.parametrize("reading", wide([np.nan, np.inf]))
 def test_a_cell_without_a_number_hides_nothing_of_the_others(name: str, reading: float) -> None:
     case, motor = CASES[name], course().tension[START][6] * -0.0015
     dead = cell(6, lambda k, t: reading, torque=motor)
     assert [each.line[:6] for each in told(dead, 60)] == ["cell 6"]
     found = told(both(dead, lambda k, cycle: case.change(k - 10, cycle)), 155, seed=8)
-    assert tuple(each.name for each in found) == ("cell zero or saturated", *case.names)
+    assert tuple(each.name for each in found) == (DEAD_CELL, *case.names)
     assert case.cycles[0] <= found[-1].cycle - START - 10 <= case.cycles[1]
 
 
@@ -633,7 +640,7 @@ def test_a_cell_without_a_number_hides_no_tight_cable_where_nothing_is_planned()
         return altered._replace(tension=np.full(8, np.nan), gains=None)
 
     found = told(homing, 60)
-    assert [(each.name, each.cycle) for each in found] == [("cell zero or saturated", 0), ("over-tension", START)]
+    assert [(each.name, each.cycle) for each in found] == [(DEAD_CELL, 0), ("over-tension", START)]
 
 
 def test_cells_that_are_not_believed_stand_for_what_is_planned_and_the_others_for_themselves() -> None:
@@ -673,7 +680,7 @@ def test_what_begins_or_is_left_when_the_winches_stand_is_told(reads_only: bool)
     stands = stops_at(START + 20, reads_only)
     found = told(both(both(both(stands, drive_trips), silent_group), both(tight, motor)), 145)
     assert [(each.name, each.cycle) for each in found] == [
-        ("group acts by itself", START),
+        (GROUP_ACTS, START),
         ("group stale", START + 7),
         ("group silent", START + 40),
         ("over-tension", START + 80),
@@ -687,29 +694,26 @@ def test_a_group_that_is_late_again_and_again_is_told_once_a_second_and_counted(
 
     found = told(late_often, START + 250)
     assert [(each.name, each.cycle - START) for each in found] == [("group stale", at) for at in (0, 110, 220)]
-    assert [each.line.partition("It was so ")[2] for each in found] == [
-        "",
-        "10 times more since this was told last.",
-        "10 times more since this was told last.",
-    ]
+    assert [re.findall(r"(\d+) times", each.line) for each in found] == [[], ["10"], ["10"]]
 
 
 @pytest.mark.parametrize(
-    ("options", "words"),
+    ("name", "value", "text"),
     [
-        ({"groups": ((0, 1), (2, 3))}, "groups is .*; allowed: tuples with each winch from 0 to 7 once"),
-        ({"groups": 4}, "groups is 4"),
-        ({"groups": ((0, 1, 2, 3, 4, 5, 6, None),)}, "groups is "),
-        ({"period": 0.0}, "period is 0 s"),
-        ({"cell_deviation": 0.0}, "cell_deviation is 0 N"),
-        ({"cell_bias": -1.0}, "cell_bias is -1 N"),
-        ({"largest_correction": np.nan}, "largest_correction is nan m"),
+        ("groups", ((0, 1), (2, 3)), "((0, 1), (2, 3))"),
+        ("groups", 4, "4"),
+        ("groups", ((0, 1, 2, 3, 4, 5, 6, None),), None),
+        ("period", 0.0, "0 s"),
+        ("cell_deviation", 0.0, "0 N"),
+        ("cell_bias", -1.0, "-1 N"),
+        ("largest_correction", np.nan, "nan m"),
     ],
 )
-def test_what_rules_cannot_be_made_of_is_refused(options: dict[str, Any], words: str) -> None:
-    with pytest.raises(sl.InvalidValueError, match=words):
-        faults_of(ROBOT, **options)
-    with pytest.raises(sl.InvalidValueError, match="robot is None"):
+def test_what_rules_cannot_be_made_of_is_refused(name: str, value: Any, text: str | None) -> None:
+    with refused(name, text, kind=sl.InvalidValueError) as caught:
+        faults_of(ROBOT, **{name: value})
+    assert name != "groups" or "0 to 7" in caught.value.allowed
+    with refused("robot", "None", kind=sl.InvalidValueError):
         faults_of(None)  # type: ignore[arg-type]
 
 
@@ -725,7 +729,7 @@ def test_what_cells_are_is_the_robots_word_unless_told() -> None:
 def test_an_emergency_stop_that_a_plc_gives_as_its_fault_is_one_event() -> None:
     found = told(field("fault", 2, GroupFault.EMERGENCY_STOP), 100)
     assert [each.name for each in found] == ["emergency stop"]
-    assert "reported by group 2." in found[0].line
+    assert re.search(r"\bgroup 2\.", found[0].line)
 
 
 def test_a_drum_that_follows_a_step_of_its_rate_has_not_jumped() -> None:

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.article.ten_poses import HOME
 from sagline.control.events import EventKind
 from sagline.control.states import State
 from tests.control.rigs import Busy, at
-from tests.control.stops import PROTOTYPE
+from tests.control.stops import HOME, PROTOTYPE
+from tests.tiers import extended
 
 BIAS = np.array([2.0, -1.0, 1.5, -2.0, 0.5, 2.0, -2.0, 1.0])  # N
 CASES = {  # what happens: what is told, the state that follows, within how many ms each
@@ -92,6 +92,7 @@ def test_it_is_told_once_and_leads_to_its_state_in_time(what: str) -> None:
         assert states[0][1] <= state[1] + 1e-6
 
 
+@extended
 @pytest.mark.parametrize("seed", range(2))
 def test_a_busy_computer_is_no_encoder_that_jumps(seed: int) -> None:
     """Drives catch up as fast as they can with what they were told late."""

@@ -16,6 +16,7 @@ from sagline.control.tension_loop import TensionLoop, TensionSettings
 from tests.control.margins import FREQUENCY, Margins, axis, closed_loops, closed_poles, inner_loops, margins
 from tests.control.stops import PROTOTYPE, stops
 from tests.kinematics.feasible import feasible_plan
+from tests.tiers import extended
 
 LOSSES = sl.Damping(loss_time=1e-3, air_damping=0.2)  # those of the twin
 STATE = stops().state[0]
@@ -131,10 +132,10 @@ def inner_margins(robot: sl.Robot, count: int, above: float = 0.0) -> tuple[Marg
     return Margins(gain.min(), phase.min(), crossover.max()), max(poles)
 
 
-COUNTS = [16, pytest.param(400, marks=pytest.mark.soak)]
+COUNTS = [pytest.param(16, marks=extended), pytest.param(400, marks=pytest.mark.soak)]
 
 
-@pytest.mark.parametrize("count", COUNTS)
+@pytest.mark.parametrize("count", [2, *COUNTS])
 def test_the_drives_have_11_db_and_60_degrees_all_over_the_test_box(count: int) -> None:
     """Each loop with 1.5 ms of delay, the seven others closed on the platform that swings; 8 dB and 30 degrees do."""
     found, slowest = inner_margins(PROTOTYPE, count)

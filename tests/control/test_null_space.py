@@ -1,5 +1,7 @@
 """The null space of lengths, against solved equilibria of changed lengths."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -10,8 +12,14 @@ from tests.control.stops import PROTOTYPE, stops
 from tests.kinematics.feasible import feasible_plan
 
 STEP = 1e-4  # m
-COGIRO = feasible_plan(sl.load_robot("cogiro"), 3, seed=4)
-PLANS = {"prototype": stops(), "cogiro": COGIRO}
+
+
+@cache
+def cogiro() -> sl.Plan:
+    return feasible_plan(sl.load_robot("cogiro"), 3, seed=4)
+
+
+PLANS = {"prototype": stops, "cogiro": cogiro}
 
 
 def changed(state: sl.Equilibrium, change: Array) -> sl.Equilibrium:
@@ -30,7 +38,7 @@ def slope(state: sl.Equilibrium, direction: Array) -> tuple[Array, Array]:
 
 @pytest.mark.parametrize("name", PLANS)
 def test_projected_lengths_leave_the_platform_where_it_is(name: str) -> None:
-    state = PLANS[name].state
+    state = PLANS[name]().state
     direction = np.random.default_rng(1).normal(size=state.unstrained_length.shape)
     inside = (null_space(state).projection @ direction[..., None])[..., 0]
     still, _ = slope(state, inside)
@@ -41,7 +49,7 @@ def test_projected_lengths_leave_the_platform_where_it_is(name: str) -> None:
 
 @pytest.mark.parametrize("name", PLANS)
 def test_the_correction_makes_up_what_is_visible_and_nothing_else(name: str) -> None:
-    state = PLANS[name].state
+    state = PLANS[name]().state
     error = 5.0 * np.random.default_rng(2).normal(size=state.unstrained_length.shape)
     known = null_space(state)
     change = -(known.correction @ error[..., None])[..., 0]
@@ -52,7 +60,7 @@ def test_the_correction_makes_up_what_is_visible_and_nothing_else(name: str) -> 
 @pytest.mark.parametrize("name", PLANS)
 def test_what_is_visible_is_a_projection_along_the_wrench(name: str) -> None:
     """Rank 2, idempotent, symmetric; what it takes away is at right angles to what lengths can do."""
-    known = null_space(PLANS[name].state)
+    known = null_space(PLANS[name]().state)
     visible = known.visible
     np.testing.assert_allclose(visible @ visible, visible, atol=1e-10)
     np.testing.assert_allclose(visible, np.swapaxes(visible, -1, -2), atol=1e-10)

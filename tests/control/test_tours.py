@@ -5,6 +5,9 @@ import pytest
 
 from tests.control.rigs import imperfect
 from tests.control.tours import OFF, Stops, tour
+from tests.tiers import extended
+
+pytestmark = extended
 
 # speed [m/s], time at a stop [s], stops: twenty seconds, and the article's fourteen minutes
 SHORT = (0.3, 1.5, 2)

@@ -8,11 +8,12 @@ import numpy as np
 
 import sagline as sl
 from sagline.arrays import Array
-from sagline.article.table2 import table2
+from sagline.control.checks import Motion
 from sagline.control.controller import Controller
 from sagline.control.tension_loop import TensionSettings
 from sagline.twin.machine import Machine
 from tests.control.rigs import HOME, rig
+from tests.control.stops import TEN_POSES
 
 OFF = TensionSettings(gain=0.0)
 SEEN = 1.0  # s at the end of each stop, over which is averaged: the platform swings by hundredths of a millimeter
@@ -53,18 +54,18 @@ def tour(true: sl.Robot, speed: float, stand: float, count: int = 10, loop: Tens
     control, machine = rig(true, loop=loop)
     begin, first, here = machine.time, len(control.events), HOME.position
     stops, acting, cycles = [], 0, 0
-    for pose in table2().desired[:count]:
+    for pose in TEN_POSES[:count]:
         motion = control.plan(sl.quintic_path([here, pose], speed=speed))
         control.start(motion)
         while control.moving:
             control.cycle()
             acting, cycles = acting + acts(control), cycles + 1
         here = pose
-        stops.append(_stop(control, machine, motion.tension[-1], stand))
+        stops.append(_stop(control, machine, motion, stand))
         cycles += round(stand / control.period)
     assert {event.kind.value for event in control.events[first:]} == {"state"}  # no fault, no note
     place, tension, correction = (np.array(column) for column in zip(*stops, strict=True))
-    error = np.linalg.norm(place - table2().desired[:count], axis=1)
+    error = np.linalg.norm(place - TEN_POSES[:count], axis=1)
     return Stops(place, error, tension, correction, acting / cycles, machine.time - begin, cycles)
 
 
@@ -73,15 +74,14 @@ def acts(control: Controller) -> bool:
     return control._loop is not None and control._loop.acting
 
 
-def _stop(control: Controller, machine: Machine, planned: Array, stand: float) -> tuple[Array, float, float]:
+def _stop(control: Controller, machine: Machine, motion: Motion, stand: float) -> tuple[Array, float, float]:
     places, tensions = [], []
     for left in range(round(stand / control.period), 0, -1):
         control.cycle()
         if left <= round(SEEN / control.period):
             places.append(machine.reading.position.copy())
             tensions.append(machine.reading.tension.copy())
-    assert control._point is not None
-    assert control._point.row is not None
-    seen = control._point.row.visible @ (np.mean(tensions, axis=0) - planned)
+    assert motion.gains is not None
+    seen = motion.gains.rows[-1].visible @ (np.mean(tensions, axis=0) - motion.tension[-1])
     largest = float(np.abs(control._correction).max())
     return np.mean(places, axis=0), float(np.sqrt(np.mean(seen**2))), largest

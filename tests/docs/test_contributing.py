@@ -15,6 +15,8 @@ from typing import NamedTuple
 
 import pytest
 
+from tests.tiers import extended
+
 ROOT = Path(__file__).parents[2]
 PAGES = sorted((ROOT / "docs" / "contributing").glob("*.md"))
 BLOCK = re.compile(r'^```(?P<kind>\w+)(?: title="(?P<file>[^"]+)")?\n(?P<text>.*?)^```$', re.MULTILINE | re.DOTALL)
@@ -85,7 +87,7 @@ def run(line: str, folder: Path, environment: dict[str, str]) -> None:
     quick = {"NO_COLOR": "1", "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
     clean = {**os.environ, "PYTHONPATH": str(folder / "src"), **quick, **environment}
     if words[:2] == ["-m", "pytest"]:
-        words += ["-q", "-p", "no:cacheprovider", "--noconftest"]
+        words += ["-q", "-p", "no:cacheprovider", "-p", "syrupy", "--noconftest"]
     done = subprocess.run([*PLACES[first], *words], cwd=folder, env=clean, capture_output=True, text=True)
     assert done.returncode == 0, f"{line}\n{done.stdout[-3000:]}\n{done.stderr[-3000:]}"
 
@@ -118,6 +120,7 @@ def test_a_page_has_ten_steps(page: Path) -> None:
     assert [int(step) for step in steps] == list(range(1, STEPS + 1))
 
 
+@extended
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_the_steps_lead_to_what_they_say(page: Path, tmp_path: Path) -> None:
     follow(page, copy_of_the_source(tmp_path), {"NUMBA_DISABLE_JIT": "1"})
@@ -130,14 +133,14 @@ def test_the_steps_lead_there_in_machine_code_too(page: Path, tmp_path: Path) ->
 
 
 def test_a_change_that_does_not_fit_is_no_change() -> None:
-    source = ["a", "long line", "b", "a"]
+    source = ["a", "long", "b", "a"]
 
     def tried(text: str) -> list[str]:
         (change,) = changes(text)
         return changed(source, change, "here")
 
-    assert tried(" long…\n+new\n") == ["a", "long line", "new", "b", "a"]
-    assert tried("-long line\n+new\n b\n") == ["a", "new", "b", "a"]
+    assert tried(" lo…\n+new\n") == ["a", "long", "new", "b", "a"]
+    assert tried("-long\n+new\n b\n") == ["a", "new", "b", "a"]
     for wrong in (" a\n+new\n", " c\n+new\n", "+new\n"):
         with pytest.raises(AssertionError, match="here"):
             tried(wrong)

@@ -13,6 +13,9 @@ from typing import Any, NamedTuple
 import pytest
 
 import sagline as sl
+from tests.tiers import extended
+
+pytestmark = extended
 
 # what is told in full; a module or folder that is not listed is not looked at
 TOLD = (

@@ -23,6 +23,9 @@ import typer
 import typer.main
 
 from sagline.cli.main import app
+from tests.tiers import extended
+
+pytestmark = extended
 
 ROOT = Path(__file__).parents[2]
 WIDTH = 80  # columns that a page shows without scrolling

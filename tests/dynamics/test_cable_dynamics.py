@@ -10,19 +10,22 @@ import pytest
 import sagline as sl
 from sagline.dynamics.cable_dynamics import in_world
 from sagline.dynamics.component_modes import Components, component_modes
-from sagline.statics.strings import strings_of
+from sagline.dynamics.reduced import setting_of
 from tests.dynamics.states import middle
 from tests.kernels.dynamics.strings import added, chain, string
+from tests.kinematics.feasible import by_tier
+from tests.refusal import refused
+from tests.tiers import wide
 
 
-@pytest.mark.parametrize("name", sl.robot_names())
+@pytest.mark.parametrize("name", by_tier(sl.robot_names()))
 def test_at_rest_it_is_the_static_stiffness(name: str) -> None:
     """By the closed form; and by the integral of C, with what is behind the frame ends, all the same."""
     state = middle(name)
     static = sl.stiffness(state).cable_stiffness
     size = np.abs(static).max(axis=(1, 2))[:, None, None]
     assert (np.abs(sl.dynamic_stiffness(state, 0.0) - static) <= 1e-11 * size).all()
-    components = component_modes(strings_of(state), 0, 0.1)
+    components = component_modes(setting_of(state).strings, 0, 0.1)
     points = components.mesh.points
     last = np.array([one[np.flatnonzero(~np.isnan(one[:, 0]))[-1]] for one in points])
     xx, xz, zz, yy = last[:, 2:].T
@@ -58,10 +61,10 @@ def test_two_thousand_extreme_cables_at_rest() -> None:
     assert (size <= 1e-8 * closed).all()
 
 
-@pytest.mark.parametrize("name", ["cogiro", "article-suspended", "expo2015-lucia", "ipanema-2-pulleys"])
+@pytest.mark.parametrize("name", wide(["cogiro", "article-suspended", "expo2015-lucia", "ipanema-2-pulleys"], first=3))
 def test_component_modes_against_the_exact_stiffness(name: str) -> None:
     state = middle(name)
-    components = component_modes(strings_of(state), 0, 80.0)
+    components = component_modes(setting_of(state).strings, 0, 80.0)
     static = sl.stiffness(state).cable_stiffness
     for frequency in (1.0, 8.0, 16.0, 19.5):  # none near a motion of a cable, which would magnify rounding
         exact = sl.dynamic_stiffness(state, frequency).real - static
@@ -118,10 +121,14 @@ def test_frequencies_that_are_none(frequency: object) -> None:
 def test_a_pose_that_is_not_feasible_has_no_dynamics() -> None:
     """Refused alike by all that take a single state; `vibration` has a status for it."""
     state = sl.inverse(sl.load_robot("cogiro"), sl.Pose((0, 0, 40), np.eye(3))).state
-    of: Callable[[sl.Equilibrium], object]
-    responses = (lambda state: sl.dynamic_stiffness(state, 1.0), lambda state: sl.frequency_response(state, [1.0]))
-    for of in (sl.frequency_slopes, sl.linearized, *responses):
-        with pytest.raises(sl.InvalidValueError, match=r"^state is one without lengths.*; allowed: a state that was"):
+    calls: tuple[tuple[Callable[[sl.Equilibrium], object], str], ...] = (
+        (sl.frequency_slopes, "one without lengths"),
+        (sl.linearized, "one without lengths or stiffness"),
+        (lambda state: sl.dynamic_stiffness(state, 1.0), "one without lengths"),
+        (lambda state: sl.frequency_response(state, [1.0]), "one without lengths"),
+    )
+    for of, value in calls:
+        with refused("state", value, "a state that was solved", kind=sl.InvalidValueError):
             of(state)
 
 

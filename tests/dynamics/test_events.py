@@ -10,8 +10,11 @@ from scipy.integrate import cumulative_trapezoid, trapezoid
 
 import sagline as sl
 from sagline.arrays import Array
+from sagline.dynamics.drives import NEEDED
 from sagline.dynamics.events import Event
 from tests.dynamics.let_go import LIFT
+from tests.refusal import refused
+from tests.tiers import wide
 
 PLACE = (0.4, 0.3, 1.5)
 
@@ -100,7 +103,7 @@ def test_a_winch_that_stalls_stands_while_the_others_go_on(winches: sl.SecondOrd
 
 
 # peaks of another simulation of the prototype, with its winches: +13 and +8 N at 0.06 m/s, +63 and +39 N at 0.3 m/s
-@pytest.mark.parametrize(("speed", "locked", "braked"), [(0.06, 13.0, 8.0), (0.3, 63.0, 39.0)])
+@pytest.mark.parametrize(("speed", "locked", "braked"), wide([(0.3, 63.0, 39.0), (0.06, 13.0, 8.0)]))
 def test_stops_between_two_poses_of_the_prototype_raise_tensions_as_known(
     speed: float, locked: float, braked: float
 ) -> None:
@@ -132,20 +135,20 @@ def test_what_happens_twice_happens_in_order() -> None:
 
 
 @pytest.mark.parametrize(
-    ("events", "message"),
+    ("events", "parts"),
     [
-        (sl.Break(8, 0.5), "events[0]: cable is 8; allowed: 0 to 7, as article-suspended has"),
-        ([sl.Break(1, 0.5), sl.Stall(9, 0.5)], "events[1]: winch is 9"),
-        (sl.Break(1, 2.5), "events[0]: time is 2.5 s; allowed: 0 to 1 s"),
-        ([sl.Break(1, 0.5), sl.Stall(1, 0.7)], "events: cable 1 is broken before 0.7 s"),
-        (sl.Drop(1e4, 0.5), "events: Drop: mass is 10000 kg"),
-        ([sl.Break(i, 0.5) for i in range(8)], "events is a break of every cable"),
-        ([3], "events[0] is 3; allowed: one of Break, Stall"),
-        ("break", "events is 'break'"),
+        (sl.Break(8, 0.5), ("events[0]: cable", "8", "0 to 7, as article-suspended has")),
+        ([sl.Break(1, 0.5), sl.Stall(9, 0.5)], ("events[1]: winch", "9")),
+        (sl.Break(1, 2.5), ("events[0]: time", "2.5 s", "0 to 1 s")),
+        ([sl.Break(1, 0.5), sl.Stall(1, 0.7)], ("events: cable 1", "broken before 0.7 s")),
+        (sl.Drop(1e4, 0.5), ("events: Drop: mass", "10000 kg")),
+        ([sl.Break(i, 0.5) for i in range(8)], ("events", "a break of every cable")),
+        ([3], ("events[0]", "3", "one of Break, Stall, Brake, Drop, PickUp")),
+        ("break", ("events", "'break'")),
     ],
 )
-def test_events_that_cannot_be_are_refused(events: object, message: str) -> None:
-    with pytest.raises(sl.InvalidValueError, match=re.escape(message)):
+def test_events_that_cannot_be_are_refused(events: object, parts: tuple[str, ...]) -> None:
+    with refused(*parts, kind=sl.InvalidValueError):
         sl.simulate(still(), events=events, duration=1.0)  # type: ignore[arg-type]
 
 
@@ -161,7 +164,7 @@ def test_a_gust_pushes_the_platform_with_half_of_its_force_on_the_cables() -> No
         across = wind - chord * (wind @ chord) / length**2
         force += 0.5 * length * 0.5 * 1.2 * 1.2 * 0.01 * np.linalg.norm(across) * across
     np.testing.assert_allclose(run.twist[-1, :3] * robot.mass, force * 1e-3, atol=2e-7 * float(np.linalg.norm(force)))
-    with pytest.raises(sl.InvalidValueError, match="cables: diameter is not given"):
+    with refused("cables: diameter", "not given"):
         sl.simulate(still(), wind=wind, duration=1.0)
 
 
@@ -170,54 +173,53 @@ def test_a_plan_without_an_answer_is_refused_by_its_first_sample() -> None:
     plan = sl.inverse(robot, sl.quintic_path([(0, 0, 1.5), (9, 0, 1.5)], durations=20.0, rate=10.0))
     first = int(np.argmin(plan.feasible))
     assert 0 < first < len(plan.feasible)
-    with pytest.raises(sl.InvalidValueError, match=rf"start: sample {first}, .*without an answer"):
+    assert plan.path is not None
+    with refused(f"start: sample {first}, {plan.path.time[first]:g} s", allowed="solved"):
         sl.simulate(plan)
 
 
 @pytest.mark.parametrize(
-    ("given", "message"),
+    ("given", "item", "value"),
     [
-        ({"step": 0.08}, "the limit of stability at"),
-        ({"cable_mass": "solid"}, "cable_mass is 'solid'"),
-        ({"damping": sl.Damping(modal_damping=0.1)}, "damping: modal_damping is 0.1; allowed: 0 in time"),
-        ({"unstrained_length": np.full(8, -1.0)}, "unstrained_length: cable 0 is -1 m"),
-        ({"wrench": ([0.5, 1.0], np.zeros((2, 6)))}, "wrench: time[0] is 0.5 s"),
-        ({"duration": None}, "duration is not given"),
-        ({"duration": 1e7}, "duration is 1e+07 s"),
-        ({"winches": "robot"}, "winches: drum_radius"),
-        ({"record": 1e-5}, "record is 1e-05 s"),
+        ({"step": 0.08}, "step", "0.08 s"),
+        ({"cable_mass": "solid"}, "cable_mass", "'solid'"),
+        ({"damping": sl.Damping(modal_damping=0.1)}, "damping: modal_damping", "0.1"),
+        ({"unstrained_length": np.full(8, -1.0)}, "unstrained_length: cable 0", "-1 m"),
+        ({"wrench": ([0.5, 1.0], np.zeros((2, 6)))}, "wrench: time[0]", "0.5 s"),
+        ({"duration": None}, "duration", "not given"),
+        ({"duration": 1e7}, "duration", "1e+07 s"),
+        ({"winches": "robot"}, "the robot", f"without winches: {', '.join(NEEDED)}"),
+        ({"record": 1e-5}, "record", "1e-05 s"),
     ],
 )
-def test_what_cannot_be_simulated_is_refused(given: dict[str, object], message: str) -> None:
+def test_what_cannot_be_simulated_is_refused(given: dict[str, object], item: str, value: str) -> None:
     arguments: dict[str, object] = {"duration": 1.0, **given}
-    with pytest.raises(sl.InvalidValueError, match=re.escape(message)):
+    with refused(item, value, kind=sl.InvalidValueError):
         sl.simulate(still(), **arguments)  # type: ignore[arg-type]
 
 
 def test_what_has_no_energy_is_refused() -> None:
     robot, pose = sl.load_robot("article-suspended"), sl.Pose.from_euler(PLACE, 0.0, 0.0, 0.0)
-    with pytest.raises(
-        sl.InvalidValueError, match=r"start: model is Parabolic\(\); allowed: Catenary\(\) or Elastic\(\)"
-    ):
+    with refused("start: model", "Parabolic()", "Catenary() or Elastic()"):
         sl.simulate(sl.inverse(robot, pose, model=sl.Parabolic()).state, duration=1.0)
     rubbing = robot.replace(winches=sl.Winch(0.05, pulley_friction=0.1))
     path = sl.septic_path([PLACE, (1.4, 0.3, 1.8)], durations=4.0, rate=20.0)
-    with pytest.raises(sl.InvalidValueError, match="start: winding is given; allowed: None"):
+    with refused("start: winding", "given", "None"):
         sl.simulate(sl.inverse(rubbing, path, winding="path"))
 
 
 def test_energy_that_grows_by_itself_stops_the_run_and_names_time_and_cable(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sagline.dynamics.simulate.checked_step", lambda *_: 0.09)
     state = still()
-    with pytest.raises(
-        sl.InvalidValueError, match=r"grows or fades by itself: at .* s most of it is in cable \d; .*Give step=0.018"
-    ):
+    with refused("step", next_step="Give step=0.018.", kind=sl.InvalidValueError) as caught:
         sl.simulate(state, wrench=np.array([50.0, 0, 0, 0, 0, 0]), duration=60.0, integrator="splitting")
+    assert re.search(r"at 0\.\d+ s .* cable \d", caught.value.value)
 
 
 def test_energy_that_fades_by_itself_stops_the_run_too() -> None:
-    with pytest.raises(sl.InvalidValueError, match="grows or fades by itself"):
+    with refused("step", next_step="Give step=0.01.") as caught:
         sl.simulate(still(), wrench=np.array([50.0, 0, 0, 0, 0, 0]), duration=60.0, step=0.05)
+    assert re.search(r"^0\.05 s, .* at \d+\.\d s .* cable \d", caught.value.value)
 
 
 def test_damping_is_that_of_the_linear_system() -> None:

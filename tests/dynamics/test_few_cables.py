@@ -8,6 +8,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipk
 
 import sagline as sl
+from tests.refusal import refused
 
 LENGTH, RADIUS, MASS = 4.0, 0.4, 20.0
 INERTIA = np.diag([0.6, 0.8, 1.3])
@@ -135,5 +136,5 @@ def test_one_that_stands_on_its_head_falls_the_way_that_is_told(cables: int) -> 
 
 
 def test_the_inverse_tells_that_it_takes_as_many_cables_as_freedoms() -> None:
-    with pytest.raises(sl.InvalidValueError, match=r"number of cables is 3; allowed: >= 6 for 3R3T"):
+    with refused("hung-3: number of cables", "3", ">= 6 for 3R3T"):
         sl.inverse(hung(3), sl.Pose.from_euler((0.0, 0.0, 1.0), 0.0, 0.0, 0.0))

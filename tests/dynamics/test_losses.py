@@ -7,11 +7,13 @@ import pytest
 
 import sagline as sl
 from tests.dynamics.let_go import LIFT, beside
+from tests.tiers import extended
 
 LOSS = sl.Damping(loss_time=1e-3)
 PULLEY, DEAD = sl.Winch(0.05), sl.Winch(dead_cable=3.0)
 
 
+@extended
 @pytest.mark.parametrize("behind", [None, PULLEY, DEAD, sl.Winch(0.05, dead_cable=3.0)])
 def test_cables_without_mass_lose_what_light_ones_with_mass_lose_while_they_are_wound_in(behind: sl.Winch) -> None:
     robot = sl.load_robot("article-suspended")

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 import sagline as sl
+from sagline import vibration
 from sagline.dynamics.at_rest import end_motions, following, stretch_losses
 from sagline.dynamics.mode_list import listed_modes, successors
-from sagline.dynamics.vibrating import vibration
+from tests.tiers import wide
 
 ROBOT = sl.load_robot("article-suspended")
 STATE = sl.inverse(ROBOT, sl.Pose([3.0, 2.0, 1.5], np.eye(3)), tension=sl.MinimumNorm()).state
@@ -76,7 +77,9 @@ def test_the_stretch_of_straight_cables_takes_what_a_complex_stiffness_takes() -
     np.testing.assert_allclose(ratio, 0.5 * 1e-4 * elastic / omega, rtol=2e-3)  # springs in series with 1/N: T/EA
 
 
-@pytest.mark.parametrize("winches", [None, sl.Winch(dead_cable=6.0), sl.Winch(0.1, dead_cable=3.0, dead_rise=2.0)])
+@pytest.mark.parametrize(
+    "winches", wide([None, sl.Winch(dead_cable=6.0), sl.Winch(0.1, dead_cable=3.0, dead_rise=2.0)])
+)
 def test_massless_cables_lose_and_lie_as_those_that_weigh_hardly_anything(winches: sl.Winch | None) -> None:
     """What is behind their exits gives way and loses too; elastic springs soft enough that it takes a fair part."""
     cables = ROBOT.cables.replace(linear_density=2e-6, axial_stiffness=2e4)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from pathlib import Path
 
@@ -10,7 +11,9 @@ import numpy as np
 import sagline as sl
 from sagline.dynamics.chains_at_rest import chains_at_rest
 from tests.dynamics.test_chains import cogiro, moved
+from tests.tiers import extended
 
+pytestmark = extended
 PAGE = Path(__file__).parents[2] / "docs" / "model.md"
 
 
@@ -39,4 +42,6 @@ def test_how_well_steps_agree_after_a_break() -> None:
         run = sl.simulate(cogiro(), cable_mass="lumped", duration=0.5, step=share * 5e-5, events=sl.Break(0, 0.0))
         after.append(run.events[0].tension_after)
     off = max(abs(one / after[-1] - 1.0) for one in after)
-    assert f"0.45, 0.2 and 0.1 agree to {100 * off:.2f} % in the largest tension" in page()
+    found = re.search(r"0\.45, 0\.2 and 0\.1 agree to (\S+) %", page())
+    assert found is not None
+    assert found[1] == f"{100 * off:.2f}"

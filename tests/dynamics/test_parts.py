@@ -10,6 +10,7 @@ import pytest
 import sagline as sl
 from sagline.dynamics.beginning import beginning
 from sagline.dynamics.simulate import run_of
+from tests.tiers import wide
 
 PARTS = (0.03, 0.1, 0.1, 0.137, 0.3, 0.05, np.inf)  # also between records, twice, and back
 EVENTS = (sl.Break(cable=1, time=0.0), sl.Break(cable=4, time=0.1), sl.Drop(mass=10.0, time=0.1234))
@@ -21,12 +22,15 @@ def state() -> sl.Equilibrium:
 
 @pytest.mark.parametrize(
     ("elements", "told"),
-    [
-        (0, {}),
-        (0, {"events": EVENTS, "damping": sl.Damping(loss_time=1e-3)}),
-        (0, {"events": EVENTS, "integrator": "splitting", "record": 0.007}),
-        (4, {"events": EVENTS[:1], "damping": sl.Damping(loss_time=1e-4)}),
-    ],
+    wide(
+        [
+            (0, {}),
+            (0, {"events": EVENTS, "damping": sl.Damping(loss_time=1e-3)}),
+            (0, {"events": EVENTS, "integrator": "splitting", "record": 0.007}),
+            (4, {"events": EVENTS[:1], "damping": sl.Damping(loss_time=1e-4)}),
+        ],
+        first=3,
+    ),
 )
 def test_in_parts_it_is_what_it_is_at_once(elements: int, told: dict[str, Any]) -> None:
     mass: dict[str, Any] = {"cable_mass": "lumped", "nodes": elements} if elements else {}

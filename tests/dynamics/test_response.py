@@ -7,6 +7,7 @@ import pytest
 
 import sagline as sl
 from tests.dynamics.states import at, middle
+from tests.tiers import wide
 
 DAMPINGS = {
     "none": sl.Damping(),
@@ -17,7 +18,7 @@ DAMPINGS = {
 }
 
 
-@pytest.mark.parametrize("name", ["cogiro", "ipanema-2-pulleys"])
+@pytest.mark.parametrize("name", wide(["cogiro", "ipanema-2-pulleys"]))
 @pytest.mark.parametrize("damping", DAMPINGS)
 def test_modes_agree_with_the_exact_stiffness(name: str, damping: str) -> None:
     found = sl.frequency_response(middle(name), np.linspace(0.0, 15.0, 31), DAMPINGS[damping])

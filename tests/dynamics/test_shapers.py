@@ -3,6 +3,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import sagline as sl
+from tests.refusal import refused
+from tests.tiers import wide
 
 SHAPERS = {
     "ZV": lambda: sl.ZV(1.8),
@@ -34,7 +36,7 @@ def left_by_impulses(shaper: sl.Shaper, frequency: float, damping_ratio: float) 
 
 
 @pytest.mark.parametrize("name", SHAPERS)
-@pytest.mark.parametrize("damping_ratio", [0.0, 0.1])
+@pytest.mark.parametrize("damping_ratio", wide([0.1, 0.0]))
 def test_the_residual_is_what_an_oscillator_keeps(name: str, damping_ratio: float) -> None:
     shaper = SHAPERS[name]()
     for frequency in (0.7, 1.8, 2.3, 2.9):
@@ -95,13 +97,13 @@ def test_options_out_of_range_are_refused(make: type, name: str, option: object)
 
 
 def test_impulses_that_are_none_are_refused() -> None:
-    with pytest.raises(sl.InvalidValueError, match=r"2 that sum to 0\.9"):
+    with refused("amplitude", "2 that sum to 0.9"):
         sl.Shaper([0.0, 1.0], [0.5, 0.4])
-    with pytest.raises(sl.InvalidValueError, match=r"time\[1\]"):
+    with refused("time[1]", "0.0 s"):
         sl.Shaper([0.0, 0.0], [0.5, 0.5])
-    with pytest.raises(sl.InvalidValueError, match="time"):
+    with refused("time[0]", "-0.1 s"):
         sl.Shaper([-0.1, 0.0], [0.5, 0.5])
-    with pytest.raises(sl.InvalidValueError, match="11907 impulses"):
+    with refused("a product of shapers", "of 11907 impulses", "<= 10000"):
         sl.ZVD(np.sqrt(np.arange(1.0, 11.0)))
-    with pytest.raises(sl.InvalidValueError, match="other factor is 2"):
+    with refused("the other factor", "2", "a Shaper"):
         sl.ZV(1.0) * 2  # type: ignore[operator]

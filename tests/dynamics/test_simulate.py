@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Literal
 
-import mujoco
 import numpy as np
 import pytest
 
 import sagline as sl
 from sagline.arrays import Array
 from tests.dynamics.let_go import LIFT, beside, integrated, lopsided
+from tests.tiers import extended, wide
 
 Code = Literal["splitting", "runge-kutta"]
 MODEL = Path(__file__).parents[2] / "docs" / "model.md"
@@ -42,8 +42,11 @@ def test_it_goes_where_another_integration_goes_with_the_order_of_the_method(int
     assert np.abs(np.diff(expected[:, :3], axis=0)).max() > 1e-3  # it moves
 
 
+@extended
 @pytest.mark.parametrize("integrator", BOTH)
 def test_elastic_cables_swing_as_tendons_of_mujoco(integrator: Code) -> None:
+    import mujoco
+
     robot, step = sl.load_robot("article-suspended"), 1e-4
     state, lengths = beside(robot, (0.5, 0.3, 1.5), SHIFT, sl.Elastic())
     model = mujoco.MjModel.from_xml_string(sl.dump_mjcf(robot, state.pose, lengths))
@@ -71,7 +74,9 @@ def test_a_robot_at_rest_stays_there(integrator: Code) -> None:
     assert np.abs(run.twist).max() < 1e-11
 
 
-@pytest.mark.parametrize(("away", "least"), [(0.006, 40.0), (0.03, 10.0)])  # the latter slackens cables again and again
+@pytest.mark.parametrize(
+    ("away", "least"), wide([(0.03, 10.0), (0.006, 40.0)])
+)  # the latter slackens cables again and again
 @pytest.mark.parametrize(("integrator", "most"), [("splitting", 5e-5), ("runge-kutta", 1e-4)])
 def test_energy_has_no_trend_in_a_minute(integrator: Code, most: float, away: float, least: float) -> None:
     state, lengths = beside(sl.load_robot("cogiro"), (0.0, 0.0, 2.0), np.array([away, 0.0, 0.0]))
@@ -120,6 +125,7 @@ def test_planned_lengths_leave_no_vibration_where_static_ones_do(place: Array, g
     assert np.abs(run.pose.position[: len(planned)] - planned).max() < 1e-9
 
 
+@extended
 def test_over_pulleys_and_dead_cable_a_plan_is_followed_and_its_energy_kept() -> None:
     robot = sl.load_robot("article-suspended").replace(winches=sl.Winch(0.05, dead_cable=3.0, dead_rise=2.5))
     path = sl.septic_path([(0, 0, 1.5), (1, 0.5, 1.8)], durations=1.5, rate=1000.0)
@@ -164,7 +170,7 @@ def test_platforms_of_fewer_motions_keep_to_them(pattern: Literal["3T", "1R2T", 
     assert np.abs(run.energy.error).max() < 1e-6
 
 
-@pytest.mark.parametrize("cable_mass", ["none", "lumped", "modal"])
+@pytest.mark.parametrize("cable_mass", wide(["none", "modal", "lumped"], first=2))
 @pytest.mark.parametrize(("duration", "last"), [(0.005, [0.0, 0.005]), (0.0234, [0.01, 0.02, 0.0234])])
 def test_the_end_is_always_recorded(cable_mass: Literal["none", "lumped", "modal"], duration: float, last: Any) -> None:
     """At the first step that is not earlier; the last sample is that of a run that records every step."""
@@ -180,7 +186,7 @@ def test_the_end_is_always_recorded(cable_mass: Literal["none", "lumped", "modal
     assert run.energy.supplied[-1] > 0.0
 
 
-@pytest.mark.parametrize("cable_mass", ["none", "lumped", "modal"])
+@pytest.mark.parametrize("cable_mass", wide(["none", "modal", "lumped"], first=2))
 def test_twists_are_of_the_origin_as_those_of_paths(cable_mass: Literal["none", "lumped", "modal"]) -> None:
     """Against differences of the poses, of a platform that turns about a center of mass that is elsewhere."""
     robot = sl.load_robot("expo2015-lucia").replace(center_of_mass=[0.05, -0.1, 0.2])

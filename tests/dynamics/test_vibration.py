@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from scipy.integrate import simpson
@@ -11,9 +13,10 @@ from sagline.dynamics.cable_dynamics import EXACT, in_world
 from sagline.dynamics.count import modes_below
 from sagline.dynamics.reduced import dynamic_matrix, setting_of
 from sagline.kernels.dynamics import collocation
-from sagline.statics.stiffness import mass_matrix
-from sagline.statics.strings import strings_of
+from tests.dynamics.linear_systems import mass_of
 from tests.dynamics.states import at, middle
+from tests.refusal import refused
+from tests.tiers import wide
 
 # [Hz], by finite elements of the whole robot with cable mass, which agree to 3e-7
 LOWEST_SIX = {
@@ -31,7 +34,7 @@ def test_lowest_six_of_article_suspended_by_finite_elements(position: tuple[floa
         assert found.massless_frequency[:3] == pytest.approx((1.787, 2.177, 2.961), abs=5e-4)
 
 
-@pytest.mark.parametrize("name", ["cogiro", "article-suspended", "ipanema-2-pulleys", "fast"])
+@pytest.mark.parametrize("name", wide(["cogiro", "article-suspended", "fast", "ipanema-2-pulleys"], first=3))
 def test_every_frequency_by_the_exact_count(name: str) -> None:
     """Below f - 1e-5 Hz are k - 1 modes, below f + 1e-5 Hz are k: each is right to 1e-5 Hz, and none is missing."""
     state = middle(name)
@@ -60,12 +63,12 @@ def test_lowest_twelve_of_cogiro_do_not_depend_on_the_cut() -> None:
     assert few.frequency == pytest.approx(many.frequency[: few.count], abs=1e-5)
 
 
-@pytest.mark.parametrize("name", ["cogiro", "ipanema-2-pulleys"])
+@pytest.mark.parametrize("name", wide(["cogiro", "ipanema-2-pulleys"]))
 def test_shapes_carry_the_energy_they_say(name: str) -> None:
     """Unit modal mass: of the platform by its mass matrix, of each cable by quadrature over its shape."""
     state = middle(name)
     found = sl.vibration(state, up_to=9.0)
-    own = np.einsum("ak,ab,bk->k", found.shape, mass_matrix(state), found.shape)
+    own = np.einsum("ak,ab,bk->k", found.shape, mass_of(state), found.shape)
     assert own == pytest.approx(found.platform_share, abs=1e-12)
     assert found.platform_share + found.cable_share.sum(axis=0) == pytest.approx(1.0, abs=1e-12)
     cables = state.cables
@@ -77,7 +80,7 @@ def test_shapes_carry_the_energy_they_say(name: str) -> None:
     assert np.moveaxis(found.cable_shape[:, :, -1], 0, -1) == pytest.approx(ends, abs=1e-12)
 
 
-@pytest.mark.parametrize("name", ["cogiro", "ipanema-2-pulleys"])
+@pytest.mark.parametrize("name", wide(["cogiro", "ipanema-2-pulleys"]))
 def test_loss_against_roots_in_the_complex_plane(name: str) -> None:
     """D(omega) u = 0 at omega (i zeta + sqrt(1 - zeta^2)) to first order: twice the damping, twice the root's shift."""
     state = middle(name)
@@ -93,7 +96,7 @@ def test_loss_against_roots_in_the_complex_plane(name: str) -> None:
 
 def _root(state: sl.Equilibrium, damping: sl.Damping, omega: complex) -> complex:
     """Root of det D near a complex frequency, by the secant method."""
-    setting, strings = setting_of(state), strings_of(state)
+    setting = setting_of(state)
     static = np.abs(np.linalg.det(dynamic_matrix(setting, 0, np.zeros((8, 3, 3)), 0.0)))
 
     def determinant(at: complex) -> complex:
@@ -103,8 +106,8 @@ def _root(state: sl.Equilibrium, damping: sl.Damping, omega: complex) -> complex
         found = np.empty((1, 1, 8, collocation.FOUND), dtype=np.complex128)
         counts = np.empty((1, 1, 8, 2), dtype=np.int64)
         room = np.empty(collocation.ROOM, dtype=np.complex128)
-        collocation.dynamic_stiffnesses(strings.table, waves, EXACT, room, found, counts)
-        moving = in_world(found[0], strings.axes[0])[0]
+        collocation.dynamic_stiffnesses(setting.strings.table, waves, EXACT, room, found, counts)
+        moving = in_world(found[0], setting.strings.axes[0])[0]
         whole = np.einsum("mai,mab,mbj->ij", setting.ends[0], moving, setting.ends[0])
         whole += setting.stiffness[0] - at**2 * setting.mass[0]
         return complex(np.linalg.det(whole) / static)
@@ -178,9 +181,9 @@ def test_a_motion_that_nothing_holds_has_exactly_no_frequency(yaw: float, densit
 def test_an_unstable_equilibrium_answers_no_oscillating_force() -> None:
     robot = sl.load_robot("article-suspended").replace(center_of_mass=(0.0, 0.0, 5.0))
     state = sl.inverse(robot, sl.Pose([0.0, 0.0, 1.5], np.eye(3))).state
-    with pytest.raises(sl.InvalidValueError, match="state is an unstable equilibrium; allowed: a stable one"):
+    with refused("state", "an unstable equilibrium"):
         sl.frequency_response(state, [1.0])
-    with pytest.raises(sl.InvalidValueError, match="modes is of an unstable state"):
+    with refused("modes", "of an unstable state"):
         sl.to_shape(sl.modes(state), sl.quintic_path([(0, 0, 1.5), (1, 0, 1.5)], durations=2.0))
 
 
@@ -217,15 +220,16 @@ def test_limits_that_are_none(up_to: object) -> None:
 
 
 def test_too_many_modes_are_counted_and_refused() -> None:
-    with pytest.raises(sl.InvalidValueError, match=r"below which the robot has 3,\d\d\d modes"):
+    with refused("up_to", kind=sl.InvalidValueError) as caught:
         sl.vibration(middle("cogiro"), up_to=900.0)
+    assert re.search(r"^900 Hz, .* 3,\d\d\d modes$", caught.value.value)
 
 
 def test_modes_and_count_that_disagree_are_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     from sagline.dynamics import robot_modes
 
     monkeypatch.setattr(robot_modes, "modes_below", lambda *_: 79)
-    with pytest.raises(sl.SaglineError, match="exact count has 79"):
+    with pytest.raises(sl.SaglineError, match=r"\b79\b"):
         sl.vibration(middle("cogiro"), up_to=10.0)
 
 
@@ -242,5 +246,5 @@ def test_modes_say_which_lie_above_the_first_string(name: str) -> None:
 def _first_string(state: sl.Equilibrium) -> float:
     from tests.kernels.dynamics.strings import held
 
-    table = strings_of(state).table[0]
+    table = setting_of(state).strings.table[0]
     return min(held(table[i : i + 1], 1, plane, 1e-6) for i in range(len(table)) for plane in (0, 1))

@@ -15,8 +15,8 @@ def test_snippets_run_and_print_what_they_should(capsys: pytest.CaptureFixture[s
         exec(compile(snippet, str(PAGE), "exec"), names)
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "k_h = 4.878, k_p = 4.009"
-    assert lines[1] == "T_x,min = 100 N, or w_max = 2.9 N"
+    assert re.findall(r"[\d.]+ N", lines[1]) == ["100 N", "2.9 N"]
     assert lines[2].startswith("linear_density = 0.067 ± 0.05")
     assert lines[3].startswith("axial_stiffness = 4.4e+04 ± ")
-    assert lines[4] == "linear_density is not determined"
+    assert lines[4].partition(" is ") == ("linear_density", " is ", "not determined")
     assert names["plan"].feasible.all()

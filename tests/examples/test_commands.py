@@ -25,8 +25,13 @@ from tests.calibration.made_up import made_up
 from tests.files.executions import execution
 from tests.kinematics.winches import wound
 from tests.stand_ins import instead_of_machines
+from tests.tiers import extended
 
 ROOT = Path(__file__).parents[2]
+LONG = (
+    "track", "lengths", "encoder", "tension", "vibrate", "simulate", "workspace", "sweep", "design", "calibrate",
+    "view", "share", "twin", "log",
+)  # fmt: skip
 
 
 def lines_of(text: str) -> list[list[str]]:
@@ -46,22 +51,43 @@ def printed() -> list[list[str]]:
     return [line for k, line in enumerate(found) if line not in found[:k]]
 
 
+def in_tiers(lines: list[list[str]]) -> list[Any]:
+    """The lines; those of commands that compute for long in the second tier."""
+    return [pytest.param(line, marks=extended) if line[0] in LONG else line for line in lines]
+
+
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def examples(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("examples")
     result = CliRunner().invoke(app, ["examples", "--out", str(place)])
     assert result.exit_code == 0, result.output
     return place
 
 
+@pytest.fixture
+def folder(examples: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Current folder with the files of `sagline examples`."""
+    shutil.copytree(examples, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
 def with_winches(place: Path) -> None:
     """A robot of one's own, with drums; a run of it, and its counts."""
     (place / "my_robot.yaml").write_text(sl.dump_robot(wound()))
     plan = sl.inverse(wound(), sl.Pose.from_euler([[0.0, 0.0, 2.0], [0.1, 0.0, 2.0]], 0.0, 0.0, 0.0))
-    (place / "output").mkdir(exist_ok=True)
+    (place / "output").mkdir()
     plan.save(place / "output" / "my-robot-catenary.nc")
     header = ",".join(f"C{k}" for k in range(8))
     np.savetxt(place / "counts.csv", sl.encoder_counts(plan), delimiter=",", header=header, comments="")
+
+
+def with_run(file: Path) -> None:
+    """A run, ROBOT-MODEL.nc, as `sagline track` writes it."""
+    file.parent.mkdir()
+    robot, _, model = file.stem.rpartition("-")
+    path = sl.quintic_path([(0.0, 0.0, 1.5), (0.1, 0.0, 1.5)], durations=1.0, rate=10)
+    sl.inverse(sl.load_robot(robot), path, {"catenary": sl.Catenary(), "empirical": sl.Empirical()}[model]).save(file)
 
 
 def with_logs(place: Path) -> None:
@@ -80,9 +106,8 @@ def with_two_runs(place: Path) -> None:
         sl.inverse(sl.load_robot("article-mixed"), path).save(place / name)
 
 
-@pytest.mark.parametrize("words", printed(), ids=" ".join)
+@pytest.mark.parametrize("words", in_tiers(printed()), ids=" ".join)
 def test_a_printed_command_runs(words: list[str], folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(folder)
     served: list[Any] = []
 
     def serve(robot: sl.Robot, *more: Any, **others: Any) -> int:
@@ -118,8 +143,6 @@ def test_a_printed_command_runs(words: list[str], folder: Path, monkeypatch: pyt
         words = [*words, "--cells", "6"]  # the same with less to do, as CELLS above
     if "worn.yaml" in words:
         (folder / "worn.yaml").write_text(sl.dump_robot(sl.load_robot("article-prototype").replace(mass=52.0)))
-    if words[0] == "new":
-        (folder / words[1]).unlink(missing_ok=True)
     if any(word.endswith(".mcap") for word in words):
         with_logs(folder)
     if "--beside" in words:
@@ -128,14 +151,17 @@ def test_a_printed_command_runs(words: list[str], folder: Path, monkeypatch: pyt
         made_up(count=6).save(folder / "found.nc")
     if words[0] == "encoder" or "--counts" in words:
         with_winches(folder)
+    else:
+        for word in words:
+            if word.startswith("output/"):
+                with_run(folder / word)
     result = CliRunner().invoke(app, words, input="\n" * 9)  # every question takes its default
     assert result.exit_code == 0, result.output
     assert len(served) == (words[0] == "view")
 
 
 @pytest.mark.soak
-def test_the_whole_article_too(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(folder)
+def test_the_whole_article_too(folder: Path) -> None:
     assert CliRunner().invoke(app, ["article"]).exit_code == 0
 
 
@@ -149,12 +175,13 @@ def test_examples_are_those_of_the_source_and_replace_nothing_unasked(tmp_path: 
     (tmp_path / "new" / "cable.csv").unlink()
     result = CliRunner().invoke(app, words)
     assert result.exit_code == 2
-    assert "exists. Choose another folder with --out, or replace it with --force." in result.stderr
+    assert "--force" in result.stderr
     assert not (tmp_path / "new" / "cable.csv").exists()
     assert CliRunner().invoke(app, [*words, "--force"]).exit_code == 0
     assert (tmp_path / "new" / "lengths.csv").read_bytes() == source["lengths.csv"]
 
 
+@extended
 def test_an_installed_package_has_them_inside(tmp_path: Path) -> None:
     """As hatch puts them there: `examples` of the source becomes `sagline/examples` of the wheel."""
     import tomllib

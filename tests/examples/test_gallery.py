@@ -1,5 +1,6 @@
 """Every example of the gallery runs as it stands, and comes to the number it claims."""
 
+import re
 import runpy
 from collections.abc import Callable
 from pathlib import Path
@@ -10,7 +11,9 @@ import numpy as np
 import pytest
 
 import sagline as sl
+from tests.tiers import extended
 
+pytestmark = extended
 EXAMPLES = Path(__file__).parents[2] / "examples"
 Run = Callable[[str], dict[str, Any]]
 
@@ -26,7 +29,7 @@ def test_one_cable(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
     # w D^2 / (8 tau) to first order, with the weight along the chord: 0.067 * 9.81 * 160 / (8 * 200)
     assert names["exact"].sag[-1] == pytest.approx(0.0657, rel=0.01)
     assert names["worst"]["Straight"] == pytest.approx(76.3, abs=0.1)
-    assert capsys.readouterr().out.startswith("  20 N: 12.7254 m of cable,   659 mm of sag")
+    assert re.match(r" +20 N: 12\.7254 m .* 659 mm ", capsys.readouterr().out)
     assert Path("one_cable.png").stat().st_size > 10_000
 
 
@@ -57,7 +60,7 @@ def test_where_it_works(run: Run) -> None:
 
 def test_how_fast(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("how_fast")["fastest"] == 1.5
-    assert "1.0 s: fails after 0.09 s by 226 N" in capsys.readouterr().out
+    assert re.search(r"\b1\.0 s: .* 0\.09 s .*\b226 N", capsys.readouterr().out)
 
 
 def test_few_cables(run: Run) -> None:

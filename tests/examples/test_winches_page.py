@@ -15,13 +15,20 @@ from sagline.arrays import Array
 from sagline.cli.main import app
 from tests.docs.test_snippets import blocks
 from tests.examples.test_commands import lines_of
+from tests.tiers import extended
 
+pytestmark = extended
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "winches.md").read_text(encoding="utf-8")
 PROSE = re.sub(r"\s+", " ", PAGE)
 ROBOTS = ("cogiro", "article-prototype", "ipanema-1", "expo2015-lucia")
 PULLEYS = sl.Winch(0.05)
 RISING = sl.Winch(0.05, dead_cable=3.0, dead_rise=3.0)
+
+
+def said(*parts: str) -> bool:
+    """Whether one sentence of the page has all the parts."""
+    return any(all(part in sentence for part in parts) for sentence in re.split(r"[.:;] ", PROSE))
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +47,7 @@ def test_the_table_is_what_the_example_finds(example: dict[str, Any]) -> None:
     for name, cells in table.items():
         assert cells == [f"{row.mean():.1f}, {row.max():.0f}" for row in example["found"][name]]
     assert {row.size for rows in example["found"].values() for row in rows} == {405}
-    assert "at 405 level poses" in PROSE
+    assert said("405 level")
     assert Path("pulleys_left_out.png").stat().st_size > 10_000
 
 
@@ -117,11 +124,10 @@ def off_by(name: str, winch: sl.Winch, *, zeroed: bool = False) -> tuple[float, 
 
 def test_the_straight_formula_is_as_near_as_the_page_says() -> None:
     without = [off_by(name, PULLEYS) for name in ROBOTS]
-    assert f"wrong by up to {max(angle for _, angle in without):.1f}°" in PROSE
-    assert f"put the platform {max(error for error, _ in without):.1f} µm off at most" in PROSE
+    assert said("angle", f"{max(angle for _, angle in without):.1f}°")
+    assert said(f"platform {max(error for error, _ in without):.1f} µm", "at most")
     rising = {name: off_by(name, RISING)[0] for name in ROBOTS}
     soft = rising.pop("article-prototype")
-    assert f"it is {1e-3 * soft:.2f} mm on the prototype's soft rope" in PROSE
-    assert f"and {1e-3 * max(rising.values()):.2f} mm elsewhere" in PROSE
+    assert said(f"{1e-3 * soft:.2f} mm on the prototype", f"{1e-3 * max(rising.values()):.2f} mm elsewhere")
     zeroed = max(off_by(name, RISING, zeroed=True)[0] for name in ROBOTS)
-    assert f"zeros set at home leave {zeroed:.0f} µm of it" in PROSE
+    assert said("at home", f"{zeroed:.0f} µm")

@@ -6,11 +6,11 @@ from functools import cache
 import numpy as np
 
 import sagline as sl
+from sagline import Plan
 from sagline.control import Command, Event, EventKind, Missing, Mode, Recorded, Sample, State
 from sagline.control.execution import Execution, ExecutionStatus, execution_of
 from sagline.control.link import PERIOD, groups_of
 from sagline.control.recording import Tape
-from sagline.kinematics.plan import Plan
 
 
 @cache

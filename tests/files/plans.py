@@ -5,7 +5,7 @@ from operator import attrgetter
 import numpy as np
 
 import sagline as sl
-from sagline.files.robot_file import dump_robot
+from sagline import dump_robot
 
 SUSPENDED = sl.load_robot("article-suspended")
 OUTSIDE = sl.quintic_path([(0.0, 0.0, 1.5), (7.2, 3.0, 1.5)], durations=5.0, rate=8.0)  # ends outside

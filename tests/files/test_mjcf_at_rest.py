@@ -5,17 +5,12 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
+from sagline import Cable, Elastic, Pose, Robot, dump_mjcf, forward, inverse, load_robot, modes, robot_names
 from sagline.arrays import Array
-from sagline.cables.cable import Cable
-from sagline.cables.elastic import Elastic
-from sagline.files.mjcf import _dynamics, dump_mjcf
-from sagline.files.robot_file import load_robot
-from sagline.kinematics.forward import forward
-from sagline.kinematics.inverse import inverse
-from sagline.robot.catalogue import robot_names
-from sagline.robot.pose import Pose
-from sagline.robot.robot import Robot
-from sagline.statics.stiffness import modes
+from sagline.files.mjcf import _dynamics
+from tests.tiers import extended
+
+pytestmark = extended
 
 
 def opened(text: str) -> tuple[mujoco.MjModel, mujoco.MjData]:

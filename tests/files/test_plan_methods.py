@@ -4,16 +4,17 @@ import numpy as np
 import pytest
 
 import sagline as sl
+from tests.tiers import wide
 
 METHODS = (
-    sl.Centroid("horizontal"),
+    sl.QuadraticProgram(weights=np.arange(1.0, 9.0), target=50.0),
     sl.PNorm(p=6.0),
     sl.PolygonWalk(optimum="1-norm"),
-    sl.QuadraticProgram(weights=np.arange(1.0, 9.0), target=50.0),
+    sl.Centroid("horizontal"),
 )
 
 
-@pytest.mark.parametrize("method", METHODS, ids=lambda method: type(method).__name__)
+@pytest.mark.parametrize("method", wide(METHODS), ids=lambda method: type(method).__name__)
 def test_a_plan_comes_back_with_its_way_of_sharing(method: sl.TensionMethod, tmp_path: Path) -> None:
     plan = sl.inverse(sl.load_robot("article-mixed"), sl.Pose([1.0, -0.5, 2.5], np.eye(3)), tension=method)
     plan.save(tmp_path / "run.nc")

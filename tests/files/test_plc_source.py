@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -16,16 +17,23 @@ from sagline.files.plc_source import source_text
 from sagline.plc.blocks import BLOCKS, CLAIM, FROM_PLC, TO_PLC, Block
 from sagline.twin.plc_program import Limits, Order, Program
 from tests.files.scl import Array, data_block, function_block, variables
+from tests.refusal import refused
+from tests.tiers import extended
 
 PERIOD = 0.005
 ROBOT = sl.load_robot("article-prototype")
-TEXT = source_text(ROBOT)
 SPEED = 0.4
+
+
+@cache
+def text() -> str:
+    """The source for a robot."""
+    return source_text(ROBOT)
 
 
 @pytest.mark.parametrize("block", BLOCKS, ids=lambda block: block.name)
 def test_offsets_in_scl_are_those_of_packing(block: Block) -> None:
-    rows, size = data_block(TEXT, block.name)
+    rows, size = data_block(text(), block.name)
     assert rows == {name: (kind, offset) for name, kind, offset in block.rows}
     assert size == block.size == block.packer.size
     values = {name: i + 1 for i, (name, _, _) in enumerate(block.rows) if name not in ("magic", "version")}
@@ -54,7 +62,7 @@ class Bench:
         self.count = count
         limits = Limits([0.5] * count, [6.0] * count, [SPEED] * count, [300.0] * count)
         self.program = Program(limits, PERIOD)
-        self.block, self.v = function_block(TEXT, "SaglineGroup"), variables(TEXT, "SaglineGroup")
+        self.block, self.v = function_block(text(), "SaglineGroup"), variables(text(), "SaglineGroup")
         filled = {name: Array([0.0] * 6 + values) for name, values in limits._asdict().items()}
         config = SimpleNamespace(group=4, winches=6 + count, **filled)
         self.db = SimpleNamespace(
@@ -177,6 +185,11 @@ def drive(bench: Bench, seed: int, scans: int) -> dict[str, int]:
     return seen
 
 
+def test_the_source_does_what_the_twins_program_does_for_a_few_seconds() -> None:
+    drive(Bench(2), seed=2, scans=1_000)
+
+
+@extended
 @pytest.mark.parametrize("count", [2, 1])
 def test_the_source_does_what_the_twins_program_does(count: int) -> None:
     seen = drive(Bench(count), seed=count, scans=8_000)
@@ -192,13 +205,13 @@ def test_the_source_does_what_the_twins_program_does_for_long() -> None:
 
 def test_the_file_names_what_is_to_be_set_and_that_it_is_not_compiled(tmp_path: Path) -> None:
     path = sl.export_scl(ROBOT, tmp_path / "plc.scl")
-    text = path.read_bytes().decode()
-    assert text.replace("\r\n", "\n") == TEXT
-    assert "@" not in text
-    assert max(map(len, text.splitlines())) <= 120
+    written = path.read_bytes().decode()
+    assert written.replace("\r\n", "\n") == text()
+    assert "@" not in written
+    assert max(map(len, written.splitlines())) <= 120
     for words in ("NOT COMPILED", "PUT/GET", "VLAN", "access level", "101, 102, 103"):
-        assert words in text.partition("DATA_BLOCK")[0]
-    speed = [float(each) for each in re.findall(r" speed\[\d\] := ([^;]+);", text)]
+        assert words in written.partition("DATA_BLOCK")[0]
+    speed = [float(each) for each in re.findall(r" speed\[\d\] := ([^;]+);", written)]
     drums = ROBOT.winches
     assert drums is not None
     assert drums.speed_limit is not None
@@ -206,7 +219,7 @@ def test_the_file_names_what_is_to_be_set_and_that_it_is_not_compiled(tmp_path: 
 
 
 def test_what_it_cannot_be_written_for_is_told(tmp_path: Path) -> None:
-    with pytest.raises(sl.FileError, match=r"Let it end in \.scl: plc\.scl"):
+    with refused(next_step="Let it end in .scl: plc.scl.", kind=sl.FileError):
         sl.export_scl(ROBOT, tmp_path / "plc.txt")
     with pytest.raises(sl.InvalidValueError, match="winches"):
         sl.export_scl(sl.load_robot("cogiro"), tmp_path / "plc.scl")

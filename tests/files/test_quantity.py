@@ -7,9 +7,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
-from sagline.errors import InvalidValueError
+from sagline import InvalidValueError
 from sagline.files.quantity import in_si, plain_number, within_reach
 from tests.effort import least_seconds
+from tests.refusal import refused
+from tests.tiers import extended
 
 
 @pytest.mark.parametrize(
@@ -58,36 +60,37 @@ def test_plain_numbers_pass_bit_for_bit(number: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("value", "unit", "message"),
+    ("value", "unit", "parts"),
     [
-        ("5 kg", "m", "x is '5 kg'; allowed: a number in m, or text with a unit that converts to it"),
-        ("5 kg", "N", "x is '5 kg'"),
-        ("5 furlongz", "m", "x is '5 furlongz'"),
-        ("5 %%", "m", "x is '5 %%'"),
-        ("1001/s", "1/s", "x is '1001/s'"),
-        ("5 m)", "m", "x is "),
-        ("5 m", "", "x is '5 m'; allowed: a number\\."),
-        ("long", "m", "x is 'long'"),
-        ("", "m", "x is ''"),
-        ("nan", "m", "x is 'nan'"),
-        (float("nan"), "m", "x is nan"),
-        (True, "m", "x is True"),
-        (None, "m", "x is None"),
-        ({"a": 1}, "m", "x is {'a': 1}"),
-        (10**400, "m", "x is 1000"),
-        ([[1.0], [2.0, "3 s"]], "m", "x\\[1\\]\\[1\\] is '3 s'"),
-        ("5 __import__('os')", "m", "x is "),
+        ("5 kg", "m", ("x", "'5 kg'", 'a number in m, or text with a unit that converts to it, such as "1.5 m"')),
+        ("5 kg", "N", ("x", "'5 kg'")),
+        ("5 furlongz", "m", ("x", "'5 furlongz'")),
+        ("5 %%", "m", ("x", "'5 %%'")),
+        ("1001/s", "1/s", ("x", "'1001/s'")),
+        ("5 m)", "m", ("x", "'5 m)'")),
+        ("5 m", "", ("x", "'5 m'", "a number")),
+        ("long", "m", ("x", "'long'")),
+        ("", "m", ("x", "''")),
+        ("nan", "m", ("x", "'nan'")),
+        (float("nan"), "m", ("x", "nan")),
+        (True, "m", ("x", "True")),
+        (None, "m", ("x", "None")),
+        ({"a": 1}, "m", ("x", "{'a': 1}")),
+        (10**400, "m", ("x", "100000000000000000...0000000000000000000")),
+        ([[1.0], [2.0, "3 s"]], "m", ("x[1][1]", "'3 s'")),
+        ("5 __import__('os')", "m", ("x", "\"5 __import__('os')\"")),
     ],
 )
-def test_what_is_no_quantity_is_named(value: object, unit: str, message: str) -> None:
-    with pytest.raises(InvalidValueError, match=message):
+def test_what_is_no_quantity_is_named(value: object, unit: str, parts: tuple[str, ...]) -> None:
+    with refused(*parts, kind=InvalidValueError):
         in_si(value, unit, "x")
 
 
 @pytest.mark.parametrize("value", [1e51, "1e51", "1e400", -1e60, "1e49 km", "-1e300 m"])
 def test_numbers_out_of_reach_are_refused(value: object) -> None:
-    with pytest.raises(InvalidValueError, match=r"x is .*; allowed: "):
+    with refused("x", kind=InvalidValueError) as caught:
         in_si(value, "m", "x")
+    assert caught.value.allowed
     assert within_reach(1e50)
     assert within_reach(-5e-324)
     assert not within_reach(inf)
@@ -155,7 +158,7 @@ def test_not_a_number_is_a_word_that_nobody_takes() -> None:
     ],
 )
 def test_units_that_will_not_do_are_told_at_once(text: str, unit: str) -> None:
-    with pytest.raises(InvalidValueError) as caught:
+    with refused("x", kind=InvalidValueError) as caught:
         in_si(text, unit, "x")
     assert least_seconds(lambda: in_si(text, unit, "x"), 1.0) < 1.0
     assert len(str(caught.value)) < 300
@@ -167,6 +170,7 @@ def test_angles_are_a_dimension(text: str, value: float) -> None:
     assert in_si("20°", "rad", "x") == pytest.approx(0.3490658503988659, rel=1e-15)
 
 
+@extended
 def test_plain_numbers_do_not_load_pint() -> None:
     code = """
 import sys

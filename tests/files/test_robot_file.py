@@ -8,16 +8,16 @@ import pytest
 import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from syrupy.assertion import SnapshotAssertion
 
-from sagline.cables.cable import Cable
-from sagline.errors import FileError, InvalidValueError, printable
-from sagline.files.robot_file import dump_robot, load_robot, parse_robot
-from sagline.robot.catalogue import robot_names
-from sagline.robot.pose_box import PoseBox
+from sagline import Cable, FileError, InvalidValueError, PoseBox, Robot, Winch, dump_robot, load_robot, robot_names
+from sagline.errors import printable
+from sagline.files.robot_file import parse_robot
 from sagline.robot.provenance import Provenance
-from sagline.robot.robot import Robot
 from sagline.robot.tolerances import UNCERTAIN, value_of
-from sagline.robot.winch import Winch
+from tests.files.wording import wording
+from tests.refusal import refused
+from tests.tiers import wide
 
 TEXT = """
 name: pendulum
@@ -30,6 +30,7 @@ tension_min: 20
 tension_max: [1 kN, 2 kN, .inf]
 assumed: {mass: a guess}
 """
+KEYS_OF_WINCHES = f"keys {', '.join(field.name for field in fields(Winch))}"
 LOG = {"log": "winches.csv", "date": "2026-03-01"}
 
 
@@ -178,7 +179,7 @@ def with_quantity(key: str, value: Any) -> Robot:
     return parse_robot(edited(**{outer: {**BESIDE.get(key, {}), inner: value} if inner else value}), "robot.yaml")
 
 
-@pytest.mark.parametrize("key", QUANTITIES)
+@pytest.mark.parametrize("key", wide(QUANTITIES, first=56))
 def test_every_quantity_is_taken_in_its_unit(key: str) -> None:
     plain, other = (arrays_of(with_quantity(key, value)) for value in QUANTITIES[key])
     for name, value in plain.items():
@@ -255,126 +256,206 @@ def test_ways_to_give_the_inertia(inertia: object, expected: object) -> None:
 
 
 @pytest.mark.parametrize(
-    ("changes", "message"),
+    ("changes", "parts"),
     [
-        ({"frame_anchor": [[0, 0, 0]], "frame_anchors": ...}, "frame_anchor is an unknown key.*mean frame_anchors"),
-        ({"cables": {"linear_densty": 1}}, "cables.linear_densty is an unknown key.*mean linear_density"),
-        ({"mass": ...}, "mass is missing. Add the key mass"),
-        ({"mass": "3 m"}, "mass is '3 m'; allowed: a number in kg, or text with a unit"),
-        ({"mass": "-3 kg"}, "mass is -3 kg; allowed: > 0 kg"),
-        ({"mass": float("nan")}, "mass is nan"),
-        ({"mass": [1, 2]}, "mass is of shape \\(2,\\)"),
-        ({"frame_anchors": [[0, 0, "3 kg"], [4, 0, 3], [0, 4, 3]]}, "frame_anchors\\[0\\]\\[2\\] is '3 kg'"),
-        ({"frame_anchors": [[0, 0, 3], [4, 0, 3]]}, "platform_anchors is 3 points"),
-        ({"frame_anchors": [[0, 0], [4, 0, 3]]}, "frame_anchors"),
-        ({"frame_anchors": [[0, 0, 3]] * 3, "platform_anchors": [[0, 0, 0]] * 3}, "cable 1 is between the same"),
-        ({"cables": 5}, "cables is 5; allowed: keys linear_density"),
-        ({"cables": {"linear_density": 0, "axial_stiffness": 1}}, "linear_density\\[0\\] is 0 kg/m; allowed: > 0"),
-        ({"cables": {"linear_density": -1, "axial_stiffness": 1}}, "linear_density is -1 kg/m"),
-        ({"cables": {"linear_density": 1, "axial_stiffness": 0}}, "axial_stiffness is 0 N; allowed: > 0 N"),
-        ({"cables": {"linear_density": 1, "axial_stiffness": "5 Pa"}}, "cables.axial_stiffness is '5 Pa'"),
-        ({"cables": {"linear_density": 1}}, "cables: stiffness is given by nothing; allowed: axial_stiffness; or"),
-        ({"cables": {"linear_density": 1, "youngs_modulus": 1, "radius": -1}}, "cables.radius is -1 m"),
+        (
+            {"frame_anchor": [[0, 0, 0]], "frame_anchors": ...},
+            ("frame_anchor", "an unknown key", None, "Did you mean frame_anchors?"),
+        ),
+        (
+            {"cables": {"linear_densty": 1}},
+            ("cables.linear_densty", "an unknown key", None, "Did you mean linear_density?"),
+        ),
+        ({"mass": ...}, ("mass", "missing")),
+        (
+            {"mass": "3 m"},
+            ("mass", "'3 m'", 'a number in kg, or text with a unit that converts to it, such as "1.5 kg"'),
+        ),
+        ({"mass": "-3 kg"}, ("mass", "-3 kg", "> 0 kg, finite")),
+        ({"mass": float("nan")}, ("mass", "nan")),
+        ({"mass": [1, 2]}, ("mass", "of shape (2,)")),
+        ({"frame_anchors": [[0, 0, "3 kg"], [4, 0, 3], [0, 4, 3]]}, ("frame_anchors[0][2]", "'3 kg'")),
+        ({"frame_anchors": [[0, 0, 3], [4, 0, 3]]}, ("platform_anchors", "3 points")),
+        ({"frame_anchors": [[0, 0], [4, 0, 3]]}, ("frame_anchors", "[[0.0, 0.0], [4.0, 0.0, 3.0]]")),
+        (
+            {"frame_anchors": [[0, 0, 3]] * 3, "platform_anchors": [[0, 0, 0]] * 3},
+            ("cable 1", "between the same two points as cable 0"),
+        ),
+        (
+            {"cables": 5},
+            (
+                "cables",
+                "5",
+                "keys linear_density, axial_stiffness, youngs_modulus, section_area, radius, diameter, expansion",
+            ),
+        ),
+        ({"cables": {"linear_density": 0, "axial_stiffness": 1}}, ("cables: linear_density[0]", "0 kg/m", "> 0 kg/m")),
+        ({"cables": {"linear_density": -1, "axial_stiffness": 1}}, ("linear_density", "-1 kg/m")),
+        ({"cables": {"linear_density": 1, "axial_stiffness": 0}}, ("axial_stiffness", "0 N", "> 0 N, finite")),
+        ({"cables": {"linear_density": 1, "axial_stiffness": "5 Pa"}}, ("cables.axial_stiffness", "'5 Pa'")),
+        (
+            {"cables": {"linear_density": 1}},
+            (
+                "cables: stiffness",
+                "given by nothing",
+                (
+                    "axial_stiffness; or youngs_modulus and section_area; or youngs_modulus "
+                    "and radius; or youngs_modulus and diameter"
+                ),
+            ),
+        ),
+        ({"cables": {"linear_density": 1, "youngs_modulus": 1, "radius": -1}}, ("cables.radius", "-1 m")),
         (
             {"cables": {"linear_density": 1, "youngs_modulus": 1, "radius": 1, "diameter": 2}},
-            "given by diameter and radius and youngs_modulus",
+            ("cables: stiffness", "given by diameter and radius and youngs_modulus"),
         ),
-        ({"cables": {"linear_density": 1, "axial_stiffness": 1, "diameter": "4 kg"}}, "cables.diameter is '4 kg'"),
-        ({"cables": {"linear_density": 1, "axial_stiffness": 1, "diameter": 0}}, "diameter is 0 m; allowed: > 0 m"),
+        ({"cables": {"linear_density": 1, "axial_stiffness": 1, "diameter": "4 kg"}}, ("cables.diameter", "'4 kg'")),
+        ({"cables": {"linear_density": 1, "axial_stiffness": 1, "diameter": 0}}, ("diameter", "0 m", "> 0 m, finite")),
         (
             {"cables": {"linear_density": [1, 1, 1], "axial_stiffness": 1, "expansion": [0, 0]}},
-            "expansion is not of one shape",
+            ("linear_density and axial_stiffness and expansion", "not of one shape, but (3,) and () and (2,)"),
         ),
-        ({"cables": {"linear_density": 1, "axial_stiffness": 1, "expansion": "1e-5"}, "mass": ...}, "mass is missing"),
+        (
+            {"cables": {"linear_density": 1, "axial_stiffness": 1, "expansion": "1e-5"}, "mass": ...},
+            ("mass", "missing"),
+        ),
         (
             {"winches": {"pulley_radius": "50 mm", "dead_cable": [1, 2]}},
-            "winches: dead_cable is 2 values; allowed: one value, or 3",
+            ("winches: dead_cable", "2 values", "one value, or 3, one a cable"),
         ),
         (
             {"winches": {"pulley_radius": [0.05, 0.05, 0.05], "dead_cable": [1, 2]}},
-            "winches: dead_cable is 2 values; allowed: one value, or 3, as pulley_radius has",
+            ("winches: dead_cable", "2 values", "one value, or 3, as pulley_radius has"),
         ),
-        ({"winches": {"drum_radiu": 1}}, "winches.drum_radiu is an unknown key.*mean drum_radius"),
-        ({"winches": {"pulley_radius": "50 kg"}}, "winches.pulley_radius is '50 kg'; allowed: a number in m"),
-        ({"winches": {"inertia": "3 kg m"}}, "winches.inertia is '3 kg m'"),
-        ({"winches": {"gear": [20, 0, 20]}}, "winches: gear\\[1\\] is 0; allowed: not 0. Give the encoder's turns"),
-        ({"winches": {"counts_per_turn": 0}}, "winches: counts_per_turn is 0; allowed: > 0"),
-        ({"winches": {"layers": [1, 1, 2.5]}}, "winches: layers\\[2\\] is 2.5; allowed: whole numbers"),
-        ({"winches": {"drum_radius": None}}, "winches.drum_radius is None"),
-        ({"winches": {"swivel_axis": "sideways"}}, "swivel_axis is 'sideways'; allowed: up, down, or a vector"),
-        ({"winches": {"swivel_axis": [0, 1, 1]}}, "winches: swivel_axis.*allowed: up or down.*not modeled"),
-        ({"winches": {"swivel_axis": [0, 0, 0]}}, "winches: swivel_axis is the zero vector"),
-        ({"winches": {"swivel_axis": ["up", "down"]}}, "winches: swivel_axis is 2 values"),
-        ({"winches": {"dead_cable": 2, "dead_rise": [1, -3, 1]}}, "winches: dead_rise\\[1\\] is -3 m; allowed: within"),
-        ({"winches": 3}, "winches is 3; allowed: keys pulley_radius"),
-        ({"winches": []}, "winches is \\[\\]; allowed: keys pulley_radius"),
-        ({"inertia": {"box": [1, 1, 1], "Ixx": 1}}, "inertia is given by Ixx and box; allowed: matrix; or"),
-        ({"inertia": {"box": [1, 0, 1]}}, "inertia.box\\[1\\] is 0 m"),
-        ({"inertia": ...}, "inertia is missing"),
-        ({"tension_min": "2 kN"}, "tension_min\\[0\\] is 2000 N; allowed: <= tension_max\\[0\\], 1000 N"),
-        ({"motion_pattern": 3}, 'motion_pattern is 3; allowed: text. Put it in quotes: motion_pattern: "..."'),
-        ({"name": ""}, "name is empty; allowed: a text to call it by"),
-        ({"name": 12}, 'name is 12; allowed: text. Put it in quotes: name: "..."'),
-        ({"assumed": {"masss": "x"}}, "assumed: field is 'masss'"),
-        ({"test_box": {"low": [0, 0, 0], "high": [1, 1, "1 kg"]}}, "test_box.high\\[2\\] is '1 kg'"),
-        ({"tolerances": {"masss": 1}}, "tolerances.masss is an unknown key.*mean mass"),
-        ({"tolerances": 3}, "tolerances is 3; allowed: keys frame_anchors"),
-        ({"tolerances": {"mass": 0}}, "tolerances: mass is 0 kg; allowed: > 0 kg"),
-        ({"tolerances": {"mass": "-1 %"}}, "tolerances: mass is -0.005 kg; allowed: > 0 kg"),
-        ({"tolerances": {"mass": "1 m"}}, "tolerances.mass is '1 m'; allowed: a number in kg"),
-        ({"tolerances": {"mass": "x %"}}, "tolerances.mass is 'x %'; allowed: a share"),
-        ({"tolerances": {"frame_anchors": "1 %"}}, "tolerances.frame_anchors is '1 %'; allowed: a number in m"),
-        ({"tolerances": {"drum_radius": "1 %"}}, "tolerances: drum_radius is in percent; allowed: a field that is"),
+        ({"winches": {"drum_radiu": 1}}, ("winches.drum_radiu", "an unknown key", None, "Did you mean drum_radius?")),
+        (
+            {"winches": {"pulley_radius": "50 kg"}},
+            (
+                "winches.pulley_radius",
+                "'50 kg'",
+                'a number in m, or text with a unit that converts to it, such as "1.5 m"',
+            ),
+        ),
+        ({"winches": {"inertia": "3 kg m"}}, ("winches.inertia", "'3 kg m'")),
+        (
+            {"winches": {"gear": [20, 0, 20]}},
+            (
+                "winches: gear[1]",
+                "0",
+                "not 0",
+                "Give the encoder's turns for one of the drum; negative where counts fall as cable is let out.",
+            ),
+        ),
+        ({"winches": {"counts_per_turn": 0}}, ("winches: counts_per_turn", "0", "> 0, finite")),
+        ({"winches": {"layers": [1, 1, 2.5]}}, ("winches: layers[2]", "2.5", "whole numbers")),
+        ({"winches": {"drum_radius": None}}, ("winches.drum_radius", "None")),
+        (
+            {"winches": {"swivel_axis": "sideways"}},
+            ("winches.swivel_axis", "'sideways'", "up, down, or a vector of three numbers"),
+        ),
+        ({"winches": {"swivel_axis": [0, 1, 1]}}, ("winches: swivel_axis", "(0, 0.707, 0.707)", "up or down")),
+        ({"winches": {"swivel_axis": [0, 0, 0]}}, ("winches: swivel_axis", "the zero vector")),
+        ({"winches": {"swivel_axis": ["up", "down"]}}, ("winches: swivel_axis", "2 values")),
+        (
+            {"winches": {"dead_cable": 2, "dead_rise": [1, -3, 1]}},
+            ("winches: dead_rise[1]", "-3 m", "within +-2 m, its dead_cable"),
+        ),
+        ({"winches": 3}, ("winches", "3", KEYS_OF_WINCHES)),
+        ({"winches": []}, ("winches", "[]", KEYS_OF_WINCHES)),
+        (
+            {"inertia": {"box": [1, 1, 1], "Ixx": 1}},
+            (
+                "inertia",
+                "given by Ixx and box",
+                "matrix; or diagonal; or Ixx and Iyy and Izz; or box; or cylinder_radius and cylinder_height",
+            ),
+        ),
+        ({"inertia": {"box": [1, 0, 1]}}, ("inertia.box[1]", "0 m")),
+        ({"inertia": ...}, ("inertia", "missing")),
+        ({"tension_min": "2 kN"}, ("tension_min[0]", "2000 N", "<= tension_max[0], 1000 N")),
+        ({"motion_pattern": 3}, ("motion_pattern", "3", "text", 'Put it in quotes: motion_pattern: "..."')),
+        ({"name": ""}, ("name", "empty", "a text to call it by")),
+        ({"name": 12}, ("name", "12", "text", 'Put it in quotes: name: "..."')),
+        ({"assumed": {"masss": "x"}}, ("assumed: field", "'masss'")),
+        ({"test_box": {"low": [0, 0, 0], "high": [1, 1, "1 kg"]}}, ("test_box.high[2]", "'1 kg'")),
+        ({"tolerances": {"masss": 1}}, ("tolerances.masss", "an unknown key", None, "Did you mean mass?")),
+        ({"tolerances": 3}, ("tolerances", "3", f"keys {', '.join(UNCERTAIN)}")),
+        ({"tolerances": {"mass": 0}}, ("tolerances: mass", "0 kg", "> 0 kg")),
+        ({"tolerances": {"mass": "-1 %"}}, ("tolerances: mass", "-0.005 kg", "> 0 kg")),
+        (
+            {"tolerances": {"mass": "1 m"}},
+            ("tolerances.mass", "'1 m'", 'a number in kg, or text with a unit that converts to it, such as "1.5 kg"'),
+        ),
+        ({"tolerances": {"mass": "x %"}}, ("tolerances.mass", "'x %'", 'a share, such as "5 %"')),
+        (
+            {"tolerances": {"frame_anchors": "1 %"}},
+            (
+                "tolerances.frame_anchors",
+                "'1 %'",
+                'a number in m, or text with a unit that converts to it, such as "1.5 m"',
+            ),
+        ),
+        ({"tolerances": {"drum_radius": "1 %"}}, ("tolerances: drum_radius", "in percent", "a field that is given")),
         (
             {"tolerances": {"axial_stiffness": ["1 %", 5e3, "1 %"]}},
-            "axial_stiffness\\[1\\] is 5000.0; allowed: a share",
+            ("tolerances.axial_stiffness[1]", "5000.0", 'a share, such as "5 %"'),
         ),
-        ({"tolerances": {"axial_stiffness": ["1 %", "2 %"]}}, "axial_stiffness is of shape \\(2,\\)"),
-        ({"tolerances": {"frame_anchors": [[1, 1, 1]] * 2}}, "frame_anchors is of shape \\(2, 3\\); allowed: shape"),
-        ({"calibration": {"date": "2026-01-01"}}, "calibration.log is missing"),
-        ({"calibration": {"log": "a.csv", "date": "soon"}}, "calibration: date is 'soon'; allowed: a date in ISO"),
-        ({"calibration": {**LOG, "standard_error": {"target": 1}}}, "calibration.standard_error.target is an unknown"),
-        ({"calibration": {**LOG, "standard_error": {"mass": -1}}}, "calibration: standard_error: mass is -1 kg"),
+        ({"tolerances": {"axial_stiffness": ["1 %", "2 %"]}}, ("tolerances: axial_stiffness", "of shape (2,)")),
+        (
+            {"tolerances": {"frame_anchors": [[1, 1, 1]] * 2}},
+            ("tolerances: frame_anchors", "of shape (2, 3)", "shape () or (3,) or (3, 3)"),
+        ),
+        ({"calibration": {"date": "2026-01-01"}}, ("calibration.log", "missing")),
+        ({"calibration": {"log": "a.csv", "date": "soon"}}, ("calibration: date", "'soon'", "a date in ISO 8601")),
+        (
+            {"calibration": {**LOG, "standard_error": {"target": 1}}},
+            ("calibration.standard_error.target", "an unknown key"),
+        ),
+        ({"calibration": {**LOG, "standard_error": {"mass": -1}}}, ("calibration: standard_error: mass", "-1 kg")),
         (
             {"calibration": {**LOG, "standard_error": {"length_zero": [0.1] * 4}}},
-            "standard_error: length_zero is of shape \\(4,\\); allowed: shape \\(\\) or \\(3,\\)",
+            ("calibration: standard_error: length_zero", "of shape (4,)", "shape () or (3,)"),
         ),
     ],
 )
-def test_a_wrong_value_is_named_with_its_file(changes: dict[str, Any], message: str) -> None:
-    with pytest.raises(FileError, match=f"^robot.yaml: .*{message}"):
+def test_a_wrong_value_is_named_with_its_file(changes: dict[str, Any], parts: tuple[str, ...]) -> None:
+    with refused(*parts, kind=FileError, file="robot.yaml"):
         parse_robot(edited(**changes), "robot.yaml")
 
 
 @pytest.mark.parametrize(
-    ("content", "message"),
+    "content",
     [
-        (b"", "is empty"),
-        (b"name: x\nframe_anchors: [[0, 0, 3], [0,", "is not complete YAML \\(line 2"),
-        (b"name: a\nname: b\n", "line 2: key name is given twice"),
-        (b"- 1\n- 2\n", "has no keys at its top level"),
-        (b"\x89HDF\r\n\x1a\n\xff\xfe", "is not UTF-8 text"),
-        (b"name: a\0b\n", "holds zero bytes"),
-        (b"name: \x01\n", "is not YAML"),
-        (b"[" * 1000, "is not YAML"),
-        (b"name: 2020-99-99\n", "frame_anchors is missing"),  # a word, no date
-        (TEXT[: TEXT.index("mass: 500")].encode(), "mass is missing"),
+        b"",
+        b"name: x\nframe_anchors: [[0, 0, 3], [0,",
+        b"name: a\nname: b\n",
+        b"- 1\n- 2\n",
+        b"\x89HDF\r\n\x1a\n\xff\xfe",
+        b"name: a\0b\n",
+        b"name: \x01\n",
+        b"[" * 1000,
+        b"name: 2020-99-99\n",  # a word, no date
+        TEXT[: TEXT.index("mass: 500")].encode(),
     ],
+    ids=range(10),
 )
-def test_a_broken_file_gets_one_clear_message(tmp_path: Path, content: bytes, message: str) -> None:
+def test_a_broken_file_gets_one_clear_message(tmp_path: Path, content: bytes, snapshot: SnapshotAssertion) -> None:
     path = tmp_path / "robot.yaml"
     path.write_bytes(content)
-    with pytest.raises(FileError, match=f"^{re.escape(str(path))}: .*{message}"):
+    with refused(kind=FileError, file=path) as caught:
         load_robot(path)
+    assert wording(caught.value, tmp_path) == snapshot
 
 
-def test_what_is_no_file(tmp_path: Path) -> None:
-    with pytest.raises(FileError, match=r"missing\.yaml: cannot be read \(No such file"):
+def test_what_is_no_file(tmp_path: Path, snapshot: SnapshotAssertion) -> None:
+    with refused(kind=FileError, file=tmp_path / "missing.yaml") as missing:
         load_robot(tmp_path / "missing.yaml")
-    with pytest.raises(FileError, match=r"is a folder\. Give the name"):
+    with refused(kind=FileError, file=tmp_path) as folder:
         load_robot(tmp_path)
-    with pytest.raises(InvalidValueError, match="Did you mean article-mixed"):
+    assert [missing.value.reason, folder.value.reason] == snapshot
+    with refused("robot", "'article-mixd'", kind=InvalidValueError) as preset:
         load_robot("article-mixd")
+    assert "article-mixed?" in preset.value.next_step
 
 
 def test_a_file_in_the_current_folder_goes_by_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -384,7 +465,7 @@ def test_a_file_in_the_current_folder_goes_by_its_name(tmp_path: Path, monkeypat
     assert load_robot("./pendulum").mass == 0.5
 
 
-@pytest.mark.parametrize("name", robot_names())
+@pytest.mark.parametrize("name", wide(robot_names(), first=4))
 def test_presets_survive_the_dump_bit_for_bit(name: str) -> None:
     robot = load_robot(name)
     assert_same(parse_robot(dump_robot(robot), "dump"), robot)
@@ -404,39 +485,46 @@ def test_a_file_may_begin_with_a_preset() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
+    ("text", "parts"),
     [
-        ("base: cogiro", "name is missing. Add the key name"),
-        ("base: cogero\nname: x", "base is 'cogero'; allowed: article-mixed.*Did you mean cogiro"),
-        ("base: [cogiro]\nname: x", r"base is \['cogiro'\]; allowed: article-mixed.*Name one of them"),
-        ("base:\nname: x", "base is None; allowed"),
-        ("base: 3\nname: x", "base is 3; allowed"),
-        ("base: ../cogiro\nname: x", "base is '../cogiro'; allowed"),
-        ("base: cogiro\nname: x\nmas: 3", "mas is an unknown key.*mean mass"),
-        ("base: cogiro\nname: x\nassumed: 3", "assumed is 3"),
-        ("base: cogiro\nname: x\nframe_anchors: [[0, 0, 3]]", "platform_anchors is 8 points"),
+        ("base: cogiro", ("name", "missing")),
+        ("base: cogero\nname: x", ("base", "'cogero'", ", ".join(robot_names()), "Did you mean cogiro?")),
+        (
+            "base: [cogiro]\nname: x",
+            ("base", "['cogiro']", ", ".join(robot_names()), "Name one of them, or leave base out."),
+        ),
+        ("base:\nname: x", ("base", "None")),
+        ("base: 3\nname: x", ("base", "3")),
+        ("base: ../cogiro\nname: x", ("base", "'../cogiro'")),
+        ("base: cogiro\nname: x\nmas: 3", ("mas", "an unknown key", None, "Did you mean mass?")),
+        ("base: cogiro\nname: x\nassumed: 3", ("assumed", "3")),
+        ("base: cogiro\nname: x\nframe_anchors: [[0, 0, 3]]", ("platform_anchors", "8 points")),
     ],
 )
-def test_a_base_that_will_not_do(text: str, message: str) -> None:
-    with pytest.raises(FileError, match=f"^robot.yaml: {message}"):
+def test_a_base_that_will_not_do(text: str, parts: tuple[str, ...]) -> None:
+    with refused(*parts, kind=FileError, file="robot.yaml"):
         parse_robot(text, "robot.yaml")
 
 
 WINCH_KEYS = [key.partition(".")[2] for key in QUANTITIES if key.startswith("winches.")]
 
 
-@pytest.mark.parametrize("key", WINCH_KEYS)
+@pytest.mark.parametrize("key", wide(WINCH_KEYS, first=3))
 def test_a_row_too_few_or_a_wrong_unit_of_any_key_of_a_winch_is_named(key: str) -> None:
     good, _ = QUANTITIES[f"winches.{key}"]
     vector = key == "swivel_axis"
     row = good[0] if vector else np.ravel(good)[0].item()
     for count in (2, 4, 0):
-        with pytest.raises(FileError, match=rf"winches(: {key})? is ({count} values|of shape)"):
+        with refused(kind=FileError) as caught:
             parse_robot(edited(winches={"dead_cable": 30, key: [row] * count}), "robot.yaml")
+        assert caught.value.item in ("winches", f"winches: {key}")
+        assert re.match(f"{count} values|of shape", caught.value.value)
     wrong: Any
     for wrong in ("5 parsec^2", "fast", True, None, {}, [None] * 3, float("nan")):
-        with pytest.raises(FileError, match=rf"winches.{key}(\[0\])? is .*; allowed: "):
+        with refused(kind=FileError) as caught:
             parse_robot(edited(winches={key: wrong}), "robot.yaml")
+        assert caught.value.item in (f"winches.{key}", f"winches.{key}[0]")
+        assert caught.value.allowed
 
 
 def test_the_blocks_have_every_number_that_may_be_off() -> None:

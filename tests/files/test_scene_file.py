@@ -2,9 +2,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import trimesh
 
 import sagline as sl
+from tests.refusal import refused
 
 HEAD = "base: cogiro\nname: mine\n"
 SCENE = """scene:
@@ -16,8 +16,11 @@ SCENE = """scene:
 
 
 def robot_file(folder: Path, scene: str) -> Path:
-    (folder / "meshes").mkdir(exist_ok=True)
-    trimesh.creation.box((1000.0, 2000.0, 3000.0)).export(folder / "meshes" / "hall.stl")
+    if "hall.stl" in scene:
+        import trimesh
+
+        (folder / "meshes").mkdir(exist_ok=True)
+        trimesh.creation.box((1000.0, 2000.0, 3000.0)).export(folder / "meshes" / "hall.stl")
     file = folder / "mine.yaml"
     file.write_text(HEAD + scene, encoding="utf-8")
     return file
@@ -48,36 +51,37 @@ def test_a_robot_loads_with_its_scene_and_does_not_keep_it(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize(
-    ("scene", "words"),
+    ("scene", "parts"),
     [
-        ("3", "scene is 3; allowed: a valid list"),
-        ("[3]", "scene[0] is 3; allowed: keys name, box"),
-        ("[{name: a}]", "scene[0] is none of them; allowed: one of box, capsule, sphere, mesh"),
-        ("[{name: a, box: [1, 2, 3], sphere: [1, 2, 3]}]", "scene[0] is box and sphere"),
-        ("[{box: [1, 2, 3]}]", "scene[0].name is missing"),
-        ("[{name: '', box: [1, 2, 3]}]", "scene[0].name is empty"),
-        ("[{name: a, bx: [1, 2, 3]}]", "Did you mean box?"),
-        ("[{name: a, box: [1, 2]}]", "scene[0].box is of shape (2,)"),
-        ("[{name: a, box: [1, 2, 3 kg]}]", "scene[0].box[2] is '3 kg'"),
-        ("[{name: a, sphere: [1, 2, 3]}]", "scene[0].radius is missing"),
-        ("[{name: a, sphere: [1, 2, 3], radius: -1}]", "scene[0].radius is -1 m"),
-        ("[{name: a, sphere: [1, 2, 3], radius: 1, unit: mm}]", "scene[0].unit is given for a sphere"),
-        ("[{name: a, box: [1, 2, 3], turned: 1 m}]", "scene[0].turned is '1 m'"),
-        ("[{name: a, mesh: a.stl, unit: kg}]", "scene[0].unit is 'kg'"),
-        ("[{name: a, mesh: 3}]", "scene[0].mesh is 3"),
+        ("3", ("scene", "3", "a valid list")),
+        ("[3]", ("scene[0]", "3", "keys name, box, center, capsule, sphere, radius, mesh, unit, position, turned")),
+        ("[{name: a}]", ("scene[0]", "none of them", "one of box, capsule, sphere, mesh")),
+        ("[{name: a, box: [1, 2, 3], sphere: [1, 2, 3]}]", ("scene[0]", "box and sphere")),
+        ("[{box: [1, 2, 3]}]", ("scene[0].name", "missing")),
+        ("[{name: '', box: [1, 2, 3]}]", ("scene[0].name", "empty")),
+        ("[{name: a, bx: [1, 2, 3]}]", ("scene[0].bx", "an unknown key", None, "Did you mean box?")),
+        ("[{name: a, box: [1, 2]}]", ("scene[0].box", "of shape (2,)")),
+        ("[{name: a, box: [1, 2, 3 kg]}]", ("scene[0].box[2]", "'3 kg'")),
+        ("[{name: a, sphere: [1, 2, 3]}]", ("scene[0].radius", "missing")),
+        ("[{name: a, sphere: [1, 2, 3], radius: -1}]", ("scene[0].radius", "-1 m")),
+        ("[{name: a, sphere: [1, 2, 3], radius: 1, unit: mm}]", ("scene[0].unit", "given for a sphere")),
+        ("[{name: a, box: [1, 2, 3], turned: 1 m}]", ("scene[0].turned", "'1 m'")),
+        ("[{name: a, mesh: a.stl, unit: kg}]", ("scene[0].unit", "'kg'")),
+        ("[{name: a, mesh: 3}]", ("scene[0].mesh", "3")),
     ],
 )
-def test_a_scene_that_is_wrong_is_refused_with_the_robot_and_by_itself(tmp_path: Path, scene: str, words: str) -> None:
+def test_a_scene_that_is_wrong_is_refused_with_the_robot_and_by_itself(
+    tmp_path: Path, scene: str, parts: tuple[str, ...]
+) -> None:
     file = robot_file(tmp_path, f"scene: {scene}\n")
     for load in (sl.load_robot, sl.load_scene):
-        with pytest.raises(sl.FileError) as error:
+        with refused(*parts, kind=sl.FileError, file=file) as error:
             load(file)
-        assert words in str(error.value)
         assert len(str(error.value)) < 300
 
 
 def test_a_mesh_that_is_not_there_is_missed_by_the_scene_alone(tmp_path: Path) -> None:
     file = robot_file(tmp_path, "scene: [{name: a, mesh: missing.stl}]\n")
     assert sl.load_robot(file).cable_count == 8
-    with pytest.raises(sl.FileError, match=r"missing\.stl: cannot be read"):
+    with refused(kind=sl.FileError, file=tmp_path / "missing.stl"):
         sl.load_scene(file)

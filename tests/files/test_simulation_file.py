@@ -1,19 +1,28 @@
+import itertools
 import re
 import shutil
+from collections.abc import Callable
 from dataclasses import fields, replace
+from functools import cache
 from pathlib import Path as FilePath
 from typing import Any, cast
 
 import numpy as np
 import pytest
 import xarray as xr
+from syrupy.assertion import SnapshotAssertion
 
 import sagline as sl
-from sagline.dynamics.simulation import EnergyBalance, Occurrence
-from sagline.files.seal import seal
+from sagline import EnergyBalance, Occurrence
+from sagline.files import simulation_file
+from sagline.files.robot_file import parse_robot
+from sagline.files.seal import Seal, seal
 from sagline.files.simulation_layout import EVENTS, LARGEST, NODES, SAMPLES, TIME
 from tests.files.plans import a_plan
-from tests.files.simulations import ROBOT, a_simulation, assert_same
+from tests.files.simulations import HAPPENED, ROBOT, a_simulation, assert_same
+from tests.files.wording import wording
+from tests.refusal import refused
+from tests.tiers import extended, wide
 
 SEAL = len("\nsagline sha256 \n") + 64  # bytes at the end
 
@@ -39,9 +48,10 @@ def saved(tmp_path: FilePath, whole: FilePath) -> FilePath:
     return FilePath(shutil.copy(whole, tmp_path))
 
 
-@pytest.mark.parametrize("nodes", [True, False])
-@pytest.mark.parametrize("events", [a_simulation().events, ()], ids=["events", "uneventful"])
-@pytest.mark.parametrize("robot", ["article-suspended", "falcon-7"])
+@pytest.mark.parametrize(
+    ("nodes", "events", "robot"),
+    wide(itertools.product((True, False), (HAPPENED, ()), ("article-suspended", "falcon-7"))),
+)
 def test_a_simulation_comes_back_to_the_last_bit(
     tmp_path: FilePath, nodes: bool, events: tuple[Occurrence, ...], robot: str
 ) -> None:
@@ -50,7 +60,7 @@ def test_a_simulation_comes_back_to_the_last_bit(
     assert_same(simulation, sl.load_simulation(str(tmp_path / "sim.nc")))
 
 
-@pytest.mark.parametrize("cable_mass", ["none", "lumped"])
+@pytest.mark.parametrize("cable_mass", wide(["none", "lumped"]))
 def test_a_broken_cable_and_a_dropped_load_come_back(tmp_path: FilePath, cable_mass: Any) -> None:
     state = sl.inverse(ROBOT, sl.Pose((0.0, 0.0, 1.5), np.eye(3))).state
     events = (sl.Break(cable=3, time=0.02), sl.Drop(mass=5.0, time=0.04))
@@ -88,29 +98,42 @@ def test_what_a_reader_finds(saved: FilePath) -> None:
         told = {"integrator": "splitting", "winches": "second-order", "bandwidth": 10.0, "bandwidth_units": "Hz"}
         losses = {"damping_ratio": 0.7, "loss_time": 1e-3, "air_damping": 0.2, "air_damping_units": "N s/m^2"}
         assert told.items() | losses.items() <= {**data.attrs, "robot": ""}.items()
-        assert "name: article-suspended" in data.attrs["robot"]
+        assert parse_robot(data.attrs["robot"], "robot").name == "article-suspended"
         assert data.attrs["source"] == f"sagline {sl.__version__}"
 
 
-def test_plans_and_simulations_are_told_apart(tmp_path: FilePath, saved: FilePath) -> None:
+def test_plans_and_simulations_are_told_apart(tmp_path: FilePath, saved: FilePath, snapshot: SnapshotAssertion) -> None:
     a_plan().save(tmp_path / "run.nc")
-    with pytest.raises(sl.FileError, match=r"run\.nc: is a plan of sagline, no simulation. Read it with load_plan"):
-        sl.load_simulation(tmp_path / "run.nc")
-    with pytest.raises(sl.FileError, match=r"sim\.nc: is a simulation of sagline, no plan. Read it with load_sim"):
-        sl.load_plan(saved)
     (tmp_path / "sim.yaml").write_text("a: 1")
-    with pytest.raises(sl.FileError, match=r"is a YAML file, no simulation of sagline. Give the .nc file that a sim"):
-        sl.load_simulation(tmp_path / "sim.yaml")
+    for load, file in ((sl.load_simulation, "run.nc"), (sl.load_plan, saved.name), (sl.load_simulation, "sim.yaml")):
+        with refused(kind=sl.FileError, file=tmp_path / file) as caught:
+            load(tmp_path / file)
+        assert wording(caught.value, tmp_path) == snapshot
 
 
-def test_what_another_program_has_changed_is_told(saved: FilePath) -> None:
+def test_what_another_program_has_changed_is_told(saved: FilePath, snapshot: SnapshotAssertion) -> None:
     content = saved.read_bytes()
-    saved.write_bytes(content[:-SEAL])
-    with pytest.raises(sl.FileError, match=r"its digest is missing. Save the simulation again"):
-        sl.load_simulation(saved)
-    saved.write_bytes(content[: len(content) // 2] + b"\1" + content[len(content) // 2 :])
-    with pytest.raises(sl.FileError, match=r"it was damaged or edited. Save the simulation again"):
-        sl.load_simulation(saved)
+    damaged = content[: len(content) // 2] + b"\1" + content[len(content) // 2 :]
+    for data in (content[:-SEAL], damaged):
+        saved.write_bytes(data)
+        with refused(kind=sl.FileError, file=saved) as caught:
+            sl.load_simulation(saved)
+        assert wording(caught.value, saved.parent) == snapshot
+
+
+Reader = Callable[[xr.Dataset], sl.Simulation]
+
+
+@pytest.fixture
+def read(monkeypatch: pytest.MonkeyPatch) -> Reader:
+    """Read a data set as from a file that somebody edited and sealed anew."""
+    monkeypatch.setattr(simulation_file, "parse_robot", cache(parse_robot))
+
+    def load(data: xr.Dataset) -> sl.Simulation:
+        monkeypatch.setattr(simulation_file, "read_dataset", lambda *_: (data, Seal.WHOLE))
+        return sl.load_simulation("sim.nc")
+
+    return load
 
 
 def edited(data: xr.Dataset, name: str, index: Any, value: Any) -> xr.Dataset:
@@ -120,82 +143,114 @@ def edited(data: xr.Dataset, name: str, index: Any, value: Any) -> xr.Dataset:
 
 
 @pytest.mark.parametrize(
-    ("name", "index", "value", "told"),
+    ("name", "index", "value", "parts"),
     [
-        ("tensions", (2, 1), -1.0, r"tensions\[2, 1\] is -1; allowed: >= 0 N, finite"),
-        ("length", (2, 1), -1.0, r"length\[2, 1\] is -1; allowed: >= 0 m"),
-        ("energy_error", 3, np.inf, r"energy_error\[3\] is inf; allowed: finite"),
-        ("twist", (0, 0), np.nan, r"twist\[0, 0\] is nan"),
-        ("quaternion", (2, 0), 7.0, "quaternion"),
-        ("time", 4, 0.5, r"time\[4\] is 0.5 s; allowed: > 1 s"),
-        ("time", 4, 1.0, r"time\[4\] is 1 s; allowed: > 1 s"),
-        ("energy_error", slice(3, 5), 5.0, r"energy_error\[3\] is 5 J; allowed: .* J, what the other energies leave"),
-        ("energy_lost", 3, 0.5, r"energy_error\[3\] is .* J; allowed: .* J, what the other energies leave"),
-        ("length", (2, 1), np.nan, r"length\[2, 1\] is nan; allowed: a number: its cable has not broken"),
-        ("length", (2, 3), 1.0, r"length\[2, 3\] is 1; allowed: nan: its cable has broken"),
-        ("node_position", (2, 1, 4, 2), np.nan, r"node_position\[2, 1, 4, 2\] is nan; allowed: a number"),
-        ("node_position", (2, 3, 4, 2), 0.5, r"node_position\[2, 3, 4, 2\] is 0.5; allowed: nan"),
-        ("event_kind", 0, "gremlin", r"event_kind\[0\] is 'gremlin'; allowed: break, stall,"),
-        ("event_kind", 0, "drop", r"event_cable\[0\] is 3; allowed: -1 for 'drop'"),
-        ("event_cable", 0, -1, r"event_cable\[0\] is -1; allowed: 0 to 7 for 'break'"),
-        ("event_cable", 2, 3, r"event_cable\[2\] is 3 at 0.5 s; allowed: a cable that is there: 3 broke at 0.1 s"),
-        ("event_cable", 0, 4, r"length\[1, 3\] is nan; allowed: a number"),
-        ("event_time", 0, 0.5, r"event_time\[1\] is 0.3.* s; allowed: 0.5 to 2 s, in order"),
-        ("event_time", 2, 99.0, r"event_time\[2\] is 99 s; allowed: 0.3.* to 2 s, in order"),
-        ("event_tension_after", 0, -1.0, r"event_tension_after\[0\] is -1; allowed: >= 0 N"),
-        ("node_position", (0, 0, 0, 0), np.inf, r"node_position\[0, 0, 0, 0\] is inf; allowed: finite"),
-        ("event_cable", 1, 8, r"event_cable\[1\] is 8; allowed: -1 for 'pick up'"),
-        ("event_cable", 0, -2, r"event_cable\[0\] is -2; allowed: 0 to 7 for 'break'"),
-        ("event_time", 0, np.nan, r"event_time\[0\] is nan; allowed: finite"),
-        ("event_kind", 0, "", r"event_kind\[0\] is .*''.*; allowed: a word that prints"),
-        ("event_kind", 0, "\x1b[31m", r"event_kind\[0\] is .*; allowed: a word that prints"),
-        ("axis", 0, "q", "axis is .*; allowed: x, y, z"),
+        ("tensions", (2, 1), -1.0, ("tensions[2, 1]", "-1", ">= 0 N, finite, at every pose")),
+        ("length", (2, 1), -1.0, ("length[2, 1]", "-1", ">= 0 m, finite, at any poses")),
+        ("energy_error", 3, np.inf, ("energy_error[3]", "inf", "finite, at every pose")),
+        ("twist", (0, 0), np.nan, ("twist[0, 0]", "nan")),
+        ("quaternion", (2, 0), 7.0, ("quaternion 2: length", "7.06767118786")),
+        ("time", 4, 0.5, ("time[4]", "0.5 s", "> 1 s")),
+        ("time", 4, 1.0, ("time[4]", "1 s", "> 1 s")),
+        ("energy_error", slice(3, 5), 5.0, ("energy_error[3]", "5 J", "-1.05394 J, what the other energies leave")),
+        ("energy_lost", 3, 0.5, ("energy_error[3]", "-1.05394 J", "-0.895963 J, what the other energies leave")),
+        ("length", (2, 1), np.nan, ("length[2, 1]", "nan", "a number: its cable has not broken")),
+        ("length", (2, 3), 1.0, ("length[2, 3]", "1", "nan: its cable has broken")),
+        (
+            "node_position",
+            (2, 1, 4, 2),
+            np.nan,
+            ("node_position[2, 1, 4, 2]", "nan", "a number: its cable has not broken"),
+        ),
+        ("node_position", (2, 3, 4, 2), 0.5, ("node_position[2, 3, 4, 2]", "0.5", "nan: its cable has broken")),
+        (
+            "event_kind",
+            0,
+            "gremlin",
+            ("event_kind[0]", "'gremlin'", "break, stall, saturate, slack, drop, pick up, brake"),
+        ),
+        ("event_kind", 0, "drop", ("event_cable[0]", "3", "-1 for 'drop'")),
+        ("event_cable", 0, -1, ("event_cable[0]", "-1", "0 to 7 for 'break'")),
+        ("event_cable", 2, 3, ("event_cable[2]", "3 at 0.5 s", "a cable that is there: 3 broke at 0.1 s")),
+        ("event_cable", 0, 4, ("length[1, 3]", "nan", "a number: its cable has not broken")),
+        ("event_time", 0, 0.5, ("event_time[1]", "0.333333 s", "0.5 to 2 s, in order")),
+        ("event_time", 2, 99.0, ("event_time[2]", "99 s", "0.333333 to 2 s, in order")),
+        ("event_tension_after", 0, -1.0, ("event_tension_after[0]", "-1", ">= 0 N, finite, at any poses")),
+        ("node_position", (0, 0, 0, 0), np.inf, ("node_position[0, 0, 0, 0]", "inf", "finite, at any poses")),
+        ("event_cable", 1, 8, ("event_cable[1]", "8", "-1 for 'pick up'")),
+        ("event_cable", 0, -2, ("event_cable[0]", "-2", "0 to 7 for 'break'")),
+        ("event_time", 0, np.nan, ("event_time[0]", "nan", "finite, at every pose")),
+        ("event_kind", 0, "", ("event_kind[0]", None, "a word that prints")),
+        ("event_kind", 0, "\x1b[31m", ("event_kind[0]", None, "a word that prints")),
+        ("axis", 0, "q", ("axis", None, "x, y, z")),
     ],
 )
 def test_values_that_no_simulation_has(
-    tmp_path: FilePath, data: xr.Dataset, name: str, index: Any, value: Any, told: str
+    read: Reader, data: xr.Dataset, name: str, index: Any, value: Any, parts: tuple[str, ...]
 ) -> None:
-    assert_refused(tmp_path / "sim.nc", edited(data, name, index, value), told)
+    assert_refused(read, edited(data, name, index, value), parts)
 
 
 @pytest.mark.parametrize(
-    ("edit", "told"),
+    ("edit", "parts"),
     [
-        (lambda data: data.drop_vars("twist"), "has no twist. Write it again"),
-        (lambda data: data.drop_vars("event_kind"), "has no event_kind. Write it again"),
-        (lambda data: data.assign_attrs(cable_mass="heavy"), "cable_mass is 'heavy'; allowed: none, lumped, modal"),
-        (lambda data: data.assign_attrs(cable_mass="none"), "node_position is given; allowed: given for cables with m"),
-        (lambda data: data.drop_vars("node_position"), "node_position is not given; allowed: given for cables with m"),
+        (
+            lambda data: data.drop_vars("twist"),
+            ("twist", "has no twist", None, "Write it again; it is incomplete or was edited."),
+        ),
+        (
+            lambda data: data.drop_vars("event_kind"),
+            ("event_kind", "has no event_kind", None, "Write it again; it is incomplete or was edited."),
+        ),
+        (lambda data: data.assign_attrs(cable_mass="heavy"), ("cable_mass", "'heavy'", "none, lumped, modal")),
+        (
+            lambda data: data.assign_attrs(cable_mass="none"),
+            ("node_position", "given", "given for cables with mass, and for no others"),
+        ),
+        (
+            lambda data: data.drop_vars("node_position"),
+            ("node_position", "not given", "given for cables with mass, and for no others"),
+        ),
         (
             lambda data: data.assign_attrs(integrator="euler"),
-            "integrator is 'euler'; allowed: splitting, runge-kutta, ",
+            ("integrator", "'euler'", "splitting, runge-kutta, exact"),
         ),
-        (lambda data: data.assign_attrs(integrator="exact"), "integrator is exact for cable_mass lumped"),
-        (lambda data: data.assign_attrs(winches="magic"), "winches is 'magic'; allowed: ideal, robot, second-order"),
-        (lambda data: data.assign_attrs(winding="none"), "winding is 'none'; allowed: constant, remembered"),
-        (lambda data: data.assign_attrs(bandwidth=0.0), "bandwidth is 0 Hz; allowed: > 0"),
-        (lambda data: data.assign_attrs(modal_damping=1.0), "modal_damping is 1; allowed: < 1"),
-        (lambda data: data.assign_attrs(loss_time="x"), "loss_time is 'x'"),
-        (lambda data: data.isel(time=[0]), "time is of 1 samples; allowed: at least the start and the end"),
-        (lambda data: data.assign_attrs(step=0.0), "step is 0 s; allowed: > 0"),
-        (lambda data: data.assign_attrs(step="x"), "step is"),
-        (lambda data: data.assign_attrs(robot="name: x"), "sim.nc, robot: .* is missing"),
-        (lambda data: data.assign_attrs(sagline_simulation_format=2), "is of format 2, .* reads up to 1. Install a"),
-        (lambda data: data.assign_attrs(sagline_simulation_format="x"), "is of format 'x', which never was"),
-        (lambda data: data.isel(cable=slice(7)), "has 7 cables, its robot 8"),
-        (lambda data: data.isel(axis=slice(2)), "axis is .*; allowed: x, y, z"),
-        (lambda data: data.assign(length=data["length"].astype("f4")), "length: type is float32; allowed: float64"),
-        (lambda data: data.assign(length=data["length"].assign_attrs(units="mm")), "length: units is 'mm'"),
-        (lambda data: data.assign(length=data["length"].T), "length: shape is 8 cable × 7 time; allowed: 7 time × 8"),
+        (lambda data: data.assign_attrs(integrator="exact"), ("integrator", "exact for cable_mass lumped")),
+        (lambda data: data.assign_attrs(winches="magic"), ("winches", "'magic'", "ideal, robot, second-order")),
+        (lambda data: data.assign_attrs(winding="none"), ("winding", "'none'", "constant, remembered")),
+        (lambda data: data.assign_attrs(bandwidth=0.0), ("bandwidth", "0 Hz", "> 0 Hz, finite")),
+        (lambda data: data.assign_attrs(modal_damping=1.0), ("modal_damping", "1", "< 1")),
+        (lambda data: data.assign_attrs(loss_time="x"), ("loss_time", "'x'")),
+        (lambda data: data.isel(time=[0]), ("time", "of 1 samples", "at least the start and the end")),
+        (lambda data: data.assign_attrs(step=0.0), ("step", "0 s", "> 0 s, finite")),
+        (lambda data: data.assign_attrs(step="x"), ("step", "'x'")),
+        (lambda data: data.assign_attrs(robot="name: x"), ("frame_anchors", "missing")),
+        (
+            lambda data: data.assign_attrs(sagline_simulation_format=2),
+            ("sagline_simulation_format", None, None, "Install a newer sagline."),
+        ),
+        (
+            lambda data: data.assign_attrs(sagline_simulation_format="x"),
+            ("sagline_simulation_format", "is of format 'x', which never was"),
+        ),
+        (lambda data: data.isel(cable=slice(7)), ("cable", "has 7 cables, its robot 8")),
+        (lambda data: data.isel(axis=slice(2)), ("axis", None, "x, y, z")),
+        (lambda data: data.assign(length=data["length"].astype("f4")), ("length: type", "float32", "float64")),
+        (lambda data: data.assign(length=data["length"].assign_attrs(units="mm")), ("length: units", "'mm'")),
+        (lambda data: data.assign(length=data["length"].T), ("length: shape", "8 cable × 7 time", "7 time × 8 cable")),
     ],
 )
-def test_files_that_were_written_by_others(tmp_path: FilePath, data: xr.Dataset, edit: Any, told: str) -> None:
-    assert_refused(tmp_path / "sim.nc", edit(data), told)
+def test_files_that_were_written_by_others(read: Reader, data: xr.Dataset, edit: Any, parts: tuple[str, ...]) -> None:
+    assert_refused(read, edit(data), parts)
 
 
-def test_what_is_edited_above_would_be_read_as_it_is(tmp_path: FilePath, data: xr.Dataset) -> None:
+def test_what_is_edited_above_would_be_read_as_it_is(tmp_path: FilePath, data: xr.Dataset, read: Reader) -> None:
+    sealed(tmp_path / "sim.nc", edited(data, "tensions", (2, 1), -1.0))
+    with refused("tensions[2, 1]", "-1", file=tmp_path / "sim.nc"):
+        sl.load_simulation(tmp_path / "sim.nc")
     sealed(tmp_path / "sim.nc", data)
     assert_same(a_simulation(), sl.load_simulation(tmp_path / "sim.nc"))
+    assert_same(a_simulation(), read(data))
 
 
 def sealed(file: FilePath, data: xr.Dataset) -> None:
@@ -205,24 +260,24 @@ def sealed(file: FilePath, data: xr.Dataset) -> None:
     seal(file)
 
 
-def assert_refused(file: FilePath, data: xr.Dataset, told: str) -> None:
-    sealed(file, data)
-    with pytest.raises(sl.FileError, match=told) as caught:
-        sl.load_simulation(file)
-    assert re.match(r".{,299}$", str(caught.value).replace(str(file), file.name))
+def assert_refused(read: Reader, data: xr.Dataset, parts: tuple[str, ...]) -> None:
+    with refused(*parts, kind=sl.FileError) as caught:
+        read(data)
+    assert caught.value.path.name.startswith("sim.nc")
+    assert re.match(r".{,299}$", str(caught.value))
 
 
 def test_what_could_not_be_read_again_is_not_written(tmp_path: FilePath) -> None:
     simulation, none, three = a_simulation(), cast("Any", None), cast("Any", 3)
-    for wrong, told in (
-        (replace(simulation, length=-simulation.length), r"length\[0, 0\] is -"),
-        (replace(simulation, cable_mass="some"), "cable_mass is 'some'"),
-        (replace(simulation, events=(Occurrence(0.1, "break", 9, 1.0, 2.0),)), r"event_cable\[0\] is 9"),
-        (replace(simulation, nodes=None), "node_position is not given"),
-        (replace(simulation, damping=none), "damping is None"),
-        (replace(simulation, winches=three), "winches is 3"),
+    for wrong, item, value in (
+        (replace(simulation, length=-simulation.length), "length[0, 0]", f"{-simulation.length[0, 0]:g}"),
+        (replace(simulation, cable_mass="some"), "cable_mass", "'some'"),
+        (replace(simulation, events=(Occurrence(0.1, "break", 9, 1.0, 2.0),)), "event_cable[0]", "9"),
+        (replace(simulation, nodes=None), "node_position", "not given"),
+        (replace(simulation, damping=none), "damping", "None"),
+        (replace(simulation, winches=three), "winches", "3"),
     ):
-        with pytest.raises(sl.InvalidValueError, match=told):
+        with refused(item, value, kind=sl.InvalidValueError):
             wrong.save(tmp_path / "sim.nc")
     assert list(tmp_path.iterdir()) == []
 
@@ -233,7 +288,7 @@ def test_the_robot_inside_is_the_robot(saved: FilePath) -> None:
     assert loaded.mass == ROBOT.mass
 
 
-@pytest.mark.parametrize("time", [0.0, 0.0301, 0.0333, 0.035])
+@pytest.mark.parametrize("time", wide([0.0301, 0.0, 0.0333, 0.035]))
 def test_events_at_any_time_leave_a_simulation_that_can_be_saved(tmp_path: FilePath, time: float) -> None:
     """At the start, between records, at the end, which no record falls on."""
     state = sl.inverse(ROBOT, sl.Pose((0.0, 0.0, 1.5), np.eye(3))).state
@@ -245,6 +300,7 @@ def test_events_at_any_time_leave_a_simulation_that_can_be_saved(tmp_path: FileP
     assert np.isnan(simulation.length[:, 3]).tolist() == (simulation.time > time).tolist()
 
 
+@extended
 def test_small_motions_come_back(tmp_path: FilePath) -> None:
     state = sl.inverse(sl.load_robot("expo2015-lucia"), sl.Pose([-0.6, 0.0, 3.5], np.eye(3))).state
     damping = sl.Damping(modal_damping=0.01)

@@ -1,8 +1,11 @@
+import re
+
 import numpy as np
 import pytest
 
-from sagline.errors import InvalidValueError
+from sagline import InvalidValueError
 from sagline.files.typed import pose_of
+from tests.refusal import refused
 
 
 def test_meters_and_degrees() -> None:
@@ -20,9 +23,8 @@ def test_meters_and_degrees() -> None:
      "1;2;3", "1 2 3", "1,2,3 m", "𝟙,2,3", "1,2,3\x1b[2J", "1," * 100_000],
 )  # fmt: skip
 def test_what_is_no_pose(text: str) -> None:
-    with pytest.raises(
-        InvalidValueError, match=r"--pose is (?s:.*); allowed: (three or six|decimal) numbers"
-    ) as caught:
+    with refused("--pose", kind=InvalidValueError) as caught:
         pose_of(text)
+    assert re.match("(three|decimal)", caught.value.allowed)
     assert len(str(caught.value)) < 300
     assert "\x1b" not in str(caught.value)

@@ -3,10 +3,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike
+from syrupy.assertion import SnapshotAssertion
 
-from sagline.cables.cable import Cable
-from sagline.errors import FileError
-from sagline.files.wirex import load_wirex
+from sagline import Cable, FileError, load_wirex
+from tests.refusal import refused
 
 TEXT = """<?xml version="1.0" ?>
 <models version="0.32">
@@ -62,8 +62,8 @@ def test_a_robot_in_full(tmp_path: Path) -> None:
 def test_what_was_lost_is_told(tmp_path: Path) -> None:
     imported = load(tmp_path)
     lost = " ".join(imported.lost)
-    assert imported.robot.notes == f"Not taken over: {lost}"
-    for what in ("The winch's gear, speeds", "The cables' damping", "The controller"):
+    assert imported.robot.notes.endswith(lost)
+    for what in ("gear", "damping", "controller"):
         assert what in lost
     assert "pulley" not in lost
 
@@ -107,7 +107,7 @@ def test_only_pulleys_about_a_vertical_axis_are_taken(tmp_path: Path, matrix: st
     imported = load(tmp_path, (AXES, matrix))
     winches = imported.robot.winches
     assert winches is not None
-    told = [line for line in imported.lost if "The pulley of chain 1 (radius 0.05 m), whose axis is not vert" in line]
+    told = [line for line in imported.lost if "pulley of chain 1 (radius 0.05 m)" in line]
     assert len(told) == (axis is None)
     assert winches.pulley_radius.tolist() == [0.05 if axis else 0.0, 0.05, 0.0]
     assert winches.swivel_axis[0].tolist() == [0.0, 0.0, axis or 1.0]
@@ -128,7 +128,7 @@ def test_drum_and_motor_of_the_winch(tmp_path: Path) -> None:
     for name, value in (("drum_radius", 0.06), ("drum_width", 0.24), ("groove_pitch", 0.006), ("inertia", 0.002)):
         np.testing.assert_allclose(getattr(winches, name), [value] * 3, rtol=1e-15, err_msg=name)
     assert winches.gear.tolist() == [1.0] * 3  # which shaft its ratio turns faster is not said
-    assert "The winch's gear" in imported.lost[0]
+    assert " gear" in imported.lost[0]
 
 
 def test_a_drum_without_pulleys(tmp_path: Path) -> None:
@@ -146,11 +146,11 @@ def test_a_zero_is_no_drum(tmp_path: Path) -> None:
     assert load(tmp_path, (WINCH, zeros), *PULLEYS_GONE).robot.winches is None
 
 
-def test_which_of_several_winches_a_cable_has_is_not_known(tmp_path: Path) -> None:
+def test_which_of_several_winches_a_cable_has_is_not_known(tmp_path: Path, snapshot: SnapshotAssertion) -> None:
     imported = load(tmp_path, (WINCH, DRIVE + DRIVE))
     assert imported.robot.winches is not None
     assert imported.robot.winches.drum_radius is None
-    assert "does not say which cable has which" in imported.lost[0]
+    assert imported.lost == snapshot
 
 
 def test_what_is_missing_is_assumed_and_said(tmp_path: Path) -> None:
@@ -168,13 +168,13 @@ def test_what_is_missing_is_assumed_and_said(tmp_path: Path) -> None:
     np.testing.assert_array_equal(robot.tension_max, [np.inf, 2500, np.inf])
     np.testing.assert_array_equal(robot.center_of_mass, [0, 0, 0])
     assert set(robot.assumed) == {"cables", "center_of_mass", "inertia", "tension_min", "tension_max"}
-    assert robot.assumed["cables"].startswith("linear density and axial stiffness of a 4 mm steel rope")
+    assert "4 mm" in robot.assumed["cables"]
 
 
 def test_without_a_winch_the_breaking_load_limits(tmp_path: Path) -> None:
     robot = load(tmp_path, (WINCH, "")).robot
     np.testing.assert_array_equal(robot.tension_max, [900, 2500, 900])
-    assert robot.assumed["tension_max"].startswith("the breaking load")
+    assert "breaking load" in robot.assumed["tension_max"]
 
 
 def test_a_material_of_choice_replaces_the_file_s(tmp_path: Path) -> None:
@@ -190,37 +190,37 @@ def test_planar_robots_get_a_plane(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "message"),
+    ("old", "new", "parts"),
     [
-        ("3R3T", "2R3T", "motionpattern is '2R3T'; allowed: 3R3T, 3T, 1R2T, 2T"),
-        ('mass="12.5" ', "", "platform: mass is missing"),
-        ('mass="12.5"', 'mass="0"', "mass is 0 kg"),
-        ('base x="2"', 'base x="two"', "chain 2: base: x is 'two'; allowed: a number in m"),
-        ('<platform x="0" y="0.1" z="0.2" />', "", "chain 3: number of <platform> is 0; allowed: 1"),
-        ('cable_id="2"', 'cable_id="3"', "chain 2: cable_id is '3'; allowed: 1 to 2"),
-        ('Iyz="-0.02"', "", "inertiatensor: I"),
-        ('f_max="800"', 'f_max="5"', r"tension_min\[1\] is 6 N"),
-        ('radius="0.001"', 'radius="thin"', "cable thin: radius is 'thin'"),
-        ('a33="1" radius="0.05"', 'a33="1" radius="wide"', "chain 1: base: radius is 'wide'"),
-        ('a33="1" radius="0.05"', 'a33="1" radius="-0.05"', r"winches: pulley_radius\[0\] is -0.05 m; allowed: >= 0 m"),
-        ('a33="1"', 'a33="up"', "chain 1: base: a33 is 'up'; allowed: a number"),
-        (WINCH, DRIVE.replace("0.06", "wide"), "winch: drum: r_drum is 'wide'"),
-        (WINCH, DRIVE.replace("0.06", "-1"), "winches: drum_radius is -1 m; allowed: > 0 m"),
-        ('radius="0.001"', 'radius="-0.001"', "cable thin: radius is -0.001 m"),
-        ("<controller", '<platform name="second" /><controller', "number of <platform> is 2; allowed: 1"),
-        ('Ixx="0.5"', 'Ixx="5"', r"principal moments 0.*larger than the other two"),
-        ('Ixx="0.5"', 'Ixx="1_0"', "inertiatensor: Ixx is '1_0'; allowed: a number in kg m"),
-        (' version="0.32"', "", "version of the format is missing; allowed: 0.31 or 0.32"),
-        ('version="0.32"', 'version="9.99"', "version of the format is '9.99'; allowed: 0.31 or 0.32"),
-        ('version="0.32"', 'version="0.3"', "version of the format is '0.3'"),
-        ("models", "shelves", "root element is <shelves>; allowed: <models>"),
-        ("robot", "wireRobot", "robot is in the old form <wireRobot>"),
-        ("chain", "leg", "number of <chain> is 0"),
-        ("</models>", "", "is no complete XML"),
+        ("3R3T", "2R3T", ("motionpattern", "'2R3T'", "3R3T, 3T, 1R2T, 2T")),
+        ('mass="12.5" ', "", ("platform: mass", "missing")),
+        ('mass="12.5"', 'mass="0"', ("mass", "0 kg")),
+        ('base x="2"', 'base x="two"', ("chain 2: base: x", "'two'", "a number in m")),
+        ('<platform x="0" y="0.1" z="0.2" />', "", ("chain 3: number of <platform>", "0", "1")),
+        ('cable_id="2"', 'cable_id="3"', ("chain 2: cable_id", "'3'", "1 to 2")),
+        ('Iyz="-0.02"', "", ("inertiatensor: Iyz", "missing")),
+        ('f_max="800"', 'f_max="5"', ("tension_min[1]", "6 N")),
+        ('radius="0.001"', 'radius="thin"', ("cable thin: radius", "'thin'")),
+        ('a33="1" radius="0.05"', 'a33="1" radius="wide"', ("chain 1: base: radius", "'wide'")),
+        ('a33="1" radius="0.05"', 'a33="1" radius="-0.05"', ("winches: pulley_radius[0]", "-0.05 m", ">= 0 m, finite")),
+        ('a33="1"', 'a33="up"', ("chain 1: base: a33", "'up'", "a number")),
+        (WINCH, DRIVE.replace("0.06", "wide"), ("winch: drum: r_drum", "'wide'")),
+        (WINCH, DRIVE.replace("0.06", "-1"), ("winches: drum_radius", "-1 m", "> 0 m, finite")),
+        ('radius="0.001"', 'radius="-0.001"', ("cable thin: radius", "-0.001 m")),
+        ("<controller", '<platform name="second" /><controller', ("number of <platform>", "2", "1")),
+        ('Ixx="0.5"', 'Ixx="5"', ("inertia",)),
+        ('Ixx="0.5"', 'Ixx="1_0"', ("inertiatensor: Ixx", "'1_0'", "a number in kg m^2")),
+        (' version="0.32"', "", ("version of the format", "missing", "0.31 or 0.32")),
+        ('version="0.32"', 'version="9.99"', ("version of the format", "'9.99'", "0.31 or 0.32")),
+        ('version="0.32"', 'version="0.3"', ("version of the format", "'0.3'")),
+        ("models", "shelves", ("root element", "<shelves>", "<models>")),
+        ("robot", "wireRobot", ("robot", "in the old form <wireRobot>")),
+        ("chain", "leg", ("number of <chain>", "0")),
+        ("</models>", "", ("line 21",)),
     ],
 )
-def test_files_that_will_not_do(tmp_path: Path, old: str, new: str, message: str) -> None:
-    with pytest.raises(FileError, match=message):
+def test_files_that_will_not_do(tmp_path: Path, old: str, new: str, parts: tuple[str, ...]) -> None:
+    with refused(*parts, kind=FileError):
         load(tmp_path, (old, new))
 
 
@@ -231,25 +231,25 @@ TENSOR = '<inertiatensor Ixx="0.5" Ixy="0.01" Ixz="0" Iyy="0.6" Iyz="-0.02" Izz=
     ("tensor", "inertia", "said"),
     [
         # as WireX 0.4 to 1.1 write it, whatever the platform
-        ('<inertiatensor Ixx="14" />', np.diag([14.0, 14.0, 14.0]), "Ixy, Ixz, Iyy, Iyz, Izz missing"),
+        ('<inertiatensor Ixx="14" />', np.diag([14.0, 14.0, 14.0]), "Ixy, Ixz, Iyy, Iyz, Izz"),
         # as WireX 2.0 writes it: all nine
         (
             '<inertiatensor Ixx="2.000000" Ixy="0.1" Ixz="0.2" Iyx="0.1" Iyy="3" Iyz="0.3" '
             'Izx="0.2" Izy="0.3" Izz="4.000000" />',
             [[2, 0.1, 0.2], [0.1, 3, 0.3], [0.2, 0.3, 4]],
-            "taken about the center of mass",
+            "center of mass",
         ),
         # the other half, by hand
-        ('<inertiatensor Ixx="2" Iyy="3" Izz="4" Iyx="0.1" Izx="0.2" Izy="0.3" />', None, "taken about the center"),
-        ('<inertiatensor Ixx="2" Iyy="3" Izz="4" />', np.diag([2.0, 3.0, 4.0]), "Ixy, Ixz, Iyz missing"),
-        ('<inertiatensor Iyy="0.2" Ixx="0.5" />', np.diag([0.5, 0.2, 0.5]), "largest given, 0.5 kg m^2"),
+        ('<inertiatensor Ixx="2" Iyy="3" Izz="4" Iyx="0.1" Izx="0.2" Izy="0.3" />', None, "center of mass"),
+        ('<inertiatensor Ixx="2" Iyy="3" Izz="4" />', np.diag([2.0, 3.0, 4.0]), "Ixy, Ixz, Iyz"),
+        ('<inertiatensor Iyy="0.2" Ixx="0.5" />', np.diag([0.5, 0.2, 0.5]), "0.5 kg m^2"),
         # a box of 0.2 x 0.2 x 0.02 m and 12.5 kg: the anchors lie in a plane
-        ("", np.diag([0.0420833333333333, 0.0420833333333333, 0.0833333333333333]), "a solid box around"),
-        ("<inertiatensor />", np.diag([0.0420833333333333, 0.0420833333333333, 0.0833333333333333]), "a solid box"),
+        ("", np.diag([0.0420833333333333, 0.0420833333333333, 0.0833333333333333]), "solid box"),
+        ("<inertiatensor />", np.diag([0.0420833333333333, 0.0420833333333333, 0.0833333333333333]), "solid box"),
         (
             '<inertiatensor Ixx="0.000000" Iyy="0.000000" Izz="0.000000" />',
             np.diag([0.0420833333333333, 0.0420833333333333, 0.0833333333333333]),
-            "a solid box",
+            "solid box",
         ),
     ],
 )

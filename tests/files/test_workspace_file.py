@@ -4,11 +4,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from syrupy.assertion import SnapshotAssertion
 
 import sagline as sl
-from sagline.files.robot_file import dump_robot
+from sagline import Mesh, dump_robot
 from sagline.files.workspace_layout import QUANTITIES
-from sagline.interference.mesh import Mesh
+from tests.files.wording import wording
+from tests.refusal import refused
+from tests.tiers import extended, wide
 
 ROBOT = sl.load_robot("article-suspended")
 WALL = (
@@ -62,7 +65,7 @@ def assert_same(space: sl.Workspace, other: sl.Workspace) -> None:
     assert dump_robot(space.robot) == dump_robot(other.robot)
 
 
-@pytest.mark.parametrize("name", SPACES)
+@pytest.mark.parametrize("name", wide(SPACES))
 def test_what_is_read_back_is_the_same(name: str, tmp_path: FilePath) -> None:
     space = space_of(name)
     space.save(tmp_path / "space.nc")
@@ -73,6 +76,7 @@ def test_what_is_read_back_is_the_same(name: str, tmp_path: FilePath) -> None:
     assert_same(space, pickle.loads(pickle.dumps(space)))
 
 
+@extended
 def test_obstacles_are_read_back(tmp_path: FilePath) -> None:
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
     mesh = Mesh(corners + 9.0, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]], "corner")
@@ -83,16 +87,18 @@ def test_obstacles_are_read_back(tmp_path: FilePath) -> None:
     assert repr(criterion.obstacles) == repr((*WALL, mesh))
 
 
-def test_other_files_are_refused(tmp_path: FilePath) -> None:
+@extended
+def test_other_files_are_refused(tmp_path: FilePath, snapshot: SnapshotAssertion) -> None:
     space_of("in a plane").save(tmp_path / "space.nc")
     whole = (tmp_path / "space.nc").read_bytes()
-    with pytest.raises(sl.FileError, match=r"is a workspace of sagline, no plan\. Read it with load_workspace"):
+    with refused(kind=sl.FileError, file=tmp_path / "space.nc") as caught:
         sl.load_plan(tmp_path / "space.nc")
+    assert wording(caught.value, tmp_path) == snapshot
     (tmp_path / "cut.nc").write_bytes(whole[: len(whole) // 2])
     (tmp_path / "changed.nc").write_bytes(whole.replace(b"limiting", b"LIMITING"))
     (tmp_path / "text.nc").write_text("x")
     for name in ("cut.nc", "changed.nc", "text.nc", "missing.nc"):
-        with pytest.raises(sl.FileError):
+        with refused(kind=sl.FileError, file=tmp_path / name):
             sl.load_workspace(tmp_path / name)
 
 
@@ -101,6 +107,6 @@ def test_criteria_of_ones_own_cannot_be_read_back(tmp_path: FilePath) -> None:
         pass
 
     space = sl.workspace(ROBOT, criteria=[Own(0.1)], cells=4)
-    with pytest.raises(sl.InvalidValueError, match="criterion_1 is Own"):
+    with refused("criterion_1", "Own", kind=sl.InvalidValueError):
         space.save(tmp_path / "space.nc")
     assert not list(tmp_path.iterdir())

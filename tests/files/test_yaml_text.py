@@ -1,12 +1,17 @@
 import math
 import re
+from pathlib import Path
 
 import pytest
 import yaml
+from syrupy.assertion import SnapshotAssertion
 
-from sagline.errors import FileError
+from sagline import FileError
 from sagline.files.yaml_text import dump_mapping, parse_mapping
 from tests.effort import least_seconds
+from tests.files.wording import wording
+from tests.refusal import refused
+from tests.tiers import extended
 
 
 @pytest.mark.parametrize(
@@ -73,15 +78,15 @@ def _bomb(first: str, item: str, between: str) -> str:
         "a: &a {b: *a}",
         "a: &a {<<: *a}",
         "a: &a\n  ? *a\n  : 1",
-        "a: &a0 [x]\n" + "".join(f"b{k}: &a{k} [*a{k - 1}]\n" for k in range(1, 3000)),
-        "a: " + "[" * 100_000,
+        pytest.param("a: &a0 [x]\n" + "".join(f"b{k}: &a{k} [*a{k - 1}]\n" for k in range(1, 3000)), marks=extended),
+        pytest.param("a: " + "[" * 100_000, marks=extended),
         "a: " + "{a: " * 30_000,
         "- " * 50_000,
         "? " * 50_000,
         "a: " + "[" * 21 + "]" * 21,
         "".join(" " * k + "a:\n" for k in range(700)),
-        "a: [" + "1," * 100_000 + "]",
-        "a: [" + "[]," * 100_000,
+        pytest.param("a: [" + "1," * 100_000 + "]", marks=extended),
+        pytest.param("a: [" + "[]," * 100_000, marks=extended),
     ],
 )
 def test_nothing_grows_while_it_is_read(text: str) -> None:
@@ -92,45 +97,46 @@ def test_nothing_grows_while_it_is_read(text: str) -> None:
 
     told: list[str] = []
     assert least_seconds(read, 2.0) < 2.0
-    assert re.search(r"an alias that stands for itself|more than 20 levels or 25000 values", told[0])
+    assert re.search(r"alias|20 levels", told[0])
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
+    "text",
     [
-        ("a: 1\nb: 2\na: 3", r"line 3: key a is given twice"),
-        ('a: 1\n"a": 3', r"line 2: key a is given twice"),
-        ("<<: {a: 1}\n<<: {a: 2}", "line 2: key << is given twice"),
-        ("a: !!python/object/apply:os.system [ls]", "line 1: the tag python/object/apply:os.system stands before"),
-        ("a: !!binary eA==", "line 1: the tag binary .*; tags are not read. Write"),
-        ("a: !!set {b, c}", "line 1: the tag set "),
-        ("a: !!map [b]", "expected a mapping node"),
-        ("{[a]: 1}", "line 1: a key is a list or a mapping; allowed: a word"),
-        ('a: "\\UFFFFFFFF"', "is not YAML"),
-        ("a: b\x1b", r"line 1 holds the character '\\x1b'"),
-        ("a: b\n\n\x00", r"line 3 holds the character '\\x00'"),
-        ("--- {a: 1}\n--- {b: 1}", "line 2: a second document begins, at ---; allowed: one. Keep one"),
-        ("a: &b 1\nc: &b 2", "line 2"),
-        ("a: *b", "line 1: undefined alias"),
-        ("a: !mine 3", "line 1: the tag !mine stands"),
-        ("a: 1\n? [b]\n: 2", "line 2: a key is a list"),
-        ("a:\n\tb: 1", "line 2: a tab stands where blanks must"),
-        ("a:\n  - b\n\t- c", "line 3: a tab stands where blanks must"),
-        ("a: b: c\nd: e", r"is not YAML \(line 1: mapping values are not allowed here\). Correct this line"),
-        ("a: [1, 2\nb: 3\nc: 4", r"is not YAML \(line"),
-        ("a: @b\nc: 1", r"is not YAML \(line 1"),
-        ("a: [1, 2", r"is not complete YAML \(line 1.*cut off"),
-        ("a: 'b\n\n", "is not complete YAML .*cut off"),
-        ("a: 1\nb", "is not complete YAML .*cut off"),
-        ("- a", "no keys at its top level"),
-        ("a", "no keys at its top level"),
-        ("# nothing", "is empty"),
+        "a: 1\nb: 2\na: 3",
+        'a: 1\n"a": 3',
+        "<<: {a: 1}\n<<: {a: 2}",
+        "a: !!python/object/apply:os.system [ls]",
+        "a: !!binary eA==",
+        "a: !!set {b, c}",
+        "a: !!map [b]",
+        "{[a]: 1}",
+        'a: "\\UFFFFFFFF"',
+        "a: b\x1b",
+        "a: b\n\n\x00",
+        "--- {a: 1}\n--- {b: 1}",
+        "a: &b 1\nc: &b 2",
+        "a: *b",
+        "a: !mine 3",
+        "a: 1\n? [b]\n: 2",
+        "a:\n\tb: 1",
+        "a:\n  - b\n\t- c",
+        "a: b: c\nd: e",
+        "a: [1, 2\nb: 3\nc: 4",
+        "a: @b\nc: 1",
+        "a: [1, 2",
+        "a: 'b\n\n",
+        "a: 1\nb",
+        "- a",
+        "a",
+        "# nothing",
     ],
+    ids=range(27),
 )
-def test_what_is_no_such_yaml(text: str, message: str) -> None:
-    with pytest.raises(FileError, match=message) as caught:
+def test_what_is_no_such_yaml(text: str, snapshot: SnapshotAssertion) -> None:
+    with refused(kind=FileError, file="x.yaml") as caught:
         parse_mapping(text, "x.yaml")
-    assert ("cut off" in str(caught.value)) == ("cut off" in message or message == "is empty")
+    assert wording(caught.value, Path()) == snapshot
 
 
 WORDS = (

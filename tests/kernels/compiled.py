@@ -4,54 +4,45 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
+from functools import cache
 from typing import Any, TypeVar, cast
 
 import numba
 import numpy as np
-from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler
 
+from sagline.kernels.jit import folder_of
 from sagline.kernels.memory import Memory
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-class Caller(JITCodeLibrary):
-    """Machine code of a caller: it calls kernels where they are.
+def compiled(caller: F, module: str = "tests") -> F:
+    """A function that calls kernels; its machine code is kept on disk until one of the kernels is edited.
 
-    numba would link all that they are made of into it, and optimize all of it once more: half of its time.
+    Args:
+        caller: The function.
+        module: Module of the only kernel it calls; all kernels if it is none of theirs.
     """
-
-    def add_linking_library(self, library: Any) -> None:
-        """Link what is numba's own, which is nowhere else; a kernel is only made ready."""
-        library._ensure_finalized()
-        module = library._shared_module or library._final_module
-        if not any("sagline" in function.name for function in module.functions if not function.is_declaration):
-            cast("Any", super()).add_linking_library(library)
-
-
-class CompilerOfCallers(Compiler):
-    """As numba compiles everything, but for where the machine code goes."""
-
-    def define_pipelines(self) -> Any:
-        """The usual steps."""
-        self.state.library = cast("Any", Caller)(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
-        self.state.library.enable_object_caching()
-        return cast("Any", super()).define_pipelines()
+    before = getattr(numba.config, "CACHE_DIR")  # noqa: B009 - set by numba at run time, unknown to type checkers
+    setattr(numba.config, "CACHE_DIR", str(folder_of(module) / "callers"))  # noqa: B010
+    try:
+        return cast("F", numba.njit(error_model="numpy", cache=True)(caller))
+    finally:
+        setattr(numba.config, "CACHE_DIR", before)  # noqa: B010
 
 
-def compiled(caller: F) -> F:
-    """A function that calls kernels, compiled anew in every run of the tests."""
-    return cast("F", numba.njit(error_model="numpy", pipeline_class=CompilerOfCallers)(caller))
-
-
+@cache
 def from_python(inner: Callable[..., Any]) -> Callable[..., Any]:
     """A kernel, formula or piece of glue that Python can call, which by itself would crash.
 
     Names are spelled out because glue cannot take *arguments.
     """
-    names = ", ".join(inspect.signature(cast("Any", inner).py_func).parameters)
-    return compiled(cast("Callable[..., Any]", eval(f"lambda {names}: _inner({names})", {"_inner": inner})))
+    kernel = cast("Any", inner).py_func
+    names, name = ", ".join(inspect.signature(kernel).parameters), f"call_{kernel.__name__}"
+    code = compile(f"def {name}({names}): return _inner({names})", kernel.__code__.co_filename, "exec")
+    space: dict[str, Any] = {"_inner": inner, "__name__": kernel.__module__}
+    exec(code, space)
+    return compiled(cast("Callable[..., Any]", space[name]), kernel.__module__)
 
 
 def memory(numbers: int = 2000, counters: int = 200) -> Memory:

@@ -2,11 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from typing import Any, Literal
+
 import numpy as np
+import pytest
 from scipy.spatial.transform import Rotation
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.arrays import Array, locked
+from tests.tiers import extended
+
+Variable = Literal["chord", "horizontal", "frame_end"]
+
+
+def pose_rows(pose: sl.Pose) -> Array:
+    """Positions and quaternions, (N, 7), read-only."""
+    return locked(np.hstack((np.atleast_2d(pose.position), np.atleast_2d(pose.quaternion))))
+
+
+def by_tier(names: Iterable[str]) -> list[Any]:
+    """Names of robots, of which those with pulleys belong to the second tier: the first does not compile for them."""
+    return [pytest.param(name, marks=extended) if "pulleys" in name else name for name in names]
 
 
 def box_poses(robot: sl.Robot, count: int, seed: int) -> sl.Pose:

@@ -9,6 +9,7 @@ import pytest
 
 import sagline as sl
 from sagline.arrays import Array
+from tests.tiers import wide
 
 ROBOTS = ("article-suspended", "article-mixed")
 
@@ -32,7 +33,7 @@ def test_the_path_is_feasible_for_both_robots() -> None:
 
 
 @pytest.mark.parametrize("tension", [sl.MinimumNorm(), sl.Closest()], ids=["minimum norm", "closest"])
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("robot", wide(ROBOTS))
 def test_tensions_are_continuous_with_bounded_slope(robot: str, tension: sl.TensionMethod) -> None:
     """Twice the rate halves the largest change from sample to sample, and the second difference with it."""
     tensions = [plan_of(robot, sl.Catenary(), tension, rate).chord_tension for rate in (100.0, 200.0)]

@@ -14,6 +14,7 @@ from sagline.kinematics import confirm as confirming
 from sagline.kinematics import forward_rows, start
 from sagline.kinematics import inverse_rows as inverting
 from tests.effort import slowness
+from tests.tiers import extended
 
 ROBOT = sl.load_robot("article-suspended")
 PATH = sl.article_path(rate=2.0)
@@ -102,6 +103,7 @@ def test_progress_counts_up_to_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
         assert counts == [7, 14, 21, 28, 35, 42, 43]
 
 
+@extended
 @pytest.mark.skipif(sys.platform == "win32", reason="no timer of processor time")
 @pytest.mark.parametrize("work", ["feasible", "infeasible", "slow sharing", "tracking", "from each pose", "search"])
 def test_an_interrupt_is_heard_within_a_fifth_of_a_second(work: str) -> None:

@@ -5,8 +5,9 @@ import pytest
 
 import sagline as sl
 from sagline.arrays import Array, Indices
-from sagline.tension.method import Variable
 from sagline.tension.methods import METHODS
+from tests.kinematics.feasible import Variable
+from tests.tiers import extended, wide
 
 SUSPENDED, MIXED = sl.load_robot("article-suspended"), sl.load_robot("article-mixed")
 COGIRO, IPANEMA = sl.load_robot("cogiro"), sl.load_robot("ipanema-1")
@@ -78,8 +79,9 @@ def followed(robot: sl.Robot, method: sl.Closest) -> tuple[Array, Array, list[sl
             for d in (1, 2)
         )
         if np.isfinite(two).all() and plan.feasible.all():
-            assert plan.length_rate is not None
-            rates.append(plan.length_rate[0])
+            rate = plan.length_rate
+            assert rate is not None
+            rates.append(rate[0])
             slopes.append((2.0 * one - 0.5 * two - 1.5 * plan.unstrained_length)[0] / step)
             states.append(plan.state[0])
     return np.array(rates), np.array(slopes), states
@@ -92,10 +94,10 @@ def held_at(states: list[sl.Equilibrium], limit: Array, quantity: str = "chord_t
     return count
 
 
-@pytest.mark.parametrize("variable", ["chord", "horizontal", "frame_end"])
+@pytest.mark.parametrize("variable", wide(["chord", "horizontal", "frame_end"]))
 @pytest.mark.parametrize(
     ("robot", "most"),
-    [(SUSPENDED, 0), (MIXED, 2), (COGIRO, 0), (IPANEMA, 2)],
+    wide([(MIXED, 2), (SUSPENDED, 0), (COGIRO, 0), (IPANEMA, 2)]),
     ids=lambda value: getattr(value, "name", ""),
 )
 def test_closest_follows_its_tensions(robot: sl.Robot, most: int, variable: Variable) -> None:
@@ -106,7 +108,7 @@ def test_closest_follows_its_tensions(robot: sl.Robot, most: int, variable: Vari
     assert (errors > 5e-8).sum() <= 1  # where an instant later another cable comes to its limit
 
 
-@pytest.mark.parametrize("limits_of", ["chord", "frame_end"])
+@pytest.mark.parametrize("limits_of", wide(["frame_end", "chord"]))
 def test_cables_that_are_held_stay_at_their_limits(limits_of: str) -> None:
     robot = MIXED.replace(tension_limits_of=limits_of, tension_min=60.0)
     rates, slopes, states = followed(robot, sl.Closest())
@@ -116,7 +118,7 @@ def test_cables_that_are_held_stay_at_their_limits(limits_of: str) -> None:
     assert (missed(rates, slopes) > 5e-8).sum() <= 1
 
 
-@pytest.mark.parametrize(("robot", "margin"), [(SUSPENDED, 60.0), (MIXED, 60.0), (COGIRO, 300.0)])
+@pytest.mark.parametrize(("robot", "margin"), wide([(SUSPENDED, 60.0), (MIXED, 60.0), (COGIRO, 300.0)]))
 def test_the_lowest_point_bound_is_a_limit_that_moves(robot: sl.Robot, margin: float) -> None:
     rates, slopes, states = followed(robot, sl.Closest(lowest_point_margin=margin))
     cables = [state.cables for state in states]
@@ -127,6 +129,7 @@ def test_the_lowest_point_bound_is_a_limit_that_moves(robot: sl.Robot, margin: f
     assert (missed(rates, slopes) > 5e-8).sum() <= 1
 
 
+@extended
 @pytest.mark.parametrize("method", [sl.Closest(), sl.Closest("horizontal")], ids=lambda m: m.variable)
 def test_a_plan_of_closest_comes_near_its_rates_as_the_samples_do(method: sl.TensionMethod) -> None:
     errors = []
@@ -140,8 +143,8 @@ def test_a_plan_of_closest_comes_near_its_rates_as_the_samples_do(method: sl.Ten
     assert errors[1] / errors[2] > 1.8
 
 
-@pytest.mark.parametrize("model", [sl.Elastic(), sl.Empirical(), sl.Parabolic()], ids=lambda m: type(m).__name__)
-@pytest.mark.parametrize("method", [sl.Closest(), sl.MinimumNorm()], ids=lambda m: type(m).__name__)
+@pytest.mark.parametrize("model", wide([sl.Elastic(), sl.Empirical(), sl.Parabolic()]), ids=lambda m: type(m).__name__)
+@pytest.mark.parametrize("method", wide([sl.MinimumNorm(), sl.Closest()]), ids=lambda m: type(m).__name__)
 def test_other_models(model: sl.CableModel, method: sl.TensionMethod) -> None:
     step = 5e-4
     plan = sl.inverse(SUSPENDED, tour(SUSPENDED, 1.0 / step), model, method)
@@ -177,7 +180,7 @@ def test_a_cable_may_be_vertical_on_the_way(method: sl.TensionMethod) -> None:
     assert (errors > 1e-5).sum() <= 6
 
 
-@pytest.mark.parametrize("method", [sl.Closest(), sl.MinimumNorm()], ids=lambda m: type(m).__name__)
+@pytest.mark.parametrize("method", wide([sl.MinimumNorm(), sl.Closest()]), ids=lambda m: type(m).__name__)
 def test_a_wrench_that_changes_along_the_path_turns_the_winches_too(method: sl.TensionMethod) -> None:
     step = 5e-4
     path = tour(COGIRO, 1.0 / step)

@@ -40,6 +40,19 @@ def test_without_readings_the_lengths_alone_count() -> None:
     np.testing.assert_allclose(found.covariance, 0.003**2 * by_length @ np.swapaxes(by_length, 1, 2), rtol=1e-6)
 
 
+def test_every_cable_has_deviations_of_its_own() -> None:
+    """Covariance of the least-squares fit, B (1/sigma_L^2 + S^T S/sigma_T^2)^-1 B^T, cable by cable."""
+    by_tension, by_length = np.geomspace(0.3, 10.0, 8), np.linspace(0.001, 0.004, 8)
+    measured = sl.MeasuredTension(TENSIONS[0], by_tension, by_length)
+    found = sl.forward(COGIRO, PLAN.unstrained_length[0], PLAN.state.pose[0], tension_measured=measured)
+    known = sl.stiffness(found.state)
+    slopes, motion = known.tension_sensitivity, known.length_sensitivity
+    weight = np.diag(by_length**-2) + slopes.T @ np.diag(by_tension**-2) @ slopes
+    expected = motion @ np.linalg.solve(weight, motion.T)
+    assert found.covariance is not None
+    np.testing.assert_allclose(found.covariance, expected, rtol=0.0, atol=1e-9 * np.abs(expected).max())
+
+
 def test_exact_readings_correct_wrong_lengths() -> None:
     # one encoder is off by 20 mm, and is known to be poor; all load cells are good
     wrong = PLAN.unstrained_length[0].copy()

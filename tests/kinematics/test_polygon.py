@@ -1,15 +1,10 @@
 import numpy as np
 import pytest
 
-from sagline.errors import InvalidValueError
-from sagline.files.robot_file import load_robot
-from sagline.kinematics.inverse import inverse
-from sagline.kinematics.polygon import tension_polygon
-from sagline.robot.pose import Pose
-from sagline.tension.method import Variable
-from sagline.tension.minimum_norm import MinimumNorm
-from sagline.tension.polygon import Side
+from sagline import InvalidValueError, MinimumNorm, Pose, Side, inverse, load_robot, tension_polygon
+from tests.kinematics.feasible import Variable
 from tests.tension.reference import planar, random_poses
+from tests.tiers import wide
 
 
 def area_by_sampling(low: np.ndarray, high: np.ndarray, basis: np.ndarray, origin: np.ndarray, radius: float) -> float:
@@ -27,7 +22,7 @@ def shoelace(corners: np.ndarray) -> float:
     return float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum() / 2)
 
 
-@pytest.mark.parametrize("name", ["article-mixed", "article-suspended", "cogiro", "ipanema-1"])
+@pytest.mark.parametrize("name", wide(["article-mixed", "cogiro", "article-suspended", "ipanema-1"]))
 @pytest.mark.parametrize("variable", ["chord", "horizontal"])
 def test_polygon_holds_the_feasible_tensions_and_no_others(name: str, variable: Variable) -> None:
     robot = load_robot(name)

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 import sagline as sl
 from sagline.arrays import Array
 from tests.tension.reference import needed, presets, random_poses, ropes, structure, unbalanced
+from tests.tiers import extended, wide
 
 WINCHES = [
     sl.Winch(0.05),
@@ -43,7 +44,7 @@ def test_nothing_behind_leaves_every_number_as_it_was() -> None:
 
 
 @pytest.mark.parametrize("winch", WINCHES)
-@pytest.mark.parametrize("model", [sl.Straight(), sl.Elastic(), sl.Empirical(), sl.Parabolic(), sl.Catenary()])
+@pytest.mark.parametrize("model", wide([sl.Straight(), sl.Elastic(), sl.Empirical(), sl.Parabolic(), sl.Catenary()]))
 def test_lengths_lead_back_to_the_pose(winch: sl.Winch, model: sl.CableModel) -> None:
     plan = sl.inverse(cogiro(winch), POSE, model)
     assert plan.feasible
@@ -56,6 +57,7 @@ def test_lengths_lead_back_to_the_pose(winch: sl.Winch, model: sl.CableModel) ->
     np.testing.assert_allclose(found.state.exit_point, plan.exit_point, atol=1e-9)
 
 
+@extended
 @pytest.mark.parametrize("robot", presets(), ids=lambda robot: robot.name)
 def test_far_starts_find_every_preset_with_pulleys_and_dead_cable(robot: sl.Robot) -> None:
     """Starts 20 degrees and a meter off, or a tenth of a small robot's frame."""
@@ -103,6 +105,7 @@ def test_cables_leave_along_their_force(winch: sl.Winch) -> None:
     assert np.abs(cosine).max() < 2e-5  # of the first of 20,000 pieces
 
 
+@extended
 @pytest.mark.parametrize("winch", WINCHES)
 @pytest.mark.parametrize("model", [sl.Elastic(), sl.Catenary()])
 def test_the_energy_s_slopes_are_the_position_and_the_tensions(winch: sl.Winch, model: sl.CableModel) -> None:
@@ -154,6 +157,7 @@ def slopes(of: Callable[[float], Array], step: float) -> Array:
     return np.asarray((8.0 * (of(0.5 * step) - of(-0.5 * step)) - (of(step) - of(-step))) / (6.0 * step))
 
 
+@extended
 @pytest.mark.parametrize("winch", WINCHES)
 def test_the_platform_follows_its_data_as_differences_say(winch: sl.Winch) -> None:
     robot = cogiro(winch, softer=0.05)
@@ -198,6 +202,7 @@ def test_the_platform_follows_its_data_as_differences_say(winch: sl.Winch) -> No
     assert np.abs(matrix - matrix.T).max() < 1e-12 * np.abs(matrix).max()
 
 
+@extended
 @pytest.mark.parametrize("winch", WINCHES)
 def test_tensions_where_cables_leave_follow_the_lengths_as_differences_say(winch: sl.Winch) -> None:
     robot = cogiro(winch, softer=0.05)
@@ -222,6 +227,7 @@ def test_a_radius_that_vanishes_leaves_the_cable_at_its_anchor() -> None:
     np.testing.assert_allclose(errors, errors[0] * np.array([1.0, 1e-3, 1e-6]), rtol=2e-3)
 
 
+@extended
 def test_what_a_first_pulley_would_do_is_known_without_one() -> None:
     """By R at R = 0, of a robot without winches, against small pulleys at the same lengths: a one-sided difference."""
     robot = sl.load_robot("cogiro")
@@ -243,6 +249,7 @@ def test_turned_and_moved_robots_need_the_same_lengths() -> None:
     np.testing.assert_allclose(lengths[0], lengths[1], rtol=1e-13)
 
 
+@extended
 def test_left_out_pulleys_cost_what_the_documentation_says() -> None:
     """A pulley of 25 to 50 mm that the plan does not know, where cables are wound from the middle of the box."""
     robot = sl.load_robot("cogiro")

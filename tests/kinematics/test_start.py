@@ -8,7 +8,7 @@ import sagline as sl
 from sagline.arrays import locked
 from sagline.kinematics.forward_rows import solve_rows
 from sagline.kinematics.start import hung, middle, outside_limits, start_quaternions
-from sagline.statics.tables import pose_rows
+from tests.kinematics.feasible import pose_rows
 
 COGIRO = sl.load_robot("cogiro")
 LEVEL = np.array([0.0, 0.0, 0.0, 1.0])

@@ -3,9 +3,7 @@ import pickle
 import numpy as np
 import pytest
 
-from sagline.errors import InvalidValueError
-from sagline.motion.path import Path
-from sagline.robot.pose import Pose
+from sagline import InvalidValueError, Path, Pose
 
 
 def still(samples: int) -> Pose:

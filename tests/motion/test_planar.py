@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from sagline.motion.planar import article_path
+from sagline import article_path
 
 
 def test_the_planar_path_of_the_comparison() -> None:

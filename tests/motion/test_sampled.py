@@ -3,10 +3,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 
-from sagline.errors import InvalidValueError
-from sagline.motion.rest_to_rest import quintic_path
-from sagline.motion.sampled import path_from_samples
-from sagline.robot.pose import Pose
+from sagline import InvalidValueError, Pose, path_from_samples, quintic_path
 
 NODES = np.sort(np.concatenate((np.linspace(0.0, 2.0, 81), [0.012, 0.711, 1.3333])))  # not uniform
 

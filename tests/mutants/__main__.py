@@ -8,6 +8,7 @@ whole first tier, then, with `--all-tiers`, by the second. A mistake that no tes
 from __future__ import annotations
 
 import argparse
+import hashlib
 import os
 import re
 import shutil
@@ -90,7 +91,18 @@ def catching_test(copy: Path, mutant: Mutant, all_tiers: bool) -> tuple[str, str
 def failing_test(copy: Path, arguments: Sequence[str]) -> str:
     """Name of the first test that fails in a copy; empty if all pass."""
     environment = {**os.environ, "PYTHONPATH": str(copy / "src"), "NUMBA_CACHE_DIR": str(copy / "cache")}
-    command = [sys.executable, "-m", "pytest", "-x", "-q", "--no-header", "-p", "no:cacheprovider", *arguments]
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-x",
+        "-q",
+        "--no-header",
+        "-p",
+        "no:cacheprovider",
+        "--no-limits",
+        *arguments,
+    ]
     try:
         run = subprocess.run(command, cwd=copy, env=environment, capture_output=True, text=True, timeout=PATIENCE)
     except subprocess.TimeoutExpired:
@@ -111,6 +123,17 @@ def copy_project(copy: Path) -> None:
         shutil.copy(ROOT / name, copy / name)
     if FOLDER.is_dir():
         shutil.copytree(FOLDER, copy / "cache" / "kernels")
+    # numba names its folders NAME_<sha1 of the folder of the source>: give them the names for the copy
+    folders = [folder for top in ("src", "tests") for folder in (ROOT / top).rglob("*") if folder.is_dir()]
+    moved = {_sha1(folder): _sha1(copy / folder.relative_to(ROOT)) for folder in folders}
+    for cached in list((copy / "cache").glob("**/*_*")):
+        name, _, source = cached.name.rpartition("_")
+        if cached.is_dir() and source in moved:
+            cached.rename(cached.with_name(f"{name}_{moved[source]}"))
+
+
+def _sha1(folder: Path) -> str:
+    return hashlib.sha1(str(folder).encode()).hexdigest()
 
 
 def main() -> int:

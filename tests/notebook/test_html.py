@@ -3,26 +3,30 @@
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from html import escape, unescape
 from html.parser import HTMLParser
 from typing import Any, Literal
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from syrupy.assertion import SnapshotAssertion
 
 import sagline as sl
 from sagline.notebook import figures, html
 from sagline.notebook.html import LARGEST
+from sagline.notebook.verdicts import told
 from tests.calibration.made_up import made_up
 from tests.effort import least_seconds
 from tests.plot import made
+from tests.tiers import extended, wide
 
 LONGEST = 2.0  # s of the processor of an ordinary machine
 ROBOT = sl.load_robot("article-suspended")
 PATH = sl.article_path(rate=5.0)
-PLAN = sl.inverse(ROBOT, PATH)
 
 
 def shown(thing: Any) -> str:
@@ -56,43 +60,46 @@ class Balanced(HTMLParser):
         assert self.open.pop() == tag
 
 
-def things() -> dict[str, Any]:
-    far = sl.inverse(ROBOT, sl.Pose([0.0, 0.0, 9.0], np.eye(3)))
-    outside = sl.Pose([[0.0, 0.0, 1.5], [7.3, 0.0, 1.5], [7.3, 0.0, 1.5], [0.0, 0.0, 2.0]], np.eye(3))
-    return {
-        "robot": ROBOT,
-        "robot without a test box": ROBOT.replace(test_box=None),
-        "path": PATH,
-        "plan": PLAN,
-        "plan of one pose": sl.inverse(ROBOT, PATH.pose[0]),
-        "plan of no answer": far,
-        "plan with gaps": sl.inverse(ROBOT, outside),
-        "confirmation": sl.confirm(PLAN),
-        "forward": sl.forward(ROBOT, PLAN.unstrained_length[0], PATH.pose[0]),
-        "workspace": sl.workspace(ROBOT, wrenches=sl.WrenchBox(force=50.0), cells=8),
-        "nowhere": sl.workspace(ROBOT, wrenches=sl.WrenchBox(force=9e4), cells=4),
-        "simulation": made.simulation(20),
-        "vibration": made.vibration(made.state_at(), np.array([1.0, 2.0]), np.array([0.9, 0.1])),
-        "calibration": made_up(count=20),
-    }
-
-
-THINGS = things()
+OUTSIDE = sl.Pose([[0.0, 0.0, 1.5], [7.3, 0.0, 1.5], [7.3, 0.0, 1.5], [0.0, 0.0, 2.0]], np.eye(3))
+THINGS: dict[str, Callable[[], Any]] = {
+    "plan": made.plan,
+    "robot": lambda: ROBOT,
+    "robot without a test box": lambda: ROBOT.replace(test_box=None),
+    "path": lambda: PATH,
+    "plan of one pose": lambda: sl.inverse(ROBOT, PATH.pose[0]),
+    "infeasible plan": lambda: sl.inverse(ROBOT, sl.Pose([0.0, 0.0, 9.0], np.eye(3))),
+    "plan with gaps": lambda: sl.inverse(ROBOT, OUTSIDE),
+    "confirmation": lambda: sl.confirm(made.plan()),
+    "forward": lambda: sl.forward(ROBOT, made.plan().unstrained_length[0], PATH.pose[0]),
+    "workspace": lambda: sl.workspace(ROBOT, wrenches=sl.WrenchBox(force=50.0), cells=8),
+    "nowhere": lambda: sl.workspace(ROBOT, wrenches=sl.WrenchBox(force=9e4), cells=4),
+    "simulation": lambda: made.simulation(20),
+    "vibration": lambda: made.vibration(made.state_at(), np.array([1.0, 2.0]), np.array([0.9, 0.1])),
+    "calibration": lambda: made_up(count=20),
+}
 DRAWN = (
-    *("robot", "path", "plan", "plan of one pose", "plan of no answer", "plan with gaps"),
+    *("plan", "robot", "path", "plan of one pose", "infeasible plan", "plan with gaps"),
     *("confirmation", "workspace", "simulation", "calibration"),
 )
 
 
 @cache
+def thing_of(name: str) -> Any:
+    return THINGS[name]()
+
+
+@cache
 def once(name: str) -> str:
-    return shown(THINGS[name])
+    return shown(thing_of(name))
 
 
-@pytest.mark.parametrize("name", THINGS)
+@pytest.mark.parametrize("name", wide(THINGS))
 def test_a_page_gets_whole_html_of_reasonable_size_in_reasonable_time(name: str) -> None:
-    thing = THINGS[name]
+    thing = thing_of(name)
     text = once(name)
+    verdict = told(thing)
+    assert verdict is not None
+    assert unescape(re.sub(r"<[^>]+>", "", text)).startswith(f"{verdict.name}: {verdict.verdict}")
     assert Balanced(text).open == []
     assert len(text.encode()) < LARGEST + 10_000
     assert ("<svg" in text) == (name in DRAWN)
@@ -100,30 +107,26 @@ def test_a_page_gets_whole_html_of_reasonable_size_in_reasonable_time(name: str)
     assert not re.search(r"""(?:src|href)=["']?(?!#|data:)\w""", text)  # nothing is loaded from elsewhere
 
 
-def test_verdicts_come_first() -> None:
-    said = {name: re.sub(r"<[^>]+>", "", once(name).split("<svg")[0]) for name in THINGS}
-    assert said["robot"].startswith("article-suspended: held in the middle of its test box by ")
-    assert said["plan"].startswith(f"Plan of article-suspended: all {len(PATH)} poses are feasible")
-    tension = PLAN.chord_tension
-    assert f"chord tensions {tension.min():.4g}\u00a0N to {tension.max():.4g}\u00a0N" in said["plan"]
-    assert said["plan of no answer"].startswith("Plan of article-suspended: no tensions within the limits balance")
-    assert said["plan with gaps"].startswith("Plan of article-suspended: 2 of 4 feasible")
-    short = THINGS["plan with gaps"].shortfall[1]
-    assert f"poses 1 to 2, {short:.1f}\u00a0N short: no tensions" in said["plan with gaps"]
-    assert said["confirmation"].startswith(f"Confirmation of article-suspended: {len(PATH)} of {len(PATH)} planned")
+def test_verdicts(snapshot: SnapshotAssertion) -> None:
+    names = ("robot", "plan", "infeasible plan", "plan with gaps", "confirmation", "forward", "workspace")
+    found = {name: told(thing_of(name)) for name in names}
+    assert {name: each and (each.name, each.verdict, each.good) for name, each in found.items()} == snapshot
+    said = {name: "\n".join((each.verdict, *each.lines)) for name, each in found.items() if each is not None}
+    tension = made.plan().chord_tension
+    assert f"{len(PATH)} poses" in said["plan"]
+    assert f"{tension.min():.4g}\u00a0N to {tension.max():.4g}\u00a0N" in said["plan"]
+    assert f"1 to 2, {thing_of('plan with gaps').shortfall[1]:.1f}\u00a0N" in said["plan with gaps"]
     assert "limited by" in said["workspace"]
-    assert said["forward"].startswith("Equilibrium of article-suspended: 1 of 1 solved, 1 stable")
 
 
 @pytest.mark.parametrize(("pattern", "freedoms"), [("3T", 3), ("1R2T", 3), ("3R3T", 6)])
 def test_freedoms_are_those_of_the_motion_pattern(pattern: Literal["3T", "1R2T", "3R3T"], freedoms: int) -> None:
-    robot = THINGS["robot"]
-    robot = sl.Robot("any", robot.frame_anchors, robot.platform_anchors, robot.cables, 10.0, robot.inertia,
+    robot = sl.Robot("any", ROBOT.frame_anchors, ROBOT.platform_anchors, ROBOT.cables, 10.0, ROBOT.inertia,
                      motion_pattern=pattern, plane_normal=[0, 1, 0] if pattern == "1R2T" else None)  # fmt: skip
     assert f"8 cables, {freedoms} freedoms ({pattern})" in re.sub(r"<[^>]+>", "", shown(robot))
 
 
-@pytest.mark.parametrize("name", DRAWN)
+@pytest.mark.parametrize("name", wide(DRAWN))
 def test_drawings_have_the_colors_of_the_page(name: str) -> None:
     """So that they are read in Jupyter's dark theme: what is black or gray takes the color of the page's text."""
     text = once(name)
@@ -135,6 +138,7 @@ def test_drawings_have_the_colors_of_the_page(name: str) -> None:
     assert "style" not in {element.tag.rpartition("}")[2] for element in picture.iter()}  # would hold for all the page
 
 
+@extended
 def test_names_in_drawings_are_their_own() -> None:
     texts = [once(name) for name in DRAWN]
     names = [re.findall(r'\bid="([^"]+)"', text) for text in texts]
@@ -150,11 +154,13 @@ def test_what_is_written_is_text() -> None:
 
 
 def test_names_are_escaped() -> None:
-    text = shown(ROBOT.replace(name="<b>a & b</b>"))
-    assert "&lt;b&gt;a &amp; b&lt;/b&gt;" in text
+    name = "<b>a & b</b>"
+    text = shown(ROBOT.replace(name=name))
+    assert text.count(escape(name)) == 2  # the verdict, and the description of the drawing
     assert "<b>" not in text
 
 
+@extended
 def test_long_plans_and_many_marks_stay_small() -> None:
     path = sl.article_path(rate=2000.0)
     plan = sl.inverse(ROBOT, path)
@@ -174,8 +180,8 @@ def test_what_cannot_be_drawn_is_told_without_a_figure(monkeypatch: pytest.Monke
         raise RuntimeError("no fonts")
 
     monkeypatch.setattr(figures, "figure_of", fails)
-    text = shown(PLAN)
-    assert "poses are feasible" in text
+    text = shown(made.plan())
+    assert f"{len(PATH)} poses" in text
     assert "<svg" not in text
 
 
@@ -184,22 +190,23 @@ def test_what_cannot_be_told_has_its_ordinary_text(monkeypatch: pytest.MonkeyPat
         raise RuntimeError("broken")
 
     monkeypatch.setattr(html, "told", fails)
-    assert PLAN._repr_html_() is None  # Jupyter shows repr() then
+    assert made.plan()._repr_html_() is None  # Jupyter shows repr() then
     monkeypatch.undo()
-    assert PLAN.state.cables._repr_html_() is None
-    broken = replace(PLAN, status=np.full(3, 77, dtype=np.int8))  # no such code, and none of that number
+    assert made.plan().state.cables._repr_html_() is None
+    broken = replace(made.plan(), status=np.full(3, 77, dtype=np.int8))  # no such code, and none of that number
     assert broken._repr_html_() is None or "<svg" not in shown(broken) or Balanced(shown(broken)).open == []
 
 
+@extended
 def test_figures_too_large_become_pictures_and_then_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = once("plan")
     monkeypatch.setattr(html, "LARGEST", len(whole) // 3)
-    assert "<svg" not in shown(PLAN)
+    assert "<svg" not in shown(made.plan())
     monkeypatch.setattr(html, "LARGEST", 100)
-    text = shown(PLAN)
+    text = shown(made.plan())
     assert "<svg" not in text
     assert "<img" not in text
-    assert "poses are feasible" in text
+    assert f"{len(PATH)} poses" in text
 
 
 WITHOUT = """
@@ -215,6 +222,7 @@ print("<svg" in text, "article-suspended" in text)
 """
 
 
+@extended
 @pytest.mark.parametrize(
     ("before", "said"),
     [pytest.param("", "True True", marks=pytest.mark.soak), ("sys.modules['matplotlib'] = None", "False True")],
@@ -237,4 +245,4 @@ def test_a_robot_is_shown_before_anything_is_compiled(tmp_path_factory: pytest.T
         "print('<svg' in text, 'held' in text, time.process_time() < 30.0)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "True False True"
+    assert done.stdout.split() == ["True", "False", "True"]

@@ -10,6 +10,8 @@ import pytest
 import sagline as sl
 from benchmarks.design import inside, posts
 from tests.optimization.pair import BEST, MARGIN, UNDER, WEIGHT, apart, pair
+from tests.refusal import refused
+from tests.tiers import extended, wide
 
 OPTIMIZERS = {"cma": 1e-6, "differential_evolution": 1e-6, "nsga2": 5e-3}  # and how near 600 robots lead [m]
 
@@ -19,7 +21,7 @@ def search(robot: sl.Robot, free: Any, goals: Any = ("least_margin",), **more: A
     return sl.design(robot, free, list(goals), **given)
 
 
-@pytest.mark.parametrize("optimizer", OPTIMIZERS)
+@pytest.mark.parametrize("optimizer", wide(OPTIMIZERS))
 def test_every_optimizer_finds_the_best_anchors(optimizer: str) -> None:
     front = search(pair(), [apart()], optimizer=optimizer, evaluations=600)
     near = OPTIMIZERS[optimizer]
@@ -50,7 +52,7 @@ def global_state() -> bytes:
     return bytes(state[1].tobytes())
 
 
-@pytest.mark.parametrize("optimizer", OPTIMIZERS)
+@pytest.mark.parametrize("optimizer", wide(OPTIMIZERS))
 def test_a_seed_gives_the_same_robots_bit_for_bit(optimizer: str) -> None:
     np.random.seed(1)  # noqa: NPY002 - what the packages would use
     before = global_state()
@@ -64,7 +66,7 @@ def test_a_seed_gives_the_same_robots_bit_for_bit(optimizer: str) -> None:
     assert not np.array_equal(first.evaluated[: len(other.evaluated)], other.evaluated[: len(first.evaluated)])
 
 
-@pytest.mark.parametrize("optimizer", OPTIMIZERS)
+@pytest.mark.parametrize("optimizer", wide(OPTIMIZERS))
 def test_it_begins_with_the_robot_itself_and_stays_within_bounds(optimizer: str) -> None:
     front = search(pair(), [apart(-0.25, 0.75)], optimizer=optimizer, evaluations=200)
     assert front.evaluated[0, 0] == 0.0
@@ -77,9 +79,7 @@ def test_where_nothing_is_better_it_says_so() -> None:
     front = search(pair(BEST), [apart(-0.5, 0.0)], evaluations=60)
     assert not front.better
     assert front.best is front.start
-    assert front.text == (
-        f"None of {len(front.evaluated)} robots is better than pair: widen what is free, or allow more evaluations."
-    )
+    assert f" {len(front.evaluated)} robots " in front.text
     assert str(front) == front.text
 
 
@@ -136,6 +136,7 @@ def test_moving_anchors_follow_the_platform() -> None:
     np.testing.assert_allclose(own, found.margin, rtol=1e-12)
 
 
+@extended
 def test_a_search_with_moving_anchors_knows_that_they_move() -> None:
     across = np.array([-1.0, 0.0, 1.0])
     poses = sl.Pose(np.column_stack((across, 0.0 * across, 0.0 * across)), np.eye(3))
@@ -150,8 +151,9 @@ def test_a_package_that_is_missing_is_named_with_its_extra(monkeypatch: pytest.M
         raise ModuleNotFoundError(f"No module named {module!r}", name=module)
 
     monkeypatch.setattr("sagline.optimization.extras.import_module", gone)
-    with pytest.raises(sl.InvalidValueError, match=r'the package cma is missing.*pip install "sagline\[design\]"'):
+    with refused("the package cma", "missing", kind=sl.InvalidValueError) as caught:
         search(pair(), [apart()])
+    assert '"sagline[design]"' in caught.value.next_step
     assert search(pair(), [apart()], optimizer="differential_evolution", evaluations=40).better
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import sagline as sl
 from sagline.optimization.front import PENALTY, best_of_front, costs_of
 from tests.optimization.pair import UNDER, apart, pair
+from tests.tiers import extended
 
 
 def test_a_front_is_what_no_other_beats() -> None:
@@ -31,6 +32,7 @@ def test_costs_are_finite_whatever_the_values() -> None:
     np.testing.assert_array_equal(costs[3], [PENALTY, 2.0])
 
 
+@extended
 def test_wider_anchors_trade_margin_for_tension() -> None:
     """Two goals with a known front: the wider the angle, up to 60 degrees, the more margin and the more tension."""
     goals = [sl.Goal("least_margin"), sl.Goal("largest_tension")]

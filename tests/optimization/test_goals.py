@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.optimization.free_cable import FreeCable
+from sagline import FreeCable
+from sagline.optimization.candidates import Candidates
 from sagline.optimization.planned import planned
-from sagline.statics.tables import cable_table, pose_rows
 from tests.tension.reference import random_poses
 
 PRESETS = ("article-suspended", "cogiro", "ipanema-1", "expo2015-lucia-pulleys", "fast", "copacabana")
@@ -19,8 +19,10 @@ def test_what_is_planned_of_tables_is_what_inverse_plans_of_robots(name: str) ->
     robot, seed = sl.load_robot(name), np.random.default_rng(4)
     poses = random_poses(robot, 30, seed)
     wrench = robot.freedom.T @ robot.freedom @ np.array([5.0, -3.0, 8.0, 0.5, -0.25, 0.75])
-    table = np.repeat(cable_table(robot), len(poses), axis=0)
-    found = planned(robot, sl.Catenary(), table, pose_rows(poses), wrench, stiffness=True)
+    lift = sl.FreeAnchors("frame", -0.1, 0.1, along=[0, 0, 1], symmetry="together")
+    table = Candidates(robot, [lift]).cables(np.zeros((len(poses), 1)))  # the robot's own
+    rows = np.hstack((poses.position, poses.quaternion))
+    found = planned(robot, sl.Catenary(), table, rows, wrench, stiffness=True)
     plan = sl.inverse(robot, poses, tension=sl.MinimumNorm(), wrench=wrench)
     held = ~np.isnan(found.tension)
     assert held.sum() > 5

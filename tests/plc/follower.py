@@ -6,9 +6,9 @@ import sys
 
 import numpy as np
 
-from sagline.control.link import PERIOD, Command, Mode, Sample
-from sagline.control.pace import Pace
+from sagline.control import Command, Mode, Pace, Sample
 from sagline.plc import S7Link
+from tests.control.protocol import PERIOD
 
 RATE = 0.005  # m/s
 OWNER = 11

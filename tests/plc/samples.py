@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sagline.arrays import Array
-from sagline.control.link import Command, Mode, Sample
+from sagline.control import Command, Mode, Sample
 
 
 def a_sample(winches: int, seed: int = 0, **values: Any) -> Sample:

@@ -12,12 +12,10 @@ from typing import Any, NamedTuple
 import pytest
 
 import sagline as sl
-from sagline.control.link import Sample
+from sagline.control import Sample
 from sagline.plc.block_link import BlockLink
-from sagline.twin.mirrors import Mirrors
-from sagline.twin.modbus_mirrors import ModbusMirrors
-from sagline.twin.s7_mirrors import S7Mirrors
 from tests.plc.samples import a_sample, sample_blocks
+from tests.twin.blocks import Mirrors, ModbusMirrors, S7Mirrors
 
 OWNER = 4711
 PATIENCE = 20.0  # s: for a machine that has much else to do; nothing waits so long where all is well

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import subprocess
 import sys
@@ -14,14 +15,16 @@ import pytest
 
 import sagline as sl
 from sagline.arrays import Array
-from sagline.control.link import HEARTBEAT, PERIOD, RAMP, GroupFault, GroupStatus, Mode, Sample
-from sagline.control.pace import Pace
-from sagline.control.states import State
+from sagline.control import Mode, Pace, Sample, State
 from sagline.twin import SCAN
+from tests.control.protocol import HEARTBEAT, PERIOD, RAMP, GroupFault, GroupStatus
 from tests.plc.follower import OWNER, RATE
 from tests.plc.samples import a_command
 from tests.plc.servers import PATIENCE, taken, until
 from tests.plc.twins import Twin, a_twin, interrupted
+from tests.tiers import extended
+
+pytestmark = extended  # real time, processes and sockets
 
 ROOT = Path(__file__).parents[2]
 TRIES = 8
@@ -130,7 +133,7 @@ def a_frozen_machine_is_a_fault_that_can_be_acknowledged(control: sl.control.Con
     done = control.wait()
     twin.signal(signal.SIGCONT)
     assert done.status is sl.control.ExecutionStatus.FAULT
-    assert "newest sample is" in done.reason
+    assert re.match(r"group .* \d+ ms", done.reason)
 
     def is_back() -> bool:
         control.cycle()
@@ -148,7 +151,7 @@ def a_killed_machine_is_a_fault(control: sl.control.Controller, twin: Twin) -> N
     done = control.wait()
     assert done.status is sl.control.ExecutionStatus.FAULT
     assert control.state is State.FAULT
-    assert "newest sample is" in done.reason
+    assert re.match(r"group .* \d+ ms", done.reason)
 
 
 @pytest.mark.soak
@@ -156,5 +159,5 @@ def test_ctrl_c_ends_a_twin_with_130_and_without_a_traceback() -> None:
     with a_twin() as twin:
         code, said = interrupted(twin)
     assert code == 130
-    assert said.splitlines()[-1] == "Interrupted. What has been written is whole."
+    assert said.splitlines()[-1].startswith("Interrupted.")
     assert "Traceback" not in said

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
 
 import sagline as sl
+from sagline import Damping, EnergyBalance, Occurrence, Simulation, Vibration, VibrationStatus
 from sagline.arrays import Array
-from sagline.dynamics.damping import Damping
-from sagline.dynamics.simulation import EnergyBalance, Occurrence, Simulation
-from sagline.dynamics.vibration import Vibration
-from sagline.dynamics.vibration_status import VibrationStatus
 
 ROBOT = sl.load_robot("article-suspended")
+
+
+@cache
+def plan() -> sl.Plan:
+    """The plan of the article's path, 301 poses."""
+    return sl.inverse(ROBOT, sl.article_path(rate=5.0))
 
 
 def state_at(x: float = 0.0, y: float = 0.0) -> sl.Equilibrium:

@@ -1,5 +1,6 @@
 """Figures of vibrations and simulations hold the numbers they claim to show."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -7,27 +8,29 @@ import pytest
 from matplotlib.collections import LineCollection, QuadMesh
 from matplotlib.figure import Figure
 from PIL import Image
+from syrupy.assertion import SnapshotAssertion
 
 import sagline as sl
-from sagline import plot
-from sagline.dynamics.damping import Damping
+from sagline import Damping, VibrationStatus, plot
 from sagline.dynamics.mode_list import ListedMode
-from sagline.dynamics.vibration_status import VibrationStatus
 from sagline.plot.film import shares_told
 from tests.plot import made
+from tests.refusal import refused
+from tests.tiers import extended
 
 FREQUENCY = np.array([1.5, 2.2, 2.9, 4.0])
 SHARE = np.array([1.0, 0.25, 0.5, 0.0])
+DIRECTIONS = "x, y, z, about x, about y, about z"
 
 
-def test_the_response_on_cables_that_hardly_weigh_is_that_of_a_platform_on_springs() -> None:
+def test_the_response_on_cables_that_hardly_weigh_is_that_of_a_platform_on_springs(snapshot: SnapshotAssertion) -> None:
     light = made.ROBOT.replace(cables=made.ROBOT.cables.replace(linear_density=1e-6))
     state = sl.inverse(light, sl.Pose([1.0, 0.5, 1.5], np.eye(3)), tension=sl.MinimumNorm()).state
     found = sl.modes(state)
     own = made.vibration(state, found.frequency, np.ones(6), Damping(modal_damping=0.02), up_to=20.0)
     ax = plot.response(own, "y")
     with_mass, massless = ax.get_lines()[:2]
-    assert (with_mass.get_label(), massless.get_label()) == ("with cable mass", "massless")
+    assert (with_mass.get_label(), massless.get_label()) == snapshot
     np.testing.assert_allclose(np.asarray(with_mass.get_ydata()), np.asarray(massless.get_ydata()), rtol=1e-3)
     frequency = np.asarray(with_mass.get_xdata())
     # modal damping is a loss factor, twice as large, of the stiffness; the inverse of the whole matrix, not a sum
@@ -36,7 +39,7 @@ def test_the_response_on_cables_that_hardly_weigh_is_that_of_a_platform_on_sprin
     for k in (0, 200, 500, frequency.size - 1):
         answer = np.linalg.inv((1.0 + 0.04j) * square - (2.0 * np.pi * frequency[k]) ** 2 * mass)
         assert np.asarray(massless.get_ydata())[k] == pytest.approx(abs(answer[1, 1]), rel=1e-6)
-    assert ax.get_ylabel() == "motion along y for a force along y [m/N]"
+    assert ax.get_ylabel() == snapshot
     assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")
     assert ax.get_title(loc="right") == "modal damping 2 %"
 
@@ -60,12 +63,12 @@ def test_losses_that_couple_modes_are_in_the_response() -> None:
         assert answer[k] == pytest.approx(abs(exact[2, 2]), rel=1e-3)
 
 
-def test_the_response_below_all_modes_is_the_compliance() -> None:
+def test_the_response_below_all_modes_is_the_compliance(snapshot: SnapshotAssertion) -> None:
     state = made.state_at(2.0, 1.0)
     ax = plot.response(made.vibration(state, FREQUENCY, SHARE), "x", "about z")
     static = abs(sl.stiffness(state).compliance[5, 0])
     assert np.asarray(ax.get_lines()[0].get_ydata())[0] == pytest.approx(static, rel=0.1)
-    assert ax.get_ylabel() == "rotation about z for a force along x [1/N]"
+    assert ax.get_ylabel() == snapshot
     marks = [np.asarray(line.get_xdata())[0] for line in ax.get_lines()[2:]]
     np.testing.assert_array_equal(marks, FREQUENCY)
 
@@ -106,7 +109,7 @@ def test_the_response_with_cable_mass_is_that_of_the_exact_stiffness_of_the_cabl
     np.testing.assert_allclose(answer, np.abs(exact), rtol=0.02)
 
 
-def test_what_frequency_response_found_is_drawn_where_it_was_asked_for() -> None:
+def test_what_frequency_response_found_is_drawn_where_it_was_asked_for(snapshot: SnapshotAssertion) -> None:
     state, damping = made.state_at(3.0, 2.0), Damping(modal_damping=0.02, loss_time=1e-4)
     frequency = np.concatenate(([0.0], np.geomspace(8.0, 0.5, 40)))  # in any order, and at rest
     found = sl.frequency_response(state, frequency, damping)
@@ -114,34 +117,33 @@ def test_what_frequency_response_found_is_drawn_where_it_was_asked_for() -> None
     for line, answer in zip(ax.get_lines(), (found.compliance, found.massless_compliance), strict=True):
         np.testing.assert_array_equal(line.get_xdata(), frequency[:0:-1])
         np.testing.assert_allclose(np.asarray(line.get_ydata()), np.abs(answer[:0:-1, 0, 4]), rtol=1e-15)
-    assert [line.get_label() for line in ax.get_lines()] == ["with cable mass", "massless"]
-    assert ax.get_ylabel() == "motion along x for a moment about y [1/N]"
-    assert ax.get_title(loc="right") == "modal damping 2 %, loss time 0.0001 s"
-    with pytest.raises(sl.InvalidValueError, match="frequency is 1 of them above 0 Hz; allowed: two at least"):
+    assert [line.get_label() for line in ax.get_lines()] == snapshot
+    assert [ax.get_ylabel(), ax.get_title(loc="right")] == snapshot
+    with refused("frequency", "1 of them above 0 Hz", "two at least", kind=sl.InvalidValueError):
         plot.response(sl.frequency_response(state, [0.0, 2.0]))
-    with pytest.raises(sl.InvalidValueError, match="motion is 'w'; allowed: x, y, z, about x"):
+    with refused("motion", "'w'", DIRECTIONS, kind=sl.InvalidValueError):
         plot.response(found, "x", "w")
 
 
 def test_a_response_needs_modes_and_a_motion() -> None:
     state = made.state_at()
     lost = made.vibration(state, FREQUENCY, SHARE, status=VibrationStatus.UNSTABLE)
-    with pytest.raises(sl.InvalidValueError, match="vibration is UNSTABLE"):
+    with refused("vibration", "UNSTABLE", kind=sl.InvalidValueError):
         plot.response(lost)
-    with pytest.raises(sl.InvalidValueError, match="no mode below up_to"):
+    with refused("vibration", kind=sl.InvalidValueError):
         plot.response(made.vibration(state, FREQUENCY[:0], SHARE[:0]))
-    with pytest.raises(sl.InvalidValueError, match="force is 'w'; allowed: x, y, z, about x"):
+    with refused("force", "'w'", DIRECTIONS, kind=sl.InvalidValueError):
         plot.response(made.vibration(state, FREQUENCY, SHARE), "w")
 
 
-def test_undamped_peaks_are_cut_and_told() -> None:
+def test_undamped_peaks_are_cut_and_told(snapshot: SnapshotAssertion) -> None:
     state = made.state_at()
     ax = plot.response(made.vibration(state, FREQUENCY, SHARE, Damping()))
-    assert ax.get_title(loc="right") == "undamped: peaks have no top"
+    assert ax.get_title(loc="right") == snapshot
     assert ax.get_ylim()[1] <= 300.0 * sl.stiffness(state).compliance[0, 0]
 
 
-def test_frequencies_along_a_path_are_as_wide_as_the_platforms_share() -> None:
+def test_frequencies_along_a_path_are_as_wide_as_the_platforms_share(snapshot: SnapshotAssertion) -> None:
     clock = np.array([0.0, 0.5, 2.0])
     states = [
         made.vibration(made.state_at(x), FREQUENCY[: 4 - (k == 1)] + 0.1 * k, (SHARE + 0.1 * k)[: 4 - (k == 1)] / 1.2)
@@ -160,19 +162,18 @@ def test_frequencies_along_a_path_are_as_wide_as_the_platforms_share() -> None:
     legend = ax.get_legend()
     assert legend is not None
     words = [text.get_text() for text in legend.get_texts()]
-    assert words[0] == "with cable mass, platform share 100 %"
-    assert words[-1] == "massless"
+    assert [words[0], words[-1]] == snapshot
     assert ax.get_xlabel() == "time [s]"
     assert plot.frequencies(states).get_xlabel() == "state"
 
 
 def test_frequencies_need_two_states_and_their_times() -> None:
     one = made.vibration(made.state_at(), FREQUENCY, SHARE)
-    with pytest.raises(sl.InvalidValueError, match="vibrations is 1 of them"):
+    with refused("vibrations", "1 of them", kind=sl.InvalidValueError):
         plot.frequencies([one])
-    with pytest.raises(sl.InvalidValueError, match="time"):
+    with refused("time", kind=sl.InvalidValueError):
         plot.frequencies([one, one], [1.0, 0.0])
-    with pytest.raises(sl.InvalidValueError, match=r"vibrations\[1\]"):
+    with refused("vibrations[1]", kind=sl.InvalidValueError):
         plot.frequencies([one, 3.0])  # type: ignore[list-item]
 
 
@@ -204,7 +205,7 @@ def test_axes_of_the_caller_are_used() -> None:
     assert plot.frequencies([one, one], ax=right) is right
 
 
-def test_a_map_has_the_value_of_a_pose_where_the_pose_is() -> None:
+def test_a_map_has_the_value_of_a_pose_where_the_pose_is(snapshot: SnapshotAssertion) -> None:
     x, y, z = np.meshgrid([-1.0, 0.5, 2.0], [0.0, 1.0], [1.5, 2.0], indexing="ij")
     order = np.random.default_rng(4).permutation(x.size)
     poses = sl.Pose(np.stack((x, y, z), axis=-1).reshape(-1, 3)[order], np.eye(3))
@@ -219,10 +220,10 @@ def test_a_map_has_the_value_of_a_pose_where_the_pose_is() -> None:
             for j, row in enumerate((0.0, 1.0)):
                 k = int(np.flatnonzero(np.all(found.pose.position == (column, row, height), axis=1))[0])
                 assert values[j, i] == found.peak[k]
-    assert figure.axes[-1].get_ylabel() == "strongest answer with cable mass [m/N]"
-    with pytest.raises(sl.InvalidValueError, match="fill no grid"):
+    assert figure.axes[-1].get_ylabel() == snapshot
+    with refused("found", "5 poses that fill no grid", kind=sl.InvalidValueError):
         plot.frequency_map(sl.frequency_map(made.ROBOT, poses[:5], up_to=4.0))
-    with pytest.raises(sl.InvalidValueError, match="quantity is 'mode'"):
+    with refused("quantity", "'mode'", kind=sl.InvalidValueError):
         plot.frequency_map(found, "mode")
 
 
@@ -230,10 +231,12 @@ def test_a_film_says_whose_the_energy_is() -> None:
     def told(cable: int | None, share: float) -> str:
         return shares_told(ListedMode(1, "with cable mass", 2.0, 1.0 - share, cable, share, 0.01))
 
-    assert told(3, 0.25) == "kinetic energy: platform 75 %, cable 3 25 %"
-    assert told(3, 0.004) == told(None, 0.004) == "kinetic energy: platform 100 %, each cable less than 1 %"
+    assert re.findall(r"\d+", told(3, 0.25)) == ["75", "3", "25"]
+    assert told(3, 0.004) == told(None, 0.004)
+    assert re.findall(r"\d+", told(3, 0.004)) == ["100", "1"]
 
 
+@extended
 def test_a_film_lasts_ten_seconds_and_is_a_gif(tmp_path: Path) -> None:
     found = sl.vibration(made.state_at(), up_to=2.0)
     told: list[tuple[int, int]] = []
@@ -241,7 +244,7 @@ def test_a_film_lasts_ten_seconds_and_is_a_gif(tmp_path: Path) -> None:
     with Image.open(tmp_path / "mode.gif") as film:
         assert film.n_frames * film.info["duration"] == 10_000  # type: ignore[attr-defined]
     assert told[-1] == (25, 25)
-    with pytest.raises(sl.InvalidValueError, match=r"number is 99; allowed: 1 to \d"):
+    with refused("number", "99", f"1 to {found.frequency.size}, modes with cable mass", kind=sl.InvalidValueError):
         plot.film(found, 99, tmp_path / "mode.gif")
-    with pytest.raises(sl.FileError, match="suffix"):
+    with refused(kind=sl.FileError, file=tmp_path / "mode.mp4", next_step="Name it .gif."):
         plot.film(found, 1, tmp_path / "mode.mp4")

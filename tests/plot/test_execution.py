@@ -4,18 +4,18 @@ import sys
 
 import numpy as np
 import pytest
+from syrupy.assertion import SnapshotAssertion
 
 import sagline as sl
 from sagline.control import Execution, State
 from tests.files.executions import execution
+from tests.tiers import extended
 
 
-def test_four_panels_with_units_and_a_line_at_each_fault() -> None:
+def test_four_panels_with_units_and_a_line_at_each_fault(snapshot: SnapshotAssertion) -> None:
     figure = sl.plot.execution(execution())
     band, tensions, error, place = figure.axes
-    assert [panel.get_ylabel() for panel in (tensions, error, place)] == [
-        "tension at the frame [N]", "mendable tension\nerror [N]", "estimated less\nplanned [mm]",
-    ]  # fmt: skip
+    assert [panel.get_ylabel() for panel in (tensions, error, place)] == snapshot
     assert place.get_xlabel() == "time [s]"
     for panel in figure.axes:
         marks = [line for line in panel.lines if np.shape(line.get_xdata()) == (2,)]
@@ -58,6 +58,7 @@ def test_long_courses_keep_their_peaks(monkeypatch: pytest.MonkeyPatch) -> None:
     assert (np.diff(np.asarray(line.get_xdata(), dtype=float)) >= 0.0).all()
 
 
+@extended
 @pytest.mark.parametrize("width", [80.0, 120.0])
 def test_a_panel_fits_paper(width: float) -> None:
     """Nothing is drawn beyond the sheet [mm]."""

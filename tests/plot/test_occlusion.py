@@ -7,6 +7,7 @@ import pytest
 
 from sagline.arrays import Array
 from sagline.plot.occlusion import ALONG, Line, directions, seen
+from tests.tiers import wide
 
 HALF, GAP = 0.02, 0.05
 NEAR = 1e-3  # of a place where something begins to be hidden: there both answers are right
@@ -117,7 +118,7 @@ def distance_to(parts: list[Array], point: Array) -> float:
     return least
 
 
-@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(k, marks=pytest.mark.soak) for k in range(2, 40))])
+@pytest.mark.parametrize("seed", wide([0, 1, *(pytest.param(k, marks=pytest.mark.soak) for k in range(2, 40))]))
 def test_what_is_left_out_is_what_a_ray_finds_hidden(seed: int) -> None:
     scene = Scene(seed)
     generator = np.random.default_rng(100 + seed)

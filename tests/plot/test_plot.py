@@ -15,14 +15,25 @@ from matplotlib.patches import Rectangle
 from matplotlib.path import Path as OutlinePath
 from matplotlib.text import Annotation, Text
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from syrupy.assertion import SnapshotAssertion
 
 import sagline as sl
-from sagline import plot
-from sagline.errors import FileError, InvalidValueError
+from sagline import FileError, InvalidValueError, plot
+from tests.plot import made
+from tests.refusal import refused
+from tests.tiers import extended, wide
 
 SUSPENDED = sl.load_robot("article-suspended")
 PATH = sl.article_path(rate=5.0)
-PLAN = sl.inverse(SUSPENDED, PATH)
+
+
+TENSIONS = {
+    "chord_tension": r"chord tension $\tau$ [N]",
+    "horizontal_tension": "horizontal tension $T_x$ [N]",
+    "vertical_force": "vertical force $T_z$ [N]",
+    "frame_end_tension": "tension at the frame end $T_A$ [N]",
+    "platform_end_tension": "tension at the platform end $T_B$ [N]",
+}
 
 
 def courses(ax: Axes) -> np.ndarray:
@@ -35,48 +46,44 @@ def legend(ax: Axes) -> list[str]:
     return [text.get_text() for text in found.get_texts()]
 
 
-@pytest.mark.parametrize(
-    ("quantity", "label"),
-    [
-        ("chord_tension", r"chord tension $\tau$ [N]"),
-        ("horizontal_tension", "horizontal tension $T_x$ [N]"),
-        ("vertical_force", "vertical force $T_z$ [N]"),
-        ("frame_end_tension", "tension at the frame end $T_A$ [N]"),
-        ("platform_end_tension", "tension at the platform end $T_B$ [N]"),
-    ],
-)
+@pytest.mark.parametrize(("quantity", "label"), TENSIONS.items())
 def test_tensions(quantity: str, label: str) -> None:
-    ax = plot.tensions(PLAN, quantity)
-    np.testing.assert_array_equal(courses(ax), getattr(PLAN.state.cables, quantity).T)
+    ax = plot.tensions(made.plan(), quantity)
+    np.testing.assert_array_equal(courses(ax), getattr(made.plan().state.cables, quantity).T)
     np.testing.assert_array_equal(ax.get_lines()[0].get_xdata(), PATH.time)
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("time [s]", label)
     assert legend(ax) == [f"cable {i}" for i in range(8)]
 
 
 def test_lengths_in_metres_and_adjusting_lengths_in_millimetres() -> None:
-    np.testing.assert_array_equal(courses(plot.lengths(PLAN)), PLAN.unstrained_length.T)
-    ax = plot.lengths(PLAN, "adjusting_length")
-    chord = np.hypot(PLAN.state.cables.span, PLAN.state.cables.rise)
-    np.testing.assert_allclose(courses(ax), 1e3 * (PLAN.unstrained_length - chord).T, rtol=1e-12, atol=1e-11)
+    np.testing.assert_array_equal(courses(plot.lengths(made.plan())), made.plan().unstrained_length.T)
+    ax = plot.lengths(made.plan(), "adjusting_length")
+    chord = np.hypot(made.plan().state.cables.span, made.plan().state.cables.rise)
+    np.testing.assert_allclose(courses(ax), 1e3 * (made.plan().unstrained_length - chord).T, rtol=1e-12, atol=1e-11)
     assert ax.get_ylabel().endswith("[mm]")
 
 
 def test_an_unknown_quantity_is_named() -> None:
-    with pytest.raises(InvalidValueError, match="quantity is 'span'; allowed: unstrained_length, adjusting_length"):
-        plot.lengths(PLAN, "span")
-    with pytest.raises(InvalidValueError, match="quantity is 'tau'; allowed: chord_tension"):
-        plot.tensions(PLAN, "tau")
+    with refused("quantity", "'span'", "unstrained_length, adjusting_length", kind=InvalidValueError):
+        plot.lengths(made.plan(), "span")
+    with refused("quantity", "'tau'", ", ".join(TENSIONS), kind=InvalidValueError):
+        plot.tensions(made.plan(), "tau")
 
 
 def test_every_cable_looks_different() -> None:
-    looks = {(line.get_color(), str(line.get_linestyle())) for line in plot.tensions(PLAN).get_lines()}
+    looks = {(line.get_color(), str(line.get_linestyle())) for line in plot.tensions(made.plan()).get_lines()}
     assert len(looks) == 8
 
 
 def test_overview_shows_the_four_quantities() -> None:
-    cables = PLAN.state.cables
-    shown = (PLAN.unstrained_length, 1e3 * cables.adjusting_length, PLAN.horizontal_tension, PLAN.vertical_force)
-    axes = plot.overview(PLAN).axes
+    cables = made.plan().state.cables
+    shown = (
+        made.plan().unstrained_length,
+        1e3 * cables.adjusting_length,
+        made.plan().horizontal_tension,
+        made.plan().vertical_force,
+    )
+    axes = plot.overview(made.plan()).axes
     for ax, values in zip(axes, shown, strict=True):
         np.testing.assert_array_equal(courses(ax), values.T)
 
@@ -125,7 +132,7 @@ def test_errors_are_in_millimetres_on_one_scale() -> None:
     left, right = plot.errors(straight, exact).axes
     np.testing.assert_array_equal(courses(left), 1e3 * straight.position_error.T)
     assert left.get_ylim() == right.get_ylim()
-    assert left.get_ylabel() == "position error [mm]"
+    assert left.get_ylabel().endswith("error [mm]")
     alone = plot.error(exact)
     low, high = alone.get_ylim()
     assert (low, high) == (-1e-3, 1e-3)  # rounding is not blown up to fill the figure
@@ -143,13 +150,11 @@ def test_errors_too_small_to_see_are_told() -> None:
 
 
 def test_poses_without_confirmed_equilibrium_are_shaded() -> None:
-    found = sl.confirm(sl.inverse(SUSPENDED, PATH))
-    status = found.status.copy()
-    status[20:30] = sl.ForwardStatus.SOLVED + 1  # any other than SOLVED
-    position = found.pose.position.copy()
-    position[20:30] = np.nan
-    lost = replace(found, status=status, pose=sl.Pose._adopt(position, found.pose.quaternion))
-    ax = plot.error(lost)
+    lengths = made.plan().unstrained_length.copy()
+    lengths[20:30] *= 0.3  # no stable equilibrium
+    found = sl.forward(SUSPENDED, lengths, start=PATH.pose)
+    assert np.flatnonzero(found.status != sl.ForwardStatus.SOLVED).tolist() == list(range(20, 30))
+    ax = plot.error(replace(sl.confirm(made.plan()), status=found.status, pose=found.pose))
     spans = [p.get_extents().transformed(ax.transData.inverted()) for p in ax.patches if isinstance(p, Rectangle)]
     middles = 0.5 * (PATH.time[19:31:10] + PATH.time[20:32:10])
     np.testing.assert_allclose([(s.x0, s.x1) for s in spans], [tuple(middles)], rtol=1e-12)
@@ -187,7 +192,7 @@ def test_cables_have_the_color_of_their_tension_and_their_numbers() -> None:
     tension = sl.inverse(robot, pose).chord_tension
     colors = np.array([to_rgb(line.get_color()) for line in ax.get_lines()[:8]])
     (bar,) = [other for other in ax.figure.axes if other is not ax]
-    assert bar.get_ylabel() == r"chord tension $\tau$ [N]"
+    assert bar.get_ylabel() == TENSIONS["chord_tension"]
     (mesh,) = [drawn for drawn in bar.collections if isinstance(drawn, QuadMesh)]
     np.testing.assert_allclose(mesh.to_rgba(tension)[:, :3], colors, atol=0.02)  # the bar says what colors mean
     assert [text.get_text() for text in ax.texts] == [str(k) for k in range(8)]
@@ -195,7 +200,7 @@ def test_cables_have_the_color_of_their_tension_and_their_numbers() -> None:
         assert np.linalg.norm(np.array(text.get_position_3d()) - anchor) < 1.0
 
 
-@pytest.mark.parametrize("name", sl.robot_names())
+@pytest.mark.parametrize("name", wide(sl.robot_names()))
 def test_numbers_on_the_axes_of_a_robot_do_not_meet(name: str) -> None:
     ax = plot.robot(sl.load_robot(name))
     figure = ax.figure
@@ -224,8 +229,9 @@ def outline(text: Text) -> OutlinePath:
     return OutlinePath(center + corners @ np.array([(c, s), (-s, c)]))
 
 
+@extended
 @pytest.mark.parametrize(
-    ("pattern", "size"), [("3T", (0.0, 0.0, 0.0)), ("2T", (0.3, 1e-9, 0.2)), ("2T", (0.0, 0.0, 0.0))]
+    ("pattern", "size"), [("2T", (0.3, 1e-9, 0.2)), ("3T", (0.0, 0.0, 0.0)), ("2T", (0.0, 0.0, 0.0))]
 )
 def test_robots_without_width_are_drawn(pattern: Literal["3T", "2T"], size: tuple[float, float, float]) -> None:
     corners = [(-4.0, 0.0, 3.0), (4.0, 0.0, 3.0), (4.0, 0.0, 0.0), (-4.0, 0.0, 0.0)]
@@ -261,16 +267,16 @@ def test_the_platform_stands_over_its_shadow() -> None:
     assert ground.get_zorder() <= shadow.get_zorder() < ax.get_lines()[0].get_zorder()
 
 
-def test_a_robot_that_nothing_holds_says_so() -> None:
+def test_a_robot_that_nothing_holds_says_so(snapshot: SnapshotAssertion) -> None:
     ax = plot.robot(SUSPENDED, sl.Pose.from_euler((0.0, 0.0, 7.0), 0.0, 0.0, 0.0))
-    assert ax.get_title() == "article-suspended: no tensions within the limits carry it here"
+    assert ax.get_title() == snapshot
     assert ax.get_lines()[0].get_linestyle() == "--"
 
 
 def test_a_robot_needs_one_pose() -> None:
-    with pytest.raises(InvalidValueError, match="pose is missing; allowed: a single pose"):
+    with refused("pose", "missing", "a single pose, where the robot has no test box", kind=InvalidValueError):
         plot.robot(SUSPENDED.replace(test_box=None))
-    with pytest.raises(InvalidValueError, match="pose is a batch of 301"):
+    with refused("pose", "a batch of 301", kind=InvalidValueError):
         plot.robot(SUSPENDED, PATH.pose)
 
 
@@ -278,13 +284,14 @@ def test_axes_of_the_caller_are_used() -> None:
     figure = Figure()
     ax = figure.add_subplot()
     for draw in (plot.tensions, plot.lengths):
-        assert draw(PLAN, ax=ax) is ax
+        assert draw(made.plan(), ax=ax) is ax
     assert plot.velocity(PATH, ax) is ax
     space = figure.add_subplot(projection="3d")
     assert plot.robot(SUSPENDED, ax=space) is space
 
 
-@pytest.mark.parametrize(("suffix", "start"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")])
+@extended
+@pytest.mark.parametrize(("suffix", "start"), [("svg", b"<?xml"), ("png", b"\x89PNG"), ("pdf", b"%PDF")])
 def test_figures_are_saved_the_same_each_time(tmp_path: FilePath, suffix: str, start: bytes) -> None:
     for name in ("a", "b"):
         plot.save(plot.velocity(PATH), tmp_path / f"{name}.{suffix}")
@@ -295,19 +302,23 @@ def test_figures_are_saved_the_same_each_time(tmp_path: FilePath, suffix: str, s
 
 
 def test_a_suffix_that_no_figure_has(tmp_path: FilePath) -> None:
-    with pytest.raises(FileError, match=r"a\.xyz: the suffix is \.xyz\. Choose one of .*png"):
-        plot.save(plot.overview(PLAN), tmp_path / "a.xyz")
+    with refused(kind=FileError, file=tmp_path / "a.xyz") as caught:
+        plot.save(plot.overview(made.plan()), tmp_path / "a.xyz")
+    assert ".xyz" in caught.value.reason
+    assert "png" in caught.value.next_step
     assert not list(tmp_path.iterdir())
 
 
+@extended
 def test_a_notebook_shows_the_figure() -> None:
     from PIL import Image
 
-    figure = plot.overview(PLAN)
+    figure = plot.overview(made.plan())
     image = Image.open(BytesIO(figure._repr_png_()))  # type: ignore[attr-defined]
     assert image.size == (700, 500)
 
 
+@extended
 def test_a_path_of_a_hundred_thousand_stops_has_as_many_arrows_as_can_be_told_apart() -> None:
     count = 200_000
     moving = (np.arange(count) % 2)[:, None] * np.ones((count, 6))

@@ -12,18 +12,19 @@ from typer.testing import CliRunner
 import sagline.cli.experiment as command
 from sagline.article.experiment import Experiment
 from sagline.cli.main import app
-from sagline.files.json_text import plain
 from sagline.report.experiment import NAMES, experiment_chapter, write_experiment
 from tests.report.test_article import NAMES as NO_NUMBERS
 from tests.report.test_article import NUMBER, Page, is_told_by, leaves
 
 
-def every_number_in_a_sentence_is_one_of_the_numbers_of_its_finding(whole: Experiment) -> None:
+def every_number_in_a_sentence_is_one_of_the_numbers_of_its_finding(whole: Experiment, tmp_path: Path) -> None:
     chapter = experiment_chapter(whole, "A twin.")
+    write_experiment(whole, tmp_path / "numbers", "A twin.")
+    written = json.loads((tmp_path / "numbers" / NAMES[1]).read_text())
     assert {number for f in chapter.findings for number in f.figures} == {25, 26, 27}
     told = 0
     for finding in chapter.findings:
-        numbers = list(leaves(plain(finding.numbers)))
+        numbers = list(leaves(written[finding.key]))
         printed = NUMBER.findall(NO_NUMBERS.sub("", finding.measured))
         told += len(printed)
         assert [found for found in printed if not is_told_by(found[0], found[1], numbers)] == [], finding.measured

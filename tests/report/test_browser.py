@@ -14,11 +14,12 @@ from playwright.sync_api import Browser, Locator, Page
 
 from sagline.report.article import ArticleReport
 from tests.chromium import NEEDED, PATIENCE, launched
+from tests.tiers import extended
 
 FLAGS = "--disable-quic --disable-gpu"
 WIDTHS, THEMES = (390, 768, 1440), ("light", "dark")
 
-pytestmark = NEEDED
+pytestmark = [extended, NEEDED]
 
 # color and ground of every text outside drawings, and of every drawing against its card
 CONTRASTS = """() => {

@@ -1,5 +1,6 @@
 """Drawings of the report: legends off the curves, nothing lifted onto a floor, maps of errors and not of samples."""
 
+import re
 from itertools import pairwise
 
 import matplotlib
@@ -7,18 +8,19 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.contour import QuadContourSet
+from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 import sagline as sl
-from sagline.plot.sheet import GAP_COLOR, Sheet
 from sagline.report.drawing import axes, floored, legend
 from sagline.report.maps import draw_errors, map_axes
 from tests.report.conftest import Written
+from tests.tiers import extended
 
 
-def test_every_legend_stands_off_its_axes_and_on_its_sheet(written: Written) -> None:
+def test_every_legend_stands_off_its_axes_and_on_its_sheet(either: Written) -> None:
     seen = 0
-    for caption, figure in written.figures:
+    for caption, figure in either.figures:
         figure.draw_without_rendering()
         for ax in figure.axes:
             key = ax.get_legend()
@@ -29,12 +31,12 @@ def test_every_legend_stands_off_its_axes_and_on_its_sheet(written: Written) -> 
                 assert sheet.x0 <= box.x0, caption
                 assert box.x1 <= sheet.x1, caption
                 seen += 1
-    assert seen > 40
+    assert seen > (40 if either.is_whole else 2)
 
 
-def test_every_drawn_text_is_on_its_sheet_and_dark_enough(written: Written) -> None:
+def test_every_drawn_text_is_on_its_sheet_and_dark_enough(either: Written) -> None:
     """Contrast of at least 4.5 with the card that a drawing stands on in the dark."""
-    for caption, figure in written.figures:
+    for caption, figure in either.figures:
         for text in figure.findobj(matplotlib.text.Text):
             if text.get_text() and text.get_visible():
                 red, green, blue = matplotlib.colors.to_rgb(text.get_color())
@@ -90,11 +92,12 @@ def test_without_anything_below_it_there_is_no_strip() -> None:
     assert len(ax.texts) == 0
 
 
-def figure_of(written: Written, caption: str) -> Sheet:
+def figure_of(written: Written, caption: str) -> Figure:
     (figure,) = [figure for name, figure in written.figures if name == caption]
     return figure
 
 
+@extended
 @pytest.mark.parametrize(
     ("caption", "over"),
     [("Over the chord.", "chord"), ("Over the linear density.", "density"), ("Over the chord tension.", "tension")],
@@ -117,6 +120,7 @@ def test_curves_of_length_errors_are_the_errors_however_small(written: Written, 
     assert drawn.min() < 1e-3  # less than the micrometer at which such curves are easily cut
 
 
+@extended
 def test_borders_of_the_sufficient_model_are_where_the_error_is_the_tolerance(written: Written) -> None:
     ax = figure_of(written, "Over chord and tension.").axes[0]
     bands = {
@@ -151,15 +155,16 @@ def test_a_map_is_filled_by_the_size_of_the_error_and_gray_where_it_is_too_small
     assert len(found) == len(place)
     shown = colors[found]
     np.testing.assert_array_equal(shown[:3], shown[:3:-1])  # the sign does not change the color
-    assert matplotlib.colors.to_hex(shown[3]).upper() == GAP_COLOR
+    assert matplotlib.colors.to_hex(shown[3]) == "#bbbbbb"
     brightness = shown[:4, :3].sum(axis=1)
     assert all(a < b for a, b in pairwise(brightness[:3]))  # darker where it is larger
     labels = [text for text in ax.texts if text.get_text()]
     assert [text.get_text().replace("\u00a0", " ") for text in labels] == ["1 m"]
     assert labels[0].get_path_effects()
-    assert figure.axes[1].get_ylabel().replace("\u00a0", " ") == "gray: below 10 mm"
+    assert re.search(r"\b10\smm$", figure.axes[1].get_ylabel())
 
 
+@extended
 @pytest.mark.parametrize("model", ["Straight", "Elastic", "Empirical", "Parabolic"])
 def test_numbers_of_maps_are_wholly_inside(written: Written, model: str) -> None:
     figure = figure_of(written, f"{model}: length error.")
@@ -175,6 +180,7 @@ def test_numbers_of_maps_are_wholly_inside(written: Written, model: str) -> None
         assert box.y1 <= ax.bbox.y1, text
 
 
+@extended
 def test_the_first_picture_shows_the_numbers_of_the_study(written: Written) -> None:
     numbers = written.report.numbers["simulation"]["five-models"]["largest_error"]
     _, figure = written.figures[-1]

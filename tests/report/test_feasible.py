@@ -30,8 +30,8 @@ def vertical_forces(tensions: Array) -> Array:
 
 
 @pytest.fixture(scope="module")
-def lines(written: Written) -> dict[str, Line2D]:
-    (figure,) = [figure for caption, figure in written.figures if caption.startswith("What is left")]
+def lines(either: Written) -> dict[str, Line2D]:
+    (figure,) = [figure for caption, figure in either.figures if caption.startswith("What is left")]
     return {str(line.get_label()): line for line in figure.axes[0].get_lines()}
 
 

@@ -1,16 +1,15 @@
+import re
+
 import numpy as np
 import pytest
 from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
+from sagline import InvalidValueError, Pose, Robot, dump_robot, forward, inverse, load_robot, robot_names
 from sagline.arrays import Array
-from sagline.errors import InvalidValueError
-from sagline.files.robot_file import dump_robot, load_robot
-from sagline.kinematics.forward import forward
-from sagline.kinematics.inverse import inverse
-from sagline.robot.catalogue import preset_text, robot_names
-from sagline.robot.pose import Pose
-from sagline.robot.robot import Robot
+from sagline.robot.catalogue import preset_text
+from tests.refusal import refused
+from tests.tiers import extended, wide
 
 PUBLISHED = {
     # name: mass, density, stiffness, tension limits, a frame anchor, a platform anchor, the fields that are ours
@@ -155,7 +154,7 @@ def wrench_feasible(robot: Robot, position: Array, rotation: Array) -> bool:
     return bool(found.status == 0)
 
 
-@pytest.mark.parametrize("name", sorted([*PUBLISHED, *ARTICLE]))
+@pytest.mark.parametrize("name", wide(["article-suspended", *sorted({*PUBLISHED, *ARTICLE} - {"article-suspended"})]))
 def test_box_is_feasible(name: str) -> None:
     robot, rng = load_robot(name), np.random.default_rng(11)
     box = robot.test_box
@@ -178,10 +177,12 @@ def test_the_articles_path_is_feasible(name: str, x: float, y: float) -> None:
 
 
 def test_an_unknown_preset_suggests_the_nearest() -> None:
-    with pytest.raises(InvalidValueError, match=r"robot is 'cogirro'; allowed: .*Did you mean cogiro\?"):
+    with refused("robot", "'cogirro'", ", ".join(robot_names()), kind=InvalidValueError) as caught:
         preset_text("cogirro")
+    assert re.search(r"\bcogiro\b", caught.value.next_step)
 
 
+@extended
 @pytest.mark.parametrize("name", PULLEYS)
 def test_the_platform_rests_where_lengths_over_pulleys_put_it(name: str) -> None:
     robot, rng = load_robot(f"{name}-pulleys"), np.random.default_rng(12)

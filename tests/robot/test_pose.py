@@ -6,11 +6,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from sagline import InvalidValueError, Pose, forward, load_robot
 from sagline.arrays import Array
-from sagline.errors import InvalidValueError
-from sagline.robot.pose import Pose
 from tests.effort import least_seconds
+from tests.refusal import refused
+from tests.tiers import extended
 
+UNIT = "largest element of Q Q^T - 1"
 ANGLE = st.floats(-7.0, 7.0)
 
 
@@ -56,9 +58,9 @@ def test_a_batch_gives_its_poses_by_index_slice_and_iteration() -> None:
     np.testing.assert_array_equal(poses[1:].position, [[3, 4, 5], [6, 7, 8]])
     np.testing.assert_array_equal(poses[np.array([True, False, True])].position[:, 0], [0, 6])
     assert [pose.position[0] for pose in poses] == [0.0, 3.0, 6.0]
-    with pytest.raises(TypeError, match="single pose"):
+    with refused("index", "0", "none", kind=TypeError):
         poses[0][0]
-    with pytest.raises(TypeError, match="single pose"):
+    with refused("this", "a single pose", "a batch", kind=TypeError):
         len(poses[0])
 
 
@@ -88,18 +90,18 @@ def test_a_printed_quaternion_is_normalized() -> None:
 
 
 @pytest.mark.parametrize(
-    ("matrix", "message"),
+    ("matrix", "parts"),
     [
-        (np.diag([1.0, 1.0, -1.0]), "rotation: determinant is -1"),
-        (np.diag([1.0, 1.0, 1.0 + 1e-8]), "rotation: largest element of Q Q\\^T - 1 is 1.9999"),
-        (np.zeros((3, 3)), "orthonormal"),
-        (np.stack([np.eye(3), np.eye(3), 2 * np.eye(3)]), "rotation 2: largest element"),
-        (np.full((3, 3), np.nan), "rotation\\[0, 0\\] is nan"),
-        (np.zeros(4), "rotation is of shape \\(4,\\)"),
+        (np.diag([1.0, 1.0, -1.0]), ("rotation: determinant", "-1")),
+        (np.diag([1.0, 1.0, 1.0 + 1e-8]), (f"rotation: {UNIT}", "1.99999998785e-08", "an orthonormal matrix")),
+        (np.zeros((3, 3)), (f"rotation: {UNIT}", "1", "an orthonormal matrix")),
+        (np.stack([np.eye(3), np.eye(3), 2 * np.eye(3)]), (f"rotation 2: {UNIT}", "3")),
+        (np.full((3, 3), np.nan), ("rotation[0, 0]", "nan", "finite")),
+        (np.zeros(4), ("rotation", "of shape (4,)")),
     ],
 )
-def test_what_is_no_rotation_is_refused(matrix: Array, message: str) -> None:
-    with pytest.raises(InvalidValueError, match=message):
+def test_matrices_that_are_no_rotations_are_refused(matrix: Array, parts: tuple[str, ...]) -> None:
+    with refused(*parts, kind=InvalidValueError):
         Pose(np.zeros(3), matrix)
 
 
@@ -109,20 +111,21 @@ def test_a_matrix_good_to_the_tolerance_passes() -> None:
 
 
 def test_other_wrong_values_are_named() -> None:
-    with pytest.raises(InvalidValueError, match=r"quaternion 1: length is 0\.5;"):
+    with refused("quaternion 1: length", "0.5", kind=InvalidValueError):
         Pose.from_quaternion(np.zeros(3), [[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0, 0.5]])
-    with pytest.raises(InvalidValueError, match="quaternion 1: length is 2;"):
+    with refused("quaternion 1: length", "2", kind=InvalidValueError):
         Pose.from_quaternion(np.zeros(3), [[0, 0, 0, 1], [0, 0, 0, 2]])
-    with pytest.raises(InvalidValueError, match="position and rotation is of batch shapes \\(2,\\) and \\(3,\\)"):
+    with refused("position and rotation", "of batch shapes (2,) and (3,)", kind=InvalidValueError):
         Pose(np.zeros((2, 3)), Rotation.identity(3))
-    with pytest.raises(InvalidValueError, match="alpha, beta, gamma is of batch shapes"):
+    with refused("alpha, beta, gamma", "of batch shapes (2,) and (3,) and ()", kind=InvalidValueError):
         Pose.from_euler(np.zeros(3), [0, 0], [0, 0, 0], 0)
-    with pytest.raises(InvalidValueError, match="position\\[1, 2\\] is inf m"):
+    with refused("position[1, 2]", "inf m", kind=InvalidValueError):
         Pose([[0.0, 0.0, 0.0], [0.0, 0.0, np.inf]], Rotation.identity())
-    with pytest.raises(InvalidValueError, match="a batch of shape \\(2, 2\\)"):
+    with refused("pose", "a batch of shape (2, 2)", kind=InvalidValueError):
         Pose(np.zeros((2, 2, 3)), Rotation.identity())
 
 
+@extended
 def test_a_million_poses_take_no_python_loop() -> None:
     rng = np.random.default_rng(5)
     position, angles = rng.normal(size=(10**6, 3)), rng.uniform(-1, 1, size=(3, 10**6))
@@ -159,9 +162,9 @@ def test_as_many_points_as_poses_still_go_with_every_pose() -> None:
 
 
 def test_points_are_checked_and_a_lost_pose_has_none() -> None:
-    with pytest.raises(InvalidValueError, match="points"):
+    with refused("points", "of shape (2,)", kind=InvalidValueError):
         Pose([0, 0, 0], np.eye(3)).transform([1.0, 2.0])
-    with pytest.raises(InvalidValueError, match=r"points\[0\]"):
+    with refused("points[0]", "nan m", kind=InvalidValueError):
         Pose([0, 0, 0], np.eye(3)).transform([np.nan, 0.0, 0.0])
-    lost = Pose._adopt(np.full((1, 3), np.nan), np.full((1, 4), np.nan))
+    lost = forward(load_robot("cogiro"), np.full(8, np.nan), Pose([0, 0, 2], np.eye(3))).pose
     assert np.isnan(lost.transform([1.0, 0.0, 0.0])).all()

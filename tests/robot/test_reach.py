@@ -9,6 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import sagline as sl
+from tests.refusal import refused
 
 SEED = 3
 NORMAL = np.array([1.0, 2.0, -2.0]) / 3.0
@@ -35,28 +36,30 @@ NONE = Rotation.identity()
 
 
 @pytest.mark.parametrize(
-    ("pattern", "turn", "shift", "words"),
+    ("pattern", "turn", "shift", "value", "allowed"),
     [
-        ("3R3T", Rotation.from_rotvec([1.0, 1.0, 0.0]), NORMAL, ""),
-        ("3T", NONE, NORMAL, ""),
-        ("3T", Rotation.from_rotvec([0.0, np.radians(20.0), 0.0]), NORMAL, r"turned by 20 deg about \(0, 1, 0\)"),
-        ("1R2T", Rotation.from_rotvec(2.5 * NORMAL), IN_PLANE, ""),
-        ("1R2T", Rotation.from_rotvec(0.01 * IN_PLANE), IN_PLANE, "allowed: a turn about plane_normal"),
-        ("1R2T", Rotation.from_rotvec(2.5 * NORMAL), 0.25 * NORMAL, r"motion\[1\] is 0.25 m along plane_normal"),
-        ("2T", NONE, IN_PLANE, ""),
-        ("2T", Rotation.from_rotvec(0.1 * NORMAL), IN_PLANE, "allowed: no turn, by motion_pattern 2T"),
-        ("2T", NONE, -1e-3 * NORMAL, "-0.001 m along plane_normal"),
+        ("3R3T", Rotation.from_rotvec([1.0, 1.0, 0.0]), NORMAL, "", ""),
+        ("3T", NONE, NORMAL, "", ""),
+        ("3T", Rotation.from_rotvec([0.0, np.radians(20.0), 0.0]), NORMAL, "turned by 20 deg about (0, 1, 0)", ""),
+        ("1R2T", Rotation.from_rotvec(2.5 * NORMAL), IN_PLANE, "", ""),
+        ("1R2T", Rotation.from_rotvec(0.01 * IN_PLANE), IN_PLANE, "turned by 0.427 deg", "a turn about plane_normal"),
+        ("1R2T", Rotation.from_rotvec(2.5 * NORMAL), 0.25 * NORMAL, "0.25 m along plane_normal", "0 m"),
+        ("2T", NONE, IN_PLANE, "", ""),
+        ("2T", Rotation.from_rotvec(0.1 * NORMAL), IN_PLANE, "turned by 5.73 deg", "no turn, by motion_pattern 2T"),
+        ("2T", NONE, -1e-3 * NORMAL, "-0.001 m along plane_normal", "0 m"),
     ],
 )
 def test_poses_between_which_no_motion_leads_are_refused(
-    pattern: str, turn: Rotation, shift: np.ndarray, words: str
+    pattern: str, turn: Rotation, shift: np.ndarray, value: str, allowed: str
 ) -> None:
     batch = poses(turn, shift)
-    if not words:
+    if not value:
         sl.inverse(robot(pattern), batch)
         return
-    with pytest.raises(sl.InvalidValueError, match=words.replace("motion", "pose", 1) if "[1" in words else words):
+    with refused("pose[1]", kind=sl.InvalidValueError) as caught:
         sl.inverse(robot(pattern), batch)
+    assert caught.value.value.startswith(value)
+    assert caught.value.allowed.startswith(allowed)
     for k in range(2):  # each alone is where somebody built the robot
         sl.inverse(robot(pattern), batch[k])
 
@@ -64,7 +67,8 @@ def test_poses_between_which_no_motion_leads_are_refused(
 def test_a_pose_that_the_pattern_cannot_have_brought_about_is_told() -> None:
     turned = sl.Pose([0.0, 0.0, 0.0], Rotation.from_rotvec([0.0, 0.0, np.radians(90.0)]))
     (text,) = sl.inverse(robot("3T"), turned).warnings
-    assert text.startswith("the platform is turned by 90 deg about (0, 0, 1), which motion_pattern 3T does not do")
+    for fact in ("turned by 90 deg", "(0, 0, 1)", "motion_pattern 3T"):
+        assert fact in text
     assert sl.inverse(robot("3R3T"), turned).warnings == ()
 
 
@@ -73,4 +77,5 @@ def test_a_planar_robot_out_of_its_plane_is_told() -> None:
                     motion_pattern="2T", plane_normal=[0, 1, 0], tension_min=1.0)  # fmt: skip
     assert sl.inverse(flat, sl.Pose([0.0, 0.5, 1.5], np.eye(3))).warnings == ()
     (text,) = sl.inverse(flat, sl.Pose([0.0, 2.0, 1.5], np.eye(3))).warnings
-    assert text.startswith("the cables leave the plane of the robot by up to 1.5 m")
+    assert "plane" in text
+    assert "1.5 m" in text

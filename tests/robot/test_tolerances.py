@@ -1,16 +1,15 @@
 import pickle
+import re
 from typing import Any
 
 import numpy as np
 import pytest
 
-from sagline.cables.cable import Cable
+from sagline import Cable, InvalidValueError, Robot, Winch
 from sagline.calibration.unknowns import KINDS
-from sagline.errors import InvalidValueError
 from sagline.robot.provenance import Provenance
-from sagline.robot.robot import Robot
 from sagline.robot.tolerances import UNCERTAIN, value_of
-from sagline.robot.winch import Winch
+from tests.refusal import refused
 
 OUTSIDE = {"measuring_frame", "target"}  # kinds of unknowns that no robot has
 
@@ -47,22 +46,26 @@ def test_a_tolerance_has_the_shape_of_its_field_however_it_is_given(name: str) -
 @pytest.mark.parametrize("name", UNCERTAIN)
 @pytest.mark.parametrize("wrong", [0.0, -1.0, np.nan, "x", None, [1.0, 2.0], np.ones((5, 3)), np.ones((4, 4, 3))])
 def test_a_wrong_tolerance_is_named(name: str, wrong: Any) -> None:
-    with pytest.raises(InvalidValueError, match=rf"^tolerances: {name}(\[\d+\])? is ") as caught:
+    with pytest.raises(InvalidValueError) as caught:
         four(tolerances={name: wrong})
+    assert re.fullmatch(rf"tolerances: {name}(\[\d+\])?", caught.value.item)
     assert len(str(caught.value)) < 300
     if isinstance(wrong, float) and wrong == 0.0:  # a standard error may be as good as none
         assert four(calibration=Provenance("", "2026-01-01", {name: wrong})).calibration is not None
         return
-    with pytest.raises(InvalidValueError, match=rf"^calibration: standard_error: {name}(\[\d+\])? is "):
+    with pytest.raises(InvalidValueError) as caught:
         four(calibration=Provenance("", "2026-01-01", {name: wrong}))
+    assert re.fullmatch(rf"calibration: standard_error: {name}(\[\d+\])?", caught.value.item)
 
 
 @pytest.mark.parametrize("wrong", ["frame_anchors", 3, None, [("mass", 1.0)], {"masss": 1.0}, {3: 1.0}, {"target": 1}])
 def test_what_are_no_tolerances_is_refused(wrong: Any) -> None:
-    with pytest.raises(InvalidValueError, match=r"^tolerances"):
+    with pytest.raises(InvalidValueError) as caught:
         four(tolerances=wrong)
-    with pytest.raises(InvalidValueError, match=r"^calibration: standard_error"):
+    assert caught.value.item.startswith("tolerances")
+    with pytest.raises(InvalidValueError) as caught:
         four(calibration=Provenance("", "2026-01-01", wrong))
+    assert caught.value.item.startswith("calibration: standard_error")
 
 
 def test_infinite_says_that_nothing_is_known() -> None:
@@ -71,8 +74,9 @@ def test_infinite_says_that_nothing_is_known() -> None:
 
 @pytest.mark.parametrize("wrong", ["yesterday", "", "2026-13-01", None, 20260301])
 def test_a_date_that_is_none(wrong: Any) -> None:
-    with pytest.raises(InvalidValueError, match=r"^calibration: date is .*ISO 8601"):
+    with refused("calibration: date", kind=InvalidValueError) as caught:
         Provenance("log.csv", wrong)
+    assert "ISO 8601" in str(caught.value)
 
 
 def test_tolerances_and_calibration_stay_with_the_robot() -> None:

@@ -18,6 +18,7 @@ from sagline.viewer import lines
 from sagline.viewer.solids import platform
 from tests.chromium import NEEDED, launched
 from tests.share.opening import FLAGS, asking, opened
+from tests.tiers import extended
 
 CONTRAST = (Path(__file__).parents[1] / "viewer" / "contrast.js").read_text()
 SIZES = ((390, 640), (1000, 640), (1440, 900))
@@ -31,7 +32,7 @@ STATES = (
 NAMELESS = """[...document.querySelectorAll("button, input, select, canvas")]
     .filter((each) => !(each.getAttribute("aria-label") || each.labels?.[0]?.innerText || each.innerText)).length"""
 
-pytestmark = NEEDED
+pytestmark = [extended, NEEDED]
 
 MATRIX = pytest.mark.parametrize(
     ("name", "size", "theme"),

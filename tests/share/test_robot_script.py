@@ -15,6 +15,7 @@ from sagline.share.machine import machine
 from sagline.statics.chords import chord_geometry
 from sagline.viewer.snapshot import Snapshot
 from tests.chromium import NEEDED, PATIENCE, launched
+from tests.tiers import extended
 
 SCRIPTS = ("catenary.js", "sharing.js", "robot.js")
 EVERY = """([machine, poses]) => poses.map(({ position, quaternion }) => {
@@ -26,7 +27,7 @@ EVERY = """([machine, poses]) => poses.map(({ position, quaternion }) => {
     };
 })"""
 
-pytestmark = NEEDED
+pytestmark = [extended, NEEDED]
 
 
 @pytest.fixture(scope="module")

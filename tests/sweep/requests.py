@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 
 import sagline as sl
-from sagline.files.sweep_folder import GROUP, TaskSize, make_folder
-from sagline.files.sweep_marks import NAME
+from sagline.files import sweep_folder, sweep_marks
 from sagline.sweep.quantities import variables_of
 
 PLANAR = Path(__file__).parents[2] / "examples" / "own_planar.yaml"
@@ -24,7 +23,7 @@ def planar(poses: int = 40, wrenches: int = 25, quantities: tuple[str, ...] = ("
 
 def in_tasks(folder: Path, request: sl.sweep.Request, size: tuple[int, int]) -> Path:
     """The folder of a sweep whose tasks have a size of their own."""
-    make_folder(folder, request, TaskSize(*size))
+    sweep_folder.make_folder(folder, request, sweep_folder.TaskSize(*size))
     return folder
 
 
@@ -32,7 +31,7 @@ def chunks(folder: Path, request: sl.sweep.Request) -> dict[str, tuple[int, int]
     """When each chunk on the disk was written, and in which file: what is written anew is another."""
     found = {}
     for variable in variables_of(request.quantities):
-        for file in sorted((folder / GROUP / variable.name / "c").rglob("*")):
+        for file in sorted((folder / sweep_folder.GROUP / variable.name / "c").rglob("*")):
             if file.is_file():
                 found[str(file.relative_to(folder))] = (file.stat().st_mtime_ns, file.stat().st_ino)
     return found
@@ -40,7 +39,7 @@ def chunks(folder: Path, request: sl.sweep.Request) -> dict[str, tuple[int, int]
 
 def marked(folder: Path) -> list[int]:
     """Tasks of the file `done`, in its order."""
-    lines = (folder / NAME).read_text().splitlines()
+    lines = (folder / sweep_marks.NAME).read_text().splitlines()
     return [int(line.split()[0]) for line in lines if line and not line.startswith("#")]
 
 

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import errno
+import os
 import shutil
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from syrupy.assertion import SnapshotAssertion
 
 import sagline as sl
-from sagline.files import sweep_folder
-from sagline.files.sweep_folder import GROUP, open_folder
-from sagline.files.sweep_marks import NAME, marking
-from sagline.sweep import running, tasks
+from sagline.files import sweep_folder, sweep_marks
+from sagline.sweep import cluster, running, tasks
+from tests.refusal import refused
 from tests.sweep.requests import bits, chunks, in_tasks, marked, planar
+from tests.tiers import extended, wide
 
 SIZE = (8, 10)  # 5 x 3 tasks of `planar()`
+INSTALL = 'Install it: pip install "sagline[sweep]".'
 
 
 class Stop:
@@ -49,7 +52,7 @@ def test_a_sweep_is_what_its_parts_are(tmp_path: Path, reference: dict[str, byte
     assert told == [(k, found.tasks) for k in range(found.tasks + 1)]
 
 
-@pytest.mark.parametrize("after", [1, 14])
+@pytest.mark.parametrize("after", wide([1, 14]))
 def test_what_was_stopped_goes_on_to_the_last_bit(tmp_path: Path, reference: dict[str, bytes], after: int) -> None:
     folder = in_tasks(tmp_path / "sweep", planar(), SIZE)
     with pytest.raises(KeyboardInterrupt):
@@ -67,6 +70,7 @@ def test_what_was_stopped_goes_on_to_the_last_bit(tmp_path: Path, reference: dic
     assert sum(found.counts) == len(planar())
 
 
+@extended
 def test_what_is_done_is_not_done_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = in_tasks(tmp_path / "sweep", planar(), SIZE)
     first = sl.sweep.run(planar(), folder, workers=1)
@@ -75,10 +79,10 @@ def test_what_is_done_is_not_done_again(tmp_path: Path, monkeypatch: pytest.Monk
     assert (again.counts, again.done, again.seconds) == (first.counts, first.done, first.seconds)
 
 
-@pytest.mark.parametrize("index", [(0, 99), (0, 0, 0, 0, 0), 0.5, None, "x"])
+@pytest.mark.parametrize("index", wide([pytest.param((0, 99)), pytest.param((0, 0, 0, 0, 0)), 0.5, None, "x"]))
 def test_an_index_that_is_none_is_told(tmp_path: Path, index: Any) -> None:
     found = sl.sweep.run(planar(2, 2), tmp_path / "sweep", workers=1)
-    with pytest.raises(sl.InvalidValueError, match="1, 2, 2"):
+    with refused("index", allowed="within 1, 2, 2", kind=sl.InvalidValueError):
         found.values("status", index)
 
 
@@ -92,19 +96,20 @@ DAMAGES: dict[str, Any] = {
 }
 
 
-@pytest.mark.parametrize(("damage", "variable"), list(zip(DAMAGES, 3 * ("status", "tension"), strict=True)))
+@pytest.mark.parametrize(("damage", "variable"), wide(zip(DAMAGES, 3 * ("status", "tension"), strict=True)))
 def test_a_chunk_that_is_torn_is_done_again(
     tmp_path: Path, reference: dict[str, bytes], damage: str, variable: str
 ) -> None:
     folder = in_tasks(tmp_path / "sweep", planar(), SIZE)
     sl.sweep.run(planar(), folder, workers=1)
     before = chunks(folder, planar())
-    chunk = sorted(file for file in (folder / GROUP / variable / "c").rglob("*") if file.is_file())[4]
+    chunk = sorted(file for file in (folder / sweep_folder.GROUP / variable / "c").rglob("*") if file.is_file())[4]
     data = DAMAGES[damage](chunk.read_bytes())
     chunk.unlink() if data is None else chunk.write_bytes(data)
     if data is not None:
-        with pytest.raises(sl.FileError, match="what is damaged is done again"):
+        with refused(kind=sl.FileError, file=folder) as caught:
             sl.sweep.load(folder).values(variable)
+        assert caught.value.reason.startswith(f"{variable} ")
     found = sl.sweep.run(planar(), folder, workers=1)
     assert bits(found) == reference
     assert found.complete
@@ -112,18 +117,20 @@ def test_a_chunk_that_is_torn_is_done_again(
     assert len([name for name in before if after[name] != before[name]]) <= len(sl.sweep.QUANTITIES["tension"])
 
 
-@pytest.mark.parametrize("text", ["", "nonsense\n\0\xff\n3 0.1 1 2", "99 0.1 1 2 3 4 5\n-1 0 0 0 0 0 0\n"])
+@extended
+@pytest.mark.parametrize("text", wide(["nonsense\n\0\xff\n3 0.1 1 2", "", "99 0.1 1 2 3 4 5\n-1 0 0 0 0 0 0\n"]))
 def test_what_the_marks_say_is_found_again_on_the_disk(tmp_path: Path, reference: dict[str, bytes], text: str) -> None:
     folder = in_tasks(tmp_path / "sweep", planar(), SIZE)
     first = sl.sweep.run(planar(), folder, workers=1)
     before = chunks(folder, planar())
-    (folder / NAME).write_bytes(text.encode("latin-1"))
+    (folder / sweep_marks.NAME).write_bytes(text.encode("latin-1"))
     found = sl.sweep.run(planar(), folder, workers=1)
     assert chunks(folder, planar()) == before
     assert (found.counts, found.done) == (first.counts, first.done)
     assert bits(found) == reference
 
 
+@extended
 def test_the_folder_of_another_sweep_is_refused(tmp_path: Path) -> None:
     folder, request = in_tasks(tmp_path / "sweep", planar(), SIZE), planar()
     others = [
@@ -137,7 +144,7 @@ def test_the_folder_of_another_sweep_is_refused(tmp_path: Path) -> None:
         sl.sweep.Request(request.robots, request.poses, request.wrenches, moment_arm=0.5),
     ]
     for other in others:
-        with pytest.raises(sl.FileError, match="holds another sweep, of"):
+        with pytest.raises(sl.FileError, match="1,000 requests"):
             sl.sweep.run(other, folder, workers=1)
     assert sl.sweep.load(folder).done == 0
     assert sl.sweep.run(request, folder, workers=1).complete
@@ -155,7 +162,7 @@ def test_a_request_is_read_back_as_it_was(tmp_path: Path) -> None:
         around=sl.WrenchBox(5.0) + sl.WrenchEllipsoid([1, 2, 3], 0.5) + sl.WrenchPolytope(np.eye(6)),
         moment_arm=0.3,
     )
-    found = open_folder(in_tasks(tmp_path / "sweep", request, SIZE))
+    found = sweep_folder.open_folder(in_tasks(tmp_path / "sweep", request, SIZE))
     assert sweep_folder.digest_of(found.request) == sweep_folder.digest_of(request) == found.digest
     for name in ("center", "segments", "ellipsoids", "corners", "sizes", "accelerations"):
         np.testing.assert_array_equal(getattr(found.request.around, name), getattr(request.around, name))
@@ -174,7 +181,7 @@ def test_what_is_no_folder_of_this_sweep_is_left_as_it_is(tmp_path: Path, what: 
     elif what == "no parent":
         folder = tmp_path / "nowhere" / "sweep"
     else:
-        attributes = in_tasks(folder, planar(), SIZE) / GROUP / "zarr.json"
+        attributes = in_tasks(folder, planar(), SIZE) / sweep_folder.GROUP / "zarr.json"
         old, new = ("sagline 0", "sagline 99.0") if what == "another sagline" else ("mass: 10", "mass: 11")
         attributes.write_text(attributes.read_text().replace(old, new))
     before = sorted(tmp_path.rglob("*"))
@@ -184,12 +191,14 @@ def test_what_is_no_folder_of_this_sweep_is_left_as_it_is(tmp_path: Path, what: 
     assert sorted(tmp_path.rglob("*")) == before
 
 
-def test_one_process_at_a_time_works_on_a_sweep(tmp_path: Path) -> None:
+def test_one_process_at_a_time_works_on_a_sweep(tmp_path: Path, snapshot: SnapshotAssertion) -> None:
     folder = in_tasks(tmp_path / "sweep", planar(), SIZE)
-    with marking(open_folder(folder)), pytest.raises(sl.FileError, match="is being worked on by another process"):
+    with sweep_marks.marking(sweep_folder.open_folder(folder)), refused(kind=sl.FileError, file=folder) as caught:
         sl.sweep.run(planar(), folder, workers=1)
+    assert str(caught.value).replace(str(folder), "FOLDER") == snapshot
 
 
+@extended
 def test_a_disk_that_is_full_loses_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, reference: dict[str, bytes]
 ) -> None:
@@ -201,12 +210,12 @@ def test_a_disk_that_is_full_loses_nothing(
         nonlocal count
         count += 1
         if count > 10:
-            raise OSError(errno.ENOSPC, "No space left on device")
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         return put(*given, **more)
 
     with monkeypatch.context() as patched:
         patched.setattr(store, "_put", full)
-        with pytest.raises(sl.FileError, match=r"cannot be written \(No space left on device\)"):
+        with pytest.raises(sl.FileError, match=os.strerror(errno.ENOSPC)):
             sl.sweep.run(planar(), folder, workers=1)
     assert 0 < sl.sweep.load(folder).done < 15
     assert bits(sl.sweep.run(planar(), folder, workers=1)) == reference
@@ -218,16 +227,27 @@ def test_without_dask_tasks_are_done_one_after_the_other(
     monkeypatch.setattr(running, "has_dask", lambda: False)
     folder, told = in_tasks(tmp_path / "sweep", planar(), SIZE), list[str]()
     assert bits(sl.sweep.run(planar(), folder, workers=2, tell=told.append)) == reference
-    assert told == ['Dask is not installed: one task after the other. For more, pip install "sagline[sweep]".']
-    with pytest.raises(sl.InvalidValueError, match="the package distributed is not installed"):
+    assert len(told) == 1
+    assert '"sagline[sweep]"' in told[0]
+    with refused("the package distributed", next_step=INSTALL, kind=sl.InvalidValueError):
         sl.sweep.run(planar(), folder, scheduler="tcp://127.0.0.1:1")
+
+
+@pytest.mark.parametrize(
+    "address",
+    ["", "127.0.0.1:8786", "tcp://", "tcp://a", "tcp://a:0", "tcp://a:65536", "tcp://:1", "tcp://a b:1", "http://a:1",
+     "tcp://a:1\n", "tcp://\x1b:1", "inproc://a:1", 3, None, b"tcp://a:1"],
+)  # fmt: skip
+def test_what_is_no_address_is_refused(address: object) -> None:
+    with refused("scheduler", repr(address), "an address, tcp://HOST:PORT", kind=sl.InvalidValueError):
+        cluster.check_address(address)
 
 
 def test_without_zarr_a_sentence_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sweep_folder, "find_spec", lambda name: None)
-    with pytest.raises(sl.InvalidValueError, match=r'pip install "sagline\[sweep\]"'):
+    with refused("the package zarr", next_step=INSTALL, kind=sl.InvalidValueError):
         sl.sweep.run(planar(), tmp_path / "sweep")
-    with pytest.raises(sl.InvalidValueError, match="the package zarr"):
+    with refused("the package zarr", next_step=INSTALL, kind=sl.InvalidValueError):
         sl.sweep.load(tmp_path)
 
 
@@ -258,6 +278,7 @@ def test_the_folder_opens_with_xarray_and_units(tmp_path: Path) -> None:
     np.testing.assert_array_equal(found.values("tension", (0, slice(3), 2, 1)), found.values("tension")[0, :3, 2, 1])
 
 
+@extended
 def test_a_folder_can_be_moved(tmp_path: Path) -> None:
     found = sl.sweep.run(planar(), tmp_path / "sweep", workers=1)
     shutil.move(tmp_path / "sweep", tmp_path / "elsewhere")
@@ -266,5 +287,5 @@ def test_a_folder_can_be_moved(tmp_path: Path) -> None:
 
 
 def found_bits(folder: Path) -> bytes:
-    status: np.ndarray[Any, Any] = open_folder(folder).group["status"][...]  # type: ignore[index,assignment]
+    status: np.ndarray[Any, Any] = sweep_folder.open_folder(folder).group["status"][...]  # type: ignore[index,assignment]
     return status.tobytes()

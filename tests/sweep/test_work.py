@@ -10,6 +10,7 @@ import pytest
 import sagline as sl
 from sagline.sweep.work import Part, counts_of, numbers_of
 from tests.sweep.requests import PLANAR, planar
+from tests.tiers import wide
 
 QUANTITIES = ("tension", "length", "shortfall", "margin")
 
@@ -68,7 +69,7 @@ def test_the_margin_is_of_the_set_around_each_wrench() -> None:
 
 
 @pytest.mark.parametrize("count", [400, pytest.param(40_000, marks=pytest.mark.soak)])
-@pytest.mark.parametrize("name", [PLANAR, "cogiro", "article-mixed", "ipanema-1", "point"])
+@pytest.mark.parametrize("name", wide([PLANAR, "cogiro", "article-mixed", "ipanema-1", "point"]))
 def test_a_proof_that_is_shared_contradicts_no_verdict(name: str, count: int) -> None:
     """At the border too: loads on rays through it, ever nearer to it."""
     robot, rng = some_robot(name), np.random.default_rng(11)

@@ -8,15 +8,8 @@ import numpy as np
 from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
+from sagline import Cable, MinimumNorm, Plan, Pose, Robot, inverse, load_robot, robot_names
 from sagline.arrays import Array
-from sagline.cables.cable import Cable
-from sagline.files.robot_file import load_robot
-from sagline.kinematics.inverse import inverse
-from sagline.kinematics.plan import Plan
-from sagline.robot.catalogue import robot_names
-from sagline.robot.pose import Pose
-from sagline.robot.robot import Robot
-from sagline.tension.minimum_norm import MinimumNorm
 
 BORDER_ROBOTS = ["article-suspended", "article-mixed", "expo2015-lucia", "ipanema-1", "fast"]
 

@@ -4,13 +4,10 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
+from sagline import Catenary, MinimumNorm, PoseStatus, forward, inverse
 from sagline.arrays import Array
-from sagline.cables.catenary import Catenary
-from sagline.kinematics.forward import forward
-from sagline.kinematics.inverse import inverse
-from sagline.kinematics.status import PoseStatus
-from sagline.tension.minimum_norm import MinimumNorm
 from tests.tension.reference import BORDER_ROBOTS, Border, found_border, structure
+from tests.tiers import wide
 
 PRECISION = 1e-6  # of the weight
 
@@ -82,7 +79,7 @@ def check_border(name: str, count: int, seed: int) -> None:
     assert (clearly.status == PoseStatus.INFEASIBLE).all()
 
 
-@pytest.mark.parametrize("name", BORDER_ROBOTS)
+@pytest.mark.parametrize("name", wide(BORDER_ROBOTS))
 def test_the_verdict_turns_where_a_nonlinear_program_says(name: str) -> None:
     check_border(name, 12, 41)
 

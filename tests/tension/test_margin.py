@@ -5,12 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sagline.cables.elastic import Elastic
-from sagline.files.robot_file import load_robot
-from sagline.kinematics.inverse import inverse
-from sagline.robot.pose import Pose
-from sagline.tension.margin import cable_margins, limit_margin
-from sagline.tension.minimum_norm import MinimumNorm
+from sagline import Elastic, MinimumNorm, Pose, inverse, limit_margin, load_robot
+from sagline.tension.margin import cable_margins
 from tests.kinematics.feasible import box_poses
 from tests.tension.reference import planar
 

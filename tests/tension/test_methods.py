@@ -7,32 +7,36 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog, minimize
 
-from sagline.cables.cable import Cable
-from sagline.cables.catenary import Catenary
-from sagline.cables.elastic import Elastic
-from sagline.errors import InvalidValueError
-from sagline.files.robot_file import load_robot
-from sagline.kinematics.inverse import inverse
-from sagline.kinematics.polygon import tension_polygon
-from sagline.kinematics.status import PoseStatus
-from sagline.robot.pose import Pose
-from sagline.robot.robot import Robot
-from sagline.tension.analytic_center import AnalyticCenter
-from sagline.tension.broken import without_cables
-from sagline.tension.centroid import Centroid
-from sagline.tension.closed_form import ClosedForm
-from sagline.tension.closest import Closest
-from sagline.tension.improved_closed_form import ImprovedClosedForm
-from sagline.tension.lowest_maximum import LowestMaximum
-from sagline.tension.lowest_sum import LowestSum
-from sagline.tension.method import TensionMethod
+from sagline import (
+    AnalyticCenter,
+    Cable,
+    Catenary,
+    Centroid,
+    ClosedForm,
+    Closest,
+    Elastic,
+    ImprovedClosedForm,
+    InvalidValueError,
+    LowestMaximum,
+    LowestSum,
+    MinimumNorm,
+    PNorm,
+    PolygonWalk,
+    Pose,
+    PoseStatus,
+    Puncture,
+    QuadraticProgram,
+    Robot,
+    TensionMethod,
+    inverse,
+    load_robot,
+    tension_polygon,
+    without_cables,
+)
 from sagline.tension.methods import METHODS
-from sagline.tension.minimum_norm import MinimumNorm
-from sagline.tension.p_norm import PNorm
-from sagline.tension.polygon_walk import PolygonWalk
-from sagline.tension.puncture import Puncture
-from sagline.tension.quadratic_program import QuadraticProgram
+from tests.refusal import refused
 from tests.tension.reference import nearest, needed, planar, random_poses, structure
+from tests.tiers import wide
 
 CLOSED = (ClosedForm(), ImprovedClosedForm(), Puncture())
 WALKS = (PolygonWalk(), PolygonWalk(optimum="1-norm"), PolygonWalk(optimum="centroid"))
@@ -86,7 +90,7 @@ def test_balance_and_limits(name: str, method: TensionMethod) -> None:
         np.testing.assert_array_equal(found, least.feasible)
 
 
-@pytest.mark.parametrize("robot", [robot for robot, _ in MANY], ids=[f"{m} cables" for _, m in MANY])
+@pytest.mark.parametrize("robot", wide([robot for robot, _ in MANY], first=2), ids=[f"{m} cables" for _, m in MANY])
 def test_many_cables_agree_with_other_programs(robot: Robot) -> None:
     poses = random_poses(robot, 15, np.random.default_rng(7), stretch=1.1)
     rng = np.random.default_rng(8)
@@ -161,7 +165,7 @@ def _check_p_norm(robot: Robot, matrix: np.ndarray, tensions: np.ndarray, p: flo
         assert (rest[at_high] < 1e-6).all()
 
 
-@pytest.mark.parametrize("name", ["article-mixed", "article-suspended", "ipanema-1", "falcon-7"])
+@pytest.mark.parametrize("name", wide(["article-suspended", "falcon-7", "article-mixed", "ipanema-1"], first=2))
 def test_few_cables_agree_with_other_programs(name: str) -> None:
     robot = load_robot(name)
     poses = random_poses(robot, 40, np.random.default_rng(9))
@@ -302,7 +306,7 @@ def test_broken_cable() -> None:
     np.testing.assert_allclose(structure(left, pose), matrix)
     alone = inverse(left, pose, model=Elastic(), tension=Centroid())
     np.testing.assert_allclose(matrix @ alone.chord_tension, needed(robot, np.zeros(6)), atol=1e-8)
-    with pytest.raises(InvalidValueError, match="cable is 8; allowed: 0 to 7"):
+    with refused("cable", "8", "0 to 7", kind=InvalidValueError):
         without_cables(robot, 8)
 
 
@@ -330,24 +334,24 @@ def test_unlimited_cables() -> None:
         assert plan.status == PoseStatus.UNBOUNDED
         assert np.isnan(plan.chord_tension).all()
     for method in CLOSED:
-        with pytest.raises(InvalidValueError, match=r"tension_max\[0\] is infinite"):
+        with refused("planar: tension_max[0]", "infinite", "finite", kind=InvalidValueError):
             inverse(robot, pose, tension=method)
     limited = inverse(planar(tension_max=1e4), pose, tension=LowestSum())
     np.testing.assert_allclose(inverse(robot, pose, tension=LowestSum()).chord_tension, limited.chord_tension)
 
 
 def test_options_are_checked() -> None:
-    with pytest.raises(InvalidValueError, match=r"p is 1\.5"):
+    with refused("p", "1.5", kind=InvalidValueError):
         PNorm(p=1.5)
-    with pytest.raises(InvalidValueError, match="p is 100"):
+    with refused("p", "100", "2 to 32", kind=InvalidValueError):
         PNorm(p=100.0)
-    with pytest.raises(InvalidValueError, match="optimum is 'best'"):
+    with refused("optimum", "'best'", kind=InvalidValueError):
         PolygonWalk(optimum="best")  # type: ignore[arg-type]
-    with pytest.raises(InvalidValueError, match="weights"):
+    with refused("weights[1]", "0", kind=InvalidValueError):
         QuadraticProgram(weights=[1.0, 0.0])
-    with pytest.raises(InvalidValueError, match=r"target is of shape \(3,\)"):
+    with refused("target", "of shape (3,)", kind=InvalidValueError):
         inverse(load_robot("cogiro"), Pose([0, 0, 2.0], np.eye(3)), tension=QuadraticProgram(target=[1.0, 2.0, 3.0]))
-    with pytest.raises(InvalidValueError, match="number of cables is 9; allowed: 6 to 8"):
+    with refused("many: number of cables", "9", "6 to 8 for 3R3T with Centroid", kind=InvalidValueError):
         inverse(MANY[0][0], Pose(np.zeros(3), np.eye(3)), tension=Centroid())
     again = pickle.loads(pickle.dumps(QuadraticProgram(weights=2.0, target=[3.0, 4.0])))
     np.testing.assert_array_equal(again.target, [3.0, 4.0])
@@ -433,7 +437,16 @@ def test_a_batch_of_no_poses_is_answered_by_none() -> None:
     assert plan.feasible.shape == (0,)
 
 
-@pytest.mark.parametrize("robot", [None, 5, "cogiro", [], ["cogiro"]])
-def test_what_is_no_robot_is_named(robot: Any) -> None:
-    with pytest.raises(InvalidValueError, match="allowed: a Robot, or a sequence of them"):
+@pytest.mark.parametrize(
+    ("robot", "item", "value"),
+    [
+        (None, "robot", "None"),
+        (5, "robot", "5"),
+        ("cogiro", "robot", "'cogiro'"),
+        ([], "robot", "[]"),
+        (["cogiro"], "robot[0]", "'cogiro'"),
+    ],
+)
+def test_what_is_no_robot_is_named(robot: Any, item: str, value: str) -> None:
+    with refused(item, value, "a Robot, or a sequence of them", kind=InvalidValueError):
         inverse(robot, Pose.from_euler([0.0, 0.0, 2.0], 0.0, 0.0, 0.0))

@@ -1,17 +1,21 @@
+import re
 import tracemalloc
 
 import numpy as np
 import pytest
 
-from sagline.cables.cable import Cable
-from sagline.errors import InvalidValueError
-from sagline.files.robot_file import load_robot
-from sagline.kinematics.inverse import inverse
-from sagline.kinematics.status import PoseStatus
-from sagline.robot.pose import Pose
-from sagline.robot.robot import Robot
-from sagline.statics.balance import structure_matrix
-from sagline.tension.singular import unresisted_motion
+from sagline import (
+    Cable,
+    InvalidValueError,
+    Pose,
+    PoseStatus,
+    Robot,
+    inverse,
+    load_robot,
+    structure_matrix,
+    unresisted_motion,
+)
+from tests.refusal import refused
 from tests.tension.reference import planar
 
 
@@ -31,8 +35,8 @@ def test_rotation_no_cable_resists() -> None:
     np.testing.assert_allclose(np.abs(motion.twist[3:]), [0, 0, 1], atol=1e-12)
     # the axis runs through (0.4, 0), the center of mass (0.3, 0) turns about it
     np.testing.assert_allclose(motion.twist[:3], np.cross(motion.twist[3:], [-0.1, 0, 0]), atol=1e-12)
-    assert motion.text.startswith("rotation about the axis (0, 0, ")
-    assert "through (0.4, 0, 0) m" in motion.text
+    assert re.match(r"rotation\b.* \(0, 0, -?1\)", motion.text)
+    assert "(0.4, 0, 0) m" in motion.text
 
 
 def test_translation_no_cable_resists() -> None:
@@ -70,7 +74,7 @@ def test_the_resistance_is_a_number_without_unit() -> None:
 
 
 def test_one_pose_at_a_time() -> None:
-    with pytest.raises(InvalidValueError, match="one pose"):
+    with refused("pose", "a batch of shape (2,)", "one pose", kind=InvalidValueError):
         unresisted_motion(planar(), Pose(np.zeros((2, 3)), np.broadcast_to(np.eye(3), (2, 3, 3))))
 
 

@@ -7,9 +7,10 @@ from functools import cache
 import numpy as np
 
 import sagline as sl
+from sagline import Plan
 from sagline.arrays import Array
-from sagline.control.link import HEARTBEAT, Command, Link, Missing, Mode, Sample
-from sagline.kinematics.plan import Plan
+from sagline.control import Command, Link, Missing, Mode, Sample
+from tests.control.protocol import HEARTBEAT
 
 HOME = sl.Pose.from_euler([0.0, 0.0, 1.5], 0.0, 0.0, 0.0)
 

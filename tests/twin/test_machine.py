@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import re
+from typing import Any
+
 import numpy as np
 import pytest
 
 import sagline as sl
 from sagline.article.machine import DEAD, LOAD, MODULUS, PULLEY, machine, rest
-from sagline.control.link import PERIOD, Command, GroupFault, GroupStatus, Mode, Sample
+from sagline.control import Command, Mode, Sample
+from tests.control.protocol import PERIOD, GroupFault, GroupStatus
 from tests.dynamics.machines import prototype
+from tests.refusal import refused
+from tests.tiers import wide
 from tests.twin.pilot import HOME, Pilot, leg
 
 ROBOT = sl.load_robot("article-prototype")
@@ -28,10 +34,10 @@ def test_it_stands_still_on_its_drives() -> None:
 
 
 STOPS = [  # model.md, section 12: how, m/s, N, mm
-    (Mode.LOCK, 0.06, 13.0, 2.3),
-    (Mode.HOLD, 0.06, 8.0, 5.1),
     (Mode.LOCK, 0.3, 63.0, 11.7),
     (Mode.HOLD, 0.3, 39.0, 26.7),
+    (Mode.LOCK, 0.06, 13.0, 2.3),
+    (Mode.HOLD, 0.06, 8.0, 5.1),
 ]
 
 
@@ -41,7 +47,7 @@ def studied() -> sl.Robot:
     return ROBOT.replace(winches=ROBOT.winches.replace(integral_gain=80e3))
 
 
-@pytest.mark.parametrize(("mode", "speed", "peak", "travel"), STOPS)
+@pytest.mark.parametrize(("mode", "speed", "peak", "travel"), wide(STOPS, first=2))
 def test_stops_of_the_study(mode: Mode, speed: float, peak: float, travel: float) -> None:
     """Whose drives had an integral gain of 80 kN/m."""
     robot = studied()
@@ -59,7 +65,7 @@ def test_stops_of_the_study(mode: Mode, speed: float, peak: float, travel: float
     assert 1e3 * np.linalg.norm(rig.reading.position - place) == pytest.approx(travel, abs=0.15)
 
 
-@pytest.mark.parametrize("speed", [0.06, 0.3])
+@pytest.mark.parametrize("speed", wide([0.3, 0.06]))
 def test_a_dead_controller_costs_speed_times_heartbeat_and_half_the_ramp(speed: float) -> None:
     """The study: +8 and +39 N, 12.7 and 61.7 mm; it counts the heartbeat from the end of the last period."""
     robot = studied()
@@ -136,21 +142,27 @@ def test_a_seed_is_a_run() -> None:
 
 
 def test_counts_are_those_of_the_drums() -> None:
-    """72 nm, 2 pi 30 mm / (20 2^17), from the mark at 3 m; whole drums as `encoder_counts` has them."""
+    """72 nm, 2 pi 30 mm / (20 2^17), from the mark at 3 m."""
     sample = Pilot(sl.twin.Machine(ROBOT).link(), PLAN).look()
     step = 2.0 * np.pi * 0.03 / (20 * 2**17)
     assert step == pytest.approx(72e-9, rel=2e-3)
     np.testing.assert_array_equal(sample.counts, np.rint((PLAN.unstrained_length - 3.0) / step))
-    for wound in (
-        prototype(count_zero=500.0),
-        prototype(gear=-20.0, winding_tension=300.0),
-        prototype(layers=3, drum_width=0.03, cable_length=6.5, drum_distance=1.0, drum_offset=-0.015),
-    ):
-        place = sl.Pose.from_euler([0.4, -1.0, 1.1], 0.0, 0.0, 0.0)
-        plan = sl.inverse(wound, place)
-        sample = Pilot(sl.twin.Machine(wound, start=place).link(), plan).look()
-        assert np.abs(sample.counts - sl.encoder_counts(plan)).max() <= 1
-        assert np.abs(sample.length - plan.unstrained_length).max() < 76e-9
+
+
+DRUMS: list[dict[str, Any]] = [
+    {"gear": -20.0, "winding_tension": 300.0},
+    {"count_zero": 500.0},
+    {"layers": 3, "drum_width": 0.03, "cable_length": 6.5, "drum_distance": 1.0, "drum_offset": -0.015},
+]
+
+
+@pytest.mark.parametrize("drum", wide(DRUMS, first=2))
+def test_counts_and_lengths_of_a_drum_are_those_of_encoder_counts(drum: dict[str, Any]) -> None:
+    wound, place = prototype(**drum), sl.Pose.from_euler([0.4, -1.0, 1.1], 0.0, 0.0, 0.0)
+    plan = sl.inverse(wound, place)
+    sample = Pilot(sl.twin.Machine(wound, start=place).link(), plan).look()
+    assert np.abs(sample.counts - sl.encoder_counts(plan)).max() <= 1
+    assert np.abs(sample.length - plan.unstrained_length).max() < 76e-9
 
 
 def test_zeros_of_the_encoders_are_off_by_what_length_zero_is() -> None:
@@ -196,8 +208,10 @@ def test_it_begins_where_the_article_s_machine_rests(error: dict[str, float]) ->
 def test_the_start_is_the_middle_of_the_test_box() -> None:
     assert np.abs(sl.twin.Machine(ROBOT).reading.position - HOME.position).max() < 1e-12
     bare = ROBOT.replace(test_box=None)
-    with pytest.raises(sl.InvalidValueError, match=r"^start is not given; .*has no test_box.*start=Pose"):
+    with refused("start", "not given", kind=sl.InvalidValueError) as caught:
         sl.twin.Machine(bare)
+    assert "test_box" in caught.value.allowed
+    assert "start=Pose" in caught.value.next_step
     place = sl.Pose.from_euler([0.2, -0.4, 1.4], 0.0, 0.0, 0.0)
     assert np.abs(sl.twin.Machine(bare, start=place).reading.position - place.position).max() < 1e-12
 
@@ -205,36 +219,52 @@ def test_the_start_is_the_middle_of_the_test_box() -> None:
 def test_a_step_that_is_too_coarse_for_the_modes() -> None:
     """sqrt(k/J_e) of the stiffest drum on its cable counts too."""
     stiff = ROBOT.replace(cables=ROBOT.cables.replace(axial_stiffness=3e6))
-    with pytest.raises(sl.InvalidValueError, match=r"^step is 0\.001 s; allowed: <= .* rad .*Hz.*Give step=") as told:
+    with refused("step", "0.001 s", kind=sl.InvalidValueError) as caught:
         sl.twin.Machine(stiff)
-    sl.twin.Machine(stiff, step=float(str(told.value).rpartition("step=")[2].rstrip(".")))
+    assert re.match(r"<= \S+ s, 0\.2 rad .* Hz", caught.value.allowed)
+    sl.twin.Machine(stiff, step=float(caught.value.next_step.rpartition("step=")[2].rstrip(".")))
     assert ROBOT.winches is not None
     light = ROBOT.replace(winches=ROBOT.winches.replace(inertia=2.77e-8, speed_gain=10.0, integral_gain=100.0))
     drum = np.sqrt(1.4e4 / PLAN.unstrained_length.min() / (2.77e-8 * (20 / 0.03) ** 2))
     limit = 0.2 / np.hypot(drum, 2.0 * np.pi * 6.2)
-    with pytest.raises(sl.InvalidValueError, match=r"^step is 0\.001 s; allowed: <= ") as told:
+    with refused("step", "0.001 s", kind=sl.InvalidValueError) as caught:
         sl.twin.Machine(light)
-    assert float(str(told.value).split("<= ")[1].split(" s")[0]) == pytest.approx(limit, rel=0.03)
+    assert float(caught.value.allowed.split("<= ")[1].split(" s")[0]) == pytest.approx(limit, rel=0.03)
 
 
 def test_what_cannot_be_a_machine() -> None:
     assert ROBOT.winches is not None
     blind = ROBOT.replace(winches=sl.Winch(drum_radius=0.03, inertia=1e-5))
-    for robot, given, says in (
-        (ROBOT.replace(winches=None), {}, "winches: counts_per_turn is not given"),
-        (blind, {}, "winches: counts_per_turn is not given"),
-        (blind.replace(winches=sl.Winch(drum_radius=0.03, counts_per_turn=4096)), {}, "without winches: inertia"),
-        (ROBOT, {"nominal": sl.load_robot("fast")}, "nominal is of 6 cables"),
-        (ROBOT, {"loss": 1.0}, "loss is 1; allowed: >= 0, < 1"),
-        (ROBOT, {"delay": -1.0}, "delay is -1 s"),
-        (ROBOT, {"seed": -1}, "seed is -1"),
-        (ROBOT, {"period": 0.0123456}, "period is"),
-        (ROBOT, {"faults": ["cell 8 sticks"]}, "cell 0 to 7"),
-        (ROBOT, {"start": sl.Pose.from_euler([9.0, 0.0, 1.0], 0.0, 0.0, 0.0)}, "start is a pose without an answer"),
-        (ROBOT.replace(mass=5000.0), {"surveyed": True, "nominal": ROBOT}, "start is a pose without an answer"),
-    ):
-        with pytest.raises(sl.InvalidValueError, match=says):
+    without_inertia = blind.replace(winches=sl.Winch(drum_radius=0.03, counts_per_turn=4096))
+    rows: list[tuple[sl.Robot, dict[str, Any], tuple[str | None, ...]]] = [
+        (ROBOT.replace(winches=None), {}, ("winches: counts_per_turn", "not given")),
+        (blind, {}, ("winches: counts_per_turn", "not given")),
+        (without_inertia, {}, ("the robot", "without winches: inertia, position_gain, speed_gain, integral_gain")),
+        (ROBOT, {"nominal": sl.load_robot("fast")}, ("nominal", "of 6 cables")),
+        (ROBOT, {"loss": 1.0}, ("loss", "1", ">= 0, < 1")),
+        (ROBOT, {"delay": -1.0}, ("delay", "-1 s")),
+        (ROBOT, {"seed": -1}, ("seed", "-1")),
+        (ROBOT, {"period": 0.0123456}, ("period", "0.0123456 s")),
+        (ROBOT, {"faults": ["cell 8 sticks"]}, ("fault", None, "cell 0 to 7")),
+        (ROBOT, {"start": sl.Pose.from_euler([9.0, 0.0, 1.0], 0.0, 0.0, 0.0)}, ("start", "a pose without an answer")),
+        (ROBOT.replace(mass=5000.0), {"surveyed": True, "nominal": ROBOT}, ("start", "a pose without an answer")),
+    ]
+    for robot, given, parts in rows:
+        with refused(*parts, kind=sl.InvalidValueError):
             sl.twin.Machine(robot, **given)
+
+
+@pytest.mark.parametrize(("share", "fault"), [(0.98, GroupFault.NONE), (1.02, GroupFault.SET_POINT)])
+def test_set_points_faster_than_the_motors_are_refused(share: float, fault: GroupFault) -> None:
+    winch = ROBOT.winches
+    assert winch is not None
+    assert winch.speed_limit is not None
+    assert winch.drum_radius is not None
+    pilot = Pilot(sl.twin.Machine(ROBOT, seed=1).link(), PLAN)
+    pilot.hold(0.2)
+    rate = np.zeros(8)
+    rate[5] = share * float((winch.speed_limit * winch.drum_radius / winch.gear)[5])
+    assert pilot.send(Mode.FOLLOW, rate=rate).fault.tolist() == [0, 0, fault, 0]
 
 
 def test_two_controllers_on_one_machine() -> None:

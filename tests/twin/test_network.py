@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.control.link import PERIOD, Command, Missing, Mode, Sample
+from sagline.control import Command, Missing, Mode, Sample
 from sagline.twin.network import Network, Way
+from tests.control.protocol import PERIOD
 from tests.twin.pilot import HOME, Pilot
 
 ROBOT = sl.load_robot("article-prototype")

@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sagline.control.link import COUNTERS, HEARTBEAT, OWNER_TIMEOUT, RAMP, GroupFault, GroupStatus, Mode, WinchState
+from sagline.control import Mode
 from sagline.twin.plc_program import Limits, Order, Program
+from tests.control.protocol import COUNTERS, HEARTBEAT, OWNER_TIMEOUT, RAMP, GroupFault, GroupStatus, WinchState
+from tests.tiers import extended
 
 PERIOD = 0.01
 LIMITS = Limits([0.5, 0.5], [8.0, 9.0], [0.4, 0.5], [1000.0, 2000.0])
@@ -396,7 +398,7 @@ def anything(generator: np.random.Generator, group: Group) -> None:
     group.now += PERIOD
 
 
-@pytest.mark.parametrize("seeds", [30, pytest.param(1000, marks=pytest.mark.soak)])
+@pytest.mark.parametrize("seeds", [8, pytest.param(30, marks=extended), pytest.param(1000, marks=pytest.mark.soak)])
 def test_whatever_comes_drives_do_what_they_may(seeds: int) -> None:
     followed = 0
     for seed in range(seeds):

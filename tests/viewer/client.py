@@ -34,7 +34,7 @@ class Client:
     def __init__(self, port: int) -> None:
         self.far = 100.0 + next(_MARKS)  # m: by which a server knows it from others
         protocol = Subprotocol(f"viser-v{viser.__version__}")
-        self._socket = connect(
+        self.socket = connect(
             f"ws://127.0.0.1:{port}",
             subprotocols=[protocol],
             compression=None,
@@ -49,13 +49,13 @@ class Client:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._socket.close()
+        self.socket.close()
 
     def say(self, **message: Any) -> None:
         self.send(msgspec.msgpack.encode(message))
 
     def send(self, raw: bytes | str) -> None:
-        self._socket.send(raw)
+        self.socket.send(raw)
 
     def look(self, position: Any, look_at: Any, width: int = 800) -> None:
         """Tell where the camera is, in a picture 600 px high."""
@@ -76,7 +76,9 @@ class Client:
             wxyz=[float(x) for x in wxyz],
         )
 
-    def set(self, uuid: str, value: Any) -> None:
+    def set(self, control: Any, value: Any) -> None:
+        """Set a control, given by its handle or its id."""
+        uuid = control if isinstance(control, str) else control._impl.uuid
         self.say(type="GuiUpdateMessage", uuid=uuid, updates={"value": value})
 
     def met(self, server: viser.ViserServer) -> viser.ClientHandle:
@@ -103,7 +105,7 @@ class Client:
         """Messages, until none has come for a while [s]."""
         while True:
             try:
-                raw = self._socket.recv(timeout=timeout)
+                raw = self.socket.recv(timeout=timeout)
             except TimeoutError:
                 return
             assert isinstance(raw, bytes)
@@ -112,7 +114,7 @@ class Client:
 
     def break_off(self) -> None:
         """Leave without a word, as a laptop does that is closed."""
-        self._socket.socket.close()
+        self.socket.socket.close()
 
 
 @contextmanager

@@ -22,6 +22,7 @@ from sagline.viewer.stage import PLATFORM
 from sagline.viewer.viewer import Viewer
 from tests.calibration.made_up import made_up
 from tests.chromium import NEEDED, PATIENCE, launched
+from tests.tiers import extended
 
 FLAGS = (
     "--disable-quic --disable-component-update --disable-sync --use-gl=angle --use-angle=swiftshader "
@@ -47,7 +48,7 @@ FEWER_PICTURES = """(() => {
     window.cancelAnimationFrame = clearTimeout
 })()"""
 
-pytestmark = NEEDED
+pytestmark = [extended, NEEDED]
 
 
 @pytest.fixture(scope="module")

@@ -11,13 +11,14 @@ from sagline.viewer.by_hand import ByHand
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.viewer import Viewer
 from tests.chromium import NEEDED, launched
+from tests.tiers import extended
 from tests.viewer.test_browser import FLAGS, OVERFLOWING, await_that, least_contrast, opened
 
 SCREENS = ((390, 640), (1000, 640), (1440, 900))
 ROBOTS = ("falcon-7", "cogiro", "fast")
 HANDLE = "svg[data-dot] .handle"
 
-pytestmark = NEEDED
+pytestmark = [extended, NEEDED]
 
 
 @pytest.fixture(scope="module")

@@ -18,6 +18,7 @@ from sagline.viewer.solids import size_of
 from sagline.viewer.tension_scale import TensionScale
 from sagline.viewer.viewer import home_pose
 from tests.chromium import NEEDED, PATIENCE, launched
+from tests.tiers import extended
 from tests.viewer.test_browser import FLAGS, await_that, opened
 
 KEEP_NOTES = """() => {
@@ -48,7 +49,7 @@ PLAY = """async (url) => {
     return { length, pictures }
 }"""
 
-pytestmark = NEEDED
+pytestmark = [extended, NEEDED]
 
 
 @pytest.fixture(scope="module")

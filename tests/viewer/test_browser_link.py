@@ -8,11 +8,12 @@ from playwright.sync_api import Browser
 
 import sagline as sl
 from tests.chromium import NEEDED, PATIENCE, launched
+from tests.tiers import extended
 from tests.viewer.reach import broken_rules
 from tests.viewer.test_browser import FEWER_PICTURES, FLAGS, await_that, opened
 from tests.viewer.test_state_code import executed
 
-pytestmark = NEEDED
+pytestmark = [extended, NEEDED]
 
 
 @pytest.fixture(scope="module")

@@ -12,13 +12,14 @@ import sagline as sl
 from sagline.viewer.run import Run
 from sagline.viewer.viewer import Viewer
 from tests.chromium import NEEDED, PATIENCE, launched
+from tests.tiers import extended
 from tests.viewer.reach import broken_rules, walked
 from tests.viewer.test_browser import BACKGROUND, FLAGS, OVERFLOWING, await_that, least_contrast, opened
 
 SIZES = ((390, 640), (1000, 640), (1440, 900))
 FOLDED = "div[data-pressed][aria-expanded=false]:visible"
 
-pytestmark = NEEDED
+pytestmark = [extended, NEEDED]
 
 
 @pytest.fixture(scope="module")

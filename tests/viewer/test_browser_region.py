@@ -12,13 +12,14 @@ import sagline as sl
 from sagline.viewer.space_show import SpaceShow
 from sagline.viewer.viewer import Viewer
 from tests.chromium import NEEDED, launched
+from tests.tiers import extended
 from tests.viewer.test_browser import FLAGS, OVERFLOWING, await_that, least_contrast, opened
 
 SCREENS = ((390, 640), (1000, 640), (1440, 900))
 ROBOTS = ("falcon-7", "cogiro", "fast")
 FAST = ("cogiro", (1000, 640))
 
-pytestmark = NEEDED
+pytestmark = [extended, NEEDED]
 
 
 @pytest.fixture(scope="module")

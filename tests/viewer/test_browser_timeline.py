@@ -12,6 +12,7 @@ import sagline as sl
 from sagline.viewer.run import Run
 from sagline.viewer.viewer import Viewer
 from tests.chromium import NEEDED, launched
+from tests.tiers import extended
 from tests.viewer.test_browser import FLAGS, OVERFLOWING, SCENE, await_that, box, least_contrast, opened
 
 ROBOTS = ("falcon-7", "cogiro", "fast")
@@ -20,7 +21,7 @@ THEMES: tuple[Literal["light", "dark"], ...] = ("light", "dark")
 
 STRIP = "#sagline-timeline"
 
-pytestmark = NEEDED
+pytestmark = [extended, NEEDED]
 
 
 @pytest.fixture(scope="module")

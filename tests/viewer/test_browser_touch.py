@@ -14,9 +14,10 @@ from sagline.viewer.eye import Eye
 from sagline.viewer.framing import fitted
 from sagline.viewer.viewer import Viewer
 from tests.chromium import NEEDED, launched
+from tests.tiers import extended
 from tests.viewer.test_browser import FLAGS, OVERFLOWING, SCENE, await_that, box, opened
 
-pytestmark = NEEDED
+pytestmark = [extended, NEEDED]
 UNCOVERED = """([x, y]) => {
     document.querySelectorAll("[role=alert].mantine-Notification-root button").forEach((each) => each.click())
     return document.elementFromPoint(x, y) instanceof HTMLCanvasElement

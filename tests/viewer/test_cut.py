@@ -15,14 +15,16 @@ from sagline.viewer.cut_show import Before
 from sagline.viewer.eye import Eye
 from sagline.viewer.moment import Moment
 from sagline.viewer.playback import Playback
+from sagline.viewer.played import Played
 from sagline.viewer.player import Player
 from sagline.viewer.server import started, stop
 from sagline.viewer.viewer import Viewer, home_pose
 from tests.effort import least_seconds
 from tests.plot import made
+from tests.tiers import extended, wide
 from tests.viewer.client import Client, await_that
+from tests.viewer.shown import ROBOT, Shown, controls, handle, shown
 from tests.viewer.test_push_show import POSE, look, tell
-from tests.viewer.test_viewer import ROBOT, Shown, handle, shown
 
 
 @pytest.fixture(scope="module")
@@ -42,58 +44,65 @@ def seen_at(page: Shown, camera: CameraHandle, cable: int) -> list[float]:
     return [float(x) for x in places[cable, away.argmax()] / eye.pixels]
 
 
+def button_of(page: Shown, cable: int) -> Any:
+    """The button that cuts a cable; None if it is not offered."""
+    found = (each for each in controls(page.server) if each.label == f"Cut cable {cable}" and each.visible)
+    return next(found, None)
+
+
 def test_a_click_marks_the_cable_below_it_and_one_beside_none(page: Shown) -> None:
-    show = page.viewer._cuts
     with Client(page.port) as client:
-        camera, button = look(client, page), show._stage._button  # the last that is shown of it
+        camera, chosen = look(client, page), handle(page, "Cable to cut")
         for cable in (0, 3, 5):
             tell(client, page, "pick", seen_at(page, camera, cable))
-            await_that(lambda cable=cable: show._panel.cable == cable and show._chosen)  # type: ignore[misc]
-            await_that(lambda cable=cable: button.visible and button.label == f"Cut cable {cable}")  # type: ignore[misc]
-            assert show._stage._line.visible
+            await_that(lambda cable=cable: button_of(page, cable) is not None)  # type: ignore[misc]
+            assert chosen.value == str(cable)
+            assert page.node("/chosen").visible
             view = page.viewer.view
             assert view is not None
             tension = view.snapshot.tension[cable]
-            assert show._stage._label.text == f"cable {cable}: {tension:.1f} N"
-            np.testing.assert_allclose(show._stage._line.points[0, 0], ROBOT.frame_anchors[cable], atol=1e-5)
+            assert page.node("/chosen_name").text == f"cable {cable}: {tension:.1f} N"
+            np.testing.assert_allclose(page.node("/chosen").points[0, 0], ROBOT.frame_anchors[cable], atol=1e-5)
         tell(client, page, "pick", [0.02, 0.98])
-        await_that(lambda: not show._stage._line.visible)
+        await_that(lambda: not page.node("/chosen").visible)
         strange: list[Any] = [None, [], {}, [1], ["x", 2], [1e300, 1e300], [[0.5, 0.5]], 10**400]
         for nonsense in strange:
             tell(client, page, "pick", nonsense)
         tell(client, page, "pick", seen_at(page, camera, 1))
-        await_that(lambda: show._panel.cable == 1)
+        await_that(lambda: chosen.value == "1")
 
 
+@extended
 def test_it_swings_as_simulate_says_and_calm_puts_all_back(page: Shown) -> None:
-    show, player = page.viewer._cuts, page.viewer._player
+    def played() -> Played | None:
+        assert page.viewer.view is not None
+        return page.viewer.view.played
+
     with Client(page.port) as client:
         camera = look(client, page)
         tell(client, page, "pick", seen_at(page, camera, 2))
-        await_that(lambda: show._panel.cable == 2 and show._chosen)
+        await_that(lambda: button_of(page, 2) is not None)
         before = page.viewer.view
         assert before is not None
-        button = show._stage._button
-        client.set(button._impl.uuid, True)
-        await_that(lambda: player.played is not None and player.played.duration > 4.0)
-        played = player.played
-        assert isinstance(played, Playback)
+        client.set(button_of(page, 2), True)
+        await_that(lambda: (found := played()) is not None and found.duration > 4.0)
+        whole = played()
+        assert isinstance(whole, Playback)
         state = sl.inverse(ROBOT, POSE, tension=sl.MinimumNorm()).state
         by_itself = sl.simulate(
             state, duration=dynamics.LASTS, events=sl.Break(cable=2, time=0.0), damping=dynamics.LOSSES
         )
-        np.testing.assert_allclose(played.simulation.tensions, by_itself.tensions, rtol=1e-9)
+        np.testing.assert_allclose(whole.simulation.tensions, by_itself.tensions, rtol=1e-9)
         peak = cut_words.peak_of(by_itself, 2)
         others = np.delete(by_itself.largest_tension, 2)  # type: ignore[arg-type]
         assert peak.tension == others.max()
-        await_that(lambda: "So far" not in show._panel._told.content)
-        assert f"{peak.tension:.1f} N in cable {peak.cable}" in show._panel._told.content
-        assert f"{peak.tension / ROBOT.tension_max[peak.cable]:.2f} times its limit" in show._panel._told.content
-        await_that(lambda: player.clock.time == player.clock.duration)
+        await_that(lambda: "So far" not in page.text)
+        assert f"{peak.tension:.1f} N in cable {peak.cable}" in page.text
+        assert f"{peak.tension / ROBOT.tension_max[peak.cable]:.2f} times" in page.text
+        await_that(lambda: page.told("clock")["time"] == whole.duration)
         assert isinstance(page.viewer.view and page.viewer.view.snapshot, Moment)
-        client.set(handle(page, "Calm")._impl.uuid, True)
-        await_that(lambda: player.played is None)
-        await_that(lambda: page.viewer.view is not None and page.viewer.view.played is None)
+        client.set(handle(page, "Calm"), True)
+        await_that(lambda: played() is None)
         after = page.viewer.view
         assert after is not None
         np.testing.assert_array_equal(after.snapshot.pose.position, POSE.position)
@@ -131,15 +140,15 @@ def test_cut_by_cut_all_is_put_back() -> None:
         first = cuts._before[-1].kept.played
         cuts.calm()
         assert player.played is first
-        assert cuts._panel._calm.visible
+        assert handle(server, "Calm").visible
         cuts.calm()
         assert player.played is given
-        assert not cuts._panel._calm.visible
+        assert not handle(server, "Calm").visible
     finally:
         stop(server)
 
 
-@pytest.mark.parametrize("name", ["falcon-7", "cogiro", "fast"])
+@pytest.mark.parametrize("name", wide(["cogiro", "falcon-7", "fast"]))
 def test_the_first_part_is_soon_there_and_begins_what_follows(name: str) -> None:
     robot = sl.load_robot(name)
     state = sl.inverse(robot, home_pose(robot), tension=sl.MinimumNorm()).state

@@ -11,18 +11,17 @@ from PIL import Image
 
 import sagline as sl
 from sagline.viewer.film import moments
-from sagline.viewer.run import Run
 from sagline.viewer.studio import Shot
 from sagline.viewer.viewer import Viewer
+from tests.refusal import refused
+from tests.tiers import extended
 from tests.viewer.client import PATIENCE, Client, await_that
-from tests.viewer.test_framing import put
-from tests.viewer.test_viewer import PATH, ROBOT, Shown, handle, shown
+from tests.viewer.shown import PATH, ROBOT, Shown, a_run, framed, handle, shown, tell
 
 
 @pytest.fixture(scope="module")
 def film() -> Iterator[Shown]:
-    run = Run.of(sl.inverse(ROBOT, PATH, model=sl.Empirical()))
-    yield from shown(lambda server: Viewer(server, ROBOT, run))
+    yield from shown(lambda server: Viewer(server, ROBOT, a_run()))
 
 
 def rendered(client: Client, message: dict[str, Any], picture: bytes) -> None:
@@ -47,12 +46,13 @@ def said(messages: Iterable[dict[str, Any]], topic: str) -> list[Any]:
     return [json.loads(content[len(head) :]) for content in contents if content.startswith(head)]
 
 
+@extended
 def test_a_film_is_a_matter_of_its_client(film: Shown) -> None:
     """One client films, gives its pictures slowly, and leaves in the middle; another drags meanwhile."""
     button = handle(film, "Film of the run")
     with Client(film.port) as filming, Client(film.port) as other:
         other.replayed()
-        filming.set(button._impl.uuid, True)
+        filming.set(button, True)
         first = next(m for m in filming.heard(PATIENCE) if m["type"] == "GetRenderRequestMessage")
         assert (first["width"], first["height"]) == (32, 32)  # names come a picture late
         rendered(filming, first, pixel())
@@ -80,7 +80,7 @@ def test_a_film_is_told_picture_by_picture_and_can_be_cancelled(film: Shown) -> 
     button, length = handle(film, "Film of the run"), PATH.time[-1]
     with Client(film.port) as client:
         client.replayed()
-        client.set(button._impl.uuid, True)
+        client.set(button, True)
         heard: list[dict[str, Any]] = []
         asked = 0
         for message in client.heard(PATIENCE):
@@ -88,7 +88,7 @@ def test_a_film_is_told_picture_by_picture_and_can_be_cancelled(film: Shown) -> 
             if message["type"] == "GetRenderRequestMessage":
                 asked += 1
                 if asked == 5:
-                    client.set(film.viewer._channel._field._impl.uuid, json.dumps({"topic": "film", "value": "cancel"}))
+                    tell(film, client, "film", "cancel")
                     await_that(lambda: any(v.cancelled.is_set() for v in film.viewer._export._visitors.values()))
                 rendered(client, message, pixel())
             if None in said([message], "film"):
@@ -108,8 +108,9 @@ def test_a_film_is_told_picture_by_picture_and_can_be_cancelled(film: Shown) -> 
 
 
 def test_a_film_longer_than_a_browser_can_keep_is_refused() -> None:
-    with pytest.raises(sl.InvalidValueError, match=r"480 s long at this speed.*at most 120 s"):
+    with refused("film", allowed="at most 120 s", kind=sl.InvalidValueError) as caught:
         moments(120.0, 0.25)
+    assert caught.value.value.startswith("480 s")
     assert moments(2.0, 4.0)[[0, -1]] == pytest.approx([0.0, 2.0])
     assert len(moments(2.0, 4.0)) == 16  # both ends of half a second
     assert len(moments(0.0, 1.0)) == 2
@@ -119,9 +120,9 @@ def test_a_picture_is_asked_for_as_large_as_its_paper(film: Shown) -> None:
     paper, strip, button = handle(film, "Picture for"), handle(film, "With legend"), handle(film, "Picture (PNG)")
     with Client(film.port) as client:
         client.replayed()
-        client.set(paper._impl.uuid, "Page, 182 mm at 300 dpi")
-        client.set(strip._impl.uuid, False)
-        client.set(button._impl.uuid, True)
+        client.set(paper, "Page, 182 mm at 300 dpi")
+        client.set(strip, False)
+        client.set(button, True)
         heard: list[dict[str, Any]] = []
         asked = []
         for message in client.heard(PATIENCE):
@@ -142,18 +143,19 @@ def test_a_picture_is_asked_for_as_large_as_its_paper(film: Shown) -> None:
     strip.value = True
 
 
+@extended
 @pytest.mark.parametrize(
     "camera",
     [{"wxyz": [0, 0, 0, 0]}, {"fov": 0.0}, {"fov": -1.0}, {"image_height": 0}, {"position": [0, float("nan"), 0]}],
 )
 def test_a_client_with_a_camera_that_cannot_be_gets_no_picture(film: Shown, camera: dict[str, Any]) -> None:
     with Client(film.port) as client:
-        put(client, film.server, film.viewer._framing)
+        framed(client, film)
         eye: dict[str, Any] = {"wxyz": [1, 0, 0, 0], "up_direction": [0, 0, 1], "position": [0, -20, 3], "fov": 1.0}
         eye |= {"look_at": [0, 0, 0], "near": 0.1, "far": client.far, "image_height": 600, "image_width": 800}
         client.replayed()
         client.say(type="ViewerCameraMessage", **{**eye, **camera})
-        client.set(handle(film, "Picture (PNG)")._impl.uuid, True)
+        client.set(handle(film, "Picture (PNG)"), True)
         messages = client.heard(PATIENCE)
         note = next(m for m in messages if m["type"] in ("NotificationShowMessage", "GetRenderRequestMessage"))
         assert note["type"] == "NotificationShowMessage"

@@ -6,13 +6,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-import viser
 
 import sagline as sl
 from sagline.viewer import solids
 from sagline.viewer.framing import BORDER, FIELD, Framing, fitted
 from sagline.viewer.server import started, stop
+from tests.tiers import extended, wide
 from tests.viewer.client import Client, await_that
+from tests.viewer.shown import put
 
 
 def seen(points: np.ndarray, camera: np.ndarray, target: np.ndarray, aspect: float, field: float) -> np.ndarray:
@@ -25,7 +26,7 @@ def seen(points: np.ndarray, camera: np.ndarray, target: np.ndarray, aspect: flo
 
 
 @pytest.mark.parametrize("aspect", [0.4, 0.7, 1.0, 1.6, 3.0])
-@pytest.mark.parametrize("name", sl.robot_names())
+@pytest.mark.parametrize("name", wide(sl.robot_names(), 4))
 def test_every_robot_fills_the_picture_and_no_more(name: str, aspect: float) -> None:
     low, high = solids.bounds(sl.load_robot(name))
     camera, target = fitted(low, high, aspect)
@@ -37,18 +38,11 @@ def test_every_robot_fills_the_picture_and_no_more(name: str, aspect: float) -> 
     assert places.max(axis=0) == pytest.approx(-places.min(axis=0), abs=1e-6)  # in the middle
 
 
-def put(client: Client, server: viser.ViserServer, framing: Framing) -> viser.CameraHandle:
-    """The camera of a client, once it has been put to where it sees all."""
-    met = client.met(server)
-    await_that(lambda: bool(framing._places.get(met.client_id)))
-    with framing._lock:  # until it has done so
-        return met.camera
-
-
 def at(camera: Any, position: Any) -> bool:
     return bool(np.allclose(camera.position, position, rtol=1e-6))
 
 
+@extended
 def test_the_box_stays_in_the_picture_until_someone_looks_from_elsewhere() -> None:
     low, high = np.array([-5.0, -4.0, 0.0]), np.array([5.0, 4.0, 6.0])
     server = started(port=0)
@@ -105,6 +99,7 @@ def test_a_camera_that_a_link_has_put_is_let_be_whatever_its_page_still_tells() 
         stop(server)
 
 
+@extended
 def test_a_camera_that_is_just_being_put_somewhere_has_not_been_moved_by_hand() -> None:
     server = started(port=0)
     try:

@@ -11,6 +11,7 @@ from sagline.viewer.cable_colors import cable_color
 from sagline.viewer.hull import Asked, hull_of, region_in
 from sagline.viewer.margin_scale import MarginScale
 from tests.effort import least_seconds
+from tests.tiers import extended
 
 ROBOT = sl.load_robot("article-suspended")
 LOADS = sl.WrenchBox(force=50.0)
@@ -51,6 +52,7 @@ def test_a_hull_that_is_empty_says_what_is_nearest(monkeypatch: pytest.MonkeyPat
     assert "rough" in hull_of(asked, True, lambda *_: None).told
 
 
+@extended
 def test_a_region_that_is_small_is_looked_at_closer() -> None:
     robot = sl.load_robot("fast")
     asked = Asked(robot, LEVEL, sl.Catenary(), sl.WrenchBox())
@@ -68,6 +70,7 @@ def test_a_region_that_is_small_is_looked_at_closer() -> None:
     assert "goes on" not in found.told
 
 
+@extended
 @pytest.mark.parametrize(
     "name", ["cogiro", *(pytest.param(one, marks=pytest.mark.soak) for one in ("falcon-7", "fast"))]
 )

@@ -1,6 +1,7 @@
 """Keys that move the platform, as a page sends them, and what is said of it."""
 
 import json
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -15,9 +16,10 @@ from sagline.viewer.snapshot import taken_at
 from sagline.viewer.spoken import place_of, spoken
 from sagline.viewer.tension_scale import TensionScale
 from sagline.viewer.view import View
-from sagline.viewer.viewer import Viewer
+from sagline.viewer.viewer import Viewer, home_pose
+from tests.tiers import extended
 from tests.viewer.client import Client, await_that
-from tests.viewer.test_viewer import Shown, handle, shown
+from tests.viewer.shown import Shown, handle, shown
 
 ROBOT = sl.load_robot("cogiro")
 
@@ -30,7 +32,7 @@ def page() -> Iterator[Shown]:
 def tell(page: Shown, topic: str, value: Any, count: int = 0) -> None:
     with Client(page.port) as client:
         text = json.dumps({"topic": topic, "value": value, "count": count})
-        client.set(handle(page, "sagline")._impl.uuid, text)
+        client.set(handle(page, "sagline"), text)
         client.replayed()  # who has not heard all takes ten seconds to leave
 
 
@@ -41,12 +43,14 @@ def there(page: Shown, position: Any, quaternion: Any) -> bool:
 
 
 def test_steps_go_along_and_turn_about_the_axes_and_home(page: Shown) -> None:
-    home = page.viewer._home
+    home = home_pose(ROBOT)
+    place = home.position + 0.1 * np.array([1.0, -2.0, 0.5])
     tell(page, "nudge", [1, -2, 0.5, 0, 0, 0])
-    await_that(lambda: there(page, home.position + 0.1 * np.array([1.0, -2.0, 0.5]), home.quaternion))
+    await_that(lambda: not there(page, home.position, home.quaternion))
+    assert there(page, place, home.quaternion)
     tell(page, "nudge", [0, 0, 0, 3, 0, 0], 1)
-    turned = Rotation.from_euler("Z", 3.0, degrees=True)
-    await_that(lambda: there(page, home.position + 0.1 * np.array([1.0, -2.0, 0.5]), turned.as_quat()))
+    await_that(lambda: not there(page, place, home.quaternion))
+    assert there(page, place, Rotation.from_euler("Z", 3.0, degrees=True).as_quat())
     tell(page, "home", 0)
     await_that(lambda: there(page, home.position, home.quaternion))
 
@@ -67,23 +71,22 @@ NONSENSE: tuple[Any, ...] = (
 )
 
 
+@extended
 def test_steps_that_are_none_and_ways_out_of_sight_move_nothing(page: Shown) -> None:
+    home = home_pose(ROBOT)
     tell(page, "home", 0)
-    await_that(lambda: there(page, page.viewer._home.position, page.viewer._home.quaternion))
+    await_that(lambda: there(page, home.position, home.quaternion))
     for count, value in enumerate(NONSENSE):
         tell(page, "nudge", value, count)
     tell(page, "nudge", [1e400, 0, 0, 0, 0, 0])
-    heard: list[Any] = []
-    page.viewer._channel.on("done", lambda value, _: heard.append(value))
-    tell(page, "done", 1)
-    await_that(lambda: bool(heard))
-    assert there(page, page.viewer._home.position, page.viewer._home.quaternion)
+    tell(page, "nudge", [0, 0, 1, 0, 0, 0], 99)  # a step that is one
+    await_that(lambda: not there(page, home.position, home.quaternion))
+    assert there(page, home.position + np.array([0.0, 0.0, 0.1]), home.quaternion)
     with Client(page.port) as client:
         for count in range(30):
             text = json.dumps({"topic": "nudge", "value": [MOST, 0, 0, 0, 0, 0], "count": count})
-            client.set(handle(page, "sagline")._impl.uuid, text)
-        told = page.viewer._channel._told
-        await_that(lambda: "nudge-told" in told and "out of sight" in str(told["nudge-told"].content))
+            client.set(handle(page, "sagline"), text)
+        await_that(lambda: "out of sight" in str(page.told("nudge-told")))
     await_that(lambda: 50.0 < page.position[0] < 100.0)
     assert page.thread.is_alive()
 
@@ -107,9 +110,14 @@ def test_the_verdict_is_a_sentence() -> None:
     pose = sl.Pose.from_euler([0.1, -0.0, 2.6], np.radians(10.0), 0.0, 0.0)
     tension = sl.inverse(ROBOT, pose, tension=sl.MinimumNorm()).chord_tension
     found = said(pose)
-    assert found.text == f"Feasible, tensions {tension.min():.0f} to {tension.max():.0f} N"
-    assert found.place == "x 0.10, y 0.00, z 2.60 m, turned 10, 0, 0 degrees about z, y, x"
+    assert found.head == "Feasible"
+    assert found.text.startswith(found.head)
+    assert re.findall(r"[\d.]+|N$", found.text) == [f"{tension.min():.0f}", f"{tension.max():.0f}", "N"]
+    place, _, turn = found.place.partition(" m, ")
+    assert place == "x 0.10, y 0.00, z 2.60"
+    assert re.findall(r"\d+|\b[xyz]\b", turn) == ["10", "0", "0", "z", "y", "x"]
     beyond = said(sl.Pose([7.4, 5.0, 2.6], np.eye(3)))
     assert beyond.head == "Not feasible"
-    assert beyond.text.startswith("Not feasible, no force alone would do; at their limits: cables 0, ")
+    assert beyond.text.startswith(beyond.head)
+    assert "cables 0, " in beyond.text
     assert place_of(sl.Pose([-0.001, 0.0, 1.0], np.eye(3))) == "x 0.00, y 0.00, z 1.00 m"

@@ -13,16 +13,15 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.robot.inertia import with_mass
 from sagline.viewer.linked_controls import short
 from sagline.viewer.run import Run
 from sagline.viewer.source import Source
-from sagline.viewer.state_link import name_of
+from sagline.viewer.state_link import name_of, pose_part
 from sagline.viewer.view import View
 from sagline.viewer.viewer import Viewer
+from tests.tiers import extended
 from tests.viewer.client import PATIENCE, Client, await_that
-from tests.viewer.test_framing import put
-from tests.viewer.test_viewer import Shown, handle, shown
+from tests.viewer.shown import Shown, controls, framed, handle, shown, tell, with_mass
 
 ROBOT = sl.load_robot("cogiro")
 
@@ -48,14 +47,14 @@ class Asking:
     """A client that asks, and is answered."""
 
     def __init__(self, page: Shown, client: Client) -> None:
-        self._page, self.client, self._count = page, client, 0
+        self.page, self.client, self.count = page, client, 0
         self.seen: list[dict[str, Any]] = []  # what came beside the answers
 
     def ask(self, topic: str, text: str) -> dict[str, Any]:
-        self._count += 1
-        name = f"{id(self)}-{self._count}"
-        uuid = handle(self._page, "sagline")._impl.uuid
-        self.client.set(uuid, json.dumps({"topic": topic, "value": [name, text], "count": self._count}))
+        self.count += 1
+        name = f"{id(self)}-{self.count}"
+        field = handle(self.page, "sagline")
+        self.client.set(field, json.dumps({"topic": topic, "value": [name, text], "count": self.count}))
         return self.answered(topic, name)
 
     def answered(self, topic: str, name: str) -> dict[str, Any]:
@@ -105,11 +104,11 @@ def randomly_set(page: Shown, client: Client, random: np.random.Generator) -> No
         slider = handle(page, label)
         if random.random() < 0.6:
             steps = int(random.integers(0, round((slider.max - slider.min) / slider.step)))
-            client.set(slider._impl.uuid, slider.min + steps * slider.step)
+            client.set(slider, slider.min + steps * slider.step)
     for label in ("Cable model", "Tensions"):
         options = [each for each in handle(page, label).options if "remembers" not in each]
-        client.set(handle(page, label)._impl.uuid, options[int(random.integers(len(options)))])
-    client.set(handle(page, "Straight cables beside")._impl.uuid, bool(random.random() < 0.5))
+        client.set(handle(page, label), options[int(random.integers(len(options)))])
+    client.set(handle(page, "Straight cables beside"), bool(random.random() < 0.5))
     turn = random.uniform(-0.1, 0.1, 4)
     turn[0] = 1.0
     position = random.uniform([-3.0, -2.0, 1.0], [3.0, 2.0, 4.0])
@@ -118,6 +117,7 @@ def randomly_set(page: Shown, client: Client, random: np.random.Generator) -> No
     await_that(lambda: np.array_equal(view(page).snapshot.pose.position, position))
 
 
+@extended
 @pytest.mark.parametrize("count", [4, pytest.param(150, marks=pytest.mark.soak)])
 def test_another_page_comes_to_the_same(one: Shown, other: Shown, count: int) -> None:
     random = np.random.default_rng(20261122)
@@ -134,7 +134,7 @@ def test_another_page_comes_to_the_same(one: Shown, other: Shown, count: int) ->
 
 
 def test_all_controls_of_the_page_are_in_it(one: Shown, other: Shown) -> None:
-    handles = [each for each in one.server.gui._gui_input_handle_from_uuid.values() if hasattr(each, "label")]
+    handles = [each for each in controls(one.server) if hasattr(each, "label")]
     wanted = {id(each) for each in handles if each.label != "sagline" and not each._impl.is_button}
     named = one.viewer._linked._controls._handles()
     assert {id(each) for each in named.values()} == wanted
@@ -142,27 +142,29 @@ def test_all_controls_of_the_page_are_in_it(one: Shown, other: Shown) -> None:
     assert {"slice", "cable-model", "mode", "modes-up-to"} <= set(named)
     with asking(one) as here, asking(other) as there:
         for label, value in (("Modes up to [Hz]", 7.0), ("Force", "about z"), ("Mode", "massless 2")):
-            here.client.set(handle(one, label)._impl.uuid, value)
-        here.client.set(handle(one, "At x, y, z [m]")._impl.uuid, [0.125, 0.0, -0.25])
+            here.client.set(handle(one, label), value)
+        here.client.set(handle(one, "At x, y, z [m]"), [0.125, 0.0, -0.25])
         await_that(lambda: handle(one, "At x, y, z [m]").value == (0.125, 0.0, -0.25))
         link = here.link()
         assert "modes-up-to=7&force=about-z" in link
         there.ask("link", link)
         assert handle(other, "Mode").value == "massless 2"
-        assert handle(other, "Modes up to [Hz]").value == 7.0
+        highest = handle(other, "Modes up to [Hz]")
+        assert highest.value == 7.0
         assert handle(other, "At x, y, z [m]").value == (0.125, 0.0, -0.25)
         assert "2 numbers" not in there.ask("link", link.replace("0.125,0,-0.25", "0.125,0"))["refused"]
-        here.client.set(handle(one, "Mode")._impl.uuid, "")
+        here.client.set(handle(one, "Mode"), "")
         await_that(lambda: handle(one, "Mode").value == "")
         there.ask("link", here.link())  # what is usual again is not told, and set all the same
         assert handle(other, "Mode").value == ""
 
 
+@extended
 def test_a_link_is_of_all_that_was_set_before_it_was_asked_for(one: Shown) -> None:
     mass = handle(one, "Platform + load [kg]")
     usual = mass.value
     with asking(one) as here:
-        number = put(here.client, one.server, one.viewer._framing).client.client_id
+        number = framed(here.client, one).client.client_id
 
         def set_and_ask() -> None:
             mass.value = 120.0
@@ -170,21 +172,22 @@ def test_a_link_is_of_all_that_was_set_before_it_was_asked_for(one: Shown) -> No
 
         one.viewer._soon(set_and_ask)  # before what is set is shown
         assert "&platform-load=120" in here.answered("copy", "both")["text"]
-        here.client.set(mass._impl.uuid, usual)
+        here.client.set(mass, usual)
         await_that(lambda: view(one).snapshot.robot.mass == usual)
 
 
+@extended
 def test_controls_of_one_name_are_told_apart(one: Shown, other: Shown) -> None:
     values = {"Force": "about z", "Force ± [N]": 12.5, "Force [N]": 3.25}
     usual = {label: handle(one, label).value for label in values}
     with asking(one) as here, asking(other) as there:
         for label, value in values.items():
-            here.client.set(handle(one, label)._impl.uuid, value)
+            here.client.set(handle(one, label), value)
         await_that(lambda: all(handle(one, label).value == value for label, value in values.items()))
         assert "refused" not in there.ask("link", here.link())
         assert {label: handle(other, label).value for label in values} == values
         for label, value in usual.items():
-            here.client.set(handle(one, label)._impl.uuid, value)
+            here.client.set(handle(one, label), value)
         await_that(lambda: all(handle(one, label).value == value for label, value in usual.items()))
         assert "refused" not in there.ask("link", here.link())
 
@@ -194,9 +197,10 @@ def test_a_page_as_it_was_opened_tells_its_pose_alone() -> None:
         assert here.link() == f"robot={name_of(ROBOT)}&pose=0,0,2.6"
 
 
+@extended
 def test_the_camera_of_who_asks_comes_with_it(one: Shown, other: Shown) -> None:
     with asking(one) as here, asking(other) as there:
-        put(here.client, one.server, one.viewer._framing)
+        framed(here.client, one)
         assert "camera" not in here.link()
         here.client.look([1.0, 2.0, 30.0], [0.5, 0.25, 0.0])
         await_that(lambda: "camera=1,2,30,0.5,0.25,0" in here.link())
@@ -211,6 +215,7 @@ def test_the_camera_of_who_asks_comes_with_it(one: Shown, other: Shown) -> None:
         raise AssertionError(places)
 
 
+@extended
 def test_payload_wrench_and_tensions_by_hand_come_with_it() -> None:
     loaded = with_mass(ROBOT, ROBOT.mass + 20.0)
     wrench = np.array([10.0, -20.0, 5.0, 1.0, 2.0, -3.0])
@@ -218,7 +223,7 @@ def test_payload_wrench_and_tensions_by_hand_come_with_it() -> None:
     with a_page(loaded, wrench=wrench, source=source) as here, a_page() as there, asking(here) as asker:
         tension = view(here).snapshot.tension + 5.0
         asker.client.set(
-            handle(here, "sagline")._impl.uuid, json.dumps({"topic": "dot", "value": {"at": [30.0, 40.0]}, "count": 9})
+            handle(here, "sagline"), json.dumps({"topic": "dot", "value": {"at": [30.0, 40.0]}, "count": 9})
         )
         await_that(lambda: type(view(here).settings.tension).__name__ == "ByHand")
         link = asker.link()
@@ -230,23 +235,24 @@ def test_payload_wrench_and_tensions_by_hand_come_with_it() -> None:
         assert not np.allclose(tension, view(there).snapshot.tension)
 
 
+@extended
 def test_a_moment_of_a_run() -> None:
     robot = sl.load_robot("article-suspended")
     ends = sl.Pose(np.array([[0.0, 0.0, 1.5], [2.0, 1.0, 1.5]]), np.stack([np.eye(3)] * 2))
     run = Run.of(sl.inverse(robot, sl.quintic_path(ends, durations=[2.00000000000777], rate=20)))
     with a_page(robot, played=run) as here, a_page(robot, played=run) as there, a_page(robot) as alone:
         with asking(here) as asker:
-            here.viewer._soon(lambda: here.viewer._player.scrub_to(1.25))
+            tell(here, asker.client, "scrub", 1.25)
             await_that(lambda: view(here).snapshot.pose.position[0] > 1.0)
             link = asker.link()
         assert "time=1.25" in link
         with asking(here) as asker:  # the end, whose time has more digits than one writes
-            here.viewer._soon(lambda: here.viewer._player.scrub_to(run.duration))
+            tell(here, asker.client, "scrub", run.duration)
             await_that(lambda: view(here).snapshot.pose.position[0] == 2.0)
             end = asker.link()
             assert "refused" not in asker.ask("link", end)
-            assert here.viewer._player.clock.time == run.duration
-            here.viewer._soon(lambda: here.viewer._player.scrub_to(1.25))
+            assert here.told("clock")["time"] == run.duration
+            tell(here, asker.client, "scrub", 1.25)
             await_that(lambda: view(here).snapshot.pose.position[0] < 2.0)
         with asking(there) as other:
             assert "refused" not in other.ask("link", link)
@@ -254,7 +260,7 @@ def test_a_moment_of_a_run() -> None:
             assert view(there).played is not None
             assert "time" in other.ask("link", link.replace("time=1.25", "time=3"))["refused"]
         with asking(alone) as third:
-            assert "sagline view ROBOT RUN" in third.ask("link", link)["refused"]
+            assert "sagline view" in third.ask("link", link)["refused"]
 
 
 OWN = f"robot={name_of(ROBOT)}"
@@ -271,6 +277,7 @@ NONSENSE = (
 )  # fmt: skip
 
 
+@extended
 def test_nonsense_is_refused_in_a_line_and_changes_nothing(one: Shown) -> None:
     with asking(one) as here:
         here.ask("pose", "0.5,0.5,2")
@@ -290,12 +297,19 @@ def test_nonsense_is_refused_in_a_line_and_changes_nothing(one: Shown) -> None:
         assert one.thread.is_alive()
 
 
+def test_a_link_has_the_angles_of_its_pose_about_z_y_x() -> None:
+    pose = sl.Pose.from_euler([1.0, -2.5, 0.125], *np.radians([10.0, -20.0, 30.0]))
+    values = [float(value) for value in pose_part(pose).split(",")]
+    assert values == pytest.approx([1.0, -2.5, 0.125, 10.0, -20.0, 30.0], abs=1e-9)
+
+
 def test_the_number_of_a_robot_is_of_all_but_its_load() -> None:
     assert name_of(ROBOT) == name_of(with_mass(ROBOT, 12.0))
     assert name_of(ROBOT) != name_of(ROBOT.replace(tension_min=ROBOT.tension_min + 1.0))
     assert name_of(ROBOT) != name_of(ROBOT.replace(frame_anchors=ROBOT.frame_anchors + 1e-9))
 
 
+@extended
 def test_a_robot_from_a_run_is_the_same(tmp_path: Path) -> None:
     sl.inverse(ROBOT, sl.Pose([[0.0, 0.0, 2.0]], np.eye(3))).save(tmp_path / "run.nc")
     assert name_of(sl.load_plan(tmp_path / "run.nc").state.one_robot) == name_of(ROBOT)

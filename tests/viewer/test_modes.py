@@ -10,28 +10,43 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.dynamics.mode_list import listed_modes
-from sagline.dynamics.vibrating import vibration
-from sagline.errors import InvalidValueError
+from sagline import InvalidValueError, vibration
 from sagline.viewer import dynamics, lines, moment_words, readout
 from sagline.viewer.aside import Aside
 from sagline.viewer.playback import Playback
 from sagline.viewer.settings import Settings
 from sagline.viewer.snapshot import taken_at
-from sagline.viewer.swing import PERIOD
+from sagline.viewer.swing import PERIOD, mode_of
 from sagline.viewer.tension_scale import TensionScale
 from sagline.viewer.viewer import Viewer, home_pose
 from tests.effort import best_rate
 from tests.plot import made
+from tests.tiers import extended, wide
 from tests.viewer.client import PATIENCE, Client, await_that
-from tests.viewer.test_viewer import ROBOT, Shown, handle, shown
+from tests.viewer.shown import ROBOT, Shown, controls, handle, shown
 
 POSE = sl.Pose([3.0, 2.0, 1.5], np.eye(3))
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def page() -> Iterator[Shown]:
     yield from shown(lambda server: Viewer(server, ROBOT, pose=POSE, mode="2"))
+
+
+def moves(page: Shown) -> bool:
+    """Whether the page says which mode moves."""
+    return re.search(r"<b>[\d.]+ Hz, ", page.text) is not None
+
+
+def rows_of(page: Shown) -> list[str]:
+    """Rows of the list of modes."""
+    return re.findall(r'<tr data-send="mode".*?</tr>', page.text)
+
+
+def marks_of(page: Shown) -> list[str]:
+    """Numbers of the modes that are marked in the drawing of the response."""
+    drawings = "".join(re.findall(r"<svg.*?</svg>", page.text, re.DOTALL))
+    return re.findall(r'data-send="mode" data-value="(\d+)"', drawings)
 
 
 def heard_for(client: Client, seconds: float) -> list[Any]:
@@ -44,6 +59,7 @@ def heard_for(client: Client, seconds: float) -> list[Any]:
     return found
 
 
+@extended
 def test_a_mode_moves_at_the_rate_of_the_page_and_stops(page: Shown) -> None:
     show = page.viewer._modes
     await_that(lambda: show.moving and not show.waiting)  # the response is there too
@@ -67,51 +83,56 @@ def test_a_mode_moves_at_the_rate_of_the_page_and_stops(page: Shown) -> None:
         while time.monotonic() < start + PERIOD or (
             max(away) < 0.9 * farthest and time.monotonic() < start + 20 * PERIOD  # a busy machine leaves pictures out
         ):
-            away.append(np.linalg.norm(page.viewer._stage._cables.points - rest, axis=-1).max())
+            away.append(np.linalg.norm(page.node("/cables").points - rest, axis=-1).max())
             time.sleep(0.01)
         assert max(away) == pytest.approx(farthest, rel=0.1)
-        client.set(handle(page, "Mode")._impl.uuid, "")
+        client.set(handle(page, "Mode"), "")
         await_that(lambda: not show.moving)
-        np.testing.assert_allclose(page.viewer._stage._cables.points, rest, atol=1e-5)
+        np.testing.assert_allclose(page.node("/cables").points, rest, atol=1e-5)
 
 
+@extended
 def test_the_list_says_what_every_frequency_is(page: Shown) -> None:
     with Client(page.port) as client:
-        client.set(handle(page, "Mode")._impl.uuid, "massless 1")
-        await_that(lambda: "massless</b>" in page.viewer._modes._panel._told.content)
-        await_that(lambda: 'data-value="massless 1" class="chosen' in page.viewer._modes._panel._list.content)
-        assert page.viewer._modes._panel._list.content.count("chosen") == 1
-        rows = re.findall(r"<tr data-send.*?</tr>", page.viewer._modes._panel._list.content)
+        client.set(handle(page, "Mode"), "massless 1")
+        await_that(lambda: "massless</b>" in page.text)
+        await_that(lambda: any('"massless 1" class="chosen' in row for row in rows_of(page)))
+        rows = rows_of(page)
+        assert sum('class="chosen' in row for row in rows) == 1
         found = vibration(page.viewer._modes.swing.state, up_to=20.0)  # type: ignore[union-attr]
         assert len(rows) == found.frequency.size + 6
-        assert all(("with cable mass" in row) != ("massless" in re.sub('data-value="[^"]*"', "", row)) for row in rows)
-        await_that(lambda: 'data-send="mode"' in page.viewer._modes._panel._response.content)
-        marks = re.findall(r'data-send="mode" data-value="(\d+)"', page.viewer._modes._panel._response.content)
+        plain = [re.sub('data-value="[^"]*"', "", row) for row in rows]
+        assert all(("cable mass" in row) != ("massless" in row) for row in plain)
+        await_that(lambda: bool(marks_of(page)))
+        marks = marks_of(page)
         assert marks == [str(k + 1) for k in range(found.frequency.size)]
-        client.set(handle(page, "Mode")._impl.uuid, "<b>nothing</b>")
-        await_that(lambda: "There is no mode &lt;b&gt;nothing" in page.viewer._modes._panel._told.content)
-        assert not page.viewer._modes.moving
-        told = page.viewer._modes._panel._told.content
-        assert f": the list has 1 to {found.frequency.size} and massless 1 to 6." in told
-        client.set(handle(page, "Mode")._impl.uuid, "1")
-        await_that(lambda: page.viewer._modes.moving)
+        client.set(handle(page, "Mode"), "<b>nothing</b>")
+        await_that(lambda: "&lt;b&gt;nothing" in page.text)
+        assert not moves(page)
+        told = re.search(r"&lt;b&gt;nothing[^<]*", page.text)
+        assert told is not None
+        assert re.findall(r"1 to (\d+)", told[0]) == [str(found.frequency.size), "6"]
+        client.set(handle(page, "Mode"), "1")
+        await_that(lambda: moves(page))
 
 
+@extended
 def test_while_the_platform_is_dragged_nothing_swings_and_then_its_new_modes_do(page: Shown) -> None:
     with Client(page.port) as client:
-        client.set(handle(page, "Mode")._impl.uuid, "1")
-        await_that(lambda: page.viewer._modes.moving)
+        client.set(handle(page, "Mode"), "1")
+        await_that(lambda: moves(page))
         for x in np.linspace(3.0, 0.0, 20):
             client.drag([x, 0.0, 1.5])
             time.sleep(0.03)
         await_that(lambda: page.position[0] == 0.0)
-        await_that(lambda: page.viewer._modes.moving)
+        await_that(lambda: moves(page))
         swing = page.viewer._modes.swing
         assert swing is not None
         assert swing.mode.frequency == pytest.approx(1.77012, abs=1e-5)  # as finite elements have it
         assert swing.state.pose.position[0] == 0.0
 
 
+@extended
 def test_a_cut_cable_is_simulated_and_played_as_a_run_is(page: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[Any] = []
 
@@ -123,18 +144,18 @@ def test_a_cut_cable_is_simulated_and_played_as_a_run_is(page: Shown, monkeypatc
     with Client(page.port) as client:
         client.drag([1.0, 0.0, 2.0])
         await_that(lambda: page.position[0] == 1.0)
-        client.set(handle(page, "Cable to cut")._impl.uuid, "3")
-        client.set(page.viewer._cuts._panel._button._impl.uuid, True)
-        await_that(lambda: page.viewer._player.played is not None)
+        client.set(handle(page, "Cable to cut"), "3")
+        client.set(next(each for each in controls(page.server) if each.label == "Cut" and each.visible), True)
+        await_that(lambda: page.viewer.view is not None and page.viewer.view.played is not None)
         assert asked == [([1.0, 0.0, 2.0], 3, "none")]
-        await_that(lambda: "break of cable 3 at 1.000 s" in page.viewer._panel._verdict.content)
-        assert "massless cables" in page.viewer._panel._verdict.content
-        assert not page.viewer._modes.moving
-        await_that(lambda: page.viewer._player.clock.time == 2.0)
+        await_that(lambda: "cable 3 at 1.000 s" in page.text)
+        assert "massless cables" in page.text
+        assert not moves(page)
+        await_that(lambda: page.told("clock")["time"] == 2.0)
         client.grab()
         client.drag([0.5, 0.0, 2.0])
         await_that(lambda: page.position[0] == 0.5)
-        await_that(lambda: page.viewer._modes.moving)
+        await_that(lambda: moves(page))
 
 
 def test_a_moment_of_a_simulation_hangs_as_its_lengths_say() -> None:
@@ -187,7 +208,7 @@ def test_of_work_aside_the_latest_alone_counts() -> None:
         tasks.pop()()
 
 
-@pytest.mark.parametrize("name", ["falcon-7", "cogiro", "fast"])
+@pytest.mark.parametrize("name", wide(["cogiro", "falcon-7", "fast"]))
 def test_every_natural_frequency_among_the_readings_is_pressed_to_see_its_mode(name: str) -> None:
     robot = sl.load_robot(name)
     seen = taken_at(robot, home_pose(robot), Settings(robot.mass), None)
@@ -195,8 +216,10 @@ def test_every_natural_frequency_among_the_readings_is_pressed_to_see_its_mode(n
     frequency = sl.modes(seen.plan.state).frequency
     text = readout.numbers(seen, TensionScale.of(robot), np.append(frequency, [0.0, np.nan]))
     pressed = re.findall(r'<button class="shake" data-send="mode" data-value="([^"]*)"[^>]*>([^<]*)</button>', text)
-    listed = {mode.name: mode.frequency for mode in listed_modes(vibration(seen.plan.state, up_to=1.0))}
+    found = vibration(seen.plan.state, up_to=1.0)
     assert len(pressed) == len(frequency) == 6
     for what, told in pressed:
-        assert told == f"{listed[what]:.2f}"
+        mode = mode_of(found, what)
+        assert mode is not None
+        assert told == f"{mode.frequency:.2f}"
     assert f"{frequency[-1]:.2f}, 0.00, – Hz" in re.sub("<[^>]*>", "", text)

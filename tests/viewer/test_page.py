@@ -1,5 +1,7 @@
 """The page around viser's client."""
 
+import re
+from html import escape
 from pathlib import Path
 from urllib.request import urlopen
 
@@ -15,9 +17,9 @@ BUILD = Path(viser.__file__).parent / "client" / "build"
 def test_the_head_is_ours_and_the_client_what_it_is() -> None:
     stock = (BUILD / "index.html").read_text()
     ours = dressed(stock, "<b>robot</b> & co")
-    assert "<title>&lt;b&gt;robot&lt;/b&gt; &amp; co</title>" in ours
+    assert re.findall("<title>(.*?)</title>", ours) == [escape("<b>robot</b> & co")]
     assert ours.count('rel="icon"') == 1
-    assert "Disconnected: is sagline view still running?" in ours
+    assert "Disconnected" in ours
     head, body = stock.split("</head>", 1)
     assert ours.endswith(body)
     assert head.partition("<script")[2] in ours
@@ -36,6 +38,8 @@ def test_the_server_serves_it_and_viser_stays_what_it_was() -> None:
     try:
         assert infra.WebsockServer is stock
         with urlopen(f"http://127.0.0.1:{server.get_port()}/") as answer:
-            assert "<title>cogiro &lt;1&gt; – sagline</title>" in answer.read().decode()
+            (title,) = re.findall("<title>(.*?)</title>", answer.read().decode())
+            assert title.startswith(escape("cogiro <1>"))
+            assert title.endswith("sagline")
     finally:
         stop(server)

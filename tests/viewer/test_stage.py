@@ -14,6 +14,7 @@ from sagline.viewer.snapshot import taken_at
 from sagline.viewer.stage import Stage
 from sagline.viewer.tension_scale import TensionScale
 from sagline.viewer.viewer import home_pose
+from tests.tiers import wide
 
 
 @pytest.fixture(scope="module")
@@ -24,10 +25,10 @@ def server() -> Iterator[Server]:
 
 
 def node(server: Server, name: str) -> Any:
-    return server.scene._handle_from_node_name[name]
+    return server.scene.get_handle_by_name(name)
 
 
-@pytest.mark.parametrize("name", sl.robot_names())
+@pytest.mark.parametrize("name", wide(sl.robot_names(), 3))
 def test_the_gizmo_is_smaller_than_the_robot_and_no_larger_than_it_must(server: Server, name: str) -> None:
     robot = sl.load_robot(name)
     Stage(server.scene, robot, home_pose(robot))
@@ -37,7 +38,7 @@ def test_the_gizmo_is_smaller_than_the_robot_and_no_larger_than_it_must(server: 
     assert gizmo.depth_test  # what is behind the platform does not hide it
 
 
-@pytest.mark.parametrize("name", sl.robot_names())
+@pytest.mark.parametrize("name", wide(sl.robot_names(), 3))
 def test_every_robot_has_a_floor_and_a_scale(server: Server, name: str) -> None:
     robot = sl.load_robot(name)
     Stage(server.scene, robot, home_pose(robot))

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.dynamics.mode_list import listed_modes
-from sagline.dynamics.vibrating import vibration
+from sagline import vibration
 from sagline.viewer import lines, solids
 from sagline.viewer.settings import Settings
 from sagline.viewer.snapshot import taken_at
 from sagline.viewer.swing import Swing, mode_of
+from tests.tiers import wide
 
 
 def swings(name: str, up_to: float = 8.0) -> list[Swing]:
@@ -17,10 +17,12 @@ def swings(name: str, up_to: float = 8.0) -> list[Swing]:
     assert robot.test_box is not None
     pose = sl.Pose.from_euler(0.4 * robot.test_box.low + 0.6 * robot.test_box.high, 0.0, 0.0, 0.0)
     found = vibration(sl.inverse(robot, pose, tension=sl.MinimumNorm()).state, up_to=up_to)
-    return [Swing.of(found, mode) for mode in listed_modes(found)]
+    names = [str(k + 1) for k in range(found.frequency.size)]
+    names += [f"massless {k + 1}" for k in range(np.count_nonzero(np.isfinite(found.massless_frequency)))]
+    return [Swing.of(found, mode) for name in names if (mode := mode_of(found, name)) is not None]
 
 
-@pytest.mark.parametrize("name", ["cogiro", "ipanema-2-pulleys"])
+@pytest.mark.parametrize("name", wide(["cogiro", "ipanema-2-pulleys"]))
 def test_at_rest_it_is_what_the_page_shows(name: str) -> None:
     for swing in swings(name):
         robot, pose = swing.state.one_robot, swing.state.pose
@@ -30,7 +32,7 @@ def test_at_rest_it_is_what_the_page_shows(name: str) -> None:
         break
 
 
-@pytest.mark.parametrize("name", ["cogiro", "ipanema-2-pulleys", "falcon-7"])
+@pytest.mark.parametrize("name", wide(["cogiro", "falcon-7", "ipanema-2-pulleys"], 2))
 def test_cables_stay_on_the_platform_and_at_the_frame(name: str) -> None:
     for swing in swings(name):
         robot = swing.state.one_robot
@@ -60,7 +62,7 @@ def test_it_says_how_much_larger_than_with_a_joule_it_is_drawn() -> None:
             * (robot.mass * swing.motion[:3] @ swing.motion[:3] + swing.motion[3:] @ inertia @ swing.motion[3:])
         )
         assert kinetic == pytest.approx(swing.factor**2, rel=1e-9)
-        assert f"drawn {swing.factor:.2g} times as large as a vibration of 1 J is" in swing.told
+        assert f"{swing.factor:.2g} times as" in swing.told
         assert f"{2.0 * swing.mode.frequency:.3g} times slower" in swing.told
 
 

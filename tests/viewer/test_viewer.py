@@ -1,15 +1,13 @@
 """The viewer with clients that drag, set, leave and talk nonsense."""
 
-import json
 import re
 import threading
-import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import partial
 from html import unescape
 from pkgutil import resolve_name
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,49 +15,16 @@ from websockets.exceptions import ConnectionClosed
 
 import sagline as sl
 from sagline.viewer.reading import Reading
-from sagline.viewer.run import Run
-from sagline.viewer.server import Server, started, stop
+from sagline.viewer.server import started, stop
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.stage import Stage
 from sagline.viewer.viewer import Viewer
+from sagline.viewer.wording import method_name
 from tests.effort import best_rate
+from tests.refusal import refused
+from tests.tiers import extended, wide
 from tests.viewer.client import PATIENCE, Client, await_that, clients
-
-ROBOT = sl.load_robot("article-suspended")
-PATH = sl.quintic_path(
-    sl.Pose(np.array([[0.0, 0.0, 1.5], [2.0, 1.0, 1.5]]), np.stack([np.eye(3)] * 2)), durations=[2.0], rate=50
-)
-
-
-class Shown(NamedTuple):
-    server: Server
-    viewer: Viewer
-    thread: threading.Thread
-
-    @property
-    def port(self) -> int:
-        return int(self.server.get_port())
-
-    @property
-    def position(self) -> np.ndarray:
-        assert self.viewer.view is not None
-        return self.viewer.view.snapshot.pose.position
-
-
-def shown(made: Callable[[Server], Viewer]) -> Iterator[Shown]:
-    """A page of a viewer made for a server, while it is served."""
-    server = started(port=0)
-    viewer = made(server)
-    thread = threading.Thread(target=viewer.serve)
-    thread.start()
-    await_that(lambda: viewer.view is not None)
-    try:
-        yield Shown(server, viewer, thread)
-    finally:
-        viewer.stop()
-        thread.join(timeout=PATIENCE)
-        stop(server)
-    assert not thread.is_alive()
+from tests.viewer.shown import PATH, ROBOT, Shown, a_run, handle, pieces_of, shown, tell, updates_a_second
 
 
 @pytest.fixture(scope="module")
@@ -67,36 +32,22 @@ def page() -> Iterator[Shown]:
     yield from shown(lambda server: Viewer(server, ROBOT))
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def film() -> Iterator[Shown]:
-    run = Run.of(sl.inverse(ROBOT, PATH, model=sl.Empirical()))
-    yield from shown(lambda server: Viewer(server, ROBOT, run))
-
-
-def handle(page: Shown, label: str) -> Any:
-    found = [each for each in page.server.gui._gui_input_handle_from_uuid.values() if each.label == label]
-    assert len(found) == 1
-    return found[0]
-
-
-def tell(page: Shown, client: Client, topic: str, value: Any) -> None:
-    """What a page says through browser/channel.js."""
-    text = json.dumps({"topic": topic, "value": value, "count": time.monotonic()})
-    client.set(handle(page, "sagline")._impl.uuid, text)
+    yield from shown(lambda server: Viewer(server, ROBOT, a_run()))
 
 
 def test_it_listens_on_the_loopback_address_alone(page: Shown) -> None:
-    sockets = page.server._websock_server
-    assert sockets._host == "127.0.0.1"
+    assert page.server.get_host() == "127.0.0.1"
     assert page.server.request_share_url() is None
 
 
 def test_a_port_that_is_taken_is_told(page: Shown) -> None:
-    with pytest.raises(sl.InvalidValueError, match="--port"):
+    with refused(f"port {page.port}", "in use on 127.0.0.1", kind=sl.InvalidValueError):
         started(port=page.port)
-    with pytest.raises(sl.InvalidValueError, match="--host"):
+    with refused("203.0.113.7:0", kind=sl.InvalidValueError):
         started(host="203.0.113.7", port=0)
-    with pytest.raises(sl.InvalidValueError, match="65535"):
+    with refused("port", "70000", "0 to 65535", kind=sl.InvalidValueError):
         started(port=70000)
 
 
@@ -128,35 +79,7 @@ def test_everything_follows_a_drag(page: Shown) -> None:
         assert any("1.000, 0.500, 2.000 m" in text for text in texts)
 
 
-def updates_a_second(
-    page: Shown,
-    client: Client,
-    move: Callable[[float], None],
-    node: str = "/cables",
-    part: str = "points",
-    along: str = "",
-) -> float:
-    """How often a page is drawn anew, and a part of a node of it arrives, while a client moves by an angle [rad].
-
-    Never, if no node follows whose name begins with `along`.
-    """
-    list(client.heard(0.5))
-    before, start = page.viewer.updates, time.monotonic()
-    while (after := time.monotonic() - start) < 2.0:
-        move(3.0 * after)
-        time.sleep(0.01)
-    heard = [m for m in client.heard(0.5) if {part, "points", "vertices"} & m.get("updates", {}).keys()]
-    if not any(m["name"].startswith(along) for m in heard):
-        return 0.0
-    seen = sum(m["name"] == node and part in m["updates"] for m in heard)
-    return float(min(page.viewer.updates - before, seen)) / 2.0
-
-
-def asked_beside(plain: float) -> float:
-    """How often a page is to be drawn that has more to do: 30 of the 60 that there can be, or half of what is here."""
-    return min(30.0, 0.5 * plain)
-
-
+@extended
 def test_thirty_updates_a_second_reach_a_client(page: Shown) -> None:
     with Client(page.port) as client:
 
@@ -179,16 +102,17 @@ def test_infeasible_pose_turns_the_platform_red_and_back(page: Shown) -> None:
 def test_a_slider_changes_the_robot(page: Shown) -> None:
     with Client(page.port) as client:
         mass = handle(page, "Platform + load [kg]")
-        client.set(mass._impl.uuid, 100.0)
+        client.set(mass, 100.0)
         await_that(lambda: page.viewer.view is not None and page.viewer.view.snapshot.robot.mass == 100.0)
         model = handle(page, "Cable model")
-        client.set(model._impl.uuid, "empirical (the article's)")
+        client.set(model, "empirical (the article's)")
         await_that(lambda: page.viewer.view is not None and page.viewer.view.snapshot.rest is not None)
-        client.set(model._impl.uuid, "catenary (exact)")
-        client.set(mass._impl.uuid, 50.0)
+        client.set(model, "catenary (exact)")
+        client.set(mass, 50.0)
         await_that(lambda: page.viewer.view is not None and page.viewer.view.snapshot.robot.mass == 50.0)
 
 
+@extended
 def test_the_same_pose_shows_the_same_tensions_whatever_the_way_there(page: Shown) -> None:
     generator = np.random.default_rng(20)
     method = handle(page, "Tensions")
@@ -206,19 +130,19 @@ def test_the_same_pose_shows_the_same_tensions_whatever_the_way_there(page: Show
         back = [tensions_at(client, place) for place in places[::-1]][::-1]
         assert np.array_equal(there, back)
         assert not forget.visible
-        client.set(method._impl.uuid, "Closest (remembers the way)")
+        client.set(method, method_name(sl.Closest()))
         await_that(lambda: bool(forget.visible))
         tensions_at(client, places[1])
         near = tensions_at(client, places[0])
         assert np.abs(near - there[0]).max() > 1.0  # N: the way there is seen
-        texts = page.viewer._panel._numbers.content
-        assert "Closest (remembers the way)" in texts
-        client.set(forget._impl.uuid, True)
+        assert method_name(sl.Closest()) in page.text
+        client.set(forget, True)
         await_that(lambda: page.viewer.view is not None and np.allclose(page.viewer.view.snapshot.tension, there[0]))
-        client.set(method._impl.uuid, "MinimumNorm")
+        client.set(method, "MinimumNorm")
         await_that(lambda: not forget.visible)
 
 
+@extended
 def test_a_client_that_vanishes_mid_drag_is_not_missed(page: Shown) -> None:
     client = Client(page.port)
     client.grab()
@@ -229,6 +153,7 @@ def test_a_client_that_vanishes_mid_drag_is_not_missed(page: Shown) -> None:
         await_that(lambda: page.position[0] == 0.6)
 
 
+@extended
 def test_ten_clients_at_once_all_see_the_drag_of_one(page: Shown) -> None:
     with clients(page.port, 10) as some:
         for client in some:
@@ -241,7 +166,7 @@ def test_ten_clients_at_once_all_see_the_drag_of_one(page: Shown) -> None:
 
 @pytest.mark.parametrize(
     "nonsense",
-    [b"", b"\xff\xfe\x00", "text", b"\x81\xa4type\xa4None", b"\x80"],
+    wide([b"\xff\xfe\x00", b"", "text", b"\x81\xa4type\xa4None", b"\x80"]),
 )
 def test_a_malformed_message_harms_its_sender_only(page: Shown, nonsense: bytes | str) -> None:
     with Client(page.port) as good:
@@ -258,6 +183,7 @@ def heard_or_cut_off(page: Shown, client: int, heard: list[int]) -> bool:
     return client in heard or client not in page.server.get_clients()
 
 
+@extended
 def test_a_pose_that_is_none_is_refused_and_forgotten(page: Shown) -> None:
     asked: list[int] = []
     page.viewer._channel.on("asked", lambda _, number: asked.append(number))
@@ -292,8 +218,8 @@ def test_what_a_slider_does_not_reach_is_refused_once_and_not_asked_again() -> N
         stop(server)
 
 
+@extended
 def test_a_run_plays_pauses_and_is_left_by_a_drag(film: Shown) -> None:
-    player = film.viewer._player
     with Client(film.port) as client:
         assert np.array_equal(film.position, PATH.pose.position[0])
         tell(film, client, "play", True)
@@ -301,30 +227,31 @@ def test_a_run_plays_pauses_and_is_left_by_a_drag(film: Shown) -> None:
         seen = film.position  # it goes on
         index = int(np.argmin(np.abs(PATH.pose.position[:, 0] - seen[0])))
         assert np.array_equal(seen, PATH.pose.position[index])
-        await_that(lambda: not player.clock.playing and film.position[0] == 2.0)
+        await_that(lambda: not film.told("clock")["playing"] and film.position[0] == 2.0)
         tell(film, client, "scrub", 1.0)
         await_that(lambda: np.array_equal(film.position, PATH.pose.position[50]))
         client.grab()
         client.drag([0.0, 0.8, 2.0])
         await_that(lambda: film.position[1] == 0.8)
-        assert player.following is False
+        await_that(lambda: film.told("clock")["following"] is False)
         tell(film, client, "play", True)
-        await_that(lambda: player.following and film.position[2] == 1.5)
+        await_that(lambda: film.told("clock")["following"] and film.position[2] == 1.5)
         tell(film, client, "play", False)
-        await_that(lambda: not player.clock.playing)
+        await_that(lambda: not film.told("clock")["playing"])
 
 
+@extended
 def test_a_run_is_named_once_and_cannot_be_changed(film: Shown) -> None:
     model, mass = handle(film, "Cable model"), handle(film, "Platform + load [kg]")
     with Client(film.port) as client:
         tell(film, client, "follow", True)
-        await_that(lambda: "empirical (the article's)" in unescape(film.viewer._panel._numbers.content))
+        await_that(lambda: "empirical (the article's)" in unescape(film.text))
         await_that(lambda: not model.visible)
         assert not mass.visible
         client.grab()
         client.drag([0.1, 0.8, 2.0])
         await_that(lambda: film.position[1] == 0.8 and bool(model.visible) and bool(mass.visible))
-        await_that(lambda: f"</b> {model.value}" in unescape(film.viewer._panel._numbers.content))
+        await_that(lambda: f"</b> {model.value}" in unescape(film.text))
 
 
 def test_cables_verdict_and_table_come_before_what_is_not_ready(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -344,12 +271,10 @@ def test_cables_verdict_and_table_come_before_what_is_not_ready(monkeypatch: pyt
         "sagline.kinematics.forward_rows.forward_poses",
     )
     server = started(port=0)
+    pieces = pieces_of(server)
     viewer = Viewer(server, ROBOT, ready=ready.__contains__)
     thread = threading.Thread(target=viewer.serve)
-
-    def texts() -> str:
-        panel = viewer._panel
-        return panel._verdict.content + panel._numbers.content + panel._polygon.content
+    page = Shown(server, viewer, thread, pieces)
 
     try:
         with monkeypatch.context() as patched:
@@ -357,11 +282,11 @@ def test_cables_verdict_and_table_come_before_what_is_not_ready(monkeypatch: pyt
                 patched.setattr(kernel, refusing(resolve_name(kernel)))
             thread.start()
             assert viewer.shown.wait(PATIENCE)
-            assert "Feasible" in texts()
-            assert texts().count("ompiling …") == 3
-            cells = re.findall(r"<td.*?>(?:<span.*?</span> )?([\d.]+)</td>", viewer._panel._numbers.content)
-            assert len(cells) == 6 * ROBOT.cable_count
-            handle(Shown(server, viewer, thread), "Cable model").value = "empirical (the article's)"
+            assert "Feasible" in page.text
+            assert page.text.count("ompiling …") == 3
+            cells = re.compile(r"<td.*?>(?:<span.*?</span> )?([\d.]+)</td>")
+            assert 6 * ROBOT.cable_count in [len(cells.findall(piece.content)) for piece in pieces]
+            handle(page, "Cable model").value = "empirical (the article's)"
             updates = viewer.updates
             viewer.refresh()
             await_that(lambda: viewer.updates > updates)
@@ -370,14 +295,14 @@ def test_cables_verdict_and_table_come_before_what_is_not_ready(monkeypatch: pyt
         for reading, text in (
             (Reading.MARGIN, "in any direction"),
             (Reading.FREQUENCIES, " Hz</span></div>"),
-            (Reading.POLYGON, "<polygon"),
+            (Reading.POLYGON, 'class="polygon"'),
             (Reading.REST, "Really rests"),
         ):
-            assert text not in texts()
+            assert text not in page.text
             ready.add(reading)
             viewer.refresh()
-            await_that(lambda text=text: text in texts())  # type: ignore[misc]
-        assert "ompiling" not in texts()
+            await_that(lambda text=text: text in page.text)  # type: ignore[misc]
+        assert "ompiling" not in page.text
     finally:
         viewer.stop()
         if thread.ident is not None:

@@ -10,9 +10,9 @@ import numpy as np
 
 import sagline as sl
 from sagline.arrays import Array
-from sagline.kernels.cable.pulls import LOOSEST
 
 GRID = 4000
+LOOSEST = 5.0  # half a cable's weight over its chord tension: fifteen times as long as its chord, see `margin`
 Support = Callable[[Array], Array]  # of normals (F, 6): the largest -y . w over a set, (F,)
 PATTERNS = {"2T": 2, "3T": 3, "1R2T": 3, "3R3T": 6}
 

@@ -9,6 +9,7 @@ import pytest
 
 import sagline as sl
 from sagline.arrays import Array
+from tests.tiers import extended
 from tests.workspaces.all_facets import all_facets, crafted, mean_arm, no_load, pulls_on_a_grid
 from tests.workspaces.test_margin import poses_of
 
@@ -87,6 +88,7 @@ def reach_of(wrench: Array, normals: Array) -> Array:
     return -normals @ wrench
 
 
+@extended
 def test_hard_robots_at_the_border_contradict_only_a_bracket_from_the_ends_alone() -> None:
     ours, without, said = at_the_border(120, np.random.default_rng(23))
     assert ours == 0

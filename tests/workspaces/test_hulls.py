@@ -7,11 +7,13 @@ import sagline as sl
 from sagline.workspaces.boundary import boundary
 from sagline.workspaces.rays import ray_hull
 from tests.effort import least_seconds
+from tests.tiers import extended
 from tests.workspaces.levels import ipanema, level_of
 
 TRUE = 9.774  # m^3, by rays extrapolated (9.7742) and by marching cubes extrapolated (9.7740)
 
 
+@extended
 def test_rays_find_the_hull_of_wirex_with_exact_feasibility() -> None:
     robot, low, high = ipanema()
     hull = ray_hull(level_of(robot, sl.Straight()), [0.0, 0.0, 1.0], low, high)
@@ -44,6 +46,7 @@ def test_that_volume_and_its_error_bar_take_two_seconds() -> None:
     assert least_seconds(partial(boundary, level, low, high, cells=64), 2.0) <= 2.0
 
 
+@extended
 def test_suspended_robot_of_the_article_in_its_frame_with_sag_and_without() -> None:
     robot = sl.load_robot("article-suspended")
     low, high = [-7.5, -5.5, 0.0], [7.5, 5.5, 6.0]
@@ -56,6 +59,7 @@ def test_suspended_robot_of_the_article_in_its_frame_with_sag_and_without() -> N
         assert found.surface.closed
 
 
+@extended
 def test_a_millimeter_to_either_side_of_the_boundary_the_inverse_says_what_it_should() -> None:
     robot = sl.load_robot("article-suspended")
     found = boundary(level_of(robot, sl.Catenary()), [-7.5, -5.5, 0.0], [7.5, 5.5, 6.0], cells=12).surface

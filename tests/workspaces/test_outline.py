@@ -4,15 +4,13 @@ import numpy as np
 import pytest
 
 import sagline as sl
+from sagline import LeastMargin, MinimumNorm, Orientations, Surface, WrenchSet
 from sagline.arrays import Array, locked
-from sagline.tension.minimum_norm import MinimumNorm
-from sagline.workspaces.criteria.margin import LeastMargin
 from sagline.workspaces.levels import Levels
-from sagline.workspaces.orientations import Orientations
 from sagline.workspaces.outline import Outline, outline
 from sagline.workspaces.region import Region, region_of
-from sagline.workspaces.surface import Surface
-from sagline.workspaces.wrench_sets import NO_LOAD, WrenchSet
+from sagline.workspaces.wrench_sets import NO_LOAD
+from tests.tiers import extended, wide
 from tests.workspaces.all_facets import all_facets, mean_arm, no_load, pulls_on_a_grid
 
 ROBOTS = ("cogiro", "falcon-7", "fast")
@@ -48,7 +46,7 @@ def turns_around(surface: Surface, places: Array) -> Array:
     return found
 
 
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("name", wide(ROBOTS))
 def test_vertices_are_where_the_margin_is_zero_by_all_facets(name: str) -> None:
     robot = sl.load_robot(name)
     found, _ = made(robot, 20)
@@ -85,6 +83,7 @@ def test_what_it_holds_can_be_held_and_nothing_else(name: str, count: int) -> No
     assert np.mean(plan.feasible != (turns > 0.5)[there]) < 0.01  # what the cables' sag leaves open
 
 
+@extended
 def test_it_holds_and_is_limited_as_the_workspace_is() -> None:
     robot, loads = sl.load_robot("article-suspended"), sl.WrenchBox(force=30.0)
     found, region = made(robot, 16, loads)

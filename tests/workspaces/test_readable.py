@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
+from syrupy.assertion import SnapshotAssertion
 
 import sagline as sl
 from sagline.workspaces.pose_cells import Prover
+from tests.tiers import extended
 
 POSE = sl.Pose([[0.0, 0.0, 2.0], [1.0, 1.0, 3.0], [7.0, 5.4, 5.9]], np.eye(3))
 BOX = sl.PoseBox([-2.0, -1.0, 1.0], [2.0, 1.0, 3.0])
@@ -27,23 +30,32 @@ def test_a_prompt_shows_each_result_in_a_line(robot: sl.Robot) -> None:
     shown = [
         loads, loads + sl.Accelerations(1.0), space, space.components, space.surface, empty, empty.components,
         empty.surface, empty.nearest, sl.margin(robot, POSE, loads), sl.margin(robot, sl.Pose([0, 0, 2.0], np.eye(3))),
-        sl.prove(robot, BOX, loads, budget=0.1), sl.clearance(state), sl.sweep.Request(robot, POSE),
+        sl.clearance(state), sl.sweep.Request(robot, POSE),
         sl.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]),
     ]  # fmt: skip
     for one in shown:
-        text = repr(one)
-        assert text.startswith(f"<{type(one).__name__}: "), text
-        assert text.endswith(">")
-        assert "\n" not in text
-        assert "array" not in text
-        assert len(text) < 250, text
-        assert "Error" not in str(one)
+        assert_in_a_line(one)
 
 
-def test_loads_are_shown_by_their_sizes() -> None:
+@extended
+def test_a_prompt_shows_a_proof_in_a_line(robot: sl.Robot) -> None:
+    assert_in_a_line(sl.prove(robot, BOX, sl.WrenchBox(force=100.0, moment=20.0), budget=0.1))
+
+
+def assert_in_a_line(one: object) -> None:
+    text = repr(one)
+    assert text.startswith(f"<{type(one).__name__}: "), text
+    assert text.endswith(">")
+    assert "\n" not in text
+    assert "array" not in text
+    assert len(text) < 250, text
+    assert "Error" not in str(one)
+
+
+def test_loads_are_shown_by_their_sizes(snapshot: SnapshotAssertion) -> None:
     assert repr(sl.WrenchBox(100.0, 20.0)).replace("\N{NO-BREAK SPACE}", " ") == "<WrenchBox: ±100 N, ±20 N m>"
     both = sl.WrenchPolytope([[0, 0, -9, 0, 0, 0]]) + sl.WrenchPolytope(np.eye(6)) + sl.WrenchEllipsoid(1.0)
-    assert str(both).replace("\N{NO-BREAK SPACE}", " ") == "an ellipsoid + (0, 0, −9) N + a polytope of 6 corners"
+    assert str(both).replace("\N{NO-BREAK SPACE}", " ") == snapshot
 
 
 def test_margins_are_counted_by_their_status(robot: sl.Robot) -> None:
@@ -63,13 +75,15 @@ def test_margins_are_counted_by_their_status(robot: sl.Robot) -> None:
 def test_a_sweep_tells_how_far_it_is(robot: sl.Robot, tmp_path: Path) -> None:
     found = sl.sweep.run(sl.sweep.Request(robot, POSE), tmp_path / "sweep", workers=1)
     feasible = int(sl.inverse(robot, POSE).feasible.sum())
-    assert str(found).startswith(f"1 robot x 3 poses x 1 wrench; 1 of 1 task done: {feasible} feasible")
+    numbers = [int(number) for number in re.findall(r"\d+", str(found))]
+    assert numbers[:6] == [1, 3, 1, 1, 1, feasible]  # robots, poses, wrenches; tasks done, of how many; feasible
 
 
 def test_a_box_that_is_all_inside_has_its_volume_without_zeros(robot: sl.Robot) -> None:
-    assert str(sl.workspace(robot, BOX, cells=4)).splitlines()[0] == "Workspace of article-suspended: 16 ± 0 m³"
+    assert str(sl.workspace(robot, BOX, cells=4)).splitlines()[0].endswith(": 16 ± 0 m³")
 
 
+@extended
 def test_the_time_for_a_proof_begins_when_its_kernel_stands(robot: sl.Robot, monkeypatch: pytest.MonkeyPatch) -> None:
     clock = [0.0]
     real = Prover.verdicts

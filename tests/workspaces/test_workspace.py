@@ -9,6 +9,8 @@ from sagline.arrays import Array
 from sagline.workspaces.criteria.criterion import Judged, no_cable
 from sagline.workspaces.criteria.given import Given
 from sagline.workspaces.space import BY_BOX
+from tests.refusal import refused
+from tests.tiers import extended
 
 SUSPENDED = sl.load_robot("article-suspended")
 ROOM = sl.PoseBox([-6.0, -4.0, 0.5], [6.0, 4.0, 5.0])  # all within the workspace
@@ -95,6 +97,7 @@ def test_two_mirrors_of_the_robot_are_mirrors_of_its_workspace(suspended: sl.Wor
     assert sum(shares.values()) == pytest.approx(1.0, rel=1e-12)
 
 
+@extended
 def test_smaller_loads_make_larger_workspaces() -> None:
     sizes = (100.0, 50.0, 20.0, 0.0)
     spaces = [sl.workspace(SUSPENDED, None, sl.WrenchBox(size, 0.1 * size), cells=8) for size in sizes]
@@ -105,6 +108,7 @@ def test_smaller_loads_make_larger_workspaces() -> None:
         assert (large.levels()(small.surface.vertices) >= -1e-9).all()
 
 
+@extended
 def test_more_rotations_make_smaller_workspaces_and_any_of_them_larger() -> None:
     turns = sl.Pose.from_euler(np.zeros(3), np.radians([0.0, 25.0, -25.0]), 0.0, 0.0).matrix
     level = sl.workspace(SUSPENDED, WIDE, cells=6)
@@ -117,14 +121,28 @@ def test_more_rotations_make_smaller_workspaces_and_any_of_them_larger() -> None
     assert_allclose(some.level * scale, np.max(each, axis=0), rtol=1e-12, atol=1e-9)
     assert every.volume < level.volume < some.volume
     tilted = sl.workspace(SUSPENDED, sl.PoseBox(ROOM.low, ROOM.high, tilt=0.2), cells=4)
-    assert "all of 27 sampled rotations" in str(tilted)
+    assert " 27 " in str(tilted)
     assert np.array_equal(tilted.level, sl.workspace(SUSPENDED, ROOM, orientations=sl.Tilts(0.2), cells=4).level)
+
+
+def test_of_several_orientations_the_worst_counts_or_the_best() -> None:
+    turns = sl.Pose.from_euler(np.zeros(3), np.radians([0.0, 25.0, -25.0]), 0.0, 0.0).matrix
+    places = np.random.default_rng(7).uniform(ROOM.low, ROOM.high, (50, 3))
+    each = [sl.margin(SUSPENDED, sl.Pose(places, turn)).value for turn in turns]
+    scale = SUSPENDED.mass * SUSPENDED.gravity
+    every, some = (
+        sl.workspace(SUSPENDED, ROOM, orientations=sl.Orientations(turns, need), cells=4, refine=False).levels()
+        for need in ("all", "any")
+    )
+    assert_allclose(every(places) * scale, np.min(each, axis=0), rtol=1e-12, atol=1e-9)
+    assert_allclose(some(places) * scale, np.max(each, axis=0), rtol=1e-12, atol=1e-9)
 
 
 def _nodes(space: sl.Workspace) -> Array:
     return np.stack(np.meshgrid(*space.axes, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
+@extended
 def test_light_cables_have_the_workspace_of_straight_ones() -> None:
     straight = sl.workspace(SUSPENDED, WIDE, model=sl.Straight(), cells=8)
     differences = []
@@ -150,6 +168,20 @@ def test_a_wall_cuts_the_workspace_in_two() -> None:
     sides = places[free][:, 0] > 1.0
     assert len(np.unique(np.stack((parts, sides))[:, parts >= 0], axis=1).T) == 2
     assert space.limits[0].criterion == "clearance"
+
+
+def test_sag_is_that_of_the_deepest_cable_under_the_middle_load() -> None:
+    corners = [[0, 0, -300, 0, 0, 0], [0, 0, -100, 0, 0, 0]]
+    loads = sl.WrenchPolytope(corners) + sl.WrenchBox(20.0, 2.0, center=[50, 0, -200, 0, 0, 5])
+    middle, limit = [50, 0, -400, 0, 0, 5], 0.3
+    space = sl.workspace(SUSPENDED, ROOM, loads, criteria=[sl.MaximumSag(limit)], cells=4, refine=False)
+    poses = sl.Pose(np.random.default_rng(6).uniform(ROOM.low, ROOM.high, (200, 3)), np.eye(3))
+    margin = sl.margin(SUSPENDED, poses, loads).value / (SUSPENDED.mass * SUSPENDED.gravity)
+    sag = sl.inverse(SUSPENDED, poses, tension=sl.MinimumNorm(), wrench=middle).state.cables.sag.max(axis=1)
+    held = margin >= 0.0
+    least = np.minimum(margin, 1.0 - sag / limit)
+    assert np.count_nonzero(least[held] < margin[held]) > 50
+    assert_allclose(space.levels()(poses.position)[held], least[held], rtol=1e-12, atol=1e-12)
 
 
 def test_the_area_of_a_planar_robot() -> None:
@@ -185,6 +217,7 @@ def test_an_empty_workspace_names_the_nearest_pose_and_its_cables() -> None:
     assert near.margin < 0.0
     assert near.cables
     assert near.margin == pytest.approx(float(sl.margin(SUSPENDED, near.pose, sl.WrenchBox(5000.0)).value))
+    assert "moments" not in near.reason
     assert "empty" in str(space)
     assert near.reason.replace("\N{NO-BREAK SPACE}", " ") in " ".join(line.strip() for line in str(space).splitlines())
 
@@ -192,7 +225,7 @@ def test_an_empty_workspace_names_the_nearest_pose_and_its_cables() -> None:
 def test_moments_that_alone_are_too_much_are_told() -> None:
     near = sl.workspace(SUSPENDED, ROOM, sl.WrenchBox(1.0, 1e5), cells=6).nearest
     assert near is not None
-    assert "moments cannot be borne there even without their forces" in near.reason
+    assert "moments" in near.reason
 
 
 def test_a_region_smaller_than_a_cell_is_found_by_the_search() -> None:
@@ -212,7 +245,7 @@ def test_a_region_smaller_than_a_cell_is_found_by_the_search() -> None:
     assert near is not None
     assert near.level >= 0.0
     assert np.linalg.norm(near.pose.position - middle) <= radius
-    assert "smaller than a cell" in near.reason
+    assert "cell" in near.reason
 
 
 def test_nothing_limits_where_nothing_can_fail() -> None:
@@ -227,42 +260,49 @@ def test_nothing_limits_where_nothing_can_fail() -> None:
     assert space.limits == ()
 
 
-BAD = {
+CONTINUOUS = "MinimumNorm, QuadraticProgram, PNorm, AnalyticCenter, Centroid, ClosedForm"
+BAD: dict[str, tuple[dict[str, object], dict[str, str]]] = {  # arguments, and parts of the error
     "tilt twice": (
         {"box": sl.PoseBox(ROOM.low, ROOM.high, 0.1), "orientations": sl.Tilts(0.1)},
-        r"orientations is given with a box of tilt 5.73 deg",
+        {"item": "orientations", "allowed": "one of the two"},
     ),
     "jumping tensions": (
         {"criteria": [sl.MaximumSag(0.05)], "tension": sl.LowestSum()},
-        "LowestSum, which has tensions that jump.*MinimumNorm, QuadraticProgram, PNorm",
+        {"item": "tension", "allowed": CONTINUOUS},
     ),
     "a corner of the polygon": (
         {"criteria": [sl.LeastStiffness(1.0)], "tension": sl.PolygonWalk(optimum="1-norm")},
-        "PolygonWalk, which has tensions that jump",
+        {"item": "tension", "allowed": CONTINUOUS},
     ),
-    "the pose before": ({"criteria": [sl.LeastFrequency(1.0)], "tension": sl.Closest()}, "depends on the pose before"),
-    "no criterion": ({"criteria": [3]}, r"criteria\[0\] is 3"),
-    "one criterion": ({"criteria": sl.MaximumSag(0.05)}, r"allowed: a list of criteria"),
-    "no extent": ({"box": sl.PoseBox([0, 0, 1], [0, 0, 2])}, "without extent along x and y"),
-    "few cells": ({"cells": 3}, "cells is 3; allowed: 4 to 128"),
-    "a wrench": ({"wrenches": [0, 0, 1, 0, 0, 0]}, "WrenchPolytope"),
-    "a rotation": ({"orientations": np.eye(3)}, r"Give Tilts\(np.radians\(10\)\), or Orientations"),
+    "the pose before": (
+        {"criteria": [sl.LeastFrequency(1.0)], "tension": sl.Closest()},
+        {"item": "tension", "allowed": CONTINUOUS},
+    ),
+    "no criterion": ({"criteria": [3]}, {"item": "criteria[0]", "value": "3"}),
+    "one criterion": ({"criteria": sl.MaximumSag(0.05)}, {"item": "criteria", "allowed": "a list of criteria"}),
+    "no extent": ({"box": sl.PoseBox([0, 0, 1], [0, 0, 2])}, {"item": "box", "value": "without extent along x and y"}),
+    "few cells": ({"cells": 3}, {"item": "cells", "value": "3", "allowed": "4 to 128"}),
+    "a wrench": ({"wrenches": [0, 0, 1, 0, 0, 0]}, {"item": "wrenches", "allowed": "a WrenchSet, or None"}),
+    "a rotation": (
+        {"orientations": np.eye(3)},
+        {"item": "orientations", "next_step": "Give Tilts(np.radians(10)), or Orientations(rotations)."},
+    ),
 }
 
 
 @pytest.mark.parametrize("case", BAD)
 def test_what_is_refused(case: str) -> None:
-    given, message = BAD[case]
-    with pytest.raises(sl.InvalidValueError, match=message):
+    given, parts = BAD[case]
+    with refused(**parts, kind=sl.InvalidValueError):
         sl.workspace(SUSPENDED, **given)  # type: ignore[arg-type]
 
 
 def test_what_planar_robots_refuse() -> None:
-    with pytest.raises(sl.InvalidValueError, match=r"0\.5 m thick along plane_normal, y.*the same y, 0\.5 m"):
+    with refused("box", "0.5 m thick along plane_normal, y", "0 m for a planar robot", kind=sl.InvalidValueError):
         sl.workspace(square(), sl.PoseBox([0, 0, 0], [2, 0.5, 2]))
-    with pytest.raises(sl.InvalidValueError, match="its platform does not turn"):
+    with refused("orientations: tilt", "5.73 deg", kind=sl.InvalidValueError):
         sl.workspace(square(), orientations=sl.Tilts(0.1))
-    with pytest.raises(sl.InvalidValueError, match="along x, y or z for a workspace"):
+    with refused("plane_normal", "(0.7071, 0.7071, 0)", kind=sl.InvalidValueError):
         sl.workspace(square(plane_normal=[1, 1, 0], frame_anchors=[[0, 0, 0], [2, -2, 0], [2, -2, 2], [0, 0, 2]]))
 
 
@@ -296,4 +336,4 @@ def test_it_reads_well_at_eighty_columns(suspended: sl.Workspace) -> None:
     assert max(map(len, text.splitlines())) <= 80
     assert "789." in text
     assert "m³" in text
-    assert "it reaches the box at z low" in text
+    assert "z low" in text

@@ -112,9 +112,8 @@ def _files(source: Path) -> tuple[Path, Path]:
     for kind, files in found.items():
         if len(files) != 1:
             names = ", ".join(file.name for file in files) or "none"
-            raise FileError(
-                source, f"goes with {len(files)} CASPR files of {kind} ({names}); allowed: 1", "Name the file itself."
-            )
+            reason = f"goes with {len(files)} CASPR files of {kind} ({names}); allowed: 1"
+            raise FileError(source, reason, "Name the file itself.", item=f"CASPR files of {kind}")
     return found["bodies"][0], found["cables"][0]
 
 

@@ -59,13 +59,14 @@ class Content(NamedTuple):
             raise FileError(path, *self._instead(attributes))
         if not isinstance(found, int | np.integer) or found < 1:
             step = "Write it again; it was edited, or damaged."
-            raise FileError(path, f"is of format {found!r}, which never was", step)
+            raise FileError(path, f"is of format {found!r}, which never was", step, item=self.key)
         if found > self.format:
             raise FileError(
                 path,
                 f"is of format {found}, written by {attributes.get('source')}; this is sagline {version('sagline')}, "
                 f"which reads up to {self.format}",
                 "Install a newer sagline.",
+                item=self.key,
             )
         return int(found)
 
@@ -87,7 +88,7 @@ class Content(NamedTuple):
             FileError: If it has none.
         """
         if found is Seal.MISSING:
-            raise FileError(path, "is not as it was written: its digest is missing", self.again)
+            raise FileError(path, "is not as it was written: its digest is missing", self.again, item="digest")
 
     def attributes(self, title: str) -> dict[str, Any]:
         """What every file of it says of itself.

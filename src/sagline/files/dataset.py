@@ -83,7 +83,8 @@ def told_of(path: Path) -> Iterator[None]:
     try:
         yield
     except KeyError as error:
-        raise FileError(path, f"has no {error.args[0]}", "Write it again; it is incomplete or was edited.") from None
+        step = "Write it again; it is incomplete or was edited."
+        raise FileError(path, f"has no {error.args[0]}", step, item=str(error.args[0])) from None
     except InvalidValueError as error:
         raise FileError.of(path, error) from None
 

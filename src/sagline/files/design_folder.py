@@ -193,7 +193,7 @@ def _check_request(place: Path, digest: str, request: Request) -> None:
     if own != digest:
         asked = f"{request.robot.name} with {request.optimizer} and seed {request.seed}"
         reason = f"holds another search, {own[:8]}, than is asked for, {digest[:8]}: {asked}"
-        raise FileError(place, reason, "Ask for the same, or name another folder.")
+        raise FileError(place, reason, "Ask for the same, or name another folder.", item="request")
 
 
 def _read(file: Path, heads: list[str]) -> tuple[Array, int]:
@@ -216,7 +216,7 @@ def _read(file: Path, heads: list[str]) -> tuple[Array, int]:
         if not right:
             if k == len(lines) - 1:
                 break  # torn
-            raise FileError(file, f"line {k + 1} is not as it was written", ANOTHER)
+            raise FileError(file, f"line {k + 1} is not as it was written", ANOTHER, item=f"line {k + 1}")
         whole += len(line.encode())
         if k:
             rows.append([float(x) for x in numbers if x is not None])

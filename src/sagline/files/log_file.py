@@ -76,7 +76,8 @@ def load_log(file: os.PathLike[str] | str, sensors: Sensors | None = None) -> Wi
         if fields[name] is not None and getattr(given, f"{key}_deviation") is None:
             wish = f"# {key}_deviation: {USUAL[key]}"
             step = f"Write a comment above the columns, for instance '{wish}', or give sensors (--{key}-deviation)."
-            raise FileError(path, f"does not say the {key}_deviation of what it holds", step)
+            reason = f"does not say the {key}_deviation of what it holds"
+            raise FileError(path, reason, step, item=f"{key}_deviation")
     try:
         return WinchLog(**fields, sensors=given, source=str(path))
     except InvalidValueError as error:

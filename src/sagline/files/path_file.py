@@ -65,11 +65,8 @@ def load_path(file: str | os.PathLike[str]) -> Path:
     yaml, table = (_path_from_yaml, YAML_LIMIT), (path_from_table, TABLE_LIMIT)
     readers = {".yaml": yaml, ".yml": yaml, ".csv": table}
     if path.suffix.lower() not in readers:
-        raise FileError(
-            path,
-            f"the suffix is {path.suffix or 'missing'}; allowed: {', '.join(readers)}",
-            "Give waypoints as .yaml, or time and pose as .csv.",
-        )
+        step = "Give waypoints as .yaml, or time and pose as .csv."
+        raise FileError.of(path, InvalidValueError("the suffix", path.suffix or "missing", ", ".join(readers), step))
     reader, limit = readers[path.suffix.lower()]
     text = read_text(path, limit)
     try:

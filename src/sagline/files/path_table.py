@@ -6,7 +6,7 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
-from sagline.errors import FileError
+from sagline.errors import FileError, InvalidValueError
 from sagline.files.table import Table, line_error
 from sagline.motion.path import Path
 from sagline.motion.sampled import path_from_samples
@@ -41,7 +41,8 @@ def path_from_table(path: FilePath, text: str) -> Path:
     late = np.diff(time, prepend=-np.inf) < _LEAST_STEP
     table.refuse(late, "time", time, "s", "a time after that of the row before")
     if time.size < 2:
-        raise FileError(path, f"number of samples {time.size}; allowed: at least two", "Add the samples of the path.")
+        step = "Add the samples of the path."
+        raise FileError.of(path, InvalidValueError("number of samples", time.size, "at least two", step))
     for name in PLACE[1:]:
         values = table.columns[name]
         table.refuse(np.abs(values) > FARTHEST, name, values, "m", f"up to {FARTHEST:g} m; millimeters are {name} [mm]")

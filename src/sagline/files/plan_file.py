@@ -188,7 +188,8 @@ def choice_of(
     """
     name = attributes[key]
     if name not in choices:
-        raise FileError(path, f"{key} is {name!r}; allowed: {', '.join(choices)}", "Read it with a newer sagline.")
+        refused = InvalidValueError(key, repr(name), ", ".join(choices), "Read it with a newer sagline.")
+        raise FileError.of(path, refused)
     choice: Any = choices[name]
     given = {field.name: attributes.get(f"{key}_{field.name}") for field in fields(choice)}
     try:
@@ -220,7 +221,8 @@ def plan_of(path: FilePath, data: Dataset, robot: Robot) -> Plan:
         return locked(np.asarray(data[name].values, order="C"))
 
     if data.sizes["cable"] != robot.cable_count:
-        raise FileError(path, f"has {data.sizes['cable']} cables, its robot {robot.cable_count}", "Write it again.")
+        reason = f"has {data.sizes['cable']} cables, its robot {robot.cable_count}"
+        raise FileError(path, reason, "Write it again.", item="cable")
     check_plan(data, robot.cable_count)
     behind = MACHINE[0].name in data.variables
     if behind != anything_behind(robot):

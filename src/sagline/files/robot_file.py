@@ -156,7 +156,7 @@ def _on_base(data: dict[Any, Any], origin: Path | str) -> dict[Any, Any]:
     if name not in robot_names():
         near = nearest(name, robot_names()) if isinstance(name, str) else None
         step = f"Did you mean {near}?" if near else "Name one of them, or leave base out."
-        raise FileError(origin, f"base is {brief(name)}; allowed: {', '.join(robot_names())}", step)
+        raise FileError.of(origin, InvalidValueError("base", brief(name), ", ".join(robot_names()), step))
     base = _on_base(parse_mapping(preset_text(name), f"preset {name}"), origin)
     del base["name"]  # two robots of one name would overwrite each other's files
     assumed = {field: why for field, why in base.get("assumed", {}).items() if field not in data}

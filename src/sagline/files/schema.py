@@ -44,29 +44,33 @@ def validated(data: Mapping[Any, Any], schema: type[Schema], origin: Path | str)
         mistakes = error.errors(include_url=False)
     # a misspelt key explains the missing one beside it, so it is told first
     first = next((mistake for mistake in mistakes if mistake["type"] == "extra_forbidden"), mistakes[0])
-    reason, next_step = _explained(first, schema)
-    raise FileError(origin, reason, next_step)
+    key, found, allowed, next_step = _explained(first, schema)
+    refused = FileError(origin, f"{key} is {found}{allowed and f'; allowed: {allowed}'}", next_step, item=key)
+    refused.value, refused.allowed = found, allowed
+    raise refused
 
 
-def _explained(mistake: ErrorDetails, schema: type[Entry]) -> tuple[str, str]:
+def _explained(mistake: ErrorDetails, schema: type[Entry]) -> tuple[str, str, str, str]:
+    """The key, its value, what is allowed and the next step."""
     where = mistake["loc"]
     key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in where).removeprefix(".")
+    found = reprlib.repr(mistake["input"])
     match mistake["type"]:
         case "missing":
-            return f"{key} is missing", f"Add the key {key}."
+            return key, "missing", "", f"Add the key {key}."
         case "extra_forbidden":
             known = list(_at(schema, where[:-1]).model_fields)
             near = nearest(str(where[-1]), known)
             next_step = f"Did you mean {near}?" if near else "Remove it."
-            return f"{key} is an unknown key; allowed: {', '.join(known)}", next_step
+            return key, "an unknown key", ", ".join(known), next_step
         case "model_type":
             known = list(_at(schema, where).model_fields)
-            return f"{key} is {reprlib.repr(mistake['input'])}; allowed: keys {', '.join(known)}", "Give it as keys."
+            return key, found, f"keys {', '.join(known)}", "Give it as keys."
         case "string_type":
-            return f"{key} is {reprlib.repr(mistake['input'])}; allowed: text", f'Put it in quotes: {key}: "..."'
+            return key, found, "text", f'Put it in quotes: {key}: "..."'
         case _:
             wanted = mistake["msg"].removeprefix("Input should be ")
-            return f"{key} is {reprlib.repr(mistake['input'])}; allowed: {wanted}", f"Correct {key}."
+            return key, found, wanted, f"Correct {key}."
 
 
 def _at(schema: type[Entry], where: tuple[int | str, ...]) -> type[Entry]:

@@ -138,7 +138,8 @@ def _winches(attributes: Any) -> Winches:
 
 def _simulation(path: FilePath, data: Dataset, robot: Robot) -> Simulation:
     if data.sizes["cable"] != robot.cable_count:
-        raise FileError(path, f"has {data.sizes['cable']} cables, its robot {robot.cable_count}", "Write it again.")
+        reason = f"has {data.sizes['cable']} cables, its robot {robot.cable_count}"
+        raise FileError(path, reason, "Write it again.", item="cable")
     check_simulation(data, robot.cable_count)
 
     def values(quantity: Quantity) -> Any:

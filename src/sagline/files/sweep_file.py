@@ -117,8 +117,8 @@ def load_sweep(file: os.PathLike[str] | str) -> Request:
     """
     path = file_path(file)
     if path.suffix.lower() not in (".yaml", ".yml"):
-        reason = f"the suffix is {path.suffix or 'missing'}; allowed: .yaml, .yml"
-        raise FileError(path, reason, "Give a sweep file: sagline examples writes one.")
+        step = "Give a sweep file: sagline examples writes one."
+        raise FileError.of(path, InvalidValueError("the suffix", path.suffix or "missing", ".yaml, .yml", step))
     entry = validated(parse_mapping(read_text(path, YAML_LIMIT), path), _SweepEntry, path)
     try:
         return Request(

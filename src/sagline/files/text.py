@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import re
 from pathlib import Path
 from typing import Final
 
@@ -70,9 +71,23 @@ def read_text(path: Path, limit: float) -> str:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
-        raise FileError(
-            path, f"is not UTF-8 text (line {line})", "Check that this is the file you mean, or save it as UTF-8."
-        ) from None
+        step = "Check that this is the file you mean, or save it as UTF-8."
+        raise error_at_line(path, f"is not UTF-8 text (line {line})", step) from None
     if "\0" in text:
         raise FileError(path, "is not text, it holds zero bytes", "Check that this is the file you mean.")
     return text
+
+
+def error_at_line(path: Path | str, reason: str, next_step: str) -> FileError:
+    """An error whose item is the line that its reason names, if it names one.
+
+    Args:
+        path: The file.
+        reason: Description of the problem, with the line ("line 3").
+        next_step: Action that solves it.
+
+    Returns:
+        The error, to be raised.
+    """
+    line = re.search(r"\bline \d+", reason)
+    return FileError(path, reason, next_step, item=line and line[0])

@@ -14,7 +14,7 @@ import numpy as np
 from sagline.arrays import Array, locked
 from sagline.errors import FileError, InvalidValueError
 from sagline.files.quantity import plain_number, within_reach
-from sagline.files.text import read_bytes
+from sagline.files.text import error_at_line, read_bytes
 
 _LIMIT: Final = 4.0  # MB; the largest of CASPR's files has 0.1
 _ENCODING = re.compile(r"utf-?8|utf-?16|us-ascii|ascii|latin-?1|iso-8859-1?[0-9]|(windows-|cp)125[0-8]", re.IGNORECASE)
@@ -48,7 +48,7 @@ def read_xml(path: Path) -> Element:
     try:
         parser.Parse(data, True)
     except (expat.ExpatError, LookupError, ValueError) as error:  # the last two: an encoding that is none of this file
-        raise FileError(path, *_cause(error, data)) from None
+        raise error_at_line(path, *_cause(error, data)) from None
     except _RefusedError as error:
         raise FileError(path, *error.args) from None
     return builder.close()

@@ -12,6 +12,7 @@ import yaml
 
 from sagline.errors import FileError
 from sagline.files.quantity import plain_number
+from sagline.files.text import error_at_line
 
 YAML_LIMIT: Final = 1.0  # MB; thousands of waypoints or cables
 _DEEPEST: Final = 20  # levels of nesting
@@ -43,11 +44,10 @@ def parse_mapping(text: str, origin: Path | str) -> dict[Any, Any]:
     try:
         data = yaml.load(text, Loader=_PlainLoader)
     except yaml.MarkedYAMLError as error:
-        raise FileError(origin, *_cause(error, text)) from None
+        raise error_at_line(origin, *_cause(error, text)) from None
     except (yaml.YAMLError, RecursionError, ValueError, OverflowError) as error:  # the last two: \UFFFFFFFF
-        raise FileError(
-            origin, f"is not YAML as read here ({_reason(error, text)})", "Check that this is the file you mean."
-        ) from None
+        reason = f"is not YAML as read here ({_reason(error, text)})"
+        raise error_at_line(origin, reason, "Check that this is the file you mean.") from None
     if data is None:
         raise FileError(origin, "is empty", "Write it again; it may have been cut off.")
     if not isinstance(data, dict):

@@ -12,6 +12,7 @@ from sagline.arrays import Array
 from sagline.kernels.dynamics import collocation
 from sagline.kernels.dynamics.string import BEHIND_X, BEHIND_Y, BEHIND_Z
 from tests.kernels.dynamics.strings import GRAVITY, added, chain, counted, held, string
+from tests.tiers import extended, wide
 
 # taut, sagging, deep, almost folded: T_x, T_z [N], L [m]; 0.1 kg/m
 CABLES = {
@@ -92,7 +93,7 @@ def test_irvine_s_first_symmetric_frequency() -> None:
     assert np.divide(errors[:-1], errors[1:]) == pytest.approx(4.0, rel=0.03)
 
 
-@pytest.mark.parametrize("name", CABLES)
+@pytest.mark.parametrize("name", wide(CABLES))
 def test_finite_elements(name: str) -> None:
     """Chains of springs: order 2, and extrapolated the same stiffness and frequencies."""
     table = CABLES[name]
@@ -109,6 +110,7 @@ def test_finite_elements(name: str) -> None:
     assert extrapolated(ends) == pytest.approx(found, abs=limit * np.abs(found).max())
 
 
+@extended
 def test_count_against_brute_force() -> None:
     """Random cables from taut to almost folded, random frequencies: as many as a fine chain has, all up to twenty."""
     random = np.random.default_rng(12)

@@ -14,9 +14,10 @@ from tests.kernels.interference.hanging import (
     random_pair,
     sampled_distance,
 )
+from tests.tiers import wide
 
 
-@pytest.mark.parametrize("cases", [80, pytest.param(6000, marks=pytest.mark.soak)])
+@pytest.mark.parametrize("cases", wide([10, 80, pytest.param(6000, marks=pytest.mark.soak)]))
 def test_no_lower_bound_is_above_what_dense_samples_find(cases: int) -> None:
     rng = np.random.default_rng(14)
     for case in range(cases):

@@ -11,6 +11,7 @@ from sagline.kernels.codes import POSE_INFEASIBLE, POSE_NOT_CONVERGED, POSE_SOLV
 from sagline.kernels.sharing import centers as c
 from tests.kernels.compiled import from_python
 from tests.kernels.sharing.problems import Problem, random_problem, room_of
+from tests.tiers import wide
 
 share_at_center = from_python(c.share_at_center)
 is_inside = from_python(c.is_inside)
@@ -24,7 +25,7 @@ def push(problem: Problem, point: Array) -> tuple[float, float]:
     return float(np.abs(terms.sum(axis=1)).max()), float(np.abs(terms).max())
 
 
-@pytest.mark.parametrize(("m", "r"), [(7, 1), (8, 2), (9, 3), (14, 8)])
+@pytest.mark.parametrize(("m", "r"), wide([(8, 2), (7, 1), (9, 3), (14, 8)]))
 def test_the_center_and_those_of_the_rounds_that_follow(m: int, r: int) -> None:
     rng = np.random.default_rng(m)
     lost = 0

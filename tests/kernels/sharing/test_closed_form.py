@@ -9,6 +9,7 @@ from sagline.kernels.codes import CLOSED_FORM, IMPROVED_CLOSED_FORM, PUNCTURE
 from sagline.kernels.sharing.closed_form import share_near_middle
 from tests.kernels.compiled import from_python, memory
 from tests.kernels.sharing.problems import Problem, random_problem
+from tests.tiers import extended
 
 share = from_python(share_near_middle)
 
@@ -62,6 +63,7 @@ def test_closed_and_improved_closed_form(m: int, r: int) -> None:
     assert min(kept.values()) > 5
 
 
+@extended
 def test_puncture_goes_back_towards_the_minimum_norm_as_far_as_limits_let_it() -> None:
     rng = np.random.default_rng(3)
     for _ in range(80):

@@ -12,6 +12,7 @@ from sagline.kernels.codes import CHORD_TENSION, CLOSEST, MINIMUM_NORM, POSE_INF
 from sagline.kernels.sharing import nearest as n
 from tests.kernels.compiled import from_python, memory
 from tests.kernels.sharing.problems import Problem, nearness, random_problem
+from tests.tiers import wide
 
 share_nearest = from_python(n.share_nearest)
 refer = from_python(n.refer)
@@ -30,7 +31,7 @@ def by_daqp(problem: Problem, reference: Array) -> Array:
     return problem.tensions(point)
 
 
-@pytest.mark.parametrize(("m", "r"), [(7, 1), (8, 2), (9, 3), (21, 15)])
+@pytest.mark.parametrize(("m", "r"), wide([(8, 2), (7, 1), (9, 3), (21, 15)]))
 def test_daqp_agrees_and_the_next_round_starts_where_this_one_ended(m: int, r: int) -> None:
     rng = np.random.default_rng(m)
     met = 0

@@ -10,6 +10,7 @@ from sagline.kernels.codes import CENTROID, POLYGON_WALK, POSE_INFEASIBLE, POSE_
 from sagline.kernels.sharing import on_polygon as o
 from tests.kernels.compiled import from_python
 from tests.kernels.sharing.problems import Problem, area_of, brute_corners, nearness, random_problem, room_of
+from tests.tiers import wide
 
 share_on_polygon = from_python(o.share_on_polygon)
 feasible_interval = from_python(o.feasible_interval)
@@ -74,7 +75,7 @@ def expected_point(problem: Problem, method: int, parameter: float, reference: n
     return np.asarray(np.average([np.mean(t, axis=0) for t in triangles], axis=0, weights=areas))
 
 
-@pytest.mark.parametrize(("method", "parameter"), [(CENTROID, 0.0)] + [(POLYGON_WALK, walk) for walk in WALKS])
+@pytest.mark.parametrize(("method", "parameter"), wide([(CENTROID, 0.0), *((POLYGON_WALK, walk) for walk in WALKS)]))
 def test_the_chosen_point_and_the_same_in_rounds_that_follow(method: int, parameter: float) -> None:
     rng = np.random.default_rng(2)
     for _ in range(25):

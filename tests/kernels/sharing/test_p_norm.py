@@ -10,6 +10,7 @@ from sagline.kernels.codes import POSE_INFEASIBLE, POSE_SOLVED
 from sagline.kernels.sharing import p_norm
 from tests.kernels.compiled import from_python, memory
 from tests.kernels.sharing.problems import Problem, nearness, random_problem
+from tests.tiers import wide
 
 share_by_norm = from_python(p_norm.share_by_norm)
 
@@ -42,7 +43,7 @@ def nonnegative(matrix: Array, right: Array) -> tuple[Array, float]:
 
 
 @pytest.mark.parametrize("p", [2.0, 4.0, 7.0, 50.0])
-@pytest.mark.parametrize(("m", "r"), [(7, 1), (8, 2), (9, 3)])
+@pytest.mark.parametrize(("m", "r"), wide([(8, 2), (7, 1), (9, 3)]))
 def test_the_least_norm_and_those_of_the_rounds_that_follow(m: int, r: int, p: float) -> None:
     rng = np.random.default_rng(m)
     lost = 0

@@ -12,6 +12,7 @@ from sagline.kernels.sharing import polygon as p
 from sagline.kernels.sharing import walk
 from tests.kernels.compiled import from_python, memory
 from tests.kernels.sharing.problems import Problem, area_of, brute_corners, corner_room, random_problem
+from tests.tiers import extended, wide
 
 feasible_polygon = from_python(p.feasible_polygon)
 polygon_again = from_python(p.polygon_again)
@@ -34,7 +35,7 @@ def scattered(rng: np.random.Generator, scale: float = 1.0) -> Problem:
     return Problem(np.array([start, -rng.uniform(0, 5, 8) * scale, rng.uniform(0, 5, 8) * scale]), null)
 
 
-@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e6])
+@pytest.mark.parametrize("scale", wide([1.0, 1e-3, 1e6]))
 def test_cut_and_walked_polygons_are_the_same_set(scale: float) -> None:
     rng = np.random.default_rng(3)
     counts = []
@@ -80,7 +81,7 @@ def assert_polygon(problem: Problem, corners: Array, labels: Indices) -> None:
                 assert tensions[label // 2] == pytest.approx(strips[LOW + label % 2, label // 2], abs=1e-8)
 
 
-@pytest.mark.parametrize("m", [3, 4, 6, 8, 14, 24])
+@pytest.mark.parametrize("m", wide([8, 3, 4, 6, 14, 24]))
 def test_corners_by_brute_force(m: int) -> None:
     rng = np.random.default_rng(m)
     signs, sizes = set(), []
@@ -100,6 +101,7 @@ def test_corners_by_brute_force(m: int) -> None:
     assert max(sizes) >= min(m, 5)
 
 
+@extended
 def test_infinite_limits_end_at_a_box_that_is_labeled_so() -> None:
     rng = np.random.default_rng(7)
     ended = set()

@@ -14,6 +14,7 @@ from sagline.kernels.codes import POSE_INFEASIBLE, POSE_NOT_CONVERGED, POSE_SOLV
 from sagline.kernels.sharing import programs as p
 from tests.kernels.compiled import from_python, memory
 from tests.kernels.sharing.problems import Problem, basis_of, nearness, random_problem
+from tests.tiers import wide
 
 status_of = from_python(p.status_of)
 share_lowest_sum = from_python(p.share_lowest_sum)
@@ -27,7 +28,7 @@ def moved_by(problem: Problem, size: float, rng: np.random.Generator) -> Problem
     return problem._replace(strips=strips)
 
 
-@pytest.mark.parametrize(("m", "r"), [(5, 1), (8, 2), (12, 6)])
+@pytest.mark.parametrize(("m", "r"), wide([(8, 2), (5, 1), (12, 6)]))
 def test_lowest_sum_and_the_rounds_that_follow(m: int, r: int) -> None:
     rng = np.random.default_rng(m)
     outcomes = []
@@ -49,7 +50,7 @@ def test_lowest_sum_and_the_rounds_that_follow(m: int, r: int) -> None:
     assert POSE_INFEASIBLE in outcomes
 
 
-@pytest.mark.parametrize(("m", "r"), [(5, 1), (8, 2), (12, 6)])
+@pytest.mark.parametrize(("m", "r"), wide([(8, 2), (5, 1), (12, 6)]))
 def test_lowest_maximum_and_the_rounds_that_follow(m: int, r: int) -> None:
     rng = np.random.default_rng(m)
     outcomes = []

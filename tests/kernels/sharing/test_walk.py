@@ -6,12 +6,13 @@ import pytest
 from sagline.kernels.sharing.walk import most_independent, walk_polygon
 from tests.kernels.compiled import from_python, memory
 from tests.kernels.sharing.problems import area_of, brute_corners, corner_room, random_problem
+from tests.tiers import wide
 
 walk = from_python(walk_polygon)
 independent = from_python(most_independent)
 
 
-@pytest.mark.parametrize("m", [3, 4, 8, 16])
+@pytest.mark.parametrize("m", wide([4, 3, 8, 16]))
 def test_corners_by_brute_force(m: int) -> None:
     rng = np.random.default_rng(m)
     empty = 0
