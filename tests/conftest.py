@@ -28,7 +28,6 @@ from tests.tiers import FILE_LIMIT, TEST_LIMIT
 # Compiled versions that only tests of the second tier use: they double the time that the others take to compile.
 SECOND_TIER_ENTRIES: Final = (
     entries.CHAINS,
-    entries.FORWARD_OVER_PULLEYS,
     entries.PROOFS,
     entries.READINGS_OVER_PULLEYS,
     entries.SIMULATION_OVER_PULLEYS,

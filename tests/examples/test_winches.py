@@ -12,6 +12,7 @@ from sagline.arrays import Array
 from sagline.calibration.screening import screened
 from sagline.calibration.suspicions import suspicions
 from tests.calibration.example_log import EXAMPLES, example_log, example_truth, text_of
+from tests.tiers import extended
 
 DRAWN, LOG, TRUTH = (EXAMPLES / f"winches{end}" for end in ("_robot.yaml", ".csv", "_truth.yaml"))
 
@@ -53,12 +54,14 @@ def test_the_log_is_what_the_true_robot_reads(tmp_path: Path) -> None:
     np.testing.assert_allclose(again.commanded.quaternion, log.commanded.quaternion, rtol=0.0, atol=2e-3)
 
 
+@extended
 def test_every_row_is_fit_and_nothing_is_suspected() -> None:
     robot, log = sl.load_robot(DRAWN), sl.load_log(LOG)
     assert len(screened(robot, log).log) == len(log) == 60
     assert suspicions(robot, log) == ()
 
 
+@extended
 def test_the_calibration_finds_the_truth() -> None:
     found = sl.calibrate(sl.load_robot(DRAWN), sl.load_log(LOG), folds=0)
     assert found.status == sl.CalibrationStatus.FOUND

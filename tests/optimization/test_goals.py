@@ -10,8 +10,10 @@ from sagline import FreeCable
 from sagline.optimization.candidates import Candidates
 from sagline.optimization.planned import planned
 from tests.tension.reference import random_poses
+from tests.tiers import extended
 
-PRESETS = ("article-suspended", "cogiro", "ipanema-1", "expo2015-lucia-pulleys", "fast", "copacabana")
+PULLEYS = pytest.param("expo2015-lucia-pulleys", marks=extended)
+PRESETS = ("article-suspended", "cogiro", "ipanema-1", PULLEYS, "fast", "copacabana")
 
 
 @pytest.mark.parametrize("name", PRESETS)

@@ -14,7 +14,7 @@ from sagline.control import Command, Mode, Sample
 from tests.control.protocol import PERIOD, GroupFault, GroupStatus
 from tests.dynamics.machines import prototype
 from tests.refusal import refused
-from tests.tiers import wide
+from tests.tiers import extended, wide
 from tests.twin.pilot import HOME, Pilot, leg
 
 ROBOT = sl.load_robot("article-prototype")
@@ -195,6 +195,7 @@ def test_a_smaller_drum_lets_out_less() -> None:
     assert np.abs(told).max() > 0.5
 
 
+@extended
 @pytest.mark.parametrize(
     "error", [{PULLEY: 33.0}, {DEAD: 0.5}, {MODULUS: 20.0}, {LOAD: 2.0}, {DEAD: 1.0, PULLEY: 20.0}]
 )
