@@ -25,7 +25,7 @@ class Timed(Spy):
     def exchange(self, command: Command | None) -> Sample | Missing:
         """Exchange, and measure."""
         begin = time.perf_counter()
-        answer: Sample | Missing = self._link.exchange(command)
+        answer: Sample | Missing = self.link.exchange(command)
         self.seconds += time.perf_counter() - begin
         return answer
 

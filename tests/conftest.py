@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import pytest
 from numba.core import event
@@ -76,11 +76,10 @@ def no_entry_is_compiled_by_a_test(request: pytest.FixtureRequest) -> Iterator[N
 def libraries_are_loaded(tmp_path_factory: pytest.TempPathFactory) -> None:
     """Load large libraries before the first test, so that no test is charged with their import."""
     import xarray
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     xarray.Dataset({"x": ("row", [1.0])}).to_netcdf(tmp_path_factory.mktemp("load") / "x.nc", engine="h5netcdf")
-    FigureCanvasAgg(Figure()).draw()
+    Figure().savefig(tmp_path_factory.mktemp("load") / "x.png")
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -129,7 +128,7 @@ class _Compilation(event.Listener):
 
 
 _compilation: Final = _Compilation()
-event.register("numba:compile", _compilation)
+cast("Any", event).register("numba:compile", _compilation)
 
 
 def processor_time() -> float:
@@ -159,7 +158,7 @@ _used_by_file: Final[dict[str, float]] = defaultdict(float)
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
     """Add up the processor time of the tests of each file."""
     if report.when == "call":
-        _used_by_file[report.nodeid.partition("::")[0]] += float(dict(report.user_properties).get(CPU, 0.0))
+        _used_by_file[report.nodeid.partition("::")[0]] += sum(float(str(used)) for name, used in report.user_properties if name == CPU)
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:

@@ -80,7 +80,8 @@ VARIANTS: Final = (
 def record() -> dict[str, Any]:
     """Make a dictionary: each command with its exit code, its JSON, and the files that it made or changed."""
     found: dict[str, Any] = {}
-    runner, before = CliRunner(), {}
+    before: dict[str, Any] = {}
+    runner = CliRunner()
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder), patch.dict(os.environ, COLUMNS="80"):
         execution().save("run.mcap")
         for command in COMMANDS:
