@@ -158,7 +158,9 @@ _used_by_file: Final[dict[str, float]] = defaultdict(float)
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
     """Add up the processor time of the tests of each file."""
     if report.when == "call":
-        _used_by_file[report.nodeid.partition("::")[0]] += sum(float(str(used)) for name, used in report.user_properties if name == CPU)
+        _used_by_file[report.nodeid.partition("::")[0]] += sum(
+            float(str(used)) for name, used in report.user_properties if name == CPU
+        )
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
