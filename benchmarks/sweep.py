@@ -15,7 +15,7 @@ from rich.console import Console
 
 import sagline as sl
 from benchmarks.measure import Row, show
-from sagline.files.sweep_folder import make_folder
+from sagline.sweep.folder import make_folder
 from sagline.sweep.tasks import measured_size, task
 
 ROBOT = Path(__file__).parents[1] / "examples" / "own_planar.yaml"
@@ -103,7 +103,7 @@ def tension_requests() -> Iterator[Row]:
 
 
 def _digest(folder: Path) -> str:
-    from sagline.files.sweep_folder import open_folder
+    from sagline.sweep.folder import open_folder
 
     return open_folder(folder).digest
 

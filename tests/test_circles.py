@@ -9,19 +9,6 @@ import pytest
 
 from tests.tiers import extended
 
-DECLARED = {  # each result's save, the one lazy call outward
-    ("sagline.kinematics.plan", "sagline.files.plan_file"),
-    ("sagline.dynamics.frequency_map", "sagline.files.frequency_map_file"),
-    ("sagline.dynamics.simulation", "sagline.files.simulation_file"),
-    ("sagline.control.execution", "sagline.files.execution_file"),
-    ("sagline.optimization.front", "sagline.files.design_folder"),
-    ("sagline.workspaces.space", "sagline.files.workspace_file"),
-    ("sagline.workspaces.surface", "sagline.files.surface_file"),
-    ("sagline.calibration.log", "sagline.files.log_file"),
-    ("sagline.calibration.chosen_poses", "sagline.files.calibration_poses_file"),
-    ("sagline.calibration.result", "sagline.files.calibration_file"),
-}
-
 
 def modules() -> dict[str, Path]:
     """Every module of sagline and its file."""
@@ -82,16 +69,7 @@ def graph() -> dict[str, set[str]]:
 @extended
 def test_no_module_leads_back_to_itself(graph: dict[str, set[str]]) -> None:
     assert len(graph) > 200
-    kept = {name: {to for to in targets if (name, to) not in DECLARED} for name, targets in graph.items()}
-    assert circles(kept) == []
-
-
-@extended
-def test_what_is_declared_is_there_and_closes_a_circle(graph: dict[str, set[str]]) -> None:
-    for outward, target in DECLARED:
-        assert target in graph[outward]
-        assert [outward in group and target in group for group in circles(graph)].count(True) == 1
-    assert len(circles(graph)) == len(DECLARED)
+    assert circles(graph) == []
 
 
 def test_a_circle_would_be_found() -> None:

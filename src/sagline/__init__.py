@@ -49,7 +49,6 @@ if TYPE_CHECKING:
     from sagline.files.c_source import export_c
     from sagline.files.calibration_file import load_calibration
     from sagline.files.caspr import load_caspr
-    from sagline.files.design_file import load_design
     from sagline.files.execution_file import load_execution
     from sagline.files.imported import Imported
     from sagline.files.log_file import load_log
@@ -62,7 +61,6 @@ if TYPE_CHECKING:
     from sagline.files.robot_file import dump_robot, load_robot
     from sagline.files.scene_file import load_scene
     from sagline.files.simulation_file import load_simulation
-    from sagline.files.sweep_file import load_sweep
     from sagline.files.wirex import load_wirex
     from sagline.files.workspace_file import load_workspace
     from sagline.interference.clearance import Clearances, clearance
@@ -89,6 +87,7 @@ if TYPE_CHECKING:
     from sagline.motion.rest_to_rest import quintic_path, septic_path
     from sagline.motion.sampled import path_from_samples
     from sagline.optimization.design import design
+    from sagline.optimization.file import load_design
     from sagline.optimization.free_anchors import FreeAnchors
     from sagline.optimization.free_cable import CableChoice, FreeCable
     from sagline.optimization.free_limit import FreeLimit
@@ -106,6 +105,7 @@ if TYPE_CHECKING:
     from sagline.statics.balance import ArticleBalance, article_balance, structure_matrix
     from sagline.statics.stiffness import Modes, Stiffness, modes, stiffness
     from sagline.statics.wrench import inertial_wrench
+    from sagline.sweep.file import load_sweep
     from sagline.tension.analytic_center import AnalyticCenter
     from sagline.tension.broken import without_cables
     from sagline.tension.centroid import Centroid
@@ -495,7 +495,7 @@ _HOMES = {
     "linearized": "sagline.dynamics.linearized",
     "load_calibration": "sagline.files.calibration_file",
     "load_caspr": "sagline.files.caspr",
-    "load_design": "sagline.files.design_file",
+    "load_design": "sagline.optimization.file",
     "load_execution": "sagline.files.execution_file",
     "load_log": "sagline.files.log_file",
     "load_measurements": "sagline.files.measurements",
@@ -505,7 +505,7 @@ _HOMES = {
     "load_robot": "sagline.files.robot_file",
     "load_scene": "sagline.files.scene_file",
     "load_simulation": "sagline.files.simulation_file",
-    "load_sweep": "sagline.files.sweep_file",
+    "load_sweep": "sagline.sweep.file",
     "load_wirex": "sagline.files.wirex",
     "load_workspace": "sagline.files.workspace_file",
     "margin": "sagline.workspaces.margin",

@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import fields
-from typing import Any
+from importlib import import_module
+from typing import Any, Final
 
 import numpy as np
 
 from sagline.arrays import locked
 from sagline.shown import Shown
+
+# Files know all results, so no result imports them: the module is loaded by its name when a result is saved.
+_FORMATS: Final = "sagline.files.formats"
+
+
+def formats() -> Any:
+    """The module that finds the format of a result by its type."""
+    return import_module(_FORMATS)
 
 
 class ByFields:
@@ -32,6 +42,30 @@ class Result(ByFields, Shown):
     def __repr__(self) -> str:
         """The first line of the text, for results whose arrays are too long to be read: `dataclass(repr=False)`."""
         return f"<{type(self).__name__}: {str(self).splitlines()[0]}>"
+
+
+class Saved:
+    """A result with a file format, see `sagline.files.formats`."""
+
+    __slots__ = ()
+
+    def save(self, file: os.PathLike[str] | str) -> None:
+        """Write the result to a file, whole or not at all, with units.
+
+        The format follows from the type: NetCDF with the robot inside for plans, simulations, workspaces, frequency
+        maps and calibrations (.nc); CSV for logs of winches (.csv); YAML for calibration poses (.yaml); MCAP or NetCDF
+        for executions (.mcap, .nc). The `load` function of the type reads the file back.
+
+        Args:
+            file: The file; a regular file that exists is replaced, anything else is refused.
+
+        Raises:
+            InvalidValueError: If the result cannot be read back: a plan of several robots, or a cable model, tension
+                method or criterion of your own.
+            FileError: If the suffix is wrong, a package is missing or the file cannot be written; the former file is
+                unchanged.
+        """
+        formats().save(self, file)
 
 
 def _again(kind: type[ByFields], values: dict[str, Any]) -> ByFields:

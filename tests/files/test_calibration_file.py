@@ -14,7 +14,7 @@ import sagline as sl
 from sagline import dump_robot
 from sagline.calibration.findings import CrossValidation, Direction, Outlier
 from sagline.files import calibration_file
-from sagline.files.calibration_file import CONTENT
+from sagline.files.calibration_file import FORMAT
 from sagline.files.dataset import read_dataset
 from sagline.files.robot_file import parse_robot
 from sagline.files.seal import Seal
@@ -167,7 +167,7 @@ def read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[xarray.Da
 def whole(tmp_path_factory: pytest.TempPathFactory) -> xarray.Dataset:
     file = tmp_path_factory.mktemp("calibration") / "found.nc"
     calibration("as usual").save(file)
-    return read_dataset(file, CONTENT)[0]
+    return read_dataset(file, FORMAT)[0]
 
 
 @pytest.mark.parametrize("edit", wide(reversed(EDITS)), ids=lambda edit: edit.__name__)
@@ -187,7 +187,7 @@ def test_an_edited_file_is_refused(
 
 
 @pytest.mark.parametrize(
-    "name", wide([CONTENT.key, "robot_before", "left_out", "log", "date", "model", "robot"], first=3)
+    "name", wide([FORMAT.key, "robot_before", "left_out", "log", "date", "model", "robot"], first=3)
 )
 @pytest.mark.parametrize("value", [None, 3.5, "\x07", "nonsense"])
 def test_an_edited_attribute_is_refused(name: str, value: Any, whole: xarray.Dataset, read: Any) -> None:

@@ -13,7 +13,7 @@ import pytest
 import sagline as sl
 from sagline import FileError, InvalidValueError
 from sagline.arrays import Array
-from sagline.files.design_folder import EVALUATIONS, REQUEST
+from sagline.optimization.folder import EVALUATIONS, REQUEST
 from sagline.optimization.rating import Rating
 from tests.optimization.pair import UNDER, apart, pair
 from tests.refusal import refused

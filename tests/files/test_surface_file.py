@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 import sagline as sl
 from sagline import Surface
 from sagline.files import surface_file
-from sagline.files.surface_file import save_surface
+from sagline.files.surface_file import save as save_surface
 from tests.interference.scenes import box_mesh
 from tests.refusal import refused
 

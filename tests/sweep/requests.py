@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 import sagline as sl
-from sagline.files import sweep_folder, sweep_marks
+from sagline.sweep import folder as sweep_folder
+from sagline.sweep import marks as sweep_marks
 from sagline.sweep.quantities import variables_of
 
 PLANAR = Path(__file__).parents[2] / "examples" / "own_planar.yaml"

@@ -13,8 +13,9 @@ import pytest
 from syrupy.assertion import SnapshotAssertion
 
 import sagline as sl
-from sagline.files import sweep_folder, sweep_marks
 from sagline.sweep import cluster, running, tasks
+from sagline.sweep import folder as sweep_folder
+from sagline.sweep import marks as sweep_marks
 from tests.refusal import refused
 from tests.sweep.requests import bits, chunks, in_tasks, marked, planar
 from tests.tiers import extended, wide

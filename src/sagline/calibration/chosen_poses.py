@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from textwrap import wrap
@@ -16,7 +15,7 @@ from sagline.calibration.sensors import Sensors
 from sagline.calibration.tour import length_of
 from sagline.calibration.unknowns import Parameters
 from sagline.numbers import SPACE, counted, n
-from sagline.results import Result
+from sagline.results import Result, Saved
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
@@ -29,7 +28,7 @@ FAR: Final = 100.0  # m: positions from here on are written with one decimal les
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class CalibrationPoses(Result):
+class CalibrationPoses(Result, Saved):
     """Result of `calibration_poses`, in an order that is short to drive.
 
     Attributes:
@@ -72,19 +71,6 @@ class CalibrationPoses(Result):
     def table(self) -> str:
         """Poses and tensions, one a line."""
         return table(self)
-
-    def save(self, file: os.PathLike[str] | str) -> None:
-        """Write poses, tensions, lengths and the errors to expect to a YAML file, whole or not at all.
-
-        Args:
-            file: The file, "poses.yaml" for instance; one that exists is replaced.
-
-        Raises:
-            FileError: If the file cannot be written; what was there before is untouched.
-        """
-        from sagline.files.calibration_poses_file import save_calibration_poses  # the one call outward
-
-        save_calibration_poses(self, file)
 
 
 def in_words(plan: CalibrationPoses, width: int = WIDTH) -> str:

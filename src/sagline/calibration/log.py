@@ -13,19 +13,19 @@ from sagline.arrays import Array, Flags, Indices, checked, locked
 from sagline.calibration.sensors import Sensors
 from sagline.errors import InvalidValueError
 from sagline.indices import part_of
-from sagline.results import Result
+from sagline.results import Result, Saved
 from sagline.robot.pose import Pose
 from sagline.robot.unit import unit
 
 if TYPE_CHECKING:
-    import os
+    pass
 
 _BY_ROW = ("counts", "unstrained_length", "load_cells", "position", "rotation", "time", "commanded")
 _UNIT = 1e-6  # by how much the length of a quaternion may be off: one printed with seven digits is taken
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class WinchLog(Result):
+class WinchLog(Result, Saved):
     """Readings of a robot that stood still at N poses. NaN stands where a reading is missing.
 
     Attributes:
@@ -154,19 +154,6 @@ class WinchLog(Result):
         for name in changes:
             choice(name, "field", WinchLog.__slots__)
         return replace(self, **changes)
-
-    def save(self, file: os.PathLike[str] | str) -> None:
-        """Write the log to a CSV file, whole or not at all, from which `load_log` reads the same.
-
-        Args:
-            file: The file, "winches.csv" for instance.
-
-        Raises:
-            FileError: If it cannot be written; what was there before is untouched.
-        """
-        from sagline.files.log_file import save_log
-
-        save_log(self, file)
 
     def __str__(self) -> str:
         """How many rows of what."""

@@ -16,15 +16,16 @@ from sagline.calibration.findings import Findings
 from sagline.calibration.pose_error import PoseError
 from sagline.kinematics.forward import forward
 from sagline.kinematics.forward_solution import ForwardSolution
+from sagline.results import Saved
 from sagline.robot.pose import Pose
 from sagline.statics.tables import pose_rows
 
 if TYPE_CHECKING:
-    import os
+    pass
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Calibration(Findings):
+class Calibration(Findings, Saved):
     """Result of `calibrate`: P numbers found from the readings at N poses.
 
     Attributes:
@@ -122,17 +123,3 @@ class Calibration(Findings):
     def table(self) -> str:
         """Every number with its standard error, what was there before, and how far it has moved, one a line."""
         return words.table(self)
-
-    def save(self, file: os.PathLike[str] | str) -> None:
-        """Write all of it to a NetCDF file, whole or not at all; `load_calibration` reads it back.
-
-        Args:
-            file: The file, "found.nc" for instance; a regular file that exists is replaced, anything else is refused.
-
-        Raises:
-            InvalidValueError: If the model is none of sagline's.
-            FileError: If the file cannot be written; what was there before is untouched.
-        """
-        from sagline.files.calibration_file import save_calibration
-
-        save_calibration(self, file)

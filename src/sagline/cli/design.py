@@ -10,12 +10,11 @@ from sagline.cli.results import figure_files, listed, write_figures
 from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.cli.values import whole_of
-from sagline.files.design_file import load_design
-from sagline.files.design_folder import FRONT
 from sagline.files.robot_file import load_robot
 from sagline.files.whole import check_files
 from sagline.optimization.design import design as searched
-from sagline.optimization.front import Front
+from sagline.optimization.file import load_design
+from sagline.optimization.front import FRONT, Front
 from sagline.optimization.goals import AT_POSES, Goal
 from sagline.optimization.request import MOST_EVALUATIONS
 

@@ -10,7 +10,7 @@ from sagline.cli.terminal import working
 from sagline.errors import FileError
 from sagline.files.dataset import is_of
 from sagline.files.plan_file import load_plan
-from sagline.files.simulation_file import CONTENT, load_simulation
+from sagline.files.simulation_file import FORMAT, load_simulation
 from sagline.robot.robot import Robot
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def played_in(robot: Robot, file: Path) -> Played:
             raise no_cycle(file)
         check_robot(file, "log", session.robot, robot)
         return session
-    if is_of(file, CONTENT):
+    if is_of(file, FORMAT):
         simulation = load_simulation(file)
         check_robot(file, "simulation", simulation.robot, robot)
         return Playback(simulation)

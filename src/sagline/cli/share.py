@@ -8,13 +8,13 @@ from typing import Final
 from sagline.cli.entries import INVERSE
 from sagline.cli.terminal import show, working
 from sagline.errors import FileError, InvalidValueError
-from sagline.files.calibration_file import CONTENT as CALIBRATION
+from sagline.files.calibration_file import FORMAT as CALIBRATION
 from sagline.files.calibration_file import load_calibration
 from sagline.files.dataset import is_of
 from sagline.files.names import file_stem
 from sagline.files.plan_file import load_plan
 from sagline.files.robot_file import load_robot
-from sagline.files.simulation_file import CONTENT as SIMULATION
+from sagline.files.simulation_file import FORMAT as SIMULATION
 from sagline.files.simulation_file import load_simulation
 from sagline.files.whole import check_file, write_text
 from sagline.robot.robot import Robot

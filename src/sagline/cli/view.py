@@ -10,11 +10,11 @@ from sagline.cli.played import LOG, check_robot, played_beside, played_in
 from sagline.cli.values import loaded, port_of
 from sagline.cli.view_log import view_log
 from sagline.errors import InvalidValueError
-from sagline.files.calibration_file import CONTENT as CALIBRATION
+from sagline.files.calibration_file import FORMAT as CALIBRATION
 from sagline.files.calibration_file import load_calibration
 from sagline.files.dataset import is_of
 from sagline.files.robot_file import load_robot
-from sagline.files.simulation_file import CONTENT
+from sagline.files.simulation_file import FORMAT
 from sagline.files.typed import pose_of, wrench_of
 from sagline.robot.robot import Robot
 
@@ -116,7 +116,7 @@ def view_run(robot: Robot, file: Path, host: str, port: int, *, browser: bool, b
 
     course = played_in(robot, file)
     other = None if beside is None else played_beside(course.robot, file, beside)
-    source = Source.of_simulation(file) if is_of(file, CONTENT) else Source.of_plan(file)
+    source = Source.of_simulation(file) if is_of(file, FORMAT) else Source.of_plan(file)
     return hosted(course.robot, course, host, port, browser=browser, source=source, other=other)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
@@ -21,7 +20,7 @@ from sagline.control.recording import (
     Tape,
 )
 from sagline.kinematics.plan import Plan
-from sagline.results import Result
+from sagline.results import Result, Saved
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.status import Status
@@ -101,7 +100,7 @@ class Samples(Result):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Execution(Result):
+class Execution(Result, Saved):
     """What became of a plan on the machine, in N cycles of m winches.
 
     The command of a cycle is what was sent in it; the sample came back in the same cycle, so that it knows nothing of
@@ -173,21 +172,6 @@ class Execution(Result):
     def pose(self) -> Pose:
         """Estimated from the encoders, a batch of N; NaN where there is none."""
         return Pose._adopt(self.position, self.quaternion)
-
-    def save(self, file: FilePath | str) -> None:
-        """Write it to a log in MCAP, or to NetCDF, whole or not at all: every number as it is, plan and robot inside.
-
-        Args:
-            file: The file; "run.mcap" is a log, which `load_execution` reads, "run.nc" a data set with the plan as its
-                group `plan`. One that exists is replaced.
-
-        Raises:
-            FileError: If the file has another suffix, cannot be written, or a package is missing; what was there
-                before is untouched.
-        """
-        from sagline.files.execution_file import save  # the one call outward
-
-        save(self, file)
 
 
 def execution_of(

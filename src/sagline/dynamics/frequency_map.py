@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path as FilePath
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -20,7 +19,7 @@ from sagline.dynamics.strongest import coupled, strongest, summed
 from sagline.dynamics.vibration_status import VibrationStatus
 from sagline.errors import InvalidValueError, SaglineError
 from sagline.kinematics.inverse import inverse
-from sagline.results import Result
+from sagline.results import Result, Saved
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
@@ -35,7 +34,7 @@ _ONE_PERCENT: Final = Damping(modal_damping=0.01)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FrequencyMap(Result):
+class FrequencyMap(Result, Saved):
     """Result of `frequency_map` at N poses.
 
     Numbers are NaN where the status is neither SOLVED nor FOLDED; frequencies also where no mode lies below up_to.
@@ -65,19 +64,6 @@ class FrequencyMap(Result):
     platform_share: Array
     peak: Array
     peak_frequency: Array
-
-    def save(self, file: FilePath | str) -> None:
-        """Write the map to a NetCDF file, whole or not at all, with units and the robot inside.
-
-        Args:
-            file: The file, "map.nc" for instance; one that exists is replaced.
-
-        Raises:
-            FileError: If the file cannot be written; what was there before is untouched.
-        """
-        from sagline.files.frequency_map_file import save_frequency_map  # the one call outward
-
-        save_frequency_map(self, file)
 
 
 def frequency_map(

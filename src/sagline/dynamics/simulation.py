@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from pathlib import Path as FilePath
 
 import numpy as np
 
 from sagline.arrays import Array, locked
 from sagline.dynamics.damping import Damping
 from sagline.dynamics.drives import Winches
-from sagline.results import Result
+from sagline.results import Result, Saved
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
@@ -59,7 +58,7 @@ class Occurrence:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Simulation(Result):
+class Simulation(Result, Saved):
     """Result of `simulate`: N samples of a motion.
 
     Attributes:
@@ -99,19 +98,6 @@ class Simulation(Result):
     winding: str = "constant"
     damping: Damping = field(default_factory=Damping)
     largest_tension: Array | None = None
-
-    def save(self, file: FilePath | str) -> None:
-        """Write the simulation to a NetCDF file, whole or not at all, with units and the robot inside.
-
-        Args:
-            file: The file, "sim.nc" for instance; one that exists is replaced. `load_simulation` reads it.
-
-        Raises:
-            FileError: If the file cannot be written; what was there before is untouched.
-        """
-        from sagline.files.simulation_file import save_simulation  # the one call outward
-
-        save_simulation(self, file)
 
 
 def energy_balance(kinetic: Array, potential: Array, supplied: Array, lost: Array, removed: Array) -> EnergyBalance:

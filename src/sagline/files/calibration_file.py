@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sagline.arguments import file_path, instance
 from sagline.arrays import locked
 from sagline.cables.models import MODELS
 from sagline.calibration.findings import CrossValidation, Direction, Outlier
@@ -29,39 +28,17 @@ from sagline.files.calibration_layout import (
     READ,
     SENSORS,
 )
-from sagline.files.content import Content
-from sagline.files.dataset import read_dataset, told_of, write_dataset
+from sagline.files.dataset import labeled_dataset
+from sagline.files.format import Format
 from sagline.files.plan_file import choice_attributes, choice_of
 from sagline.files.robot_file import dump_robot, parse_robot
-from sagline.files.variables import PARTS, Quantity
+from sagline.files.variables import Quantity
 from sagline.robot.pose import Pose
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
-CONTENT: Final = Content(
-    name="calibration",
-    made="calibration of sagline",
-    give="Give the .nc file that sagline calibrate wrote, or a calibration's save.",
-    again="Save the calibration again, or take the file from where it came.",
-    key="sagline_calibration_format",
-    format=1,
-)
 _NONE: Final = -1  # cable of an outlier that is a whole pose
-
-
-def save_calibration(found: Calibration, file: os.PathLike[str] | str) -> None:
-    """Write a calibration to a NetCDF file, whole or not at all, with a digest at its end.
-
-    Args:
-        found: The calibration.
-        file: The file, "found.nc" for instance; a regular file that exists is replaced, anything else is refused.
-
-    Raises:
-        InvalidValueError: If it is no calibration, or its model is none of sagline's.
-        FileError: If the file cannot be written; what was there before is untouched.
-    """
-    write_dataset(_dataset(instance(found, Calibration, "found")), file_path(file))
 
 
 def load_calibration(file: os.PathLike[str] | str) -> Calibration:
@@ -93,17 +70,11 @@ def load_calibration(file: os.PathLike[str] | str) -> Calibration:
         >>> print(f"{value:.1f} kg, in truth {robot.mass:.1f}")
         50.0 kg, in truth 50.0
     """
-    path = file_path(file)
-    data, found = read_dataset(path, CONTENT)
-    CONTENT.format_of(path, data.attrs)
-    CONTENT.check_sealed(path, found)
-    with told_of(path):
-        return _calibration(path, data)
+    return FORMAT.load(file)
 
 
-def _dataset(found: Calibration) -> Dataset:
-    from xarray import Coordinates, Dataset
-
+def pack(found: Calibration) -> Dataset:
+    """Data set of a calibration."""
     quantities = [(one, one.of(found)) for one in FOUND]
     quantities += [(one, one.of(found.parameters)) for one in PARAMETERS]
     quantities += [(one, one.of(found.sensors)) for one in PLACED]
@@ -116,8 +87,7 @@ def _dataset(found: Calibration) -> Dataset:
     omitted = [(row, reason.value) for reason, rows in found.left_out.items() for row in rows]
     quantities += list(zip(LEFT_OUT, np.array(omitted, dtype=np.int64).reshape(-1, 2).T, strict=True))
     variables = {one.name: (one.parts, _stored(one, value), one.attributes) for one, value in quantities}
-    labels = Coordinates({part: (part, list(PARTS[part])) for part in ("axis", "quaternion_part")}, indexes={})
-    return Dataset(variables, labels, _attributes(found))
+    return labeled_dataset(variables, _attributes(found))
 
 
 def _stored(quantity: Quantity, values: Any) -> Any:
@@ -148,7 +118,7 @@ def _sensor(name: str, axes: int) -> Quantity:
 
 def _attributes(found: Calibration) -> dict[str, Any]:
     return {
-        **CONTENT.attributes(f"Calibration of {found.robot.name}"),
+        **FORMAT.attributes(f"Calibration of {found.robot.name}"),
         "log": found.log,
         "read": READ[found.parameters.counted],
         "date": found.date,
@@ -159,7 +129,8 @@ def _attributes(found: Calibration) -> dict[str, Any]:
     }
 
 
-def _calibration(path: Path, data: Dataset) -> Calibration:
+def unpack(path: Path, data: Dataset) -> Calibration:
+    """The calibration of a data set; its path is for messages."""
     robot = parse_robot(str(data.attrs["robot"]), f"{path}, robot")
     before = parse_robot(str(data.attrs["robot_before"]), f"{path}, robot_before")
     measured = ["length_deviation", *(name for name in SENSORS if name in data.variables)]  # which is always there
@@ -211,3 +182,17 @@ def _outlier(row: int, cable: int, quantity: str, size: float, deviations: float
 def _directions(names: Any, vectors: Any, known: Any, steps: Any) -> tuple[Direction, ...]:
     rows = zip(names, vectors, known.tolist(), steps, strict=True)
     return tuple(Direction(str(name), locked(vector.copy()), share, str(step)) for name, vector, share, step in rows)
+
+
+FORMAT: Final = Format(
+    kind=Calibration,
+    name="calibration",
+    made="calibration of sagline",
+    give="Give the .nc file that sagline calibrate wrote, or a calibration's save.",
+    again="Save the calibration again, or take the file from where it came.",
+    key="sagline_calibration_format",
+    version=1,
+    pack=pack,
+    unpack=unpack,
+)
+save = FORMAT.save

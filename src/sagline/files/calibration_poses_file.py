@@ -33,7 +33,7 @@ _DECIMALS: Final = {"position": 4, "quaternion": 6, "frame_end_tension": 1, "uns
 _DIGITS: Final = 4  # of an error: more is not known of one
 
 
-def save_calibration_poses(plan: CalibrationPoses, file: os.PathLike[str] | str) -> None:
+def save(plan: CalibrationPoses, file: os.PathLike[str] | str) -> None:
     """Write poses, tensions and lengths, and the errors to expect, to a YAML file, whole or not at all.
 
     Args:

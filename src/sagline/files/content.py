@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 
@@ -22,7 +23,8 @@ OTHERS: Final = {
 }
 
 
-class Content(NamedTuple):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Content:
     """One kind of content, in a reader's words.
 
     Attributes:
@@ -31,7 +33,7 @@ class Content(NamedTuple):
         give: Which file to give: "Give the .nc file that sagline track wrote."
         again: What to do about a damaged file.
         key: The attribute that has its format.
-        format: The newest format; raised whenever an older sagline could misread the file.
+        version: Newest version of the format; raised whenever an older sagline could misread the file.
     """
 
     name: str
@@ -39,7 +41,7 @@ class Content(NamedTuple):
     give: str
     again: str
     key: str
-    format: int
+    version: int
 
     def format_of(self, path: Path, attributes: Mapping[str, Any]) -> int:
         """The format of a file.
@@ -60,11 +62,11 @@ class Content(NamedTuple):
         if not isinstance(found, int | np.integer) or found < 1:
             step = "Write it again; it was edited, or damaged."
             raise FileError(path, f"is of format {found!r}, which never was", step, item=self.key)
-        if found > self.format:
+        if found > self.version:
             raise FileError(
                 path,
                 f"is of format {found}, written by {attributes.get('source')}; this is sagline {version('sagline')}, "
-                f"which reads up to {self.format}",
+                f"which reads up to {self.version}",
                 "Install a newer sagline.",
                 item=self.key,
             )
@@ -96,4 +98,4 @@ class Content(NamedTuple):
         Args:
             title: Of this file.
         """
-        return {"title": title, "source": f"sagline {version('sagline')}", self.key: self.format}
+        return {"title": title, "source": f"sagline {version('sagline')}", self.key: self.version}

@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+import numpy as np
 
 from sagline.errors import FileError, InvalidValueError
 from sagline.files.content import Content
 from sagline.files.kinds import kind_of
 from sagline.files.seal import Seal, seal, seal_of
+from sagline.files.variables import PARTS
 from sagline.files.whole import written_whole
 
 if TYPE_CHECKING:
@@ -24,6 +27,31 @@ _KINDS: Final = {
 }
 INFLATION = 1000  # times the size of a file that its numbers may take in memory: nobody packs them so well
 HEADERS: Final = 1 << 18  # bytes, more than all names and attributes take beside texts, such as the robot
+
+
+def labeled_dataset(
+    variables: Mapping[str, Any], attributes: Mapping[str, Any], coordinates: Mapping[str, Any] | None = None
+) -> Dataset:
+    """Make a data set whose dimensions carry labels, without indexes: whoever reads the file builds those needed.
+
+    Args:
+        variables: Dimensions, values and attributes of each variable, by name.
+        attributes: Attributes of the data set.
+        coordinates: Coordinates besides the labels of `PARTS`.
+
+    Returns:
+        The data set.
+    """
+    from xarray import Coordinates, Dataset
+
+    parts = {dimension for dimensions, *_ in variables.values() for dimension in dimensions} & PARTS.keys()
+    labels = {part: (part, list(PARTS[part])) for part in sorted(parts)}
+    return Dataset(variables, Coordinates({**labels, **(coordinates or {})}, indexes={}), attributes)
+
+
+def numbered(dimension: str, count: int) -> tuple[str, Any, dict[str, str]]:
+    """Coordinate that counts cables or the like from 0."""
+    return dimension, np.arange(count), {"long_name": f"{dimension}, counted from 0"}
 
 
 def write_dataset(data: Dataset, file: Path, groups: Mapping[str, Dataset] | None = None) -> None:
@@ -71,7 +99,7 @@ def read_dataset(path: Path, content: Content) -> tuple[Dataset, Seal]:
 
 
 @contextmanager
-def told_of(path: Path) -> Iterator[None]:
+def file_errors(path: Path) -> Iterator[None]:
     """Tell what is wrong with the values of a file with the file that has them.
 
     Args:

@@ -15,14 +15,14 @@ from sagline.arrays import locked
 from sagline.control.execution import Execution, ExecutionStatus, Samples
 from sagline.control.states import State
 from sagline.errors import FileError, InvalidValueError, SaglineWarning
-from sagline.files.content import Content
-from sagline.files.dataset import write_dataset
-from sagline.files.execution_layout import CABLE, CYCLES, EVENTS, EVERY, GROUP, NONE, ROWS, SMALL, TIME
+from sagline.files.dataset import labeled_dataset, numbered, write_dataset
+from sagline.files.execution_layout import CABLE, CYCLES, EVENTS, EVERY, NONE, ROWS, SMALL, TIME
+from sagline.files.format import Format
 from sagline.files.mcap_log import save_execution
 from sagline.files.mcap_reader import AGAIN, Ending, Log, read_log
 from sagline.files.packed_dataset import unpack_dataset
 from sagline.files.plan_file import plan_dataset, plan_of
-from sagline.files.robot_file import dump_robot, parse_robot
+from sagline.files.robot_file import dump_robot
 from sagline.files.variables import PARTS, Quantity
 from sagline.kinematics.plan import Plan
 from sagline.robot.robot import Robot
@@ -30,14 +30,6 @@ from sagline.robot.robot import Robot
 if TYPE_CHECKING:
     from xarray import Dataset
 
-CONTENT: Final = Content(
-    name="execution",
-    made="execution of sagline log",
-    give="Give the .nc file that sagline log wrote.",
-    again="Write it again with sagline log.",
-    key="sagline_execution_format",
-    format=1,
-)
 PLAN_GROUP: Final = "plan"
 
 
@@ -135,7 +127,7 @@ def plan_of_log(log: Log, number: int) -> Plan:
         InvalidValueError: If its values are none.
     """
     data = unpack_dataset(log.plans[number])
-    return plan_of(log.path, data, parse_robot(str(data.attrs["robot"]), f"{log.path}, robot of plan {number}"))
+    return plan_of(log.path, data, f"robot of plan {number}")
 
 
 def _column(quantity: Quantity, blocks: list[dict[str, NDArray[Any]]]) -> NDArray[Any]:
@@ -168,8 +160,6 @@ def to_dataset(execution: Execution) -> Dataset:
     Returns:
         The data set; the robot is one of its attributes.
     """
-    from xarray import Coordinates, Dataset
-
     done = instance(execution, Execution, "execution")
     variables: dict[str, Any] = {
         quantity.name: ((ROWS, *quantity.parts), quantity.of(done), quantity.attributes) for quantity in CYCLES
@@ -178,17 +168,17 @@ def to_dataset(execution: Execution) -> Dataset:
     for name, what in EVENTS.items() if done.events else ():
         values = [getattr(event, name) for event in done.events]
         variables[f"event_{name}"] = ("event", [_plain(value) for value in values], {"long_name": what})
-    used = {part for quantity in EVERY for part in quantity.parts} & PARTS.keys()
-    coordinates: dict[str, Any] = {part: (part, list(PARTS[part])) for part in sorted(used)}
-    for (part,), count in ((CABLE, done.robot.cable_count), (GROUP, done.samples.age.shape[1])):
-        coordinates[part] = (part, np.arange(count), {"long_name": f"{part}, counted from 0"})
-    coordinates[TIME.name] = (ROWS, done.time, TIME.attributes)
+    coordinates: dict[str, Any] = {
+        "cable": numbered("cable", done.robot.cable_count),
+        "group": numbered("group", done.samples.age.shape[1]),
+        TIME.name: (ROWS, done.time, TIME.attributes),
+    }
     attributes = {
-        **CONTENT.attributes(f"Execution on {done.robot.name}"),
+        **FORMAT.attributes(f"Execution on {done.robot.name}"),
         **{"status": done.status.name, "reason": done.reason, "period": done.period, "period_units": "s"},
         "robot": dump_robot(done.robot),
     }
-    return Dataset(variables, Coordinates(coordinates, indexes={}), attributes)
+    return labeled_dataset(variables, attributes, coordinates)
 
 
 def save(execution: Execution, file: os.PathLike[str] | str) -> None:
@@ -226,3 +216,15 @@ def save_dataset(execution: Execution, file: os.PathLike[str] | str) -> None:
 def _plain(value: Any) -> Any:
     """A number or a text as it is; a state by its name."""
     return value.name if isinstance(value, State) else str(value) if isinstance(value, str) else value
+
+
+FORMAT: Final = Format(
+    kind=Execution,
+    name="execution",
+    made="execution of sagline log",
+    give="Give the .nc file that sagline log wrote.",
+    again="Write it again with sagline log.",
+    key="sagline_execution_format",
+    version=1,
+    pack=to_dataset,
+)

@@ -2,28 +2,18 @@
 
 from __future__ import annotations
 
-import os
 from typing import TYPE_CHECKING, Final
 
-from sagline.arguments import file_path, instance
 from sagline.dynamics.frequency_map import FrequencyMap
 from sagline.dynamics.vibration_status import VibrationStatus
-from sagline.files.content import Content
-from sagline.files.dataset import write_dataset
+from sagline.files.dataset import labeled_dataset
+from sagline.files.format import Format
 from sagline.files.robot_file import dump_robot
-from sagline.files.variables import PARTS, Known, Quantity
+from sagline.files.variables import Known, Quantity
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
-CONTENT: Final = Content(
-    name="map of frequencies",
-    made="map of sagline",
-    give="Give the .nc file that a map's save wrote.",
-    again="Make the map again, or take the file from where it came.",
-    key="sagline_frequency_map_format",
-    format=1,
-)
 ROWS: Final = "pose"
 QUANTITIES: Final = (
     Quantity("position", "pose.position", ("axis",), "m", "position of the platform origin in the world"),
@@ -37,27 +27,11 @@ QUANTITIES: Final = (
 )
 
 
-def save_frequency_map(found: FrequencyMap, file: os.PathLike[str] | str) -> None:
-    """Write a map to a NetCDF file, whole or not at all, with a digest at its end.
-
-    Args:
-        found: The map.
-        file: The file, "map.nc" for instance; a regular file that exists is replaced, anything else is refused.
-
-    Raises:
-        InvalidValueError: If it is no map.
-        FileError: If the file cannot be written; what was there before is untouched.
-    """
-    write_dataset(_dataset(instance(found, FrequencyMap, "found")), file_path(file))
-
-
-def _dataset(found: FrequencyMap) -> Dataset:
-    from xarray import Coordinates, Dataset
-
+def pack(found: FrequencyMap) -> Dataset:
+    """Data set of a frequency map."""
     variables = {one.name: ((ROWS, *one.parts), one.of(found), one.attributes) for one in QUANTITIES}
-    parts = {part: (part, list(PARTS[part])) for part in ("axis", "quaternion_part")}
     attributes = {
-        **CONTENT.attributes(f"Frequencies of {found.robot.name} over poses"),
+        **FORMAT.attributes(f"Frequencies of {found.robot.name} over poses"),
         "up_to": found.up_to,
         "up_to_units": "Hz",
         "loss_time": found.damping.loss_time,
@@ -67,4 +41,17 @@ def _dataset(found: FrequencyMap) -> Dataset:
         "modal_damping": found.damping.modal_damping,
         "robot": dump_robot(found.robot),
     }
-    return Dataset(variables, Coordinates(parts, indexes={}), attributes)
+    return labeled_dataset(variables, attributes)
+
+
+FORMAT: Final = Format(
+    kind=FrequencyMap,
+    name="map of frequencies",
+    made="map of sagline",
+    give="Give the .nc file that a map's save wrote.",
+    again="Make the map again, or take the file from where it came.",
+    key="sagline_frequency_map_format",
+    version=1,
+    pack=pack,
+)
+save = FORMAT.save

@@ -86,7 +86,7 @@ def load_log(file: os.PathLike[str] | str, sensors: Sensors | None = None) -> Wi
         raise FileError.of(path, error) from None
 
 
-def save_log(log: WinchLog, file: os.PathLike[str] | str) -> None:
+def save(log: WinchLog, file: os.PathLike[str] | str) -> None:
     """Write a log to a CSV file, whole or not at all; `load_log` reads the same numbers, to the last bit.
 
     Args:

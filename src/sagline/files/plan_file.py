@@ -7,41 +7,31 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import numpy as np
 
-from sagline.arguments import file_path, instance
 from sagline.arrays import locked
 from sagline.cables.model import CableState
 from sagline.cables.models import MODELS
 from sagline.errors import FileError, InvalidValueError, SaglineWarning
-from sagline.files.content import Content
-from sagline.files.dataset import read_dataset, told_of, write_dataset
+from sagline.files.dataset import labeled_dataset, numbered
+from sagline.files.format import Format
 from sagline.files.plan_checks import check_plan
 from sagline.files.plan_layout import JERK, MACHINE, MOTION, PROOF, QUANTITIES, TIME, WINDING
 from sagline.files.robot_file import dump_robot, parse_robot
-from sagline.files.variables import PARTS, Quantity
+from sagline.files.variables import Quantity
 from sagline.kinematics.plan import Plan
 from sagline.motion.path import Path
 from sagline.robot.contact import Contact
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
-from sagline.robot.robot import Robot
 from sagline.robot.several import anything_behind
 from sagline.tension.methods import METHODS
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
-CONTENT = Content(
-    name="plan",
-    made="run of sagline track",
-    give="Give the .nc file that sagline track wrote.",
-    again="Run sagline track again, or take the file from where it came.",
-    key="sagline_format",
-    format=2,  # 2: with a digest
-)
 RESTS = "rests"  # of a path whose rests are known
 FREE = {"unstrained_length": "free_length", "chord_tension": "free_chord_tension"}  # of cables over pulleys
 STATE_ARRAYS = ("span", "rise", "unstrained_length", "horizontal_tension", "vertical_force", "chord_tension")
@@ -65,9 +55,7 @@ def save_plan(plan: Plan, file: os.PathLike[str] | str) -> None:
             none of sagline's; or if its values are none that `inverse` gives.
         FileError: If the file cannot be written; what was there before is untouched.
     """
-    data = plan_dataset(instance(plan, Plan, "plan"))
-    check_plan(data, plan.state.one_robot.cable_count)
-    write_dataset(data, file_path(file))
+    FORMAT.save(plan, file)
 
 
 def load_plan(file: os.PathLike[str] | str) -> Plan:
@@ -94,15 +82,13 @@ def load_plan(file: os.PathLike[str] | str) -> Plan:
         >>> print(plan.state.robot.name, plan.unstrained_length.shape)
         cogiro (283, 8)
     """
-    path = file_path(file)
-    data, found = read_dataset(path, CONTENT)
-    if CONTENT.format_of(path, data.attrs) > 1:
-        CONTENT.check_sealed(path, found)
-    else:
-        text = f"{path} is from before plans carried a digest: damage to it need not show. Save it again to have one."
-        warnings.warn(text, SaglineWarning, stacklevel=2)
-    with told_of(path):
-        return plan_of(path, data, parse_robot(str(data.attrs["robot"]), f"{path}, robot"))
+    return FORMAT.load(file, unsealed=_warn_of_damage)
+
+
+def _warn_of_damage(path: FilePath) -> None:
+    """Warn that damage to a file without a digest need not show; the caller of `load_plan` is meant."""
+    text = f"{path} is from before plans carried a digest: damage to it need not show. Save it again to have one."
+    warnings.warn(text, SaglineWarning, stacklevel=4)
 
 
 def plan_dataset(plan: Plan) -> Dataset:
@@ -114,8 +100,6 @@ def plan_dataset(plan: Plan) -> Dataset:
     Raises:
         InvalidValueError: If it is of several robots, or of a model or way of sharing that is none of sagline's.
     """
-    from xarray import Coordinates, Dataset
-
     rows = ("pose",) * len(plan.state.pose.shape)
 
     def variable(quantity: Quantity) -> tuple[tuple[str, ...], Any, dict[str, Any]]:
@@ -126,22 +110,20 @@ def plan_dataset(plan: Plan) -> Dataset:
     contact = plan.state.contact
     machine = () if contact is None else MACHINE if contact.winding is None else (*MACHINE, WINDING)
     quantities = QUANTITIES + machine + proof + motion
-    used = {part for quantity in quantities for part in quantity.parts} & PARTS.keys()
-    coordinates: dict[str, Any] = {part: (part, list(PARTS[part])) for part in sorted(used)}
-    cables = np.arange(plan.state.one_robot.cable_count)
-    coordinates["cable"] = ("cable", cables, {"long_name": "cable, counted from 0"})
+    coordinates: dict[str, Any] = {"cable": numbered("cable", plan.state.one_robot.cable_count)}
     if plan.path is not None:
         coordinates["time"] = variable(TIME)
-    labels = Coordinates(coordinates, indexes={})  # whoever reads the file builds what indexes they need
     variables: dict[str, Any] = {quantity.name: variable(quantity) for quantity in quantities}
     if plan.path is not None and plan.path.rests is not None:
         variables[RESTS] = (("rest",), plan.path.rests, {"units": "s", "long_name": "when the platform stands"})
-    return Dataset(variables, labels, _attributes(plan))
+    data = labeled_dataset(variables, _attributes(plan), coordinates)
+    check_plan(data, plan.state.one_robot.cable_count)
+    return data
 
 
 def _attributes(plan: Plan) -> dict[str, Any]:
     return {
-        **CONTENT.attributes(f"Cable lengths and tensions of {plan.state.one_robot.name}"),
+        **FORMAT.attributes(f"Cable lengths and tensions of {plan.state.one_robot.name}"),
         **choice_attributes("model", plan.state.cables.model, MODELS),
         **choice_attributes("tension", plan.tension, METHODS),
         "robot": dump_robot(plan.state.one_robot),
@@ -204,18 +186,19 @@ def _plain(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else value
 
 
-def plan_of(path: FilePath, data: Dataset, robot: Robot) -> Plan:
+def plan_of(path: FilePath, data: Dataset, where: str = "robot") -> Plan:
     """The plan of a data set.
 
     Args:
         path: The file it is from, for messages.
         data: What `plan_dataset` gave.
-        robot: The robot among its attributes.
+        where: Name of the robot in messages.
 
     Raises:
         FileError: If it is none of a plan.
         InvalidValueError: If one of its values is none.
     """
+    robot = parse_robot(str(data.attrs["robot"]), f"{path}, {where}")
 
     def values(name: str) -> Any:
         return locked(np.asarray(data[name].values, order="C"))
@@ -227,7 +210,7 @@ def plan_of(path: FilePath, data: Dataset, robot: Robot) -> Plan:
     behind = MACHINE[0].name in data.variables
     if behind != anything_behind(robot):
         said, has = ("is", "none of its") if behind else ("is not", "some of its")
-        raise FileError(path, f"{said} of cables over pulleys, but {has} robot's are", CONTENT.again)
+        raise FileError(path, f"{said} of cables over pulleys, but {has} robot's are", FORMAT.again)
     pose = Pose.from_quaternion(values("position"), values("quaternion"))
     cables = CableState(
         model=choice_of(path, data.attrs, "model", MODELS),
@@ -254,3 +237,18 @@ def plan_of(path: FilePath, data: Dataset, robot: Robot) -> Plan:
         blocking=values("blocking"),
         **{quantity.name: values(quantity.name) for quantity in PROOF if quantity.name in data.variables},
     )
+
+
+FORMAT: Final = Format(
+    kind=Plan,
+    name="plan",
+    made="run of sagline track",
+    give="Give the .nc file that sagline track wrote.",
+    again="Run sagline track again, or take the file from where it came.",
+    key="sagline_format",
+    version=2,  # 2: with a digest
+    pack=plan_dataset,
+    unpack=plan_of,
+    sealed_from=2,
+)
+save = FORMAT.save

@@ -4,55 +4,26 @@ from __future__ import annotations
 
 import os
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sagline.arguments import file_path, instance
+from sagline.arguments import instance
 from sagline.arrays import locked
 from sagline.dynamics.damping import Damping
 from sagline.dynamics.drives import SecondOrder, Winches
 from sagline.dynamics.simulation import EnergyBalance, Occurrence, Simulation
 from sagline.errors import FileError
-from sagline.files.content import Content
-from sagline.files.dataset import read_dataset, told_of, write_dataset
+from sagline.files.dataset import labeled_dataset, numbered
+from sagline.files.format import Format
 from sagline.files.robot_file import dump_robot, parse_robot
 from sagline.files.simulation_checks import EVENT_ROWS, ROWS, check_simulation, has_events
 from sagline.files.simulation_layout import EVENTS, LAG, LAGGING, LARGEST, LOSSES, NO_CABLE, NODES, SAMPLES, STEP, TIME
-from sagline.files.variables import PARTS, Quantity
+from sagline.files.variables import Quantity
 from sagline.robot.pose import Pose
-from sagline.robot.robot import Robot
 
 if TYPE_CHECKING:
     from xarray import Dataset
-
-CONTENT = Content(
-    name="simulation",
-    made="simulation of sagline",
-    give="Give the .nc file that a simulation's save wrote.",
-    again="Save the simulation again, or take the file from where it came.",
-    key="sagline_simulation_format",
-    format=1,
-)
-
-
-def save_simulation(simulation: Simulation, file: os.PathLike[str] | str) -> None:
-    """Write a simulation to a NetCDF file, whole or not at all.
-
-    Dimensions are time, cable, node (of cables with mass) and event (where something happened). A digest over all
-    values and attributes stands at the end, behind what NetCDF reads, and shows when anything has changed.
-
-    Args:
-        simulation: The simulation.
-        file: The file, "sim.nc" for instance; a regular file that exists is replaced, anything else is refused.
-
-    Raises:
-        InvalidValueError: If its values are none that `simulate` gives.
-        FileError: If the file cannot be written; what was there before is untouched.
-    """
-    data = _dataset(instance(simulation, Simulation, "simulation"))
-    check_simulation(data, simulation.robot.cable_count)
-    write_dataset(data, file_path(file))
 
 
 def load_simulation(file: os.PathLike[str] | str) -> Simulation:
@@ -68,17 +39,11 @@ def load_simulation(file: os.PathLike[str] | str) -> Simulation:
         FileError: If the file is missing, cut off, no NetCDF file, no simulation, of a newer format, or not as it was
             written: its digest, shapes, units and signs are checked.
     """
-    path = file_path(file)
-    data, found = read_dataset(path, CONTENT)
-    CONTENT.format_of(path, data.attrs)
-    CONTENT.check_sealed(path, found)
-    with told_of(path):
-        return _simulation(path, data, parse_robot(str(data.attrs["robot"]), f"{path}, robot"))
+    return FORMAT.load(file)
 
 
-def _dataset(simulation: Simulation) -> Dataset:
-    from xarray import Coordinates, Dataset
-
+def pack(simulation: Simulation) -> Dataset:
+    """Data set of a simulation, with the dimensions time, cable, node (cables with mass) and event."""
     quantities = SAMPLES if simulation.nodes is None else (*SAMPLES, NODES)
     variables: dict[str, Any] = {
         quantity.name: ((ROWS, *quantity.parts), quantity.of(simulation), quantity.attributes)
@@ -89,13 +54,13 @@ def _dataset(simulation: Simulation) -> Dataset:
     for quantity in EVENTS if simulation.events else ():
         values = [_written(quantity.of(event)) for event in simulation.events]
         variables[quantity.name] = (EVENT_ROWS, np.array(values, dtype=quantity.type), quantity.attributes)
-    used = {part for quantity in quantities for part in quantity.parts} & PARTS.keys()
-    coordinates: dict[str, Any] = {part: (part, list(PARTS[part])) for part in sorted(used)}
-    cables = np.arange(simulation.robot.cable_count)
-    coordinates["cable"] = ("cable", cables, {"long_name": "cable, counted from 0"})
-    coordinates[TIME.name] = (ROWS, TIME.of(simulation), TIME.attributes)
-    labels = Coordinates(coordinates, indexes={})  # whoever reads the file builds what indexes they need
-    return Dataset(variables, labels, _attributes(simulation))
+    coordinates = {
+        "cable": numbered("cable", simulation.robot.cable_count),
+        TIME.name: (ROWS, TIME.of(simulation), TIME.attributes),
+    }
+    data = labeled_dataset(variables, _attributes(simulation), coordinates)
+    check_simulation(data, simulation.robot.cable_count)
+    return data
 
 
 def _written(value: Any) -> Any:
@@ -104,7 +69,7 @@ def _written(value: Any) -> Any:
 
 def _attributes(simulation: Simulation) -> dict[str, Any]:
     return {
-        **CONTENT.attributes(f"Motion of {simulation.robot.name} in time"),
+        **FORMAT.attributes(f"Motion of {simulation.robot.name} in time"),
         "cable_mass": simulation.cable_mass,
         "integrator": simulation.integrator,
         **_numbers(simulation, STEP),
@@ -136,7 +101,9 @@ def _winches(attributes: Any) -> Winches:
     return kind
 
 
-def _simulation(path: FilePath, data: Dataset, robot: Robot) -> Simulation:
+def unpack(path: FilePath, data: Dataset) -> Simulation:
+    """The simulation of a data set; its path is for messages."""
+    robot = parse_robot(str(data.attrs["robot"]), f"{path}, robot")
     if data.sizes["cable"] != robot.cable_count:
         reason = f"has {data.sizes['cable']} cables, its robot {robot.cable_count}"
         raise FileError(path, reason, "Write it again.", item="cable")
@@ -169,3 +136,17 @@ def _occurrences(data: Dataset) -> tuple[Occurrence, ...]:
     columns = {quantity.place: data.variables[quantity.name].values.tolist() for quantity in EVENTS}
     columns["cable"] = [None if cable == NO_CABLE else cable for cable in columns["cable"]]
     return tuple(Occurrence(**dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True))
+
+
+FORMAT: Final = Format(
+    kind=Simulation,
+    name="simulation",
+    made="simulation of sagline",
+    give="Give the .nc file that a simulation's save wrote.",
+    again="Save the simulation again, or take the file from where it came.",
+    key="sagline_simulation_format",
+    version=1,
+    pack=pack,
+    unpack=unpack,
+)
+save = FORMAT.save

@@ -20,7 +20,7 @@ ENDINGS: Final = (".stl", ".glb", ".ply", ".vtk", ".vtu")
 _VTK: Final = (".vtk", ".vtu")
 
 
-def save_surface(surface: Surface, file: Path | str, colors: ArrayLike | None = None) -> None:
+def save(surface: Surface, file: Path | str, colors: ArrayLike | None = None) -> None:
     """Write a surface to a file, whole or not at all, in meters.
 
     Args:

@@ -9,20 +9,18 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sagline.arguments import file_path, instance
 from sagline.arrays import locked
 from sagline.cables.models import MODELS
-from sagline.files.content import Content
 from sagline.files.criteria_attributes import criteria_attributes, criteria_of
-from sagline.files.dataset import read_dataset, told_of, write_dataset
+from sagline.files.dataset import labeled_dataset
+from sagline.files.format import Format
 from sagline.files.plan_file import choice_attributes, choice_of
 from sagline.files.robot_file import dump_robot, parse_robot
-from sagline.files.variables import PARTS, Quantity
+from sagline.files.variables import Quantity
 from sagline.files.workspace_checks import check_workspace
 from sagline.files.workspace_layout import QUANTITIES, TYPES
 from sagline.robot.pose import Pose
 from sagline.robot.pose_box import PoseBox
-from sagline.robot.robot import Robot
 from sagline.tension.methods import METHODS
 from sagline.workspaces.components import Components
 from sagline.workspaces.nearest import Nearest
@@ -33,29 +31,6 @@ from sagline.workspaces.wrench_sets import WrenchSet
 
 if TYPE_CHECKING:
     from xarray import Dataset
-
-CONTENT: Final = Content(
-    name="workspace",
-    made="workspace of sagline",
-    give="Give the .nc file that sagline workspace wrote, or a workspace's save.",
-    again="Save the workspace again, or take the file from where it came.",
-    key="sagline_workspace_format",
-    format=1,
-)
-
-
-def save_workspace(space: Workspace, file: os.PathLike[str] | str) -> None:
-    """Write a workspace to a NetCDF file, whole or not at all, with a digest at its end.
-
-    Args:
-        space: The workspace.
-        file: The file, "workspace.nc" for instance; a regular file that exists is replaced, anything else is refused.
-
-    Raises:
-        InvalidValueError: If it is no workspace, or a criterion, model or method is none of sagline's.
-        FileError: If the file cannot be written; what was there before is untouched.
-    """
-    write_dataset(_dataset(instance(space, Workspace, "space")), file_path(file))
 
 
 def load_workspace(file: os.PathLike[str] | str) -> Workspace:
@@ -77,22 +52,14 @@ def load_workspace(file: os.PathLike[str] | str) -> Workspace:
         >>> print(sl.load_workspace("workspace.nc").robot.name)
         ipanema-1
     """
-    path = file_path(file)
-    data, found = read_dataset(path, CONTENT)
-    CONTENT.format_of(path, data.attrs)
-    CONTENT.check_sealed(path, found)
-    with told_of(path):
-        return _workspace(path, data, parse_robot(str(data.attrs["robot"]), f"{path}, robot"))
+    return FORMAT.load(file)
 
 
-def _dataset(space: Workspace) -> Dataset:
-    from xarray import Coordinates, Dataset
-
+def pack(space: Workspace) -> Dataset:
+    """Data set of a workspace."""
     variables: dict[str, Any] = {one.name: (one.parts, _wide(one, one.of(space)), one.attributes) for one in QUANTITIES}
     attributes, obstacles = criteria_attributes(space.criteria)
-    used = {part for one in QUANTITIES for part in one.parts} & PARTS.keys()
-    labels = Coordinates({part: (part, list(PARTS[part])) for part in sorted(used)}, indexes={})
-    return Dataset(variables | obstacles, labels, _attributes(space) | attributes)
+    return labeled_dataset(variables | obstacles, _attributes(space) | attributes)
 
 
 def _wide(quantity: Quantity, values: Any) -> Any:
@@ -102,7 +69,7 @@ def _wide(quantity: Quantity, values: Any) -> Any:
 
 def _attributes(space: Workspace) -> dict[str, Any]:
     attributes = {
-        **CONTENT.attributes(f"Workspace of {space.robot.name}"),
+        **FORMAT.attributes(f"Workspace of {space.robot.name}"),
         "volume": space.volume,
         "volume_error": space.volume_error,
         "volume_units": space.unit,
@@ -135,7 +102,9 @@ def _attributes(space: Workspace) -> dict[str, Any]:
     return attributes
 
 
-def _workspace(path: FilePath, data: Dataset, robot: Robot) -> Workspace:
+def unpack(path: FilePath, data: Dataset) -> Workspace:
+    """The workspace of a data set; its path is for messages."""
+    robot = parse_robot(str(data.attrs["robot"]), f"{path}, robot")
     check_workspace(data, robot.cable_count)
 
     def values(name: str) -> Any:
@@ -202,3 +171,17 @@ def field_of(space: Workspace) -> Dataset:
     values = {name: (("x", "y", "z"), getattr(found, name).reshape(shape), about[name]) for name in about}
     axes = {name: (name, axis, {"units": "m"}) for name, axis in zip("xyz", space.axes, strict=True)}
     return Dataset(values, axes, {"title": f"Workspace of {space.robot.name}"})
+
+
+FORMAT: Final = Format(
+    kind=Workspace,
+    name="workspace",
+    made="workspace of sagline",
+    give="Give the .nc file that sagline workspace wrote, or a workspace's save.",
+    again="Save the workspace again, or take the file from where it came.",
+    key="sagline_workspace_format",
+    version=1,
+    pack=pack,
+    unpack=unpack,
+)
+save = FORMAT.save

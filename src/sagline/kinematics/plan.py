@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path as FilePath
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +13,7 @@ from sagline.cables.status import CableStatus
 from sagline.kinematics.length_rate import length_rate
 from sagline.kinematics.status import PoseStatus
 from sagline.motion.path import Path
-from sagline.results import Result
+from sagline.results import Result, Saved
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.reach import LEVEL, ROUNDING, forbidden_turn, in_words, out_of_plane
 from sagline.robot.several import first_of
@@ -43,7 +42,7 @@ class Gap(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Plan(Result):
+class Plan(Result, Saved):
     """Result of `inverse`: a single pose with fields of shape (m,), or N poses with fields of shape (N, m).
 
     Attributes:
@@ -205,17 +204,3 @@ class Plan(Result):
             cables=tuple(int(i) for i in cables),
             hopeless=hopeless,
         )
-
-    def save(self, file: FilePath | str) -> None:
-        """Write the plan to a NetCDF file, whole or not at all, with units and the robot inside.
-
-        Args:
-            file: The file, "run.nc" for instance; one that exists is replaced. `load_plan` reads it.
-
-        Raises:
-            InvalidValueError: If the plan is of several robots, one a pose: to save those, solve them one by one.
-            FileError: If the file cannot be written; what was there before is untouched.
-        """
-        from sagline.files.plan_file import save_plan  # the one call outward: a plan knows how to leave
-
-        save_plan(self, file)

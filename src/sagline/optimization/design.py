@@ -12,6 +12,7 @@ from sagline.blocks import Progress
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.errors import InvalidValueError
+from sagline.optimization.folder import recorded
 from sagline.optimization.free import Free
 from sagline.optimization.front import Front
 from sagline.optimization.goals import Goal
@@ -112,6 +113,4 @@ def design(
 def _record(folder: Path | str | None, request: Request) -> AbstractContextManager[Record | None]:
     if folder is None:
         return nullcontext()
-    from sagline.files.design_folder import recorded
-
     return recorded(folder, request)

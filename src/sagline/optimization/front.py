@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+import csv
 from dataclasses import dataclass
+from io import StringIO
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
+from sagline.arguments import file_path
 from sagline.arrays import Array, Flags, Indices
+from sagline.files.names import file_stem
+from sagline.files.robot_file import dump_robot
+from sagline.files.whole import made_folder, written_together
 from sagline.optimization.free import Part
 from sagline.optimization.goals import Goal
 from sagline.results import Result
 from sagline.robot.robot import Robot
+
+FRONT: Final = "front.csv"
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -78,9 +87,21 @@ class Front(Result):
         Raises:
             FileError: If one cannot be written.
         """
-        from sagline.files.design_folder import save_front
-
-        return save_front(self, folder)
+        place = made_folder(file_path(folder, "folder", folder=True))
+        robots = self.robots if self.better else ()
+        names = [FRONT, *(f"{file_stem(robot.name)}.yaml" for robot in robots)]
+        heads = ["robot", *(f"{goal.kind} [{goal.unit}]" if goal.unit else goal.kind for goal in self.goals)]
+        heads += [f"{part.name} [{part.unit}]" if part.unit else part.name for part in self.parts]
+        rows = [[self.start.name, *self.start_values.tolist(), *(part.start for part in self.parts)]]
+        for robot, goals, values in zip(robots, self.values, self.changed, strict=False):
+            rows.append([robot.name, *goals.tolist(), *values.tolist()])
+        text = StringIO()
+        csv.writer(text, lineterminator="\n").writerows([heads, *rows])
+        texts = [text.getvalue(), *(dump_robot(robot) for robot in robots)]
+        with written_together(place, names) as parts:
+            for part, content in zip(parts, texts, strict=True):
+                part.write_bytes(content.encode())
+        return [place / name for name in names]
 
     def __str__(self) -> str:
         """The sentence."""

@@ -16,6 +16,9 @@ from sagline.errors import FileError, InvalidValueError
 from sagline.memory import check_memory
 from sagline.numbers import counted
 from sagline.results import Result
+from sagline.sweep.dataset import dataset_of
+from sagline.sweep.folder import check_packages, open_folder
+from sagline.sweep.marks import read_marks, total_of
 from sagline.sweep.quantities import variables_of
 from sagline.sweep.request import Request
 from sagline.sweep.work import Counts
@@ -73,8 +76,6 @@ class Sweep(Result):
                 there is.
             FileError: If a chunk is damaged.
         """
-        from sagline.files.sweep_folder import open_folder
-
         choice(name, "name", self.names)
         array: Any = open_folder(self.folder).group[name]
         if isinstance(index, tuple) and not index:
@@ -92,8 +93,6 @@ class Sweep(Result):
     @property
     def field(self) -> Any:
         """All variables with units and labels, as a Dataset of xarray; nothing is read before it is used."""
-        from sagline.files.sweep_dataset import dataset_of
-
         return dataset_of(self.folder, self.request)
 
 
@@ -110,9 +109,6 @@ def load(folder: os.PathLike[str] | str) -> Sweep:
         FileError: If it is no folder of a sweep, or damaged.
         InvalidValueError: If Zarr is not installed.
     """
-    from sagline.files.sweep_folder import check_packages, open_folder
-    from sagline.files.sweep_marks import read_marks, total_of
-
     path = file_path(folder, "folder", folder=True)
     check_packages()
     opened = open_folder(path)

@@ -8,20 +8,18 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from sagline.arguments import callback, file_path, instance, whole_number
 from sagline.blocks import Progress
 from sagline.errors import FileError, InvalidValueError
 from sagline.sweep.cluster import check_address, cores, has_dask, local_workers, remote_workers, spread
+from sagline.sweep.folder import SweepFolder, check_made_here, check_packages, digest_of, make_folder, open_folder
+from sagline.sweep.marks import Mark, Marks, marking
 from sagline.sweep.request import Request
 from sagline.sweep.result import Sweep, load
 from sagline.sweep.tasks import found_counts, measured_size, task
 from sagline.sweep.work import Counts
-
-if TYPE_CHECKING:
-    from sagline.files.sweep_folder import SweepFolder
-    from sagline.files.sweep_marks import Marks
 
 MOST_WORKERS: Final = 1024
 FEW: Final = 4  # tasks that are done before workers would have started
@@ -69,9 +67,6 @@ def run(
         [[[0]
           [0]]]
     """
-    from sagline.files.sweep_folder import check_packages
-    from sagline.files.sweep_marks import Mark, marking
-
     instance(request, Request, "request")
     path = file_path(folder, "folder", folder=True)
     count = cores() if workers is None else whole_number(workers, "workers", 1, MOST_WORKERS)
@@ -134,8 +129,6 @@ def opened_for(path: Path, request: Request) -> SweepFolder:
     Raises:
         FileError: If it is no folder of a sweep, damaged, or of another request.
     """
-    from sagline.files.sweep_folder import digest_of, open_folder
-
     opened = open_folder(path)
     if opened.digest != digest_of(request):
         step = "Give this one another folder, or remove that one."
@@ -145,8 +138,6 @@ def opened_for(path: Path, request: Request) -> SweepFolder:
 
 def _made(path: Path, request: Request) -> SweepFolder:
     """The folder with this request in it, made where there is none."""
-    from sagline.files.sweep_folder import check_made_here, make_folder
-
     try:
         empty = not path.exists() or not any(path.iterdir())
     except OSError as error:
@@ -160,8 +151,6 @@ def _made(path: Path, request: Request) -> SweepFolder:
 
 def _waiting(folder: SweepFolder, marks: Marks) -> list[int]:
     """Tasks that are still to be done: those whose chunks are whole on the disk are marked, and not done again."""
-    from sagline.files.sweep_marks import Mark
-
     waiting = []
     for number in range(folder.tasks):
         counts = found_counts(folder, number)

@@ -5,18 +5,16 @@ from __future__ import annotations
 import time
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
 from sagline.arrays import Indices
 from sagline.errors import FileError
+from sagline.sweep.folder import SweepFolder, TaskSize, check_made_here, open_folder
 from sagline.sweep.quantities import variables_of
 from sagline.sweep.request import Request
 from sagline.sweep.work import Counts, Part, counts_of, numbers_of
-
-if TYPE_CHECKING:
-    from sagline.files.sweep_folder import SweepFolder, TaskSize
 
 SECONDS: Final = 0.75  # of a task: what a scheduler does for it is a hundredth of that
 LONGEST: Final = 10.0  # s, of a task of a sweep that takes days
@@ -52,8 +50,6 @@ def task(folder: str, digest: str, number: int) -> tuple[float, tuple[int, ...]]
 @lru_cache(maxsize=4)
 def _opened(folder: str, digest: str) -> SweepFolder:
     """The folder, kept open from task to task."""
-    from sagline.files.sweep_folder import check_made_here, open_folder
-
     found = open_folder(Path(folder))
     if found.digest != digest:
         step = "Let all workers see the same folder under the same name."
@@ -97,8 +93,6 @@ def measured_size(request: Request) -> TaskSize:
 
 def _size(rows: int, poses: int, wrenches: int) -> TaskSize:
     """So many requests as a task: rather wrenches than poses, because the proof of one holds for others of its pose."""
-    from sagline.files.sweep_folder import TaskSize
-
     wide = min(wrenches, rows)
     return TaskSize(min(poses, max(1, rows // wide)), wide)
 

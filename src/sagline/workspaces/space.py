@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path as FilePath
 from textwrap import wrap
 from typing import Any, Final, NamedTuple
 
@@ -12,7 +11,7 @@ import numpy as np
 from sagline.arrays import Array, Codes, Indices
 from sagline.cables.model import CableModel
 from sagline.numbers import SPACE, counted, n
-from sagline.results import Result
+from sagline.results import Result, Saved, formats
 from sagline.robot.pose_box import PoseBox
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
@@ -53,7 +52,7 @@ class Limit(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Workspace(Result):
+class Workspace(Result, Saved):
     """Result of `workspace`.
 
     Of a planar robot, and in a box without height, all is of the plane: the volume is an area [m2], and the surface
@@ -140,9 +139,7 @@ class Workspace(Result):
 
         An xarray Dataset with dimensions x, y and z; worked out at each call.
         """
-        from sagline.files.workspace_file import field_of  # xarray is of the outer ring
-
-        return field_of(self)
+        return formats().module_of(self).field_of(self)
 
     def levels(self) -> Levels:
         """The function of the position whose sign says whether the robot can work there.
@@ -160,20 +157,6 @@ class Workspace(Result):
             self.moment_arm,
             flat_axis(self.box),
         )
-
-    def save(self, file: FilePath | str) -> None:
-        """Write the workspace to a NetCDF file, whole or not at all, with units and the robot inside.
-
-        Args:
-            file: The file, "workspace.nc" for instance; one that exists is replaced.
-
-        Raises:
-            InvalidValueError: If a criterion or a model is none of sagline's: it could not be read back.
-            FileError: If the file cannot be written; what was there before is untouched.
-        """
-        from sagline.files.workspace_file import save_workspace  # the one call outward
-
-        save_workspace(self, file)
 
     def __str__(self) -> str:
         """What a person wants to know of it, in lines of at most 80 columns."""

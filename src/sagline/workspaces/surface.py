@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from sagline.arrays import Array
 from sagline.numbers import counted, n
-from sagline.results import Result
+from sagline.results import Result, formats
 
 Indices = NDArray[np.int64]
 
@@ -65,9 +65,7 @@ class Surface(Result):
             FileError: If the ending is another, a package is missing, or the file cannot be written; what was there
                 before is untouched.
         """
-        from sagline.files.surface_file import save_surface  # the one call outward
-
-        save_surface(self, file)
+        formats().save(self, file)
 
 
 def normals_of(vertices: Array, faces: Indices) -> Array:

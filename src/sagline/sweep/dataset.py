@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sagline.files.sweep_folder import GROUP
 from sagline.files.variables import PARTS
+from sagline.sweep.folder import GROUP
 from sagline.sweep.request import Request
 
 if TYPE_CHECKING:

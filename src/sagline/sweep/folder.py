@@ -42,7 +42,7 @@ CONTENT: Final = Content(
     give="Give the folder that sagline sweep wrote.",
     again="Sweep again, into another folder.",
     key="sagline_sweep_format",
-    format=1,
+    version=1,
 )
 DIMENSIONS: Final = ("robot", "pose", "wrench")
 GROUP: Final = "numbers.zarr"  # in the folder, beside what is no matter of Zarr

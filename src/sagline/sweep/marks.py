@@ -10,7 +10,7 @@ import numpy as np
 
 from sagline.errors import FileError
 from sagline.files.staging import is_taken
-from sagline.files.sweep_folder import STEP, SweepFolder
+from sagline.sweep.folder import STEP, SweepFolder
 from sagline.sweep.work import Counts
 
 NAME: Final = "done"

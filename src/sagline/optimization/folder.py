@@ -25,16 +25,13 @@ from sagline.arguments import file_path
 from sagline.arrays import Array
 from sagline.errors import FileError
 from sagline.files.json_text import json_text
-from sagline.files.names import file_stem
 from sagline.files.quantity import plain_number
-from sagline.files.robot_file import dump_robot
 from sagline.files.staging import is_taken
 from sagline.files.text import exists, read_text
-from sagline.files.whole import check_file, check_files, made_folder, write_text, written_together
-from sagline.optimization.front import Front
+from sagline.files.whole import check_file, check_files, made_folder, write_text
 from sagline.optimization.request import Request
 
-REQUEST, EVALUATIONS, FRONT = "design.json", "evaluations.csv", "front.csv"
+REQUEST, EVALUATIONS = "design.json", "evaluations.csv"
 LIMIT: Final = 1000.0  # MB of evaluations
 ANOTHER: Final = "Name another folder, or remove this one."
 
@@ -116,36 +113,6 @@ def recorded(folder: Path | str, request: Request) -> Iterator[DesignFolder]:
         yield record
     finally:
         os.close(handle)
-
-
-def save_front(front: Front, folder: Path | str) -> list[Path]:
-    """Write the robots of a front and a table of them, all together.
-
-    Args:
-        front: The front.
-        folder: Where; created if missing.
-
-    Returns:
-        The files.
-
-    Raises:
-        FileError: If one cannot be written.
-    """
-    place = made_folder(file_path(folder, "folder", folder=True))
-    robots = front.robots if front.better else ()
-    names = [FRONT, *(f"{file_stem(robot.name)}.yaml" for robot in robots)]
-    heads = ["robot", *(f"{goal.kind} [{goal.unit}]" if goal.unit else goal.kind for goal in front.goals)]
-    heads += [f"{part.name} [{part.unit}]" if part.unit else part.name for part in front.parts]
-    rows = [[front.start.name, *front.start_values.tolist(), *(part.start for part in front.parts)]]
-    for robot, goals, values in zip(robots, front.values, front.changed, strict=False):
-        rows.append([robot.name, *goals.tolist(), *values.tolist()])
-    text = StringIO()
-    csv.writer(text, lineterminator="\n").writerows([heads, *rows])
-    texts = [text.getvalue(), *(dump_robot(robot) for robot in robots)]
-    with written_together(place, names) as parts:
-        for part, content in zip(parts, texts, strict=True):
-            part.write_bytes(content.encode())
-    return [place / name for name in names]
 
 
 def digest_of(request: Request) -> str:
