@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, Final, cast
 
 import pytest
+from hypothesis import settings
 from numba.core import event
 from typer.main import get_command
 
@@ -34,12 +35,20 @@ SECOND_TIER_ENTRIES: Final = (
     entries.VIBRATION_OVER_PULLEYS,
 )
 ALL_EXTENDED: Final = re.compile(r"^pytestmark = (extended|\[extended\b)", re.MULTILINE)
+EXAMPLES: Final = 40  # of a property, in the first tier
 CPU: Final = "cpu"  # property of a report: processor time of the test [s], compilation excluded
 
 
 def first_tier_alone(config: pytest.Config) -> bool:
     """Whether only tests of the first tier run."""
     return "not extended" in str(config.getoption("markexpr"))
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Let hypothesis try fewer examples in the first tier; `make soak` runs all tests with its own number."""
+    settings.register_profile("first tier", max_examples=EXAMPLES)
+    if first_tier_alone(config):
+        settings.load_profile("first tier")
 
 
 def needed_entries(config: pytest.Config) -> list[str]:

@@ -17,7 +17,7 @@ from syrupy.assertion import SnapshotAssertion
 
 import sagline as sl
 from sagline import FileError, SaglineWarning, dump_robot
-from sagline.files import plan_file
+from sagline.files import format, plan_file
 from sagline.files.robot_file import parse_robot
 from sagline.files.seal import Seal
 from tests.files.plans import OUTSIDE, SUSPENDED, a_plan, assert_same
@@ -52,7 +52,7 @@ def read(monkeypatch: pytest.MonkeyPatch) -> Reader:
     monkeypatch.setattr(plan_file, "parse_robot", cache(parse_robot))
 
     def load(data: xr.Dataset) -> sl.Plan:
-        monkeypatch.setattr(plan_file, "read_dataset", lambda *_: (data, Seal.MISSING))
+        monkeypatch.setattr(format, "read_dataset", lambda *_: (data, Seal.MISSING))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SaglineWarning)
             return sl.load_plan("run.nc")

@@ -14,7 +14,7 @@ from syrupy.assertion import SnapshotAssertion
 
 import sagline as sl
 from sagline import EnergyBalance, Occurrence
-from sagline.files import simulation_file
+from sagline.files import format, simulation_file
 from sagline.files.robot_file import parse_robot
 from sagline.files.seal import Seal, seal
 from sagline.files.simulation_layout import EVENTS, LARGEST, NODES, SAMPLES, TIME
@@ -130,7 +130,7 @@ def read(monkeypatch: pytest.MonkeyPatch) -> Reader:
     monkeypatch.setattr(simulation_file, "parse_robot", cache(parse_robot))
 
     def load(data: xr.Dataset) -> sl.Simulation:
-        monkeypatch.setattr(simulation_file, "read_dataset", lambda *_: (data, Seal.WHOLE))
+        monkeypatch.setattr(format, "read_dataset", lambda *_: (data, Seal.WHOLE))
         return sl.load_simulation("sim.nc")
 
     return load
