@@ -10,6 +10,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
+import attrs
 import numpy as np
 import trimesh
 from matplotlib.figure import Figure
@@ -17,7 +18,6 @@ from matplotlib.figure import Figure
 import sagline as sl
 from sagline.control.link import Command, Mode
 from sagline.robot.provenance import Provenance
-from sagline.robot.winch import RULES
 from tests.calibration.made_up import made_up
 from tests.calibration.synthetic import log_of, true_robot, with_drums
 from tests.control.rigs import HOME, at, prototype, rig
@@ -226,7 +226,7 @@ def _robots(given: _Given) -> dict[str, Call]:
     )
     angle = ("array", [0.25, 0.5])
     wound: dict[str, tuple[Any, ...]] = {
-        name: ("array", [2.0, 1.0], not rule.needed) for name, rule in RULES.items() if name != "dead_rise"
+        field.name: ("array", [2.0, 1.0], field.default is None) for field in attrs.fields(sl.Winch)
     }
     wound |= {"dead_rise": ("array", [0.5, -0.25]), "swivel_axis": ("array", [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])}
     wound |= {

@@ -3,6 +3,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+import attrs
 import numpy as np
 import pytest
 import yaml
@@ -30,7 +31,7 @@ tension_min: 20
 tension_max: [1 kN, 2 kN, .inf]
 assumed: {mass: a guess}
 """
-KEYS_OF_WINCHES = f"keys {', '.join(field.name for field in fields(Winch))}"
+KEYS_OF_WINCHES = f"keys {', '.join(field.name for field in attrs.fields(Winch))}"
 LOG = {"log": "winches.csv", "date": "2026-03-01"}
 
 
@@ -194,7 +195,7 @@ def test_a_tilt_in_degrees() -> None:
 
 
 def test_the_block_has_every_field_of_the_winch() -> None:
-    assert {f"winches.{field.name}" for field in fields(Winch)} == {
+    assert {f"winches.{field.name}" for field in attrs.fields(Winch)} == {
         key for key in QUANTITIES if key.startswith("winches")
     }
 

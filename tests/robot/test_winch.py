@@ -3,14 +3,16 @@
 import pickle
 from typing import Any, NamedTuple
 
+import attrs
 import numpy as np
 import pytest
 
 from sagline import Cable, InvalidValueError, Robot, Winch, load_robot, without_cables
 from sagline.robot.several import cables_of
-from sagline.robot.winch import RULES
 from tests.refusal import refused
 
+# the fields that hold a number for each cable
+RULES = {field.name: field for field in attrs.fields(Winch) if field.name not in ("swivel_axis", "guides")}
 # beside a value of 2 or 3 for every field: what else must be there
 BESIDE: dict[str, dict[str, float]] = {"dead_rise": {"dead_cable": 5.0}}
 # which values a field refuses, by hand from what it is
@@ -89,7 +91,7 @@ class Case(NamedTuple):
 def cases() -> list[Case]:
     found: list[Case] = []
     for name, rule in RULES.items():
-        unit = f" {rule.unit}".rstrip()
+        unit = f" {rule.metadata['unit']}".rstrip()
         found += [
             Case(name, np.nan, f"nan{unit}", "finite"),
             Case(name, [2.0, np.inf, 2.0], f"inf{unit}", "finite", "[1]"),

@@ -10,11 +10,12 @@ import numpy as np
 from sagline.arrays import Array
 from sagline.cli.tables import Grid, show_table
 from sagline.cli.terminal import show, show_json
+from sagline.fields import units
 from sagline.files.robot_file import load_robot
 from sagline.robot.catalogue import robot_names
 from sagline.robot.robot import Robot
 from sagline.robot.tolerances import UNCERTAIN
-from sagline.robot.winch import RULES, Winch
+from sagline.robot.winch import Winch
 
 WHOLE = {  # fields and their units; one value, or one that holds for all cables
     "motion_pattern": "",
@@ -167,8 +168,8 @@ def _deviations(deviations: Mapping[str, Array], head: str) -> Grid:
 
 def _parts(winches: Winch) -> dict[str, Any]:
     """What is known of the winches, each with its unit."""
-    units = {name: rule.unit.replace("^2", "²") for name, rule in RULES.items()}
-    return {name: {"value": field, "unit": units.get(name, "")} for name, field in winches.known().items()}
+    unit = units(Winch) | {"guides": ""}
+    return {name: {"value": value, "unit": unit[name].replace("^2", "²")} for name, value in winches.known().items()}
 
 
 def _marked(robot: Robot, field: str) -> str:

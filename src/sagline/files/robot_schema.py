@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 from sagline.arrays import Array, checked, exactly, number
 from sagline.cables.cable import Cable
 from sagline.errors import InvalidValueError
+from sagline.fields import units
 from sagline.files.quantity import in_si, plain_number
 from sagline.files.scene_schema import Place, check_scene
 from sagline.files.schema import Entry
@@ -19,7 +20,7 @@ from sagline.robot.pose_box import PoseBox
 from sagline.robot.provenance import Provenance
 from sagline.robot.robot import Robot
 from sagline.robot.tolerances import UNCERTAIN, of_share, value_of
-from sagline.robot.winch import RULES, Winch
+from sagline.robot.winch import Winch
 
 _ERROR: Final = "calibration.standard_error."  # where those of a robot's numbers are
 _UNITS: Final = {
@@ -48,9 +49,7 @@ _UNITS: Final = {
     "test_box.low": "m",
     "test_box.high": "m",
     "test_box.tilt": "rad",
-    "winches.swivel_axis": "",
-    "winches.guides": "m",
-    **{f"winches.{name}": rule.unit for name, rule in RULES.items()},
+    **{f"winches.{name}": unit for name, unit in units(Winch).items()},
 }  # every other key of inertia is in kg m^2
 SWIVEL_AXES: Final = {"up": [0.0, 0.0, 1.0], "down": [0.0, 0.0, -1.0]}  # the words for the axes that there are
 

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any, Final
 from zlib import crc32
 
+import attrs
 import numpy as np
 
 from sagline.arguments import file_path
@@ -131,8 +132,9 @@ def _canonical(value: Any) -> str:
     """A text in which any two values that differ, differ."""
     if isinstance(value, np.ndarray):
         return f"array({value.dtype.str}, {value.shape}, {np.ascontiguousarray(value).tobytes().hex()})"
-    if is_dataclass(value):
-        inside = ", ".join(f"{field.name}={_canonical(getattr(value, field.name))}" for field in fields(value))
+    if is_dataclass(value) or attrs.has(type(value)):
+        names = [field.name for field in (fields(value) if is_dataclass(value) else attrs.fields(type(value)))]
+        inside = ", ".join(f"{name}={_canonical(getattr(value, name))}" for name in names)
         return f"{type(value).__name__}({inside})"
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{key!r}: {_canonical(value[key])}" for key in sorted(value)) + "}"

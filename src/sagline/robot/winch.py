@@ -2,77 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from types import MappingProxyType
-from typing import Any, Final, NamedTuple
+from typing import Any, ClassVar, Final
 
 import numpy as np
+from attrs import Attribute, evolve, field, fields_dict, frozen
 from numpy.typing import ArrayLike, NDArray
 
 from sagline.arguments import choice, whole_number
 from sagline.arrays import SMALLEST, Array, checked, locked, spread
 from sagline.errors import InvalidValueError
+from sagline.fields import given, if_known, rule
 from sagline.memory import check_memory
 from sagline.robot.unit import unit
 
 UPRIGHT: Final = 1e-9  # how far from vertical a swivel axis may be, as the sine of an angle
 _AGREEING: Final = 1e-9  # of the dead cable: how far a given one may be from that of the guides
 MOST_NAMED: Final = 3  # fields that a message names
+_AXES: Final = {"swivel_axis": 1, "guides": 2}  # of a field for one cable, where it is no number
 
 
-class Rule(NamedTuple):
-    """What a field's values must be.
-
-    Attributes:
-        unit: Their unit.
-        low: The least value, or None.
-        above: A bound they must exceed, or None.
-        needed: Whether the field cannot be left unknown, None.
-    """
-
-    unit: str
-    low: float | None = None
-    above: float | None = None
-    needed: bool = False
-
-
-# every field but the swivel axis and the guides, in order
-RULES: Final[Mapping[str, Rule]] = MappingProxyType(
-    {
-        "pulley_radius": Rule("m", low=0.0, needed=True),
-        "pulley_friction": Rule("", low=0.0, needed=True),
-        "rolling_friction": Rule("", low=0.0, needed=True),
-        "dead_cable": Rule("m", low=0.0, needed=True),
-        "dead_rise": Rule("m", needed=True),
-        "drum_radius": Rule("m", above=0.0),
-        "drum_width": Rule("m", above=0.0),
-        "groove_pitch": Rule("m", above=0.0),
-        "layers": Rule("", low=1.0, needed=True),
-        "drum_distance": Rule("m", above=0.0),
-        "drum_offset": Rule("m", needed=True),
-        "gear": Rule("", needed=True),
-        "counts_per_turn": Rule("", above=0.0),
-        "count_zero": Rule("", needed=True),
-        "length_zero": Rule("m", above=0.0),
-        "cable_length": Rule("m", above=0.0),
-        "winding_tension": Rule("N", low=0.0, needed=True),
-        "inertia": Rule("kg m^2", above=0.0),
-        "torque_limit": Rule("N m", above=0.0),
-        "speed_limit": Rule("rad/s", above=0.0),
-        "friction": Rule("N", low=0.0, needed=True),
-        "position_gain": Rule("1/s", low=0.0),
-        "speed_gain": Rule("N s/m", low=0.0),
-        "integral_gain": Rule("N/m", low=0.0),
-        "load_cell_range": Rule("N", above=0.0),
-        "load_cell_deviation": Rule("N", low=0.0, needed=True),
-        "load_cell_bias": Rule("N", needed=True),
-        "load_cell_gain": Rule("", above=0.0, needed=True),
-    }
-)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
+@frozen(eq=False, weakref_slot=False)
 class Winch:
     """One winch with its pulley, or those of all cables: every field that is given has one shape, () or (m,).
 
@@ -128,132 +77,66 @@ class Winch:
         load_cell_deviation: Standard deviation of a reading [N], >= 0.
         load_cell_bias: What it reads without load [N].
         load_cell_gain: What it reads of a newton.
+
+    All are given in SI, one number for all cables or one a cable. A swivel axis may have any length but zero; guides
+    have the shape (k, 3) for all cables or (m, k, 3), k >= 1, and leave dead_cable and dead_rise at 0.
+
+    Raises:
+        InvalidValueError: If a value is out of its range, the dead cable rises by more than its length or is longer
+            than all of the cable, a gear is zero, a swivel axis is not vertical, two guides in a row coincide, or
+            the shapes do not fit.
+
+    Examples:
+        >>> import sagline as sl
+        >>> winch = sl.Winch(pulley_radius=0.05, dead_cable=[4.0, 5.0])
+        >>> winch.pulley_radius
+        array([0.05, 0.05])
     """
 
-    pulley_radius: Array
-    swivel_axis: Array
-    pulley_friction: Array
-    rolling_friction: Array
-    dead_cable: Array
-    dead_rise: Array
-    guides: Array | None
-    drum_radius: Array | None
-    drum_width: Array | None
-    groove_pitch: Array | None
-    layers: Array
-    drum_distance: Array | None
-    drum_offset: Array
-    gear: Array
-    counts_per_turn: Array | None
-    count_zero: Array
-    length_zero: Array | None
-    cable_length: Array | None
-    winding_tension: Array
-    inertia: Array | None
-    torque_limit: Array | None
-    speed_limit: Array | None
-    friction: Array
-    position_gain: Array | None
-    speed_gain: Array | None
-    integral_gain: Array | None
-    load_cell_range: Array | None
-    load_cell_deviation: Array
-    load_cell_bias: Array
-    load_cell_gain: Array
+    __slots__: ClassVar[tuple[str, ...]]  # the names of the fields, in order
 
-    def __init__(
-        self,
-        pulley_radius: ArrayLike = 0.0,
-        *,
-        swivel_axis: ArrayLike = (0.0, 0.0, 1.0),
-        pulley_friction: ArrayLike = 0.0,
-        rolling_friction: ArrayLike = 0.0,
-        dead_cable: ArrayLike = 0.0,
-        dead_rise: ArrayLike = 0.0,
-        guides: ArrayLike | None = None,
-        drum_radius: ArrayLike | None = None,
-        drum_width: ArrayLike | None = None,
-        groove_pitch: ArrayLike | None = None,
-        layers: ArrayLike = 1.0,
-        drum_distance: ArrayLike | None = None,
-        drum_offset: ArrayLike = 0.0,
-        gear: ArrayLike = 1.0,
-        counts_per_turn: ArrayLike | None = None,
-        count_zero: ArrayLike = 0.0,
-        length_zero: ArrayLike | None = None,
-        cable_length: ArrayLike | None = None,
-        winding_tension: ArrayLike = 0.0,
-        inertia: ArrayLike | None = None,
-        torque_limit: ArrayLike | None = None,
-        speed_limit: ArrayLike | None = None,
-        friction: ArrayLike = 0.0,
-        position_gain: ArrayLike | None = None,
-        speed_gain: ArrayLike | None = None,
-        integral_gain: ArrayLike | None = None,
-        load_cell_range: ArrayLike | None = None,
-        load_cell_deviation: ArrayLike = 0.0,
-        load_cell_bias: ArrayLike = 0.0,
-        load_cell_gain: ArrayLike = 1.0,
-    ) -> None:
-        """Check every field once, and give all that are known one shape.
+    pulley_radius: Array = field(default=0.0, converter=given, metadata=rule("m", low=0.0))
+    swivel_axis: Array = field(default=(0.0, 0.0, 1.0), kw_only=True, converter=given, metadata=rule(shape=(3,)))
+    pulley_friction: Array = field(default=0.0, kw_only=True, converter=given, metadata=rule(low=0.0))
+    rolling_friction: Array = field(default=0.0, kw_only=True, converter=given, metadata=rule(low=0.0))
+    dead_cable: Array = field(default=0.0, kw_only=True, converter=given, metadata=rule("m", low=0.0))
+    dead_rise: Array = field(default=0.0, kw_only=True, converter=given, metadata=rule("m"))
+    guides: Array | None = field(default=None, kw_only=True, converter=if_known, metadata=rule("m"))
+    drum_radius: Array | None = field(default=None, kw_only=True, converter=if_known, metadata=rule("m", above=0.0))
+    drum_width: Array | None = field(default=None, kw_only=True, converter=if_known, metadata=rule("m", above=0.0))
+    groove_pitch: Array | None = field(default=None, kw_only=True, converter=if_known, metadata=rule("m", above=0.0))
+    layers: Array = field(default=1.0, kw_only=True, converter=given, metadata=rule(low=1.0))
+    drum_distance: Array | None = field(default=None, kw_only=True, converter=if_known, metadata=rule("m", above=0.0))
+    drum_offset: Array = field(default=0.0, kw_only=True, converter=given, metadata=rule("m"))
+    gear: Array = field(default=1.0, kw_only=True, converter=given, metadata=rule())
+    counts_per_turn: Array | None = field(default=None, kw_only=True, converter=if_known, metadata=rule(above=0.0))
+    count_zero: Array = field(default=0.0, kw_only=True, converter=given, metadata=rule())
+    length_zero: Array | None = field(default=None, kw_only=True, converter=if_known, metadata=rule("m", above=0.0))
+    cable_length: Array | None = field(default=None, kw_only=True, converter=if_known, metadata=rule("m", above=0.0))
+    winding_tension: Array = field(default=0.0, kw_only=True, converter=given, metadata=rule("N", low=0.0))
+    inertia: Array | None = field(default=None, kw_only=True, converter=if_known, metadata=rule("kg m^2", above=0.0))
+    torque_limit: Array | None = field(default=None, kw_only=True, converter=if_known, metadata=rule("N m", above=0.0))
+    speed_limit: Array | None = field(default=None, kw_only=True, converter=if_known, metadata=rule("rad/s", above=0.0))
+    friction: Array = field(default=0.0, kw_only=True, converter=given, metadata=rule("N", low=0.0))
+    position_gain: Array | None = field(default=None, kw_only=True, converter=if_known, metadata=rule("1/s", low=0.0))
+    speed_gain: Array | None = field(default=None, kw_only=True, converter=if_known, metadata=rule("N s/m", low=0.0))
+    integral_gain: Array | None = field(default=None, kw_only=True, converter=if_known, metadata=rule("N/m", low=0.0))
+    load_cell_range: Array | None = field(default=None, kw_only=True, converter=if_known, metadata=rule("N", above=0.0))
+    load_cell_deviation: Array = field(default=0.0, kw_only=True, converter=given, metadata=rule("N", low=0.0))
+    load_cell_bias: Array = field(default=0.0, kw_only=True, converter=given, metadata=rule("N"))
+    load_cell_gain: Array = field(default=1.0, kw_only=True, converter=given, metadata=rule(above=0.0))
 
-        Args:
-            pulley_radius: As the attributes, in SI; one number for all cables, or one a cable.
-            swivel_axis: Up or down, of any length but zero.
-            pulley_friction: See the attributes.
-            rolling_friction: See the attributes.
-            dead_cable: See the attributes; 0 where it is to follow from guides.
-            dead_rise: See the attributes; 0 where it is to follow from guides.
-            guides: Shape (k, 3) for all cables or (m, k, 3), k >= 1.
-            drum_radius: See the attributes.
-            drum_width: See the attributes.
-            groove_pitch: See the attributes.
-            layers: See the attributes.
-            drum_distance: See the attributes.
-            drum_offset: See the attributes.
-            gear: See the attributes.
-            counts_per_turn: See the attributes.
-            count_zero: See the attributes.
-            length_zero: See the attributes.
-            cable_length: See the attributes.
-            winding_tension: See the attributes.
-            inertia: See the attributes.
-            torque_limit: See the attributes.
-            speed_limit: See the attributes.
-            friction: See the attributes.
-            position_gain: See the attributes.
-            speed_gain: See the attributes.
-            integral_gain: See the attributes.
-            load_cell_range: See the attributes.
-            load_cell_deviation: See the attributes.
-            load_cell_bias: See the attributes.
-            load_cell_gain: See the attributes.
-
-        Raises:
-            InvalidValueError: If a value is out of its range, the dead cable rises by more than its length or is longer
-                than all of the cable, a gear is zero, a swivel axis is not vertical, two guides in a row coincide, or
-                the shapes do not fit.
-
-        Examples:
-            >>> import sagline as sl
-            >>> winch = sl.Winch(pulley_radius=0.05, dead_cable=[4.0, 5.0])
-            >>> winch.pulley_radius
-            array([0.05, 0.05])
-        """
-        given = locals()
+    def __attrs_post_init__(self) -> None:
+        """Check every field once, and give all that are known one shape."""
         values = {
-            name: _checked(given[name], name) for name, rule in RULES.items() if rule.needed or given[name] is not None
+            name: _checked(value, about)
+            for name, about in _FIELDS.items()
+            if (value := getattr(self, name)) is not None or about.default is not None
         }
-        axis = _vertical(swivel_axis)
-        points = None if guides is None else _points(guides)
-        shapes = {name: value.shape for name, value in values.items()} | {"swivel_axis": axis.shape[:-1]}
-        shape = _shape(shapes if points is None else shapes | {"guides": points.shape[:-2]})
-        for name in RULES:
-            object.__setattr__(self, name, spread(values[name], shape) if name in values else None)
-        object.__setattr__(self, "swivel_axis", spread(axis, (*shape, 3)))
-        if points is not None:
-            points = spread(points, (*shape, *points.shape[-2:]))
-        object.__setattr__(self, "guides", points)
+        batch = {name: value.ndim - _AXES.get(name, 0) for name, value in values.items()}
+        shape = _shape({name: value.shape[: batch[name]] for name, value in values.items()})
+        for name, value in values.items():
+            object.__setattr__(self, name, spread(value, (*shape, *value.shape[batch[name] :])))
         _check_rise(self.dead_cable, self.dead_rise)
         _check_rolling(self.rolling_friction)
         _check_whole(self.dead_cable, self.cable_length)
@@ -281,7 +164,7 @@ class Winch:
             InvalidValueError: If the fields have another length, or the count is no whole number >= 1.
         """
         count = whole_number(count, "count", 1)
-        check_memory("winches", 8.0 * len(RULES) * count, "Give fewer cables.")
+        check_memory("winches", 8.0 * (len(_FIELDS) - len(_AXES)) * count, "Give fewer cables.")
         if self.shape not in ((), (1,), (count,)):
             allowed = f"one value, or {count}, one a cable"
             raise InvalidValueError(self._long(), f"{self.shape[0]} values", allowed, "Give every cable its own.")
@@ -324,11 +207,11 @@ class Winch:
             >>> winch.replace(pulley_radius=0.06).pulley_radius
             array([0.06, 0.06])
         """
-        for field in changes:
-            choice(field, "field", self.__slots__)
+        for name in changes:
+            choice(name, "field", self.__slots__)
         if self.guides is not None and changes.get("guides") is not None:
             changes = {"dead_cable": 0.0, "dead_rise": 0.0, **changes}  # they follow anew
-        return replace(self, **changes)
+        return evolve(self, **changes)
 
     def _run_to(self, frame_anchors: Array) -> Winch:
         """These winches with the dead cable that follows from their guides.
@@ -357,16 +240,16 @@ class Winch:
                 "List the guides from the drum on, without the frame anchor.",
             )
         rise = np.clip(frame_anchors[:, 2] - self.guides[:, 0, 2], -length, length)  # within it, whatever is rounded
-        for name, given, follows in (("dead_cable", self.dead_cable, length), ("dead_rise", self.dead_rise, rise)):
-            if (wrong := (given != 0.0) & (np.abs(given - follows) > _AGREEING * length)).any():
+        for name, own, follows in (("dead_cable", self.dead_cable, length), ("dead_rise", self.dead_rise, rise)):
+            if (wrong := (own != 0.0) & (np.abs(own - follows) > _AGREEING * length)).any():
                 i = int(np.argmax(wrong))
                 raise InvalidValueError(
                     f"winches: {name}[{i}]",
-                    f"{given[i]:.9g} m",
+                    f"{own[i]:.9g} m",
                     f"{follows[i]:.9g} m, as the guides have it, or 0",
                     "Leave it out where guides are given.",
                 )
-        return replace(self, dead_cable=length, dead_rise=rise)
+        return evolve(self, dead_cable=length, dead_rise=rise)
 
     def known(self) -> dict[str, Array]:
         """The fields that are known, by their names, in order.
@@ -381,32 +264,40 @@ class Winch:
         return _from_fields, (self.known(),)
 
 
+# in the order of the checks
+_FIELDS: Final = dict(sorted(fields_dict(Winch).items(), key=lambda each: each[0] in _AXES))
+
+
 def _from_fields(values: dict[str, Any]) -> Winch:
     return Winch(**values)
 
 
-def _checked(value: ArrayLike, name: str) -> Array:
+def _checked(value: ArrayLike, about: Attribute[Any]) -> Array:
     """The values of one field."""
-    rule, item = RULES[name], f"winches: {name}"
-    low, above = (-np.inf if bound is None else bound for bound in (rule.low, rule.above))
-    array = checked(value, item, rule.unit, low=low, above=above)
-    if name not in ("layers", "gear"):
-        return array
-    wrong = array != np.floor(array) if name == "layers" else array == 0.0
-    if wrong.any():
-        index = tuple(int(i) for i in np.argwhere(wrong)[0])
-        if index:
-            item += f"[{', '.join(map(str, index))}]"
-        if name == "layers":
+    item = f"winches: {about.name}"
+    array = checked(value, item, **about.metadata)
+    match about.name:
+        case "swivel_axis":
+            return _vertical(array)
+        case "guides":
+            return _points(array)
+        case "layers" if (wrong := array != np.floor(array)).any():
+            item, index = _element(item, wrong)
             raise InvalidValueError(item, f"{array[index]:g}", "whole numbers", "Give how many layers the drum takes.")
-        step = "Give the encoder's turns for one of the drum; negative where counts fall as cable is let out."
-        raise InvalidValueError(item, "0", "not 0", step)
+        case "gear" if (wrong := array == 0.0).any():
+            step = "Give the encoder's turns for one of the drum; negative where counts fall as cable is let out."
+            raise InvalidValueError(_element(item, wrong)[0], "0", "not 0", step)
     return array
 
 
-def _points(given: ArrayLike) -> Array:
+def _element(item: str, wrong: NDArray[np.bool_]) -> tuple[str, tuple[int, ...]]:
+    """The first wrong element of a field: its name and its index."""
+    index = tuple(int(i) for i in np.argwhere(wrong)[0])
+    return (f"{item}[{', '.join(map(str, index))}]" if index else item), index
+
+
+def _points(points: Array) -> Array:
     """The guides of all cables (k, 3), or of each (m, k, 3)."""
-    points = checked(given, "winches: guides", "m")
     if points.ndim not in (2, 3) or points.shape[-1] != 3 or 0 in points.shape:
         allowed = "shape (k, 3) or (m, k, 3), k >= 1"
         step = "Give the points from the drum on, or None."
@@ -437,9 +328,8 @@ def _shape(shapes: dict[str, tuple[int, ...]]) -> tuple[int, ...]:
     return shapes[longest]
 
 
-def _vertical(given: ArrayLike) -> Array:
+def _vertical(axis: Array) -> Array:
     """Unit vectors of the swivel axes, which are vertical."""
-    axis = checked(given, "winches: swivel_axis", "", shape=(3,))
     length = np.linalg.norm(axis, axis=-1)
     if not length.all():
         raise InvalidValueError(
