@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
 from typing import Any
 
+import attrs
 import numpy as np
 import pytest
 
@@ -57,7 +58,7 @@ def test_every_call_succeeds_as_it_is(answers: dict[str, Any], table: dict[str, 
 def test_answers_stay_locked_when_they_are_pickled_or_copied(answers: dict[str, Any]) -> None:
     looked_at, found = 0, []
     for name, answer in answers.items():
-        if not is_dataclass(answer):
+        if not _fields(answer):
             continue
         for again in (pickle.loads(pickle.dumps(answer)), copy.deepcopy(answer)):
             assert _same(again, answer), name
@@ -139,12 +140,18 @@ def _fault_of_answer(result: Any, kinds: str) -> str:
     return ""
 
 
+def _fields(value: Any) -> list[str]:
+    """Names of the fields of a dataclass or an attrs class, none of anything else."""
+    declared = attrs.fields(type(value)) if attrs.has(type(value)) else fields(value) if is_dataclass(value) else ()
+    return [field.name for field in declared]
+
+
 def _arrays(value: Any) -> Iterator[np.ndarray[Any, Any]]:
     if isinstance(value, np.ndarray | np.generic):
         yield np.asarray(value)
-    elif is_dataclass(value):
-        for field in fields(value):
-            yield from _arrays(getattr(value, field.name))
+    elif names := _fields(value):
+        for name in names:
+            yield from _arrays(getattr(value, name))
     elif isinstance(value, tuple | list):
         for entry in value:
             yield from _arrays(entry)

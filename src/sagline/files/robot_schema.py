@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import reprlib
+from collections.abc import Iterable
 from typing import Any, Final
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, create_model, model_validator
 
 from sagline.arrays import Array, checked, exactly, number
 from sagline.cables.cable import Cable
@@ -76,6 +77,12 @@ class _RobotPart(Entry):
         )
 
 
+def _with_keys(names: Iterable[str]) -> Any:
+    """A mapping in a robot file with keys of these names, all of them optional."""
+    keys: dict[str, Any] = dict.fromkeys(names, (Any, None))
+    return create_model("_Keys", __base__=_RobotPart, **keys)
+
+
 class _Cables(_RobotPart):
     """Material of the cables; each value one number for all of them, or a list."""
 
@@ -106,39 +113,10 @@ class _Cables(_RobotPart):
         return Cable.from_material(density, self.given("youngs_modulus", "cables."), width, **known)
 
 
-class _Winches(_RobotPart):
+class _Winches(_with_keys(units(Winch))):  # type: ignore[misc]
     """The machine behind the frame anchors; each value one number for all cables, or a list."""
 
-    pulley_radius: Any = None
-    swivel_axis: Any = None
-    pulley_friction: Any = None
-    rolling_friction: Any = None
-    dead_cable: Any = None
-    dead_rise: Any = None
-    guides: Any = None
-    drum_radius: Any = None
-    drum_width: Any = None
-    groove_pitch: Any = None
-    layers: Any = None
-    drum_distance: Any = None
-    drum_offset: Any = None
-    gear: Any = None
-    counts_per_turn: Any = None
-    count_zero: Any = None
-    length_zero: Any = None
-    cable_length: Any = None
-    winding_tension: Any = None
-    inertia: Any = None
-    torque_limit: Any = None
-    speed_limit: Any = None
-    friction: Any = None
-    position_gain: Any = None
-    speed_gain: Any = None
-    integral_gain: Any = None
-    load_cell_range: Any = None
-    load_cell_deviation: Any = None
-    load_cell_bias: Any = None
-    load_cell_gain: Any = None
+    swivel_axis: Any = None  # may be a word
 
     def winches(self) -> Winch:
         """The winches; what is left out takes the winch's own default."""
@@ -212,21 +190,8 @@ class _TestBox(_RobotPart):
     tilt: Any = 0.0
 
 
-class _Deviations(_RobotPart):
+class _Deviations(_with_keys(UNCERTAIN)):  # type: ignore[misc]
     """Standard deviations of a robot's numbers; each one number for the field, one along each axis, or all of it."""
-
-    frame_anchors: Any = None
-    platform_anchors: Any = None
-    length_zero: Any = None
-    drum_radius: Any = None
-    linear_density: Any = None
-    axial_stiffness: Any = None
-    pulley_radius: Any = None
-    dead_cable: Any = None
-    load_cell_gain: Any = None
-    load_cell_bias: Any = None
-    mass: Any = None
-    center_of_mass: Any = None
 
     def of(self, robot: Robot, within: str) -> dict[str, Any]:
         """Those that are given, in SI; percents are of the robot's own numbers."""
