@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
+from attrs import evolve, field, fields, frozen
 from numpy.typing import ArrayLike, NDArray
 
 from sagline.arguments import choice
 from sagline.arrays import Array, broadcast_shape, checked, locked, spread
+from sagline.fields import given, if_known, rule
 from sagline.memory import check_memory
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@frozen(eq=False, weakref_slot=False)
 class Cable:
     """One cable's material, or that of many: every field that is given has one shape.
 
@@ -24,10 +25,7 @@ class Cable:
         diameter: Diameter of the rope [m], shape (...), > 0; None where it is not known. What is wound on a drum needs
             it, and nothing that hangs.
         expansion: Coefficient of thermal expansion [1/K], shape (...), negative for most fibers; None where it is not
-            known.
-
-    Examples:
-        Braided fiber of 67 g/m and 44 kN, and two cables at once:
+    XX fiber of 67 g/m and 44 kN, and two cables at once:
 
         >>> import sagline as sl
         >>> cable = sl.Cable(linear_density=0.067, axial_stiffness=44e3)
@@ -38,45 +36,25 @@ class Cable:
         array([44000., 44000.])
     """
 
-    linear_density: Array
-    axial_stiffness: Array
-    diameter: Array | None
-    expansion: Array | None
+    __slots__: ClassVar[tuple[str, ...]]  # the names of the fields, in order
 
-    def __init__(
-        self,
-        linear_density: ArrayLike,
-        axial_stiffness: ArrayLike,
-        *,
-        diameter: ArrayLike | None = None,
-        expansion: ArrayLike | None = None,
-    ) -> None:
-        """Check and broadcast the fields.
+    linear_density: Array = field(converter=given, metadata=rule("kg/m", low=0.0))
+    axial_stiffness: Array = field(converter=given, metadata=rule("N", above=0.0))
+    diameter: Array | None = field(default=None, kw_only=True, converter=if_known, metadata=rule("m", above=0.0))
+    expansion: Array | None = field(default=None, kw_only=True, converter=if_known, metadata=rule("1/K"))
 
-        Args:
-            linear_density: Mass per unstrained length [kg/m], shape (...), >= 0.
-            axial_stiffness: EA [N], > 0; a shape that broadcasts with that of linear_density.
-            diameter: [m], > 0, a shape that broadcasts with the others, or None.
-            expansion: [1/K], a shape that broadcasts with the others, or None.
-
-        Raises:
-            InvalidValueError: If a density is negative, a stiffness or a diameter not positive, or the shapes do not
-                broadcast.
-        """
+    def __attrs_post_init__(self) -> None:
+        """Check and broadcast the fields."""
         values = {
-            "linear_density": checked(linear_density, "linear_density", "kg/m", low=0.0),
-            "axial_stiffness": checked(axial_stiffness, "axial_stiffness", "N", above=0.0),
+            about.name: checked(value, about.name, **about.metadata)
+            for about in fields(Cable)
+            if (value := getattr(self, about.name)) is not None or about.default is not None
         }
-        if diameter is not None:
-            values["diameter"] = checked(diameter, "diameter", "m", above=0.0)
-        if expansion is not None:
-            values["expansion"] = checked(expansion, "expansion", "1/K")
         item = " and ".join(values)
-        shape = broadcast_shape(item, *(field.shape for field in values.values()))
+        shape = broadcast_shape(item, *(value.shape for value in values.values()))
         check_memory(item, 8.0 * len(values) * math.prod(shape), "Give fewer cables.")
-        for name in self.__slots__:
-            field = values.get(name)
-            object.__setattr__(self, name, None if field is None else spread(field, shape))
+        for name, value in values.items():
+            object.__setattr__(self, name, spread(value, shape))
 
     @classmethod
     def from_material(
@@ -136,9 +114,9 @@ class Cable:
             >>> print(worn.axial_stiffness, worn.diameter)
             39600.0 0.006
         """
-        for field in changes:
-            choice(field, "field", self.__slots__)
-        return replace(self, **changes)
+        for name in changes:
+            choice(name, "field", self.__slots__)
+        return evolve(self, **changes)
 
     def known(self) -> dict[str, Array]:
         """The fields that are known, by their names.
@@ -146,7 +124,7 @@ class Cable:
         Returns:
             linear_density and axial_stiffness, and of diameter and expansion those that are not None.
         """
-        return {name: field for name in self.__slots__ if (field := getattr(self, name)) is not None}
+        return {name: value for name in self.__slots__ if (value := getattr(self, name)) is not None}
 
     def _part(self, index: int | slice | NDArray[Any], shape: tuple[int, ...]) -> Cable:
         """The material of a part of a batch of that shape; one without the batch's first axis stays what it is."""
@@ -155,10 +133,10 @@ class Cable:
             return self
         part = object.__new__(Cable)
         for name in self.__slots__:
-            field = getattr(self, name)
-            if field is not None:
-                field = locked(np.broadcast_to(field, (shape[0], *own[1:]))[index, ...])
-            object.__setattr__(part, name, field)
+            value = getattr(self, name)
+            if value is not None:
+                value = locked(np.broadcast_to(value, (shape[0], *own[1:]))[index, ...])
+            object.__setattr__(part, name, value)
         return part
 
     def __reduce__(self) -> tuple[Any, tuple[dict[str, Array]]]:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from sagline.arrays import Array
+from sagline.cables.cable import Cable
 from sagline.cli.tables import Grid, show_table
 from sagline.cli.terminal import show, show_json
 from sagline.fields import units
@@ -17,6 +18,7 @@ from sagline.robot.robot import Robot
 from sagline.robot.tolerances import UNCERTAIN
 from sagline.robot.winch import Winch
 
+MATERIAL = units(Cable)
 WHOLE = {  # fields and their units; one value, or one that holds for all cables
     "motion_pattern": "",
     "plane_normal": "",
@@ -24,10 +26,7 @@ WHOLE = {  # fields and their units; one value, or one that holds for all cables
     "center_of_mass": "m",
     "inertia": "kg m²",
     "gravity": "m/s²",
-    "linear_density": "kg/m",
-    "axial_stiffness": "N",
-    "diameter": "m",
-    "expansion": "1/K",
+    **MATERIAL,
     "tension_min": "N",
     "tension_max": "N",
     "tension_limits_of": "",
@@ -36,7 +35,6 @@ WHOLE = {  # fields and their units; one value, or one that holds for all cables
     "test_box": "m",
 }
 ANCHORS = {"frame_anchors": "m", "platform_anchors": "m"}
-MATERIAL = ("linear_density", "axial_stiffness", "diameter", "expansion")  # fields of the robot's cables
 PER_CABLE = (*MATERIAL, "tension_min", "tension_max")
 
 

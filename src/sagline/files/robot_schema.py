@@ -35,13 +35,9 @@ _UNITS: Final = {
     "tension_max": "N",
     "platform_size": "m",
     "frame_size": "m",
-    "cables.linear_density": "kg/m",
-    "cables.axial_stiffness": "N",
     "cables.youngs_modulus": "Pa",
     "cables.section_area": "m^2",
     "cables.radius": "m",
-    "cables.diameter": "m",
-    "cables.expansion": "1/K",
     "inertia.box": "m",
     "inertia.cylinder_radius": "m",
     "inertia.cylinder_height": "m",
@@ -50,6 +46,7 @@ _UNITS: Final = {
     "test_box.low": "m",
     "test_box.high": "m",
     "test_box.tilt": "rad",
+    **{f"cables.{name}": unit for name, unit in units(Cable).items()},
     **{f"winches.{name}": unit for name, unit in units(Winch).items()},
 }  # every other key of inertia is in kg m^2
 SWIVEL_AXES: Final = {"up": [0.0, 0.0, 1.0], "down": [0.0, 0.0, -1.0]}  # the words for the axes that there are
