@@ -9,10 +9,10 @@ import numpy as np
 from attrs import evolve, field, fields, frozen
 from numpy.typing import ArrayLike, NDArray
 
-from sagline.arguments import choice
-from sagline.arrays import Array, broadcast_shape, checked, locked, spread
-from sagline.fields import given, if_known, rule
-from sagline.memory import check_memory
+from sagline.core.arguments import choice
+from sagline.core.arrays import Array, broadcast_shape, checked, locked, spread
+from sagline.core.fields import given, if_known, rule
+from sagline.core.memory import check_memory
 
 
 @frozen(eq=False, weakref_slot=False)

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from sagline.arrays import Array
 from sagline.cables.cable import Cable
 from sagline.cli.tables import Grid, show_table
 from sagline.cli.terminal import show, show_json
-from sagline.fields import units
+from sagline.core.arrays import Array
+from sagline.core.fields import units
 from sagline.files.robot_file import load_robot
 from sagline.robot.catalogue import robot_names
 from sagline.robot.robot import Robot

@@ -1,7 +1,7 @@
 """Fields of input types: name, default, unit and allowed range stand once, where the type declares the field.
 
 A type is `attrs.frozen`; a field has a converter, from which a type checker knows what the constructor takes, and the
-arguments of `sagline.arrays.checked` as metadata. `__attrs_post_init__` checks what is given.
+arguments of `sagline.core.arrays.checked` as metadata. `__attrs_post_init__` checks what is given.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Any
 from attrs import fields
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 
 
 def given(value: ArrayLike) -> Array:
