@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.dynamics.drives import Winding
 from sagline.kernels import tables
 from sagline.kernels.cable.rows import CABLE_ROWS, LENGTH

@@ -13,7 +13,7 @@ from sagline.cli.ending import OUTSIDE
 from sagline.cli.entries import FORWARD, INVERSE, READINGS, STARTING_LENGTHS
 from sagline.cli.options import JsonOption, Model, ModelOption, RobotArgument
 from sagline.cli.terminal import note, show, show_json, show_pieces, working
-from sagline.errors import FileError, InvalidValueError, printable
+from sagline.core.errors import FileError, InvalidValueError, printable
 from sagline.files.whole import check_files, made_folder, write_text
 
 if TYPE_CHECKING:

@@ -12,9 +12,9 @@ import typer
 from sagline.cli.entries import FORWARD, INVERSE
 from sagline.cli.options import Format
 from sagline.cli.terminal import note, show_data, working
-from sagline.errors import FileError, InvalidValueError
+from sagline.core.errors import FileError, InvalidValueError
+from sagline.core.numbers import n
 from sagline.files.whole import write_text
-from sagline.numbers import n
 
 if TYPE_CHECKING:
     from sagline.cables.cable import Cable

@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from sagline.cli.terminal import show
-from sagline.errors import FileError
+from sagline.core.errors import FileError
 from sagline.files.whole import check_folder, made_folder, written_whole
 
 KINDS = (".py", ".yaml", ".csv", ".wcrfx")

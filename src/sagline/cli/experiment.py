@@ -12,9 +12,9 @@ import typer
 from sagline.cli.entries import FORWARD, INVERSE, SIMULATION
 from sagline.cli.options import JsonOption, OutOption
 from sagline.cli.terminal import note, show, show_json, working
-from sagline.errors import InvalidValueError, nearest
+from sagline.core.errors import InvalidValueError, nearest
+from sagline.core.numbers import n
 from sagline.files.whole import check_files
-from sagline.numbers import n
 
 if TYPE_CHECKING:
     from sagline.article.experiment import Experiment, Tell

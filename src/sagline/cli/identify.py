@@ -11,7 +11,7 @@ import typer
 from sagline.cli.options import JsonOption, TensionPlace
 from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
-from sagline.numbers import n
+from sagline.core.numbers import n
 
 if TYPE_CHECKING:
     from sagline.article.identify import EmpiricalFit

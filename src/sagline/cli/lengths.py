@@ -14,11 +14,11 @@ from sagline.cli.entries import needed_for
 from sagline.cli.options import Winding
 from sagline.cli.tables import csv_text
 from sagline.cli.terminal import note, show_data, working
-from sagline.errors import FileError
+from sagline.core.errors import FileError
 from sagline.files.whole import write_text
 
 if TYPE_CHECKING:
-    from sagline.arrays import Array
+    from sagline.core.arrays import Array
     from sagline.kinematics.plan import Plan
 
 RunArgument = Annotated[

@@ -12,13 +12,13 @@ import typer
 from sagline.cli.options import JsonOption
 from sagline.cli.tables import Grid, show_table
 from sagline.cli.terminal import show, show_json, working
+from sagline.core.numbers import n
 from sagline.files.whole import check_file
-from sagline.numbers import n
 
 if TYPE_CHECKING:
-    from sagline.arrays import Array
     from sagline.control.events import Event
     from sagline.control.execution import Execution
+    from sagline.core.arrays import Array
 
 MOST_EVENTS: Final = 20  # that are listed
 MOST_PLANS: Final = 100_000

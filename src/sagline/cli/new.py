@@ -13,12 +13,12 @@ import typer
 
 from sagline.cli.entries import INVERSE
 from sagline.cli.terminal import note, show, working
-from sagline.errors import FileError, InvalidValueError
+from sagline.core.errors import FileError, InvalidValueError
+from sagline.core.numbers import n
 from sagline.files.whole import write_text
-from sagline.numbers import n
 
 if TYPE_CHECKING:
-    from sagline.arrays import Array
+    from sagline.core.arrays import Array
     from sagline.kinematics.plan import Plan
     from sagline.robot.design import Design
     from sagline.robot.pose import Pose
@@ -196,7 +196,7 @@ def _count(text: str, layout: str) -> int:
 
 def _edges(text: str, item: str) -> Array:
     """Three edges in m from "6 x 4 x 3 m", "6x4x3", or "600 cm x 4 m x 3 m"."""
-    from sagline.arrays import checked
+    from sagline.core.arrays import checked
     from sagline.files.quantity import in_si
 
     parts = [part.strip() for part in text.replace("×", "x").split("x")]

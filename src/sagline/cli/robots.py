@@ -13,7 +13,7 @@ from sagline.cli.terminal import show as show_text
 from sagline.cli.terminal import show_json
 
 if TYPE_CHECKING:
-    from sagline.arrays import Array
+    from sagline.core.arrays import Array
     from sagline.robot.robot import Robot
     from sagline.robot.winch import Winch
 

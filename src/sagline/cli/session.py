@@ -16,7 +16,7 @@ from sagline.control.controller import Controller
 from sagline.control.events import Event, EventKind
 from sagline.control.guard import interrupt_calls
 from sagline.control.states import State
-from sagline.errors import InvalidValueError, SaglineError, nearest
+from sagline.core.errors import InvalidValueError, SaglineError, nearest
 from sagline.files.path_file import load_path
 from sagline.files.typed import pose_of
 from sagline.robot.pose import Pose

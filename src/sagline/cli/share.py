@@ -10,7 +10,7 @@ import typer
 from sagline.cli.entries import INVERSE
 from sagline.cli.options import robot_completions
 from sagline.cli.terminal import show, working
-from sagline.errors import FileError, InvalidValueError
+from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.whole import check_file, write_text
 
 if TYPE_CHECKING:

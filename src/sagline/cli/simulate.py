@@ -27,13 +27,13 @@ from sagline.cli.results import figure_files, listed, write_figures
 from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.cli.track import check_unit
-from sagline.errors import FileError, InvalidValueError
+from sagline.core.errors import FileError, InvalidValueError
+from sagline.core.numbers import n
 from sagline.files.whole import check_files, made_folder
-from sagline.numbers import n
 
 if TYPE_CHECKING:
-    from sagline.arrays import Array
     from sagline.cli.line import Line
+    from sagline.core.arrays import Array
     from sagline.dynamics.events import Break
     from sagline.dynamics.simulation import Simulation
     from sagline.kinematics.plan import Plan

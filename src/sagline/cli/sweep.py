@@ -13,9 +13,9 @@ from sagline.cli.entries import INVERSE, SHARING, VERDICTS
 from sagline.cli.options import JsonOption
 from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
-from sagline.errors import InvalidValueError, SaglineError
+from sagline.core.errors import InvalidValueError, SaglineError
+from sagline.core.numbers import counted
 from sagline.files.whole import check_folder, made_folder
-from sagline.numbers import counted
 
 if TYPE_CHECKING:
     from sagline.sweep.request import Request

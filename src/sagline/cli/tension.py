@@ -25,12 +25,12 @@ from sagline.cli.options import (
 from sagline.cli.results import figure_files, write_figures
 from sagline.cli.tables import Grid, show_table
 from sagline.cli.terminal import note, show, show_json, working
-from sagline.errors import InvalidValueError
+from sagline.core.errors import InvalidValueError
+from sagline.core.numbers import n
 from sagline.files.whole import check_files, made_folder
-from sagline.numbers import n
 
 if TYPE_CHECKING:
-    from sagline.arrays import Array
+    from sagline.core.arrays import Array
     from sagline.kinematics.plan import Plan
     from sagline.robot.pose import Pose
     from sagline.robot.robot import Robot

@@ -25,7 +25,7 @@ from sagline.cli.options import (
 )
 from sagline.cli.results import figure_files, write_figures, write_plans
 from sagline.cli.terminal import working
-from sagline.errors import FileError
+from sagline.core.errors import FileError
 from sagline.files.whole import check_files, write_text
 
 if TYPE_CHECKING:

@@ -24,7 +24,7 @@ from sagline.cli.options import (
 from sagline.cli.results import figure_files, listed, write_figures
 from sagline.cli.tables import Grid, csv_text, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
-from sagline.errors import InvalidValueError
+from sagline.core.errors import InvalidValueError
 from sagline.files.whole import check_files, made_folder, write_text
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sagline.cli.options import PayloadOption, WrenchOption, robot_completions
-from sagline.errors import InvalidValueError
+from sagline.core.errors import InvalidValueError
 
 if TYPE_CHECKING:
     from sagline.cli.hosting import Start

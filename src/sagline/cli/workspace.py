@@ -15,9 +15,9 @@ from sagline.cli.options import JsonOption, Model, ModelOption, OutOption, Paylo
 from sagline.cli.results import figure_files, listed, write_figures
 from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
-from sagline.errors import InvalidValueError
+from sagline.core.errors import InvalidValueError
+from sagline.core.numbers import counted
 from sagline.files.whole import check_files, made_folder
-from sagline.numbers import counted
 
 if TYPE_CHECKING:
     from sagline.interference.pairs import Obstacle
