@@ -36,7 +36,7 @@ from benchmarks.measure import (
     show,
 )
 from benchmarks.sweep import sweeps
-from sagline.arrays import Array, locked
+from sagline.core.arrays import Array, locked
 from sagline.kernels.cable.batch import BUFFERS, CHUNK, batch_from_length, batch_from_tension
 from tests.cables.reference import load_reference
 

@@ -11,13 +11,13 @@ from scipy.optimize import least_squares
 
 import sagline as sl
 from benchmarks.measure import Row, best_seconds, print_table
-from sagline.arrays import Array
 from sagline.calibration.calibrate import readings_of, sensors_there
 from sagline.calibration.gauss_newton import best_step
 from sagline.calibration.least_squares import passed
 from sagline.calibration.parameters import external, parameters_of, robot_with
 from sagline.calibration.problem import Log, Problem, State
 from sagline.calibration.start import start_of
+from sagline.core.arrays import Array
 from sagline.robot.drum import drums_of
 from tests.calibration.synthetic import Truth, true_robot, usual_sensors, with_drums
 from tests.calibration.varied import ERRORS, at_chosen, left_error, varied

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 import sagline as sl
 from benchmarks.measure import Row, best_of_calls, best_seconds, one_core, show
-from sagline.arrays import Array, Flags
+from sagline.core.arrays import Array, Flags
 from tests.kinematics.feasible import angle_error, feasible_plan, motion_between, moved, position_error
 
 BOX_POSES = 10_000

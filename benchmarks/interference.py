@@ -8,7 +8,7 @@ import numpy as np
 
 import sagline as sl
 from benchmarks.measure import Row, best_seconds, print_table
-from sagline.arrays import Array, Indices, locked
+from sagline.core.arrays import Array, Indices, locked
 from sagline.interference.clearance_rows import ClearanceRows
 from sagline.interference.rows import cable_rows
 from sagline.kernels.interference import shapes

@@ -14,8 +14,8 @@ from rich.console import Console
 
 import sagline as sl
 from benchmarks.measure import Row, show
-from sagline.arrays import Array
 from sagline.control.link import PERIOD, Command, Mode
+from sagline.core.arrays import Array
 from sagline.plc.block_link import BlockLink
 from sagline.plc.blocks import FROM_PLC
 from sagline.twin.mirrors import Mirrors

@@ -15,7 +15,7 @@ from rich.progress import track
 
 import sagline as sl
 from benchmarks.measure import Row, best_seconds, one_core, show
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.algebra.strips import HIGH, LOW, START, STRIP_ROWS
 from sagline.kernels.jit import entry
 from sagline.kernels.memory import Memory, block, memory_for

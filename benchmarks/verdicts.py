@@ -9,7 +9,7 @@ from rich.console import Console
 
 import sagline as sl
 from benchmarks.measure import Row, best_seconds, one_core, show
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kinematics.inverse_rows import decide_rows, solve_rows
 from sagline.statics.tables import pose_rows
 from sagline.tension.options import kernel_options

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sagline import InvalidValueError
-from sagline.arrays import checked, kernel_input, locked, number
+from sagline.core.arrays import checked, kernel_input, locked, number
 from tests.refusal import refused
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sagline import FileError, InvalidValueError
-from sagline.errors import MOST, nearest, printable, shortened
+from sagline.core.errors import MOST, nearest, printable, shortened
 
 SEED = 7
 

@@ -6,7 +6,7 @@ from decimal import Decimal
 import numpy as np
 import pytest
 
-from sagline.numbers import n, plus_minus
+from sagline.core.numbers import n, plus_minus
 
 PREFIX = {"f": -15, "p": -12, "n": -9, "µ": -6, "m": -3, "": 0, "k": 3, "M": 6, "G": 9}
 UNITS = ("m", "mm", "N", "kN", "kg", "kg/m", "N m", "m/s²", "rad", "s", "N/s", "mm/m", "m²/s⁴", "%", "°", "")

@@ -5,8 +5,8 @@ import pickle
 import pytest
 
 import sagline as sl
+from sagline.core.status import Status
 from sagline.kernels import codes
-from sagline.status import Status
 
 # no kernel answers NO_POSE: what is no pose does not reach one
 PREFIX = {sl.CableStatus: "CABLE_", sl.PoseStatus: "POSE_", sl.ForwardStatus: "FORWARD_"}

@@ -29,6 +29,11 @@ from .calibration.sensors import Sensors as Sensors
 from .calibration.status import CalibrationStatus as CalibrationStatus
 from .calibration.status import Omission as Omission
 from .calibration.unknowns import Unknown as Unknown
+from .core.errors import CableGeometryError as CableGeometryError
+from .core.errors import FileError as FileError
+from .core.errors import InvalidValueError as InvalidValueError
+from .core.errors import SaglineError as SaglineError
+from .core.errors import SaglineWarning as SaglineWarning
 from .dynamics.cable_dynamics import dynamic_stiffness as dynamic_stiffness
 from .dynamics.damping import Damping as Damping
 from .dynamics.drives import SecondOrder as SecondOrder
@@ -61,11 +66,6 @@ from .dynamics.to_shape import to_shape as to_shape
 from .dynamics.vibrating import vibration as vibration
 from .dynamics.vibration import Vibration as Vibration
 from .dynamics.vibration_status import VibrationStatus as VibrationStatus
-from .errors import CableGeometryError as CableGeometryError
-from .errors import FileError as FileError
-from .errors import InvalidValueError as InvalidValueError
-from .errors import SaglineError as SaglineError
-from .errors import SaglineWarning as SaglineWarning
 from .files.c_source import export_c as export_c
 from .files.calibration_file import load_calibration as load_calibration
 from .files.caspr import load_caspr as load_caspr

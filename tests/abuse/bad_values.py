@@ -13,7 +13,7 @@ import pint
 from matplotlib.figure import Figure
 
 import sagline as sl
-from sagline.results import Result
+from sagline.core.results import Result
 
 REFUSED, SAME, EITHER = "refused", "the same answer", "refused or answered"
 UNITS: pint.UnitRegistry[Any] = pint.UnitRegistry()

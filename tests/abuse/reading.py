@@ -14,7 +14,7 @@ import numpy as np
 
 import sagline as sl
 from sagline import SaglineError
-from sagline.errors import printable
+from sagline.core.errors import printable
 from sagline.files.lengths_file import load_counts, load_lengths
 from sagline.files.typed import pose_of
 from tests.effort import least_seconds

@@ -7,7 +7,7 @@ import pytest
 
 import sagline as sl
 from sagline import article_balance
-from sagline.errors import MOST
+from sagline.core.errors import MOST
 from sagline.viewer import readout
 from sagline.viewer.settings import Settings
 from sagline.viewer.snapshot import taken_at

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.errors import printable
+from sagline.core.errors import printable
 from tests.abuse.bad_values import REFUSED, SAME, Bad, bad_values
 from tests.abuse.calls import INTERNAL, LINKS, Call, calls, public_names
 from tests.effort import least_seconds

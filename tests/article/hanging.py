@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 
 GRAVITY = 9.81
 

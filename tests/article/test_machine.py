@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.arrays import Array
 from sagline.article.explanations import Explanation, explanations, information
 from sagline.article.machine import (
     ANCHORS,
@@ -28,6 +27,7 @@ from sagline.article.machine import (
 )
 from sagline.article.table2 import table2
 from sagline.article.ten_poses import HOME, METHOD, tour
+from sagline.core.arrays import Array
 from tests.refusal import refused
 
 ROBOT = sl.load_robot("article-prototype")

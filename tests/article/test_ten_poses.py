@@ -7,7 +7,6 @@ import pytest
 from scipy.optimize import least_squares
 
 import sagline as sl
-from sagline.arrays import Array
 from sagline.article.explanations import explanations
 from sagline.article.machine import (
     ANCHORS,
@@ -24,6 +23,7 @@ from sagline.article.machine import (
     rest,
 )
 from sagline.article.ten_poses import METHOD, TenPoses, ten_poses
+from sagline.core.arrays import Array
 from tests.tiers import extended
 
 pytestmark = extended

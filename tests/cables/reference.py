@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from sagline import Cable
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 
 FILE = Path(__file__).parents[1] / "data" / "cables.csv"
 GRAVITY = 9.81

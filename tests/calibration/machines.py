@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from tests.calibration.reference import Machine
 from tests.kinematics.feasible import feasible_plan
 from tests.statics.test_sensitivities import planar, point

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 import sagline as sl
-from sagline.arrays import Array, locked
 from sagline.calibration.findings import CrossValidation, Direction, Outlier
 from sagline.calibration.unknowns import KINDS, Parameters
+from sagline.core.arrays import Array, locked
 
 NAMES = ("frame_anchors", "length_zero", "axial_stiffness", "mass", "center_of_mass")
 SENSORS = sl.Sensors(length_deviation=5e-4, tension_deviation=5.0, position_deviation=1e-3)

@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from tests.calibration.reference import counts_of
 
 

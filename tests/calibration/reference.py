@@ -8,8 +8,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import sagline as sl
-from sagline.arrays import Array, locked
 from sagline.calibration.unknowns import KINDS, Parameters
+from sagline.core.arrays import Array, locked
 from sagline.kernels.calibration import kinds
 from sagline.robot.drum import drums_of
 

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import sagline as sl
-from sagline.arrays import Array
 from sagline.calibration.unknowns import KINDS
+from sagline.core.arrays import Array
 from tests.calibration.reference import counts_of
 from tests.kinematics.feasible import box_poses
 

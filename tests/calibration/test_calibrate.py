@@ -8,9 +8,9 @@ import pytest
 
 import sagline as sl
 from sagline import InvalidValueError
-from sagline.arrays import Array
 from sagline.calibration import search
 from sagline.calibration.parameters import parameters_of
+from sagline.core.arrays import Array
 from tests.calibration.synthetic import (
     LENGTH_NOISE,
     TENSION_NOISE,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.arrays import Array, Flags
+from sagline.core.arrays import Array, Flags
 from tests.calibration.synthetic import Synthetic, log_of, true_robot, usual_sensors
 from tests.tiers import wide
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.arrays import Array
 from sagline.calibration.findings import Direction
 from sagline.calibration.gauge import folded, frame_of, gauge_of, told
 from sagline.calibration.observing import observed
 from sagline.calibration.unknowns import KINDS, Parameters
+from sagline.core.arrays import Array
 from tests.calibration import reference
 from tests.calibration.machines import Standing, robots, standing, with_drums
 from tests.calibration.reference import Machine, pose_rows

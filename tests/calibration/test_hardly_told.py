@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.arrays import Array
 from sagline.calibration.findings import Direction
 from sagline.calibration.gauge import folded, frame_of, gauge_of
 from sagline.calibration.hardly_told import cannot_tell_apart
 from sagline.calibration.observing import observed
 from sagline.calibration.unknowns import Parameters
+from sagline.core.arrays import Array
 from tests.calibration import reference
 from tests.calibration.machines import standing
 from tests.calibration.reference import pose_rows

@@ -5,8 +5,8 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from sagline.arrays import Array, Indices
 from sagline.calibration.information import Information, deviations_of, ground, most_telling
+from sagline.core.arrays import Array, Indices
 from tests.tiers import wide
 
 SURELY = 1.0 - np.exp(-1.0)  # of the best log det, which a greedy choice never misses

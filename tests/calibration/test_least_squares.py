@@ -5,13 +5,13 @@ import pytest
 from scipy.optimize import least_squares
 
 import sagline as sl
-from sagline.arrays import Array
 from sagline.calibration.calibrate import readings_of, sensors_there
 from sagline.calibration.least_squares import moved, passed, solve
 from sagline.calibration.parameters import external, parameters_of, robot_with
 from sagline.calibration.problem import Fit, Log, Problem, State, machine_at, said_lengths
 from sagline.calibration.sensors import load_cells_of
 from sagline.calibration.start import start_of
+from sagline.core.arrays import Array
 from tests.calibration import reference
 from tests.calibration.machines import robots, standing
 from tests.calibration.synthetic import Synthetic, log_of, true_robot, usual_sensors, with_drums

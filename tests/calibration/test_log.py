@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from tests.refusal import refused
 
 N, M = 4, 3

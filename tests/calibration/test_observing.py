@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.arrays import Array
 from sagline.calibration.observing import observed
 from sagline.calibration.unknowns import KINDS
+from sagline.core.arrays import Array
 from tests.calibration import reference
 from tests.calibration.machines import Standing, robots, sensors, standing
 from tests.calibration.reference import Machine, pose_rows

@@ -9,9 +9,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import sagline as sl
-from sagline.arrays import Array
 from sagline.calibration.expected import known_of, moved_at
 from sagline.calibration.parameters import offset_with, parameters_of, robot_with
+from sagline.core.arrays import Array
 from tests.calibration.reference import counts_of, pose_rows
 from tests.calibration.synthetic import log_of, true_robot, with_drums
 from tests.kinematics.feasible import box_poses

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.arrays import Array
 from sagline.calibration import chosen_poses
 from sagline.calibration.observing import observed
 from sagline.calibration.parameters import parameters_of
 from sagline.calibration.unknowns import KINDS
+from sagline.core.arrays import Array
 from tests.calibration import reference
 from tests.calibration.machines import robots
 from tests.calibration.reference import counts_of, pose_rows

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.arrays import Array
 from sagline.calibration.screening import lengths_of, reading_count, screened
+from sagline.core.arrays import Array
 from tests.calibration.synthetic import Synthetic, log_of, true_robot, usual_sensors, with_drums
 from tests.refusal import refused
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.arrays import Array
 from sagline.calibration.findings import CrossValidation, Direction, Outlier
 from sagline.calibration.relative import anchor_covariance, relative_covariance
 from sagline.calibration.words import in_words, rows_in_words
+from sagline.core.arrays import Array
 from tests.calibration.made_up import MOTIONS, STEP, made_up, motions, parameters
 from tests.refusal import refused
 

@@ -16,7 +16,7 @@ from sagline.calibration.words import in_words
 from sagline.cli import calibrate as cli
 from sagline.cli import terminal
 from sagline.cli.main import app
-from sagline.numbers import SPACE
+from sagline.core.numbers import SPACE
 from tests.abuse.command_lines import commands
 from tests.calibration.made_up import made_up
 from tests.calibration.synthetic import log_of, true_robot, usual_sensors, with_drums

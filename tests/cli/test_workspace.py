@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 import sagline as sl
 from sagline.cli.main import app
 from sagline.cli.regions import box_of, wrenches_of
-from sagline.errors import MOST
+from sagline.core.errors import MOST
 from tests.tiers import extended
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 import sagline as sl
-from sagline.arrays import Array, Indices
+from sagline.core.arrays import Array, Indices
 
 DELAY = 1.5e-3  # s: half a period of the drives, and one to work in
 # Hz; a platform's mode is a percent wide

@@ -9,11 +9,11 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 import sagline as sl
-from sagline.arrays import Array
 from sagline.control.controller import Controller
 from sagline.control.link import Command, Missing, Sample
 from sagline.control.recording import Recorded
 from sagline.control.states import State
+from sagline.core.arrays import Array
 from sagline.twin.machine import Machine
 
 HOME = sl.Pose.from_euler([0.0, 0.0, 1.5], 0.0, 0.0, 0.0)

@@ -9,10 +9,10 @@ import pytest
 
 import sagline as sl
 from sagline import Path
-from sagline.arrays import Array
 from sagline.control.checks import motion_along
 from sagline.control.link import PERIOD
 from sagline.control.states import RefusedError
+from sagline.core.arrays import Array
 from tests.control.rigs import HOME, at, prototype, rig, state_of
 
 RATE = 100.0

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.arrays import Array
 from sagline.control.cycle import Cycle
 from sagline.control.fault import Reaction
 from sagline.control.faults import FAULT_TABLE, FAULTS, faults_of
 from sagline.control.link import GroupFault, GroupStatus, Mode, Sample, WinchState
+from sagline.core.arrays import Array
 from tests.control.lockstep import OWNER, ROBOT, Change, course, cycles, one, told, with_sample
 from tests.refusal import refused
 from tests.tiers import extended, wide

@@ -9,10 +9,10 @@ import pytest
 from scipy.linalg import expm
 
 import sagline as sl
-from sagline.arrays import Array
 from sagline.control.link import PERIOD
 from sagline.control.null_space import null_space
 from sagline.control.tension_loop import TensionLoop, TensionSettings
+from sagline.core.arrays import Array
 from tests.control.margins import FREQUENCY, Margins, axis, closed_loops, closed_poles, inner_loops, margins
 from tests.control.stops import PROTOTYPE, stops
 from tests.kinematics.feasible import feasible_plan

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.arrays import Array
 from sagline.control.null_space import NullSpace, null_space
+from sagline.core.arrays import Array
 from tests.control.stops import PROTOTYPE, stops
 from tests.kinematics.feasible import feasible_plan
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.arrays import Array
 from sagline.control.null_space import NullSpace, null_space
 from sagline.control.tension_loop import TensionLoop, TensionSettings
+from sagline.core.arrays import Array
 from tests.control.stops import stops
 from tests.refusal import refused
 

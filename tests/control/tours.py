@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 import sagline as sl
-from sagline.arrays import Array
 from sagline.control.checks import Motion
 from sagline.control.controller import Controller
 from sagline.control.tension_loop import TensionSettings
+from sagline.core.arrays import Array
 from sagline.twin.machine import Machine
 from tests.control.rigs import HOME, rig
 from tests.control.stops import TEN_POSES

@@ -8,9 +8,9 @@ import pytest
 from syrupy.assertion import SnapshotAssertion
 
 import sagline as sl
-from sagline.arrays import Array
 from sagline.calibration.observing import observed
 from sagline.calibration.parameters import parameters_of
+from sagline.core.arrays import Array
 from sagline.statics.tables import pose_rows
 from tests.calibration.synthetic import USUAL, log_of, true_robot, with_drums
 from tests.tiers import extended

@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 
 LIFT = sl.MinimumNorm()
 

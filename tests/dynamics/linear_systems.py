@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from tests.kinematics.feasible import center, unbalance
 from tests.statics.test_stiffness import richardson
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.dynamics.carrier import Carrier
 from sagline.kernels.dynamics import rigid_body as body
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.dynamics.chains_at_rest import chains_at_rest
 from tests.refusal import refused
 from tests.tiers import extended, wide

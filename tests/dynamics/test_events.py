@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import cumulative_trapezoid, trapezoid
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.dynamics.drives import NEEDED
 from sagline.dynamics.events import Event
 from tests.dynamics.let_go import LIFT

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.dynamics.flexibility import flexibility
 from tests.dynamics.linear_systems import flexibility_of, stretch_of
 from tests.tiers import wide

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.dynamics.string_swings import Cable, _edges, _longest
 from tests.dynamics.linear_systems import mass_of
 from tests.kinematics.feasible import feasible_plan

@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.signal import lsim
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from tests.dynamics.linear_systems import (
     flexibility_of,
     mass_of,

@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import simpson, solve_ivp
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.dynamics.modal import answering, swing_modes
 from tests.refusal import refused
 from tests.tiers import extended

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.dynamics.curves import Bent
 from sagline.dynamics.hermite import piecewise
 from sagline.dynamics.moves import moves_of

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from tests.dynamics.let_go import LIFT, beside, integrated, lopsided
 from tests.tiers import extended, wide
 

@@ -8,9 +8,9 @@ import numpy as np
 from scipy.stats import chi2
 
 import sagline as sl
-from sagline.arrays import Array
 from sagline.calibration.screening import screened
 from sagline.calibration.suspicions import suspicions
+from sagline.core.arrays import Array
 from tests.calibration.example_log import EXAMPLES, example_log, example_truth, text_of
 from tests.tiers import extended
 

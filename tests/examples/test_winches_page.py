@@ -11,8 +11,8 @@ import pytest
 from typer.testing import CliRunner
 
 import sagline as sl
-from sagline.arrays import Array
 from sagline.cli.main import app
+from sagline.core.arrays import Array
 from tests.docs.test_snippets import blocks
 from tests.examples.test_commands import lines_of
 from tests.tiers import extended

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 
 STRICT = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-O2")
 SOLVED, BAD_INPUT, DEEP_SAG, OVERSTRAINED, SINGULAR, INFEASIBLE, NOT_CONVERGED = range(7)

@@ -6,7 +6,7 @@ import numpy as np
 
 import sagline as sl
 from sagline import Occurrence, dump_robot
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.files.simulation_layout import LARGEST, NODES, SAMPLES, TIME
 
 ROBOT = sl.load_robot("article-suspended")

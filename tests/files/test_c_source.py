@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from tests.files.c_programs import (
     BAD_INPUT,
     DEEP_SAG,

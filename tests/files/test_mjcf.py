@@ -22,7 +22,7 @@ from sagline import (
     inverse,
     load_robot,
 )
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from tests.refusal import refused
 from tests.tiers import extended, wide
 

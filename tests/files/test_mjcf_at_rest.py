@@ -6,7 +6,7 @@ import pytest
 from scipy.linalg import eigh
 
 from sagline import Cable, Elastic, Pose, Robot, dump_mjcf, forward, inverse, load_robot, modes, robot_names
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.files.mjcf import _dynamics
 from tests.tiers import extended
 

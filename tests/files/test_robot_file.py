@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from syrupy.assertion import SnapshotAssertion
 
 from sagline import Cable, FileError, InvalidValueError, PoseBox, Robot, Winch, dump_robot, load_robot, robot_names
-from sagline.errors import printable
+from sagline.core.errors import printable
 from sagline.files.robot_file import parse_robot
 from sagline.robot.provenance import Provenance
 from sagline.robot.tolerances import UNCERTAIN, value_of

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 import sagline as sl
 from sagline import Mesh
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 
 LEVEL = np.eye(3)
 _FACES = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1]]

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from tests.interference.scenes import at_rest, cable_points, from_box, from_segment, turned
 from tests.tiers import wide
 

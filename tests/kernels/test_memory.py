@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sagline.arrays import Array, Indices
+from sagline.core.arrays import Array, Indices
 from sagline.kernels.balance.setting import new_balance
 from sagline.kernels.cable.cables import new_cables
 from sagline.kernels.codes import LOWEST_MAXIMUM, LOWEST_SUM

@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import sagline as sl
-from sagline.arrays import Array, locked
+from sagline.core.arrays import Array, locked
 from tests.tiers import extended
 
 Variable = Literal["chord", "horizontal", "frame_end"]

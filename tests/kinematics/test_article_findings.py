@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from tests.tiers import wide
 
 ROBOTS = ("article-suspended", "article-mixed")

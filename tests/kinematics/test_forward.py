@@ -9,7 +9,7 @@ import scipy.optimize
 from scipy.spatial.transform import Rotation
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from tests.kinematics.feasible import angle_error, box_poses, by_tier, feasible_plan, moved, position_error, unbalance
 from tests.refusal import refused
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.arrays import Array, Indices
+from sagline.core.arrays import Array, Indices
 from sagline.tension.methods import METHODS
 from tests.kinematics.feasible import Variable
 from tests.tiers import extended, wide

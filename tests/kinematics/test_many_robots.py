@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 import sagline as sl
-from sagline.arrays import Array, locked
+from sagline.core.arrays import Array, locked
 from sagline.kinematics.forward_rows import solve_rows
 from sagline.kinematics.start import outside_limits
 from tests.kinematics.feasible import box_poses, feasible_plan, moved, pose_rows

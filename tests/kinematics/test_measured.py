@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from tests.kinematics.feasible import feasible_plan, motion_between, position_error
 
 COGIRO = sl.load_robot("cogiro")

@@ -11,7 +11,7 @@ from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from tests.tension.reference import needed, presets, random_poses, ropes, structure, unbalanced
 from tests.tiers import extended, wide
 

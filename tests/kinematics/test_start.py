@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import sagline as sl
-from sagline.arrays import locked
+from sagline.core.arrays import locked
 from sagline.kinematics.forward_rows import solve_rows
 from sagline.kinematics.start import hung, middle, outside_limits, start_quaternions
 from tests.kinematics.feasible import pose_rows

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from tests.kinematics.winches import wound
 from tests.refusal import refused
 from tests.tension.reference import random_poses

@@ -12,7 +12,7 @@ import pytest
 
 import sagline as sl
 from sagline import FileError, InvalidValueError
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.optimization.folder import EVALUATIONS, REQUEST
 from sagline.optimization.rating import Rating
 from tests.optimization.pair import UNDER, apart, pair

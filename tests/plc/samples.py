@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.arrays import Array
 from sagline.control import Command, Mode, Sample
+from sagline.core.arrays import Array
 
 
 def a_sample(winches: int, seed: int = 0, **values: Any) -> Sample:

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.arrays import Array
 from sagline.control import Mode, Pace, Sample, State
+from sagline.core.arrays import Array
 from sagline.twin import SCAN
 from tests.control.protocol import HEARTBEAT, PERIOD, RAMP, GroupFault, GroupStatus
 from tests.plc.follower import OWNER, RATE

@@ -9,7 +9,7 @@ import numpy as np
 
 import sagline as sl
 from sagline import Damping, EnergyBalance, Occurrence, Simulation, Vibration, VibrationStatus
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 
 ROBOT = sl.load_robot("article-suspended")
 

@@ -11,7 +11,7 @@ from syrupy.assertion import SnapshotAssertion
 
 import sagline as sl
 from sagline import Calibration, plot
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.plot.calibration import LINE, MOST_POSES, REACH, _apart
 from tests.calibration.made_up import NAMES, made_up
 from tests.refusal import refused

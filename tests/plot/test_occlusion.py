@@ -5,7 +5,7 @@ from itertools import combinations, pairwise, product
 import numpy as np
 import pytest
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.plot.occlusion import ALONG, Line, directions, seen
 from tests.tiers import wide
 

@@ -5,7 +5,7 @@ import pytest
 from matplotlib.lines import Line2D
 from scipy.optimize import fsolve
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from tests.article.hanging import GRAVITY, end_of
 from tests.report.conftest import Written
 

@@ -5,8 +5,8 @@ import re
 import numpy as np
 import pytest
 
-from sagline.arrays import Array
 from sagline.article.constants import published_sampling
+from sagline.core.arrays import Array
 from sagline.report.blocks import Finding
 from sagline.report.sag import sag_chapter
 from tests.article.hanging import GRAVITY, length_and_force

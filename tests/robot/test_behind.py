@@ -10,7 +10,7 @@ from scipy.integrate import quad, solve_ivp
 from scipy.optimize import minimize_scalar, root
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.robot.behind import kernel_length
 from sagline.robot.drum import drum_tension
 from tests.tiers import extended

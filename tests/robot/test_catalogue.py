@@ -6,7 +6,7 @@ from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
 from sagline import InvalidValueError, Pose, Robot, dump_robot, forward, inverse, load_robot, robot_names
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.robot.catalogue import preset_text
 from tests.refusal import refused
 from tests.tiers import extended, wide

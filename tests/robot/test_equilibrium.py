@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from tests.refusal import refused
 
 ROBOT = sl.load_robot("article-suspended")

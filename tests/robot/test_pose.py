@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from sagline import InvalidValueError, Pose, forward, load_robot
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from tests.effort import least_seconds
 from tests.refusal import refused
 from tests.tiers import extended

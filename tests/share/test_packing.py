@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.share.course import MOST_RATE, of_plan
 from sagline.share.packing import Channel, packed
 from sagline.share.page import course_page

@@ -10,7 +10,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.robot.bounds import home_pose
 from sagline.share.course import of_plan
 from sagline.share.page import LENGTH, POSITION, TENSION, TIME, TURN, course_page, robot_page

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.cable import geometry
 from sagline.statics.chords import chord_geometry, touching_angle
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from tests.kinematics.feasible import feasible_plan, motion_between
 from tests.statics.test_stiffness import richardson
 from tests.tiers import wide

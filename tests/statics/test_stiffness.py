@@ -6,7 +6,7 @@ import scipy.linalg
 from scipy.spatial.transform import Rotation
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from tests.kinematics.feasible import center, feasible_plan, motion_between, unbalance
 
 MODELS = [sl.Catenary(), sl.Elastic(), sl.Parabolic(), sl.Empirical()]

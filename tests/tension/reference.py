@@ -9,7 +9,7 @@ from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
 from sagline import Cable, MinimumNorm, Plan, Pose, Robot, inverse, load_robot, robot_names
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 
 BORDER_ROBOTS = ["article-suspended", "article-mixed", "expo2015-lucia", "ipanema-1", "fast"]
 

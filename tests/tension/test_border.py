@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import minimize
 
 from sagline import Catenary, MinimumNorm, PoseStatus, forward, inverse
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from tests.tension.reference import BORDER_ROBOTS, Border, found_border, structure
 from tests.tiers import wide
 

@@ -8,8 +8,8 @@ import numpy as np
 
 import sagline as sl
 from sagline import Plan
-from sagline.arrays import Array
 from sagline.control import Command, Link, Missing, Mode, Sample
+from sagline.core.arrays import Array
 from tests.control.protocol import HEARTBEAT
 
 HOME = sl.Pose.from_euler([0.0, 0.0, 1.5], 0.0, 0.0, 0.0)

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.arrays import Array
 from sagline.control import Command, Mode, Sample
+from sagline.core.arrays import Array
 from sagline.twin.server import block_of
 from tests.control.protocol import GroupFault, GroupStatus
 from tests.plc.protocol import CLAIM, FROM_PLC, TO_PLC, BlockLink, Refusal

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, Indices
+from sagline.core.arrays import Array, Indices
 
 RADIUS, WALL, PER_METER = 1.5, 1.0, 100.0  # m, m, N/m
 

@@ -11,7 +11,7 @@ import pytest
 from scipy.optimize import linprog
 
 import sagline as sl
-from sagline.arrays import locked
+from sagline.core.arrays import locked
 from sagline.viewer.channel import chosen_by
 from sagline.viewer.missing import missing_of
 from sagline.viewer.missing_nearest import NearestHeld, nearest_held

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.viewer.panel import mass_range
 from sagline.viewer.playback import Playback
 from sagline.viewer.run import Run

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 
 GRID = 4000
 LOOSEST = 5.0  # half a cable's weight over its chord tension: fifteen times as long as its chord, see `margin`

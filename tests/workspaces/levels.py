@@ -3,7 +3,7 @@
 import numpy as np
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.workspaces.margin_rows import MarginRows
 from tests.workspaces.shapes import Level
 

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.workspaces.pose_cells import PRECISION, Prover
 from sagline.workspaces.wrench_sets import load_of
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 
 Level = Callable[[Array], Array]
 

@@ -3,7 +3,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.workspaces.boundary import Boundary, boundary
 from tests.refusal import refused
 from tests.tiers import extended, wide

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from tests.tiers import extended
 from tests.workspaces.all_facets import all_facets, crafted, mean_arm, no_load, pulls_on_a_grid
 from tests.workspaces.test_margin import poses_of

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.workspaces.crossing import brackets, crossings, way_to_box
 from tests.workspaces.shapes import Counted, Level
 

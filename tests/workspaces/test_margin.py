@@ -11,7 +11,7 @@ from scipy.optimize import linprog
 
 import sagline as sl
 from sagline import InvalidValueError
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels import tables
 from sagline.workspaces.margin_rows import MarginRows
 from tests.refusal import refused

@@ -5,7 +5,7 @@ import pytest
 
 import sagline as sl
 from sagline import LeastMargin, MinimumNorm, Orientations, Surface, WrenchSet
-from sagline.arrays import Array, locked
+from sagline.core.arrays import Array, locked
 from sagline.workspaces.levels import Levels
 from sagline.workspaces.outline import Outline, outline
 from sagline.workspaces.region import Region, region_of

@@ -3,7 +3,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial import ConvexHull
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.workspaces.boundary import boundary
 from sagline.workspaces.rays import generations, ray_hull, ray_hull_by_facets
 from tests.refusal import refused

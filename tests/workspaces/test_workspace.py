@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.workspaces.criteria.criterion import Judged, no_cable
 from sagline.workspaces.criteria.given import Given
 from sagline.workspaces.space import BY_BOX

@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array
 from sagline.article.intercept import intercept_studies
 from sagline.article.sag_constant import sag_study
 from sagline.article.sampling import GRAVITY, Sampling, article_sampling
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Array
+from sagline.core.errors import InvalidValueError
 
 PUBLISHED_K_H = 4.845  # m/s^2, in magnitude: Gia Luan & Truong Thinh 2020, section 4.2.2
 PUBLISHED_K_P = 4.385  # m^2/s^4: section 5.2.4

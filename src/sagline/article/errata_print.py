@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from sagline.arrays import Array
 from sagline.article.erratum import Erratum, Quantity
 from sagline.article.simulation import ROBOTS
 from sagline.article.table2 import table2
+from sagline.core.arrays import Array
 from sagline.files.robot_file import load_robot
 from sagline.robot.pose import Pose
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from sagline.arrays import Array
 from sagline.article.erratum import Erratum, Quantity
 from sagline.article.sampling import GRAVITY
 from sagline.article.simulation import METHOD, ROBOTS
 from sagline.cables.catenary import Catenary
 from sagline.cables.empirical import Empirical
+from sagline.core.arrays import Array
 from sagline.files.robot_file import load_robot
 from sagline.kinematics.confirm import confirm
 from sagline.kinematics.inverse import inverse

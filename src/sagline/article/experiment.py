@@ -16,7 +16,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array, locked
 from sagline.article.machine import DRUM, ZERO, Errors, machine
 from sagline.article.table2 import Table2, table2
 from sagline.article.ten_poses import HOME
@@ -28,6 +27,8 @@ from sagline.control.null_space import null_space
 from sagline.control.recording import Recorded
 from sagline.control.states import RefusedError, State
 from sagline.control.tension_loop import TensionSettings
+from sagline.core.arrays import Array, locked
+from sagline.core.status import Status
 from sagline.files.robot_file import load_robot
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan
@@ -35,7 +36,6 @@ from sagline.motion.path import Path
 from sagline.motion.rest_to_rest import quintic_path
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.status import Status
 from sagline.twin.machine import Machine
 
 PROTOTYPE: Final = "article-prototype"

@@ -8,9 +8,9 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from sagline.arrays import Array, Flags
 from sagline.article.machine import Errors, Parameter
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Array, Flags
+from sagline.core.errors import InvalidValueError
 
 STEP = 0.01  # of a plausible error, for the slopes
 NEWTON_STEPS = 20

@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array
 from sagline.article.fits import Line, fit_line
 from sagline.article.sampling import GRAVITY
 from sagline.cables.cable import Cable
 from sagline.cables.catenary import Catenary
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Array
+from sagline.core.errors import InvalidValueError
 
 CORNERS = np.array([(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0), (1.0, 0.0)])  # of |x| + |z| = 1
 

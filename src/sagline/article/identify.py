@@ -9,17 +9,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import instance
-from sagline.arrays import Array, Flags, checked, kernel_input, number
 from sagline.article.fits import fit_factor
 from sagline.cables.cable import Cable
 from sagline.cables.catenary import Catenary
 from sagline.cables.empirical import Empirical
 from sagline.cables.model import CableState
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import instance
+from sagline.core.arrays import Array, Flags, checked, kernel_input, number
+from sagline.core.errors import InvalidValueError
+from sagline.core.memory import check_memory
+from sagline.core.results import Result
 from sagline.kernels.cable.batch import batch_end
-from sagline.memory import check_memory
-from sagline.results import Result
 
 CONFIDENCE = 0.95
 POINT_BYTES = 400.0  # what each combination of span, rise and tension takes while it is fitted

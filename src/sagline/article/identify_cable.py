@@ -9,13 +9,13 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import brief, choice, optional
-from sagline.arrays import Array, checked, locked, number
 from sagline.cables.cable import Cable
 from sagline.cables.catenary import Catenary
-from sagline.errors import InvalidValueError
-from sagline.numbers import n
-from sagline.results import Result
+from sagline.core.arguments import brief, choice, optional
+from sagline.core.arrays import Array, checked, locked, number
+from sagline.core.errors import InvalidValueError
+from sagline.core.numbers import n
+from sagline.core.results import Result
 
 TensionAt = Literal["frame_end", "platform_end", "chord"]
 UNITS = {"linear_density": "kg/m", "axial_stiffness": "N", "length_offset": "m"}

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sagline.arrays import Array
 from sagline.article.fits import fit_factor, fit_line
 from sagline.article.sampling import Sampling
+from sagline.core.arrays import Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from sagline.arrays import Array
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Array
+from sagline.core.errors import InvalidValueError
 from sagline.kinematics.forward import forward
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array, checked
 from sagline.article.identify import position_error
 from sagline.article.sampling import GRAVITY
 from sagline.cables.cable import Cable
@@ -17,6 +16,7 @@ from sagline.cables.empirical import Empirical
 from sagline.cables.model import CableModel
 from sagline.cables.parabolic import Parabolic
 from sagline.cables.straight import Straight
+from sagline.core.arrays import Array, checked
 
 MODELS: tuple[CableModel, ...] = (Straight(), Elastic(), Empirical(), Parabolic(), Catenary())  # coarse to exact
 

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sagline.arrays import Array
 from sagline.article.feasible_sets import End
 from sagline.article.fits import fit_factor
 from sagline.article.sampling import GRAVITY, UNSTRETCHABLE, Sampling
 from sagline.cables.cable import Cable
 from sagline.cables.catenary import Catenary
+from sagline.core.arrays import Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array, checked
 from sagline.cables.cable import Cable
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableState
+from sagline.core.arrays import Array, checked
 
 GRAVITY = 9.81  # m/s^2, everywhere in the article's studies
 ANGLE = 0.754  # rad, of the article's figure 10

@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array
 from sagline.article.model_errors import MODELS
 from sagline.cables.empirical import Empirical
 from sagline.cables.model import CableModel
+from sagline.core.arrays import Array
 from sagline.files.robot_file import load_robot
 from sagline.kinematics.confirm import Confirmation, confirm
 from sagline.kinematics.inverse import inverse

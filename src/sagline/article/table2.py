@@ -8,7 +8,7 @@ from importlib.resources import files
 
 import numpy as np
 
-from sagline.arrays import Array, locked
+from sagline.core.arrays import Array, locked
 
 
 @dataclass(frozen=True, slots=True, eq=False)

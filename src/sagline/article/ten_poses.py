@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, locked
 from sagline.article.explanations import ErrorOf, Explanation, explanations, subsets, tangents
 from sagline.article.fits import Line, fit_line
 from sagline.article.machine import ANCHORS, DEAD, PARAMETERS, PULLEY, ZERO, Errors, Parameter, machine, rest
 from sagline.article.table2 import Table2, table2
 from sagline.cables.empirical import Empirical
+from sagline.core.arrays import Array, locked
 from sagline.files.robot_file import load_robot
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sagline.arguments import choice
-from sagline.arrays import Array, broadcast_shape, checked, locked, spread
-from sagline.memory import check_memory
+from sagline.core.arguments import choice
+from sagline.core.arrays import Array, broadcast_shape, checked, locked, spread
+from sagline.core.memory import check_memory
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array, broadcast_shape, checked, locked
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Array, broadcast_shape, checked, locked
+from sagline.core.errors import InvalidValueError
 from sagline.kernels.cable.creep import creep_strains
 
 MOST_ELEMENTS = 2

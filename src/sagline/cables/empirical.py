@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from sagline.arrays import number
 from sagline.cables.model import CableModel
+from sagline.core.arrays import number
 from sagline.kernels import codes
 
 

@@ -9,16 +9,16 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sagline.arguments import instance, whole_number
-from sagline.arrays import Array, Codes, checked, kernel_input, locked, number
 from sagline.cables.cable import Cable
 from sagline.cables.problem import Problem
-from sagline.errors import InvalidValueError
-from sagline.indices import length_of, part_of
+from sagline.core.arguments import instance, whole_number
+from sagline.core.arrays import Array, Codes, checked, kernel_input, locked, number
+from sagline.core.errors import InvalidValueError
+from sagline.core.indices import length_of, part_of
+from sagline.core.memory import check_memory
+from sagline.core.results import Result
 from sagline.kernels.cable import batch, shape
 from sagline.kernels.cable.terms import Terms
-from sagline.memory import check_memory
-from sagline.results import Result
 
 _ARRAYS = (
     "span",

@@ -8,10 +8,10 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array, Codes, broadcast_shape, checked, kernel_input, locked, number
 from sagline.cables.cable import Cable
-from sagline.errors import CableGeometryError, InvalidValueError
-from sagline.memory import check_memory
+from sagline.core.arrays import Array, Codes, broadcast_shape, checked, kernel_input, locked, number
+from sagline.core.errors import CableGeometryError, InvalidValueError
+from sagline.core.memory import check_memory
 
 
 class Problem(NamedTuple):

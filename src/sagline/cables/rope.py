@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-from sagline.arrays import checked
 from sagline.cables.cable import Cable
+from sagline.core.arrays import checked
 
 SAFETY = 5.0  # breaking force over the highest tension that a robot may use, as usual for general lifting
 

@@ -7,9 +7,6 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arguments import callback, instance, whole_number
-from sagline.arrays import Array, Indices
-from sagline.blocks import Progress
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.calibration.conclusion import concluded
@@ -25,9 +22,12 @@ from sagline.calibration.sensors import Sensors
 from sagline.calibration.status import Omission
 from sagline.calibration.suspicions import GOOD, fits_unmeasured, measured_elsewhere, suspicions, wrong_units
 from sagline.calibration.unknowns import Parameters, Unknown
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import callback, instance, whole_number
+from sagline.core.arrays import Array, Indices
+from sagline.core.errors import InvalidValueError
+from sagline.core.numbers import counted
+from sagline.core.progress import Progress
 from sagline.kernels import codes
-from sagline.numbers import counted
 from sagline.robot.robot import Robot
 
 _CATENARY = Catenary()

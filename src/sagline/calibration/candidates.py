@@ -6,10 +6,10 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, Codes, Flags, Indices, locked
-from sagline.blocks import Progress, blocks
 from sagline.cables.model import CableModel
-from sagline.errors import CableGeometryError, InvalidValueError
+from sagline.core.arrays import Array, Codes, Flags, Indices, locked
+from sagline.core.errors import CableGeometryError, InvalidValueError
+from sagline.core.progress import Progress, blocks
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.status import PoseStatus
 from sagline.robot.pattern import ROTATING

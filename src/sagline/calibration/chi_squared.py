@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.special import chdtr, chdtrc, chdtri
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 
 
 def below(squares: Any, freedoms: Any) -> Array:

@@ -9,13 +9,13 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arrays import Array
 from sagline.calibration.further import error_in_words
 from sagline.calibration.sensors import Sensors
 from sagline.calibration.tour import length_of
 from sagline.calibration.unknowns import Parameters
-from sagline.numbers import SPACE, counted, n
-from sagline.results import Result, Saved
+from sagline.core.arrays import Array
+from sagline.core.numbers import SPACE, counted, n
+from sagline.core.results import Result, Saved
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 

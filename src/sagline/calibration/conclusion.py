@@ -8,8 +8,6 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, Flags, Indices, locked
-from sagline.blocks import blocks
 from sagline.calibration.chi_squared import above, below, exceeded_with
 from sagline.calibration.findings import CrossValidation, Outlier
 from sagline.calibration.gauge import OPEN, folded, gauge_of
@@ -23,6 +21,8 @@ from sagline.calibration.provenance import provenance_of
 from sagline.calibration.result import Calibration
 from sagline.calibration.search import Found
 from sagline.calibration.status import CalibrationStatus, Omission
+from sagline.core.arrays import Array, Flags, Indices, locked
+from sagline.core.progress import blocks
 from sagline.robot.pose import Pose
 
 DOUBTFUL: Final = 1e-4  # chi squared that would be so far from what is to be expected that rarely is none

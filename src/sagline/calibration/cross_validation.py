@@ -7,15 +7,15 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from sagline.arrays import Array, Flags, locked
-from sagline.blocks import Progress, blocks
 from sagline.calibration.findings import CrossValidation
 from sagline.calibration.least_squares import passed, solve
 from sagline.calibration.observing import BLOCK, NO_LOAD, Machine
 from sagline.calibration.problem import Problem, machine_at, said_lengths
 from sagline.calibration.search import Found
 from sagline.calibration.sensors import load_cells_of
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Array, Flags, locked
+from sagline.core.errors import InvalidValueError
+from sagline.core.progress import Progress, blocks
 from sagline.kernels.calibration import kinds
 from sagline.kinematics.forward_rows import solve_rows
 

@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array
 from sagline.cables.model import CableModel
 from sagline.calibration.plain_slopes import plain_slopes
 from sagline.calibration.sensors import Sensors
 from sagline.calibration.unknowns import Parameters
+from sagline.core.arrays import Array
 from sagline.kinematics.inverse import inverse
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot

@@ -8,9 +8,9 @@ from typing import Final, NamedTuple
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from sagline.arrays import Array, Flags, Indices, locked
 from sagline.calibration.observing import NO_LOAD
 from sagline.calibration.plain_slopes import Bench, said_at
+from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.kernels.calibration.terms import Readings
 from sagline.kinematics.forward_rows import solve_rows
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sagline.arrays import Array, Indices, locked
 from sagline.cables.model import CableModel
 from sagline.calibration.sensors import Sensors
 from sagline.calibration.status import CalibrationStatus, Omission
 from sagline.calibration.unknowns import Parameters
-from sagline.results import Result
+from sagline.core.arrays import Array, Indices, locked
+from sagline.core.results import Result
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 

@@ -7,14 +7,14 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array
 from sagline.cables.model import CableModel
 from sagline.calibration.candidates import Candidates
 from sagline.calibration.information import Information, told_by
 from sagline.calibration.observing import observed
 from sagline.calibration.sensors import Sensors
 from sagline.calibration.unknowns import Parameters
-from sagline.numbers import n
+from sagline.core.arrays import Array
+from sagline.core.numbers import n
 from sagline.robot.robot import Robot
 
 TOTAL_STATION: Final = 1e-3  # m, of each coordinate

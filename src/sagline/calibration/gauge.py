@@ -7,12 +7,12 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, Indices, locked
 from sagline.calibration.findings import Direction
 from sagline.calibration.generators import Generator, Symmetries, symmetries
 from sagline.calibration.sensors import Sensors
 from sagline.calibration.steps import easiest
 from sagline.calibration.unknowns import KINDS, Parameters
+from sagline.core.arrays import Array, Indices, locked
 from sagline.kernels.calibration import kinds
 from sagline.robot.robot import Robot
 

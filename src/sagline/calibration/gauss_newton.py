@@ -7,8 +7,8 @@ from typing import Final
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve, eigh
 
-from sagline.arrays import Array
 from sagline.calibration.problem import Normal, Problem, State
+from sagline.core.arrays import Array
 
 OPEN: Final = 1e-13  # of the largest: smaller eigenvalues are rounding
 

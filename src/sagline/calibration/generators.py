@@ -10,10 +10,10 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, Flags
 from sagline.calibration.sensors import Sensors
 from sagline.calibration.turn import left_jacobian
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Array, Flags
+from sagline.core.errors import InvalidValueError
 from sagline.kernels.calibration import kinds
 from sagline.robot.drum import drums_of
 from sagline.robot.robot import Robot

@@ -8,11 +8,11 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, Flags, Indices, locked
 from sagline.calibration.findings import Direction
 from sagline.calibration.gauge import Frame, frame_of
 from sagline.calibration.steps import easiest, easy_place
 from sagline.calibration.unknowns import Parameters
+from sagline.core.arrays import Array, Flags, Indices, locked
 
 LITTLE: Final = 0.5  # of the prior's deviation: where more is left, the readings said little
 ALIKE: Final = 0.98  # correlation: beyond it two numbers are known five times worse than their sum or difference

@@ -8,7 +8,6 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, Indices
 from sagline.cables.model import CableModel
 from sagline.calibration.gauss_newton import best_step
 from sagline.calibration.least_squares import passed, solve
@@ -17,7 +16,8 @@ from sagline.calibration.parameters import parameters_of
 from sagline.calibration.problem import Begun, Log, Problem, State, machine_at, said_lengths
 from sagline.calibration.start import start_of
 from sagline.calibration.unknowns import Unknown
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Array, Indices
+from sagline.core.errors import InvalidValueError
 from sagline.robot.drum import drums_of
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot

@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, Indices
+from sagline.core.arrays import Array, Indices
 
 FEW: Final = 8  # readings a number: with more, exchanges lower no error by a hundredth
 OPEN: Final = 1e-12  # of the largest singular value: of a direction with less nothing is known

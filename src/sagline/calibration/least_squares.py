@@ -10,8 +10,6 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arrays import Array, Flags, Indices, locked
-from sagline.blocks import Progress, blocks
 from sagline.calibration.carried import carried
 from sagline.calibration.chi_squared import exceeded_with
 from sagline.calibration.gauss_newton import best_step
@@ -20,7 +18,9 @@ from sagline.calibration.paid import counts_of, paid_slopes
 from sagline.calibration.problem import Begun, Fit, Normal, Problem, State, machine_at, said_lengths
 from sagline.calibration.sensors import Sensors, reading_deviations
 from sagline.calibration.turn import left_jacobian
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Array, Flags, Indices, locked
+from sagline.core.errors import InvalidValueError
+from sagline.core.progress import Progress, blocks
 from sagline.kernels.calibration import kinds
 from sagline.kernels.calibration.terms import Readings
 from sagline.kinematics.forward_rows import solve_rows

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import choice, instance, optional, text
-from sagline.arrays import Array, Flags, Indices, checked, locked
 from sagline.calibration.sensors import Sensors
-from sagline.errors import InvalidValueError
-from sagline.indices import part_of
-from sagline.results import Result, Saved
+from sagline.core.arguments import choice, instance, optional, text
+from sagline.core.arrays import Array, Flags, Indices, checked, locked
+from sagline.core.errors import InvalidValueError
+from sagline.core.indices import part_of
+from sagline.core.results import Result, Saved
 from sagline.robot.pose import Pose
 from sagline.robot.unit import unit
 

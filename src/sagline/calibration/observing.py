@@ -6,12 +6,12 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, kernel_input, locked
 from sagline.cables.model import CableModel
 from sagline.calibration.paid import counts_of, paid_slopes
 from sagline.calibration.parameters import slopes_of_values
 from sagline.calibration.sensors import Sensors
 from sagline.calibration.unknowns import Parameters
+from sagline.core.arrays import Array, kernel_input, locked
 from sagline.kernels.calibration import kinds
 from sagline.kernels.calibration.observe import observe
 from sagline.kernels.calibration.terms import BESIDE, Readings, SensingArrays

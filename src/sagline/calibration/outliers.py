@@ -8,7 +8,6 @@ from typing import Final
 import numpy as np
 from scipy.special import gammaln
 
-from sagline.arrays import Array, Flags, Indices
 from sagline.cables.model import CableModel
 from sagline.calibration.chi_squared import above, exceeded_with
 from sagline.calibration.explaining import Explained, Stand, Suspect, explained
@@ -16,6 +15,7 @@ from sagline.calibration.findings import Outlier
 from sagline.calibration.plain_slopes import bench_of, said_at
 from sagline.calibration.problem import Problem, State, said_lengths
 from sagline.calibration.sensors import Sensors, reading_deviations
+from sagline.core.arrays import Array, Flags, Indices
 from sagline.kernels.calibration.terms import Readings
 from sagline.robot.robot import Robot
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from sagline.arrays import Array
 from sagline.cables.cable import Cable
 from sagline.calibration.unknowns import Parameters
+from sagline.core.arrays import Array
 from sagline.kernels.calibration import kinds
 from sagline.robot.drum import Drums, drums_of
 from sagline.robot.robot import Robot

@@ -7,11 +7,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from sagline.arguments import brief, instance
-from sagline.arrays import Array, locked
 from sagline.calibration.sensors import Sensors
 from sagline.calibration.unknowns import KINDS, Kind, Parameters, Unknown
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import brief, instance
+from sagline.core.arrays import Array, locked
+from sagline.core.errors import InvalidValueError
 from sagline.kernels.calibration import kinds
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot

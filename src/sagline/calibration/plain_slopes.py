@@ -6,14 +6,14 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array
-from sagline.blocks import blocks
 from sagline.cables.model import CableModel
 from sagline.calibration.observing import BLOCK, Machine, any_readings, machine_of, observed_rows
 from sagline.calibration.paid import SLOPES, counts_of, paid_slopes
 from sagline.calibration.parameters import parameters_of
 from sagline.calibration.sensors import Sensors
 from sagline.calibration.unknowns import Parameters, Unknown
+from sagline.core.arrays import Array
+from sagline.core.progress import blocks
 from sagline.kernels.calibration.terms import Readings
 from sagline.robot.robot import Robot
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sagline.arrays import Array, locked
-from sagline.numbers import counted, n
-from sagline.results import Result
+from sagline.core.arrays import Array, locked
+from sagline.core.numbers import counted, n
+from sagline.core.results import Result
 from sagline.robot.pose import Pose
 
 

@@ -7,9 +7,6 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arguments import callback, instance, optional, whole_number
-from sagline.arrays import Array, Flags, Indices, locked
-from sagline.blocks import Progress
 from sagline.cables.catenary import Catenary
 from sagline.calibration.calibrate import UNKNOWNS
 from sagline.calibration.candidates import Candidates, candidates_of
@@ -22,8 +19,11 @@ from sagline.calibration.parameters import parameters_of, slopes_of_values
 from sagline.calibration.sensors import Sensors
 from sagline.calibration.tour import short_tour
 from sagline.calibration.unknowns import KINDS, Parameters, Unknown
-from sagline.errors import InvalidValueError
-from sagline.memory import check_memory
+from sagline.core.arguments import callback, instance, optional, whole_number
+from sagline.core.arrays import Array, Flags, Indices, locked
+from sagline.core.errors import InvalidValueError
+from sagline.core.memory import check_memory
+from sagline.core.progress import Progress
 from sagline.robot.pattern import ROTATING
 from sagline.robot.pose import Pose
 from sagline.robot.pose_box import PoseBox

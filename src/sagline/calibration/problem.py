@@ -6,13 +6,13 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, Indices
 from sagline.cables.model import CableModel
 from sagline.calibration.observing import Machine, Observed, machine_of
 from sagline.calibration.paid import paid_out
 from sagline.calibration.parameters import external, internal, offset_with, robot_with, sensors_with
 from sagline.calibration.sensors import Sensors
 from sagline.calibration.unknowns import KINDS, Parameters
+from sagline.core.arrays import Array, Indices
 from sagline.robot.robot import Robot
 
 _AT_LEAST_NONE: Final = ("pulley_radius", "dead_cable")  # kinds of which less than nothing is none, and nothing usual

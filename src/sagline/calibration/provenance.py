@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from sagline.arrays import Array
 from sagline.calibration.status import CalibrationStatus
 from sagline.calibration.unknowns import KINDS, Parameters
+from sagline.core.arrays import Array
 from sagline.robot.provenance import Provenance
 from sagline.robot.tolerances import UNCERTAIN
 

@@ -6,8 +6,8 @@ from typing import Final, Literal
 
 import numpy as np
 
-from sagline.arrays import Array
 from sagline.calibration.unknowns import KINDS, Parameters
+from sagline.core.arrays import Array
 
 Anchors = Literal["frame_anchors", "platform_anchors"]
 _TURNS: Final = {"frame_anchors": (2,), "platform_anchors": (0, 1, 2)}  # axes about which nothing would notice

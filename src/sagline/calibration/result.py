@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import choice, instance
-from sagline.arrays import locked, numbers
 from sagline.calibration import words
 from sagline.calibration.expected import Known, about_center, expected_at, known_of, moved_at, scatter_of
 from sagline.calibration.findings import Findings
 from sagline.calibration.pose_error import PoseError
+from sagline.core.arguments import choice, instance
+from sagline.core.arrays import locked, numbers
+from sagline.core.results import Saved
 from sagline.kinematics.forward import forward
 from sagline.kinematics.forward_solution import ForwardSolution
-from sagline.results import Saved
 from sagline.robot.pose import Pose
 from sagline.statics.tables import pose_rows
 

@@ -8,12 +8,12 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.arguments import instance
-from sagline.arrays import Array, Flags, Indices, locked, number
 from sagline.calibration.log import WinchLog
 from sagline.calibration.sensors import load_cells_of
 from sagline.calibration.status import Omission
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import instance
+from sagline.core.arrays import Array, Flags, Indices, locked, number
+from sagline.core.errors import InvalidValueError
 from sagline.kinematics.encoder import lengths_from_counts
 from sagline.robot.robot import Robot
 

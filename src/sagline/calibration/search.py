@@ -7,8 +7,6 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Flags, Indices, locked
-from sagline.blocks import Progress
 from sagline.calibration.chi_squared import exceeded_with
 from sagline.calibration.least_squares import passed, solve
 from sagline.calibration.observing import NO_LOAD
@@ -16,7 +14,9 @@ from sagline.calibration.outliers import EXAMINED, outliers_in
 from sagline.calibration.problem import Begun, Fit, Problem, State, said_lengths
 from sagline.calibration.start import held_lengths, start_of
 from sagline.calibration.status import Omission
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Flags, Indices, locked
+from sagline.core.errors import InvalidValueError
+from sagline.core.progress import Progress
 from sagline.kinematics.start import search
 from sagline.robot.pose import Pose
 

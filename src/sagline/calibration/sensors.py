@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import choice, instance
-from sagline.arrays import Array, checked, exactly
-from sagline.errors import InvalidValueError
-from sagline.results import Result
+from sagline.core.arguments import choice, instance
+from sagline.core.arrays import Array, checked, exactly
+from sagline.core.errors import InvalidValueError
+from sagline.core.results import Result
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from sagline.arrays import Array, locked
 from sagline.calibration.observing import NO_LOAD, Machine
 from sagline.calibration.problem import Problem, State, machine_at, said_lengths
 from sagline.calibration.sensors import load_cells_of
+from sagline.core.arrays import Array, locked
 from sagline.kernels.calibration import kinds
 from sagline.kernels.calibration.starting_lengths import starting_lengths
 from sagline.kernels.memory import memory_for

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sagline.status import Status
+from sagline.core.status import Status
 
 
 class CalibrationStatus(Status):

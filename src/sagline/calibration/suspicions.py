@@ -8,14 +8,14 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arguments import instance
-from sagline.arrays import Array, Flags, Indices
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.calibration.hypotheses import Change, Trial
 from sagline.calibration.log import WinchLog
 from sagline.calibration.screening import screened
 from sagline.calibration.sensors import load_cells_of
+from sagline.core.arguments import instance
+from sagline.core.arrays import Array, Flags, Indices
 from sagline.robot.robot import Robot
 
 _CATENARY = Catenary()

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arrays import Array, Indices
+from sagline.core.arrays import Array, Indices
 
 PASSES: Final = 50  # over all pairs of legs; a tour of a hundred places takes a handful
 _ROUNDING: Final = 1e-9  # of the largest distance

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 
 _SMALL = 1e-4  # rad: below it the first terms of the series are exact
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
-from sagline.arguments import choice
-from sagline.arrays import Array, Flags, Indices, exactly
+from sagline.core.arguments import choice
+from sagline.core.arrays import Array, Flags, Indices, exactly
+from sagline.core.results import Result
 from sagline.kernels.calibration import kinds
-from sagline.results import Result
 
 
 class Kind(NamedTuple):

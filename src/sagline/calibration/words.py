@@ -8,12 +8,12 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arrays import Indices
 from sagline.calibration.findings import Direction, Findings, Outlier
 from sagline.calibration.relative import Anchors, anchor_covariance, relative_covariance
 from sagline.calibration.status import CalibrationStatus
 from sagline.calibration.unknowns import KINDS
-from sagline.numbers import SPACE, counted, n, plus_minus
+from sagline.core.arrays import Indices
+from sagline.core.numbers import SPACE, counted, n, plus_minus
 
 WIDTH: Final = 80
 MOST_OUTLIERS: Final = 12  # that are listed; the rest are counted

@@ -18,7 +18,7 @@ from sagline.cli.ending import OUTSIDE
 from sagline.cli.entries import FORWARD, INVERSE, READINGS, STARTING_LENGTHS
 from sagline.cli.terminal import note, show, show_json, show_pieces, working
 from sagline.cli.values import quantity
-from sagline.errors import FileError, InvalidValueError, printable
+from sagline.core.errors import FileError, InvalidValueError, printable
 from sagline.files.log_file import load_log
 from sagline.files.log_sensors import sensors_of_comments
 from sagline.files.robot_file import dump_robot, load_robot

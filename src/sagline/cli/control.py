@@ -20,7 +20,7 @@ from sagline.control.events import Event, EventKind
 from sagline.control.guard import interrupt_calls
 from sagline.control.pace import Pace
 from sagline.control.states import State
-from sagline.errors import InvalidValueError, SaglineError, nearest
+from sagline.core.errors import InvalidValueError, SaglineError, nearest
 from sagline.files.path_file import load_path
 from sagline.files.robot_file import load_robot
 from sagline.files.typed import pose_of

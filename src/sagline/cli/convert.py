@@ -14,14 +14,14 @@ from sagline.cli.choices import Format
 from sagline.cli.entries import FORWARD, INVERSE
 from sagline.cli.terminal import note, show_data, working
 from sagline.cli.values import quantity
-from sagline.errors import FileError, InvalidValueError
+from sagline.core.errors import FileError, InvalidValueError
+from sagline.core.numbers import n
 from sagline.files.imported import Imported
 from sagline.files.robot_file import dump_robot, load_robot
 from sagline.files.typed import FARTHEST, numbers
 from sagline.files.whole import write_text
 from sagline.kinematics.confirm import confirm
 from sagline.kinematics.inverse import inverse
-from sagline.numbers import n
 from sagline.robot.pose import Pose
 
 if TYPE_CHECKING:

@@ -75,7 +75,7 @@ def _told(error: BaseException, debug: bool) -> int:
 
         traceback.print_exception(error)
     from sagline.cli.terminal import note
-    from sagline.errors import LONGEST, shortened
+    from sagline.core.errors import LONGEST, shortened
 
     head, text, code = _message(error)
     (text,) = shortened((text,), LONGEST - len(head))
@@ -89,7 +89,7 @@ def _message(error: BaseException) -> tuple[str, str, int]:
     """Head, text and exit code."""
     from typer import Abort
 
-    from sagline.errors import HEAD, SaglineError, shortened
+    from sagline.core.errors import HEAD, SaglineError, shortened
 
     if isinstance(error, SaglineError):
         return HEAD, str(error), BAD_INPUT
@@ -117,7 +117,7 @@ def _message(error: BaseException) -> tuple[str, str, int]:
 def _usage(error: BaseException) -> str:
     text = str(error.format_message()).strip().replace(" Value error, ", " ", 1)  # type: ignore[attr-defined]
     if found := re.search(r"'([^']*)' is not one of (.*)", text):
-        from sagline.errors import nearest
+        from sagline.core.errors import nearest
 
         near = nearest(found[1].replace("_", "-"), re.findall(r"'([^']*)'", found[2]))
         text += f" Did you mean {near}?" if near else ""

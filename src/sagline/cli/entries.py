@@ -80,7 +80,7 @@ def _verdicts() -> None:
     import numpy as np
 
     import sagline as sl
-    from sagline.arrays import locked
+    from sagline.core.arrays import locked
     from sagline.kernels.codes import POSE_INFEASIBLE
     from sagline.kinematics.inverse_rows import Found, decide_rows
     from sagline.statics.tables import pose_rows
@@ -198,7 +198,7 @@ def _hung_state(name: str = ROBOT) -> Equilibrium:
     import numpy as np
 
     import sagline as sl
-    from sagline.arrays import locked
+    from sagline.core.arrays import locked
     from sagline.robot.contact import Contact
 
     robot, pose = sl.load_robot(name), sl.Pose(PLACE, LEVEL)
@@ -216,7 +216,7 @@ def _unknown_state(name: str = ROBOT) -> Equilibrium:
     import numpy as np
 
     import sagline as sl
-    from sagline.arrays import locked
+    from sagline.core.arrays import locked
 
     robot = sl.load_robot(name)
     unknown: Any = locked(np.full(robot.cable_count, np.nan))
@@ -236,9 +236,9 @@ def _readings(name: str = ROBOT) -> None:
     import numpy as np
 
     import sagline as sl
-    from sagline.arrays import locked
     from sagline.calibration.observing import observed
     from sagline.calibration.parameters import parameters_of
+    from sagline.core.arrays import locked
     from sagline.statics.tables import pose_rows
 
     state, sensors = _hung_state(name), sl.Sensors()
@@ -256,7 +256,7 @@ def _starting_lengths() -> None:
     import numpy as np
 
     import sagline as sl
-    from sagline.arrays import locked
+    from sagline.core.arrays import locked
     from sagline.kernels.calibration.starting_lengths import starting_lengths
     from sagline.kernels.memory import memory_for
     from sagline.statics.tables import body_table, cable_table, pose_rows

@@ -8,7 +8,7 @@ from pathlib import Path
 from shlex import quote
 
 from sagline.cli.terminal import show
-from sagline.errors import FileError
+from sagline.core.errors import FileError
 from sagline.files.whole import check_folder, made_folder, written_whole
 
 KINDS = (".py", ".yaml", ".csv", ".wcrfx")

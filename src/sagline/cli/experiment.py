@@ -16,11 +16,11 @@ from sagline.cli.terminal import note, show, show_json, working
 from sagline.cli.values import whole_of
 from sagline.control.controller import Controller
 from sagline.control.pace import Pace
-from sagline.errors import InvalidValueError, nearest
+from sagline.core.errors import InvalidValueError, nearest
+from sagline.core.numbers import n
 from sagline.files.json_text import plain
 from sagline.files.robot_file import load_robot
 from sagline.files.whole import check_files
-from sagline.numbers import n
 from sagline.report.experiment import NAMES, experiment_chapter, write_experiment
 from sagline.robot.robot import Robot
 from sagline.twin.machine import MOST_SEED

@@ -11,9 +11,9 @@ from contextlib import AbstractContextManager, nullcontext
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, NamedTuple
 
-from sagline.arrays import Array
 from sagline.cli.terminal import note, show, working
-from sagline.errors import FileError
+from sagline.core.arrays import Array
+from sagline.core.errors import FileError
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 

@@ -13,8 +13,8 @@ from sagline.article.identify_cable import UNITS, CableFit, TensionAt, identify_
 from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.cli.values import quantity
+from sagline.core.numbers import n
 from sagline.files.measurements import Measurements, load_measurements
-from sagline.numbers import n
 
 STEPS = 25  # along each axis of the working range
 TOLERANCE = 5e-3  # m, of the position: the article's own is 6 mm

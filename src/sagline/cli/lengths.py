@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sagline.arrays import Array
 from sagline.cli.choices import Winding
 from sagline.cli.csv_text import csv_text
 from sagline.cli.ending import OUTSIDE
 from sagline.cli.entries import needed_for
 from sagline.cli.terminal import note, show_data, working
-from sagline.errors import FileError
+from sagline.core.arrays import Array
+from sagline.core.errors import FileError
 from sagline.files.plan_file import load_plan
 from sagline.files.whole import write_text
 from sagline.kinematics.encoder import encoder_counts

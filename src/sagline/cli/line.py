@@ -9,10 +9,10 @@ from rich.console import Console, RenderableType
 from rich.progress import BarColumn, Progress, ProgressColumn, SpinnerColumn, Task, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
-from sagline.blocks import Progress as Told
 from sagline.cli.cold_start import compile_all
 from sagline.cli.compiling import Stage, first_run_text, heard
-from sagline.errors import printable
+from sagline.core.errors import printable
+from sagline.core.progress import Progress as Told
 
 PATIENCE = 2.0  # s: work that takes longer shows a bar and the time left
 

@@ -8,7 +8,6 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array
 from sagline.cli.tables import Grid, show_table
 from sagline.cli.terminal import show, show_json, working
 from sagline.cli.values import whole_of
@@ -16,9 +15,10 @@ from sagline.control.deviation import position_error
 from sagline.control.events import Event
 from sagline.control.execution import Execution
 from sagline.control.states import State
+from sagline.core.arrays import Array
+from sagline.core.numbers import n
 from sagline.files.execution_file import load_execution, save
 from sagline.files.whole import check_file
-from sagline.numbers import n
 
 MOST_EVENTS: Final = 20  # that are listed
 MOST_PLANS: Final = 100_000

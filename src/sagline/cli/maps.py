@@ -13,8 +13,8 @@ from sagline.cli.entries import INVERSE, MODES, VIBRATION
 from sagline.cli.results import figure_files, listed, write_figures
 from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
+from sagline.core.errors import InvalidValueError
 from sagline.dynamics.frequency_map import frequency_map
-from sagline.errors import InvalidValueError
 from sagline.files.names import file_stem
 from sagline.files.whole import check_files, made_folder
 from sagline.robot.pose import Pose

@@ -11,18 +11,18 @@ from typing import NamedTuple
 import numpy as np
 import typer
 
-from sagline.arrays import Array, checked
 from sagline.cables.rope import ROPES, SAFETY
 from sagline.cli.entries import INVERSE
 from sagline.cli.terminal import note, show, working
 from sagline.cli.values import quantity
-from sagline.errors import FileError, InvalidValueError
+from sagline.core.arrays import Array, checked
+from sagline.core.errors import FileError, InvalidValueError
+from sagline.core.numbers import n
 from sagline.files.quantity import in_si
 from sagline.files.robot_file import dump_robot, parse_robot
 from sagline.files.whole import write_text
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan
-from sagline.numbers import n
 from sagline.robot.design import COUNTS, LAYOUTS, SLACK_LIMIT, Design
 from sagline.robot.pose import Pose
 from sagline.robot.pose_box import PoseBox

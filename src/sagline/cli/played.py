@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 from sagline.cli.entries import FORWARD
 from sagline.cli.terminal import working
-from sagline.errors import FileError
+from sagline.core.errors import FileError
 from sagline.files.dataset import is_of
 from sagline.files.plan_file import load_plan
 from sagline.files.simulation_file import FORMAT, load_simulation

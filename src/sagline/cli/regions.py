@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from sagline.cli.values import quantity
-from sagline.errors import InvalidValueError
+from sagline.core.errors import InvalidValueError
 from sagline.files.quantity import in_si
 from sagline.files.typed import FARTHEST, wrench_of
 from sagline.robot.pose_box import PoseBox

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from sagline.arrays import Array
 from sagline.cli.tables import Grid, show_table
 from sagline.cli.terminal import show, show_json
+from sagline.core.arrays import Array
 from sagline.files.robot_file import load_robot
 from sagline.robot.catalogue import robot_names
 from sagline.robot.robot import Robot

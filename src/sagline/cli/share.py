@@ -7,7 +7,7 @@ from typing import Final
 
 from sagline.cli.entries import INVERSE
 from sagline.cli.terminal import show, working
-from sagline.errors import FileError, InvalidValueError
+from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.calibration_file import FORMAT as CALIBRATION
 from sagline.files.calibration_file import load_calibration
 from sagline.files.dataset import is_of

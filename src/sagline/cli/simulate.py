@@ -15,26 +15,26 @@ from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.cli.track import check_unit
 from sagline.cli.values import damping_of, loaded, middle_of, quantity
+from sagline.core.errors import FileError, InvalidValueError
+from sagline.core.numbers import n
 from sagline.dynamics.events import Break
 from sagline.dynamics.shaped import shaped
 from sagline.dynamics.shapers import EI, ZV, ZVD
 from sagline.dynamics.simulate import simulate as integrated
 from sagline.dynamics.to_shape import to_shape
 from sagline.dynamics.vibrating import vibration
-from sagline.errors import FileError, InvalidValueError
 from sagline.files.names import file_stem
 from sagline.files.path_file import load_path
 from sagline.files.robot_file import load_robot
 from sagline.files.typed import wrench_of
 from sagline.files.whole import check_files, made_folder
 from sagline.kinematics.inverse import inverse
-from sagline.numbers import n
 from sagline.robot.several import anything_behind
 from sagline.statics.stiffness import modes
 
 if TYPE_CHECKING:
-    from sagline.arrays import Array
     from sagline.cli.line import Line
+    from sagline.core.arrays import Array
     from sagline.dynamics.simulation import Simulation
     from sagline.kinematics.plan import Plan
     from sagline.motion.path import Path as MotionPath

@@ -7,16 +7,16 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from sagline.arrays import Array
-from sagline.blocks import Progress
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
+from sagline.core.arrays import Array
+from sagline.core.numbers import n
+from sagline.core.progress import Progress
 from sagline.files.names import file_stem
 from sagline.kinematics.confirm import Confirmation, confirm
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Gap, Plan
 from sagline.motion.path import Path
-from sagline.numbers import n
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 

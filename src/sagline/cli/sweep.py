@@ -11,9 +11,9 @@ from sagline.cli.entries import INVERSE, SHARING, VERDICTS
 from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.cli.values import whole_of
-from sagline.errors import InvalidValueError, SaglineError
+from sagline.core.errors import InvalidValueError, SaglineError
+from sagline.core.numbers import counted
 from sagline.files.whole import check_folder, made_folder
-from sagline.numbers import counted
 from sagline.sweep.cluster import check_address
 from sagline.sweep.file import load_sweep
 from sagline.sweep.running import MOST_WORKERS, opened_for, run

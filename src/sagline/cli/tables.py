@@ -15,7 +15,7 @@ from rich.table import Table
 from rich.text import Text
 
 from sagline.cli.terminal import FREE, show_pieces
-from sagline.errors import printable
+from sagline.core.errors import printable
 
 
 @dataclass(frozen=True, slots=True)

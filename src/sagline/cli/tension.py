@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sagline.arrays import Array
 from sagline.cli.choices import Model, Variable
 from sagline.cli.ending import OUTSIDE
 from sagline.cli.entries import INVERSE, MARGINS, POLYGON, SHARING
@@ -15,7 +14,9 @@ from sagline.cli.results import figure_files, write_figures
 from sagline.cli.tables import Grid, show_table
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.cli.values import loaded, middle_of
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Array
+from sagline.core.errors import InvalidValueError
+from sagline.core.numbers import n
 from sagline.files.names import file_stem
 from sagline.files.robot_file import load_robot
 from sagline.files.typed import pose_of, wrench_of
@@ -23,7 +24,6 @@ from sagline.files.whole import check_files, made_folder
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.polygon import tension_polygon
 from sagline.kinematics.status import PoseStatus
-from sagline.numbers import n
 from sagline.robot.pose import Pose
 from sagline.tension.margin import capacity_margin
 from sagline.tension.method import TensionMethod

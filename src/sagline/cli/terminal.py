@@ -14,9 +14,9 @@ from rich.console import Console, RenderableType
 from rich.padding import Padding
 from rich.text import Text
 
-from sagline.errors import FileError, SaglineWarning, printable
+from sagline.core.errors import FileError, SaglineWarning, printable
+from sagline.core.numbers import SPACE
 from sagline.files.json_text import json_text
-from sagline.numbers import SPACE
 
 if TYPE_CHECKING:
     from sagline.cli.line import Line

@@ -14,7 +14,7 @@ from sagline.cli.results import figure_files, tell, write_figures, write_plans
 from sagline.cli.study import Run, run_along, run_name
 from sagline.cli.terminal import working
 from sagline.cli.values import loaded
-from sagline.errors import FileError
+from sagline.core.errors import FileError
 from sagline.files.path_file import load_path
 from sagline.files.robot_file import load_robot
 from sagline.files.typed import wrench_of

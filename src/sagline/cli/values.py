@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from sagline.arrays import checked
+from sagline.core.arrays import checked
+from sagline.core.errors import InvalidValueError
 from sagline.dynamics.damping import Damping
-from sagline.errors import InvalidValueError
 from sagline.files.quantity import in_si
 from sagline.robot.inertia import with_mass
 from sagline.robot.pose import Pose

@@ -15,11 +15,11 @@ from sagline.cli.results import figure_files, listed, write_figures
 from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.cli.values import damping_of, loaded, middle_of, quantity
+from sagline.core.errors import InvalidValueError
 from sagline.dynamics.damping import Damping
 from sagline.dynamics.mode_list import MASSLESS, WITH_MASS, ListedMode, listed_modes, successors
 from sagline.dynamics.vibrating import vibration
 from sagline.dynamics.vibration_status import VibrationStatus
-from sagline.errors import InvalidValueError
 from sagline.files.names import file_stem
 from sagline.files.robot_file import load_robot
 from sagline.files.typed import pose_of, wrench_of

@@ -9,7 +9,7 @@ from sagline.cli.hosting import HOME, Start, check_viewer, hosted
 from sagline.cli.played import LOG, check_robot, played_beside, played_in
 from sagline.cli.values import loaded, port_of
 from sagline.cli.view_log import view_log
-from sagline.errors import InvalidValueError
+from sagline.core.errors import InvalidValueError
 from sagline.files.calibration_file import FORMAT as CALIBRATION
 from sagline.files.calibration_file import load_calibration
 from sagline.files.dataset import is_of

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 from sagline.cli.hosting import check_viewer, hosted
 from sagline.cli.played import no_cycle, played_beside
 from sagline.cli.terminal import note, working
-from sagline.errors import FileError, SaglineError
+from sagline.core.errors import FileError, SaglineError
 from sagline.files.robot_file import load_robot
 
 if TYPE_CHECKING:

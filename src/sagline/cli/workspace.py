@@ -15,13 +15,13 @@ from sagline.cli.results import figure_files, listed, write_figures
 from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.cli.values import loaded, quantity
-from sagline.errors import InvalidValueError
+from sagline.core.errors import InvalidValueError
+from sagline.core.numbers import counted
 from sagline.files.mesh_file import load_mesh
 from sagline.files.names import file_stem
 from sagline.files.robot_file import load_robot
 from sagline.files.scene_file import load_scene
 from sagline.files.whole import check_files, made_folder
-from sagline.numbers import counted
 from sagline.workspaces.criteria.clearance import Clearance
 from sagline.workspaces.criteria.frame import InFrame
 from sagline.workspaces.criteria.frequency import LeastFrequency

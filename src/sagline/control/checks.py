@@ -7,10 +7,10 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arrays import Array, Indices, locked
 from sagline.cables.model import CableModel
 from sagline.control.gains import Gains, gains_along
 from sagline.control.states import RefusedError
+from sagline.core.arrays import Array, Indices, locked
 from sagline.dynamics.drives import lever_of
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan

@@ -6,7 +6,6 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Flags
 from sagline.control.link import (
     COUNTERS,
     OWNER_TIMEOUT,
@@ -19,6 +18,7 @@ from sagline.control.link import (
     fault_text,
 )
 from sagline.control.states import RefusedError
+from sagline.core.arrays import Flags
 
 CLAIMING: Final = OWNER_TIMEOUT + 0.7  # s, at most, until all grants are there
 SILENT: Final = 7.0  # s, at most, until every group has answered once

@@ -9,8 +9,6 @@ from typing import Final, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import instance
-from sagline.arrays import number
 from sagline.cables.model import CableModel
 from sagline.control.aside import aside
 from sagline.control.checks import Motion, check_lead, check_motion, check_start, motion_along
@@ -27,7 +25,9 @@ from sagline.control.pace import Pace
 from sagline.control.recording import Recorder
 from sagline.control.states import MOTION, RefusedError, State, check_transition
 from sagline.control.tension_loop import TensionSettings
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import instance
+from sagline.core.arrays import number
+from sagline.core.errors import InvalidValueError
 from sagline.motion.path import Path
 from sagline.motion.rest_to_rest import septic_path
 from sagline.robot.pose import Pose

@@ -7,11 +7,11 @@ from typing import Final, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
-from sagline.arrays import Array, Flags
 from sagline.cables.model import CableModel
 from sagline.control.checks import Motion
 from sagline.control.link import RAMP
 from sagline.control.null_space import NullSpace, null_space
+from sagline.core.arrays import Array, Flags
 from sagline.kinematics.forward import forward
 from sagline.kinematics.forward_status import STABLE, ForwardStatus
 from sagline.robot.drum import drum_tension

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from sagline.arrays import Array
 from sagline.control.link import Command, Mode, Sample
 from sagline.control.null_space import NullSpace
+from sagline.core.arrays import Array
 
 MOVING: Final = 1e-3  # m/s: a set point that changes faster is in motion
 

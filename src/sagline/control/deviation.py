@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from sagline.arguments import instance
-from sagline.arrays import Array, locked, number
 from sagline.control.execution import Execution
 from sagline.control.gains import gains_along
 from sagline.control.tension_loop import TensionSettings
+from sagline.core.arguments import instance
+from sagline.core.arrays import Array, locked, number
 
 
 def planned_position(execution: Execution) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import isfinite
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 
 
 def finite(values: Array) -> bool:

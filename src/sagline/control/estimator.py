@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sagline.arrays import Array
 from sagline.cables.model import CableModel
+from sagline.core.arrays import Array
 from sagline.kinematics.forward_solver import ForwardSolver
 from sagline.kinematics.forward_status import STABLE, ForwardStatus
 from sagline.robot.pose import Pose

@@ -7,11 +7,11 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arrays import Array, Flags
 from sagline.control.cycle import MOVING, Cycle
 from sagline.control.ends import ends, finite, largest
 from sagline.control.link import RAMP, WinchState, groups_of
 from sagline.control.load_cells import SIGMAS
+from sagline.core.arrays import Array, Flags
 from sagline.robot.robot import Robot
 
 SLACK_SHARE: Final = 0.3  # of the lower limit: a cable that pulls less is slack

@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.arguments import whole_number
-from sagline.arrays import Array, Codes, Flags, Indices, locked
 from sagline.control.events import Event
 from sagline.control.link import Sample
 from sagline.control.recording import (
@@ -19,11 +17,13 @@ from sagline.control.recording import (
     WHOLE_OF_WINCHES,
     Tape,
 )
+from sagline.core.arguments import whole_number
+from sagline.core.arrays import Array, Codes, Flags, Indices, locked
+from sagline.core.results import Result, Saved
+from sagline.core.status import Status
 from sagline.kinematics.plan import Plan
-from sagline.results import Result, Saved
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.status import Status
 
 
 class ExecutionStatus(Status):

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from sagline.arguments import brief, instance
-from sagline.arrays import number
 from sagline.control.evidence import Evidence
 from sagline.control.fault import Fault
 from sagline.control.faults_cells import CellDead, CellOff, CellStuck
@@ -25,7 +23,9 @@ from sagline.control.faults_tension import CableBroken, OverTension, Slack
 from sagline.control.link import PERIOD
 from sagline.control.load_cells import cell_errors
 from sagline.control.tension_loop import TensionSettings
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import brief, instance
+from sagline.core.arrays import number
+from sagline.core.errors import InvalidValueError
 from sagline.robot.robot import Robot
 
 LARGEST_CORRECTION: Final = TensionSettings().largest  # m

@@ -7,13 +7,13 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arrays import Array
 from sagline.control.cycle import Cycle
 from sagline.control.ends import largest
 from sagline.control.evidence import Evidence
 from sagline.control.fault import Fault, Reaction
 from sagline.control.faults_tension import SLACK_SAMPLES
 from sagline.control.load_cells import SIGMAS
+from sagline.core.arrays import Array
 
 STUCK_SAMPLES: Final = 50
 ODD_TIME: Final = 0.35  # s: for so long a cell must be at odds; the ramps and swings of the platform take less

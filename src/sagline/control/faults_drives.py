@@ -7,13 +7,13 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arrays import Array
 from sagline.control.connecting import BEHIND
 from sagline.control.cycle import Cycle
 from sagline.control.ends import finite, largest
 from sagline.control.evidence import Evidence
 from sagline.control.fault import Fault, Reaction
 from sagline.control.link import COUNTERS, Command, GroupStatus, Mode, Sample, WinchState, newer
+from sagline.core.arrays import Array
 
 JUMP: Final = 1e-3  # m a cycle
 OFF_BEAT: Final = 1.5  # cycles that a PLC's clock and the commands it took may differ by from sample to sample

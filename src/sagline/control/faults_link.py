@@ -7,11 +7,11 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arrays import Flags
 from sagline.control.cycle import Cycle
 from sagline.control.evidence import Evidence
 from sagline.control.fault import Fault, Reaction
 from sagline.control.link import GroupFault, GroupStatus, Mode, WinchState, fault_text
+from sagline.core.arrays import Flags
 
 STALE, SILENT = 3, 10  # cycles
 WINDOW: Final = 100  # cycles that are looked back on

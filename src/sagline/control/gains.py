@@ -8,10 +8,10 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arguments import instance
-from sagline.arrays import Array, locked, number
 from sagline.control.null_space import NullSpace, null_space
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import instance
+from sagline.core.arrays import Array, locked, number
+from sagline.core.errors import InvalidValueError
 from sagline.kinematics.plan import Plan
 from sagline.robot.several import first_of
 

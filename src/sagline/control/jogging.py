@@ -8,13 +8,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import whole_number
-from sagline.arrays import Array, checked, number
 from sagline.cables.model import CableModel
 from sagline.control.checks import Motion, check_lead
 from sagline.control.courses import Fade, SetPoint, smooth, smooth_slope
 from sagline.control.states import RefusedError
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import whole_number
+from sagline.core.arrays import Array, checked, number
+from sagline.core.errors import InvalidValueError
 from sagline.kinematics.forward import forward
 from sagline.kinematics.forward_status import ForwardStatus
 from sagline.kinematics.inverse_solver import InverseSolver

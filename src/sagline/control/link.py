@@ -8,8 +8,8 @@ from typing import Final, NamedTuple, Protocol, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.arrays import Array, Flags
-from sagline.status import Status
+from sagline.core.arrays import Array, Flags
+from sagline.core.status import Status
 
 Whole: TypeAlias = NDArray[np.int64]
 

@@ -6,8 +6,8 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arguments import instance
-from sagline.arrays import Array, locked
+from sagline.core.arguments import instance
+from sagline.core.arrays import Array, locked
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.robot import Robot
 from sagline.robot.several import first_of

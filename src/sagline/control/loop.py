@@ -11,8 +11,6 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arguments import brief, instance, optional, whole_number
-from sagline.arrays import Array, number
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.control.aside import aside
@@ -36,8 +34,10 @@ from sagline.control.sender import Sender
 from sagline.control.states import HOLDS_GRANT, MOTION, RefusedError, State, check_transition
 from sagline.control.tension_loop import TensionLoop, TensionSettings
 from sagline.control.warm import load_all
+from sagline.core.arguments import brief, instance, optional, whole_number
+from sagline.core.arrays import Array, number
+from sagline.core.errors import InvalidValueError
 from sagline.dynamics.drives import lever_of
-from sagline.errors import InvalidValueError
 from sagline.kinematics.forward_status import ForwardStatus
 from sagline.kinematics.plan import Plan
 from sagline.robot.robot import Robot

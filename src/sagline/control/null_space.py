@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, locked
 from sagline.control.load_cells import parity
+from sagline.core.arrays import Array, locked
 from sagline.robot.equilibrium import Equilibrium
 from sagline.statics.stiffness import stiffness
 

@@ -8,9 +8,9 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arrays import Indices, locked, number
 from sagline.control.link import PERIOD
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Indices, locked, number
+from sagline.core.errors import InvalidValueError
 
 BIN: Final = 1e-4  # s
 BINS: Final = 1000  # and one for all that is longer

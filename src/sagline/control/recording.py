@@ -8,12 +8,12 @@ from typing import Any, Final, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.arrays import Array, Indices
 from sagline.control.events import Event
 from sagline.control.link import Command, Missing, Sample
 from sagline.control.states import State
+from sagline.core.arrays import Array, Indices
+from sagline.core.status import Status
 from sagline.kinematics.plan import Plan
-from sagline.status import Status
 
 # what a cycle leaves, of m winches and G groups: real numbers, and whole ones
 REAL_OWN: Final = ("time", "late", "clock")

@@ -6,8 +6,8 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arrays import Array, Flags
 from sagline.control.link import COUNTERS, HEARTBEAT, Command, Mode, Sample
+from sagline.core.arrays import Array, Flags
 
 VALID_FOR: Final = HEARTBEAT  # s: so long a PLC may go on with a command
 MOST_OWNER: Final = 2**31

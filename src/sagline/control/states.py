@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from sagline.errors import MOST, SaglineError, shortened
-from sagline.status import Status
+from sagline.core.errors import MOST, SaglineError, shortened
+from sagline.core.status import Status
 
 
 class State(Status):

@@ -7,12 +7,12 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arguments import instance, whole_number
-from sagline.arrays import Array, number
 from sagline.control.ends import finite, largest
 from sagline.control.link import PERIOD
 from sagline.control.null_space import NullSpace
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import instance, whole_number
+from sagline.core.arrays import Array, number
+from sagline.core.errors import InvalidValueError
 
 MOST_CABLES: Final = 10**6
 MOST_GAIN: Final = 0.1  # a cycle: a loop with five cycles of delay is unstable from 0.17 on

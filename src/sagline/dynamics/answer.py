@@ -6,8 +6,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array
-from sagline.blocks import blocks
+from sagline.core.arrays import Array
+from sagline.core.progress import blocks
 from sagline.dynamics.cable_dynamics import Complex, moving_stiffness
 from sagline.dynamics.component_modes import Components, Motions, component_modes, stretch_of_motions
 from sagline.dynamics.damping import Damping

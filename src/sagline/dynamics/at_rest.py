@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.dynamics.flexibility import flexibility
 from sagline.kernels.dynamics import string as columns
 from sagline.robot.equilibrium import Equilibrium

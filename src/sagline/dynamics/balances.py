@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.dynamics.curves import Jet
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from sagline.arguments import brief
-from sagline.arrays import Array, checked, number
 from sagline.cables.model import CableModel
+from sagline.core.arguments import brief
+from sagline.core.arrays import Array, checked, number
+from sagline.core.errors import InvalidValueError
 from sagline.dynamics.course import Course, table_in_time
-from sagline.errors import InvalidValueError
 from sagline.kernels import codes
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus

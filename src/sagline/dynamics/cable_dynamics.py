@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sagline.arguments import instance, optional
-from sagline.arrays import Array, checked, locked
+from sagline.core.arguments import instance, optional
+from sagline.core.arrays import Array, checked, locked
+from sagline.core.errors import InvalidValueError, SaglineError
+from sagline.core.memory import check_memory
 from sagline.dynamics.damping import Damping
-from sagline.errors import InvalidValueError, SaglineError
 from sagline.kernels import codes
 from sagline.kernels.dynamics import collocation
 from sagline.kernels.dynamics.collocation import dynamic_stiffnesses
-from sagline.memory import check_memory
 from sagline.robot.equilibrium import Equilibrium
 from sagline.statics.slopes import cable_slopes
 from sagline.statics.strings import Strings, strings_of

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.dynamics import rigid_body as body
 
 

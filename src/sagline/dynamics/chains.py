@@ -7,15 +7,15 @@ from typing import Any, ClassVar, Final
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from sagline.arguments import whole_number
-from sagline.arrays import Array, locked
+from sagline.core.arguments import whole_number
+from sagline.core.arrays import Array, locked
+from sagline.core.errors import InvalidValueError
 from sagline.dynamics.beginning import Beginning
 from sagline.dynamics.carrier import Carrier
 from sagline.dynamics.chains_at_rest import chains_at_rest
 from sagline.dynamics.course import Course
 from sagline.dynamics.damping import Damping
 from sagline.dynamics.plant import Plant, Records
-from sagline.errors import InvalidValueError
 from sagline.kernels import codes, tables
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.dynamics import chain as c

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, Flags, Indices
+from sagline.core.arrays import Array, Flags, Indices
 from sagline.dynamics.lobatto import lobatto
 from sagline.kernels.dynamics import string as columns
 from sagline.kernels.dynamics.spectral import interpolate, node_counts, spectral_matrices, stretch_matrices

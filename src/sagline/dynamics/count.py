@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.dynamics.cable_dynamics import check_counts, in_world
 from sagline.dynamics.reduced import Setting, dynamic_matrix
 from sagline.kernels.dynamics import collocation

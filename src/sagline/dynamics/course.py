@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array, checked, exactly, locked
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Array, checked, exactly, locked
+from sagline.core.errors import InvalidValueError
 from sagline.kernels.dynamics.tables_in_time import CourseArrays
 from sagline.motion.path import checked_time
 

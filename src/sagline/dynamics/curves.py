@@ -7,8 +7,8 @@ from typing import Any, Final, NamedTuple, Protocol
 
 import numpy as np
 
-from sagline.arrays import Array
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Array
+from sagline.core.errors import InvalidValueError
 from sagline.motion.profile import QUINTIC
 from sagline.motion.segments import Segments
 from sagline.robot.pose import Pose

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sagline.arrays import number
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import number
+from sagline.core.errors import InvalidValueError
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,9 +7,9 @@ from typing import Any, Final, Literal, TypeAlias, get_args
 
 import numpy as np
 
-from sagline.arguments import brief, choice
-from sagline.arrays import Array, number
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import brief, choice
+from sagline.core.arrays import Array, number
+from sagline.core.errors import InvalidValueError
 from sagline.kernels.dynamics import drives as d
 from sagline.robot.drum import drums_of, not_given
 from sagline.robot.robot import Robot

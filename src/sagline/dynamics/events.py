@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Final, TypeAlias
 
-from sagline.arguments import brief, whole_number
-from sagline.arrays import number
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import brief, whole_number
+from sagline.core.arrays import number
+from sagline.core.errors import InvalidValueError
 from sagline.robot.robot import Robot
 
 LAST: Final = 9_999  # cable or winch; no robot has more

@@ -6,10 +6,10 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arguments import instance
-from sagline.arrays import Array, locked
+from sagline.core.arguments import instance
+from sagline.core.arrays import Array, locked
+from sagline.core.errors import InvalidValueError
 from sagline.dynamics.moves import Move, moves_of
-from sagline.errors import InvalidValueError
 from sagline.motion.path import Path
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.robot import Robot

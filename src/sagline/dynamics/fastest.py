@@ -8,9 +8,10 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arguments import callback, instance
-from sagline.arrays import Array, locked, number
-from sagline.blocks import Progress
+from sagline.core.arguments import callback, instance
+from sagline.core.arrays import Array, locked, number
+from sagline.core.errors import InvalidValueError
+from sagline.core.progress import Progress
 from sagline.dynamics.balances import Balances, HalfPlanes
 from sagline.dynamics.curves import Curve
 from sagline.dynamics.drives import lever_of
@@ -18,7 +19,6 @@ from sagline.dynamics.jerk_bounded import Bounds, JerkProfile, fastest_course
 from sagline.dynamics.moves import Move, moves_of
 from sagline.dynamics.phase_plane import Profile, fastest_profile
 from sagline.dynamics.shaped import sample_time
-from sagline.errors import InvalidValueError
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, Flags
+from sagline.core.arrays import Array, Flags
 from sagline.robot.equilibrium import Equilibrium
 
 _SMOOTH = 0.1  # of u = w L/(N_A + N_B): up to there twelve points integrate to the last digit

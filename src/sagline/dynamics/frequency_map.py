@@ -7,9 +7,11 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from sagline.arguments import callback, instance, optional
-from sagline.arrays import Array, Codes, locked, number
-from sagline.blocks import Progress, blocks
+from sagline.core.arguments import callback, instance, optional
+from sagline.core.arrays import Array, Codes, locked, number
+from sagline.core.errors import InvalidValueError, SaglineError
+from sagline.core.progress import Progress, blocks
+from sagline.core.results import Result, Saved
 from sagline.dynamics.answer import Answer
 from sagline.dynamics.cable_dynamics import check_model
 from sagline.dynamics.damping import Damping
@@ -17,9 +19,7 @@ from sagline.dynamics.reduced import Setting, massless, setting_of
 from sagline.dynamics.robot_modes import Found, cable_shares, loss, modes_of
 from sagline.dynamics.strongest import coupled, strongest, summed
 from sagline.dynamics.vibration_status import VibrationStatus
-from sagline.errors import InvalidValueError, SaglineError
 from sagline.kinematics.inverse import inverse
-from sagline.results import Result, Saved
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot

@@ -8,18 +8,18 @@ from itertools import pairwise
 
 import numpy as np
 
-from sagline.arguments import instance
-from sagline.arrays import Array, Flags, Indices, locked, number
 from sagline.cables.catenary import Catenary
 from sagline.cables.elastic import Elastic
+from sagline.core.arguments import instance
+from sagline.core.arrays import Array, Flags, Indices, locked, number
+from sagline.core.errors import InvalidValueError
+from sagline.core.results import Result
 from sagline.dynamics.cable_dynamics import check_lengths
 from sagline.dynamics.flexibility import Flexibility, flexibility
 from sagline.dynamics.mode_slopes import Rest, Slopes, Swings, rest_of, slopes_of
 from sagline.dynamics.string_swings import cables_of_state, swings_of
 from sagline.dynamics.vibration import Vibration
 from sagline.dynamics.vibration_status import VibrationStatus
-from sagline.errors import InvalidValueError
-from sagline.results import Result
 from sagline.robot.equilibrium import Equilibrium
 from sagline.statics.stiffness import modes
 

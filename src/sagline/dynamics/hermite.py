@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 
 
 def piecewise(knots: Array, values: Array, at_end: int) -> Any:

@@ -8,7 +8,7 @@ from typing import Final, TypeAlias
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.dynamics.balances import Balances, HalfPlanes
 from sagline.dynamics.curves import Curve
 from sagline.kinematics.inverse import inverse

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
-from sagline.arguments import choice, instance
-from sagline.arrays import Array, locked
+from sagline.core.arguments import choice, instance
+from sagline.core.arrays import Array, locked
+from sagline.core.errors import InvalidValueError
+from sagline.core.results import Result
 from sagline.dynamics.damping import Damping
 from sagline.dynamics.flexibility import flexibility
-from sagline.errors import InvalidValueError
-from sagline.results import Result
 from sagline.robot.equilibrium import Equilibrium
 from sagline.statics.slopes import CableSlopes, cable_slopes, on_platform
 from sagline.statics.stiffness import mass_matrix, modes

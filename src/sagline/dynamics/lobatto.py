@@ -8,7 +8,7 @@ import numpy as np
 from numpy.polynomial import legendre
 from scipy.special import roots_jacobi
 
-from sagline.arrays import Array, locked
+from sagline.core.arrays import Array, locked
 from sagline.kernels.dynamics.spectral_elements import LARGEST_DEGREE, Lobatto
 
 

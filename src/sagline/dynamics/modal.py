@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from sagline.arrays import Array, locked, number
+from sagline.core.arrays import Array, locked, number
+from sagline.core.errors import InvalidValueError
+from sagline.core.memory import check_memory
 from sagline.dynamics.beginning import Beginning
 from sagline.dynamics.course import Course
 from sagline.dynamics.damping import Damping
@@ -18,9 +20,7 @@ from sagline.dynamics.simulation import Simulation, energy_balance, twist_of_ori
 from sagline.dynamics.vibrating import vibration
 from sagline.dynamics.vibration import Vibration
 from sagline.dynamics.vibration_status import VibrationStatus
-from sagline.errors import InvalidValueError
 from sagline.kernels import codes
-from sagline.memory import check_memory
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.statics.stiffness import Stiffness, modes, stiffness

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.dynamics.at_rest import stretch_losses
 from sagline.dynamics.vibration import Vibration
 from sagline.statics.stiffness import modes

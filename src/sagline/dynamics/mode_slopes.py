@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.robot.equilibrium import Equilibrium
 from sagline.statics.slopes import CableSlopes, cable_slopes
 from sagline.statics.stiffness import mass_matrix, stiffness

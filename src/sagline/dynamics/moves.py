@@ -8,10 +8,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
+from sagline.core.errors import InvalidValueError
 from sagline.dynamics.curves import Bent, Curve, Line, lengths
 from sagline.dynamics.hermite import piecewise
-from sagline.errors import InvalidValueError
 from sagline.motion.path import Path
 from sagline.robot.pose import Pose
 

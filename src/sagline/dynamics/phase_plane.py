@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.dynamics.balances import HalfPlanes
 
 _FLAT = 1e-12  # of the largest: rates that are none

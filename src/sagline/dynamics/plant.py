@@ -7,10 +7,10 @@ from typing import Any, ClassVar, Final
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from sagline.arrays import Array, Indices, locked
 from sagline.cables.model import CableModel
+from sagline.core.arrays import Array, Indices, locked
+from sagline.core.errors import InvalidValueError
 from sagline.dynamics.course import Course
-from sagline.errors import InvalidValueError
 from sagline.kernels import tables
 from sagline.kernels.cable.rows import CABLE_ROWS
 from sagline.kernels.cable.rows import LENGTH as LENGTH_ROW

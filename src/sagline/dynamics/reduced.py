@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, Flags
+from sagline.core.arrays import Array, Flags
 from sagline.dynamics.component_modes import Components, component_modes
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.several import first_of

@@ -8,17 +8,17 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import optional
-from sagline.arrays import Array, checked, locked
+from sagline.core.arguments import optional
+from sagline.core.arrays import Array, checked, locked
+from sagline.core.errors import InvalidValueError
+from sagline.core.memory import check_memory
+from sagline.core.results import Result
 from sagline.dynamics.answer import LOWEST, Answer
 from sagline.dynamics.cable_dynamics import Complex, check_lengths, one_state
 from sagline.dynamics.count import modes_below
 from sagline.dynamics.damping import Damping
 from sagline.dynamics.reduced import massless, setting_of
 from sagline.dynamics.robot_modes import check_number
-from sagline.errors import InvalidValueError
-from sagline.memory import check_memory
-from sagline.results import Result
 from sagline.robot.equilibrium import Equilibrium
 from sagline.statics.slopes import cable_slopes
 

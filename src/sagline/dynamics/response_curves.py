@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arguments import choice, instance
-from sagline.arrays import Array, locked
+from sagline.core.arguments import choice, instance
+from sagline.core.arrays import Array, locked
+from sagline.core.errors import InvalidValueError
 from sagline.dynamics.response import FrequencyResponse, frequency_response
 from sagline.dynamics.vibration import Vibration
 from sagline.dynamics.vibration_status import VibrationStatus
-from sagline.errors import InvalidValueError
 from sagline.statics.stiffness import modes, stiffness
 
 MOTIONS = ("x", "y", "z", "about x", "about y", "about z")

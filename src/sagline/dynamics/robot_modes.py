@@ -8,12 +8,12 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
+from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.dynamics.component_modes import Components, stretch
 from sagline.dynamics.count import modes_below
 from sagline.dynamics.damping import Damping
 from sagline.dynamics.reduced import Reduced, Setting, massless, reduced
-from sagline.errors import InvalidValueError, SaglineError
 
 MOST_MODES: Final = 2_000
 SLOW: Final = 1e-2  # of up_to: lower frequencies may be those of motions that nothing holds

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from sagline.arrays import locked
+from sagline.core.arrays import locked
 from sagline.dynamics.course import Course
 from sagline.dynamics.events import KINDS, Brake, Break, Drop, Event, PickUp, Stall, cable_of
 from sagline.dynamics.plant import NOTES, Plant, Records

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from sagline.arrays import Array, locked
+from sagline.core.arrays import Array, locked
 from sagline.kernels.dynamics.period import read_cells, read_encoders
 from sagline.kernels.jit import machine_code
 from sagline.robot.drum import drums_of

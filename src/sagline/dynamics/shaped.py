@@ -6,12 +6,12 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arguments import instance
-from sagline.arrays import Array, locked
+from sagline.core.arguments import instance
+from sagline.core.arrays import Array, locked
+from sagline.core.errors import InvalidValueError
+from sagline.core.memory import check_memory
 from sagline.dynamics.moves import Move, moves_of
 from sagline.dynamics.shapers import Shaper
-from sagline.errors import InvalidValueError
-from sagline.memory import check_memory
 from sagline.motion.path import Path
 from sagline.motion.rest_to_rest import time_grid
 from sagline.robot.pose import Pose

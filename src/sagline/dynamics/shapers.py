@@ -11,11 +11,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import instance
-from sagline.arrays import Array, broadcast_shape, checked, locked, number
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import instance
+from sagline.core.arrays import Array, broadcast_shape, checked, locked, number
+from sagline.core.errors import InvalidValueError
+from sagline.core.results import Result
 from sagline.motion.path import checked_time
-from sagline.results import Result
 
 MOST_IMPULSES: Final = 10_000  # three for each of eight frequencies are 6,561
 _SAME: Final = 1e-12  # of a shaper's duration: impulses so near are one

@@ -7,8 +7,10 @@ from typing import Any, Final, Literal, get_args
 
 import numpy as np
 
-from sagline.arguments import choice, optional
-from sagline.arrays import number
+from sagline.core.arguments import choice, optional
+from sagline.core.arrays import number
+from sagline.core.errors import InvalidValueError
+from sagline.core.memory import check_memory
 from sagline.dynamics.beginning import Beginning, beginning
 from sagline.dynamics.chains import ChainPlant, check_lumped, checked_nodes, wave_frequency
 from sagline.dynamics.course import Course, TableInTime, table_in_time
@@ -20,11 +22,9 @@ from sagline.dynamics.plant import Plant
 from sagline.dynamics.run import Run
 from sagline.dynamics.simulation import Simulation
 from sagline.dynamics.steps import checked_step, highest_frequency, with_drives
-from sagline.errors import InvalidValueError
 from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics import massless as k
 from sagline.kinematics.plan import Plan
-from sagline.memory import check_memory
 from sagline.robot.equilibrium import Equilibrium
 
 Integrator = Literal["splitting", "runge-kutta"]  # in the order of the kernel's codes

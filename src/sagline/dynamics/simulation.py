@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sagline.arrays import Array, locked
+from sagline.core.arrays import Array, locked
+from sagline.core.results import Result, Saved
 from sagline.dynamics.damping import Damping
 from sagline.dynamics.drives import Winches
-from sagline.results import Result, Saved
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 

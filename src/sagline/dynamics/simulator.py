@@ -8,8 +8,9 @@ from typing import Any, Final, NamedTuple, NoReturn
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import brief, instance, integer, whole_number
-from sagline.arrays import Array, checked, locked, number
+from sagline.core.arguments import brief, instance, integer, whole_number
+from sagline.core.arrays import Array, checked, locked, number
+from sagline.core.errors import InvalidValueError
 from sagline.dynamics.beginning import Beginning, beginning, check_lengths
 from sagline.dynamics.course import Course
 from sagline.dynamics.damping import Damping
@@ -24,7 +25,6 @@ from sagline.dynamics.simulate import (
     step_of,
     work_of,
 )
-from sagline.errors import InvalidValueError
 from sagline.kernels.cable.rows import LENGTH
 from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics import motion

@@ -7,9 +7,9 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arrays import Array, number
+from sagline.core.arrays import Array, number
+from sagline.core.errors import InvalidValueError
 from sagline.dynamics.damping import Damping
-from sagline.errors import InvalidValueError
 from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics.massless import RUNGE_KUTTA, SPLITTING
 from sagline.robot.pose import Pose

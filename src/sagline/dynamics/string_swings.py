@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.dynamics.mode_slopes import Rest, Swings, lever_form
 from sagline.kernels.dynamics.string import SMOOTH, TINY
 from sagline.kernels.dynamics.transfer import INTEGRALS, NODES, STAGES, WEIGHTS

@@ -7,7 +7,7 @@ from typing import Final, TypeAlias
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.dynamics.answer import Answer
 from sagline.dynamics.cable_dynamics import Complex
 from sagline.dynamics.damping import Damping

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from sagline.arguments import brief
-from sagline.arrays import Array
+from sagline.core.arguments import brief
+from sagline.core.arrays import Array
+from sagline.core.errors import InvalidValueError
 from sagline.dynamics.excitation import most_excited
 from sagline.dynamics.vibration import Vibration
-from sagline.errors import InvalidValueError
 from sagline.motion.path import Path
 from sagline.statics.stiffness import Modes
 

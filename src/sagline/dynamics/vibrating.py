@@ -6,8 +6,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from sagline.arguments import optional
-from sagline.arrays import Array, locked, number
+from sagline.core.arguments import optional
+from sagline.core.arrays import Array, locked, number
 from sagline.dynamics.cable_dynamics import one_state
 from sagline.dynamics.component_modes import cable_shapes
 from sagline.dynamics.damping import Damping

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
+from sagline.core.results import Result
 from sagline.dynamics.damping import Damping
 from sagline.dynamics.excitation import most_excited
 from sagline.dynamics.vibration_status import VibrationStatus
 from sagline.motion.path import Path
-from sagline.results import Result
 from sagline.robot.equilibrium import Equilibrium
 
 

@@ -11,9 +11,9 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arguments import file_path, instance
-from sagline.arrays import Array
-from sagline.errors import FileError, InvalidValueError
+from sagline.core.arguments import file_path, instance
+from sagline.core.arrays import Array
+from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.whole import written_together
 from sagline.robot.robot import Robot
 

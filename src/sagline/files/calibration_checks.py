@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sagline.arguments import choice, text
 from sagline.calibration.status import Omission
 from sagline.calibration.unknowns import KINDS
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import choice, text
+from sagline.core.errors import InvalidValueError
 from sagline.files.calibration_layout import (
     CROSS_VALIDATION,
     DIRECTIONS,

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sagline.arrays import locked
 from sagline.cables.models import MODELS
 from sagline.calibration.findings import CrossValidation, Direction, Outlier
 from sagline.calibration.result import Calibration
 from sagline.calibration.sensors import Sensors
 from sagline.calibration.status import CalibrationStatus, Omission
 from sagline.calibration.unknowns import Parameters
+from sagline.core.arrays import locked
 from sagline.files.calibration_checks import check_calibration
 from sagline.files.calibration_layout import (
     CROSS_VALIDATION,

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sagline.arguments import file_path
-from sagline.arrays import Array
 from sagline.calibration.paid import can_count, counts_of
+from sagline.core.arguments import file_path
+from sagline.core.arrays import Array
 from sagline.files.whole import write_text
 from sagline.files.yaml_text import dump_mapping
 from sagline.robot.drum import drums_of

@@ -9,10 +9,10 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from sagline.arguments import file_path, optional, text
-from sagline.arrays import Array
 from sagline.cables.cable import Cable
-from sagline.errors import FileError, InvalidValueError
+from sagline.core.arguments import file_path, optional, text
+from sagline.core.arrays import Array
+from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.imported import STEEL_ROPE_DENSITY, STEEL_ROPE_STIFFNESS, Imported, imported
 from sagline.files.text import exists
 from sagline.files.xml_text import number, numbers, only_child, read_xml

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from sagline.errors import FileError
+from sagline.core.errors import FileError
 from sagline.files.seal import Seal
 
 OTHERS: Final = {

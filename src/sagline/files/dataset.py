@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
-from sagline.errors import FileError, InvalidValueError
+from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.content import Content
 from sagline.files.kinds import kind_of
 from sagline.files.seal import Seal, seal, seal_of

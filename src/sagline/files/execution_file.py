@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.arguments import brief, file_path, instance, integer
-from sagline.arrays import locked
 from sagline.control.execution import Execution, ExecutionStatus, Samples
 from sagline.control.states import State
-from sagline.errors import FileError, InvalidValueError, SaglineWarning
+from sagline.core.arguments import brief, file_path, instance, integer
+from sagline.core.arrays import locked
+from sagline.core.errors import FileError, InvalidValueError, SaglineWarning
 from sagline.files.dataset import labeled_dataset, numbered, write_dataset
 from sagline.files.execution_layout import CABLE, CYCLES, EVENTS, EVERY, NONE, ROWS, SMALL, TIME
 from sagline.files.format import Format

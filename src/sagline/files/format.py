@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Generic, TypeVar
 
-from sagline.arguments import file_path, instance
+from sagline.core.arguments import file_path, instance
 from sagline.files.content import Content
 from sagline.files.dataset import file_errors, read_dataset, write_dataset
 

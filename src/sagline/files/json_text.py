@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from sagline.errors import is_seen
+from sagline.core.errors import is_seen
 
 _OTHERS = re.compile(r"[^\n -~]+")  # beside ASCII that prints; json escapes what of it is below the space
 

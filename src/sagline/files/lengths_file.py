@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, locked
+from sagline.core.arrays import Array, locked
 from sagline.files.table import TABLE_LIMIT, Table, line_error
 from sagline.files.text import read_text
 

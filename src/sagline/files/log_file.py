@@ -7,10 +7,10 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arguments import file_path, instance, optional
 from sagline.calibration.log import WinchLog
 from sagline.calibration.sensors import Sensors
-from sagline.errors import FileError, InvalidValueError
+from sagline.core.arguments import file_path, instance, optional
+from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.log_sensors import comments_of_sensors, sensors_of_comments
 from sagline.files.log_table import log_columns, log_fields
 from sagline.files.table import TABLE_LIMIT

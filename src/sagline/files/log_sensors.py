@@ -10,9 +10,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from sagline.arrays import Array
 from sagline.calibration.sensors import Sensors
-from sagline.errors import FileError, InvalidValueError
+from sagline.core.arrays import Array
+from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.pose_entry import PoseEntry, pose_of_entry
 from sagline.files.quantity import in_si
 from sagline.files.schema import Entry, validated

@@ -9,8 +9,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from sagline.arrays import Array, locked
 from sagline.calibration.log import WinchLog
+from sagline.core.arrays import Array, locked
 from sagline.files.path_table import EULER, QUATERNION, QUATERNION_TOLERANCE
 from sagline.files.table import Table, line_error
 from sagline.robot.pose import Pose

@@ -16,9 +16,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.arrays import Array
 from sagline.control.events import Event
-from sagline.errors import FileError
+from sagline.core.arrays import Array
+from sagline.core.errors import FileError
 from sagline.files.execution_layout import DECIMALS, NONE
 from sagline.files.mcap_layout import (
     CYCLE,

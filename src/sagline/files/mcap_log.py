@@ -13,13 +13,14 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arguments import file_path, instance
-from sagline.arrays import Array
 from sagline.control.events import Event
 from sagline.control.execution import Execution, ExecutionStatus, execution_of
 from sagline.control.link import PERIOD, groups_of
 from sagline.control.recording import Recorded, Tape
-from sagline.errors import FileError
+from sagline.core.arguments import file_path, instance
+from sagline.core.arrays import Array
+from sagline.core.errors import FileError
+from sagline.core.status import Status
 from sagline.files.execution_layout import DECIMALS, NONE, columns_of
 from sagline.files.mcap_file import McapFile, check_packages
 from sagline.files.mcap_layout import NANO
@@ -27,7 +28,6 @@ from sagline.files.packed import rounded
 from sagline.files.whole import check_file, written_whole
 from sagline.kinematics.plan import Plan
 from sagline.robot.robot import Robot
-from sagline.status import Status
 
 CHUNK: Final = 0.9  # s from chunk to chunk: with what it takes to write one, no more than a second is ever lost
 BLOCK: Final = 100  # cycles of a chunk at the most: on a lockstep clock they come faster

@@ -15,16 +15,16 @@ from typing import Any, Final, NamedTuple
 
 from numpy.typing import NDArray
 
-from sagline.arguments import file_path
 from sagline.control.events import Event
-from sagline.errors import FileError, InvalidValueError
+from sagline.core.arguments import file_path
+from sagline.core.errors import FileError, InvalidValueError
+from sagline.core.memory import check_memory
 from sagline.files.execution_layout import EVERY
 from sagline.files.kinds import kind_of
 from sagline.files.mcap_file import check_packages
 from sagline.files.mcap_layout import END, EVENT, FORMAT, HEAD, PLAN, RECORD, TRUTH, event_of
 from sagline.files.packed import unpack
 from sagline.files.robot_file import parse_robot
-from sagline.memory import check_memory
 from sagline.robot.robot import Robot
 
 MAGIC: Final = bytes((137, 77, 67, 65, 80, 48, 13, 10))

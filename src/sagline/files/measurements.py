@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arguments import file_path
-from sagline.arrays import Array, locked
+from sagline.core.arguments import file_path
+from sagline.core.arrays import Array, locked
 from sagline.files.table import TABLE_LIMIT, Table, line_error
 from sagline.files.text import read_text
 

@@ -10,9 +10,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.arguments import brief, file_path, label
-from sagline.arrays import Array, Indices
-from sagline.errors import FileError, InvalidValueError, SaglineError
+from sagline.core.arguments import brief, file_path, label
+from sagline.core.arrays import Array, Indices
+from sagline.core.errors import FileError, InvalidValueError, SaglineError
 from sagline.files.quantity import in_si
 from sagline.files.text import read_bytes
 from sagline.interference.mesh import MOST, Mesh, extent_text

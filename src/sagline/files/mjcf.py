@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import eigh
 
-from sagline.arguments import instance
-from sagline.arrays import Array, checked
 from sagline.cables.elastic import Elastic
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import instance
+from sagline.core.arrays import Array, checked
+from sagline.core.errors import InvalidValueError
 from sagline.files.mjcf_pulleys import NOTE, add_pulleys, free_chords, lead_of, numbers_text
 from sagline.kinematics.forward import dead_only
 from sagline.kinematics.inverse import inverse

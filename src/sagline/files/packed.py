@@ -17,7 +17,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.memory import check_memory
+from sagline.core.memory import check_memory
 
 MOST_ORDER: Final = 5
 LEVEL: Final = 9  # of zstandard: above it takes much longer and saves little

@@ -6,8 +6,8 @@ import os
 from pathlib import Path as FilePath
 from typing import Any, Literal
 
-from sagline.arguments import file_path
-from sagline.errors import FileError, InvalidValueError
+from sagline.core.arguments import file_path
+from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.path_table import path_from_table
 from sagline.files.pose_entry import PoseEntry, pose_of_entry
 from sagline.files.quantity import in_si

@@ -6,7 +6,7 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
-from sagline.errors import FileError, InvalidValueError
+from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.table import Table, line_error
 from sagline.motion.path import Path
 from sagline.motion.sampled import path_from_samples

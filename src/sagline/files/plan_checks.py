@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sagline.errors import InvalidValueError
+from sagline.core.errors import InvalidValueError
 from sagline.files.plan_layout import JERK, MACHINE, MOTION, PROOF, QUANTITIES, TIME, WINDING
 from sagline.files.variable_checks import STEP, check_labels, check_variable
 from sagline.files.variables import Quantity

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import numpy as np
 
-from sagline.arrays import locked
 from sagline.cables.model import CableState
 from sagline.cables.models import MODELS
-from sagline.errors import FileError, InvalidValueError, SaglineWarning
+from sagline.core.arrays import locked
+from sagline.core.errors import FileError, InvalidValueError, SaglineWarning
 from sagline.files.dataset import labeled_dataset, numbered
 from sagline.files.format import Format
 from sagline.files.plan_checks import check_plan

@@ -8,7 +8,6 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Final
 
-from sagline.arguments import file_path, instance
 from sagline.control.link import (
     COUNTERS,
     GROUP_SIZE,
@@ -21,7 +20,8 @@ from sagline.control.link import (
     Mode,
     WinchState,
 )
-from sagline.errors import FileError
+from sagline.core.arguments import file_path, instance
+from sagline.core.errors import FileError
 from sagline.files.whole import written_together
 from sagline.plc.blocks import BLOCKS, LAYOUT, Block, Field
 from sagline.robot.robot import Robot

@@ -6,8 +6,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from sagline.arrays import Array, checked
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Array, checked
+from sagline.core.errors import InvalidValueError
 from sagline.files.path_table import FARTHEST, QUATERNION_TOLERANCE
 from sagline.files.quantity import in_si
 from sagline.files.schema import Entry

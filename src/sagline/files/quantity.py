@@ -9,7 +9,7 @@ from math import isinf, isnan
 from sys import float_info
 from typing import TYPE_CHECKING, Any, Final
 
-from sagline.errors import InvalidValueError
+from sagline.core.errors import InvalidValueError
 
 if TYPE_CHECKING:
     from pint import UnitRegistry

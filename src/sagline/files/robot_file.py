@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from sagline.arguments import brief, file_path, instance
-from sagline.arrays import Array
-from sagline.errors import FileError, InvalidValueError, nearest
+from sagline.core.arguments import brief, file_path, instance
+from sagline.core.arrays import Array
+from sagline.core.errors import FileError, InvalidValueError, nearest
 from sagline.files.robot_schema import SWIVEL_AXES, RobotEntry
 from sagline.files.schema import validated
 from sagline.files.text import exists, read_text

@@ -8,9 +8,9 @@ from typing import Any, Final
 import numpy as np
 from pydantic import Field, model_validator
 
-from sagline.arrays import Array, checked, exactly, number
 from sagline.cables.cable import Cable
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Array, checked, exactly, number
+from sagline.core.errors import InvalidValueError
 from sagline.files.quantity import in_si, plain_number
 from sagline.files.scene_schema import Place, check_scene
 from sagline.files.schema import Entry

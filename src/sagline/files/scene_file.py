@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from sagline.arguments import file_path
-from sagline.errors import FileError, InvalidValueError
+from sagline.core.arguments import file_path
+from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.mesh_file import load_mesh, meters
 from sagline.files.robot_file import robot_entry
 from sagline.files.scene_schema import Place

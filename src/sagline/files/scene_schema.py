@@ -7,9 +7,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from sagline.arguments import label
-from sagline.arrays import exactly, number
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import label
+from sagline.core.arrays import exactly, number
+from sagline.core.errors import InvalidValueError
 from sagline.files.mesh_file import meters
 from sagline.files.quantity import in_si
 from sagline.files.schema import Entry

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from sagline.errors import FileError, nearest
+from sagline.core.errors import FileError, nearest
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails

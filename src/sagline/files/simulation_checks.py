@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sagline.arguments import choice
-from sagline.arrays import Array, number
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import choice
+from sagline.core.arrays import Array, number
+from sagline.core.errors import InvalidValueError
 from sagline.files.simulation_layout import (
     CABLE_MASS,
     EVENTS,

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sagline.arguments import instance
-from sagline.arrays import locked
+from sagline.core.arguments import instance
+from sagline.core.arrays import locked
+from sagline.core.errors import FileError
 from sagline.dynamics.damping import Damping
 from sagline.dynamics.drives import SecondOrder, Winches
 from sagline.dynamics.simulation import EnergyBalance, Occurrence, Simulation
-from sagline.errors import FileError
 from sagline.files.dataset import labeled_dataset, numbered
 from sagline.files.format import Format
 from sagline.files.robot_file import dump_robot, parse_robot

@@ -10,9 +10,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sagline.arguments import file_path
-from sagline.arrays import Array
-from sagline.errors import FileError, InvalidValueError
+from sagline.core.arguments import file_path
+from sagline.core.arrays import Array
+from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.whole import check_file, written_whole
 from sagline.workspaces.surface import Indices, Surface
 

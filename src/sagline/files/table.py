@@ -16,8 +16,8 @@ from typing import Final, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.arrays import Array
-from sagline.errors import FileError, InvalidValueError, nearest
+from sagline.core.arrays import Array
+from sagline.core.errors import FileError, InvalidValueError, nearest
 from sagline.files.quantity import LARGEST, REACH, in_si, plain_number
 
 TABLE_LIMIT: Final = 64.0  # MB, about half a million rows

@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 from typing import Final
 
-from sagline.errors import FileError
+from sagline.core.errors import FileError
 from sagline.files.kinds import kind_of
 
 MEGABYTE: Final = 1_000_000

@@ -7,8 +7,8 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arrays import Array
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Array
+from sagline.core.errors import InvalidValueError
 from sagline.files.quantity import plain_number
 from sagline.robot.pose import Pose
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sagline.arrays import Flags
-from sagline.errors import InvalidValueError, printable
+from sagline.core.arrays import Flags
+from sagline.core.errors import InvalidValueError, printable
 from sagline.files.variables import PARTS, Known, Quantity
 
 if TYPE_CHECKING:

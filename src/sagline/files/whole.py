@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 
-from sagline.errors import FileError
+from sagline.core.errors import FileError
 from sagline.files.kinds import kind_of
 from sagline.files.staging import SUFFIX, staging
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sagline.arguments import choice
-from sagline.arrays import number
+from sagline.core.arguments import choice
+from sagline.core.arrays import number
 from sagline.files.variable_checks import check_indices, check_labels, check_variable
 from sagline.files.workspace_layout import QUANTITIES
 

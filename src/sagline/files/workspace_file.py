@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sagline.arrays import locked
 from sagline.cables.models import MODELS
+from sagline.core.arrays import locked
 from sagline.files.criteria_attributes import criteria_attributes, criteria_of
 from sagline.files.dataset import labeled_dataset
 from sagline.files.format import Format

@@ -11,8 +11,8 @@ from xml.parsers import expat
 
 import numpy as np
 
-from sagline.arrays import Array, locked
-from sagline.errors import FileError, InvalidValueError
+from sagline.core.arrays import Array, locked
+from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.quantity import plain_number, within_reach
 from sagline.files.text import error_at_line, read_bytes
 

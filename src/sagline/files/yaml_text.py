@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Final
 
 import yaml
 
-from sagline.errors import FileError
+from sagline.core.errors import FileError
 from sagline.files.quantity import plain_number
 from sagline.files.text import error_at_line
 

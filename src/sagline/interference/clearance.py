@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import brief, instance
-from sagline.arrays import Array, checked, locked, number
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import brief, instance
+from sagline.core.arrays import Array, checked, locked, number
+from sagline.core.errors import InvalidValueError
+from sagline.core.memory import check_memory
+from sagline.core.results import Result
 from sagline.interference.clearance_rows import ClearanceRows
 from sagline.interference.mesh import Mesh, extent_text
 from sagline.interference.obstacles import Box
 from sagline.interference.pairs import Obstacle
-from sagline.memory import check_memory
-from sagline.results import Result
 from sagline.robot.bounds import bounds
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.robot import Robot

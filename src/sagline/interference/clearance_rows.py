@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, Indices, locked
-from sagline.blocks import blocks
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Array, Indices, locked
+from sagline.core.errors import InvalidValueError
+from sagline.core.progress import blocks
 from sagline.interference.mesh import Mesh
 from sagline.interference.obstacles import Box, Capsule, Sphere
 from sagline.interference.pairs import Obstacle, pairs_of

@@ -6,8 +6,8 @@ from itertools import combinations, product
 
 import numpy as np
 
-from sagline.arguments import instance
-from sagline.arrays import number
+from sagline.core.arguments import instance
+from sagline.core.arrays import number
 from sagline.interference.obstacles import Capsule
 from sagline.robot.bounds import bounds
 from sagline.robot.robot import Robot

@@ -8,12 +8,12 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import instance, label
-from sagline.arrays import Array, Flags, Indices, checked, locked, numbers
-from sagline.errors import InvalidValueError
-from sagline.memory import check_memory
-from sagline.numbers import counted
-from sagline.results import Result
+from sagline.core.arguments import instance, label
+from sagline.core.arrays import Array, Flags, Indices, checked, locked, numbers
+from sagline.core.errors import InvalidValueError
+from sagline.core.memory import check_memory
+from sagline.core.numbers import counted
+from sagline.core.results import Result
 from sagline.robot.pose import Pose
 
 MOST: Final = 1_000_000  # triangles

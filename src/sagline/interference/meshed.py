@@ -16,8 +16,8 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, locked
-from sagline.errors import SaglineError
+from sagline.core.arrays import Array, locked
+from sagline.core.errors import SaglineError
 from sagline.interference.mesh import Mesh
 from sagline.interference.obstacles import Box, Capsule, Sphere
 from sagline.interference.pairs import Pairs

@@ -8,9 +8,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import label
-from sagline.arrays import Array, exactly, number
-from sagline.results import Result
+from sagline.core.arguments import label
+from sagline.core.arrays import Array, exactly, number
+from sagline.core.results import Result
 from sagline.robot.pose import Pose
 
 _LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

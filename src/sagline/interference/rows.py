@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.interference.obstacles import Box, Capsule, Sphere
 from sagline.kernels.codes import CATENARY
 from sagline.kernels.interference import shapes

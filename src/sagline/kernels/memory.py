@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, Indices
+from sagline.core.arrays import Array, Indices
 from sagline.kernels.jit import glue
 
 

@@ -10,9 +10,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from sagline.arguments import brief
-from sagline.arrays import Array, exactly
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import brief
+from sagline.core.arrays import Array, exactly
+from sagline.core.errors import InvalidValueError
 
 ARRAY: Final = np.ndarray  # a name of a module's own is found quicker than that of another
 FLOAT: Final = np.dtype(np.float64)

@@ -6,17 +6,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sagline.arguments import callback, instance
-from sagline.arrays import Array, Codes, Flags, locked
-from sagline.blocks import Progress, blocks
 from sagline.cables.catenary import Catenary
+from sagline.core.arguments import callback, instance
+from sagline.core.arrays import Array, Codes, Flags, locked
+from sagline.core.progress import Progress, blocks
+from sagline.core.results import Result
 from sagline.kinematics.forward import forward
 from sagline.kinematics.forward_rows import solve_rows
 from sagline.kinematics.forward_solution import ForwardSolution
 from sagline.kinematics.forward_status import ForwardStatus
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.winding import settled
-from sagline.results import Result
 from sagline.robot.behind import differs, kernel_length
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose

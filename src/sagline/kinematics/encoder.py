@@ -7,10 +7,10 @@ from typing import Final, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import choice, instance, optional
-from sagline.arrays import Array, kernel_input, locked, numbers
 from sagline.cables.creep import Creep
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import choice, instance, optional
+from sagline.core.arrays import Array, kernel_input, locked, numbers
+from sagline.core.errors import InvalidValueError
 from sagline.kernels.cable.drum import MEMORY_ROWS, follow_memory
 from sagline.kinematics.plan import Plan
 from sagline.robot.drum import Drums, drum_tension, drums_of, warmth

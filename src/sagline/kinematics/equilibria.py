@@ -7,11 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import instance, whole_number
-from sagline.arrays import Array, Indices, locked
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import instance, whole_number
+from sagline.core.arrays import Array, Indices, locked
+from sagline.core.errors import InvalidValueError
+from sagline.core.memory import check_memory
+from sagline.core.results import Result
 from sagline.kernels.forward.problem import ENERGY
 from sagline.kinematics.forward import checked_lengths
 from sagline.kinematics.forward_rows import Found
@@ -19,8 +21,6 @@ from sagline.kinematics.forward_solution import ForwardSolution
 from sagline.kinematics.forward_status import STABLE, ForwardStatus
 from sagline.kinematics.start import from_orientations, start_quaternions
 from sagline.kinematics.winding import settled
-from sagline.memory import check_memory
-from sagline.results import Result
 from sagline.robot.behind import differs, with_behind
 from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.robot import Robot

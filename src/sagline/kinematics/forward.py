@@ -8,18 +8,18 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import callback, instance, optional
-from sagline.arrays import LARGEST, SMALLEST, Array, locked, numbers
-from sagline.blocks import Progress
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import callback, instance, optional
+from sagline.core.arrays import LARGEST, SMALLEST, Array, locked, numbers
+from sagline.core.errors import InvalidValueError
+from sagline.core.memory import check_poses
+from sagline.core.progress import Progress
 from sagline.kinematics.forward_rows import solve_rows
 from sagline.kinematics.forward_solution import ForwardSolution
 from sagline.kinematics.measured import MeasuredTension, corrected
 from sagline.kinematics.start import search
 from sagline.kinematics.winding import checked_winding, settled
-from sagline.memory import check_poses
 from sagline.robot.behind import differs, with_behind
 from sagline.robot.pose import Pose
 from sagline.robot.reach import check_reach

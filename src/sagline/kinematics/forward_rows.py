@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, Codes, Flags, Indices, locked
-from sagline.blocks import Progress, blocks, rows_of
 from sagline.cables.model import CableModel
+from sagline.core.arrays import Array, Codes, Flags, Indices, locked
+from sagline.core.progress import Progress, blocks, rows_of
 from sagline.kernels import codes, tables
 from sagline.kernels.cable.rows import CABLE_ROWS
 from sagline.kernels.forward.fit import fit_poses

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sagline.arrays import Array, Codes, Flags, Indices
+from sagline.core.arrays import Array, Codes, Flags, Indices
+from sagline.core.results import Result
 from sagline.kinematics.forward_status import STABLE, ForwardStatus
-from sagline.results import Result
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 

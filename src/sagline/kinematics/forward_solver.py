@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import instance, optional
-from sagline.arrays import LARGEST, SMALLEST, Array, Codes, checked, exactly, locked
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import instance, optional
+from sagline.core.arrays import LARGEST, SMALLEST, Array, Codes, checked, exactly, locked
+from sagline.core.errors import InvalidValueError
 from sagline.kernels import codes, tables
 from sagline.kernels.forward.forward import forward_poses
 from sagline.kernels.forward.problem import FORCE_RESIDUAL, FORWARD_NUMBERS, MOMENT_RESIDUAL, STIFFNESS_MIN

@@ -8,11 +8,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import instance
-from sagline.arrays import Array, Flags, checked
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import instance
+from sagline.core.arrays import Array, Flags, checked
+from sagline.core.errors import InvalidValueError
 from sagline.kernels.cable.geometry import GEOMETRY_ROWS
 from sagline.kernels.cable.homing import lengths_at_frame_ends
 from sagline.robot.checks import per_cable

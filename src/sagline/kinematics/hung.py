@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sagline.arrays import Array, Codes, locked
 from sagline.cables.model import CableModel, CableState
+from sagline.core.arrays import Array, Codes, locked
 from sagline.kernels import tables
 from sagline.robot.contact import Contact
 from sagline.robot.several import Robots, anything_behind, cables_of, first_of

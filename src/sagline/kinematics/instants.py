@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, Indices
+from sagline.core.arrays import Array, Indices
 from sagline.motion.path import Path
 from sagline.motion.sampled import spline_rates
 from sagline.robot.pose import Pose

@@ -9,18 +9,18 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import brief, callback, choice, instance
-from sagline.arrays import Array, exactly, locked
-from sagline.blocks import Progress
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import brief, callback, choice, instance
+from sagline.core.arrays import Array, exactly, locked
+from sagline.core.errors import InvalidValueError
+from sagline.core.memory import check_poses
+from sagline.core.progress import Progress
 from sagline.kernels import codes
 from sagline.kinematics.hung import hung_cables
 from sagline.kinematics.inverse_rows import decide_rows, solve_rows
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.winding import Winding, checked_winding
-from sagline.memory import check_poses
 from sagline.motion.path import Path
 from sagline.robot.behind import with_behind
 from sagline.robot.equilibrium import Equilibrium

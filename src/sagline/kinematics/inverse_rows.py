@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, Codes, Flags, locked
-from sagline.blocks import Progress, blocks
+from sagline.core.arrays import Array, Codes, Flags, locked
+from sagline.core.progress import Progress, blocks
 from sagline.kernels import codes, tables
 from sagline.kernels.inverse.poses import Answers, inverse_poses
 from sagline.kernels.inverse.verdicts import ENOUGH, PROVED, decide_poses

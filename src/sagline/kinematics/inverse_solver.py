@@ -10,11 +10,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import instance, optional
-from sagline.arrays import Array, exactly, locked
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import instance, optional
+from sagline.core.arrays import Array, exactly, locked
+from sagline.core.errors import InvalidValueError
 from sagline.kernels import tables
 from sagline.kernels.inverse.poses import inverse_poses
 from sagline.kernels.inverse.verdicts import decide_poses

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sagline.arrays import Array, Flags, Indices, locked
+from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.kernels import tables
 from sagline.kinematics.hung import hung_cables
 from sagline.kinematics.instants import Instant, Instants, instants

@@ -8,12 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array, checked, locked
 from sagline.cables.model import CableModel
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Array, checked, locked
+from sagline.core.errors import InvalidValueError
+from sagline.core.results import Result
 from sagline.kernels import codes, tables
 from sagline.kinematics.forward_rows import Found, solve_rows
-from sagline.results import Result
 from sagline.robot.robot import Robot
 from sagline.robot.several import Robots, robot_at
 from sagline.statics.stiffness import stiffness

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import instance
-from sagline.arrays import Array, Indices, locked
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import instance
+from sagline.core.arrays import Array, Indices, locked
+from sagline.core.errors import InvalidValueError
 from sagline.kernels.algebra import strips
 from sagline.kernels.inverse.queries import polygon_of_pose
 from sagline.kernels.memory import memory_for

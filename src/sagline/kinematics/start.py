@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from sagline.arrays import Array, Flags, Indices, locked
-from sagline.blocks import Progress, blocks, rows_of
 from sagline.cables.model import CableModel
+from sagline.core.arrays import Array, Flags, Indices, locked
+from sagline.core.progress import Progress, blocks, rows_of
 from sagline.kernels import codes
 from sagline.kernels.forward.problem import ENERGY
 from sagline.kinematics.forward_rows import BLOCK, Found, solve_rows

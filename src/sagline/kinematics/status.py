@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from sagline.core.status import Status
 from sagline.kernels import codes
-from sagline.status import Status
 
 
 class PoseStatus(Status):

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, Flags
 from sagline.cables.model import CableState
+from sagline.core.arrays import Array, Flags
 from sagline.kinematics.instants import Instant
 from sagline.robot.equilibrium import Equilibrium, limited_tension
 from sagline.robot.pose import Pose

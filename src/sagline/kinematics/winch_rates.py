@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from sagline.arguments import instance
-from sagline.arrays import Array, Flags, locked
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import instance
+from sagline.core.arrays import Array, Flags, locked
+from sagline.core.errors import InvalidValueError
+from sagline.core.results import Result
 from sagline.kinematics.plan import Plan
-from sagline.results import Result
 from sagline.robot.drum import drum_tension, drums_of
 
 

@@ -8,9 +8,9 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array, checked, locked
 from sagline.cables.model import CableModel
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Array, checked, locked
+from sagline.core.errors import InvalidValueError
 from sagline.kernels import codes
 from sagline.kinematics.forward_rows import Found, solve_rows
 from sagline.robot.behind import with_behind

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import instance
-from sagline.arrays import Array, checked
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import instance
+from sagline.core.arrays import Array, checked
+from sagline.core.errors import InvalidValueError
+from sagline.core.results import Shown
 from sagline.robot.pose import Pose
-from sagline.shown import Shown
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 
 
 @dataclass(frozen=True, slots=True)

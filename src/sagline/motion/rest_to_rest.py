@@ -8,9 +8,9 @@ from typing import cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array, Flags, checked, number
-from sagline.errors import InvalidValueError
-from sagline.memory import check_memory
+from sagline.core.arrays import Array, Flags, checked, number
+from sagline.core.errors import InvalidValueError
+from sagline.core.memory import check_memory
 from sagline.motion.path import Path
 from sagline.motion.profile import QUINTIC, SEPTIC, Profile
 from sagline.motion.segments import Segments

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import instance
-from sagline.arrays import Array
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import instance
+from sagline.core.arrays import Array
+from sagline.core.errors import InvalidValueError
 from sagline.motion.path import Path, checked_time
 from sagline.robot.pose import Pose
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sagline.arrays import Array, Flags, locked, number
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Array, Flags, locked, number
+from sagline.core.errors import InvalidValueError
 from sagline.motion.path import Path
 from sagline.motion.profile import Profile
 from sagline.robot.pose import Pose

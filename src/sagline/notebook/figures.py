@@ -26,7 +26,7 @@ from sagline.robot.robot import Robot
 from sagline.workspaces.space import Workspace
 
 if TYPE_CHECKING:
-    from sagline.arrays import Array, Flags, Indices
+    from sagline.core.arrays import Array, Flags, Indices
 
 STYLE: Final = replace(PLAIN, name="notebook", width=6.0, height=0.8, direct=True)
 MOST_SAMPLES: Final = 300  # of a course

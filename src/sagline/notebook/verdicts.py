@@ -9,6 +9,8 @@ import numpy as np
 
 from sagline.calibration.result import Calibration
 from sagline.calibration.words import chi_squared_in_words
+from sagline.core.numbers import n
+from sagline.core.results import Result
 from sagline.dynamics.simulation import Simulation
 from sagline.dynamics.vibration import Vibration
 from sagline.kernels.jit import is_compiled
@@ -18,8 +20,6 @@ from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
 from sagline.motion.path import Path
-from sagline.numbers import n
-from sagline.results import Result
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.workspaces.space import Workspace

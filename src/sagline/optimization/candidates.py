@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from sagline.arguments import brief
-from sagline.arrays import Array, Flags, Indices
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import brief
+from sagline.core.arrays import Array, Flags, Indices
+from sagline.core.errors import InvalidValueError
 from sagline.kernels import tables
 from sagline.optimization.free import Bound, Free, Part
 from sagline.optimization.free_cable import FreeCable

@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.optimization.extras import extra
 from sagline.optimization.search import Task
 

@@ -7,11 +7,11 @@ from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Final
 
-from sagline.arguments import callback, instance, whole_number
-from sagline.blocks import Progress
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import callback, instance, whole_number
+from sagline.core.errors import InvalidValueError
+from sagline.core.progress import Progress
 from sagline.optimization.folder import recorded
 from sagline.optimization.free import Free
 from sagline.optimization.front import Front

@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
-from sagline.errors import InvalidValueError
+from sagline.core.errors import InvalidValueError
 
 
 def extra(module: str) -> Any:

@@ -8,9 +8,9 @@ from typing import Any, Final, TypeVar
 
 from pydantic import model_validator
 
-from sagline.arguments import choice, file_path
 from sagline.cables.cable import Cable
-from sagline.errors import FileError, InvalidValueError
+from sagline.core.arguments import choice, file_path
+from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.quantity import in_si
 from sagline.files.schema import Entry, validated
 from sagline.files.text import read_text

@@ -21,9 +21,9 @@ from zlib import crc32
 
 import numpy as np
 
-from sagline.arguments import file_path
-from sagline.arrays import Array
-from sagline.errors import FileError
+from sagline.core.arguments import file_path
+from sagline.core.arrays import Array
+from sagline.core.errors import FileError
 from sagline.files.json_text import json_text
 from sagline.files.quantity import plain_number
 from sagline.files.staging import is_taken

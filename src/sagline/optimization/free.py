@@ -7,10 +7,10 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from sagline.arguments import brief, integer
-from sagline.arrays import Array, Indices
-from sagline.errors import InvalidValueError
-from sagline.results import ByFields
+from sagline.core.arguments import brief, integer
+from sagline.core.arrays import Array, Indices
+from sagline.core.errors import InvalidValueError
+from sagline.core.results import ByFields
 from sagline.robot.robot import Robot
 
 

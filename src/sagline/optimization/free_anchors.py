@@ -9,9 +9,9 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import brief, choice
-from sagline.arrays import Array, checked, locked
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import brief, choice
+from sagline.core.arrays import Array, checked, locked
+from sagline.core.errors import InvalidValueError
 from sagline.kernels import tables
 from sagline.optimization.free import Bound, Free, Part, cable_numbers, cables_of_robot, check_order, whose_text
 from sagline.optimization.symmetry import Symmetry, followed, symmetry_of

@@ -8,10 +8,10 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from sagline.arguments import brief, instance, label
-from sagline.arrays import Array, number
 from sagline.cables.cable import Cable
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import brief, instance, label
+from sagline.core.arrays import Array, number
+from sagline.core.errors import InvalidValueError
 from sagline.kernels import tables
 from sagline.optimization.free import Bound, Free, Part
 from sagline.robot.robot import Robot

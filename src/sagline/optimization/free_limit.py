@@ -8,9 +8,9 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from sagline.arguments import choice
-from sagline.arrays import Array, Indices, number
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import choice
+from sagline.core.arrays import Array, Indices, number
+from sagline.core.errors import InvalidValueError
 from sagline.kernels import tables
 from sagline.optimization.free import Bound, Free, Part, cable_numbers, cables_of_robot, check_order, whose_text
 from sagline.robot.robot import Robot

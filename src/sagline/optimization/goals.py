@@ -9,9 +9,9 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from sagline.arguments import brief, choice
-from sagline.arrays import Array, number
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import brief, choice
+from sagline.core.arrays import Array, number
+from sagline.core.errors import InvalidValueError
 
 
 class Measured(NamedTuple):

@@ -7,7 +7,7 @@ from typing import Final, TypeAlias
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.optimization.candidates import Candidates
 from sagline.optimization.sample import latin_hypercube
 

@@ -6,9 +6,9 @@ from typing import Final, Protocol
 
 import numpy as np
 
-from sagline.arrays import Array, locked
-from sagline.blocks import Progress
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Array, locked
+from sagline.core.errors import InvalidValueError
+from sagline.core.progress import Progress
 from sagline.optimization.candidates import Candidates
 from sagline.optimization.front import Front, best_of_front, costs_of, weighted
 from sagline.optimization.request import Request

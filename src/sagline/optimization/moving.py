@@ -8,20 +8,20 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arguments import callback, instance, optional
-from sagline.arrays import Array, locked
-from sagline.blocks import Progress, blocks
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
-from sagline.errors import InvalidValueError
-from sagline.numbers import counted, n
+from sagline.core.arguments import callback, instance, optional
+from sagline.core.arrays import Array, locked
+from sagline.core.errors import InvalidValueError
+from sagline.core.numbers import counted, n
+from sagline.core.progress import Progress, blocks
+from sagline.core.results import Result
 from sagline.optimization.candidates import Candidates, free_parts
 from sagline.optimization.free import Free, Part
 from sagline.optimization.goals import Goal
 from sagline.optimization.inner import best_moved
 from sagline.optimization.poses import COUNTS, poses_of
 from sagline.optimization.rating import Rating
-from sagline.results import Result
 from sagline.robot.pose import Pose
 from sagline.robot.pose_box import PoseBox
 from sagline.robot.robot import Robot

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, locked
-from sagline.blocks import blocks
 from sagline.cables.model import CableModel
+from sagline.core.arrays import Array, locked
+from sagline.core.progress import blocks
 from sagline.kernels import codes, tables
 from sagline.kernels.cable.shape import sags
 from sagline.kernels.forward.sensitivity import DATA, describe_states

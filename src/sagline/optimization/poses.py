@@ -7,8 +7,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from sagline.arguments import brief, instance, whole_number
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import brief, instance, whole_number
+from sagline.core.errors import InvalidValueError
 from sagline.robot.pose import Pose
 from sagline.robot.pose_box import PoseBox
 from sagline.robot.reach import check_reach

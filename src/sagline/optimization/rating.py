@@ -7,9 +7,9 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arrays import Array, Flags
 from sagline.cables.model import CableModel
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Array, Flags
+from sagline.core.errors import InvalidValueError
 from sagline.kernels import tables
 from sagline.optimization.candidates import Candidates, Solid, impossible
 from sagline.optimization.goals import AT_POSES, Goal, Measured

@@ -9,9 +9,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from sagline.arguments import brief, choice, instance, optional, whole_number
 from sagline.cables.model import CableModel
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import brief, choice, instance, optional, whole_number
+from sagline.core.errors import InvalidValueError
 from sagline.kernels import tables
 from sagline.optimization import cma, differential_evolution, nsga2
 from sagline.optimization.candidates import Candidates, Solid, free_parts

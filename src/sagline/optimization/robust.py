@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sagline.arguments import choice, whole_number
-from sagline.arrays import Array, number
+from sagline.core.arguments import choice, whole_number
+from sagline.core.arrays import Array, number
 from sagline.kernels import tables
 
 TAKEN = ("worst", "mean")

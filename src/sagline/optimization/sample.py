@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 
 
 def latin_hypercube(count: int, dimensions: int, seed: int) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple, TypeAlias
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 
 Rate: TypeAlias = Callable[[Array], Array]  # points of the unit cube (N, d) to costs (N, g); the least are wanted
 

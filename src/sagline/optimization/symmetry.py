@@ -7,9 +7,9 @@ from typing import Any, Final, TypeAlias
 
 import numpy as np
 
-from sagline.arguments import choice
-from sagline.arrays import Array
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import choice
+from sagline.core.arrays import Array
+from sagline.core.errors import InvalidValueError
 
 Symmetry: TypeAlias = str
 MIRRORED: Final = tuple("".join(axes) for count in (1, 2, 3) for axes in combinations("xyz", count))

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
 
-from sagline.arguments import brief, whole_number
 from sagline.control.link import groups_of
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import brief, whole_number
+from sagline.core.errors import InvalidValueError
 from sagline.robot.robot import Robot
 
 LAST_PORT: Final = 65535

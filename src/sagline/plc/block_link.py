@@ -8,9 +8,9 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arrays import Array, number
 from sagline.control.link import PERIOD, Command, Missing, Sample, Sent, sent_to
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Array, number
+from sagline.core.errors import InvalidValueError
 from sagline.plc.addresses import Address, groups_at
 from sagline.plc.blocks import CLAIM, TO_PLC, Refusal
 from sagline.plc.group import Group

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from sagline.arguments import whole_number
+from sagline.core.arguments import whole_number
 from sagline.plc.addresses import addresses_of
 from sagline.plc.block_link import BlockLink
 from sagline.plc.wire import needed

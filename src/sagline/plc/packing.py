@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from sagline.arrays import Array
 from sagline.control.link import GROUP_SIZE, Command, Sample, Whole, groups_of
+from sagline.core.arrays import Array
 from sagline.plc.blocks import CLAIM, TO_PLC, winch_row
 
 

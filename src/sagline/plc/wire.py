@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Final, Protocol
 
-from sagline.errors import MOST, FileError, SaglineError, shortened
+from sagline.core.errors import MOST, FileError, SaglineError, shortened
 from sagline.plc.blocks import Block, Refusal
 
 ANSWER: Final = 0.5  # s: a PLC that has not answered for so long is connected anew

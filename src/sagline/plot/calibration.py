@@ -10,12 +10,12 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
-from sagline.arguments import choice, instance
-from sagline.arrays import locked, number
 from sagline.calibration.result import Calibration
 from sagline.calibration.words import chi_squared_in_words
-from sagline.errors import InvalidValueError
-from sagline.numbers import n
+from sagline.core.arguments import choice, instance
+from sagline.core.arrays import locked, number
+from sagline.core.errors import InvalidValueError
+from sagline.core.numbers import n
 from sagline.plot.names import fitting, wrapped
 from sagline.plot.sheet import COLORS, GAP_COLOR, VERMILLION, dressed, sheet
 from sagline.plot.style import current
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-    from sagline.arrays import Array
+    from sagline.core.arrays import Array
 
 PARTS: Final = ("all", "residuals", "correlation", "errors")
 BANDS: Final = ((2.0, 0.35), (1.0, 0.55))  # standard deviations, and how dense

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
-from sagline.arguments import choice, instance
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import choice, instance
+from sagline.core.errors import InvalidValueError
 from sagline.kinematics.plan import Plan
 from sagline.plot.names import name_all, name_lines
 from sagline.plot.sheet import COLORS, axes_or_new, draw_course, dressed, shade, sheet
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from sagline.arrays import Array
+    from sagline.core.arrays import Array
 
 TENSIONS = {
     "chord_tension": r"chord tension $\tau$ [N]",

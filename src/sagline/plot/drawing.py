@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 from matplotlib.collections import LineCollection, PolyCollection
 
-from sagline.arguments import instance, optional
-from sagline.arrays import number
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import instance, optional
+from sagline.core.arrays import number
+from sagline.core.errors import InvalidValueError
 from sagline.kinematics.inverse import inverse
 from sagline.plot.marks import draw_axes, free_axes, label_boxes, places_of_numbers
 from sagline.plot.occlusion import Line, directions, seen
@@ -24,7 +24,7 @@ from sagline.viewer.tension_scale import TensionScale
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from sagline.arrays import Array
+    from sagline.core.arrays import Array
     from sagline.kinematics.plan import Plan
 
 AZIMUTH, ELEVATION = np.radians(-60.0), np.radians(24.0)

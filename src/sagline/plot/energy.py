@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sagline.arguments import instance
+from sagline.core.arguments import instance
+from sagline.core.numbers import n
 from sagline.dynamics.simulation import Simulation
-from sagline.numbers import n
 from sagline.plot.names import name_lines, wrapped
 from sagline.plot.sheet import COLORS, GAP_COLOR, dressed, sheet
 from sagline.plot.style import current
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from sagline.arrays import Array
+    from sagline.core.arrays import Array
 
 STYLES = ("-", (0, (4.0, 1.6)), (0, (1.0, 1.2)), (0, (5.0, 1.5, 1.0, 1.5)), (0, (7.0, 2.0)))
 ROUNDING = 1e-12  # of the energy that there is: an error below it is the arithmetic's

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sagline.arguments import HOW_TO_GET, instance
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import HOW_TO_GET, instance
+from sagline.core.errors import InvalidValueError
+from sagline.core.numbers import n
 from sagline.kinematics.confirm import Confirmation
-from sagline.numbers import n
 from sagline.plot.courses import INFEASIBLE, clock_of, dress_over
 from sagline.plot.names import name_all, name_lines
 from sagline.plot.sheet import COLORS, ORANGE, axes_or_new, draw_course, runs, shade, sheet

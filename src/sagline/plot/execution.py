@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sagline.arguments import instance
 from sagline.control.deviation import null_space_error, position_error
 from sagline.control.events import EventKind
 from sagline.control.execution import Execution
 from sagline.control.states import State
+from sagline.core.arguments import instance
 from sagline.plot.names import above, name_lines
 from sagline.plot.sheet import (
     BLUE,
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from sagline.arrays import Array
+    from sagline.core.arrays import Array
 
 MOST_POINTS: Final = 4000  # of a line: what lies closer is drawn as the range that it covers
 DASHED: Final = (0, (4.0, 1.6))

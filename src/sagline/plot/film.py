@@ -12,17 +12,17 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 from PIL import Image
 
-from sagline.arguments import file_path, instance, whole_number
+from sagline.core.arguments import file_path, instance, whole_number
+from sagline.core.errors import FileError, InvalidValueError
 from sagline.dynamics.mode_list import WITH_MASS, ListedMode, listed_modes
 from sagline.dynamics.vibration import Vibration
-from sagline.errors import FileError, InvalidValueError
 from sagline.files.whole import written_whole
 from sagline.plot.sheet import BLUE, GAP_COLOR, LABEL, TICK, VERMILLION, sheet
 from sagline.viewer.swing import PERIOD, Swing
 
 if TYPE_CHECKING:
-    from sagline.arrays import Array
-    from sagline.blocks import Progress
+    from sagline.core.arrays import Array
+    from sagline.core.progress import Progress
     from sagline.robot.pose import Pose
     from sagline.robot.robot import Robot
 

@@ -12,10 +12,10 @@ from matplotlib.colors import to_rgb
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from sagline.arguments import instance
-from sagline.arrays import checked
+from sagline.core.arguments import instance
+from sagline.core.arrays import checked
+from sagline.core.errors import InvalidValueError
 from sagline.dynamics.vibration import Vibration
-from sagline.errors import InvalidValueError
 from sagline.plot.names import above
 from sagline.plot.sheet import BLUE, TICK, VERMILLION, axes_or_new, dressed
 from sagline.plot.style import current
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import ArrayLike
 
-    from sagline.arrays import Array
+    from sagline.core.arrays import Array
 
 THIN, WIDE = 0.6, 3.6  # pt: a mode in which only cables swing, one in which only the platform does
 FAINT = 0.4  # how dense the thin ones are

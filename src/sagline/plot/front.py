@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sagline.arguments import instance
+from sagline.core.arguments import instance
 from sagline.optimization.front import Front
 from sagline.plot.names import name_lines, wrapped
 from sagline.plot.sheet import BLUE, GAP_COLOR, VERMILLION, dressed, sheet
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from sagline.arrays import Array
+    from sagline.core.arrays import Array
     from sagline.optimization.goals import Goal
 
 EACH = 3.2  # in, the height of a panel

@@ -8,16 +8,16 @@ import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm, Normalize
 
-from sagline.arguments import choice, instance
+from sagline.core.arguments import choice, instance
+from sagline.core.errors import InvalidValueError
 from sagline.dynamics.frequency_map import FrequencyMap
-from sagline.errors import InvalidValueError
 from sagline.plot.sheet import GAP_COLOR, WIDTH, sheet
 from sagline.plot.style import current
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from sagline.arrays import Array
+    from sagline.core.arrays import Array
 
 PANELS: Final = {6: 3, 4: 2, 3: 3, 2: 2, 1: 1}  # heights that are drawn -> panels beside each other; none stays empty
 COLORS: Final = "cividis"  # the same to all eyes

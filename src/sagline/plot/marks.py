@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sagline.numbers import n
+from sagline.core.numbers import n
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from matplotlib.axes import Axes
 
-    from sagline.arrays import Array
+    from sagline.core.arrays import Array
     from sagline.plot.style import Style
 
 PLACES: Final = np.linspace(0.12, 0.72, 31)  # along a cable from the frame, where its number may stand

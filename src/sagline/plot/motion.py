@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sagline.arguments import instance
+from sagline.core.arguments import instance
 from sagline.motion.path import Path
 from sagline.plot.names import name_lines
 from sagline.plot.sheet import BLUE, COLORS, VERMILLION, axes_or_new, dressed

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sagline.arguments import choice, instance
+from sagline.core.arguments import choice, instance
 from sagline.kinematics.plan import Plan
 from sagline.plot.courses import INFEASIBLE, LENGTHS, TENSIONS, clock_of, dress_over
 from sagline.plot.sheet import BLUE, VERMILLION, draw_course, shade, sheet

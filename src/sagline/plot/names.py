@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
-    from sagline.arrays import Array
+    from sagline.core.arrays import Array
 
 POINT = 1.0 / 72.0  # in
 WIDE = {SANS: 0.58, SERIF: 0.48}  # of the size of the text, that a letter takes

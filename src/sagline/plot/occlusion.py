@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, Indices
+from sagline.core.arrays import Array, Indices
 
 FLAT = 1e-9  # of the size of the picture: a surface seen from its edge, or a line from its end, hides nothing
 TOUCHING = 1e-6  # of the size of the picture: so near a line lies on a surface, not behind it

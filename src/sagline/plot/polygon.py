@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.textpath import TextPath
 
-from sagline.arguments import instance
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import instance
+from sagline.core.errors import InvalidValueError
 from sagline.plot.names import name_lines
 from sagline.plot.sheet import COLORS, GAP_COLOR, axes_or_new, dressed
 from sagline.plot.style import current
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import ArrayLike
 
-    from sagline.arrays import Array
+    from sagline.core.arrays import Array
 
 MARKERS = "osD^v<>pPX*h"
 POINT = 1.0 / 72.0  # in

@@ -15,7 +15,7 @@ from sagline.plot.style import current
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from sagline.arrays import Array
+    from sagline.core.arrays import Array
     from sagline.dynamics.vibration import Vibration
 
 HIGHEST, LOWEST = 2e2, 1e-3  # over the answer at rest: undamped peaks have no top, and zeros no bottom

@@ -12,9 +12,9 @@ from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 
-from sagline.arguments import instance, optional
+from sagline.core.arguments import instance, optional
+from sagline.core.numbers import n
 from sagline.kinematics.inverse import inverse
-from sagline.numbers import n
 from sagline.plot.scene import EDGES, frame_box, ground, hung, platform_box, pose_of, taut, wheels
 from sagline.plot.sheet import VERMILLION, sheet
 from sagline.plot.style import current
@@ -25,7 +25,7 @@ from sagline.viewer.tension_scale import TensionScale
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from sagline.arrays import Array
+    from sagline.core.arrays import Array
     from sagline.kinematics.plan import Plan
 
 FRAME_COLOR, FLOOR_COLOR, SHADOW_COLOR, WHEEL_COLOR = "0.6", "0.955", "0.82", "0.35"

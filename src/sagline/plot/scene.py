@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from sagline.errors import InvalidValueError
+from sagline.core.errors import InvalidValueError
 from sagline.robot.pose import Pose
 from sagline.robot.several import pulleys_of
 from sagline.robot.wheels import on_wheels
 from sagline.viewer import lines
 
 if TYPE_CHECKING:
-    from sagline.arrays import Array
+    from sagline.core.arrays import Array
     from sagline.kinematics.plan import Plan
     from sagline.robot.robot import Robot
 

@@ -13,8 +13,8 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 
-from sagline.arguments import brief, file_path, optional
-from sagline.errors import FileError, InvalidValueError
+from sagline.core.arguments import brief, file_path, optional
+from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.whole import written_whole
 from sagline.plot.fonts import with_fonts
 from sagline.plot.names import break_labels
@@ -23,7 +23,7 @@ from sagline.plot.style import PLAIN, Using, current
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from sagline.arrays import Array, Flags
+    from sagline.core.arrays import Array, Flags
 
 # Okabe and Ito 2008, "Color universal design", without the two that are too pale for a line on white
 BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"

@@ -10,10 +10,10 @@ from matplotlib import patheffects
 from matplotlib.colors import to_rgba
 from scipy.ndimage import distance_transform_edt, label
 
-from sagline.arguments import choice, instance
-from sagline.arrays import number
-from sagline.errors import InvalidValueError
-from sagline.numbers import n
+from sagline.core.arguments import choice, instance
+from sagline.core.arrays import number
+from sagline.core.errors import InvalidValueError
+from sagline.core.numbers import n
 from sagline.plot.names import wrapped
 from sagline.plot.sheet import GAP_COLOR, axes_or_new, dressed
 from sagline.plot.style import current
@@ -25,7 +25,7 @@ from sagline.workspaces.space import Workspace
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from sagline.arrays import Array, Flags
+    from sagline.core.arrays import Array, Flags
 
 POINTS: Final = 200  # along the longer side
 LINES: Final = 5  # of equal margin, at most about so many

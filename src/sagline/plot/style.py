@@ -9,7 +9,7 @@ from typing import Any, Final, cast
 
 import matplotlib
 
-from sagline.arguments import choice, whole_number
+from sagline.core.arguments import choice, whole_number
 
 SANS, SERIF = "DejaVu Sans", "STIXGeneral"  # come with Matplotlib, so that they are on any machine; one like Times
 SLIDE_HEIGHT, PAGE_HEIGHT = 6.0, 9.0  # in, that a figure may be tall

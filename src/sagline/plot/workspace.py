@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.colors import to_rgb
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from sagline.arguments import instance
+from sagline.core.arguments import instance
 from sagline.plot.names import wrapped
 from sagline.plot.robot import draw_robot, dress_space
 from sagline.plot.sheet import GAP_COLOR, sheet
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from mpl_toolkits.mplot3d.axes3d import Axes3D
 
-    from sagline.arrays import Array, Indices
+    from sagline.core.arrays import Array, Indices
     from sagline.plot.slice import Key
 
 NEAR_SIDE, FAR_SIDE = 0.5, 0.22  # opacity of the hull before and behind the robot

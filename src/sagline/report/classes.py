@@ -8,7 +8,7 @@ from sagline.article.explanations import Explanation
 from sagline.article.fits import fit_line
 from sagline.article.machine import ANCHORS, PULLEY
 from sagline.article.ten_poses import TenPoses, Trend
-from sagline.numbers import n
+from sagline.core.numbers import n
 from sagline.report.blocks import Finding, Table, Verdict
 
 NOTHING = 0.95  # of what was measured: what leaves more explains nothing

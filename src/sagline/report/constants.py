@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sagline.arrays import Array
 from sagline.article.constants import (
     PUBLISHED_K_H,
     PUBLISHED_K_P,
@@ -18,7 +17,8 @@ from sagline.article.constants import (
     published_sampling,
 )
 from sagline.article.intercept import InterceptStudy, intercept_studies
-from sagline.numbers import n
+from sagline.core.arrays import Array
+from sagline.core.numbers import n
 from sagline.plot.sheet import BLUE, PURPLE, VERMILLION
 from sagline.report.blocks import Chapter, Finding, Table, Verdict
 from sagline.report.drawing import Drawings, axes, legend, shades

@@ -12,7 +12,7 @@ import matplotlib
 import numpy as np
 from matplotlib.textpath import TextPath
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.plot.sheet import BLUE, GAP_COLOR, TICK, Sheet, dressed
 from sagline.report.blocks import Panel
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sagline.article.errata import errata
 from sagline.article.erratum import Erratum
-from sagline.numbers import n
+from sagline.core.numbers import n
 from sagline.report.blocks import Chapter, Finding, Table, Verdict
 
 

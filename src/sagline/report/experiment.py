@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from sagline.arrays import Array
 from sagline.article.experiment import SPEED, STOP, Experiment
 from sagline.control.events import EventKind
+from sagline.core.arrays import Array
+from sagline.core.numbers import n
 from sagline.files.json_text import json_text, plain
 from sagline.files.whole import made_folder, written_together
-from sagline.numbers import n
 from sagline.plot.sheet import BLUE, COLORS, TICK, VERMILLION
 from sagline.report.blocks import Chapter, Finding, Panel, Table, Verdict
 from sagline.report.drawing import Drawings, axes, legend, thinned

@@ -9,7 +9,7 @@ import numpy as np
 from sagline.article.explanations import Explanation, information
 from sagline.article.machine import ANCHORS, DEAD, DENSITY, LOAD, MODULUS, PULLEY, ZERO
 from sagline.article.ten_poses import TenPoses
-from sagline.numbers import n
+from sagline.core.numbers import n
 from sagline.plot.sheet import BLUE, VERMILLION
 from sagline.report.blocks import Finding, Panel, Table, Verdict
 from sagline.report.drawing import Drawings, axes, legend

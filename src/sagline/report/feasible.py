@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from sagline.arrays import Array
 from sagline.article.errata_cables import simulated_cable
 from sagline.article.feasible_sets import End, FeasibleSets, feasible_sets
 from sagline.article.sampling import ANGLE
-from sagline.numbers import n
+from sagline.core.arrays import Array
+from sagline.core.numbers import n
 from sagline.plot.sheet import BLUE, VERMILLION
 from sagline.report.blocks import Chapter, Finding, Verdict
 from sagline.report.drawing import Drawings, axes, legend, shades

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from sagline.arrays import Array
 from sagline.article.errata_cables import simulated_cable
 from sagline.article.identify import EmpiricalFit, identify_empirical
 from sagline.article.identify_cable import CableFit, identify_cable
 from sagline.cables.cable import Cable
 from sagline.cables.catenary import Catenary
-from sagline.numbers import n
+from sagline.core.arrays import Array
+from sagline.core.numbers import n
 from sagline.report.blocks import Chapter, Finding, Table, Verdict
 from sagline.report.drawing import Drawings, axes, legend, shades
 from sagline.report.maps import draw_errors, map_axes

@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib import patheffects
 from matplotlib.colors import BoundaryNorm, ListedColormap
 
-from sagline.arrays import Array
-from sagline.numbers import n
+from sagline.core.arrays import Array
+from sagline.core.numbers import n
 from sagline.plot.sheet import GAP_COLOR, LABEL, TICK, Sheet
 from sagline.report.drawing import axes
 

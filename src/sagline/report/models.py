@@ -9,11 +9,11 @@ import numpy as np
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.patches import Rectangle
 
-from sagline.arrays import Array
 from sagline.article.errata_cables import simulated_cable
 from sagline.article.model_errors import MODELS, ModelErrors, model_errors
 from sagline.article.sampling import GRAVITY
-from sagline.numbers import n
+from sagline.core.arrays import Array
+from sagline.core.numbers import n
 from sagline.plot.sheet import COLORS, TICK
 from sagline.report.blocks import Chapter, Finding, Panel, Table, Verdict
 from sagline.report.drawing import Drawings, axes, floored, legend

@@ -9,7 +9,7 @@ from difflib import get_close_matches
 from importlib import import_module
 from typing import NamedTuple
 
-from sagline.errors import InvalidValueError
+from sagline.core.errors import InvalidValueError
 from sagline.report.blocks import Chapter
 
 _numbers = re.compile(r"(\d+)(?:-(\d+))?")

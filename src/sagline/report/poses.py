@@ -6,7 +6,7 @@ import numpy as np
 
 from sagline.article.fits import fit_line
 from sagline.article.ten_poses import TenPoses, Tour, ten_poses, tour
-from sagline.numbers import n
+from sagline.core.numbers import n
 from sagline.plot.sheet import BLUE, COLORS, TICK
 from sagline.report.blocks import Chapter, Finding, Table, Verdict
 from sagline.report.classes import classes

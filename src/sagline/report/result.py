@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from matplotlib.ticker import FixedLocator, NullLocator
 
 from sagline.article.simulation import ERROR_BAND
-from sagline.numbers import n
+from sagline.core.numbers import n
 from sagline.plot.sheet import BLUE, VERMILLION
 from sagline.report.blocks import Chapter, Panel
 from sagline.report.drawing import NAMES, Drawings, axes, legend

@@ -6,7 +6,6 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from sagline.arrays import Array
 from sagline.article.constants import PUBLISHED_K_P, SHALLOW_K_P, published_sampling
 from sagline.article.errata_cables import simulated_cable
 from sagline.article.feasible_sets import End
@@ -21,7 +20,8 @@ from sagline.article.sag_constant import (
     stretch_study,
 )
 from sagline.article.sampling import ANGLE
-from sagline.numbers import n
+from sagline.core.arrays import Array
+from sagline.core.numbers import n
 from sagline.plot.sheet import BLUE, GREEN, VERMILLION
 from sagline.report.blocks import Chapter, Finding, Verdict
 from sagline.report.drawing import Courses, Drawings, axes, legend, with_fit

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from sagline.arrays import Array
 from sagline.article.simulation import ERROR_BAND, Figures, LowTension, Simulation, figures, low_tension_study, simulate
 from sagline.cables.catenary import Catenary
 from sagline.cables.empirical import Empirical
 from sagline.cables.parabolic import Parabolic
+from sagline.core.arrays import Array
+from sagline.core.numbers import n
 from sagline.kinematics.confirm import Confirmation
 from sagline.kinematics.plan import Plan
 from sagline.motion.path import Path
-from sagline.numbers import n
 from sagline.plot.motion import path as draw_path
 from sagline.plot.robot import robot as draw_robot
 from sagline.plot.sheet import BLUE, COLORS, VERMILLION, Sheet

@@ -8,8 +8,8 @@ import numpy as np
 
 from sagline.cables.catenary import Catenary
 from sagline.cables.straight import Straight
+from sagline.core.numbers import n
 from sagline.files.robot_file import load_robot
-from sagline.numbers import n
 from sagline.plot.sheet import BLUE, VERMILLION
 from sagline.report.blocks import Chapter, Finding, Panel, Table, Verdict
 from sagline.report.drawing import Drawings, axes, legend

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib.resources import files
 
-from sagline.errors import InvalidValueError, nearest
+from sagline.core.errors import InvalidValueError, nearest
 
 _PRESETS = files("sagline.robot") / "presets"
 

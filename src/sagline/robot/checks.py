@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import instance, optional
-from sagline.arrays import SMALLEST, Array, checked, exactly, locked
 from sagline.cables.cable import Cable
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import instance, optional
+from sagline.core.arrays import SMALLEST, Array, checked, exactly, locked
+from sagline.core.errors import InvalidValueError
 from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.unit import unit
 from sagline.robot.winch import Winch

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sagline.arrays import Array, locked
-from sagline.results import Result
+from sagline.core.arrays import Array, locked
+from sagline.core.results import Result
 from sagline.robot.several import Index
 
 

@@ -8,10 +8,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import choice
-from sagline.arrays import Array, checked
 from sagline.cables.rope import ROPES, SAFETY
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import choice
+from sagline.core.arrays import Array, checked
+from sagline.core.errors import InvalidValueError
 from sagline.robot.inertia import box_inertia
 from sagline.robot.pose_box import PoseBox
 from sagline.robot.robot import Robot

@@ -10,8 +10,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from sagline.arrays import Array, checked, kernel_input, locked
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Array, checked, kernel_input, locked
+from sagline.core.errors import InvalidValueError
 from sagline.kernels.cable import drum
 from sagline.kernels.codes import CATENARY
 from sagline.robot.behind import differs, real_behind

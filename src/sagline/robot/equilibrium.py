@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sagline.arrays import Array, locked
 from sagline.cables.model import CableState
-from sagline.errors import InvalidValueError
-from sagline.indices import length_of, part_of
-from sagline.results import Result
+from sagline.core.arrays import Array, locked
+from sagline.core.errors import InvalidValueError
+from sagline.core.indices import length_of, part_of
+from sagline.core.results import Result
 from sagline.robot.contact import Contact
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot

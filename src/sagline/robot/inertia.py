@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 
 if TYPE_CHECKING:
     from sagline.robot.robot import Robot

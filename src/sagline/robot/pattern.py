@@ -6,7 +6,7 @@ from typing import Final, Literal, get_args
 
 import numpy as np
 
-from sagline.arrays import Array, locked
+from sagline.core.arrays import Array, locked
 
 MotionPattern = Literal["3R3T", "3T", "1R2T", "2T"]
 MOTION_PATTERNS: Final[tuple[str, ...]] = get_args(MotionPattern)

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sagline.arrays import Array, checked, locked
-from sagline.errors import InvalidValueError
-from sagline.indices import length_of, part_of
-from sagline.memory import check_memory
+from sagline.core.arrays import Array, checked, locked
+from sagline.core.errors import InvalidValueError
+from sagline.core.indices import length_of, part_of
+from sagline.core.memory import check_memory
 from sagline.robot.unit import unit
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array, checked, number
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Array, checked, number
+from sagline.core.errors import InvalidValueError
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,9 +10,9 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from sagline.arguments import brief, text
-from sagline.arrays import Array, locked, numbers
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import brief, text
+from sagline.core.arrays import Array, locked, numbers
+from sagline.core.errors import InvalidValueError
 from sagline.robot.tolerances import deviations
 
 

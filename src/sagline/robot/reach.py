@@ -6,8 +6,8 @@ from math import asin, degrees
 
 import numpy as np
 
-from sagline.arrays import Array
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Array
+from sagline.core.errors import InvalidValueError
 from sagline.robot.pattern import ROTATING
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot

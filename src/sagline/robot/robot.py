@@ -10,17 +10,17 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import brief, choice, label, optional, text
-from sagline.arrays import Array, exactly, number
 from sagline.cables.cable import Cable
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import brief, choice, label, optional, text
+from sagline.core.arrays import Array, exactly, number
+from sagline.core.errors import InvalidValueError
+from sagline.core.results import Shown
 from sagline.robot import checks
 from sagline.robot.pattern import MOTION_PATTERNS, MotionPattern, freedom_matrix
 from sagline.robot.pose_box import PoseBox
 from sagline.robot.provenance import Provenance
 from sagline.robot.tolerances import deviations, value_of
 from sagline.robot.winch import Winch
-from sagline.shown import Shown
 
 TensionLimitsOf = Literal["chord", "frame_end"]
 

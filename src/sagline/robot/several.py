@@ -8,10 +8,10 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.arguments import brief
-from sagline.arrays import Array
 from sagline.cables.cable import Cable
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import brief
+from sagline.core.arrays import Array
+from sagline.core.errors import InvalidValueError
 from sagline.robot.robot import Robot
 
 Robots: TypeAlias = Robot | tuple[Robot, ...]  # `together` makes it from what a caller gives

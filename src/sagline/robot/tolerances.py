@@ -9,9 +9,9 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import brief, choice
-from sagline.arrays import Array, checked, locked
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import brief, choice
+from sagline.core.arrays import Array, checked, locked
+from sagline.core.errors import InvalidValueError
 
 
 class Uncertain(NamedTuple):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 
 # Rounding leaves a freshly normalized vector of 3 or 4 numbers within 2.5 eps of length 1.
 _ROUNDING = 4.0 * np.finfo(np.float64).eps

@@ -10,10 +10,10 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sagline.arguments import choice, whole_number
-from sagline.arrays import SMALLEST, Array, checked, locked, spread
-from sagline.errors import InvalidValueError
-from sagline.memory import check_memory
+from sagline.core.arguments import choice, whole_number
+from sagline.core.arrays import SMALLEST, Array, checked, locked, spread
+from sagline.core.errors import InvalidValueError
+from sagline.core.memory import check_memory
 from sagline.robot.unit import unit
 
 UPRIGHT: Final = 1e-9  # how far from vertical a swivel axis may be, as the sine of an angle

@@ -7,9 +7,9 @@ from math import pi
 from types import MappingProxyType
 from typing import Any, Final
 
-from sagline.arguments import brief
-from sagline.arrays import number
-from sagline.errors import InvalidValueError, nearest
+from sagline.core.arguments import brief
+from sagline.core.arrays import number
+from sagline.core.errors import InvalidValueError, nearest
 from sagline.robot.winch import Winch
 
 _TURN: Final = 2.0 * pi / 60.0  # rad/s of a turn a minute

@@ -8,13 +8,13 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.arrays import Array
 from sagline.cables.catenary import Catenary
+from sagline.core.arrays import Array
+from sagline.core.numbers import n
 from sagline.dynamics.simulation import Simulation
 from sagline.kernels.cable import geometry
 from sagline.kinematics.plan import Gap, Plan
 from sagline.kinematics.status import PoseStatus
-from sagline.numbers import n
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.robot.several import pulleys_of

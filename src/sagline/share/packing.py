@@ -10,7 +10,7 @@ from typing import Final, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 
 Codes = NDArray[np.int64]
 

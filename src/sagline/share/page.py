@@ -11,9 +11,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
+from sagline.core.numbers import n
 from sagline.kinematics.inverse import inverse
-from sagline.numbers import n
 from sagline.robot.bounds import bounds, home_pose
 from sagline.robot.robot import Robot
 from sagline.share.course import Course

@@ -7,8 +7,8 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arrays import Array
 from sagline.cables.catenary import Catenary
+from sagline.core.arrays import Array
 from sagline.robot.bounds import bounds
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arguments import instance
-from sagline.arrays import Array, locked, number
+from sagline.core.arguments import instance
+from sagline.core.arrays import Array, locked, number
 from sagline.kernels.balance.wrench import structure_matrices
 from sagline.kernels.cable import geometry as rows
 from sagline.robot.pose import Pose

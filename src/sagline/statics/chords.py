@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sagline.arrays import Array
-from sagline.errors import CableGeometryError
+from sagline.core.arrays import Array
+from sagline.core.errors import CableGeometryError
 from sagline.kernels.balance.setting import SHORTEST_CHORD
 from sagline.kernels.cable import geometry as rows
 from sagline.kernels.cable.geometry import cable_geometries

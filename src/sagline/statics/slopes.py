@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, locked
-from sagline.blocks import blocks, rows_of
+from sagline.core.arrays import Array, locked
+from sagline.core.progress import blocks, rows_of
 from sagline.kernels import tables
 from sagline.kernels.forward.sensitivity import (
     BY_DEAD,

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sagline.arguments import instance
-from sagline.arrays import Array, Flags, locked
-from sagline.memory import check_memory
-from sagline.results import Result
+from sagline.core.arguments import instance
+from sagline.core.arrays import Array, Flags, locked
+from sagline.core.memory import check_memory
+from sagline.core.results import Result
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.several import bodies_of, first_of
 from sagline.statics.slopes import CableSlopes, cable_slopes, on_platform

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, Flags, Indices
+from sagline.core.arrays import Array, Flags, Indices
 from sagline.kernels import codes
 from sagline.kernels.cable.rows import CABLE_ROWS
 from sagline.kernels.dynamics import collocation

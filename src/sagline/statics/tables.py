@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sagline.arrays import Array, locked
+from sagline.core.arrays import Array, locked
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.robot.several import Robots, first_of, pulleys_of

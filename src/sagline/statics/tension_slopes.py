@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.several import pulleys_of
 from sagline.statics.slopes import CableSlopes

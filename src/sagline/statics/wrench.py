@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import instance
-from sagline.arrays import Array, checked, exactly, locked
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import instance
+from sagline.core.arrays import Array, checked, exactly, locked
+from sagline.core.errors import InvalidValueError
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.robot.several import bodies_of, one_a_pose

@@ -14,7 +14,7 @@ from importlib.util import find_spec
 from itertools import islice
 from typing import Any, Final
 
-from sagline.errors import InvalidValueError, SaglineError
+from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.sweep.tasks import task
 
 HERE: Final = "127.0.0.1"  # nobody else is served

@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.arrays import locked
 from sagline.cables.models import MODELS
-from sagline.errors import FileError, InvalidValueError
+from sagline.core.arrays import locked
+from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.content import Content
 from sagline.files.plan_file import choice_attributes, choice_of
 from sagline.files.robot_file import dump_robot, parse_robot

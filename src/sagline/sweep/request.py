@@ -9,14 +9,14 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import brief, choice, instance
-from sagline.arrays import Array, checked, locked, number
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import brief, choice, instance
+from sagline.core.arrays import Array, checked, locked, number
+from sagline.core.errors import InvalidValueError
+from sagline.core.numbers import counted
+from sagline.core.results import Result
 from sagline.kinematics.winding import without_guides
-from sagline.numbers import counted
-from sagline.results import Result
 from sagline.robot.pose import Pose
 from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot

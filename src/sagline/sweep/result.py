@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.arguments import brief, choice, file_path
-from sagline.arrays import locked
-from sagline.errors import FileError, InvalidValueError
-from sagline.memory import check_memory
-from sagline.numbers import counted
-from sagline.results import Result
+from sagline.core.arguments import brief, choice, file_path
+from sagline.core.arrays import locked
+from sagline.core.errors import FileError, InvalidValueError
+from sagline.core.memory import check_memory
+from sagline.core.numbers import counted
+from sagline.core.results import Result
 from sagline.sweep.dataset import dataset_of
 from sagline.sweep.folder import check_packages, open_folder
 from sagline.sweep.marks import read_marks, total_of

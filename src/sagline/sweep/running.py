@@ -10,9 +10,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
-from sagline.arguments import callback, file_path, instance, whole_number
-from sagline.blocks import Progress
-from sagline.errors import FileError, InvalidValueError
+from sagline.core.arguments import callback, file_path, instance, whole_number
+from sagline.core.errors import FileError, InvalidValueError
+from sagline.core.progress import Progress
 from sagline.sweep.cluster import check_address, cores, has_dask, local_workers, remote_workers, spread
 from sagline.sweep.folder import SweepFolder, check_made_here, check_packages, digest_of, make_folder, open_folder
 from sagline.sweep.marks import Mark, Marks, marking

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arrays import Array, Flags, Indices, locked
+from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.kernels import codes
 from sagline.kinematics.inverse_rows import UNDECIDED, Found, Verdicts, decide_rows
 from sagline.robot.robot import Robot

@@ -9,8 +9,8 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arrays import Indices
-from sagline.errors import FileError
+from sagline.core.arrays import Indices
+from sagline.core.errors import FileError
 from sagline.sweep.folder import SweepFolder, TaskSize, check_made_here, open_folder
 from sagline.sweep.quantities import variables_of
 from sagline.sweep.request import Request

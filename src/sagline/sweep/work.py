@@ -8,7 +8,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.arrays import Array, locked
+from sagline.core.arrays import Array, locked
 from sagline.kernels import tables
 from sagline.kernels.inverse.verdicts import PROVED
 from sagline.kinematics.inverse_rows import decide_rows, solve_rows

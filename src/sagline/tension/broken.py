@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sagline.arguments import instance, whole_number
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import instance, whole_number
+from sagline.core.errors import InvalidValueError
 from sagline.robot.robot import Robot
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from sagline.arguments import instance
-from sagline.arrays import Array, locked
-from sagline.blocks import blocks, rows_of
+from sagline.core.arguments import instance
+from sagline.core.arrays import Array, locked
+from sagline.core.progress import blocks, rows_of
 from sagline.kernels.inverse.queries import margins_of_poses
 from sagline.kernels.memory import memory_for
 from sagline.robot.equilibrium import Equilibrium

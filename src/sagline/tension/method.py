@@ -7,9 +7,9 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from sagline.arguments import choice
-from sagline.arrays import Array, locked, number
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import choice
+from sagline.core.arrays import Array, locked, number
+from sagline.core.errors import InvalidValueError
 from sagline.kernels import codes
 from sagline.robot.equilibrium import Equilibrium
 

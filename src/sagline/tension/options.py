@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arrays import locked
 from sagline.cables.model import CableModel
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import locked
+from sagline.core.errors import InvalidValueError
 from sagline.kernels import codes
 from sagline.kernels.inverse.poses import LimitTerms, ModelTerms, SharingTerms
 from sagline.robot.robot import Robot

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from sagline.arrays import number
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import number
+from sagline.core.errors import InvalidValueError
 from sagline.kernels import codes
 from sagline.tension.method import TensionMethod
 

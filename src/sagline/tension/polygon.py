@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array, checked
-from sagline.errors import InvalidValueError
-from sagline.results import Result
+from sagline.core.arrays import Array, checked
+from sagline.core.errors import InvalidValueError
+from sagline.core.results import Result
 
 
 class Side(NamedTuple):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from sagline.arguments import choice
+from sagline.core.arguments import choice
 from sagline.kernels import codes
 from sagline.kernels.sharing.on_polygon import WALK_CENTROID, WALK_NORM, WALK_SUM
 from sagline.tension.method import TensionMethod

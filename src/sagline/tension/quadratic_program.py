@@ -8,8 +8,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arrays import Array, checked, locked
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Array, checked, locked
+from sagline.core.errors import InvalidValueError
 from sagline.kernels import codes
 from sagline.tension.method import GOAL, PREFERENCE_ROWS, ROOT_WEIGHT, TensionMethod, Variable
 

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arguments import instance
-from sagline.arrays import Array, locked
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import instance
+from sagline.core.arrays import Array, locked
+from sagline.core.errors import InvalidValueError
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.balance import structure_matrix

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array
-from sagline.errors import InvalidValueError, SaglineError
+from sagline.core.arrays import Array
+from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.twin.machine import Machine

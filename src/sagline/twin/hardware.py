@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.dynamics.damping import Damping
 from sagline.dynamics.drives import lever_of
 from sagline.dynamics.simulator import Reading, Simulator

@@ -9,8 +9,8 @@ from heapq import heappop, heappush
 from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
-from sagline.arguments import brief
-from sagline.errors import InvalidValueError, nearest
+from sagline.core.arguments import brief
+from sagline.core.errors import InvalidValueError, nearest
 
 
 class Kind(NamedTuple):

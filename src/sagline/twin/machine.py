@@ -7,12 +7,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from sagline.arguments import brief, choice, instance, optional, whole_number
-from sagline.arrays import number
 from sagline.control.link import COUNTERS, PERIOD, Command, groups_of
+from sagline.core.arguments import brief, choice, instance, optional, whole_number
+from sagline.core.arrays import number
+from sagline.core.errors import InvalidValueError
 from sagline.dynamics.damping import Damping
 from sagline.dynamics.simulator import Reading
-from sagline.errors import InvalidValueError
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.twin.hardware import CELL, LENGTH, Hardware

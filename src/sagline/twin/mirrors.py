@@ -6,7 +6,7 @@ import socket
 from collections.abc import Sequence
 from typing import Final, Protocol
 
-from sagline.errors import InvalidValueError
+from sagline.core.errors import InvalidValueError
 
 LOOPBACK: Final = "127.0.0.1"
 

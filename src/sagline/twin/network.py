@@ -7,8 +7,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from sagline.arrays import number
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import number
+from sagline.core.errors import InvalidValueError
 
 TINY: Final = 1e-9  # s, of rounding
 

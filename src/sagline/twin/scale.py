@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
+from sagline.core.errors import InvalidValueError
 from sagline.dynamics.drives import lever_of
-from sagline.errors import InvalidValueError
 from sagline.kernels.cable.drum import lengths_of_turns, turns_of_lengths
 from sagline.robot.drum import drums_of
 from sagline.robot.robot import Robot

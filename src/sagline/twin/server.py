@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sagline.arguments import instance, whole_number
 from sagline.control.link import Command, Mode
 from sagline.control.pace import Pace
+from sagline.core.arguments import instance, whole_number
 from sagline.plc.addresses import LAST_PORT
 from sagline.plc.blocks import AGAIN, CLAIM, FROM_PLC, TO_PLC, Refusal, winch_row
 from sagline.plc.packing import winch_rows

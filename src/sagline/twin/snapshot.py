@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from sagline.arrays import Array
 from sagline.control.link import Whole
+from sagline.core.arrays import Array
 
 FIRST: Final = 2  # of the arrays of a snapshot that are of groups rather than winches
 

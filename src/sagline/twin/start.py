@@ -7,12 +7,12 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from sagline.arguments import optional
-from sagline.arrays import Array
 from sagline.control.link import HEARTBEAT
+from sagline.core.arguments import optional
+from sagline.core.arrays import Array
+from sagline.core.errors import InvalidValueError
 from sagline.dynamics.drives import drive_data
 from sagline.dynamics.steps import highest_frequency, with_drives
-from sagline.errors import InvalidValueError
 from sagline.kernels.dynamics import drives as d
 from sagline.kinematics.forward import forward
 from sagline.kinematics.inverse import inverse

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable
 from typing import Final, TypeVar
 
-from sagline.errors import SaglineError
+from sagline.core.errors import SaglineError
 
 T = TypeVar("T")
 

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import viser
 
-from sagline.errors import InvalidValueError
+from sagline.core.errors import InvalidValueError
 
 FIELD: Final = "Row of the log"
 TOPIC: Final = "row"  # that a page tells the number of a row under that is clicked

@@ -8,10 +8,10 @@ from typing import Any, Final
 import numpy as np
 import viser
 
-from sagline.arrays import Array
 from sagline.calibration.relative import Anchors, anchor_covariance, relative_covariance, without_motion
 from sagline.calibration.result import Calibration
-from sagline.errors import SaglineError
+from sagline.core.arrays import Array
+from sagline.core.errors import SaglineError
 from sagline.robot.pose import Pose
 from sagline.viewer import calibration_words, fit_scale, solids
 from sagline.viewer.calibration_panel import TOPIC, CalibrationPanel

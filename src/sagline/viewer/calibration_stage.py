@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 import viser
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.viewer.ellipsoids import Ellipsoids, ball
 from sagline.viewer.stage import TRACE_WIDTH, TRUTH
 from sagline.viewer.tension_scale import Colors

@@ -6,13 +6,13 @@ from html import escape
 
 import numpy as np
 
-from sagline.arrays import Array
 from sagline.calibration.findings import Direction
 from sagline.calibration.result import Calibration
 from sagline.calibration.sensors import reading_deviations
 from sagline.calibration.status import CalibrationStatus
 from sagline.calibration.words import chi_squared_in_words, outlier_in_words
-from sagline.numbers import counted, n
+from sagline.core.arrays import Array
+from sagline.core.numbers import counted, n
 from sagline.viewer.channel import chosen_by
 from sagline.viewer.fit_scale import freedoms
 from sagline.viewer.readout import block, box, sentence

@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 import viser
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.viewer import lines
 from sagline.viewer.cut_panel import TOP
 

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sagline.core.numbers import n
 from sagline.dynamics.simulation import Simulation
-from sagline.numbers import n
 from sagline.robot.equilibrium import Equilibrium
 from sagline.viewer.readout import box
 from sagline.viewer.tension_scale import force_unit

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arrays import Array, locked
+from sagline.core.arrays import Array, locked
 from sagline.tension.polygon import Side, TensionPolygon
 
 WIDTH, BORDER = 340, 26  # px

@@ -8,8 +8,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Array
+from sagline.core.errors import InvalidValueError
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.inverse_solver import InverseSolver
 from sagline.kinematics.plan import Plan

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.viewer import moment_words, session_words
 from sagline.viewer.by_hand import ByHand
 from sagline.viewer.channel import Channel

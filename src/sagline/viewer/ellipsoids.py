@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from sagline.arrays import Array, Indices
+from sagline.core.arrays import Array, Indices
 from sagline.viewer.solids import Solid, round_below
 
 THINNEST: Final = 0.03  # of its longest axis: a flat one is still seen

@@ -9,8 +9,8 @@ from typing import Any
 
 import viser
 
-from sagline.arrays import Array
-from sagline.errors import SaglineError
+from sagline.core.arrays import Array
+from sagline.core.errors import SaglineError
 from sagline.files.names import file_stem
 from sagline.viewer.channel import Channel, Told
 from sagline.viewer.film import TOPIC as FILM

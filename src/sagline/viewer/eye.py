@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.viewer.solids import Solid
 
 

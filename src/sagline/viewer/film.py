@@ -14,8 +14,8 @@ from typing import Any, Final
 import numpy as np
 import viser
 
-from sagline.arrays import Array
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Array
+from sagline.core.errors import InvalidValueError
 from sagline.viewer.channel import Told
 from sagline.viewer.played import Played
 from sagline.viewer.readout import headline

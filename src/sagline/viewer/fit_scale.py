@@ -6,9 +6,9 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arrays import Indices
 from sagline.calibration.chi_squared import exceeded_with
 from sagline.calibration.result import Calibration
+from sagline.core.arrays import Indices
 from sagline.viewer.readout import block, css_color
 from sagline.viewer.stage import INFEASIBLE, PLATFORM, REST
 from sagline.viewer.tension_scale import Colors

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.robot.equilibrium import Equilibrium
 from sagline.viewer.cable_colors import NONE, Color, cable_color
 

@@ -6,8 +6,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array
-from sagline.numbers import n
+from sagline.core.arrays import Array
+from sagline.core.numbers import n
 from sagline.robot.equilibrium import Equilibrium
 from sagline.viewer.cable_colors import Color
 from sagline.viewer.force_polygon import MISSING, Pull, pulls_of, residual, turns

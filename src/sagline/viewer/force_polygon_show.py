@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 import viser
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.robot.equilibrium import Equilibrium
 from sagline.viewer.force_polygon import pulls_of
 from sagline.viewer.force_polygon_figure import force_polygon_figure

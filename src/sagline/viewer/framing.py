@@ -9,7 +9,7 @@ import numpy as np
 import viser
 from scipy.optimize import brentq
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 
 TOWARD: Final = np.array([0.42, -0.86, 0.36]) / np.linalg.norm([0.42, -0.86, 0.36])  # from the box to the camera
 FIELD = 0.7  # rad, of view, upright: a longer lens than viser's bends less

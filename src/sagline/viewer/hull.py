@@ -10,9 +10,9 @@ from typing import Final, NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from sagline.arrays import Array, Flags, Indices
 from sagline.cables.model import CableModel
-from sagline.numbers import counted, n
+from sagline.core.arrays import Array, Flags, Indices
+from sagline.core.numbers import counted, n
 from sagline.robot.robot import Robot
 from sagline.tension.minimum_norm import MinimumNorm
 from sagline.viewer.cable_colors import cable_color

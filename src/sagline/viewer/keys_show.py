@@ -8,8 +8,8 @@ from typing import Any, Final
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from sagline.arrays import Array
-from sagline.errors import SaglineError
+from sagline.core.arrays import Array
+from sagline.core.errors import SaglineError
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.viewer import solids

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.arrays import Array, locked
 from sagline.cables.model import CableState
+from sagline.core.arrays import Array, locked
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.robot.several import pulleys_of

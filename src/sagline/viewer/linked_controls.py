@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import viser
 
-from sagline.errors import InvalidValueError
+from sagline.core.errors import InvalidValueError
 from sagline.files.quantity import plain_number
 from sagline.viewer.channel import NAME
 

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Array
+from sagline.core.errors import InvalidValueError
 from sagline.files.typed import STRONGEST, pose_of
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot

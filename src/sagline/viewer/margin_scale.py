@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arrays import Array, Indices
+from sagline.core.arrays import Array, Indices
 from sagline.viewer.readout import block, css_color
 from sagline.viewer.tension_scale import Colors
 from sagline.viewer.wording import ForceUnit

@@ -8,8 +8,8 @@ from typing import Final, NamedTuple
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from sagline.arrays import Array, locked
-from sagline.errors import SaglineError
+from sagline.core.arrays import Array, locked
+from sagline.core.errors import SaglineError
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus

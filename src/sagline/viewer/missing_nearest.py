@@ -6,9 +6,9 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, Flags
 from sagline.cables.model import CableModel
-from sagline.errors import SaglineError
+from sagline.core.arrays import Array, Flags
+from sagline.core.errors import SaglineError
 from sagline.kinematics.inverse import inverse
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot

@@ -7,9 +7,9 @@ from typing import Final
 
 import numpy as np
 
-from sagline.errors import SaglineError
+from sagline.core.errors import SaglineError
+from sagline.core.numbers import n
 from sagline.kinematics.status import PoseStatus
-from sagline.numbers import n
 from sagline.tension.singular import unresisted_motion
 from sagline.viewer.channel import chosen_by
 from sagline.viewer.missing import Missing

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.dynamics.simulation import Occurrence, Simulation
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from sagline.core.numbers import n
 from sagline.dynamics.simulation import Occurrence
-from sagline.numbers import n
 from sagline.viewer.moment import Moment
 from sagline.viewer.readout import block, box, css_color, pose_line, sentence
 from sagline.viewer.tension_scale import TensionScale, force_unit

@@ -8,7 +8,7 @@ from typing import Any
 
 import viser
 
-from sagline.errors import InvalidValueError
+from sagline.core.errors import InvalidValueError
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 from sagline.viewer import readout

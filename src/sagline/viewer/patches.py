@@ -7,7 +7,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import viser
 
-from sagline.arrays import Array, Indices
+from sagline.core.arrays import Array, Indices
 
 OPACITY: Final = 0.35  # the robot inside is seen
 

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.dynamics.simulation import Simulation
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from sagline.errors import InvalidValueError
+from sagline.core.errors import InvalidValueError
 from sagline.kinematics.polygon import polygon_at, tension_polygon
 from sagline.tension.minimum_norm import MinimumNorm
 from sagline.tension.options import kernel_options

@@ -9,9 +9,9 @@ from typing import Final, NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from sagline.arrays import Array, Flags, locked
 from sagline.cables.straight import Straight
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Array, Flags, locked
+from sagline.core.errors import InvalidValueError
 from sagline.kinematics.forward import forward
 from sagline.kinematics.inverse import inverse
 from sagline.robot.equilibrium import Equilibrium

@@ -8,8 +8,8 @@ from typing import Any, Final
 import numpy as np
 import viser
 
-from sagline.arrays import Array
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Array
+from sagline.core.errors import InvalidValueError
 from sagline.robot.robot import Robot
 from sagline.viewer.push import Push
 from sagline.viewer.readout import refused, sentence

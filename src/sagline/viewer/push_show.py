@@ -9,8 +9,8 @@ from typing import Any, Final
 import numpy as np
 import viser
 
-from sagline.arrays import Array
-from sagline.errors import SaglineError
+from sagline.core.arrays import Array
+from sagline.core.errors import SaglineError
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.robot import Robot
 from sagline.viewer import push_words, solids

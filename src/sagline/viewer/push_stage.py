@@ -8,7 +8,7 @@ import numpy as np
 import viser
 from scipy.spatial.transform import Rotation
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.viewer import solids

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sagline.numbers import n
+from sagline.core.numbers import n
 from sagline.viewer.push import Pushed, Reserve, radii
 from sagline.viewer.readout import LATER, box
 from sagline.viewer.tension_scale import force_unit

@@ -7,10 +7,10 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
+from sagline.core.numbers import n
 from sagline.dynamics.mode_list import MASSLESS
 from sagline.kinematics.status import PoseStatus
-from sagline.numbers import n
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.robot.several import pulleys_of

@@ -7,7 +7,7 @@ from math import ceil, floor, log10
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.dynamics.mode_list import ListedMode
 from sagline.dynamics.response_curves import ResponseCurves
 from sagline.viewer.channel import chosen_by

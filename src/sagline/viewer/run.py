@@ -6,9 +6,9 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from sagline.arrays import Array
-from sagline.blocks import Progress
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Array
+from sagline.core.errors import InvalidValueError
+from sagline.core.progress import Progress
 from sagline.kinematics.confirm import Confirmation, confirm
 from sagline.kinematics.plan import Plan
 from sagline.robot.pose import Pose

@@ -12,7 +12,7 @@ from io import StringIO
 
 import viser
 
-from sagline.errors import InvalidValueError
+from sagline.core.errors import InvalidValueError
 from sagline.viewer import page
 
 LOOPBACK = "127.0.0.1"

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sagline.arrays import Array, Codes
 from sagline.control.events import Event, EventKind
 from sagline.control.states import State
+from sagline.core.arrays import Array, Codes
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.viewer.drawn import Drawn

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.files.execution_file import plan_of_log
 from sagline.files.mcap_layout import NANO
 from sagline.files.mcap_reader import Log, LogReader

@@ -7,7 +7,7 @@ from html import escape
 import numpy as np
 
 from sagline.control.events import Event
-from sagline.numbers import n
+from sagline.core.numbers import n
 from sagline.viewer.readout import block, box, css_color, pose_line, sentence
 from sagline.viewer.session import PER_METER, SessionMoment
 from sagline.viewer.tension_scale import TensionScale, force_unit

@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Final
 
-from sagline.arrays import checked
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.cables.models import MODELS as ALL_MODELS
+from sagline.core.arrays import checked
 from sagline.robot.inertia import with_mass
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod

@@ -8,7 +8,7 @@ import numpy as np
 from contourpy import LineType, contour_generator
 from numpy.typing import NDArray
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.viewer.margin_scale import MarginScale, bare
 from sagline.viewer.wording import ForceUnit
 from sagline.workspaces.slice import Slice

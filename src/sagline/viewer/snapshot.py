@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sagline.arrays import Array
 from sagline.cables.catenary import Catenary
-from sagline.errors import CableGeometryError
+from sagline.core.arrays import Array
+from sagline.core.errors import CableGeometryError
 from sagline.kinematics.confirm import confirm
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.robot.bounds import bounds as bounds
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import viser
 
-from sagline.errors import InvalidValueError
+from sagline.core.errors import InvalidValueError
 from sagline.viewer.margin_scale import MarginScale
 from sagline.viewer.readout import block, refused, sentence
 from sagline.viewer.where_to import NAMES, WhereTo

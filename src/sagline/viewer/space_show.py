@@ -11,9 +11,9 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, locked
 from sagline.cables.model import CableModel
-from sagline.errors import SaglineError
+from sagline.core.arrays import Array, locked
+from sagline.core.errors import SaglineError
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.viewer.aside import Aside

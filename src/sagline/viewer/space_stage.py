@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 import viser
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.viewer.patches import Patch, Patches
 from sagline.viewer.slice_picture import Picture
 from sagline.viewer.stage import INFEASIBLE, PLATFORM, REST

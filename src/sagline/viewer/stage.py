@@ -7,8 +7,8 @@ from typing import Any, Final
 import numpy as np
 import viser
 
-from sagline.arrays import Array
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Array
+from sagline.core.errors import InvalidValueError
 from sagline.robot.pattern import ROTATING
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot

@@ -8,8 +8,8 @@ from zlib import crc32
 
 import numpy as np
 
-from sagline.arrays import Array
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Array
+from sagline.core.errors import InvalidValueError
 from sagline.files.robot_file import dump_robot
 from sagline.files.typed import numbers
 from sagline.robot.pose import Pose

@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-from sagline.errors import InvalidValueError, SaglineError
+from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.files.typed import pose_of
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot

@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 
 import viser
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.viewer.channel import Told
 from sagline.viewer.strip import HEIGHT as STRIP
 from sagline.viewer.strip import strip_of

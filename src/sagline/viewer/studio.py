@@ -11,8 +11,8 @@ import numpy as np
 import viser
 from scipy.spatial.transform import Rotation
 
-from sagline.arrays import Array
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Array
+from sagline.core.errors import InvalidValueError
 from sagline.viewer.played import Played
 from sagline.viewer.stage import TRACE_POINTS, Stage
 from sagline.viewer.view import View

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.dynamics.at_rest import end_motions, following
 from sagline.dynamics.mode_list import WITH_MASS, ListedMode, listed_modes
 from sagline.dynamics.vibration import Vibration

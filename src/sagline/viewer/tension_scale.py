@@ -8,7 +8,7 @@ from math import isfinite, log, log10
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.robot.robot import Robot
 from sagline.viewer.wording import ForceUnit
 

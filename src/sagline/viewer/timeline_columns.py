@@ -7,7 +7,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.viewer.timeline_track import COLORS, Chart, Limit, Track
 
 MOST: Final = 1500  # columns

@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.robot.robot import Robot
 
 # Cables by number, here and nowhere else: no color of the platform, of its path, of a tension or of a verdict.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.viewer.drawn import Drawn
 from sagline.viewer.played import Played
 from sagline.viewer.settings import Settings

@@ -10,9 +10,9 @@ from collections.abc import Callable
 import numpy as np
 import viser
 
-from sagline.arrays import Array
 from sagline.calibration.result import Calibration
-from sagline.errors import SaglineError
+from sagline.core.arrays import Array
+from sagline.core.errors import SaglineError
 from sagline.kinematics.plan import Plan
 from sagline.robot.bounds import home_pose as home_pose
 from sagline.robot.pose import Pose

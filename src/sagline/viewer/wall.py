@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.viewer.cable_colors import cable_color
 from sagline.viewer.hull import Hull
 from sagline.viewer.patches import Patch

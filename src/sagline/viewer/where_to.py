@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arrays import Array, Flags, Indices, locked
+from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.robot.robot import Robot
 from sagline.workspaces.slice import Find
 

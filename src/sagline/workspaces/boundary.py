@@ -8,10 +8,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sagline.arguments import whole_number
-from sagline.arrays import Array, exactly, locked
-from sagline.errors import InvalidValueError
-from sagline.results import Result
+from sagline.core.arguments import whole_number
+from sagline.core.arrays import Array, exactly, locked
+from sagline.core.errors import InvalidValueError
+from sagline.core.results import Result
 from sagline.workspaces.components import Components, components_of
 from sagline.workspaces.crossing import crossings
 from sagline.workspaces.grid import Grid, Level, refined, sampled

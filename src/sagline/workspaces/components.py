@@ -8,9 +8,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sagline.arrays import Array, checked, locked
-from sagline.numbers import counted, n
-from sagline.results import Result
+from sagline.core.arrays import Array, checked, locked
+from sagline.core.numbers import counted, n
+from sagline.core.results import Result
 from sagline.workspaces.grid import Grid
 from sagline.workspaces.surface import Indices
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.workspaces.grid import Level, evaluate
 from sagline.workspaces.surface import Indices
 

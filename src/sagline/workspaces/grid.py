@@ -9,9 +9,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.arrays import Array, locked
-from sagline.errors import InvalidValueError
-from sagline.results import Result
+from sagline.core.arrays import Array, locked
+from sagline.core.errors import InvalidValueError
+from sagline.core.results import Result
 
 Level = Callable[[Array], Array]
 """A function of positions [m], shape (N, 3): >= 0 inside, shape (N,); it may be infinite, and may jump."""

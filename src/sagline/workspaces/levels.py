@@ -7,9 +7,9 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, Indices, locked
-from sagline.blocks import blocks
 from sagline.cables.model import CableModel
+from sagline.core.arrays import Array, Indices, locked
+from sagline.core.progress import blocks
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 from sagline.workspaces.criteria.criterion import Criterion

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sagline.errors import FileError
+from sagline.core.errors import FileError
 from sagline.workspaces.grid import Mask
 from sagline.workspaces.surface import Indices
 

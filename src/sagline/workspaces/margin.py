@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import callback, instance
-from sagline.arrays import Array, Codes, Flags, Indices, locked, number
-from sagline.blocks import Progress
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
-from sagline.memory import check_memory
-from sagline.numbers import counted, n
-from sagline.results import Result
+from sagline.core.arguments import callback, instance
+from sagline.core.arrays import Array, Codes, Flags, Indices, locked, number
+from sagline.core.memory import check_memory
+from sagline.core.numbers import counted, n
+from sagline.core.progress import Progress
+from sagline.core.results import Result
 from sagline.robot.pose import Pose
 from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot

@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.arrays import Array, Codes, Indices, locked, number
-from sagline.blocks import Progress, blocks
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
-from sagline.errors import InvalidValueError
+from sagline.core.arrays import Array, Codes, Indices, locked, number
+from sagline.core.errors import InvalidValueError
+from sagline.core.progress import Progress, blocks
 from sagline.kernels import tables
 from sagline.kernels.memory import memory_for
 from sagline.kernels.workspaces.signed_margin import FACET_SIZE, signed_margins

@@ -7,11 +7,11 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arrays import Array, locked
+from sagline.core.arrays import Array, locked
+from sagline.core.numbers import n
+from sagline.core.results import Result
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.status import PoseStatus
-from sagline.numbers import n
-from sagline.results import Result
 from sagline.robot.pose import Pose
 from sagline.workspaces.grid import Grid
 from sagline.workspaces.levels import Details, Levels

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import brief, choice
-from sagline.arrays import Array, locked, number
-from sagline.errors import InvalidValueError
-from sagline.numbers import n
+from sagline.core.arguments import brief, choice
+from sagline.core.arrays import Array, locked, number
+from sagline.core.errors import InvalidValueError
+from sagline.core.numbers import n
 from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.pose import Pose
 from sagline.robot.reach import LEVEL, ROUNDING, forbidden_turn, in_words

@@ -11,8 +11,8 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arrays import Array, Flags, Indices, locked
-from sagline.results import Result
+from sagline.core.arrays import Array, Flags, Indices, locked
+from sagline.core.results import Result
 from sagline.workspaces.boundary import FACES, faces_on_box, placed
 from sagline.workspaces.grid import Grid, sampled
 from sagline.workspaces.levels import Levels

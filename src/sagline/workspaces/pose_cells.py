@@ -9,11 +9,11 @@ from typing import Any, Final
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from sagline.arrays import Array, Codes, Indices, locked
-from sagline.blocks import Progress
 from sagline.cables.model import CableModel
+from sagline.core.arrays import Array, Codes, Indices, locked
+from sagline.core.progress import Progress
+from sagline.core.results import Result
 from sagline.kernels.workspaces.pose_box_proof import BOX_COLUMNS, prove_boxes, room_for
-from sagline.results import Result
 from sagline.robot.pose_box import PoseBox
 from sagline.robot.robot import Robot
 from sagline.statics.tables import robot_terms

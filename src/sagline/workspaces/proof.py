@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sagline.arguments import callback, instance
-from sagline.arrays import number
-from sagline.blocks import Progress
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
-from sagline.errors import InvalidValueError
-from sagline.numbers import counted
-from sagline.results import Result
+from sagline.core.arguments import callback, instance
+from sagline.core.arrays import number
+from sagline.core.errors import InvalidValueError
+from sagline.core.numbers import counted
+from sagline.core.progress import Progress
+from sagline.core.results import Result
 from sagline.robot.pose_box import PoseBox
 from sagline.robot.robot import Robot
 from sagline.workspaces.orientations import check_tilt

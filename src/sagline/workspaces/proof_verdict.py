@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from sagline.core.status import Status
 from sagline.kernels.workspaces.pose_box_proof import INSIDE, OPEN, OUTSIDE
-from sagline.status import Status
 
 
 class ProofVerdict(Status):

@@ -12,9 +12,9 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import whole_number
-from sagline.arrays import Array, exactly, locked
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import whole_number
+from sagline.core.arrays import Array, exactly, locked
+from sagline.core.errors import InvalidValueError
 from sagline.workspaces.crossing import Brackets, brackets, crossings, crossings_of, way_to_box
 from sagline.workspaces.grid import Level, evaluate
 from sagline.workspaces.surface import Indices, Surface

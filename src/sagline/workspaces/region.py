@@ -6,9 +6,9 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from sagline.arguments import optional
-from sagline.arrays import Array
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import optional
+from sagline.core.arrays import Array
+from sagline.core.errors import InvalidValueError
 from sagline.robot.bounds import bounds
 from sagline.robot.pose_box import PoseBox
 from sagline.robot.reach import ROUNDING

@@ -8,7 +8,7 @@ from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 
-from sagline.arrays import Array, Indices, locked
+from sagline.core.arrays import Array, Indices, locked
 
 _IN_PLANE: Final = ((1, 2), (0, 2), (0, 1))  # axes across and up a drawing, by the axis that is normal to it
 AXES: Final = "xyz"

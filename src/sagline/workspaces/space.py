@@ -8,10 +8,10 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, Codes, Indices
 from sagline.cables.model import CableModel
-from sagline.numbers import SPACE, counted, n
-from sagline.results import Result, Saved, formats
+from sagline.core.arrays import Array, Codes, Indices
+from sagline.core.numbers import SPACE, counted, n
+from sagline.core.results import Result, Saved, formats
 from sagline.robot.pose_box import PoseBox
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod

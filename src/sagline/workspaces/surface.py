@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.arrays import Array
-from sagline.numbers import counted, n
-from sagline.results import Result, formats
+from sagline.core.arrays import Array
+from sagline.core.numbers import counted, n
+from sagline.core.results import Result, formats
 
 Indices = NDArray[np.int64]
 

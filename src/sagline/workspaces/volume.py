@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.workspaces.crossing import Brackets, brackets, crossings, way_to_box
 from sagline.workspaces.grid import Grid, Level, evaluate
 from sagline.workspaces.surface import Indices, normals_of

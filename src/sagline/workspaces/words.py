@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sagline.arrays import Array
-from sagline.numbers import n
+from sagline.core.arrays import Array
+from sagline.core.numbers import n
 
 
 def in_words(center: Array, segments: Array, ellipsoids: int, polytopes: Sequence[Array], accelerations: Array) -> str:

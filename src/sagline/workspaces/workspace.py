@@ -8,12 +8,12 @@ from typing import Final
 
 import numpy as np
 
-from sagline.arguments import brief, callback, instance, whole_number
-from sagline.arrays import Array, Flags, locked, number
-from sagline.blocks import Progress
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import brief, callback, instance, whole_number
+from sagline.core.arrays import Array, Flags, locked, number
+from sagline.core.errors import InvalidValueError
+from sagline.core.progress import Progress
 from sagline.robot.pose_box import PoseBox
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod

@@ -12,10 +12,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.arguments import brief
-from sagline.arrays import Array, Indices, checked, exactly, locked, number
-from sagline.errors import InvalidValueError
-from sagline.results import ByFields
+from sagline.core.arguments import brief
+from sagline.core.arrays import Array, Indices, checked, exactly, locked, number
+from sagline.core.errors import InvalidValueError
+from sagline.core.results import ByFields
 from sagline.workspaces.words import in_words
 
 

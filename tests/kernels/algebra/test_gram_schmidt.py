@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.algebra.gram_schmidt import keep, take_out
 from tests.kernels.compiled import from_python
 

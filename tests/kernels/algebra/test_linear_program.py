@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.algebra import linear_program as lp
 from sagline.kernels.algebra.linear_program import LP_EMPTY, LP_SOLVED, LP_UNBOUNDED
 from tests.kernels.compiled import from_python, memory

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.algebra import nearest_point as n
 from tests.kernels.compiled import from_python, memory
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.algebra import cholesky, eigenvalues, elimination
 from sagline.kernels.algebra import trust_step as trust
 from tests.kernels.compiled import from_python

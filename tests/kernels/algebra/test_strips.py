@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.algebra import strips as s
 from tests.kernels.compiled import from_python
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels import tables
 from sagline.kernels.algebra.strips import HIGH, LOW, START
 from sagline.kernels.balance import setting as s

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.balance import wrench as w
 from sagline.kernels.cable import geometry as g
 from tests.kernels.balance.robots import A_POINT, EVERY_MOTION, GRAVITY, IN_A_PLANE, TO_AND_FRO, Case, random_case

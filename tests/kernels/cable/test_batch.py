@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from sagline.arrays import Array, Codes
+from sagline.core.arrays import Array, Codes
 from sagline.kernels.cable import models
 from sagline.kernels.cable.batch import BUFFERS, CHUNK, batch_end, batch_from_length, batch_from_tension
 from sagline.kernels.cable.terms import Chord, Material, Model, Terms

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from sagline.arrays import Array, locked
+from sagline.core.arrays import Array, locked
 from sagline.kernels.cable import drum
 from sagline.kernels.cable.drum import MEMORY_ROWS, follow_memory, lengths_of_turns, turns_of_lengths
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from sagline.arrays import Array, Codes
+from sagline.core.arrays import Array, Codes
 from sagline.kernels.cable import hanging as h
 from sagline.kernels.cable import models
 from sagline.kernels.cable.cables import Cables, new_cables

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels import tables
 from sagline.kernels.cable import forces, geometry, hanging, models, over_pulleys, pulley
 from sagline.kernels.cable import rows as t

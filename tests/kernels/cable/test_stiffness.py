@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.cable import catenary, energy, stiffness
 from sagline.kernels.cable.terms import Force, Material, Model
 from tests.kernels.cable.exact import exact_end

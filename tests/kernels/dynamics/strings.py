@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh, solve
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.dynamics.cable_dynamics import EXACT, waves_of
 from sagline.kernels.dynamics import collocation
 from sagline.kernels.dynamics.string import STRING_COLUMNS

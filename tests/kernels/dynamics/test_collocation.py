@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 from scipy.special import j0, y0
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.dynamics import collocation
 from sagline.kernels.dynamics.string import BEHIND_X, BEHIND_Y, BEHIND_Z
 from tests.kernels.dynamics.strings import GRAVITY, added, chain, counted, held, string

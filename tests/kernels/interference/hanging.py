@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 import sagline as sl
-from sagline.arrays import Array, Indices, locked
+from sagline.core.arrays import Array, Indices, locked
 from sagline.interference.rows import cable_rows
 from sagline.kernels.interference import shapes
 from sagline.kernels.interference.hanging_distance import least_distances, memory_for_pieces

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from sagline.arrays import locked
+from sagline.core.arrays import locked
 from sagline.kernels.interference import shapes
 from sagline.kernels.interference.hanging_distance import BULGE, PIECE_COLUMNS, cut
 from tests.interference.scenes import from_segment

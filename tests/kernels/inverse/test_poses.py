@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from sagline.arrays import Array, Codes, locked
+from sagline.core.arrays import Array, Codes, locked
 from sagline.kernels import codes, tables
 from sagline.kernels.cable import hanging, models
 from sagline.kernels.cable.pulley import Pulley

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.cable.pulls import TURN_ROWS, Curves
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import STRAIGHT

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import linprog
 
-from sagline.arrays import Array, Indices
+from sagline.core.arrays import Array, Indices
 from sagline.kernels.algebra.linear_program import Basis
 from sagline.kernels.algebra.nearest_point import Held
 from sagline.kernels.algebra.strips import HIGH, LOW, START

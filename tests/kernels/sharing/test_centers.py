@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.algebra.strips import HIGH, LOW, START
 from sagline.kernels.codes import POSE_INFEASIBLE, POSE_NOT_CONVERGED, POSE_SOLVED, POSE_UNBOUNDED
 from sagline.kernels.sharing import centers as c

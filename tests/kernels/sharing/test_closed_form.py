@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.algebra.strips import HIGH, LOW, START
 from sagline.kernels.codes import CLOSED_FORM, IMPROVED_CLOSED_FORM, PUNCTURE
 from sagline.kernels.sharing.closed_form import share_near_middle

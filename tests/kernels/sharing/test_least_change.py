@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.sharing import least_change as kernels
 from sagline.kernels.sharing.least_change import Change
 from tests.kernels.compiled import from_python, memory

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.sharing import margin
 from tests.kernels.compiled import from_python, memory
 from tests.tiers import wide

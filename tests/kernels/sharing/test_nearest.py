@@ -6,7 +6,7 @@ import daqp
 import numpy as np
 import pytest
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.algebra.strips import HIGH, LOW, START
 from sagline.kernels.codes import CHORD_TENSION, CLOSEST, MINIMUM_NORM, POSE_INFEASIBLE, POSE_SOLVED, QUADRATIC_PROGRAM
 from sagline.kernels.sharing import nearest as n

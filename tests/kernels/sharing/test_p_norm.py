@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize, nnls
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.algebra.strips import HIGH, LOW
 from sagline.kernels.codes import POSE_INFEASIBLE, POSE_SOLVED
 from sagline.kernels.sharing import p_norm

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from sagline.arrays import Array, Indices
+from sagline.core.arrays import Array, Indices
 from sagline.kernels.algebra.strips import HIGH, LOW, START
 from sagline.kernels.sharing import polygon as p
 from sagline.kernels.sharing import walk

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.algebra.linear_program import LP_EMPTY, LP_GAVE_UP, LP_SOLVED, LP_UNBOUNDED
 from sagline.kernels.algebra.strips import HIGH, LOW, START
 from sagline.kernels.codes import POSE_INFEASIBLE, POSE_NOT_CONVERGED, POSE_SOLVED, POSE_UNBOUNDED

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.workspaces import bands
 from tests.kernels.cable.room import plain_cables
 

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 from scipy.optimize import minimize
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.workspaces import centered
 from sagline.kernels.workspaces.centered import Centered
 from tests.kernels.compiled import from_python

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.workspaces import loads as kernels
 from sagline.kernels.workspaces.loads import Loads
 from tests.kernels.compiled import from_python

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.geometry import cable_geometry
 from sagline.kernels.tables import BODY_COLUMNS, CABLE_COLUMNS

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.cable import hanging, models
 from sagline.kernels.cable.pulley import Pulley
 from sagline.kernels.cable.pulls import LOOSEST

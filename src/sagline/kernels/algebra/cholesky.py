@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.jit import kernel
 
 LEAST_PIVOT = 1e-15  # of the diagonal element it is left of: smaller ones are rounding

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.jit import formula
 
 HEADS, FACTORS = 0, 1

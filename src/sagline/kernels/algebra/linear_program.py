@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from sagline.arrays import Array, Indices
+from sagline.core.arrays import Array, Indices
 from sagline.kernels.algebra.strips import TOLERANCE, box_radius, inward, largest_number, most_missed, side_of
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block, counters

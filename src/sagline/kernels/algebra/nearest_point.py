@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from sagline.arrays import Array, Indices
+from sagline.core.arrays import Array, Indices
 from sagline.kernels.algebra.gram_schmidt import keep, take_out
 from sagline.kernels.algebra.strips import inward, most_missed, side_of
 from sagline.kernels.jit import glue, kernel

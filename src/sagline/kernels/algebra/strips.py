@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.jit import formula, kernel
 
 START, LOW, HIGH = 0, 1, 2

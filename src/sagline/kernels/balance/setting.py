@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels import tables
 from sagline.kernels.algebra.householder import factorize, minimum_norm, orthogonal_factor, pseudo_inverse
 from sagline.kernels.algebra.strips import HIGH, LOW, START, STRIP_ROWS

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from sagline.arrays import Array, Codes
+from sagline.core.arrays import Array, Codes
 from sagline.kernels.cable.catenary import (
     TAUT_STRAIN,
     catenary_end,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.cable.pulley import Pulley
 from sagline.kernels.cable.terms import Chord, Material
 from sagline.kernels.jit import glue

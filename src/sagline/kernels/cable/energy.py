@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.over_pulleys import energy_over, material_at

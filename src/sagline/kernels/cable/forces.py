@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels import tables
 from sagline.kernels.algebra.hyperbolic import cosh_polynomial, sinh_excess_polynomial, sinhc_polynomial
 from sagline.kernels.cable import geometry as g

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from sagline.arrays import Codes
+from sagline.core.arrays import Codes
 from sagline.kernels.cable.cables import Cables, chord_of, free_chord_of, material_of, pulley_of
 from sagline.kernels.cable.catenary import (
     TAUT_STRAIN,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels import tables
 from sagline.kernels.algebra.angle import angle
 from sagline.kernels.cable.geometry import CHORD, COSINE, SINE, cable_geometry

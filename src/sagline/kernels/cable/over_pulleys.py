@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels import tables
 from sagline.kernels.algebra.angle import angle
 from sagline.kernels.algebra.hyperbolic import EXCESS_LIMIT, atanhc_excess_polynomial

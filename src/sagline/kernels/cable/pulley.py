@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels import tables
 from sagline.kernels.algebra.angle import angle
 from sagline.kernels.cable.terms import Chord, Force, Material, Model

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from sagline.arrays import Array, Codes
+from sagline.core.arrays import Array, Codes
 from sagline.kernels.cable.cables import Cables, chord_of, material_of, pulley_of
 from sagline.kernels.cable.hanging import hang_cable, hang_cables
 from sagline.kernels.cable.models import pull_of_shallow

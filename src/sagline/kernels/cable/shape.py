@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.cable.catenary import catenary_end
 from sagline.kernels.cable.models import sag_of_shallow
 from sagline.kernels.cable.shallow import shallow_length_ratio

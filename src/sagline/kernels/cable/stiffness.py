@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.algebra.hyperbolic import atanhc_excess
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable import rows as t

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.balance.freedom import turns
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable import rows as t

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.algebra.cholesky import solve_lower, solve_upper
 from sagline.kernels.balance.freedom import components_along, spread
 from sagline.kernels.calibration.terms import Slopes, Space

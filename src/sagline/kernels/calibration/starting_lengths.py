@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from sagline.arrays import Array, Indices
+from sagline.core.arrays import Array, Indices
 from sagline.kernels import tables
 from sagline.kernels.algebra.cholesky import factor_positive, solve_lower, solve_upper
 from sagline.kernels.balance.freedom import components_along

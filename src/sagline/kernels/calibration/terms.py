@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from sagline.arrays import Array, Indices
+from sagline.core.arrays import Array, Indices
 from sagline.kernels.cable.rows import CABLE_ROWS
 from sagline.kernels.jit import glue
 from sagline.kernels.memory import Memory, block

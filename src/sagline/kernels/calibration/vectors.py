@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.forward.platform import Triple
 from sagline.kernels.jit import formula
 

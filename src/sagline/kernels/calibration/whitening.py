@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.algebra.cholesky import factor_positive
 from sagline.kernels.calibration.terms import BESIDE, Observed, Sensing, Space
 from sagline.kernels.jit import glue

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.over_pulleys import fed
 from sagline.kernels.cable.pulley import pulley_at

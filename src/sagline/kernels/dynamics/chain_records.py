@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.cable import rows as t
 from sagline.kernels.dynamics import chain as c
 from sagline.kernels.dynamics import drives as d

@@ -6,7 +6,7 @@ winches, courses and audit are the same. docs/model.md, section 11.
 
 from __future__ import annotations
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.cable import rows as t
 from sagline.kernels.dynamics import chain as c
 from sagline.kernels.dynamics import drives as d

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from sagline.arrays import Array, Indices
+from sagline.core.arrays import Array, Indices
 from sagline.kernels.dynamics.string import (
     BEHIND_X,
     BEHIND_Y,

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels import tables
 from sagline.kernels.cable import rows as t
 from sagline.kernels.dynamics.winding import pay_out, wind_in

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from sagline.arrays import Array, Indices
+from sagline.core.arrays import Array, Indices
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import CATENARY
 from sagline.kernels.dynamics.drives import Drives

@@ -6,7 +6,7 @@ energy has no trend), and the classical Runge-Kutta method (four evaluations, or
 
 from __future__ import annotations
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics.drives import close_loops, filter_tensions
 from sagline.kernels.dynamics.forces import damp, evaluate, take_set_points

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sagline.arrays import LARGEST, Array, Indices
+from sagline.core.arrays import LARGEST, Array, Indices
 from sagline.kernels.cable.drum import turns_of_lengths
 from sagline.kernels.dynamics.progress import LENGTH_AT, NOTES, RENEWED
 from sagline.kernels.jit import entry

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.forward.platform import turned
 from sagline.kernels.jit import entry, formula
 

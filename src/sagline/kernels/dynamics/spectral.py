@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from sagline.arrays import Array, Indices
+from sagline.core.arrays import Array, Indices
 from sagline.kernels.dynamics.spectral_elements import (
     Lobatto,
     Rule,

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.dynamics.string import String, element, slowness, vertical_at
 from sagline.kernels.jit import formula, kernel
 

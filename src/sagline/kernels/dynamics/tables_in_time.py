@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.jit import formula, glue
 
 MOMENT = 1e-6  # of a step: instants that are nearer are the same

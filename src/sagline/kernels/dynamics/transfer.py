@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, locked
+from sagline.core.arrays import Array, locked
 from sagline.kernels.dynamics.string import String, vertical_at
 from sagline.kernels.jit import glue
 

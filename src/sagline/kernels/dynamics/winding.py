@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.jit import formula, kernel
 
 BIN = 0.005  # m of cable on the drum that lie at one tension

@@ -6,7 +6,7 @@ units.
 
 from __future__ import annotations
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.algebra.trust_step import trust_step
 from sagline.kernels.balance.freedom import components_along, norm, symmetric_part
 from sagline.kernels.forward.newton import BALANCED, NEAR

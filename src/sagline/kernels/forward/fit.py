@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from sagline.arrays import Array, Indices
+from sagline.core.arrays import Array, Indices
 from sagline.kernels import tables
 from sagline.kernels.algebra.angle import angle
 from sagline.kernels.algebra.cholesky import factor_positive

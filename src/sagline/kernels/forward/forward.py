@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from sagline.arrays import Array, Codes, Indices
+from sagline.core.arrays import Array, Codes, Indices
 from sagline.kernels import tables
 from sagline.kernels.algebra.cholesky import factor_positive
 from sagline.kernels.algebra.eigenvalues import extreme_eigenvalues

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels import tables
 from sagline.kernels.algebra.cholesky import factor_positive, solve_lower, solve_upper
 from sagline.kernels.algebra.elimination import solve_general

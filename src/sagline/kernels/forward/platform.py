@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels import tables
 from sagline.kernels.balance.freedom import spread
 from sagline.kernels.cable import geometry as g

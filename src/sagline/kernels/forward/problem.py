@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from sagline.arrays import Array, Codes
+from sagline.core.arrays import Array, Codes
 from sagline.kernels import tables
 from sagline.kernels.balance.freedom import turns
 from sagline.kernels.cable.terms import Model

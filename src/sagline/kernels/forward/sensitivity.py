@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from sagline.arrays import Array, Indices
+from sagline.core.arrays import Array, Indices
 from sagline.kernels import tables
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable import rows as t

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from sagline.arrays import Array, Indices
+from sagline.core.arrays import Array, Indices
 from sagline.kernels.interference.nearest import nearest_of_curves, nearest_to_box, square_between
 from sagline.kernels.interference.segments import between_segments, nearest_in_box, to_box
 from sagline.kernels.interference.shapes import AXES, BOX, FIRST, HALF, KIND, LAST, PLACE, RADIUS, bulge, point, turn

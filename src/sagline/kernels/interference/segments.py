@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.interference.shapes import AXES, HALF, PLACE
 from sagline.kernels.jit import kernel
 

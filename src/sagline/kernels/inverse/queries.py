@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from sagline.arrays import Array, Indices
+from sagline.core.arrays import Array, Indices
 from sagline.kernels import tables
 from sagline.kernels.algebra.strips import STRIP_ROWS
 from sagline.kernels.balance.freedom import translations_of

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from sagline.arrays import Codes
+from sagline.core.arrays import Codes
 from sagline.kernels.balance.setting import Balance, Platform, need, start_from_minimum_norm
 from sagline.kernels.cable.cables import Cables, chord_of, material_of, pulley_of
 from sagline.kernels.cable.hanging import NEAR, frame_end_tension, hang_cables

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.algebra.householder import factorize, orthogonal_factor, pseudo_inverse
 from sagline.kernels.cable.pulls import LOOSEST, Curves, Section, most_along, pull_at, pull_range, slopes_at
 from sagline.kernels.cable.turns import find_turns

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.algebra.gram_schmidt import keep, take_out
 from sagline.kernels.algebra.strips import HIGH, LOW, START, TOLERANCE, largest_number
 from sagline.kernels.codes import CLOSED_FORM, PUNCTURE

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.algebra.cholesky import factor_positive, solve_lower, solve_upper
 from sagline.kernels.algebra.householder import factorize, minimum_norm, orthogonal_factor, pseudo_inverse
 from sagline.kernels.algebra.nearest_point import Held, nearest_point, new_held

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.algebra.nearest_point import Held, nearest_point, new_held
 from sagline.kernels.algebra.strips import HIGH, LOW, START, TOLERANCE, largest_number
 from sagline.kernels.codes import CLOSEST, POSE_INFEASIBLE, POSE_SOLVED, QUADRATIC_PROGRAM

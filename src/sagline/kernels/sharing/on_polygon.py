@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from sagline.arrays import Array, Indices
+from sagline.core.arrays import Array, Indices
 from sagline.kernels.algebra.strips import HIGH, LOW, START, TOLERANCE, box_radius, largest_number, most_missed
 from sagline.kernels.codes import (
     POLYGON_WALK,

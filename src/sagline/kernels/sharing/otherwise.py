@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.algebra.strips import TOLERANCE, largest_number
 from sagline.kernels.codes import (
     ANALYTIC_CENTER,

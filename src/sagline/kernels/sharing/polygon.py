@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from sagline.arrays import Array, Indices
+from sagline.core.arrays import Array, Indices
 from sagline.kernels.algebra.strips import HIGH, LOW, START, TOLERANCE, box_radius, inward, largest_number, side_of
 from sagline.kernels.jit import formula, glue, kernel
 

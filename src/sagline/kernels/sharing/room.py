@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from sagline.arrays import Array, Indices
+from sagline.core.arrays import Array, Indices
 from sagline.kernels.algebra.linear_program import Basis, new_basis
 from sagline.kernels.codes import LOWEST_SUM
 from sagline.kernels.jit import glue

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.cable.cables import Cables
 from sagline.kernels.cable.pulls import LOOSEST, Curves, Section, pull_range, pulls_at
 from sagline.kernels.cable.turns import find_turns

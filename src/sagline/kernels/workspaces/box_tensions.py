@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels import tables
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.pulls import LOOSEST, Curves, pulls_at

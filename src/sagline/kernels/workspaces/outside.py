@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.algebra.cholesky import solve_lower, solve_upper
 from sagline.kernels.cable.pulls import Curves
 from sagline.kernels.jit import formula, kernel

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 from sagline.kernels.balance.freedom import turns
 from sagline.kernels.balance.wrench import fill_structure_matrix, rows_along_freedom
 from sagline.kernels.cable import geometry as g

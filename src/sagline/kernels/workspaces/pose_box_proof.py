@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sagline.arrays import Array, Codes, Indices
+from sagline.core.arrays import Array, Codes, Indices
 from sagline.kernels import tables
 from sagline.kernels.balance.setting import Limits, place_cables
 from sagline.kernels.cable import geometry as g

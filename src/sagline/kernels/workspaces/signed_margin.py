@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from sagline.arrays import Array, Codes, Indices
+from sagline.core.arrays import Array, Codes, Indices
 from sagline.kernels import tables
 from sagline.kernels.balance.freedom import turns
 from sagline.kernels.balance.setting import Limits, place_cables

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from sagline.arrays import Array, Indices
+from sagline.core.arrays import Array, Indices
 from sagline.kernels import tables
 from sagline.kernels.jit import glue, kernel
 from sagline.kernels.memory import Memory, block

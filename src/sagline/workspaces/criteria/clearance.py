@@ -10,9 +10,9 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 
-from sagline.arguments import brief
-from sagline.arrays import number
-from sagline.errors import InvalidValueError
+from sagline.core.arguments import brief
+from sagline.core.arrays import number
+from sagline.core.errors import InvalidValueError
 from sagline.interference.clearance import check_obstacles
 from sagline.interference.clearance_rows import ClearanceRows
 from sagline.interference.pairs import Obstacle

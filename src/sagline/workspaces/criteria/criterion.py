@@ -7,9 +7,9 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from sagline.arrays import Array, Indices, locked
-from sagline.errors import InvalidValueError
-from sagline.numbers import n
+from sagline.core.arrays import Array, Indices, locked
+from sagline.core.errors import InvalidValueError
+from sagline.core.numbers import n
 from sagline.robot.robot import Robot
 from sagline.workspaces.criteria.given import Given
 

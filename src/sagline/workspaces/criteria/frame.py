@@ -8,7 +8,7 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from sagline.arrays import Array, locked, number
+from sagline.core.arrays import Array, locked, number
 from sagline.robot.bounds import bounds
 from sagline.robot.robot import Robot
 from sagline.workspaces.criteria.criterion import Criterion, Judged, no_cable

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from sagline.arrays import number
+from sagline.core.arrays import number
 from sagline.robot.robot import Robot
 from sagline.statics.stiffness import modes
 from sagline.workspaces.criteria.criterion import Criterion, Judged, no_cable

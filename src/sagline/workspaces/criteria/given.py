@@ -6,8 +6,8 @@ from functools import cached_property
 
 import numpy as np
 
-from sagline.arrays import Array, Flags, Indices, locked
 from sagline.cables.model import CableModel
+from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan
 from sagline.robot.equilibrium import Equilibrium

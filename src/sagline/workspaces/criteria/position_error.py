@@ -7,9 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from sagline.arguments import instance
-from sagline.arrays import number
 from sagline.cables.model import CableModel
+from sagline.core.arguments import instance
+from sagline.core.arrays import number
 from sagline.kinematics.confirm import confirm
 from sagline.robot.robot import Robot
 from sagline.workspaces.criteria.criterion import Criterion, Judged, no_cable

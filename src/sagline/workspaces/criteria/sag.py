@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from sagline.arrays import number
+from sagline.core.arrays import number
 from sagline.robot.robot import Robot
 from sagline.workspaces.criteria.criterion import Criterion, Judged
 from sagline.workspaces.criteria.given import Given

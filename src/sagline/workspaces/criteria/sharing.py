@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from sagline.errors import InvalidValueError
+from sagline.core.errors import InvalidValueError
 from sagline.tension.closest import Closest
 from sagline.tension.improved_closed_form import ImprovedClosedForm
 from sagline.tension.lowest_maximum import LowestMaximum

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from sagline.arrays import Array, number
+from sagline.core.arrays import Array, number
 from sagline.robot.robot import Robot
 from sagline.statics.slopes import cable_slopes
 from sagline.statics.stiffness import compliance_of

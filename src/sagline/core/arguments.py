@@ -1,6 +1,6 @@
 """The border between a caller's objects and ours: what is no number is checked here by its kind.
 
-Numbers and arrays of them come through `sagline.arrays`.
+Numbers and arrays of them come through `sagline.core.arrays`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any, Final, TypeVar
 
 import numpy as np
 
-from sagline.errors import FileError, InvalidValueError, nearest, printable
+from sagline.core.errors import FileError, InvalidValueError, nearest, printable
 
 T = TypeVar("T")
 

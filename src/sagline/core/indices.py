@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.arguments import brief, integer
-from sagline.errors import NoBatchError, NoSuchEntryError
+from sagline.core.arguments import brief, integer
+from sagline.core.errors import NoBatchError, NoSuchEntryError
 
 
 def part_of(index: Any, shape: tuple[int, ...], single: str) -> Any:

@@ -129,7 +129,7 @@ def printable(text: str, kept: str = "") -> str:
         Python writes them.
 
     Examples:
-        >>> from sagline.errors import printable
+        >>> from sagline.core.errors import printable
         >>> print(printable("a\x1b[31m\nb"))
         a\x1b[31m\nb
     """
@@ -161,7 +161,7 @@ def nearest(word: str, known: Iterable[str]) -> str | None:
         The nearest known word; None where none is near.
 
     Examples:
-        >>> from sagline.errors import nearest
+        >>> from sagline.core.errors import nearest
         >>> nearest("cogero", ["cogiro", "fast"]), nearest("nothere", ["cogiro", "fast"])
         ('cogiro', None)
     """

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import TypeAlias
 
-from sagline.arrays import Array
+from sagline.core.arrays import Array
 
 Progress: TypeAlias = Callable[[int, int], None]  # told after each block: how many are done, of how many
 

@@ -13,9 +13,9 @@ from typing import Any, Final, TypeGuard
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sagline.arguments import brief
-from sagline.errors import InvalidValueError
-from sagline.memory import check_memory
+from sagline.core.arguments import brief
+from sagline.core.errors import InvalidValueError
+from sagline.core.memory import check_memory
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int8]

@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 from typing import Final
 
-from sagline.errors import InvalidValueError
+from sagline.core.errors import InvalidValueError
 
 UNASKED: Final = 1 << 26  # bytes: less is not worth asking how much is free
 _POSE_BYTES, _CABLE_BYTES = 400.0, 64.0  # what a pose takes while it is solved, and each of its cables: as measured

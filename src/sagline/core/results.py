@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from dataclasses import fields
 from importlib import import_module
 from typing import Any, Final
 
 import numpy as np
 
-from sagline.arrays import locked
-from sagline.shown import Shown
+from sagline.core.arrays import locked
 
+# The ring that draws is far out, and loads when something is shown, by its name: an import would close a circle here.
+_PAGES = "sagline.notebook.html"
 # Files know all results, so no result imports them: the module is loaded by its name when a result is saved.
 _FORMATS: Final = "sagline.files.formats"
 
@@ -19,6 +21,19 @@ _FORMATS: Final = "sagline.files.formats"
 def formats() -> Any:
     """The module that finds the format of a result by its type."""
     return import_module(_FORMATS)
+
+
+class Shown:
+    """Something that Jupyter shows with its verdict and a figure; elsewhere it is its ordinary text."""
+
+    __slots__ = ()
+
+    def _repr_html_(self) -> str | None:
+        """The verdict, and a figure inside; None, whereupon the ordinary text is shown, where there is nothing more."""
+        with suppress(Exception):  # a notebook's cell has done its work: how that looks must not spoil it
+            shown: str | None = import_module(_PAGES).html_of(self)
+            return shown
+        return None
 
 
 class ByFields:

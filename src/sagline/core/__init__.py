@@ -1,0 +1,1 @@
+"""Arrays, arguments, errors, numbers and results: what every other folder builds on."""
