@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 import sagline as sl
+from sagline.cli.session import Session
 
 
 def instead_of_machines(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -14,13 +15,17 @@ def instead_of_machines(monkeypatch: pytest.MonkeyPatch) -> None:
     def served(server: Any, watch: Any) -> None:
         raise SystemExit(0)
 
-    def linked(robot: sl.Robot, asked: Any) -> Any:
-        if asked.shadow:  # until Ctrl-C
+    def begun(session: Session) -> None:
+        if session._shadow:  # until Ctrl-C
             raise SystemExit(0)
-        return sl.twin.Machine(robot).link()
+        begin(session)
+
+    begin = Session._begin
+    monkeypatch.setattr(Session, "_begin", begun)
 
     monkeypatch.setattr("sagline.twin.server.Server.run", served)
-    monkeypatch.setattr("sagline.cli.control._link", linked)
-    for name in ("in_process", "apart_over_s7", "_tell", "experiment_chapter"):
-        monkeypatch.setattr(f"sagline.cli.experiment.{name}", lambda *_, **__: SimpleNamespace(findings=()))
-    monkeypatch.setattr("sagline.cli.experiment.write_experiment", lambda result, folder, how: folder)
+    monkeypatch.setattr("sagline.cli.control._link", lambda robot, *_, **__: sl.twin.Machine(robot).link())
+    for name in ("article.experiment.in_process", "cli.experiment.apart_over_s7", "cli.experiment._tell"):
+        monkeypatch.setattr(f"sagline.{name}", lambda *_, **__: SimpleNamespace())
+    monkeypatch.setattr("sagline.report.experiment.experiment_chapter", lambda *_: SimpleNamespace(findings=()))
+    monkeypatch.setattr("sagline.report.experiment.write_experiment", lambda result, folder, how: folder)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline import memory
+from sagline.core import memory
 from sagline.core.memory import check_memory, free_memory
 from tests.refusal import refused
 from tests.tiers import wide

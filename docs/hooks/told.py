@@ -29,8 +29,9 @@ INTERRUPTED: Final = 130  # exit code
 IN_PROCESS: Final = """\
 import sagline as sl
 from sagline.cli import control, main
-control._link = lambda robot, asked: sl.twin.Machine(robot, seed=1).link()
-control.Pace = lambda: None
+from sagline.control import pace
+control._link = lambda robot, plc, modbus: sl.twin.Machine(robot, seed=1).link()
+pace.Pace = lambda: None
 main.app({words!r})
 """
 DRIVEN: Final = "home 0,0,1.5\ngoto 0.1,-0.2,1.4\njog 3 +5mm\noff\n"

@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 
 import sagline as sl
 from sagline.control.link import Command, Mode
+from sagline.core.results import Saved
 from sagline.robot.provenance import Provenance
 from tests.calibration.made_up import made_up
 from tests.calibration.synthetic import log_of, true_robot, with_drums
@@ -74,7 +75,8 @@ def _of_class(name: str, kind: type) -> set[str]:
     if issubclass(kind, Exception | Enum | tuple):
         return set()
     found = set() if name in RESULTS or not inspect.signature(kind).parameters else {name}
-    for method, value in vars(kind).items():  # inherited ones are called once, where they are
+    own = {**vars(kind), **(vars(Saved) if issubclass(kind, Saved) else {})}  # other inherited ones are called once
+    for method, value in own.items():
         function = value.__func__ if isinstance(value, classmethod) else value
         public = not method.startswith("_") or method in MAGIC
         if inspect.isfunction(function) and public and len(inspect.signature(function).parameters) > 1:

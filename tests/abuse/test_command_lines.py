@@ -62,8 +62,7 @@ def stocked(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def short_of_work(stocked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Long commands stop once their arguments are accepted, or do a little of what they do."""
     short = sl.load_path(stocked / "short.yaml")
-    for module in ("run", "track"):
-        monkeypatch.setattr(f"sagline.cli.{module}.article_path", lambda: short)
+    monkeypatch.setattr("sagline.motion.planar.article_path", lambda: short)
     monkeypatch.setattr("sagline.cli.run.FIGURES", ())
     monkeypatch.setattr("sagline.cli.run.CELLS", 4)
     monkeypatch.setattr("sagline.cli.run._figures", lambda *_: ())
@@ -76,8 +75,8 @@ def short_of_work(stocked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         server._check(host, port)
         raise SystemExit(0)
 
-    def linked(robot: sl.Robot, asked: Any) -> Any:
-        groups_at(addresses_of(asked.plc, 102), robot)
+    def linked(robot: sl.Robot, plc: str, *, modbus: bool) -> Any:
+        groups_at(addresses_of(plc, 102), robot)
         return sl.twin.Machine(robot).link()
 
     instead_of_machines(monkeypatch)

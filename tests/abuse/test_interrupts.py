@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from sagline.cli.examples import write_examples
+from sagline.cli.examples import examples
 from tests.tiers import extended
 
 pytestmark = extended
@@ -88,7 +88,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Whole:
     @cache
     def found(words: tuple[str, ...]) -> tuple[float, set[str]]:
         place = tmp_path_factory.mktemp("whole")
-        write_examples(place, force=False)
+        examples(place, force=False)
         before, start = files(place), time.monotonic()
         process = started(place, 600.0, signal.SIGINT, words)
         _, errors = process.communicate(timeout=300)
@@ -107,7 +107,7 @@ def files(place: Path) -> set[str]:
 def check(
     words: tuple[str, ...], seconds: float, made: set[str], place: Path, draw: random.Random, number: int
 ) -> None:
-    write_examples(place, force=False)
+    examples(place, force=False)
     before = files(place)
     moment = seconds * draw.random()
     process = started(place, moment, number, words)
@@ -163,7 +163,7 @@ def test_ctrl_c_that_the_shell_told_to_ignore_is_ignored(tmp_path: Path) -> None
 
 def test_all_at_once_ends_at_once(tmp_path: Path) -> None:
     """Ctrl-C held down: many signals, one line."""
-    write_examples(tmp_path, force=False)
+    examples(tmp_path, force=False)
     process = started(tmp_path, 0.3, signal.SIGINT, TRACK, HELD)
     _, errors = process.communicate(timeout=120)
     assert process.returncode == 130, errors

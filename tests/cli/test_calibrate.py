@@ -13,7 +13,6 @@ from typer.testing import CliRunner, Result
 import sagline as sl
 from sagline.calibration import chosen_poses
 from sagline.calibration.words import in_words
-from sagline.cli import calibrate as cli
 from sagline.cli import terminal
 from sagline.cli.main import app
 from sagline.core.numbers import SPACE
@@ -98,7 +97,7 @@ def test_what_is_not_to_be_trusted_ends_with_1(
     status: sl.CalibrationStatus, run: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     found = made_up(status=status)
-    monkeypatch.setattr(cli, "calibrate", lambda *_, **__: found)
+    monkeypatch.setattr("sagline.calibration.calibrate.calibrate", lambda *_, **__: found)
     result = run("robot.yaml", "winches.csv", "--out", str(tmp_path / "r.yaml"), "--out", str(tmp_path / "all.nc"))
     assert result.exit_code == 1
     assert status.text in result.stderr.replace("\n", " ")

@@ -259,7 +259,7 @@ def test_a_cold_start_says_what_it_compiles(monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_completion_offers_presets_and_files() -> None:
-    from sagline.cli.choices import robot_completions
+    from sagline.cli.options import robot_completions
 
     assert robot_completions("article-m") == ["article-mixed"]
     assert robot_completions("in") == ["inside.yaml"]

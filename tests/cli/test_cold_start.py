@@ -31,7 +31,7 @@ from sagline.cli.entries import (
     STARTING_LENGTHS,
     VIBRATION,
 )
-from sagline.cli.examples import write_examples
+from sagline.cli.examples import examples
 from sagline.cli.line import shown
 from sagline.kernels.forward.forward import forward_poses
 from sagline.kernels.inverse.poses import inverse_poses, measure_balance
@@ -347,6 +347,6 @@ print(*silent, sep="\\n", end="")
 )
 def test_whatever_a_command_compiles_is_told(words: tuple[str, ...], tmp_path: FilePath) -> None:
     """Each kernel is loaded, or compiled where it is not there yet, while somebody listens who would say so."""
-    write_examples(tmp_path, force=False)
+    examples(tmp_path, force=False)
     done = subprocess.run([sys.executable, "-c", WATCHED, *words], cwd=tmp_path, capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (0, ""), done.stderr

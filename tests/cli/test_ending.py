@@ -28,7 +28,7 @@ def broken(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
     def fail(*_: object, **__: object) -> None:
         raise error
 
-    monkeypatch.setattr("sagline.cli.robots.list_robots", fail)
+    monkeypatch.setattr("sagline.robot.catalogue.robot_names", fail)
 
 
 @pytest.mark.parametrize(
@@ -115,8 +115,7 @@ def test_no_name_from_a_file_gives_orders_to_the_terminal(
         "durations: 1\nrate: 4\nwaypoints: [{position: [0, 0, 1.5]}, {position: [1, 0, 1.5]}]\n"
     )
     plan = sl.inverse(robot, sl.load_path("short.yaml"))
-    for module in ("robots", "tension", "track", "forward"):
-        monkeypatch.setattr(f"sagline.cli.{module}.load_robot", lambda _: robot)
+    monkeypatch.setattr("sagline.files.robot_file.load_robot", lambda _: robot)
     header = ",".join(f"L{k}" for k in range(8))
     row = ",".join(f"{length:.6f}" for length in plan.unstrained_length[0])
     Path("lengths.csv").write_text(f"{header}\n{row}\n")
@@ -201,12 +200,14 @@ def test_any_encoding_of_the_output_will_do() -> None:
 def test_what_libraries_warn_of_is_not_told() -> None:
     code = (
         "import logging, sys, warnings\n"
-        "from sagline.cli import __main__ as start, robots\n"
-        "def noisy(*, as_json):\n"
+        "from sagline.cli import __main__ as start\n"
+        "from sagline.robot import catalogue\n"
+        "def noisy():\n"
         "    warnings.warn('of a library', RuntimeWarning)\n"
         "    logging.getLogger('matplotlib').warning('of another')\n"
         "    print('answer')\n"
-        "robots.list_robots = noisy\n"
+        "    raise SystemExit(0)\n"
+        "catalogue.robot_names = noisy\n"
         "start.app_entry()\n"
     )
     done = subprocess.run([sys.executable, "-c", code, "robots"], capture_output=True, text=True)
@@ -219,12 +220,14 @@ def test_what_libraries_warn_of_is_not_told() -> None:
 def test_a_thread_that_fails_says_so_in_one_line() -> None:
     code = (
         "import threading\n"
-        "from sagline.cli import __main__ as start, robots\n"
-        "def fails(*, as_json):\n"
+        "from sagline.cli import __main__ as start\n"
+        "from sagline.robot import catalogue\n"
+        "def fails():\n"
         "    thread = threading.Thread(target=lambda: 1 / 0)\n"
         "    thread.start()\n"
         "    thread.join()\n"
-        "robots.list_robots = fails\n"
+        "    return []\n"
+        "catalogue.robot_names = fails\n"
         "start.app_entry()\n"
     )
     done = subprocess.run([sys.executable, "-c", code, "robots"], capture_output=True, text=True)

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 import sagline as sl
 from sagline.cables.rope import ROPES
 from sagline.cli.main import app
-from sagline.cli.new import grid
+from sagline.cli.new import ROPE_NAMES, grid
 from sagline.robot.design import Design
 from tests.tiers import extended
 
@@ -158,3 +158,7 @@ def test_what_the_options_say_is_checked_before_anything_is_asked_of_the_rest(fo
         assert result.exit_code == 2
         assert result.stderr.startswith("Error: ")
         assert list(folder.iterdir()) == []
+
+
+def test_the_question_names_all_ropes() -> None:
+    assert ", ".join(ROPES) == ROPE_NAMES

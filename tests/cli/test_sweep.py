@@ -70,7 +70,7 @@ def test_ctrl_c_prints_the_command_that_goes_on(monkeypatch: pytest.MonkeyPatch)
     def stopped(*_: Any, **__: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("sagline.cli.sweep.run", stopped)
+    monkeypatch.setattr("sagline.sweep.running.run", stopped)
     result = ended("own_sweep.yaml", "--out", "my sweep", "--workers", "3")
     assert result.exit_code == 130
     assert command_of(result) == ["sweep", "own_sweep.yaml", "--out", "my sweep", "--workers", "3"]
@@ -83,7 +83,7 @@ def test_a_failure_on_the_way_prints_it_too(monkeypatch: pytest.MonkeyPatch) -> 
         (folder / "done").touch()
         raise sl.SaglineError("Gone.")
 
-    monkeypatch.setattr("sagline.cli.sweep.run", failed)
+    monkeypatch.setattr("sagline.sweep.running.run", failed)
     result = ended("own_sweep.yaml", "--out", "out", "--scheduler", "tcp://10.0.0.1:8786")
     assert result.exit_code == 2
     assert result.stderr.startswith("Error: Gone.\n")
@@ -95,7 +95,7 @@ def test_a_failure_on_the_way_prints_it_too(monkeypatch: pytest.MonkeyPatch) -> 
 def test_requests_without_a_verdict_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
     found = sl.sweep.run(sl.load_sweep("own_sweep.yaml"), "out", workers=1)
     open_ones = sl.sweep.Sweep(found.folder, found.request, 1, 1, sl.sweep.Counts(5000, 479, 0, 2, 0), 1.0)
-    monkeypatch.setattr("sagline.cli.sweep.run", lambda *_, **__: open_ones)
+    monkeypatch.setattr("sagline.sweep.running.run", lambda *_, **__: open_ones)
     result = ended("own_sweep.yaml")
     assert result.exit_code == 1
     assert result.stderr.startswith("2 of 5,481 ")

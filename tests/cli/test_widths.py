@@ -21,7 +21,7 @@ from typer.testing import CliRunner
 
 import sagline as sl
 from sagline.cli import terminal
-from sagline.cli.examples import write_examples
+from sagline.cli.examples import examples
 from sagline.cli.main import app
 from sagline.cli.tables import Grid
 from tests.abuse.command_lines import LINES
@@ -61,7 +61,7 @@ COMMANDS = (
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("widths")
-    write_examples(place, force=False)
+    examples(place, force=False)
     (place / "short.yaml").write_text(SHORT)
     (place / "far.yaml").write_text(SHORT.replace("[1, 0, 1.5]", "[7.2, 3, 1.5]"))
     robot = sl.load_robot("article-suspended")  # three robots in one: 24 cables, as many as can be
@@ -84,7 +84,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(autouse=True)
 def place(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
-    monkeypatch.setattr("sagline.cli.run.article_path", lambda: sl.load_path("short.yaml"))
+    monkeypatch.setattr("sagline.motion.planar.article_path", lambda: sl.load_path("short.yaml"))
     monkeypatch.setattr("sagline.cli.run.FIGURES", ())
     monkeypatch.setattr("sagline.cli.run.CELLS", 4)
     monkeypatch.setattr("sagline.cli.run._figures", lambda *_: ())

@@ -8,6 +8,7 @@ import pytest
 import sagline as sl
 from sagline.core.arrays import Array
 from sagline.dynamics.drives import Winding
+from sagline.dynamics.simulate import CableMass, Integrator
 from sagline.kernels import tables
 from sagline.kernels.cable.rows import CABLE_ROWS, LENGTH
 from sagline.kernels.dynamics import drives as d
@@ -35,7 +36,7 @@ def test_a_lagging_winch_is_late_by_twice_its_damping_ratio_over_its_frequency()
 
 @pytest.mark.parametrize("integrator", ["splitting", "runge-kutta"])
 def test_a_lagging_winch_answers_a_step_as_its_transfer_function_says(
-    integrator: sl.dynamics.simulate.Integrator,
+    integrator: Integrator,
 ) -> None:
     state = lift(sl.load_robot("article-prototype"), 1.0).state[0]
     target = state.unstrained_length + 1e-3
@@ -175,9 +176,7 @@ def test_a_brake_holds_the_tensions_that_motors_expect_too() -> None:
 
 
 @pytest.mark.parametrize("mass", wide(["none", "lumped"]))
-def test_what_begins_is_noted_however_much_of_it(
-    mass: sl.dynamics.simulate.CableMass, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_begins_is_noted_however_much_of_it(mass: CableMass, monkeypatch: pytest.MonkeyPatch) -> None:
     state = lift(prototype(), 1.0).state[0]
     times = 0.1 * np.arange(11)
     lengths = state.unstrained_length + 0.06 * np.outer(np.arange(11) % 2, np.resize([1.0, -1.0], 8))

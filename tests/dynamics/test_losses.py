@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
+from sagline.dynamics.simulate import Integrator
 from tests.dynamics.let_go import LIFT, beside
 from tests.tiers import extended
 
@@ -30,7 +31,7 @@ def test_cables_without_mass_lose_what_light_ones_with_mass_lose_while_they_are_
 
 @pytest.mark.parametrize("integrator", ["splitting", "runge-kutta"])
 def test_tensions_are_those_that_move_the_platform_damping_included(
-    integrator: sl.dynamics.simulate.Integrator,
+    integrator: Integrator,
 ) -> None:
     robot, step = sl.load_robot("article-suspended"), 1e-4
     state, lengths = beside(robot, (0.5, 0.3, 1.5), np.array([0.004, -0.003, 0.0033]), sl.Elastic())

@@ -1,8 +1,9 @@
 """Apply mistakes to a copy of the project, one at a time, and list the first test that catches each.
 
-`python -m tests.mutants [FOLDER ...] [--all-tiers]`. Each mistake is an entry of a TOML file beside this one. A copy of
-the project is tested with the mistake in it, first by the tests named in the entry and those of its folder, then by the
-whole first tier, then, with `--all-tiers`, by the second. A mistake that no test catches is listed as SURVIVED.
+`python -m tests.mutants [FOLDER ...] [--all-tiers] [--random N]`. Each mistake is an entry of a TOML file beside this
+one, or, with `--random`, a change that nobody chose. A copy of the project is tested with the mistake in it, first by
+the tests named in the entry and those of its folder, then by the whole first tier, then, with `--all-tiers`, by the
+second. A mistake that no test catches is listed as SURVIVED.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final, NamedTuple
+
+from tests.mutants.random import changes
 
 ROOT: Final = Path(__file__).parents[2]
 COPIED: Final = ("src", "tests", "examples", "docs", "benchmarks")
@@ -47,6 +50,7 @@ class Mutant(NamedTuple):
         old: Text that occurs exactly once in the file.
         new: Text that replaces it.
         tests: Paths of tests that run before those of the folder; they only save time.
+        source: Text of the whole file with the mistake, if it is not made by replacing text.
     """
 
     folder: str
@@ -54,7 +58,8 @@ class Mutant(NamedTuple):
     mistake: str
     old: str
     new: str
-    tests: tuple[str, ...]
+    tests: tuple[str, ...] = ()
+    source: str = ""
 
     @property
     def path(self) -> Path:
@@ -73,6 +78,13 @@ def mutants(folders: Sequence[str]) -> Iterator[Mutant]:
             if count != 1 or mutant.old == mutant.new:
                 raise SystemExit(f"{listed.name}: {mutant.mistake!r}: its text occurs {count} times in {mutant.file}")
             yield mutant
+
+
+def chosen_at_random(count: int, seed: int) -> Iterator[Mutant]:
+    """Mistakes that nobody chose; the folder is that of the source."""
+    for change in changes(ROOT / "src" / "sagline", count, seed):
+        place = f"line {change.line}: {change.old} -> {change.new}"
+        yield Mutant(change.file.parts[0], change.file.as_posix(), place, "", "", source=change.source)
 
 
 def catching_test(copy: Path, mutant: Mutant, all_tiers: bool) -> tuple[str, str]:
@@ -140,16 +152,21 @@ def main() -> int:
     """Command line; exit code 1 if a mistake survived."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", nargs="*", help="names of TOML files; all if none is given")
+    parser.add_argument(
+        "--random", type=int, default=0, metavar="N", help="N random changes instead of the listed ones"
+    )
+    parser.add_argument("--seed", type=int, default=1, help="of the random changes")
     parser.add_argument("--all-tiers", action="store_true", help="test survivors of the first tier with the second")
     chosen = parser.parse_args()
     tally: Counter[str] = Counter()
-    listed = list(mutants(chosen.folders))
+    listed = list(chosen_at_random(chosen.random, chosen.seed) if chosen.random else mutants(chosen.folders))
     with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
         copy = Path(folder)
         copy_project(copy)
         for k, mutant in enumerate(listed):
             start, source = time.monotonic(), (ROOT / mutant.path).read_text(encoding="utf-8")
-            (copy / mutant.path).write_text(source.replace(mutant.old, mutant.new), encoding="utf-8")
+            wrong = mutant.source or source.replace(mutant.old, mutant.new)
+            (copy / mutant.path).write_text(wrong, encoding="utf-8")
             tier, test = catching_test(copy, mutant, chosen.all_tiers)
             (copy / mutant.path).write_text(source, encoding="utf-8")
             tally[tier or "none"] += 1

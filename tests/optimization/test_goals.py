@@ -36,8 +36,19 @@ def test_what_is_planned_of_tables_is_what_inverse_plans_of_robots(name: str) ->
     np.testing.assert_allclose(found.stiffness[held], 1.0 / softest, rtol=1e-6)
 
 
-def test_every_goal_is_what_it_says() -> None:
-    robot, load = sl.load_robot("cogiro"), sl.WrenchBox(force=100.0, moment=10.0, center=[0, 0, -50, 0, 0, 0])
+BOX = sl.WrenchBox(force=[100.0, 100.0, 50.0], moment=10.0)
+MIDDLE = [0.0, 0.0, -50.0, 0.0, 0.0, 0.0]  # of both sets of loads
+
+
+@pytest.mark.parametrize(
+    "load",
+    [
+        sl.WrenchBox(force=100.0, moment=10.0, center=MIDDLE),
+        pytest.param(BOX + sl.WrenchPolytope([[0.0] * 6, [0.0, 0.0, -100.0, 0.0, 0.0, 0.0]]), id="polytope"),
+    ],
+)
+def test_every_goal_is_what_it_says(load: sl.WrenchSet) -> None:
+    robot = sl.load_robot("cogiro")
     poses = random_poses(robot, 20, np.random.default_rng(2))
     own = sl.Cable(robot.cables.linear_density[0], robot.cables.axial_stiffness[0])
     catalogue = [sl.CableChoice("own", own, cost=3.0), sl.CableChoice("thin", sl.Cable(0.03, 2e5), cost=1.0)]
@@ -45,7 +56,7 @@ def test_every_goal_is_what_it_says() -> None:
     front = sl.design(robot, [FreeCable(catalogue)], [*kinds, "cable_cost"], load, poses, evaluations=16)
     for robot_found, values in ((front.start, front.start_values), (front.best, front.values[0])):
         margin = sl.margin(robot_found, poses, load).value
-        plan = sl.inverse(robot_found, poses, tension=sl.MinimumNorm(), wrench=[0, 0, -50, 0, 0, 0])
+        plan = sl.inverse(robot_found, poses, tension=sl.MinimumNorm(), wrench=MIDDLE)
         assert plan.feasible.all()
         stiff = np.linalg.norm(sl.stiffness(plan.state).compliance[:, :3, :3], ord=2, axis=(1, 2))
         ends = poses.transform(robot.platform_anchors)

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-import sagline.cli.experiment as command
 from sagline.article.experiment import Experiment
 from sagline.cli.main import app
 from sagline.report.experiment import NAMES, experiment_chapter, write_experiment
@@ -55,7 +54,7 @@ def the_page_needs_nothing_else_and_its_numbers_stand_beside_it(whole: Experimen
 def the_command_writes_the_page_and_tells_the_table(
     whole: Experiment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(command, "in_process", lambda *robots, **options: whole)
+    monkeypatch.setattr("sagline.article.experiment.in_process", lambda *robots, **options: whole)
     words = ["experiment", "article", "--in-process", "--out", str(tmp_path)]
     done = CliRunner().invoke(app, words)
     assert done.exit_code == 0, done.stderr

@@ -3,25 +3,45 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
 from pathlib import Path
+from typing import Annotated
+
+import typer
 
 from sagline.cli.entries import FORWARD, INVERSE
+from sagline.cli.options import JsonOption, OutOption
 from sagline.cli.terminal import counting, note, show_json
 from sagline.files.whole import check_files
-from sagline.report.article import NAMES, write_article
 
 
-def write_report(folder: Path, parts: Sequence[str], *, as_json: bool) -> None:
-    """Write the report and say where it is.
+def article(
+    parts: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="PART",
+            help="figures N-M, table 2, or a chapter: feasible-sets, intercept, sag, constants, identify, models, "
+            "simulation, poses, workspace, errata. Default: everything.",
+        ),
+    ] = None,
+    folder: OutOption = Path("output"),
+    as_json: JsonOption = False,
+) -> None:
+    """Redo the article's figures, tables and errata, as one page: what it says beside what is computed.
 
-    Raises:
-        SaglineError: If a part is unknown or the folder cannot be written; then nothing has been.
+    Writes DIR/article.html, which needs nothing else, and DIR/article.json with the numbers.
+
+    For example:
+
+        sagline article
+        sagline article figures 6-9 --out results
+        sagline article errata table 2
     """
+    from sagline.report.article import NAMES, write_article
+
     check_files(folder, NAMES)
     needed = () if parts else (INVERSE, FORWARD)  # single parts need neither, or one
     with counting("redoing the article", *needed) as progress:
-        report = write_article(folder, parts, progress)
+        report = write_article(folder, parts or [], progress)
     if as_json:
         show_json(report.numbers)
         return

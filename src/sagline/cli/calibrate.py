@@ -4,36 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
 
+import typer
 from rich.text import Text
 
-from sagline.calibration import chosen_poses, parameters, words
-from sagline.calibration.calibrate import UNKNOWNS, calibrate
-from sagline.calibration.log import WinchLog
-from sagline.calibration.poses import calibration_poses
-from sagline.calibration.sensors import Sensors
-from sagline.calibration.status import CalibrationStatus
 from sagline.cli.ending import OUTSIDE
 from sagline.cli.entries import FORWARD, INVERSE, READINGS, STARTING_LENGTHS
+from sagline.cli.options import JsonOption, Model, ModelOption, RobotArgument
 from sagline.cli.terminal import note, show, show_json, show_pieces, working
-from sagline.cli.values import quantity
 from sagline.core.errors import FileError, InvalidValueError, printable
-from sagline.files.log_file import load_log
-from sagline.files.log_sensors import sensors_of_comments
-from sagline.files.robot_file import dump_robot, load_robot
-from sagline.files.table import TABLE_LIMIT
-from sagline.files.text import read_text
 from sagline.files.whole import check_files, made_folder, write_text
 
 if TYPE_CHECKING:
     from sagline.cables.model import CableModel
     from sagline.calibration.chosen_poses import CalibrationPoses
+    from sagline.calibration.log import WinchLog
     from sagline.calibration.result import Calibration
 
 ROBOTS: Final = (".yaml", ".yml")
 WHOLE: Final = ".nc"
-FITTING: Final = (FORWARD, STARTING_LENGTHS, READINGS)
 FIGURES: Final = (".png", ".svg", ".pdf")
 
 
@@ -51,6 +41,8 @@ class Deviations(NamedTuple):
         Raises:
             InvalidValueError: If one is no such quantity, or not positive.
         """
+        from sagline.cli.values import quantity
+
         units = {"length": "m", "tension": "N", "position": "m", "rotation": "rad"}
         return {
             f"{name}_deviation": quantity(text, f"--{name}-deviation", units[name], above=0.0)
@@ -70,6 +62,8 @@ class Asked(NamedTuple):
 
     def names(self) -> tuple[str, ...]:
         """Names of the unknowns."""
+        from sagline.calibration.calibrate import UNKNOWNS
+
         return UNKNOWNS if self.unknowns is None else tuple(name.strip() for name in self.unknowns.split(","))
 
     def check_files(self, suffixes: tuple[str, ...]) -> None:
@@ -88,12 +82,95 @@ class Asked(NamedTuple):
             check_files(file.parent, [file.name])
 
 
-def fit(asked: Asked, log: Path | None, model: CableModel, folds: int, *, robust: bool, as_json: bool) -> int:
+def _deviation(what: str) -> typer.models.OptionInfo:
+    found: typer.models.OptionInfo = typer.Option(
+        metavar="NUMBER", help=f"Standard deviation of {what}. Default: what the log says.", show_default=False
+    )
+    return found
+
+
+def calibrate(
+    robot: RobotArgument,
+    log: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="LOG",
+            help="CSV: one row a pose; count_0, ... or length_0, ..., load_cell_0, ..., and x, y, z where measured.",
+            show_default=False,
+        ),
+    ] = None,
+    out: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--out",
+            metavar="FILE",
+            help="The robot that was found, .yaml, or all that was found, .nc; may be given twice. With --plan: the "
+            "poses, .yaml.",
+            show_default=False,
+        ),
+    ] = None,
+    unknowns: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAMES",
+            help="What is looked for, with commas between. Default: "
+            "frame_anchors,length_zero,axial_stiffness,mass,center_of_mass.",
+            show_default=False,
+        ),
+    ] = None,
+    length_deviation: Annotated[str | None, _deviation("a length off a drum, counted or given, '0.5 mm'")] = None,
+    tension_deviation: Annotated[str | None, _deviation("a load cell's reading, '5 N'")] = None,
+    position_deviation: Annotated[str | None, _deviation("a measured coordinate, '1 mm'")] = None,
+    rotation_deviation: Annotated[str | None, _deviation("a measured rotation, '1 mrad'")] = None,
+    folds: Annotated[
+        int, typer.Option(metavar="NUMBER", help="Parts of the poses that are predicted from the others; 0 for none.")
+    ] = 5,
+    robust: Annotated[
+        bool, typer.Option("--robust/--no-robust", help="Poses that do not fit the rest count less.")
+    ] = True,
+    model: ModelOption = Model.CATENARY,
+    plot: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="A figure of the fit: .png, .svg or .pdf.", show_default=False),
+    ] = None,
+    plan: Annotated[
+        int | None,
+        typer.Option(metavar="NUMBER", help="Choose so many poses to measure, instead of a LOG.", show_default=False),
+    ] = None,
+    seed: Annotated[int, typer.Option(metavar="NUMBER", help="Of the poses among which --plan chooses.")] = 0,
+    as_json: JsonOption = False,
+) -> int:
+    """Find what a robot's anchors, zeros and cables really are, from its own readings.
+
+    It stands at some poses; what encoders, load cells and perhaps a measuring system read there is in LOG. Told are the
+    numbers with their standard errors, what the readings leave open, and which do not fit. With --plan, before anybody
+    measures: the poses and tensions that tell most, and the errors to expect. Exit code 1 where the search did not
+    converge, or the fit says that model or deviations are wrong.
+
+    For example:
+
+        sagline calibrate winches_robot.yaml winches.csv --out calibrated.yaml
+        sagline calibrate winches_robot.yaml winches.csv --folds 10 --out found.nc
+        sagline calibrate winches_robot.yaml --plan 40 --out poses.yaml
+    """
+    deviations = Deviations(length_deviation, tension_deviation, position_deviation, rotation_deviation)
+    asked = Asked(robot, unknowns, deviations, tuple(out or ()), plot)
+    if plan is not None:
+        return _plan_poses(asked, plan, seed, log, as_json=as_json)
+    return _fit(asked, log, model.build(), folds, robust=robust, as_json=as_json)
+
+
+def _fit(asked: Asked, log: Path | None, model: CableModel, folds: int, *, robust: bool, as_json: bool) -> int:
     """Calibrate, tell, and write; returns the exit code.
 
     Raises:
         SaglineError: If an input is wrong or a file cannot be written.
     """
+    from sagline.calibration import parameters, words
+    from sagline.calibration.calibrate import calibrate
+    from sagline.calibration.status import CalibrationStatus
+    from sagline.files.robot_file import load_robot
+
     if log is None:
         step = "Give the readings, or ask where to read: --plan 40."
         raise InvalidValueError("LOG", "missing", "a CSV file, or --plan", step)
@@ -102,7 +179,7 @@ def fit(asked: Asked, log: Path | None, model: CableModel, folds: int, *, robust
     asked.check_files((*ROBOTS, WHOLE))
     robot, readings = load_robot(asked.robot), _log(log, asked.deviations)
     unknowns = parameters.chosen(asked.names())  # before anything is compiled
-    with working(f"{robot.name}: calibrating from {len(readings):,} rows", *FITTING) as line:
+    with working(f"{robot.name}: calibrating from {len(readings):,} rows", FORWARD, STARTING_LENGTHS, READINGS) as line:
         found = calibrate(robot, readings, unknowns, model=model, robust=robust, folds=folds, progress=line.progress)
         files = _written(found, asked, line)
     if as_json:
@@ -119,12 +196,17 @@ def fit(asked: Asked, log: Path | None, model: CableModel, folds: int, *, robust
     return OUTSIDE
 
 
-def plan_poses(asked: Asked, count: int, seed: int, log: Path | None, *, as_json: bool) -> int:
+def _plan_poses(asked: Asked, count: int, seed: int, log: Path | None, *, as_json: bool) -> int:
     """Choose poses, tell, and write them; returns the exit code.
 
     Raises:
         SaglineError: If an input is wrong or the file cannot be written.
     """
+    from sagline.calibration import chosen_poses, parameters
+    from sagline.calibration.poses import calibration_poses
+    from sagline.calibration.sensors import Sensors
+    from sagline.files.robot_file import load_robot
+
     for item, value in (("LOG", log), ("--plot", asked.plot)):
         if value is not None:
             step = f"Leave out --plan, or {item}."
@@ -148,6 +230,11 @@ def plan_poses(asked: Asked, count: int, seed: int, log: Path | None, *, as_json
 
 def _log(file: Path, deviations: Deviations) -> WinchLog:
     """The log, its sensors as the command line has them where it says something."""
+    from sagline.files.log_file import load_log
+    from sagline.files.log_sensors import sensors_of_comments
+    from sagline.files.table import TABLE_LIMIT
+    from sagline.files.text import read_text
+
     given = deviations.given()
     if not given:
         return load_log(file)
@@ -157,6 +244,9 @@ def _log(file: Path, deviations: Deviations) -> WinchLog:
 
 def _written(found: Calibration, asked: Asked, line: Any) -> list[Path]:
     """Write what is to be written; a robot only where it was found. Returns the files."""
+    from sagline.calibration.status import CalibrationStatus
+    from sagline.files.robot_file import dump_robot
+
     files = []
     for file in asked.files:
         made_folder(file.parent)
@@ -179,6 +269,8 @@ def _written(found: Calibration, asked: Asked, line: Any) -> list[Path]:
 
 def _show_lines(text: Callable[[int], str]) -> None:
     """A text that is written for a width, in that of the terminal where it is narrow."""
+    from sagline.calibration import words
+
     show_pieces(
         lambda _, width: [(Text(printable(line)), 0) for line in text(min(width, words.WIDTH)).splitlines()],
     )

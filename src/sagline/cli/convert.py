@@ -4,27 +4,21 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
+import typer
 
-from sagline.cables.cable import Cable
-from sagline.cables.elastic import Elastic
-from sagline.cli.choices import Format
 from sagline.cli.entries import FORWARD, INVERSE
+from sagline.cli.options import Format
 from sagline.cli.terminal import note, show_data, working
-from sagline.cli.values import quantity
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.core.numbers import n
-from sagline.files.imported import Imported
-from sagline.files.robot_file import dump_robot, load_robot
-from sagline.files.typed import FARTHEST, numbers
 from sagline.files.whole import write_text
-from sagline.kinematics.confirm import confirm
-from sagline.kinematics.inverse import inverse
-from sagline.robot.pose import Pose
 
 if TYPE_CHECKING:
+    from sagline.cables.cable import Cable
+    from sagline.files.imported import Imported
     from sagline.robot.robot import Robot
 
 LEAST = 1e-6  # m: a distance that is told is no smaller
@@ -32,19 +26,48 @@ ENDINGS = {Format.ROBOT: (".yaml", ".yml"), Format.MJCF: (".xml", ".mjcf")}
 
 
 def convert(
-    source: str,
-    out: Path | None,
-    form: Format,
-    density: str | None,
-    stiffness: str | None,
-    cable_set: str | None,
-    at: tuple[str, str, str] | None,
+    source: Annotated[
+        str,
+        typer.Argument(
+            metavar="SOURCE",
+            help="A WireX file, robot.wcrfx; the folder of a CASPR robot, or its .xml; a robot file; or a preset.",
+        ),
+    ],
+    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="File to write. Default: stdout.")] = None,
+    form: Annotated[
+        Format,
+        typer.Option(
+            "--format", metavar="FORMAT", help="robot: a robot file in YAML; mjcf: a MuJoCo model with straight cables."
+        ),
+    ] = Format.ROBOT,
+    linear_density: Annotated[
+        str | None, typer.Option(metavar="QUANTITY", help="Mass of all cables per length, '65 g/m' for instance.")
+    ] = None,
+    axial_stiffness: Annotated[
+        str | None, typer.Option(metavar="QUANTITY", help="EA of all cables, '700 kN' for instance.")
+    ] = None,
+    cable_set: Annotated[
+        str | None, typer.Option(metavar="NAME", help="CASPR: which set of cables. Default: the file's own.")
+    ] = None,
+    at: Annotated[
+        tuple[str, str, str] | None,
+        typer.Option(metavar="X Y Z", help="MuJoCo: where the platform starts, in m. Default: middle of the test box."),
+    ] = None,
 ) -> None:
-    """Read, convert, write to a file or to stdout, and report on stderr.
+    r"""Convert a robot of CASPR or WireX to a robot file, or any robot to a MuJoCo model.
 
-    Raises:
-        SaglineError: If the source is wrong, cannot be converted, or the file cannot be written.
+    What had to be assumed and what was lost is told on stderr, and stands in the robot file.
+
+    For example:
+
+        sagline convert robot.wcrfx --out robot.yaml
+        sagline convert robot.wcrfx --out my_robot.yaml \
+            --linear-density "20 g/m" --axial-stiffness "50 kN"
+        sagline convert cogiro --format mjcf --out cogiro.xml
     """
+    from sagline.files.robot_file import dump_robot
+    from sagline.files.typed import FARTHEST, numbers
+
     if out is not None and Path(source).exists() and out.resolve() == Path(source).resolve():
         raise FileError(out, "is the file to convert", "Name another file with --out.")
     if out is not None and out.suffix.lower() not in ENDINGS[form]:
@@ -55,7 +78,7 @@ def convert(
             "--at", "given for a robot file", "--format mjcf", "A robot file holds no pose: leave it out."
         )
     place = None if at is None else numbers(at, "--at", "m", FARTHEST)
-    imported = _read(source, _material(density, stiffness), cable_set)
+    imported = _read(source, _material(linear_density, axial_stiffness), cable_set)
     if form is Format.ROBOT:
         text = dump_robot(imported.robot)
     else:
@@ -69,6 +92,9 @@ def convert(
 
 
 def _read(source: str, cables: Cable | None, cable_set: str | None) -> Imported:
+    from sagline.files.imported import Imported
+    from sagline.files.robot_file import load_robot
+
     path = Path(source)
     is_caspr = path.suffix.lower() == ".xml" or path.is_dir()
     if cable_set is not None and not is_caspr:
@@ -86,6 +112,9 @@ def _read(source: str, cables: Cable | None, cable_set: str | None) -> Imported:
 
 
 def _material(density: str | None, stiffness: str | None) -> Cable | None:
+    from sagline.cables.cable import Cable
+    from sagline.cli.values import quantity
+
     if density is None and stiffness is None:
         return None
     if density is None or stiffness is None:
@@ -96,7 +125,11 @@ def _material(density: str | None, stiffness: str | None) -> Cable | None:
 
 def _mjcf(robot: Robot, at: list[float] | None) -> tuple[str, str]:
     """The model, and what it costs this robot that its tendons neither sag nor weigh."""
+    from sagline.cables.elastic import Elastic
     from sagline.files.mjcf import dump_mjcf
+    from sagline.kinematics.confirm import confirm
+    from sagline.kinematics.inverse import inverse
+    from sagline.robot.pose import Pose
 
     if at is None and robot.test_box is None:
         raise InvalidValueError("--at", "missing", "X Y Z in m", "Say where the platform starts.")

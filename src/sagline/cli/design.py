@@ -3,39 +3,60 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+import typer
 
 from sagline.cli.entries import INVERSE, SIGNED_MARGINS, VIBRATION
+from sagline.cli.options import JsonOption, RobotArgument
 from sagline.cli.results import figure_files, listed, write_figures
 from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
-from sagline.cli.values import whole_of
-from sagline.files.robot_file import load_robot
 from sagline.files.whole import check_files
-from sagline.optimization.design import design as searched
-from sagline.optimization.file import load_design
-from sagline.optimization.front import FRONT, Front
-from sagline.optimization.goals import AT_POSES, Goal
-from sagline.optimization.request import MOST_EVALUATIONS
+
+if TYPE_CHECKING:
+    from sagline.optimization.front import Front
+    from sagline.optimization.goals import Goal
 
 FIGURE: Final = "front"
 MOST_ROWS: Final = 12  # of the table; front.csv has all
 
 
-def design(robot: str, file: Path, out: Path, evaluations: str | None, *, figures: bool, as_json: bool) -> None:
-    """Search, tell, write and draw.
+def design(
+    robot: RobotArgument,
+    file: Annotated[
+        Path, typer.Argument(metavar="DESIGN", help="What may change and what should be better, design.yaml.")
+    ],
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", help="Folder for what is found; a search in it is gone on with.")
+    ] = Path("front"),
+    evaluations: Annotated[
+        str | None,
+        typer.Option(metavar="NUMBER", help="Robots that are tried. Default: as the file says.", show_default=False),
+    ] = None,
+    figures: Annotated[
+        bool, typer.Option("--figures/--no-figures", help="Draw what was tried and found, as PNG and SVG.")
+    ] = True,
+    as_json: JsonOption = False,
+) -> None:
+    r"""Search for a better robot: anchors, cables and limits that may change, and goals, stand in a file.
 
-    Args:
-        robot: A preset or a robot file.
-        file: The design file.
-        out: Folder of the search.
-        evaluations: Robots that are tried, as the command line has it; None for what the file says.
-        figures: Whether to draw.
-        as_json: Whether to print JSON.
+    Found robots are ordinary robot files; front.csv lists them. Whatever is rated is kept in the folder at once: after
+    Ctrl-C, or with more --evaluations, the same command goes on from there.
 
-    Raises:
-        SaglineError: If robot or file say something wrong, or the folder holds another search or cannot be written.
+    For example:
+
+        sagline design own_robot.yaml design.yaml --out front
+        sagline design own_robot.yaml design.yaml --out front \
+            --evaluations 600
     """
+    from sagline.cli.values import whole_of
+    from sagline.files.robot_file import load_robot
+    from sagline.optimization.design import design as searched
+    from sagline.optimization.file import load_design
+    from sagline.optimization.front import FRONT
+    from sagline.optimization.request import MOST_EVALUATIONS
+
     first, asked = load_robot(robot), load_design(file)
     if evaluations is not None:
         asked["evaluations"] = whole_of(evaluations, "--evaluations", 1, MOST_EVALUATIONS)
@@ -69,6 +90,8 @@ def design(robot: str, file: Path, out: Path, evaluations: str | None, *, figure
 
 def _needed(goals: list[Goal]) -> tuple[str, ...]:
     """Entries of the kernels that the goals need."""
+    from sagline.optimization.goals import AT_POSES
+
     needs = {goal.needs for goal in goals}
     found = [SIGNED_MARGINS] if "margin" in needs else []
     found += [INVERSE] if needs & set(AT_POSES) else []

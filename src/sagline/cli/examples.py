@@ -6,6 +6,9 @@ import shutil
 from importlib.resources import files
 from pathlib import Path
 from shlex import quote
+from typing import Annotated
+
+import typer
 
 from sagline.cli.terminal import show
 from sagline.core.errors import FileError
@@ -14,15 +17,19 @@ from sagline.files.whole import check_folder, made_folder, written_whole
 KINDS = (".py", ".yaml", ".csv", ".wcrfx")
 
 
-def write_examples(folder: Path, *, force: bool) -> None:
-    """Copy the example files to a folder.
+def examples(
+    folder: Annotated[
+        Path, typer.Option("--out", metavar="DIR", help="Folder for the files; created if missing.")
+    ] = Path("sagline-examples"),
+    force: Annotated[bool, typer.Option("--force", help="Replace files that exist.")] = False,
+) -> None:
+    """Write the files that the documentation's commands work with: a robot, a path, lengths, measurements, scripts.
 
-    Args:
-        folder: Where to; created if missing.
-        force: Whether files that exist are replaced.
+    For example:
 
-    Raises:
-        FileError: If one of them exists, or the folder cannot be written; then nothing has been.
+        sagline examples --out DIR
+        cd DIR
+        sagline track own_robot.yaml own_path.yaml
     """
     sources = example_files()
     check_folder(folder)

@@ -4,71 +4,83 @@ from __future__ import annotations
 
 from contextlib import closing
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Final
 
 import numpy as np
+import typer
 
-from sagline.article.experiment import PROTOTYPE, Experiment, Tell, Watch, in_process, level, with_cells
-from sagline.article.experiment import experiment as driven
-from sagline.article.ten_poses import HOME
 from sagline.cli.entries import FORWARD, INVERSE, SIMULATION
+from sagline.cli.options import JsonOption, OutOption
 from sagline.cli.terminal import note, show, show_json, working
-from sagline.cli.values import whole_of
-from sagline.control.controller import Controller
-from sagline.control.pace import Pace
 from sagline.core.errors import InvalidValueError, nearest
 from sagline.core.numbers import n
-from sagline.files.json_text import plain
-from sagline.files.robot_file import load_robot
 from sagline.files.whole import check_files
-from sagline.report.experiment import NAMES, experiment_chapter, write_experiment
-from sagline.robot.robot import Robot
-from sagline.twin.machine import MOST_SEED
+
+if TYPE_CHECKING:
+    from sagline.article.experiment import Experiment, Tell
+    from sagline.robot.robot import Robot
 
 KNOWN: Final = ("article",)
 PARTS: Final = 1000  # of the whole, as progress is told
 
 
-class Asked(NamedTuple):
-    """What was asked for, as the command line has it."""
+def experiment(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="article: ten points, Table 2 and figures 25-27.")],
+    waits: Annotated[
+        bool,
+        typer.Option("--in-process", help="Let the twin's clock wait: half a minute instead of 14, and no network."),
+    ] = False,
+    true: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ROBOT",
+            help="The robot as it really is, where that is another one; the controller still knows article-prototype.",
+            show_default=False,
+        ),
+    ] = None,
+    seed: Annotated[str, typer.Option(metavar="NUMBER", help="Of the load cells' noise.")] = "1",
+    folder: OutOption = Path("output"),
+    as_json: JsonOption = False,
+) -> None:
+    """Do an experiment again: home, the ten points of Table 2, home, as one page beside the article's numbers.
 
-    in_process: bool
-    true: str | None
-    seed: str
-    out: Path
-    as_json: bool
+    The controller drives a twin of the prototype in another process, over S7 and in real time, which takes 14 minutes.
+    Writes DIR/experiment.html, which needs nothing else, and DIR/experiment.json with the numbers.
 
+    For example:
 
-def experiment(name: str, asked: Asked) -> None:
-    """Do it, write the page and say where it is.
-
-    Raises:
-        SaglineError: If there is no such experiment, a robot cannot be read, the folder cannot be written, or the
-            experiment ends on the way; then nothing has been written.
+        sagline experiment article --in-process
+        sagline experiment article
+        sagline experiment article --in-process --true worn.yaml --out worn
     """
+    from sagline.article.experiment import PROTOTYPE, in_process
+    from sagline.cli.values import whole_of
+    from sagline.files.json_text import plain
+    from sagline.files.robot_file import load_robot
+    from sagline.report.experiment import NAMES, experiment_chapter, write_experiment
+    from sagline.twin.machine import MOST_SEED
+
     if name not in KNOWN:
         near = nearest(name, KNOWN)
         raise InvalidValueError("experiment", repr(name), ", ".join(KNOWN), f"Did you mean {near or KNOWN[0]}?")
-    seed = whole_of(asked.seed, "--seed", 0, MOST_SEED)
+    noise = whole_of(seed, "--seed", 0, MOST_SEED)
     nominal = load_robot(PROTOTYPE)
-    true = nominal if asked.true is None else load_robot(asked.true)
-    if true.cable_count != nominal.cable_count:
+    real = nominal if true is None else load_robot(true)
+    if real.cable_count != nominal.cable_count:
         step = "Begin a robot file with base: article-prototype, and say what is other."
-        raise InvalidValueError("--true", f"a robot of {true.cable_count} cables", f"{nominal.cable_count}", step)
-    check_files(asked.out, NAMES)
-    how = _how(asked, true)
+        raise InvalidValueError("--true", f"a robot of {real.cable_count} cables", f"{nominal.cable_count}", step)
+    check_files(folder, NAMES)
+    how = _how(None if true is None else real.name, waits)
     with working("home, ten points, home", INVERSE, FORWARD, SIMULATION) as line:
 
         def tell(share: float) -> None:
             line.progress(round(PARTS * share), PARTS)
 
         result = (
-            in_process(true, nominal, seed=seed, tell=tell)
-            if asked.in_process
-            else apart_over_s7(true, nominal, seed, tell)
+            in_process(real, nominal, seed=noise, tell=tell) if waits else apart_over_s7(real, nominal, noise, tell)
         )
-    place = write_experiment(result, asked.out, how)
-    if asked.as_json:
+    place = write_experiment(result, folder, how)
+    if as_json:
         show_json({finding.key: plain(finding.numbers) for finding in experiment_chapter(result, how).findings})
         return
     _tell(result)
@@ -77,6 +89,11 @@ def experiment(name: str, asked: Asked) -> None:
 
 def apart_over_s7(true: Robot, nominal: Robot, seed: int, tell: Tell) -> Experiment:
     """Drive a twin in another process, over S7, in real time."""
+    from sagline.article.experiment import Watch, level, with_cells
+    from sagline.article.experiment import experiment as driven
+    from sagline.article.ten_poses import HOME
+    from sagline.control.controller import Controller
+    from sagline.control.pace import Pace
     from sagline.plc.s7_link import S7Link
     from sagline.twin.apart import apart
 
@@ -88,9 +105,9 @@ def apart_over_s7(true: Robot, nominal: Robot, seed: int, tell: Tell) -> Experim
         return driven(Controller(nominal, link, pace=Pace(), record=watch), watch)
 
 
-def _how(asked: Asked, true: Robot) -> str:
-    machine = "a twin of the prototype as it was planned" if asked.true is None else f"a twin of {true.name}"
-    way = "in one process, on a clock that waits" if asked.in_process else "over four S7 connections, in real time"
+def _how(true: str | None, waits: bool) -> str:
+    machine = "a twin of the prototype as it was planned" if true is None else f"a twin of {true}"
+    way = "in one process, on a clock that waits" if waits else "over four S7 connections, in real time"
     return f"The controller drove {machine}, {way}; it knew the prototype of Table 1, with our anchors."
 
 

@@ -3,52 +3,60 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
+import typer
 
-from sagline.cli.choices import Model
-from sagline.cli.csv_text import csv_text
 from sagline.cli.ending import OUTSIDE
 from sagline.cli.entries import FIT, FORWARD
-from sagline.cli.tables import Grid, show_table, written
+from sagline.cli.options import JsonOption, Model, ModelOption, OutOption, PayloadOption, RobotArgument, WrenchOption
+from sagline.cli.tables import Grid, csv_text, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
-from sagline.cli.values import loaded
-from sagline.files.lengths_file import Lengths, load_counts, load_lengths
-from sagline.files.names import file_stem
-from sagline.files.robot_file import load_robot
-from sagline.files.typed import wrench_of
 from sagline.files.whole import check_files, made_folder, write_text
-from sagline.kinematics.encoder import lengths_from_counts
-from sagline.kinematics.forward import forward as solve
-from sagline.kinematics.forward_solution import ForwardSolution
-from sagline.kinematics.forward_status import ForwardStatus
-from sagline.robot.robot import Robot
+
+if TYPE_CHECKING:
+    from sagline.files.lengths_file import Lengths
+    from sagline.kinematics.forward_solution import ForwardSolution
+    from sagline.robot.robot import Robot
 
 SHOWN = 12  # rows of the table on the terminal; the file has them all
-FINE = (ForwardStatus.SOLVED, ForwardStatus.FITTED)
 COLUMNS = ("x", "y", "z", "qx", "qy", "qz", "qw", "force_residual", "moment_residual", "iterations")
-
 Cell = float | str
 
 
 def forward(
-    name: str,
-    file: Path,
-    model: Model,
-    wrench: str | None,
-    payload: str | None,
-    folder: Path,
-    *,
-    counts: bool,
-    as_json: bool,
+    name: RobotArgument,
+    file: Annotated[
+        Path, typer.Argument(metavar="CSV", help="Columns L0, L1, ... and perhaps time; units in brackets: L0 [mm].")
+    ],
+    counts: Annotated[
+        bool,
+        typer.Option("--counts", help="The columns are C0, C1, ...: counts of the encoders of the robot's winches."),
+    ] = False,
+    model: ModelOption = Model.CATENARY,
+    wrench: WrenchOption = None,
+    payload: PayloadOption = None,
+    folder: OutOption = Path("output"),
+    as_json: JsonOption = False,
 ) -> int:
-    """Find the poses, tell, and write them; returns the exit code.
+    """Find the poses in which the platform rests on cables of measured lengths.
 
-    The first sample is searched for without a start; each other begins where the last one ended.
+    The first sample needs no start; each other begins where the last one ended. Exit code 1 where a sample
+    ends in no stable equilibrium.
 
-    Raises:
-        SaglineError: If an input is wrong or the folder cannot be written.
+    For example:
+
+        sagline forward cogiro lengths.csv --out poses
+        sagline forward my_robot.yaml counts.csv --counts
     """
+    from sagline.cli.values import loaded
+    from sagline.files.names import file_stem
+    from sagline.files.robot_file import load_robot
+    from sagline.files.typed import wrench_of
+    from sagline.kinematics.forward import forward as solve
+    from sagline.kinematics.forward_status import ForwardStatus
+
     load = wrench_of(wrench)
     robot = loaded(load_robot(name), payload)
     lengths = _counted(file, robot) if counts else _measured(file, robot)
@@ -62,7 +70,7 @@ def forward(
     made_folder(folder)
     rows = _rows(lengths, found)
     write_text(target, csv_text(rows))
-    lost = [k for k, status in enumerate(found.status) if status not in FINE]
+    lost = [k for k, status in enumerate(found.status) if status not in (ForwardStatus.SOLVED, ForwardStatus.FITTED)]
     if as_json:
         header = [str(cell).split(" ")[0] for cell in rows[0]]
         show_json({"poses": [dict(zip(header, row, strict=True)) for row in rows[1:]], "file": target})
@@ -79,16 +87,23 @@ def forward(
 
 
 def _measured(file: Path, robot: Robot) -> Lengths:
+    from sagline.files.lengths_file import load_lengths
+
     return load_lengths(file, robot.cable_count, float(np.linalg.norm(np.ptp(robot.frame_anchors, axis=0))))
 
 
 def _counted(file: Path, robot: Robot) -> Lengths:
+    from sagline.files.lengths_file import Lengths, load_counts
+    from sagline.kinematics.encoder import lengths_from_counts
+
     read = load_counts(file, robot.cable_count)
     return Lengths(read.time, lengths_from_counts(robot, read.counts))
 
 
 def _rows(lengths: Lengths, found: ForwardSolution) -> list[list[Cell]]:
     """Header and one row a sample; the time if it was given."""
+    from sagline.kinematics.forward_status import ForwardStatus
+
     units = {"x": "m", "y": "m", "z": "m", "force_residual": "N", "moment_residual": "N*m"}
     numbers = np.hstack((found.pose.position, found.pose.quaternion, found.wrench_residual)).tolist()
     words = [ForwardStatus(int(code)).name for code in found.status]

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from sagline.viewer.source import Source
     from sagline.viewer.viewer import Viewer
 
-
 LATER = "trimesh"  # what the viewer loads when somebody asks for it
 
 
@@ -39,9 +38,6 @@ class Start(NamedTuple):
     pose: Pose | None = None
     mode: str = ""
     wrench: Array | None = None
-
-
-HOME = Start()
 
 
 def check_viewer() -> None:
@@ -65,7 +61,7 @@ def hosted(
     port: int,
     *,
     browser: bool,
-    start: Start = HOME,
+    start: Start | None = None,
     found: Calibration | None = None,
     source: Source | None = None,
     other: Beside | None = None,
@@ -79,7 +75,7 @@ def hosted(
         host: Address to listen on.
         port: Port; 0 for any that is free.
         browser: Whether to open one here.
-        start: How the robot is shown at first.
+        start: How the robot is shown at first; None for its home.
         found: A calibration to show with it; None for none.
         source: Where all this came from; None if nobody knows.
         other: What is played with the same clock; None for nothing.
@@ -89,6 +85,7 @@ def hosted(
     from sagline.viewer import server as web
     from sagline.viewer.viewer import Viewer
 
+    start = start or Start()
     server = web.started(host, port, machine.name)
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)  # from here on Ctrl-C is how one ends, and no failure

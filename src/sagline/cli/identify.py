@@ -2,38 +2,58 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
+import typer
 
-from sagline.article.identify import EmpiricalFit, identify_empirical
-from sagline.article.identify_cable import UNITS, CableFit, TensionAt, identify_cable
+from sagline.cli.options import JsonOption, TensionPlace
 from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
-from sagline.cli.values import quantity
 from sagline.core.numbers import n
-from sagline.files.measurements import Measurements, load_measurements
+
+if TYPE_CHECKING:
+    from sagline.article.identify import EmpiricalFit
+    from sagline.article.identify_cable import CableFit
+    from sagline.files.measurements import Measurements
 
 STEPS = 25  # along each axis of the working range
 TOLERANCE = 5e-3  # m, of the position: the article's own is 6 mm
 
 
 def identify(
-    file: Path,
-    length_error: str,
-    tension_error: str,
-    tension_at: TensionAt,
-    unknowns: Sequence[str],
-    *,
-    as_json: bool,
+    file: Annotated[
+        Path, typer.Argument(metavar="CSV", help="Columns span, rise, length, tension; units in brackets: span [mm].")
+    ],
+    length_error: Annotated[
+        str, typer.Option(metavar="LENGTH", help="Standard error of a length, 0.002 or '2 mm'.")
+    ] = "0.001",
+    tension_error: Annotated[str, typer.Option(metavar="FORCE", help="Standard error of a tension, 5 or '5 N'.")] = "1",
+    tension_at: Annotated[
+        TensionPlace,
+        typer.Option(
+            metavar="PLACE", help=f"Where the tension is measured: {', '.join(each.value for each in TensionPlace)}."
+        ),
+    ] = TensionPlace.FRAME_END,
+    offset: Annotated[
+        bool, typer.Option("--offset/--no-offset", help="Find the zero of the lengths too, as one more unknown.")
+    ] = False,
+    as_json: JsonOption = False,
 ) -> None:
-    """Find the cable, then the article's constants for it in the measured range, and print both.
+    """Find what a measured cable weighs and how stiff it is, and the empirical model for it.
 
-    Raises:
-        SaglineError: If the file or a value is wrong.
+    Standard errors and warnings say what the measurements do not determine or cannot tell apart.
+
+    For example:
+
+        sagline identify cable.csv
+        sagline identify cable.csv --length-error "2 mm" --tension-at platform-end --offset
     """
+    from sagline.article.identify_cable import UNITS, identify_cable
+    from sagline.cli.values import quantity
+    from sagline.files.measurements import load_measurements
+
     length_deviation = quantity(length_error, "--length-error", "m", above=0.0)
     tension_deviation = quantity(tension_error, "--tension-error", "N", above=0.0)
     data = load_measurements(file)
@@ -42,8 +62,8 @@ def identify(
             *data,
             length_error=length_deviation,
             tension_error=tension_deviation,
-            tension_at=tension_at,
-            unknowns=unknowns,
+            tension_at=tension_at.key,
+            unknowns=["linear_density", "axial_stiffness", *["length_offset"] * offset],
         )
         model = _model(cable, data)
     if as_json:
@@ -68,6 +88,8 @@ def identify(
 
 def _model(cable: CableFit, data: Measurements) -> EmpiricalFit:
     """The empirical model over the measured range of spans, rises and tensions."""
+    from sagline.article.identify import identify_empirical
+
     horizontal = data.tension * data.span / np.hypot(data.span, data.rise)
     spans, rises, tensions = (
         np.linspace(values.min(), values.max(), STEPS) for values in (data.span, data.rise, horizontal)

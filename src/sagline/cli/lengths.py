@@ -4,43 +4,71 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
+import typer
 
-from sagline.cli.choices import Winding
-from sagline.cli.csv_text import csv_text
 from sagline.cli.ending import OUTSIDE
 from sagline.cli.entries import needed_for
+from sagline.cli.options import Winding
+from sagline.cli.tables import csv_text
 from sagline.cli.terminal import note, show_data, working
-from sagline.core.arrays import Array
 from sagline.core.errors import FileError
-from sagline.files.plan_file import load_plan
 from sagline.files.whole import write_text
-from sagline.kinematics.encoder import encoder_counts
-from sagline.kinematics.status import PoseStatus
-from sagline.kinematics.winch_rates import winch_rates
 
 if TYPE_CHECKING:
+    from sagline.core.arrays import Array
     from sagline.kinematics.plan import Plan
 
+RunArgument = Annotated[
+    Path, typer.Argument(metavar="RUN.nc", help="A run written by sagline track.", show_default=False)
+]
+FileOption = Annotated[
+    Path | None, typer.Option("--out", metavar="FILE", help="File to write. Default: stdout.", show_default=False)
+]
 
-def write_lengths(file: Path, out: Path | None) -> int:
-    """Write times and lengths of the feasible samples to a file or to stdout; returns the exit code.
 
-    Raises:
-        SaglineError: If the run cannot be read, none of it is feasible, or the file cannot be written.
+def lengths(
+    file: RunArgument,
+    out: FileOption = None,
+) -> int:
+    """Take the planned lengths out of a run: a row a sample, as `sagline forward` reads them and controllers do.
+
+    Rows are feasible ones; how many are not, and so are left out, is told on stderr (exit code 1).
+
+    For example:
+
+        sagline lengths output/cogiro-catenary.nc --out lengths.csv
     """
     plan = _plan_of(file, out)
     return write_rows(plan, "L{} [m]", np.atleast_2d(plan.unstrained_length).tolist(), out)
 
 
-def write_counts(file: Path, winding: Winding, out: Path | None) -> int:
-    """Write times and counts of the encoders in the same way.
+def encoder(
+    file: RunArgument,
+    winding: Annotated[
+        Winding,
+        typer.Option(
+            metavar="WINDING",
+            help="What lies on the drums: constant, cable at the winches' winding_tension; remembered, cable wound "
+            "along the run at the tension it had there.",
+        ),
+    ] = Winding.CONSTANT,
+    out: FileOption = None,
+) -> int:
+    """Take the counts of the encoders out of a run: a row a sample, for the drives.
 
-    Raises:
-        SaglineError: As above, or if the robot's winches cannot say the counts.
+    The robot's winches must say drum_radius, groove_pitch, counts_per_turn and length_zero, its cables their diameter.
+    Rows are feasible ones. Exit code 1 where some are not, or winches would exceed their speed_limit or torque_limit.
+
+    For example:
+
+        sagline encoder output/my-robot-catenary.nc --out counts.csv
     """
+    from sagline.kinematics.encoder import encoder_counts
+    from sagline.kinematics.winch_rates import winch_rates
+
     plan = _plan_of(file, out)
     counts = np.atleast_2d(encoder_counts(plan, winding.value))
     whole = [[int(count) if count == count else count for count in row] for row in counts.tolist()]
@@ -88,6 +116,8 @@ def write_rows(plan: Plan, name: str, rows: Sequence[Sequence[float]], out: Path
 
 def _plan_of(file: Path, out: Path | None) -> Plan:
     """The plan in a run, some of which is feasible; the file to write is another one."""
+    from sagline.files.plan_file import load_plan
+
     if out is not None and out.exists() and out.resolve() == file.resolve():
         raise FileError(out, "is the run itself", "Name another file with --out.")
     plan = load_plan(file)
@@ -98,6 +128,8 @@ def _plan_of(file: Path, out: Path | None) -> Plan:
 
 def plan_text(plan: Plan) -> str:
     """A whole plan as CSV: time, pose, lengths, tensions and how each sample ended; empty where it has no answer."""
+    from sagline.kinematics.status import PoseStatus
+
     pose, lengths, tensions = plan.state.pose, plan.unstrained_length, plan.chord_tension
     columns: dict[str, Array] = {}
     if plan.path is not None:

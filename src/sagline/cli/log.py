@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
 
 import numpy as np
+import typer
 
+from sagline.cli.options import JsonOption
 from sagline.cli.tables import Grid, show_table
 from sagline.cli.terminal import show, show_json, working
-from sagline.cli.values import whole_of
-from sagline.control.deviation import position_error
-from sagline.control.events import Event
-from sagline.control.execution import Execution
-from sagline.control.states import State
-from sagline.core.arrays import Array
 from sagline.core.numbers import n
-from sagline.files.execution_file import load_execution, save
 from sagline.files.whole import check_file
+
+if TYPE_CHECKING:
+    from sagline.control.events import Event
+    from sagline.control.execution import Execution
+    from sagline.core.arrays import Array
 
 MOST_EVENTS: Final = 20  # that are listed
 MOST_PLANS: Final = 100_000
@@ -45,12 +45,37 @@ class Extreme(NamedTuple):
     cable: int | None = None
 
 
-def log(file: Path, to: Path | None, plan: str | None, *, as_json: bool) -> int:
-    """Read a log and tell what is in it, or write it to another file; returns the exit code.
+def log(
+    file: Annotated[Path, typer.Argument(metavar="RUN.mcap", help="A log, also one of a process that was killed.")],
+    to: Annotated[
+        Path | None,
+        typer.Option(
+            "--to",
+            metavar="FILE",
+            help="Write it to this file and tell nothing else: .nc is a data set with the plan in it, .mcap a log "
+            "with its end.",
+            show_default=False,
+        ),
+    ] = None,
+    plan: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NUMBER", help="Only the cycles of one of its plans, from 0. Default: all.", show_default=False
+        ),
+    ] = None,
+    as_json: JsonOption = False,
+) -> int:
+    """Tell what a log of the controller holds: states, largest errors, late cycles, events.
 
-    Raises:
-        SaglineError: If it cannot be read, has no such plan, or the other file cannot be written.
+    For example:
+
+        sagline log run.mcap
+        sagline log run.mcap --to run.nc
+        sagline log killed.mcap --to mended.mcap
     """
+    from sagline.cli.values import whole_of
+    from sagline.files.execution_file import load_execution, save
+
     which = None if plan is None else whole_of(plan, "--plan", 0, MOST_PLANS)
     if to is not None:
         check_file(to)
@@ -97,6 +122,8 @@ def _row(done: Execution, event: Event) -> list[str]:
 
 def _states(done: Execution) -> list[list[str]]:
     """How long the controller was in which state, in the order of the states."""
+    from sagline.control.states import State
+
     codes, counts = np.unique(done.state, return_counts=True)
     return [
         [State(code).name, f"{count * done.period:.2f}", f"{count:,}"]
@@ -106,6 +133,8 @@ def _states(done: Execution) -> list[list[str]]:
 
 def _extremes(done: Execution) -> list[Extreme]:
     """The largest errors; those of which there is one."""
+    from sagline.control.deviation import position_error
+
     errors: list[tuple[str, Array, str]] = [
         ("tension error", done.tension - done.planned_tension, "N"),
         ("tension", done.tension, "N"),

@@ -13,22 +13,31 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from sagline.cli.commands.article import article, identify
-from sagline.cli.commands.calibrate import calibrate
-from sagline.cli.commands.control import control
-from sagline.cli.commands.design import design
-from sagline.cli.commands.experiment import experiment
-from sagline.cli.commands.log import log
-from sagline.cli.commands.motion import simulate, vibrate
-from sagline.cli.commands.poses import forward, tension
-from sagline.cli.commands.robots import convert, examples, export_c, export_scl, new, robots, show
-from sagline.cli.commands.share import share
-from sagline.cli.commands.sweep import sweep
-from sagline.cli.commands.track import encoder, lengths, run, track
-from sagline.cli.commands.twin import twin
-from sagline.cli.commands.view import view
-from sagline.cli.commands.workspace import workspace
+from sagline.cli.article import article
+from sagline.cli.calibrate import calibrate
+from sagline.cli.control import control
+from sagline.cli.convert import convert
+from sagline.cli.design import design
 from sagline.cli.ending import ended
+from sagline.cli.examples import examples
+from sagline.cli.experiment import experiment
+from sagline.cli.export import export_c, export_scl
+from sagline.cli.forward import forward
+from sagline.cli.identify import identify
+from sagline.cli.lengths import encoder, lengths
+from sagline.cli.log import log
+from sagline.cli.new import new
+from sagline.cli.robots import robots, show
+from sagline.cli.run import run
+from sagline.cli.share import share
+from sagline.cli.simulate import simulate
+from sagline.cli.sweep import sweep
+from sagline.cli.tension import tension
+from sagline.cli.track import track
+from sagline.cli.twin import twin
+from sagline.cli.vibrate import vibrate
+from sagline.cli.view import view
+from sagline.cli.workspace import workspace
 from sagline.files.whole import finished_files
 
 DEBUG = "--debug"

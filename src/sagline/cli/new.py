@@ -6,32 +6,32 @@ import re
 import sys
 from pathlib import Path
 from shlex import quote
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
 import typer
 
-from sagline.cables.rope import ROPES, SAFETY
 from sagline.cli.entries import INVERSE
 from sagline.cli.terminal import note, show, working
-from sagline.cli.values import quantity
-from sagline.core.arrays import Array, checked
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.core.numbers import n
-from sagline.files.quantity import in_si
-from sagline.files.robot_file import dump_robot, parse_robot
 from sagline.files.whole import write_text
-from sagline.kinematics.inverse import inverse
-from sagline.kinematics.plan import Plan
-from sagline.robot.design import COUNTS, LAYOUTS, SLACK_LIMIT, Design
-from sagline.robot.pose import Pose
-from sagline.robot.pose_box import PoseBox
-from sagline.robot.robot import Robot
+
+if TYPE_CHECKING:
+    from sagline.core.arrays import Array
+    from sagline.kinematics.plan import Plan
+    from sagline.robot.design import Design
+    from sagline.robot.pose import Pose
+    from sagline.robot.pose_box import PoseBox
+    from sagline.robot.robot import Robot
 
 MIDDLE = 0.5  # of the frame's edges: where the feasible share is told
 GRID = 7  # poses along each edge of a box
 NEARLY_ALL = 0.95  # feasible poses of a box that the file recommends
 _BOXES = (0.7, 0.6, 0.5, 0.4, 0.3, 0.2)  # of the frame's edges, tried in this order
+
+
+ROPE_NAMES = "dyneema-sk78, dyneema-sk62, steel-6x19, steel-7x19"
 
 
 class Question(NamedTuple):
@@ -54,23 +54,49 @@ QUESTIONS = (
     Question("cables", "Number of cables (6 to 8)", "8"),
     Question("platform", "Platform, length x width x height", "0.5 x 0.5 x 0.4 m"),
     Question("mass", "Mass of the platform with its load", "30 kg"),
-    Question("rope", f"Rope ({', '.join(ROPES)})", "dyneema-sk78"),
+    Question("rope", f"Rope ({ROPE_NAMES})", "dyneema-sk78"),
     Question("diameter", "Diameter of the rope", "4 mm"),
 )
 
 
-def new(file: Path, answers: dict[str, str | None], *, force: bool) -> Robot:
-    """Ask what is missing, check, explain, write.
+def new(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The robot file to write, my_robot.yaml.")],
+    frame: Annotated[str | None, typer.Option(metavar="SIZE", help='Edges of the frame, "6 x 4 x 3 m".')] = None,
+    layout: Annotated[
+        str | None, typer.Option(metavar="LAYOUT", help="Cables from the top, or mixed: from above and below.")
+    ] = None,
+    cables: Annotated[str | None, typer.Option(metavar="NUMBER", help="Number of cables, 6 to 8.")] = None,
+    platform: Annotated[
+        str | None, typer.Option(metavar="SIZE", help='Edges of the platform, "0.5 x 0.5 x 0.4 m".')
+    ] = None,
+    mass: Annotated[
+        str | None, typer.Option(metavar="MASS", help='Mass of the platform with its load, "30 kg".')
+    ] = None,
+    rope: Annotated[
+        str | None,
+        typer.Option(metavar="ROPE", help=f"What the cables are: {ROPE_NAMES}."),
+    ] = None,
+    diameter: Annotated[str | None, typer.Option(metavar="LENGTH", help='Diameter of the rope, "4 mm".')] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace the file if it exists.")] = False,
+    look: Annotated[bool, typer.Option("--view", help="Look at it in the browser afterwards.")] = False,
+) -> int:
+    r"""Make a robot file of your own: asks for what no option says, checks it, explains it.
 
-    Args:
-        file: The robot file to be, my_robot.yaml.
-        answers: What the options say; what is None is asked; an empty line takes the default.
-        force: Whether a file that exists is replaced.
+    Without a terminal, answers are the lines of the input; an empty line takes the default.
 
-    Raises:
-        SaglineError: If an answer is wrong or missing, or the file exists or cannot be written; nothing has been
-            written then.
+    For example:
+
+        sagline new my_robot.yaml
+        sagline new my_robot.yaml --frame "15 x 11 x 6 m" --mass "50 kg" \
+            --rope steel-6x19 --diameter "3 mm"
     """
+    from sagline.cli.view import serve
+    from sagline.files.robot_file import dump_robot, parse_robot
+
+    answers = {
+        "frame": frame, "layout": layout, "cables": cables, "platform": platform, "mass": mass, "rope": rope,
+        "diameter": diameter,
+    }  # fmt: skip
     _refuse_existing(file, force=force)
     design, said = _answered(file.stem, answers)
     with working(f"checking {GRID**3} poses of each of a few boxes", INVERSE):
@@ -90,7 +116,9 @@ def new(file: Path, answers: dict[str, str | None], *, force: bool) -> Robot:
         )
     for what, command in (("Written", ""), ("Look at it", "sagline view "), ("Every value", "sagline show ")):
         show(f"{what}: {command}{quote(str(file)) if command else file}", whole=True)
-    return made
+    if not look:
+        return 0
+    return serve(made, file, "127.0.0.1", 8080, browser=True)
 
 
 def _refuse_existing(file: Path, *, force: bool) -> None:
@@ -136,6 +164,10 @@ def _read(question: Question) -> str:
 
 def _design(name: str, said: dict[str, str]) -> Design:
     """The design as far as it has been answered; the rest stands in for what is not known yet, and cannot be wrong."""
+    from sagline.cables.rope import ROPES
+    from sagline.cli.values import quantity
+    from sagline.robot.design import COUNTS, LAYOUTS, Design
+
     frame = _edges(said["frame"], "frame")
     layout = said.get("layout", LAYOUTS[0])
     design = Design(
@@ -154,6 +186,8 @@ def _design(name: str, said: dict[str, str]) -> Design:
 
 
 def _count(text: str, layout: str) -> int:
+    from sagline.robot.design import COUNTS
+
     if not re.fullmatch(r"[0-9]{1,3}", text.strip()):
         allowed = " or ".join(map(str, COUNTS.get(layout, (6, 7, 8))))
         raise InvalidValueError("cables", repr(text), allowed, "Give a whole number.")
@@ -162,6 +196,9 @@ def _count(text: str, layout: str) -> int:
 
 def _edges(text: str, item: str) -> Array:
     """Three edges in m from "6 x 4 x 3 m", "6x4x3", or "600 cm x 4 m x 3 m"."""
+    from sagline.core.arrays import checked
+    from sagline.files.quantity import in_si
+
     parts = [part.strip() for part in text.replace("×", "x").split("x")]
     if len(parts) != 3:
         raise InvalidValueError(item, repr(text), 'three edges, such as "6 x 4 x 3 m"', f"Correct {item}.")
@@ -172,6 +209,8 @@ def _edges(text: str, item: str) -> Array:
 
 def _boxed(design: Design) -> tuple[Robot, Plan]:
     """The robot with the largest box of poses of which nearly all are feasible, and the plan of its middle."""
+    from sagline.kinematics.inverse import inverse
+
     robot = design.robot()
     middle = inverse(robot, grid(design.placed(MIDDLE)))
     for share in _BOXES:
@@ -183,6 +222,8 @@ def _boxed(design: Design) -> tuple[Robot, Plan]:
 
 def grid(box: PoseBox) -> Pose:
     """Level poses on a grid in a box, a batch of GRID cubed."""
+    from sagline.robot.pose import Pose
+
     axes = [np.linspace(low, high, GRID) for low, high in zip(box.low, box.high, strict=True)]
     places: Array = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     return Pose.from_quaternion(places, np.array([0.0, 0.0, 0.0, 1.0]))
@@ -195,6 +236,9 @@ def _header(said: dict[str, str]) -> str:
 
 def _explained(robot: Robot, design: Design, middle: Plan) -> tuple[list[str], float]:
     """What there is to say of the robot, and the feasible share of the poses in its middle."""
+    from sagline.cables.rope import ROPES, SAFETY
+    from sagline.robot.design import SLACK_LIMIT
+
     share = float(middle.feasible.mean())
     density, stiffness = float(robot.cables.linear_density[0]), float(robot.cables.axial_stiffness[0])
     lines = [

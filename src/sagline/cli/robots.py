@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sagline.cables.cable import Cable
+from sagline.cli.options import JsonOption, RobotArgument
 from sagline.cli.tables import Grid, show_table
-from sagline.cli.terminal import show, show_json
-from sagline.core.arrays import Array
-from sagline.core.fields import units
-from sagline.files.robot_file import load_robot
-from sagline.robot.catalogue import robot_names
-from sagline.robot.robot import Robot
-from sagline.robot.tolerances import UNCERTAIN
-from sagline.robot.winch import Winch
+from sagline.cli.terminal import show as show_text
+from sagline.cli.terminal import show_json
 
-MATERIAL = units(Cable)
+if TYPE_CHECKING:
+    from sagline.core.arrays import Array
+    from sagline.robot.robot import Robot
+    from sagline.robot.winch import Winch
+
 WHOLE = {  # fields and their units; one value, or one that holds for all cables
     "motion_pattern": "",
     "plane_normal": "",
@@ -26,7 +24,10 @@ WHOLE = {  # fields and their units; one value, or one that holds for all cables
     "center_of_mass": "m",
     "inertia": "kg m²",
     "gravity": "m/s²",
-    **MATERIAL,
+    "linear_density": "kg/m",
+    "axial_stiffness": "N",
+    "diameter": "m",
+    "expansion": "1/K",
     "tension_min": "N",
     "tension_max": "N",
     "tension_limits_of": "",
@@ -35,11 +36,15 @@ WHOLE = {  # fields and their units; one value, or one that holds for all cables
     "test_box": "m",
 }
 ANCHORS = {"frame_anchors": "m", "platform_anchors": "m"}
+MATERIAL = ("linear_density", "axial_stiffness", "diameter", "expansion")  # fields of the robot's cables
 PER_CABLE = (*MATERIAL, "tension_min", "tension_max")
 
 
-def list_robots(*, as_json: bool) -> None:
-    """Print the presets."""
+def robots(as_json: JsonOption = False) -> None:
+    """List the robots that come with sagline."""
+    from sagline.files.robot_file import load_robot
+    from sagline.robot.catalogue import robot_names
+
     robots = [load_robot(name) for name in robot_names()]
     if as_json:
         show_json([_short(robot) for robot in robots])
@@ -51,19 +56,23 @@ def list_robots(*, as_json: bool) -> None:
         for frame, platform in [(_frame(robot), _platform(robot))]
     ]
     show_table(Grid(heads, rows, left=frozenset({0, 2, 4, 5})))
-    show("Frame: length × width × height over the floor. Where a source gives no size, what the anchors span.")
-    show("")
+    show_text("Frame: length × width × height over the floor. Where a source gives no size, what the anchors span.")
+    show_text("")
     for robot in robots:
-        show(robot.name, style="bold")
-        show(robot.source, indent=4)
+        show_text(robot.name, style="bold")
+        show_text(robot.source, indent=4)
 
 
-def show_robot(name: str, *, as_json: bool) -> None:
-    """Print all values of a robot.
+def show(name: RobotArgument, as_json: JsonOption = False) -> None:
+    """Show every value of a robot with its unit; what its source does not give is marked, with the reason.
 
-    Raises:
-        SaglineError: If there is no such robot, or its file is wrong.
+    For example:
+
+        sagline show ipanema-1
+        sagline show own_robot.yaml --json
     """
+    from sagline.files.robot_file import load_robot
+
     robot = load_robot(name)
     if as_json:
         show_json(_record(robot))
@@ -76,16 +85,16 @@ def show_robot(name: str, *, as_json: bool) -> None:
         show_table(_deviations(robot.tolerances, "tolerance"))
     if (known := robot.calibration) is not None:
         source, note = (f" from {known.log}" * bool(known.log), f": {known.note}" * bool(known.note))
-        show(f"Calibrated on {known.date}{source}{note}")
+        show_text(f"Calibrated on {known.date}{source}{note}")
         show_table(_deviations(known.standard_error, "standard error"))
     for label, text in (("Source", robot.source), ("Notes", robot.notes)):
         if text:
-            show(f"{label}:")
-            show(text, indent=2)
+            show_text(f"{label}:")
+            show_text(text, indent=2)
     if robot.assumed:
-        show("* assumed, not in the source:")
+        show_text("* assumed, not in the source:")
         for field, why in robot.assumed.items():
-            show(f"{field}: {why}", indent=2)
+            show_text(f"{field}: {why}", indent=2)
 
 
 def _short(robot: Robot) -> dict[str, Any]:
@@ -149,6 +158,8 @@ def _record(robot: Robot) -> dict[str, Any]:
 
 def _parts_of(deviations: Mapping[str, Array]) -> dict[str, Any]:
     """Standard deviations, each with its unit."""
+    from sagline.robot.tolerances import UNCERTAIN
+
     return {
         name: {"value": value, "unit": UNCERTAIN[name].unit.replace("^2", "²")} for name, value in deviations.items()
     }
@@ -156,6 +167,8 @@ def _parts_of(deviations: Mapping[str, Array]) -> dict[str, Any]:
 
 def _deviations(deviations: Mapping[str, Array], head: str) -> Grid:
     """Standard deviations of numbers: one where all of a field are alike."""
+    from sagline.robot.tolerances import UNCERTAIN
+
     rows = []
     for name, value in deviations.items():
         alike = bool((value == value.flat[0]).all())
@@ -166,6 +179,9 @@ def _deviations(deviations: Mapping[str, Array], head: str) -> Grid:
 
 def _parts(winches: Winch) -> dict[str, Any]:
     """What is known of the winches, each with its unit."""
+    from sagline.core.fields import units
+    from sagline.robot.winch import Winch
+
     unit = units(Winch) | {"guides": ""}
     return {name: {"value": value, "unit": unit[name].replace("^2", "²")} for name, value in winches.known().items()}
 

@@ -3,34 +3,56 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Annotated, Final
+
+import typer
 
 from sagline.cli.entries import INVERSE
+from sagline.cli.options import robot_completions
 from sagline.cli.terminal import show, working
 from sagline.core.errors import FileError, InvalidValueError
-from sagline.files.calibration_file import FORMAT as CALIBRATION
-from sagline.files.calibration_file import load_calibration
-from sagline.files.dataset import is_of
-from sagline.files.names import file_stem
-from sagline.files.plan_file import load_plan
-from sagline.files.robot_file import load_robot
-from sagline.files.simulation_file import FORMAT as SIMULATION
-from sagline.files.simulation_file import load_simulation
 from sagline.files.whole import check_file, write_text
-from sagline.robot.robot import Robot
-from sagline.share.course import Course, of_plan, of_simulation
-from sagline.share.page import MADE, course_page, robot_page
+
+if TYPE_CHECKING:
+    from sagline.robot.robot import Robot
+    from sagline.share.course import Course
 
 ENDINGS: Final = (".html", ".htm")
 HEAD: Final = 2000  # bytes of a page, in which it says who made it
 
 
-def share(what: str, out: Path | None) -> None:
-    """Write the page, and tell its size.
+def share(
+    what: Annotated[
+        str,
+        typer.Argument(
+            metavar="WHAT",
+            help="A run, a simulation, run.nc, or a log of the controller, run.mcap: it plays. A preset (see sagline "
+            "robots) or a robot file, robot.yaml: its platform can be dragged.",
+            autocompletion=robot_completions,
+        ),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="FILE.html", help="Default: its name, here: run.html.", show_default=False),
+    ] = None,
+) -> None:
+    """Make one page of a robot or a run, that needs no server and no network: for a phone, a mail, a lecture.
 
-    Raises:
-        SaglineError: If what is to be shared cannot be read, or the page cannot be written.
+    A run plays, a robot can be dragged; the page itself computes how the cables hang. The picture turns by mouse, touch
+    and keys. The file is of some 80 kB, and 150 kB more for a minute of run.
+
+    For example:
+
+        sagline share cogiro
+        sagline share own_robot.yaml --out hall.html
+        sagline track cogiro own_path.yaml
+        sagline share output/cogiro-catenary.nc
+        sagline share run.mcap
     """
+    from sagline.files.names import file_stem
+    from sagline.robot.robot import Robot
+    from sagline.share.page import course_page, robot_page
+
     source = Path(what)
     if out is not None and out.suffix.lower() not in ENDINGS:
         raise FileError(out, "is no name for a page", "Let it end in .html.")
@@ -49,6 +71,15 @@ def share(what: str, out: Path | None) -> None:
 
 def _found(source: Path) -> Robot | Course:
     """A robot, or what is to be played."""
+    from sagline.files.calibration_file import FORMAT as CALIBRATION
+    from sagline.files.calibration_file import load_calibration
+    from sagline.files.dataset import is_of
+    from sagline.files.plan_file import load_plan
+    from sagline.files.robot_file import load_robot
+    from sagline.files.simulation_file import FORMAT as SIMULATION
+    from sagline.files.simulation_file import load_simulation
+    from sagline.share.course import of_plan, of_simulation
+
     suffix = source.suffix.lower()
     if suffix == ".mcap":
         return _log(source)
@@ -79,6 +110,8 @@ def _log(source: Path) -> Course:
 
 def _free(file: Path) -> Path:
     """A name that nobody chose is not taken from a page of somebody else's."""
+    from sagline.share.page import MADE
+
     check_file(file)
     if file.exists() and MADE.encode() not in file.read_bytes()[:HEAD]:
         raise FileError(file, "exists, and is no page of sagline", "Name the page with --out; it may be this one.")

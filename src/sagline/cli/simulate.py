@@ -4,103 +4,135 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
+import typer
 
-from sagline.cli.choices import CableMass, ShaperKind, Tension, Variable
 from sagline.cli.entries import CHAINS, SIMULATION, SIMULATION_OVER_PULLEYS, VIBRATION, needed_for
+from sagline.cli.options import (
+    AirDampingOption,
+    CableMass,
+    JsonOption,
+    LossTimeOption,
+    PayloadOption,
+    RobotArgument,
+    ShaperKind,
+    Tension,
+    TensionOption,
+    Variable,
+    WrenchOption,
+)
 from sagline.cli.results import figure_files, listed, write_figures
 from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.cli.track import check_unit
-from sagline.cli.values import damping_of, loaded, middle_of, quantity
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.core.numbers import n
-from sagline.dynamics.events import Break
-from sagline.dynamics.shaped import shaped
-from sagline.dynamics.shapers import EI, ZV, ZVD
-from sagline.dynamics.simulate import simulate as integrated
-from sagline.dynamics.to_shape import to_shape
-from sagline.dynamics.vibrating import vibration
-from sagline.files.names import file_stem
-from sagline.files.path_file import load_path
-from sagline.files.robot_file import load_robot
-from sagline.files.typed import wrench_of
 from sagline.files.whole import check_files, made_folder
-from sagline.kinematics.inverse import inverse
-from sagline.robot.several import anything_behind
-from sagline.statics.stiffness import modes
 
 if TYPE_CHECKING:
     from sagline.cli.line import Line
     from sagline.core.arrays import Array
+    from sagline.dynamics.events import Break
     from sagline.dynamics.simulation import Simulation
     from sagline.kinematics.plan import Plan
     from sagline.motion.path import Path as MotionPath
     from sagline.robot.equilibrium import Equilibrium
     from sagline.robot.robot import Robot
+    from sagline.tension.method import TensionMethod
 
-SHAPERS = {ShaperKind.ZV: ZV, ShaperKind.ZVD: ZVD, ShaperKind.EI: EI}
 BREAK = re.compile(r"([0-9]{1,3})@([^@]+)")
 STEP = "Give the cable and when it breaks: --break 3@2.5s."
 LAST = 1.0  # s at the end, over which the residual vibration is taken
 
 
-class Asked(NamedTuple):
-    """What was asked for, as the command line has it."""
-
-    shaper: ShaperKind
-    cable_mass: CableMass
-    breaks: tuple[str, ...]
-    after: str
-    step: str | None
-    tension: Tension
-    loss_time: str
-    air_damping: str
-
-
 def simulate(
-    name: str,
-    path: Path | None,
-    asked: Asked,
-    wrench: str | None,
-    payload: str | None,
-    out: Path | None,
-    *,
-    figures: bool,
-    as_json: bool,
+    name: RobotArgument,
+    path: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="PATH",
+            help="Waypoints in .yaml, or time and pose in .csv. Default: at rest in the middle of the test box.",
+            show_default=False,
+        ),
+    ] = None,
+    shaper: Annotated[
+        ShaperKind,
+        typer.Option(metavar="SHAPER", help=f"Shapes the path: {', '.join(each.value for each in ShaperKind)}."),
+    ] = ShaperKind.NONE,
+    cable_mass: Annotated[
+        CableMass,
+        typer.Option(metavar="KIND", help=f"Mass of the cables: {', '.join(each.value for each in CableMass)}."),
+    ] = CableMass.NONE,
+    breaks: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--break", metavar="CABLE@TIME", help="A cable breaks: 3@2.5s. May be given again.", show_default=False
+        ),
+    ] = None,
+    after: Annotated[str, typer.Option(metavar="TIME", help="How long it goes on after the path's end [s].")] = "3",
+    step: Annotated[
+        str | None, typer.Option(metavar="TIME", help="Of the integrator [s]. Default: as the robot needs it.")
+    ] = None,
+    tension: TensionOption = Tension.CLOSEST,
+    loss_time: LossTimeOption = "0",
+    air_damping: AirDampingOption = "0",
+    wrench: WrenchOption = None,
+    payload: PayloadOption = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="FILE", help="File to write. Default: ROBOT-simulation.nc in output."),
+    ] = None,
+    figures: Annotated[
+        bool, typer.Option("--figures/--no-figures", help="Draw the balance of energy beside it, as PNG and SVG.")
+    ] = True,
+    as_json: JsonOption = False,
 ) -> int:
-    """Plan, simulate, tell, write and draw; returns the exit code.
+    """Move a robot in time along a path, vibrating as it does, with cables that may break.
 
-    Raises:
-        SaglineError: If an input is wrong or the files cannot be written; then nothing has been.
+    Lengths are planned as `sagline track` plans them. What is told: the largest tension, how far the platform still
+    swings at the end, the balance of energy, and what happened. Play the file with `sagline view ROBOT FILE`.
+
+    For example:
+
+        sagline simulate article-suspended own_path.yaml --shaper zvd
+        sagline simulate cogiro --break 3@0.5s --loss-time 0.001 --out sim.nc
     """
+    from sagline.cli.values import damping_of, loaded, quantity
+    from sagline.dynamics.simulate import simulate as integrated
+    from sagline.files.names import file_stem
+    from sagline.files.path_file import load_path
+    from sagline.files.robot_file import load_robot
+    from sagline.files.typed import wrench_of
+    from sagline.robot.several import anything_behind
+
     load, robot = wrench_of(wrench), loaded(load_robot(name), payload)
-    events = tuple(_break(text, robot) for text in asked.breaks)
-    after = quantity(asked.after, "--after", "s", low=0.0)
-    step = None if asked.step is None else quantity(asked.step, "--step", "s", above=0.0)
-    damping = damping_of(asked.loss_time, asked.air_damping)
+    events = tuple(_break(text, robot) for text in breaks or ())
+    rest = quantity(after, "--after", "s", low=0.0)
+    size = None if step is None else quantity(step, "--step", "s", above=0.0)
+    damping = damping_of(loss_time, air_damping)
     file = Path("output") / f"{file_stem(robot.name, 'simulation')}.nc" if out is None else out
     if file.suffix != ".nc":
         raise FileError(file, "does not end in .nc", "Name a NetCDF file: --out sim.nc.")
     drawing = f"{file.stem}-energy"
     check_files(file.parent, [file.name, *figure_files([drawing] * figures)])
-    if path is None and asked.shaper is not ShaperKind.NONE:
+    if path is None and shaper is not ShaperKind.NONE:
         advice = "Give a path, or leave --shaper out."
-        raise InvalidValueError("--shaper", f"{asked.shaper.value} without a path", "none without a path", advice)
+        raise InvalidValueError("--shaper", f"{shaper.value} without a path", "none without a path", advice)
     way = None if path is None else load_path(path)
     if path is not None and way is not None:
         check_unit(path, way, robot)
     massless = SIMULATION_OVER_PULLEYS if anything_behind(robot) else SIMULATION
-    moving = {CableMass.NONE: (massless,), CableMass.LUMPED: (CHAINS,)}.get(asked.cable_mass, ())
-    needed = (*needed_for(asked.tension.build(Variable.CHORD)), VIBRATION, *moving)
+    moving = {CableMass.NONE: (massless,), CableMass.LUMPED: (CHAINS,)}.get(cable_mass, ())
+    method = tension.build(Variable.CHORD)
+    needed = (*needed_for(method), VIBRATION, *moving)
     with working(f"{robot.name}: simulating", *needed) as line:
-        start = _start(robot, way, asked, load, line)
-        end = after if way is None else _duration(start) + after
-        line.stage(f"{robot.name}: {end:g} s in time, {_cables(asked.cable_mass.value)}")
-        kind: Any = asked.cable_mass.value
-        simulation = integrated(start, duration=end, step=step, cable_mass=kind, events=events, damping=damping)
+        start = _start(robot, way, method, shaper, cable_mass, load, line)
+        end = rest if way is None else _duration(start) + rest
+        line.stage(f"{robot.name}: {end:g} s in time, {_cables(cable_mass.value)}")
+        kind: Any = cable_mass.value
+        simulation = integrated(start, duration=end, step=size, cable_mass=kind, events=events, damping=damping)
         made_folder(file.parent)
         simulation.save(file)
         files = [file]
@@ -118,6 +150,9 @@ def simulate(
 
 
 def _break(text: str, robot: Robot) -> Break:
+    from sagline.cli.values import quantity
+    from sagline.dynamics.events import Break
+
     found = BREAK.fullmatch(text.strip())
     if found is None:
         raise InvalidValueError("--break", repr(text), "CABLE@TIME", STEP)
@@ -127,23 +162,38 @@ def _break(text: str, robot: Robot) -> Break:
     return Break(cable=cable, time=time)
 
 
-def _start(robot: Robot, way: MotionPath | None, asked: Asked, load: Array | None, line: Line) -> Plan | Equilibrium:
+def _start(
+    robot: Robot,
+    way: MotionPath | None,
+    method: TensionMethod,
+    shaper: ShaperKind,
+    cable_mass: CableMass,
+    load: Array | None,
+    line: Line,
+) -> Plan | Equilibrium:
     """A plan along the path, shaped if asked for; or the robot at rest."""
-    method = asked.tension.build(Variable.CHORD)
+    from sagline.cli.values import middle_of
+    from sagline.dynamics.shaped import shaped
+    from sagline.dynamics.shapers import EI, ZV, ZVD
+    from sagline.dynamics.to_shape import to_shape
+    from sagline.dynamics.vibrating import vibration
+    from sagline.kinematics.inverse import inverse
+    from sagline.statics.stiffness import modes
+
     if way is None:
         plan = inverse(robot, middle_of(robot), tension=method, wrench=load)
         if not plan.feasible:
             raise InvalidValueError("robot", "not held in the middle of its test box", "one that is", "Give a path.")
         return plan.state
-    if asked.shaper is not ShaperKind.NONE:
+    if shaper is not ShaperKind.NONE:
         state = inverse(robot, way.pose[len(way) - 1], wrench=load).state
         light = modes(state)
-        heavy = asked.cable_mass is not CableMass.NONE
+        heavy = cable_mass is not CableMass.NONE
         frequency = to_shape(vibration(state, up_to=float(light.frequency.max())) if heavy else light, way)
         told = " and ".join(f"{value:.3f}" for value in frequency)
         kind = "with cable mass" if heavy else "massless"
-        note("Shaper: ", f"{asked.shaper.value} for {told} Hz ({kind}), at the end of the path")
-        way = shaped(way, SHAPERS[asked.shaper](frequency))
+        note("Shaper: ", f"{shaper.value} for {told} Hz ({kind}), at the end of the path")
+        way = shaped(way, {ShaperKind.ZV: ZV, ShaperKind.ZVD: ZVD, ShaperKind.EI: EI}[shaper](frequency))
     return inverse(robot, way, tension=method, wrench=load, progress=line.stage(f"{robot.name}: planning"))
 
 

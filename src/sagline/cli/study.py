@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path as FilePath
+from textwrap import fill
 from time import perf_counter
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
+from sagline.cli.ending import OUTSIDE
+from sagline.cli.results import listed
+from sagline.cli.tables import Grid, show_table, written
+from sagline.cli.terminal import note, show, show_json
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.core.progress import Progress
@@ -16,10 +23,26 @@ from sagline.files.names import file_stem
 from sagline.kinematics.confirm import Confirmation, confirm
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Gap, Plan
+from sagline.kinematics.status import PoseStatus
 from sagline.motion.path import Path
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 
+ROWS = {  # of a summary: what a person reads, and how its number is written
+    "position_error_max_mm": ("position error, largest [mm]", ".3g"),
+    "position_error_mean_mm": ("position error, mean [mm]", ".3g"),
+    "chord_tension_min_n": ("chord tension, smallest [N]", ".1f"),
+    "chord_tension_max_n": ("chord tension, largest [N]", ".1f"),
+    "unstrained_length_min_m": ("unstrained length, smallest [m]", ".3f"),
+    "unstrained_length_max_m": ("unstrained length, largest [m]", ".3f"),
+    "adjusting_length_min_mm": ("adjusting length, smallest [mm]", ".1f"),
+    "adjusting_length_max_mm": ("adjusting length, largest [mm]", ".1f"),
+    "feasible_share_percent": ("feasible poses [%]", ".4g"),
+    "inverse_us_per_pose": ("inverse kinematics [µs a pose]", ".2f"),
+}
+NARROW, WIDE = 10, 30  # characters of a column's head: four narrow ones fit a line of 80
+MOST_GAPS = 5  # told in full
+WIDEN = " Move the path, or widen the tension limits."
 SAME_PLACE = 1e-6  # m: far above rounding, far below any second equilibrium
 
 
@@ -138,6 +161,69 @@ def gap_text(gap: Gap, plan: Plan) -> str:
     if gap.hopeless:
         short += f", and at {gap.hopeless} of {gap.last - gap.first + 1} poses no force alone would do"
     return f"{when}: {short}; limits of {cables}"
+
+
+def tell(runs: Sequence[Run], files: Sequence[FilePath], folder: FilePath, *, as_json: bool) -> int:
+    """Print the numbers and what went wrong; returns the exit code."""
+    if as_json:
+        show_json({"runs": [_record(run) for run in runs], "files": list(files)})
+    else:
+        show_table(summary_grid(runs))
+        show(f"In {folder.resolve()}: {listed(files)}", whole=True)
+    return max((_complaints(run) for run in runs), default=0)
+
+
+def summary_grid(runs: Sequence[Run]) -> Grid:
+    """One column a run, so that it fits any terminal; one row a number."""
+    heads = [""]
+    for run in runs:
+        name = fill(run.plan.state.one_robot.name, NARROW if len(runs) > 2 else WIDE)
+        heads.append(f"{name}\n{type(run.plan.state.cables.model).__name__}")
+    numbers: list[Summary] = [summary(run) for run in runs]
+    rows = [
+        [label, *(written(getattr(column, field), form) for column in numbers)] for field, (label, form) in ROWS.items()
+    ]
+    return Grid(heads, rows)
+
+
+def _complaints(run: Run) -> int:
+    """Say where the path cannot be followed; the exit code of this run."""
+    name, gaps, plan = run.plan.state.one_robot.name, run.plan.gaps, run.plan
+    for gap in gaps[:MOST_GAPS]:
+        note(f"{name}: ", f"the path leaves the feasible region {gap_text(gap, plan)}", style="bold red")
+    if len(gaps) > MOST_GAPS:
+        note(f"{name}: ", f"and {len(gaps) - MOST_GAPS} times more", style="bold red")
+    if gaps:
+        limits = all(gap.status is PoseStatus.INFEASIBLE for gap in gaps)
+        note("", "The file keeps the feasible part and marks the rest." + WIDEN * limits)
+    if run.lost:
+        what = f"{run.lost} of the planned poses are no stable equilibria: there the platform would leave its path"
+        note(f"{name}: ", f"{what}; move it, or raise the tensions", style="bold red")
+    return OUTSIDE if gaps or run.lost else 0
+
+
+def _record(run: Run) -> dict[str, Any]:
+    plan = run.plan
+    clock = plan.path.time if plan.path is not None else None
+    return {
+        "robot": plan.state.one_robot.name,
+        "model": type(plan.state.cables.model).__name__,
+        "tension": type(plan.tension).__name__,
+        "tension_variable": plan.tension.variable,
+        "poses": plan.status.size,
+        **summary(run)._asdict(),
+        "poses_not_stable": run.lost,
+        "gaps": [
+            {
+                "from_s": None if clock is None else clock[gap.first],
+                "to_s": None if clock is None else clock[gap.last],
+                "shortfall_n": gap.shortfall,
+                "cables": list(gap.cables),
+                "reason": gap.status.text,
+            }
+            for gap in plan.gaps
+        ],
+    }
 
 
 def _range(values: Array) -> tuple[float, float]:

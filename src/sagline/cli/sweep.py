@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+import typer
 
 from sagline.cli.ending import OUTSIDE
 from sagline.cli.entries import INVERSE, SHARING, VERDICTS
+from sagline.cli.options import JsonOption
 from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
-from sagline.cli.values import whole_of
 from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.core.numbers import counted
 from sagline.files.whole import check_folder, made_folder
-from sagline.sweep.cluster import check_address
-from sagline.sweep.file import load_sweep
-from sagline.sweep.running import MOST_WORKERS, opened_for, run
-from sagline.tension.options import takes_default_kernel
 
 if TYPE_CHECKING:
     from sagline.sweep.request import Request
@@ -32,12 +30,52 @@ ENDS = {
 }
 
 
-def sweep(file: Path, out: Path | None, workers: str | None, scheduler: str | None, *, as_json: bool) -> int:
-    """Run or take up a sweep, and tell how its requests ended; returns the exit code.
+def sweep(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="SWEEP.yaml", help="Robots, poses, wrenches and what is asked of each.", show_default=False
+        ),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            metavar="DIR",
+            help="Folder of the sweep; one that holds a part of it is taken up. Default: SWEEP in output.",
+            show_default=False,
+        ),
+    ] = None,
+    workers: Annotated[
+        str | None,
+        typer.Option(metavar="COUNT", help="Processes of this machine. Default: one a processor.", show_default=False),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            metavar="tcp://HOST:PORT",
+            help="Use the workers of this Dask scheduler instead. All of them must see the folder.",
+            show_default=False,
+        ),
+    ] = None,
+    as_json: JsonOption = False,
+) -> int:
+    """Ask tensions, lengths or shortfalls of every robot at every pose under every wrench.
 
-    Raises:
-        SaglineError: If an input is wrong, or something failed on the way; what was done is kept.
+    Results are on the disk from the first minute, a chunk for each task, and DIR/done says how far it is. What was
+    stopped goes on with the same command. Read the numbers with sl.sweep.load("DIR"), or as Zarr. Exit code 1 where
+    requests were left without a verdict.
+
+    For example:
+
+        sagline sweep own_sweep.yaml
+        sagline sweep own_sweep.yaml --workers 1 --out results/sweep
     """
+    from sagline.cli.values import whole_of
+    from sagline.sweep.cluster import check_address
+    from sagline.sweep.file import load_sweep
+    from sagline.sweep.running import MOST_WORKERS, opened_for, run
+
     count = None if workers is None else whole_of(workers, "--workers", 1, MOST_WORKERS)
     if scheduler is not None:
         if count is not None:
@@ -72,6 +110,8 @@ def sweep(file: Path, out: Path | None, workers: str | None, scheduler: str | No
 
 
 def _entries(request: Request) -> tuple[str, ...]:
+    from sagline.tension.options import takes_default_kernel
+
     return (INVERSE, *[SHARING] * (not takes_default_kernel(request.tension)), VERDICTS)
 
 

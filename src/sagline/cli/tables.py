@@ -1,9 +1,11 @@
-"""The tables that the commands print; no cell of one is ever cut."""
+"""The tables that the commands print, of which no cell is ever cut, and tables of numbers as CSV."""
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from io import StringIO
 from itertools import pairwise
 from math import isnan
 
@@ -108,3 +110,15 @@ def _split(columns: range, count: int) -> Iterable[range]:
 def written(number: float, form: str) -> str:
     """A number with a true minus sign, or a dash where there is none."""
     return "–" if isnan(number) else format(number, f"z{form}").replace("-", "−")  # z: no minus zero
+
+
+def csv_text(rows: Iterable[Sequence[object]]) -> str:
+    """The text of a CSV file: with units in brackets, every number to the last bit.
+
+    Args:
+        rows: The names of the columns, with units in brackets; then floats of Python, which are written to the last
+            bit, and words.
+    """
+    text = StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()

@@ -3,58 +3,73 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
+import typer
 
-from sagline.cli.choices import Model, Variable
 from sagline.cli.ending import OUTSIDE
 from sagline.cli.entries import INVERSE, MARGINS, POLYGON, SHARING
+from sagline.cli.options import (
+    JsonOption,
+    Model,
+    ModelOption,
+    OutOption,
+    PayloadOption,
+    PoseOption,
+    RobotArgument,
+    Variable,
+    VariableOption,
+    WrenchOption,
+)
 from sagline.cli.results import figure_files, write_figures
 from sagline.cli.tables import Grid, show_table
 from sagline.cli.terminal import note, show, show_json, working
-from sagline.cli.values import loaded, middle_of
-from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
-from sagline.files.names import file_stem
-from sagline.files.robot_file import load_robot
-from sagline.files.typed import pose_of, wrench_of
 from sagline.files.whole import check_files, made_folder
-from sagline.kinematics.inverse import inverse
-from sagline.kinematics.polygon import tension_polygon
-from sagline.kinematics.status import PoseStatus
-from sagline.robot.pose import Pose
-from sagline.tension.margin import capacity_margin
-from sagline.tension.method import TensionMethod
-from sagline.tension.methods import METHODS
-from sagline.tension.minimum_norm import MinimumNorm
-from sagline.tension.singular import unresisted_motion
 
 if TYPE_CHECKING:
+    from sagline.core.arrays import Array
     from sagline.kinematics.plan import Plan
+    from sagline.robot.pose import Pose
     from sagline.robot.robot import Robot
+    from sagline.tension.method import TensionMethod
 
-ALONE = {name: method for name, method in METHODS.items() if name not in ("Closest", "QuadraticProgram", "PolygonWalk")}
+LEFT_OUT = ("Closest", "QuadraticProgram", "PolygonWalk")  # at one pose they choose what others do
 
 
 def tension(
-    name: str,
-    pose: str | None,
-    model: Model,
-    variable: Variable,
-    wrench: str | None,
-    payload: str | None,
-    folder: Path,
-    *,
-    figures: bool,
-    as_json: bool,
+    name: RobotArgument,
+    pose: PoseOption = None,
+    model: ModelOption = Model.CATENARY,
+    variable: VariableOption = Variable.CHORD,
+    wrench: WrenchOption = None,
+    payload: PayloadOption = None,
+    folder: OutOption = Path("output"),
+    figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the polygon, as PNG and SVG.")] = True,
+    as_json: JsonOption = False,
 ) -> int:
-    """Share the load of one pose in every way, tell, and draw; returns the exit code.
+    """Share the load of one pose in nine ways, and draw the polygon of feasible tensions with all of them in it.
 
-    Raises:
-        SaglineError: If an input is wrong or the folder cannot be written.
+    Three ways are left out: at one pose, without targets, Closest and QuadraticProgram choose what MinimumNorm
+    does; PolygonWalk, by its optimum, what LowestSum, MinimumNorm or Centroid does.
+
+    For example:
+
+        sagline tension article-mixed --pose 1,0.5,2.5
+        sagline tension cogiro --pose 0,0,2,10,0,0 --variable frame_end --no-figures
     """
+    from sagline.cli.values import loaded, middle_of
+    from sagline.files.names import file_stem
+    from sagline.files.robot_file import load_robot
+    from sagline.files.typed import pose_of, wrench_of
+    from sagline.kinematics.inverse import inverse
+    from sagline.kinematics.polygon import tension_polygon
+    from sagline.tension.margin import capacity_margin
+    from sagline.tension.methods import METHODS
+    from sagline.tension.minimum_norm import MinimumNorm
+
     load, place = wrench_of(wrench), None if pose is None else pose_of(pose)
     robot = loaded(load_robot(name), payload)
     place = middle_of(robot) if place is None else place
@@ -64,7 +79,11 @@ def tension(
         check_files(folder, figure_files([name_of_figure]))
     with working(f"{robot.name}: sharing the load", INVERSE, SHARING, MARGINS, *[POLYGON] * drawn):
         least = inverse(robot, place, model.build(), MinimumNorm(variable.value), load)  # refuses what none can share
-        plans = {title: _plan(robot, place, model, method(variable.value), load) for title, method in ALONE.items()}
+        plans = {
+            title: _plan(robot, place, model, method(variable.value), load)
+            for title, method in METHODS.items()
+            if title not in LEFT_OUT
+        }
         reason = _reason(robot, place, least)
         margin = float(capacity_margin(least.state))
         shape = tension_polygon(robot, place, model.build(), load, variable.value) if drawn else None
@@ -94,6 +113,8 @@ def tension(
 
 def _plan(robot: Robot, pose: Pose, model: Model, method: TensionMethod, wrench: Array | None) -> Plan | None:
     """None where the method cannot share among the robot's cables."""
+    from sagline.kinematics.inverse import inverse
+
     try:
         return inverse(robot, pose, model.build(), method, wrench)
     except InvalidValueError:
@@ -101,6 +122,9 @@ def _plan(robot: Robot, pose: Pose, model: Model, method: TensionMethod, wrench:
 
 
 def _reason(robot: Robot, pose: Pose, plan: Plan) -> str:
+    from sagline.kinematics.status import PoseStatus
+    from sagline.tension.singular import unresisted_motion
+
     status = PoseStatus(int(plan.status))
     if status is PoseStatus.SINGULAR:
         return f"{status.text}. No cable resists {unresisted_motion(robot, pose).text}"
@@ -114,12 +138,16 @@ def _reason(robot: Robot, pose: Pose, plan: Plan) -> str:
 
 
 def _record(plan: Plan | None) -> Any:
+    from sagline.kinematics.status import PoseStatus
+
     if plan is None:
         return None
     return {"status": PoseStatus(int(plan.status)).name, "chord_tension": list(map(float, plan.chord_tension))}
 
 
 def _grid(robot: Robot, plans: dict[str, Plan | None]) -> Grid:
+    from sagline.kinematics.status import PoseStatus
+
     rows = []
     for title, plan in plans.items():
         if plan is not None and plan.feasible:

@@ -3,28 +3,36 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
+import typer
 
-from sagline.cli.choices import Model, Tension, Variable
 from sagline.cli.entries import FORWARD, needed_for
 from sagline.cli.lengths import plan_text
-from sagline.cli.results import figure_files, tell, write_figures, write_plans
-from sagline.cli.study import Run, run_along, run_name
+from sagline.cli.options import (
+    JsonOption,
+    Model,
+    ModelOption,
+    OutOption,
+    PayloadOption,
+    RobotArgument,
+    Tension,
+    TensionOption,
+    Variable,
+    VariableOption,
+    WrenchOption,
+)
+from sagline.cli.results import figure_files, write_figures, write_plans
 from sagline.cli.terminal import working
-from sagline.cli.values import loaded
 from sagline.core.errors import FileError
-from sagline.files.path_file import load_path
-from sagline.files.robot_file import load_robot
-from sagline.files.typed import wrench_of
 from sagline.files.whole import check_files, write_text
-from sagline.motion.planar import article_path
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from sagline.cli.study import Run
     from sagline.motion.path import Path as MotionPath
     from sagline.robot.robot import Robot
 
@@ -33,24 +41,45 @@ FIGURES = ("path", "velocity", "cables", "error")
 
 
 def track(
-    robot: str,
-    path: Path | None,
-    model: Model,
-    tension: Tension,
-    variable: Variable,
-    wrench: str | None,
-    payload: str | None,
-    folder: Path,
-    *,
-    figures: bool,
-    table: bool,
-    as_json: bool,
+    robot: RobotArgument,
+    path: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="PATH",
+            help="Waypoints in .yaml, or time and pose in .csv. Default: the article's path.",
+            show_default=False,
+        ),
+    ] = None,
+    model: ModelOption = Model.CATENARY,
+    tension: TensionOption = Tension.CLOSEST,
+    variable: VariableOption = Variable.CHORD,
+    wrench: WrenchOption = None,
+    payload: PayloadOption = None,
+    folder: OutOption = Path("output"),
+    figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw figures, as PNG and SVG.")] = True,
+    table: Annotated[
+        bool, typer.Option("--csv", help="Write the plan as DIR/ROBOT-MODEL.csv too: poses, lengths, tensions.")
+    ] = False,
+    as_json: JsonOption = False,
 ) -> int:
-    """Plan, confirm, write and tell; returns the exit code.
+    """Plan a robot's cable lengths along a path, and prove them with the exact cable.
 
-    Raises:
-        SaglineError: If an input is wrong or the folder cannot be written; then nothing has been.
+    The lengths of the chosen model are wound onto exact catenaries; the position error is where the platform then
+    really rests, less where it was planned. The plan is written to DIR/ROBOT-MODEL.nc.
+
+    For example:
+
+        sagline track article-suspended
+        sagline track own_robot.yaml own_path.yaml --model empirical --out results
+        sagline track cogiro own_samples.csv --payload 20 --csv
     """
+    from sagline.cli.study import run_along, run_name, tell
+    from sagline.cli.values import loaded
+    from sagline.files.path_file import load_path
+    from sagline.files.robot_file import load_robot
+    from sagline.files.typed import wrench_of
+    from sagline.motion.planar import article_path
+
     load = wrench_of(wrench)
     machine = loaded(load_robot(robot), payload)
     way = article_path() if path is None else load_path(path)

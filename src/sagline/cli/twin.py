@@ -7,64 +7,97 @@ from collections.abc import Sequence
 from contextlib import ExitStack, closing
 from pathlib import Path
 from socket import gethostname
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Final
+
+import typer
 
 from sagline.cli.entries import FORWARD, INVERSE, SIMULATION
+from sagline.cli.options import RobotArgument
 from sagline.cli.terminal import note, show, working
-from sagline.cli.values import port_of, whole_of
-from sagline.control.link import GroupStatus, fault_text
-from sagline.files.robot_file import load_robot
-from sagline.twin.machine import MOST_SEED, Machine
-from sagline.twin.server import SCAN, Server
 
 if TYPE_CHECKING:
     from sagline.dynamics.simulator import Reading
     from sagline.files.mcap_log import Recorder
+    from sagline.twin.machine import Machine
+    from sagline.twin.server import Server
     from sagline.twin.snapshot import Report
 
 LOOK: Final = 0.1  # s, between two looks at what the PLCs do
 LATE: Final = 0.05  # s, by which a scan may be late without a word
-STATUS: Final = (  # the first that holds
-    (GroupStatus.EMERGENCY, "emergency stop"),
-    (GroupStatus.LOCKED, "drums locked"),
-    (GroupStatus.BRAKED, "brakes on"),
-    (GroupStatus.RAMPING, "slowing down"),
-    (GroupStatus.HOLDING, "holding by itself"),
-    (GroupStatus.FOLLOWING, "following"),
-    (GroupStatus.READY, "holding"),
-)
+STATUS: Final = {  # the first that holds, by the names of `GroupStatus`
+    "EMERGENCY": "emergency stop",
+    "LOCKED": "drums locked",
+    "BRAKED": "brakes on",
+    "RAMPING": "slowing down",
+    "HOLDING": "holding by itself",
+    "FOLLOWING": "following",
+    "READY": "holding",
+}
 
 
-class Asked(NamedTuple):
-    """What was asked for, as the command line has it."""
+def twin(
+    name: RobotArgument,
+    true: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ROBOT",
+            help="The robot as it really is, where that is another one; the PLCs still know ROBOT.",
+            show_default=False,
+        ),
+    ] = None,
+    port: Annotated[
+        str, typer.Option(metavar="NUMBER", help="Of the first group, the others follow; 0 takes any that are free.")
+    ] = "11021",
+    host: Annotated[
+        str, typer.Option(metavar="ADDRESS", help="Address to listen on; 0.0.0.0 is every one of this machine.")
+    ] = "127.0.0.1",
+    modbus: Annotated[bool, typer.Option("--modbus", help="Speak Modbus TCP instead of S7.")] = False,
+    seed: Annotated[str, typer.Option(metavar="NUMBER", help="Of the load cells' noise.")] = "0",
+    faults: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--fault",
+            metavar="TEXT",
+            help="What goes wrong, and when: 'cell 3 sticks at 40 s', 'group 1 is silent at 20 s for 0.2 s'; "
+            "parts count from 0. May be given again.",
+            show_default=False,
+        ),
+    ] = None,
+    log: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.mcap", help="Write where the platform truly is, until Ctrl-C.", show_default=False),
+    ] = None,
+) -> int:
+    """Be the machine: plant, drives and PLCs of a robot, in real time, until Ctrl-C.
 
-    host: str
-    port: str
-    modbus: bool
-    seed: str
-    faults: tuple[str, ...]
-    log: Path | None
+    Each group of two winches has a PLC, which is a server of its own with the data blocks of the real one. The first
+    lines say how a controller reaches them; then comes what the PLCs do. Exit code 130, as of every Ctrl-C.
 
+    For example:
 
-def twin(name: str, true: str | None, asked: Asked) -> int:
-    """Serve until Ctrl-C.
-
-    Raises:
-        SaglineError: If a robot cannot be read or has not all the data a machine needs, or nothing can listen there.
+        sagline twin article-prototype
+        sagline twin article-prototype --fault "cell 3 sticks at 40 s"
+        sagline twin article-prototype --true worn.yaml --log twin.mcap
+        sagline twin article-prototype --modbus --port 5020
     """
+    from sagline.cli.values import port_of, whole_of
+    from sagline.files.robot_file import load_robot
+    from sagline.twin.machine import MOST_SEED, Machine
+    from sagline.twin.server import SCAN, Server
+
     robot = load_robot(name)
     real = robot if true is None else load_robot(true)
-    port, seed = port_of(asked.port), whole_of(asked.seed, "--seed", 0, MOST_SEED)
+    first, noise = port_of(port), whole_of(seed, "--seed", 0, MOST_SEED)
     with ExitStack() as stack:
         with working("switching the machine on", INVERSE, FORWARD, SIMULATION):
-            machine = Machine(real, nominal=robot, seed=seed, period=SCAN, faults=asked.faults)
-            server = stack.enter_context(closing(Server(machine, host=asked.host, port=port, modbus=asked.modbus)))
+            machine = Machine(real, nominal=robot, seed=noise, period=SCAN, faults=tuple(faults or ()))
+            server = stack.enter_context(closing(Server(machine, host=host, port=first, modbus=modbus)))
         watch = Watch(machine)
-        if asked.log is not None:
+        if log is not None:
             from sagline.files.mcap_log import Recorder
 
-            watch.recorder = stack.enter_context(Recorder(asked.log, real, period=SCAN))
-        _greet(name, server, asked)
+            watch.recorder = stack.enter_context(Recorder(log, real, period=SCAN))
+        _greet(name, server, host, modbus=modbus)
         gc.collect()
         gc.freeze()  # nothing of all that was made so far is looked at again, while time counts
         try:
@@ -75,18 +108,18 @@ def twin(name: str, true: str | None, asked: Asked) -> int:
     return 0
 
 
-def _greet(name: str, server: Server, asked: Asked) -> None:
+def _greet(name: str, server: Server, host: str, *, modbus: bool) -> None:
     machine = server.machine
     winches, groups = machine.robot.cable_count, len(machine.groups)
-    spoken = "Modbus TCP" if asked.modbus else "S7"
+    spoken = "Modbus TCP" if modbus else "S7"
     show(f"{machine.nominal.name}: {winches} winches behind {groups} PLCs that speak {spoken}, brakes on.")
     show("From another terminal:")
-    show(f"  sagline control {name}{' --modbus' * asked.modbus} \\", whole=True)
+    show(f"  sagline control {name}{' --modbus' * modbus} \\", whole=True)
     everywhere = "0.0.0.0:"
     places = [place.replace(everywhere, f"{gethostname()}:") for place in server.addresses]
     show(f"    --plc {','.join(places)}", whole=True)
     show("Ctrl-C switches it off.")
-    if asked.host != "127.0.0.1":
+    if host != "127.0.0.1":
         note("Note: ", "everyone who can reach this machine can drive it: nothing asks for a password.", style="bold")
 
 
@@ -135,7 +168,9 @@ class Watch:
 
 def _doing(report: Report) -> str:
     """What a PLC does, in a few words."""
-    state = next((words for bit, words in STATUS if report.status & bit), "not ready")
+    from sagline.control.link import GroupStatus, fault_text
+
+    state = next((words for name, words in STATUS.items() if report.status & GroupStatus[name]), "not ready")
     why = f" ({fault_text(report.fault)})" if report.fault else ""
     return f"{state}{why}, {f'driven by {report.owner}' if report.owner else 'free'}"
 

@@ -9,12 +9,12 @@ import numpy as np
 
 from sagline.core.arrays import checked
 from sagline.core.errors import InvalidValueError
-from sagline.dynamics.damping import Damping
 from sagline.files.quantity import in_si
 from sagline.robot.inertia import with_mass
 from sagline.robot.pose import Pose
 
 if TYPE_CHECKING:
+    from sagline.dynamics.damping import Damping
     from sagline.robot.robot import Robot
 
 LAST_PORT = 65535
@@ -91,6 +91,8 @@ def damping_of(loss_time: str, air_damping: str, modal_damping: str = "0") -> Da
     Raises:
         InvalidValueError: If one is no such quantity, or negative.
     """
+    from sagline.dynamics.damping import Damping
+
     times = quantity(loss_time, "--loss-time", "s", low=0.0)
     return Damping(times, quantity(air_damping, "--air-damping", "N*s/m^2", low=0.0), ratio(modal_damping, "--damping"))
 

@@ -3,31 +3,32 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
+import typer
 
-from sagline.cli.csv_text import csv_text
 from sagline.cli.ending import OUTSIDE
 from sagline.cli.entries import ANSWERS, INVERSE, MODES, VIBRATION
-from sagline.cli.maps import counts_of, vibrate_all_over
+from sagline.cli.options import (
+    AirDampingOption,
+    Direction,
+    JsonOption,
+    LossTimeOption,
+    OutOption,
+    PayloadOption,
+    PoseOption,
+    RobotArgument,
+    WrenchOption,
+)
 from sagline.cli.results import figure_files, listed, write_figures
-from sagline.cli.tables import Grid, show_table, written
+from sagline.cli.tables import Grid, csv_text, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
-from sagline.cli.values import damping_of, loaded, middle_of, quantity
 from sagline.core.errors import InvalidValueError
-from sagline.dynamics.damping import Damping
-from sagline.dynamics.mode_list import MASSLESS, WITH_MASS, ListedMode, listed_modes, successors
-from sagline.dynamics.vibrating import vibration
-from sagline.dynamics.vibration_status import VibrationStatus
-from sagline.files.names import file_stem
-from sagline.files.robot_file import load_robot
-from sagline.files.typed import pose_of, wrench_of
 from sagline.files.whole import check_files, made_folder, write_text
-from sagline.kinematics.inverse import inverse
-from sagline.kinematics.status import PoseStatus
 
 if TYPE_CHECKING:
+    from sagline.dynamics.mode_list import ListedMode
     from sagline.dynamics.vibration import Vibration
     from sagline.robot.equilibrium import Equilibrium
 
@@ -36,46 +37,68 @@ LOWEST = 3  # modes that are shown whatever swings
 FRAME_TIME = 0.08  # s, of a film
 
 
-class Losses(NamedTuple):
-    """Damping as texts of the command line."""
-
-    damping: str
-    loss_time: str
-    air_damping: str
-
-    @property
-    def damping_of(self) -> Damping:
-        """As numbers."""
-        return damping_of(self.loss_time, self.air_damping, self.damping)
-
-
 def vibrate(
-    name: str,
-    pose: str | None,
-    grid: str | None,
-    up_to: str,
-    losses: Losses,
-    force: str,
-    film: int | None,
-    wrench: str | None,
-    payload: str | None,
-    folder: Path,
-    *,
-    figures: bool,
-    as_json: bool,
+    name: RobotArgument,
+    pose: PoseOption = None,
+    grid: Annotated[
+        str | None,
+        typer.Option(
+            "--map",
+            metavar="NXxNYxNZ",
+            help="Lowest frequency and strongest answer at so many poses all over the test box, instead of one pose.",
+            show_default=False,
+        ),
+    ] = None,
+    up_to: Annotated[str, typer.Option(metavar="HZ", help="Frequency below which all modes are found.")] = "20",
+    damping: Annotated[
+        str, typer.Option(metavar="RATIO", help="Damping ratio of every mode, 0.01 or '1 %', besides the cables'.")
+    ] = "0.01",
+    loss_time: LossTimeOption = "0",
+    air_damping: AirDampingOption = "0",
+    force: Annotated[
+        Direction,
+        typer.Option(metavar="AXIS", help=f"Of the response figure: {', '.join(each.value for each in Direction)}."),
+    ] = Direction.X,
+    film: Annotated[
+        int | None, typer.Option(metavar="MODE", help="Film this mode, ten seconds of it, as GIF.", show_default=False)
+    ] = None,
+    wrench: WrenchOption = None,
+    payload: PayloadOption = None,
+    folder: OutOption = Path("output"),
+    figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the response, as PNG and SVG.")] = True,
+    as_json: JsonOption = False,
 ) -> int:
-    """Work out the modes, tell, write and draw them; returns the exit code.
+    """Find all natural frequencies of a pose: of the platform, and of the strings that its cables are.
 
-    Raises:
-        SaglineError: If an input is wrong or the folder cannot be written.
+    Each says how much of it is the platform's and which cable swings most; the frequencies that massless cables would
+    have stand beside. DIR/ROBOT-modes.csv has them all, the response figure both robots' answer to a force. Exit code
+    1 where the pose is not feasible, or no stable equilibrium.
+
+    For example:
+
+        sagline vibrate cogiro --pose 0,0,2 --up-to 20
+        sagline vibrate article-suspended --damping "2 %" --force z --film 1
+        sagline vibrate cogiro --map 8x6x4 --out maps
     """
-    limit, damping = quantity(up_to, "--up-to", "Hz", above=0.0), losses.damping_of
+    from sagline.cli.maps import counts_of, vibrate_all_over
+    from sagline.cli.values import damping_of, loaded, middle_of, quantity
+    from sagline.dynamics.mode_list import listed_modes
+    from sagline.dynamics.vibrating import vibration
+    from sagline.dynamics.vibration_status import VibrationStatus
+    from sagline.files.names import file_stem
+    from sagline.files.robot_file import load_robot
+    from sagline.files.typed import pose_of, wrench_of
+    from sagline.kinematics.inverse import inverse
+    from sagline.kinematics.status import PoseStatus
+
+    limit = quantity(up_to, "--up-to", "Hz", above=0.0)
+    losses = damping_of(loss_time, air_damping, damping)
     load, place = wrench_of(wrench), None if pose is None else pose_of(pose)
     counts = None if grid is None else counts_of(grid)
     robot = loaded(load_robot(name), payload)
     if counts is not None:
         _check_alone(pose=pose, film=film, wrench=wrench)
-        return vibrate_all_over(robot, counts, limit, damping, folder, figures=figures, as_json=as_json)
+        return vibrate_all_over(robot, counts, limit, losses, folder, figures=figures, as_json=as_json)
     table, drawing = (file_stem(robot.name, what) for what in ("modes", "response"))
     reel = f"{file_stem(robot.name, f'mode-{film}')}.gif"
     check_files(folder, [f"{table}.csv", *figure_files([drawing] * figures), *[reel] * (film is not None)])
@@ -85,7 +108,7 @@ def vibrate(
         if not plan.feasible:
             note("No modes: ", PoseStatus(int(plan.status)).text, style="bold red")
             return OUTSIDE
-        found = vibration(plan.state, up_to=limit, damping=damping)
+        found = vibration(plan.state, up_to=limit, damping=losses)
         if found.status in (VibrationStatus.UNSTABLE, VibrationStatus.NO_LENGTHS):
             note("No modes: ", found.status.text, style="bold red")
             return OUTSIDE
@@ -98,7 +121,7 @@ def vibrate(
             from sagline import plot
 
             line.stage("drawing the response")
-            files += write_figures({drawing: plot.response(found, force)}, folder)
+            files += write_figures({drawing: plot.response(found, force.value)}, folder)
         if film is not None:
             from sagline import plot
 
@@ -122,6 +145,8 @@ def _check_alone(**others: object) -> None:
 
 
 def _check_film(film: int | None, modes: list[ListedMode]) -> None:
+    from sagline.dynamics.mode_list import WITH_MASS
+
     count = sum(mode.kind == WITH_MASS for mode in modes)
     if film is not None and not 1 <= film <= count:
         raise InvalidValueError("--film", film, f"1 to {count}, modes with cable mass", "Raise --up-to for more.")
@@ -129,6 +154,8 @@ def _check_film(film: int | None, modes: list[ListedMode]) -> None:
 
 def _tell(found: Vibration, modes: list[ListedMode], state: Equilibrium) -> None:
     """The table, with each massless mode beside the one in which most of its motion is found."""
+    from sagline.dynamics.mode_list import MASSLESS, WITH_MASS, successors
+
     swinging = [mode for mode in modes if mode.kind == WITH_MASS]
     shares = successors(found)
     beside: dict[int, list[str]] = {}

@@ -4,41 +4,87 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
-from sagline.cli.hosting import HOME, Start, check_viewer, hosted
-from sagline.cli.played import LOG, check_robot, played_beside, played_in
-from sagline.cli.values import loaded, port_of
-from sagline.cli.view_log import view_log
+import typer
+
+from sagline.cli.options import PayloadOption, WrenchOption, robot_completions
 from sagline.core.errors import InvalidValueError
-from sagline.files.calibration_file import FORMAT as CALIBRATION
-from sagline.files.calibration_file import load_calibration
-from sagline.files.dataset import is_of
-from sagline.files.robot_file import load_robot
-from sagline.files.simulation_file import FORMAT
-from sagline.files.typed import pose_of, wrench_of
-from sagline.robot.robot import Robot
+
+if TYPE_CHECKING:
+    from sagline.cli.hosting import Start
+    from sagline.robot.robot import Robot
 
 
 def view(
-    robot: str,
-    run: Path | None,
-    beside: Path | None,
-    live: bool,
-    truth: Path | None,
-    pose: str | None,
-    mode: str | None,
-    wrench: str | None,
-    payload: str | None,
-    host: str,
-    port: str,
-    *,
-    browser: bool,
+    robot: Annotated[
+        str,
+        typer.Argument(
+            metavar="ROBOT",
+            help="A preset (see sagline robots) or a robot file, robot.yaml; a log of the controller, run.mcap; or a "
+            "calibration, found.nc.",
+            autocompletion=robot_completions,
+        ),
+    ],
+    run: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="RUN",
+            help="To play: a run of this robot, written by sagline track, a simulation, or a log of the controller; "
+            "or a calibration to show.",
+        ),
+    ] = None,
+    beside: Annotated[
+        Path | None,
+        typer.Option(metavar="RUN", help="Another run of the same robot beside it, with the same clock, as a ghost."),
+    ] = None,
+    live: Annotated[bool, typer.Option("--live", help="Follow a log that is still written.")] = False,
+    truth: Annotated[
+        Path | None,
+        typer.Option(metavar="TWIN.mcap", help="Beside a log: the twin's own, where the platform truly was."),
+    ] = None,
+    pose: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,Y,Z[,A,B,C]",
+            help="Where the platform is at first: position [m] and angles about z, y, x [degrees].",
+        ),
+    ] = None,
+    mode: Annotated[
+        str | None,
+        typer.Option(metavar="NUMBER", help="Natural mode that moves at first: 1, 2, ...; 'massless 1'."),
+    ] = None,
+    wrench: WrenchOption = None,
+    payload: PayloadOption = None,
+    host: Annotated[
+        str, typer.Option(metavar="ADDRESS", help="Address to listen on; 0.0.0.0 is every one, for others to look.")
+    ] = "127.0.0.1",
+    port: Annotated[str, typer.Option(metavar="NUMBER", help="Port to listen on; 0 takes any that is free.")] = "8080",
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open it in a browser here.")] = True,
 ) -> int:
-    """Serve until Ctrl-C; returns the exit code.
+    """Look at a robot in the browser: drag its platform, and the cables follow.
 
-    Raises:
-        SaglineError: If the robot or the run cannot be read, or nothing can listen there.
+    Over SSH, forward the port (`ssh -L 8080:localhost:8080 ...`) and open http://localhost:8080 at home.
+
+    For example:
+
+        sagline view cogiro
+        sagline view cogiro --pose 0,0,2 --mode 1
+        sagline view own_robot.yaml --payload "5 kg" --port 9000
+        sagline track article-mixed --model empirical
+        sagline view article-mixed output/article-mixed-empirical.nc
+        sagline view article-mixed run_a.nc --beside run_b.nc
+        sagline view found.nc
+        sagline view run.mcap --live
+        sagline view run.mcap --truth twin.mcap
     """
+    from sagline.cli.hosting import Start
+    from sagline.cli.played import LOG
+    from sagline.cli.values import loaded, port_of
+    from sagline.cli.view_log import view_log
+    from sagline.files.robot_file import load_robot
+    from sagline.files.typed import pose_of, wrench_of
+
     number = port_of(port)
     log = next((file for file in (run, Path(robot)) if file is not None and file.suffix.lower() == LOG), None)
     if log is None and (live or truth is not None):
@@ -74,7 +120,7 @@ def serve(
     port: int,
     *,
     browser: bool,
-    start: Start = HOME,
+    start: Start | None = None,
     mass: float | None = None,
 ) -> int:
     """Serve a robot until Ctrl-C; returns the exit code.
@@ -85,12 +131,14 @@ def serve(
         host: Address to listen on.
         port: Port to listen on.
         browser: Whether to open one here.
-        start: How it is shown at first.
+        start: How it is shown at first; None for its home.
         mass: Its mass with a payload [kg]; None for its own.
 
     Raises:
         SaglineError: If nothing can listen there.
     """
+    from sagline.cli.hosting import check_viewer, hosted
+
     check_viewer()
     from sagline.viewer.source import Source
 
@@ -111,6 +159,11 @@ def view_run(robot: Robot, file: Path, host: str, port: int, *, browser: bool, b
     Raises:
         SaglineError: If the file cannot be read, or nothing can listen there.
     """
+    from sagline.cli.hosting import check_viewer, hosted
+    from sagline.cli.played import played_beside, played_in
+    from sagline.files.dataset import is_of
+    from sagline.files.simulation_file import FORMAT
+
     check_viewer()
     from sagline.viewer.source import Source
 
@@ -133,6 +186,11 @@ def view_calibration(file: Path, robot: str | None, host: str, port: int, *, bro
     Raises:
         SaglineError: If a file cannot be read, or nothing can listen there.
     """
+    from sagline.cli.hosting import check_viewer, hosted
+    from sagline.cli.played import check_robot
+    from sagline.files.calibration_file import load_calibration
+    from sagline.files.robot_file import load_robot
+
     check_viewer()
     found = load_calibration(file)
     if robot is not None:
@@ -144,6 +202,9 @@ def view_calibration(file: Path, robot: str | None, host: str, port: int, *, bro
 
 
 def _is_calibration(file: Path) -> bool:
+    from sagline.files.calibration_file import FORMAT as CALIBRATION
+    from sagline.files.dataset import is_of
+
     return file.suffix.lower() == ".nc" and is_of(file, CALIBRATION)
 
 

@@ -4,44 +4,42 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import numpy as np
+import typer
 
 from sagline.cli.ending import OUTSIDE
 from sagline.cli.entries import CLEARANCES, INVERSE, PROOFS, SIGNED_MARGINS, VIBRATION
-from sagline.cli.regions import box_of, wrenches_of
+from sagline.cli.options import JsonOption, Model, ModelOption, OutOption, PayloadOption, RobotArgument
 from sagline.cli.results import figure_files, listed, write_figures
 from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
-from sagline.cli.values import loaded, quantity
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import counted
-from sagline.files.mesh_file import load_mesh
-from sagline.files.names import file_stem
-from sagline.files.robot_file import load_robot
-from sagline.files.scene_file import load_scene
 from sagline.files.whole import check_files, made_folder
-from sagline.workspaces.criteria.clearance import Clearance
-from sagline.workspaces.criteria.frame import InFrame
-from sagline.workspaces.criteria.frequency import LeastFrequency
-from sagline.workspaces.criteria.margin import LeastMargin
-from sagline.workspaces.criteria.sag import MaximumSag
-from sagline.workspaces.criteria.stiffness import LeastStiffness
-from sagline.workspaces.orientations import Tilts
-from sagline.workspaces.proof import prove
-from sagline.workspaces.proof_verdict import ProofVerdict
-from sagline.workspaces.space import amount_of, facts_of, span_of
-from sagline.workspaces.workspace import workspace
 
 if TYPE_CHECKING:
-    from sagline.cables.model import CableModel
     from sagline.interference.pairs import Obstacle
     from sagline.workspaces.criteria.criterion import Criterion
     from sagline.workspaces.proof import Proof
     from sagline.workspaces.space import Workspace
 
 MOST_LIMITS = 12  # shares that are told
+LoadsOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="LOADS",
+        help="Loads that the platform bears all over it besides its weight: '±100 N, ±20 N m', accelerations "
+        "'±2 m/s^2, ±1 rad/s^2', both, or one wrench FX,FY,FZ[,MX,MY,MZ].",
+        show_default=False,
+    ),
+]
+
+
+def _limit(metavar: str, text: str) -> typer.models.OptionInfo:
+    found: typer.models.OptionInfo = typer.Option(metavar=metavar, help=text, show_default=False)
+    return found
 
 
 class Asked(NamedTuple):
@@ -64,6 +62,14 @@ class Asked(NamedTuple):
         Raises:
             SaglineError: If one is none, or the scene cannot be read.
         """
+        from sagline.cli.values import quantity
+        from sagline.workspaces.criteria.clearance import Clearance
+        from sagline.workspaces.criteria.frame import InFrame
+        from sagline.workspaces.criteria.frequency import LeastFrequency
+        from sagline.workspaces.criteria.margin import LeastMargin
+        from sagline.workspaces.criteria.sag import MaximumSag
+        from sagline.workspaces.criteria.stiffness import LeastStiffness
+
         found: list[Criterion] = []
         if self.reserve is not None:
             found.append(LeastMargin(quantity(self.reserve, "--reserve", "N", low=0.0)))
@@ -82,65 +88,105 @@ class Asked(NamedTuple):
         return found + [InFrame()] * self.in_frame
 
 
-class Where(NamedTuple):
-    """Which poses and loads, as texts of the command line."""
-
-    wrench: str | None
-    payload: str | None
-    tilt: str | None
-    box: str | None
-    to_prove: str | None
-    budget: str
-
-
-class How(NamedTuple):
-    """How it is found."""
-
-    cells: int
-    model: CableModel
-
-
 def around(name: str) -> tuple[Obstacle, ...]:
     """What stands around: the scene of a robot file, a mesh file, nothing for a preset's name."""
+    from sagline.files.mesh_file import load_mesh
+    from sagline.files.scene_file import load_scene
+
     path = Path(name)
     if path.suffix.lower() in (".yaml", ".yml"):
         return load_scene(path)
     return (load_mesh(path),) if path.suffix else ()
 
 
-def find(name: str, where: Where, asked: Asked, how: How, folder: Path, *, figures: bool, as_json: bool) -> int:
-    """Find the workspace, tell, write and draw it; returns the exit code.
+def workspace(
+    name: RobotArgument,
+    wrench: LoadsOption = None,
+    payload: PayloadOption = None,
+    tilt: Annotated[
+        str | None, _limit("ANGLE", "The platform has to tilt so far about any axis, '10deg'. Default: it is level.")
+    ] = None,
+    box: Annotated[
+        str | None, _limit("BOX", "Where to look: '-2..2, -1..1, 1..3 m'. Default: the robot's frame.")
+    ] = None,
+    reserve: Annotated[str | None, _limit("FORCE", "Margin that is left everywhere [N].")] = None,
+    max_sag: Annotated[str | None, _limit("LENGTH", "No cable sags further, '5 cm'.")] = None,
+    min_stiffness: Annotated[
+        str | None, _limit("NUMBER", "A force moves the platform no further than force over this [N/m].")
+    ] = None,
+    min_frequency: Annotated[str | None, _limit("HZ", "The platform swings no slower, cables without mass.")] = None,
+    clearance: Annotated[str | None, _limit("LENGTH", "Cables, and what they pass, stay so far apart, '3 cm'.")] = None,
+    scene: Annotated[
+        str | None,
+        _limit("FILE", "With --clearance: a robot file with a scene, or a mesh in meters. Default: the robot's scene."),
+    ] = None,
+    in_frame: Annotated[bool, typer.Option("--in-frame", help="The whole platform stays within the frame.")] = False,
+    to_prove: Annotated[
+        str | None,
+        typer.Option("--prove", metavar="BOX", help="Prove that it can work in all of this box.", show_default=False),
+    ] = None,
+    budget: Annotated[str, typer.Option(metavar="TIME", help="Of the proof [s].")] = "10",
+    cells: Annotated[
+        int, typer.Option(metavar="NUMBER", help="Cells of the grid along the longest edge of the box.")
+    ] = 32,
+    model: ModelOption = Model.CATENARY,
+    folder: OutOption = Path("output"),
+    figures: Annotated[
+        bool, typer.Option("--figures/--no-figures", help="Draw hull and slice, as PNG and SVG.")
+    ] = True,
+    as_json: JsonOption = False,
+) -> int:
+    """Find where a robot can work: volume with its error bar, and what limits it where.
 
-    Raises:
-        SaglineError: If an input is wrong or the folder cannot be written.
+    The platform can be held wherever the cables, as they sag, bear all loads within their limits. DIR has the workspace
+    in NetCDF, its hull in GLB and figures. Exit code 1 where it is empty, when the nearest pose is told, and where not
+    all of the box of --prove is proved.
+
+    For example:
+
+        sagline workspace article-suspended
+        sagline workspace cogiro --wrench "±100 N, ±20 N m" --tilt 10deg
+        sagline workspace article-suspended --prove "-2..2, -1..1, 1..3 m"
+        sagline workspace ipanema-1 --max-sag "5 cm" --box "-1..1, -1..1, 0..2 m"
     """
-    loads, criteria = wrenches_of(where.wrench), asked.criteria(name)
-    angle = 0.0 if where.tilt is None else quantity(where.tilt, "--tilt", "rad", low=0.0)
+    from sagline.cli.regions import box_of, wrenches_of
+    from sagline.cli.values import loaded, quantity
+    from sagline.files.names import file_stem
+    from sagline.files.robot_file import load_robot
+    from sagline.workspaces.orientations import Tilts
+    from sagline.workspaces.proof import prove
+    from sagline.workspaces.proof_verdict import ProofVerdict
+    from sagline.workspaces.workspace import workspace
+
+    asked = Asked(reserve, max_sag, min_stiffness, min_frequency, clearance, scene, in_frame)
+    cable = model.build()
+    loads, criteria = wrenches_of(wrench), asked.criteria(name)
+    angle = 0.0 if tilt is None else quantity(tilt, "--tilt", "rad", low=0.0)
     if angle > np.pi:  # a number alone counts in radians
         step = "Give its unit, --tilt 10deg: no rotation turns by more than half a turn."
-        raise InvalidValueError("--tilt", repr(where.tilt), "0 to 180deg", step)
-    region = None if where.box is None else box_of(where.box, "--box")
-    to_prove = None if where.to_prove is None else box_of(where.to_prove, "--prove", angle)
-    budget = quantity(where.budget, "--budget", "s", above=0.0)
-    robot = loaded(load_robot(name), where.payload)
+        raise InvalidValueError("--tilt", repr(tilt), "0 to 180deg", step)
+    region = None if box is None else box_of(box, "--box")
+    claim = None if to_prove is None else box_of(to_prove, "--prove", angle)
+    seconds = quantity(budget, "--budget", "s", above=0.0)
+    robot = loaded(load_robot(name), payload)
     space_file, hull = f"{file_stem(robot.name, 'workspace')}.nc", f"{file_stem(robot.name, 'hull')}.glb"
     drawn = [file_stem(robot.name, what) for what in ("workspace", "slice")] if figures else []
     check_files(folder, [space_file, hull, *figure_files(drawn)])
-    with working(f"{robot.name}: workspace", *_needed(asked), *[PROOFS] * (to_prove is not None)) as line:
+    with working(f"{robot.name}: workspace", *_needed(asked), *[PROOFS] * (claim is not None)) as line:
         space = workspace(
             robot,
             region,
             loads,
             orientations=Tilts(angle),
             criteria=criteria,
-            model=how.model,
-            cells=how.cells,
+            model=cable,
+            cells=cells,
             progress=line.progress,
         )
         proof = None
-        if to_prove is not None:
+        if claim is not None:
             told = line.stage(f"{robot.name}: proof")
-            proof = prove(robot, to_prove, loads, budget=budget, model=how.model, progress=told)
+            proof = prove(robot, claim, loads, budget=seconds, model=cable, progress=told)
         made_folder(folder)
         files = [folder / space_file]
         space.save(files[0])
@@ -182,6 +228,8 @@ def _needed(asked: Asked) -> tuple[str, ...]:
 
 
 def _tell(space: Workspace) -> None:
+    from sagline.workspaces.space import amount_of, facts_of
+
     facts = [("area" if space.unit == "m²" else "volume", amount_of(space))]
     facts += [(head, text) for head, text in facts_of(space) if head != "nearest"]
     show_table(Grid(["robot", space.robot.name], facts, left=frozenset({0, 1}), prose=frozenset({1})))
@@ -199,6 +247,8 @@ def _tell(space: Workspace) -> None:
 
 
 def _tell_proof(proof: Proof) -> None:
+    from sagline.workspaces.space import span_of
+
     spans = span_of(proof.box)
     shares = ((f"proved {word}", getattr(proof, word)) for word in ("inside", "outside"))
     rows = [
