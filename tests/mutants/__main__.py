@@ -26,7 +26,7 @@ from typing import Final, NamedTuple
 from tests.mutants.random import changes
 
 ROOT: Final = Path(__file__).parents[2]
-COPIED: Final = ("src", "tests", "examples", "docs", "benchmarks")
+COPIED: Final = ("src", "tests", "examples", "docs", "benchmarks", "tools")
 FILES: Final = (
     "pyproject.toml",
     "Makefile",
@@ -35,6 +35,8 @@ FILES: Final = (
     "CITATION.cff",
     "CONTRIBUTING.md",
     "mkdocs.yml",
+    "LICENSE",
+    ".gitignore",
 )
 FIRST, SECOND = "not extended and not soak", "extended and not soak"
 PATIENCE: Final = 1800.0  # s for one run of tests
@@ -69,6 +71,9 @@ class Mutant(NamedTuple):
 
 def mutants(folders: Sequence[str]) -> Iterator[Mutant]:
     """All mistakes of some folders, or of all; an entry whose text is not found exactly once is an error."""
+    known = sorted(file.stem for file in Path(__file__).parent.glob("*.toml"))
+    if unknown := set(folders) - set(known):
+        raise SystemExit(f"no mistakes are listed for {', '.join(sorted(unknown))}; choose from {', '.join(known)}")
     for listed in sorted(Path(__file__).parent.glob("*.toml")):
         if folders and listed.stem not in folders:
             continue
@@ -121,6 +126,8 @@ def failing_test(copy: Path, arguments: Sequence[str]) -> str:
         return "(no end)"
     if run.returncode in (0, 5):  # all passed; none selected
         return ""
+    if run.returncode == 4:  # wrong arguments: a test of this name does not exist
+        raise SystemExit(f"pytest does not take {' '.join(arguments)}; correct the names of the tests")
     named = re.search(r"^(?:FAILED|ERROR) (\S+)", run.stdout, re.MULTILINE)
     return named[1] if named else f"(pytest exit code {run.returncode})"
 

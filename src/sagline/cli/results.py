@@ -6,24 +6,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sagline.files.whole import made_folder
-
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from sagline.cli.study import Run
-
 FORMS = ("png", "svg")  # of a figure
-
-
-def write_plans(runs: Sequence[Run], folder: Path) -> list[Path]:
-    """Save the plan of each run; returns the files."""
-    made_folder(folder)
-    files = [folder / f"{run.name}.nc" for run in runs]
-    for run, file in zip(runs, files, strict=True):
-        run.plan.save(file)
-    return files
 
 
 def figure_files(names: Iterable[str]) -> list[str]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from sagline.cli.entries import FORWARD, INVERSE, SIGNED_MARGINS
 from sagline.cli.options import JsonOption, OutOption
-from sagline.cli.results import figure_files, write_figures, write_plans
+from sagline.cli.results import figure_files, write_figures
 from sagline.cli.terminal import show, working
 from sagline.files.whole import check_files
 
@@ -33,7 +33,7 @@ def run(folder: OutOption = Path("output"), as_json: JsonOption = False) -> int:
     """
     from sagline.cables.catenary import Catenary
     from sagline.cables.empirical import Empirical
-    from sagline.cli.study import run_along, run_name, tell
+    from sagline.cli.study import run_along, run_name, tell, write_plans
     from sagline.files.robot_file import load_robot
     from sagline.motion.planar import article_path
     from sagline.tension.minimum_norm import MinimumNorm

@@ -20,6 +20,7 @@ from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.core.progress import Progress
 from sagline.files.names import file_stem
+from sagline.files.whole import made_folder
 from sagline.kinematics.confirm import Confirmation, confirm
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Gap, Plan
@@ -229,3 +230,12 @@ def _record(run: Run) -> dict[str, Any]:
 def _range(values: Array) -> tuple[float, float]:
     finite = values[~np.isnan(values)]
     return (float(finite.min()), float(finite.max())) if finite.size else (np.nan, np.nan)
+
+
+def write_plans(runs: Sequence[Run], folder: FilePath) -> list[FilePath]:
+    """Save the plan of each run; returns the files."""
+    made_folder(folder)
+    files = [folder / f"{run.name}.nc" for run in runs]
+    for run, file in zip(runs, files, strict=True):
+        run.plan.save(file)
+    return files

@@ -23,7 +23,7 @@ from sagline.cli.options import (
     VariableOption,
     WrenchOption,
 )
-from sagline.cli.results import figure_files, write_figures, write_plans
+from sagline.cli.results import figure_files, write_figures
 from sagline.cli.terminal import working
 from sagline.core.errors import FileError
 from sagline.files.whole import check_files, write_text
@@ -73,7 +73,7 @@ def track(
         sagline track own_robot.yaml own_path.yaml --model empirical --out results
         sagline track cogiro own_samples.csv --payload 20 --csv
     """
-    from sagline.cli.study import run_along, run_name, tell
+    from sagline.cli.study import run_along, run_name, tell, write_plans
     from sagline.cli.values import loaded
     from sagline.files.path_file import load_path
     from sagline.files.robot_file import load_robot

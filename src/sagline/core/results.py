@@ -1,4 +1,4 @@
-"""What answers have in common: they cannot be changed, whatever process they come from."""
+"""Common base classes of results: immutable, pickled by field, displayed in notebooks, saved to files."""
 
 from __future__ import annotations
 
@@ -69,7 +69,8 @@ class Saved:
 
         The format follows from the type: NetCDF with the robot inside for plans, simulations, workspaces, frequency
         maps and calibrations (.nc); CSV for logs of winches (.csv); YAML for calibration poses (.yaml); MCAP or NetCDF
-        for executions (.mcap, .nc). The `load` function of the type reads the file back.
+        for executions (.mcap, .nc). `load_plan`, `load_simulation` and so on read it back;
+        `load_path` reads calibration poses; xarray opens frequency maps and NetCDF files of executions.
 
         Args:
             file: The file; a regular file that exists is replaced, anything else is refused.

@@ -22,8 +22,7 @@ MODULES: Final = {
 
 def module_of(result: object) -> Any:
     """The module of files that writes a result; KeyError if there is none."""
-    name = next(kind.__name__ for kind in type(result).__mro__ if kind.__name__ in MODULES)
-    return import_module(f"sagline.files.{MODULES[name]}")
+    return import_module(f"sagline.files.{MODULES[type(result).__name__]}")
 
 
 def save(result: object, file: os.PathLike[str] | str) -> None:
