@@ -21,8 +21,9 @@ MODULES: Final = {
 
 
 def module_of(result: object) -> Any:
-    """The module of files that writes a result; KeyError if there is none."""
-    return import_module(f"sagline.files.{MODULES[type(result).__name__]}")
+    """The module of files that writes a result, or what it derives from; KeyError if there is none."""
+    names = [kind.__name__ for kind in type(result).__mro__]
+    return import_module(f"sagline.files.{MODULES[next((name for name in names if name in MODULES), names[0])]}")
 
 
 def save(result: object, file: os.PathLike[str] | str) -> None:
