@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 
-from sagline.cli.ending import ended
+from sagline.cli.ending import INTERRUPTED, ended
 
 
 def app_entry() -> None:
@@ -18,7 +18,10 @@ def app_entry() -> None:
             if descriptor == 1:  # refuses whatever is written, so that nothing is lost without a word
                 sys.stdout = os.fdopen(1, "w", encoding="utf-8", closefd=False)
     debug = "--debug" in sys.argv
-    sys.exit(ended(lambda: _command(debug), debug=debug, last=True))
+    code = ended(lambda: _command(debug), debug=debug, last=True)
+    if code == INTERRUPTED:  # Python's finalization can abort in an extension whose import was interrupted
+        os._exit(code)
+    sys.exit(code)
 
 
 def _command(debug: bool) -> object:

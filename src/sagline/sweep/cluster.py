@@ -174,6 +174,9 @@ def spread(client: Any, job: Job, numbers: Iterable[int], finish: Finish, tell: 
             ahead.add(future)
 
     def take(future: Any) -> None:
+        if future.status == "lost":  # its worker ended before the result was fetched: the scheduler repeats the task
+            ahead.add(future)
+            return
         number = which.pop(future)
         seconds, counts = _result(future)
         future.release()
@@ -213,7 +216,7 @@ def quiet() -> Iterator[None]:
 def _result(future: Any) -> tuple[float, tuple[int, ...]]:
     from distributed import KilledWorker
 
-    if future.status in ("cancelled", "lost"):
+    if future.status == "cancelled":
         raise SaglineError("The scheduler is gone. What was done is kept: run the same again to go on.")
     try:
         found: tuple[float, tuple[int, ...]] = future.result()
