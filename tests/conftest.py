@@ -12,6 +12,7 @@ from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import suppress
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from typing import Any, Final, cast
 
@@ -84,10 +85,14 @@ def no_entry_is_compiled_by_a_test(request: pytest.FixtureRequest) -> Iterator[N
 @pytest.fixture(scope="session", autouse=True)
 def libraries_are_loaded(tmp_path_factory: pytest.TempPathFactory) -> None:
     """Load large libraries before the first test, so that no test is charged with their import."""
+    for name in ("pint", "scipy.optimize", "scipy.spatial", "skimage.measure", "trimesh"):
+        import_module(name)
     import xarray
     from matplotlib.figure import Figure
 
-    xarray.Dataset({"x": ("row", [1.0])}).to_netcdf(tmp_path_factory.mktemp("load") / "x.nc", engine="h5netcdf")
+    xarray.Dataset({"x": ("row", [1.0])}, {"row": [0.0]}).to_netcdf(
+        tmp_path_factory.mktemp("load") / "x.nc", engine="h5netcdf"
+    )
     strategies.characters(codec="utf-8", exclude_categories=("Cc", "Cs", "Cn")).validate()  # its tables of unicode
     Figure().savefig(tmp_path_factory.mktemp("load") / "x.png")
 
