@@ -9,8 +9,7 @@ import sagline as sl
 from sagline import article_balance
 from sagline.core.errors import MOST
 from sagline.viewer import readout
-from sagline.viewer.settings import Settings
-from sagline.viewer.snapshot import taken_at
+from sagline.viewer.snapshot import Settings, taken_at
 from tests.refusal import refused
 from tests.tiers import extended, wide
 

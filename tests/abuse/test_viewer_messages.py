@@ -10,7 +10,7 @@ import pytest
 import viser
 
 import sagline as sl
-from sagline.viewer.run import Run
+from sagline.viewer.playback import Run
 from sagline.viewer.server import started, stop
 from sagline.viewer.viewer import Viewer
 from tests.tiers import extended

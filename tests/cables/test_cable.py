@@ -13,7 +13,7 @@ import pytest
 from sagline import Cable, Catenary, InvalidValueError, Robot, dump_robot, identify_cable, load_robot, without_cables
 from sagline.article.machine import PARAMETERS, Parameter, machine
 from sagline.cables.rope import ROPES
-from sagline.viewer.settings import Settings
+from sagline.viewer.snapshot import Settings
 from tests.refusal import refused
 
 FIELDS = ("linear_density", "axial_stiffness", "diameter", "expansion")

@@ -10,7 +10,7 @@ from sagline.cli import readings as module
 from sagline.cli.compiling import Stage
 from sagline.cli.entries import MARGINS, POLYGON, VIBRATION
 from sagline.cli.readings import ENTRY_OF, ORDER, Readings
-from sagline.viewer.reading import Reading
+from sagline.viewer.feature import Reading
 
 
 class Watched:

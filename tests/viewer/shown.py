@@ -12,9 +12,9 @@ import numpy as np
 import viser
 
 import sagline as sl
+from sagline.viewer.camera import Framing
 from sagline.viewer.channel import NAME
-from sagline.viewer.framing import Framing
-from sagline.viewer.run import Run
+from sagline.viewer.playback import Run
 from sagline.viewer.server import Server, started, stop
 from sagline.viewer.viewer import Viewer
 from tests.viewer.client import PATIENCE, Client, await_that

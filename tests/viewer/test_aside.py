@@ -7,7 +7,7 @@ from queue import Queue
 
 import pytest
 
-from sagline.viewer.aside import NICENESS, Aside
+from sagline.viewer.feature import NICENESS, Aside
 from tests.viewer.client import PATIENCE
 
 

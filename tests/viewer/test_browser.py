@@ -16,7 +16,7 @@ from playwright.sync_api import Browser, ConsoleMessage, Error, FloatRect, Page
 from viser._messages import ViewerCameraMessage
 
 import sagline as sl
-from sagline.viewer.run import Run
+from sagline.viewer.playback import Run
 from sagline.viewer.server import started, stop
 from sagline.viewer.stage import PLATFORM
 from sagline.viewer.viewer import Viewer

@@ -12,8 +12,8 @@ from PIL import Image
 from playwright.sync_api import Browser, Page
 
 import sagline as sl
-from sagline.viewer import film
-from sagline.viewer.run import Run
+from sagline.viewer.features import export
+from sagline.viewer.playback import Run
 from sagline.viewer.solids import size_of
 from sagline.viewer.tension_scale import TensionScale
 from sagline.viewer.viewer import home_pose
@@ -98,7 +98,7 @@ MATRIX = [
 def test_a_film_shows_the_run_with_clock_and_legend(
     browser: Browser, tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch, name: str, width: int
 ) -> None:
-    monkeypatch.setattr(film, "RATE", 0.5)
+    monkeypatch.setattr(export, "RATE", 0.5)
     run = a_run(name)
     with opened(browser, run.robot, run, width=width) as (page, viewer):
         page.get_by_text("Take away").click()
@@ -133,7 +133,7 @@ def test_a_film_shows_the_run_with_clock_and_legend(
 def test_a_browser_without_an_encoder_records_the_film_as_it_is_shown(
     browser: Browser, tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(film, "RATE", 0.5)
+    monkeypatch.setattr(export, "RATE", 0.5)
     run = a_run("article-suspended")
     with opened(browser, run.robot, run) as (page, _):
         page.evaluate("delete window.VideoEncoder")  # as over plain HTTP

@@ -9,7 +9,7 @@ from PIL import Image
 from playwright.sync_api import Browser, Page
 
 import sagline as sl
-from sagline.viewer.space_show import SpaceShow
+from sagline.viewer.features.region import SpaceShow
 from sagline.viewer.viewer import Viewer
 from tests.chromium import NEEDED, launched
 from tests.tiers import extended

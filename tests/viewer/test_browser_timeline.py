@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import Browser, FloatRect, Page
 
 import sagline as sl
-from sagline.viewer.run import Run
+from sagline.viewer.playback import Run
 from sagline.viewer.viewer import Viewer
 from tests.chromium import NEEDED, launched
 from tests.tiers import extended

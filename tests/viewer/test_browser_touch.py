@@ -10,8 +10,7 @@ from playwright.sync_api import Browser, Page
 from viser._messages import ViewerCameraMessage
 
 import sagline as sl
-from sagline.viewer.eye import Eye
-from sagline.viewer.framing import fitted
+from sagline.viewer.camera import Eye, fitted
 from sagline.viewer.viewer import Viewer
 from tests.chromium import NEEDED, launched
 from tests.tiers import extended

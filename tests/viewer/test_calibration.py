@@ -13,10 +13,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import sagline as sl
-from sagline.viewer import calibration_words, fit_scale
-from sagline.viewer.calibration_panel import FIELD
-from sagline.viewer.ellipsoids import Ellipsoids, ball, readable
+from sagline.viewer import calibration_words
+from sagline.viewer.features.calibration import FIELD
 from sagline.viewer.panel import written_mass
+from sagline.viewer.solids import Ellipsoids, ball, readable
 from sagline.viewer.viewer import Viewer
 from tests.calibration.made_up import made_up, parameters
 from tests.tiers import extended
@@ -87,8 +87,8 @@ def test_one_pose_in_twenty_has_another_color() -> None:
     freedom = np.where(np.arange(count) % 2 == 0, m + 3, m)
     squares = np.sum(random.standard_normal((count, m + 3)) ** 2 * (np.arange(m + 3) < freedom[:, None]), axis=1)
     many = replace(calibrated(), residuals=residuals, chi_squared_of_pose=squares)
-    np.testing.assert_array_equal(fit_scale.freedoms(many), freedom)
-    shares = np.bincount(fit_scale.bands(many), minlength=3) / count
+    np.testing.assert_array_equal(calibration_words.freedoms(many), freedom)
+    shares = np.bincount(calibration_words.bands(many), minlength=3) / count
     np.testing.assert_allclose(shares, [0.95, 0.049, 0.001], atol=0.004)
     assert shares[2] == pytest.approx(0.001, abs=7e-4)
 
@@ -201,7 +201,7 @@ def test_a_row_that_is_chosen_is_gone_to(page: Shown, client: Client) -> None:
 @extended
 def test_a_pose_that_is_clicked_is_chosen(page: Shown, client: Client) -> None:
     np.testing.assert_allclose(page.node("/log").batched_positions, calibrated().poses.position, rtol=1e-6)
-    np.testing.assert_array_equal(page.node("/log").batched_colors, fit_scale.colors(calibrated()))
+    np.testing.assert_array_equal(page.node("/log").batched_colors, calibration_words.colors(calibrated()))
     assert [page.node(f"/log/{row}").text for row in (4, 17)] == ["row 4, cable 3", "row 17, cable 6"]
     client.say(
         type="SceneNodeClickMessage", name="/log", instance_index=5, ray_origin=[0.0, 0.0, 0.0],

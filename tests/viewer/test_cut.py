@@ -10,13 +10,12 @@ import pytest
 from viser import CameraHandle
 
 import sagline as sl
-from sagline.viewer import cut_words, dynamics
-from sagline.viewer.cut_show import Before
-from sagline.viewer.eye import Eye
-from sagline.viewer.moment import Moment
-from sagline.viewer.playback import Playback
-from sagline.viewer.played import Played
-from sagline.viewer.player import Player
+from sagline.viewer import swing
+from sagline.viewer.camera import Eye
+from sagline.viewer.features import cut
+from sagline.viewer.features.cut import Before
+from sagline.viewer.playback import Moment, Playback
+from sagline.viewer.player import Played, Player
 from sagline.viewer.server import started, stop
 from sagline.viewer.viewer import Viewer, home_pose
 from tests.effort import least_seconds
@@ -89,11 +88,9 @@ def test_it_swings_as_simulate_says_and_calm_puts_all_back(page: Shown) -> None:
         whole = played()
         assert isinstance(whole, Playback)
         state = sl.inverse(ROBOT, POSE, tension=sl.MinimumNorm()).state
-        by_itself = sl.simulate(
-            state, duration=dynamics.LASTS, events=sl.Break(cable=2, time=0.0), damping=dynamics.LOSSES
-        )
+        by_itself = sl.simulate(state, duration=swing.LASTS, events=sl.Break(cable=2, time=0.0), damping=swing.LOSSES)
         np.testing.assert_allclose(whole.simulation.tensions, by_itself.tensions, rtol=1e-9)
-        peak = cut_words.peak_of(by_itself, 2)
+        peak = cut.peak_of(by_itself, 2)
         others = np.delete(by_itself.largest_tension, 2)  # type: ignore[arg-type]
         assert peak.tension == others.max()
         await_that(lambda: "So far" not in page.text)
@@ -152,10 +149,10 @@ def test_cut_by_cut_all_is_put_back() -> None:
 def test_the_first_part_is_soon_there_and_begins_what_follows(name: str) -> None:
     robot = sl.load_robot(name)
     state = sl.inverse(robot, home_pose(robot), tension=sl.MinimumNorm()).state
-    parts = dynamics.cut(state, 1, "none")
+    parts = swing.cut(state, 1, "none")
     first = next(parts)
-    assert least_seconds(lambda: next(dynamics.cut(state, 1, "none")), 0.15) < 0.15  # of the 0.3 until something moves
-    again, second = next(dynamics.cut(state, 1, "none")), next(parts)
+    assert least_seconds(lambda: next(swing.cut(state, 1, "none")), 0.15) < 0.15  # of the 0.3 until something moves
+    again, second = next(swing.cut(state, 1, "none")), next(parts)
     for part in (again, second):
         np.testing.assert_array_equal(part.tensions[: len(first.time)], first.tensions)
     kinetic = second.energy.kinetic

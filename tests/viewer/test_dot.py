@@ -13,14 +13,10 @@ import pytest
 from scipy.optimize import minimize
 
 import sagline as sl
-from sagline.viewer.by_hand import BY_HAND, ByHand
-from sagline.viewer.dot_field import DotField
-from sagline.viewer.dot_marks import Marks, grouped
-from sagline.viewer.polygon_figure import field_of, polygon_figure
-from sagline.viewer.settings import METHODS, Settings
-from sagline.viewer.snapshot import Snapshot, taken_at
-from sagline.viewer.source import Source
-from sagline.viewer.state_code import code_of
+from sagline.viewer.by_hand import BY_HAND, ByHand, DotField
+from sagline.viewer.features.tensions import Marks, field_of, grouped, polygon_figure
+from sagline.viewer.snapshot import METHODS, Settings, Snapshot, taken_at
+from sagline.viewer.state_code import Source, code_of
 from sagline.viewer.viewer import Viewer, home_pose
 from tests.effort import best_rate
 from tests.tiers import extended, wide
@@ -265,7 +261,7 @@ def test_marks_of_a_robot_that_is_moved_are_those_of_one_that_is_not(
         calls.append(arguments[1])
         return sl.inverse(*arguments)
 
-    monkeypatch.setattr("sagline.viewer.dot_marks.inverse", counted)
+    monkeypatch.setattr("sagline.viewer.features.tensions.inverse", counted)
     home, load = home_pose(robot), np.array([30.0, -20.0, -50.0, 4.0, 2.0, -1.0])
     for k, away in enumerate(([0.0, 0.0, 0.0], [0.4, 0.1, 0.2], [-0.5, 0.3, -0.1], [2.4, 1.3, 0.6])):
         pose = sl.Pose.from_euler(home.position + away, 0.02 * k, -0.03, 0.05)

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.viewer.settings import Settings
-from sagline.viewer.snapshot import taken_at
+from sagline.viewer.snapshot import Settings, taken_at
 from sagline.viewer.tension_scale import TensionScale
 
 ROBOT = sl.load_robot("article-suspended")

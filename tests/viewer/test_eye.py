@@ -7,7 +7,7 @@ import pytest
 
 import sagline as sl
 from sagline.viewer import solids
-from sagline.viewer.eye import Eye, chosen_line, met
+from sagline.viewer.camera import Eye, chosen_line, met
 
 CAMERA = SimpleNamespace(  # ten meters before the origin, looking along y
     wxyz=np.array([np.sqrt(0.5), -np.sqrt(0.5), 0.0, 0.0]),

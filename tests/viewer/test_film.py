@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 import sagline as sl
-from sagline.viewer.film import moments
+from sagline.viewer.features.export import moments
 from sagline.viewer.studio import Shot
 from sagline.viewer.viewer import Viewer
 from tests.refusal import refused

@@ -7,11 +7,9 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.viewer.force_polygon import cable_forces, pulls_of, residual
-from sagline.viewer.force_polygon_figure import force_polygon_figure
+from sagline.viewer.features.proof import cable_forces, force_polygon_figure, pulls_of, residual
 from sagline.viewer.missing import missing_of
-from sagline.viewer.settings import Settings
-from sagline.viewer.snapshot import taken_at
+from sagline.viewer.snapshot import Settings, taken_at
 from sagline.viewer.tension_scale import force_unit
 from sagline.viewer.viewer import Viewer, home_pose
 from tests.tiers import wide

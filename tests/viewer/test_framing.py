@@ -9,7 +9,7 @@ import pytest
 
 import sagline as sl
 from sagline.viewer import solids
-from sagline.viewer.framing import BORDER, FIELD, Framing, fitted
+from sagline.viewer.camera import BORDER, FIELD, Framing, fitted
 from sagline.viewer.server import started, stop
 from tests.tiers import extended, wide
 from tests.viewer.client import Client, await_that

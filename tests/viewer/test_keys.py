@@ -10,12 +10,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import sagline as sl
-from sagline.viewer.keys_show import MOST, TURN, nudged
-from sagline.viewer.settings import Settings
-from sagline.viewer.snapshot import taken_at
-from sagline.viewer.spoken import place_of, spoken
+from sagline.viewer.feature import View
+from sagline.viewer.features.keyboard import MOST, TURN, nudged, place_of, spoken
+from sagline.viewer.snapshot import Settings, taken_at
 from sagline.viewer.tension_scale import TensionScale
-from sagline.viewer.view import View
 from sagline.viewer.viewer import Viewer, home_pose
 from tests.tiers import extended
 from tests.viewer.client import Client, await_that

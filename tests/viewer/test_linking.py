@@ -13,11 +13,10 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.viewer.linked_controls import short
-from sagline.viewer.run import Run
-from sagline.viewer.source import Source
-from sagline.viewer.state_link import name_of, pose_part
-from sagline.viewer.view import View
+from sagline.viewer.feature import View
+from sagline.viewer.link import name_of, pose_part, short
+from sagline.viewer.playback import Run
+from sagline.viewer.state_code import Source
 from sagline.viewer.viewer import Viewer
 from tests.tiers import extended
 from tests.viewer.client import PATIENCE, Client, await_that

@@ -13,13 +13,11 @@ from scipy.optimize import linprog
 import sagline as sl
 from sagline.core.arrays import locked
 from sagline.viewer.channel import chosen_by
-from sagline.viewer.missing import missing_of
-from sagline.viewer.missing_nearest import NearestHeld, nearest_held
-from sagline.viewer.missing_words import explanation, missing_label
-from sagline.viewer.reading import Reading
+from sagline.viewer.feature import Reading
+from sagline.viewer.features.missing import explanation, missing_label
+from sagline.viewer.missing import NearestHeld, missing_of, nearest_held
 from sagline.viewer.server import Server
-from sagline.viewer.settings import Settings
-from sagline.viewer.snapshot import Snapshot, taken_at
+from sagline.viewer.snapshot import Settings, Snapshot, taken_at
 from sagline.viewer.tension_scale import force_unit
 from sagline.viewer.viewer import Viewer, home_pose
 from tests.effort import best_rate

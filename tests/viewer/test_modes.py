@@ -11,11 +11,10 @@ import pytest
 
 import sagline as sl
 from sagline import InvalidValueError, vibration
-from sagline.viewer import dynamics, lines, moment_words, readout
-from sagline.viewer.aside import Aside
+from sagline.viewer import lines, playback, readout, swing
+from sagline.viewer.feature import Aside
 from sagline.viewer.playback import Playback
-from sagline.viewer.settings import Settings
-from sagline.viewer.snapshot import taken_at
+from sagline.viewer.snapshot import Settings, taken_at
 from sagline.viewer.swing import PERIOD, mode_of
 from sagline.viewer.tension_scale import TensionScale
 from sagline.viewer.viewer import Viewer, home_pose
@@ -140,7 +139,7 @@ def test_a_cut_cable_is_simulated_and_played_as_a_run_is(page: Shown, monkeypatc
         asked.append((state.pose.position.tolist(), cable, cable_mass))
         yield made.simulation()
 
-    monkeypatch.setattr(dynamics, "cut", cut)
+    monkeypatch.setattr(swing, "cut", cut)
     with Client(page.port) as client:
         client.drag([1.0, 0.0, 2.0])
         await_that(lambda: page.position[0] == 1.0)
@@ -167,7 +166,7 @@ def test_a_moment_of_a_simulation_hangs_as_its_lengths_say() -> None:
     assert end.index == 199
     assert np.isnan(end.tension[3])
     np.testing.assert_array_equal(end.courses(1.0)[3], np.broadcast_to(ROBOT.frame_anchors[3], (41, 3)))
-    assert "<td>–</td>" in moment_words.numbers(end, TensionScale.of(ROBOT))
+    assert "<td>–</td>" in playback.numbers(end, TensionScale.of(ROBOT))
     assert played.duration == 2.0
     wanted, actual = played.traces(50, 1.0)
     assert np.isnan(wanted).all()

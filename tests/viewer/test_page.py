@@ -8,8 +8,7 @@ from urllib.request import urlopen
 import viser
 from viser import infra
 
-from sagline.viewer.page import Page, dressed
-from sagline.viewer.server import started, stop
+from sagline.viewer.server import ClientFile, dressed, started, stop
 
 BUILD = Path(viser.__file__).parent / "client" / "build"
 
@@ -27,7 +26,7 @@ def test_the_head_is_ours_and_the_client_what_it_is() -> None:
 
 def test_only_the_first_page_is_dressed(tmp_path: Path) -> None:
     (tmp_path / "other.html").write_bytes(b"<title>Viser</title></head>")
-    folder = Page(tmp_path, "robot")
+    folder = ClientFile(tmp_path, "robot")
     assert (folder / "other.html").read_bytes() == b"<title>Viser</title></head>"
     assert not (folder / "index.html").is_file()
 

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.viewer.polygon_figure import polygon_figure
-from sagline.viewer.settings import Settings
-from sagline.viewer.snapshot import taken_at
+from sagline.viewer.features.tensions import polygon_figure
+from sagline.viewer.snapshot import Settings, taken_at
 
 ROBOT = sl.load_robot("article-suspended")
 HERE = sl.Pose([1.0, 0.5, 2.0], np.eye(3))

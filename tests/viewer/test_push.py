@@ -10,7 +10,7 @@ from scipy.optimize import linprog
 
 import sagline as sl
 from sagline import structure_matrix
-from sagline.viewer import push_words
+from sagline.viewer.features import push
 from sagline.viewer.push import Push, pushed, radii
 from sagline.viewer.viewer import home_pose
 from tests.refusal import refused
@@ -159,7 +159,7 @@ def test_it_is_drawn_as_many_times_as_it_moves_and_told_so() -> None:
     np.testing.assert_allclose(once.position, found.pushed.pose.position, atol=1e-12)
     place = state.pose.transform(found.push.at)
     np.testing.assert_allclose(often.transform(found.push.at) - place, 20.0 * found.moved, atol=1e-12)
-    told = push_words.answer(found, 100.0)
+    told = push.response_text(found, 100.0)
     assert f"{1e3 * np.linalg.norm(found.moved):.3g}\N{NO-BREAK SPACE}mm" in told
     assert f"cable {found.held.cable}" in told
     assert found.shared is not None
@@ -174,7 +174,7 @@ def test_straight_cables_answer_no_force() -> None:
 def test_what_nothing_holds_is_told() -> None:
     state = rest("cogiro")
     found = replace(pushed(state, push_of(state)), compliance=np.full((3, 3), np.nan), pushed=None)
-    told = push_words.answer(found, None)
+    told = push.response_text(found, None)
     assert "no rest" in told
     assert "nothing holds" in told
     assert found.drawn(1.0) is None

@@ -10,10 +10,10 @@ from viser import CameraHandle
 
 import sagline as sl
 from sagline.viewer import solids
+from sagline.viewer.camera import Eye
 from sagline.viewer.channel import NAME
-from sagline.viewer.eye import Eye
+from sagline.viewer.features.push import FAR
 from sagline.viewer.push import Push, Pushed, pushed
-from sagline.viewer.push_show import FAR
 from sagline.viewer.viewer import Viewer
 from tests.tiers import extended, wide
 from tests.viewer.client import Client, await_that

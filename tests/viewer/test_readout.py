@@ -8,11 +8,10 @@ import pytest
 
 import sagline as sl
 from sagline.viewer import readout
-from sagline.viewer.settings import Settings
-from sagline.viewer.snapshot import taken_at
+from sagline.viewer.snapshot import Settings, taken_at
 from sagline.viewer.stage import ACTUAL, INFEASIBLE, PLATFORM, REST, WANTED
 from sagline.viewer.tension_scale import TensionScale
-from sagline.viewer.timeline_track import COLORS
+from sagline.viewer.timeline import COLORS
 from sagline.viewer.viewer import home_pose
 
 ROBOT = sl.load_robot("article-suspended")

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.viewer.run import Run
-from sagline.viewer.timeline import Timeline
+from sagline.viewer.playback import Run
+from sagline.viewer.player import Timeline
 
 ROBOT = sl.load_robot("article-mixed")
 PATH = sl.quintic_path(

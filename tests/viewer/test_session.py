@@ -11,14 +11,13 @@ import viser
 import sagline as sl
 from sagline.control import Event, EventKind, State
 from sagline.files.mcap_log import Recorder
-from sagline.viewer import session_words
+from sagline.viewer.player import Timeline
 from sagline.viewer.readout import css_color
 from sagline.viewer.server import started, stop
-from sagline.viewer.session import Session, SessionMoment
+from sagline.viewer.session import Session, SessionMoment, numbers, verdict
 from sagline.viewer.session_log import Follower
 from sagline.viewer.stage import ACTUAL, INFEASIBLE, PLATFORM, TRUTH
 from sagline.viewer.tension_scale import TensionScale
-from sagline.viewer.timeline import Timeline
 from sagline.viewer.viewer import Viewer
 from tests.files.executions import cycles_of, events_of, execution, plan_of
 from tests.tiers import extended, wide
@@ -75,24 +74,24 @@ def test_set_estimated_and_true_platforms_stand_where_they_were(log: Path, truth
 def test_the_panel_tells_state_errors_and_what_happened(log: Path, truth: Path) -> None:
     session, done = session_of(log, truth), execution()
     moment, scale = session.sight(1.2), TensionScale.of(ROBOT)
-    said = text_of(session_words.verdict(moment))
+    said = text_of(verdict(moment))
     assert said.startswith("MOVING Time 1.20 s")
     assert "planned 3 mm" in said
     assert events_of()[1].text in said
-    assert events_of()[1].text not in text_of(session_words.verdict(session.sight(0.4)))
-    row = text_of(session_words.numbers(moment, scale))
+    assert events_of()[1].text not in text_of(verdict(session.sight(0.4)))
+    row = text_of(numbers(moment, scale))
     off = done.tension[120] - done.planned_tension[120]
     assert f"5 {done.tension[120, 5]:.1f} {off[5]:.1f}" in row
-    assert css_color(scale.colors(moment.tension)[5]) in session_words.numbers(moment, scale)
+    assert css_color(scale.colors(moment.tension)[5]) in numbers(moment, scale)
 
 
 def test_a_text_from_a_log_is_text_on_the_page(log: Path) -> None:
     session = session_of(log)
     evil = Event(1000.0, 0, EventKind.NOTE, "x", State.MOVING, "<script>alert(1)</script>")
     parts = {name: getattr(session, name) for name in session.__slots__ if name != "shown"}
-    verdict = session_words.verdict(Session(**parts | {"events": (evil,)}).sight(1.0))
-    assert "<script>" not in verdict
-    assert "&lt;script&gt;" in verdict
+    text = verdict(Session(**parts | {"events": (evil,)}).sight(1.0))
+    assert "<script>" not in text
+    assert "&lt;script&gt;" in text
 
 
 @pytest.mark.parametrize("state", wide([State.FAULT, State.MOVING, State.EMERGENCY]))

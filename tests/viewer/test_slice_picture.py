@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from sagline.viewer.margin_scale import MarginScale
-from sagline.viewer.slice_picture import APART, FINER, INSIDE_OPACITY, OUTSIDE_OPACITY, picture_of
+from sagline.viewer.slices import APART, FINER, INSIDE_OPACITY, OUTSIDE_OPACITY, MarginScale, picture_of
 from sagline.viewer.wording import ForceUnit
 from sagline.workspaces.slice import Plane, slice_of
 from tests.viewer.analytic import PER_METER, RADIUS, WALL, ball

@@ -11,11 +11,11 @@ import pytest
 
 import sagline as sl
 from sagline import SaglineError
-from sagline.viewer.cable_colors import cable_color
+from sagline.viewer.feature import Reading
+from sagline.viewer.features.region import SpaceShow, planes_of
 from sagline.viewer.hull import Asked, Hull
-from sagline.viewer.reading import Reading
 from sagline.viewer.server import Server
-from sagline.viewer.space_show import SpaceShow, planes_of
+from sagline.viewer.tension_scale import cable_color
 from sagline.viewer.viewer import Viewer
 from tests.effort import best_rate
 from tests.kinematics.test_many_robots import planar
@@ -245,7 +245,7 @@ def test_a_hull_that_takes_long_shows_how_far_it_is(
         return ball(asked, rough, told)
 
     monkeypatch.setattr(MAKER, "hull", slow)
-    monkeypatch.setattr("sagline.viewer.aside.PATIENCE", 0.1)
+    monkeypatch.setattr("sagline.viewer.feature.PATIENCE", 0.1)
     choose(page, client, hull=True, force=7.0)
     await_that(lambda: "25 %" in page.text)
     choose(page, client, force=8.0)  # another is wanted meanwhile

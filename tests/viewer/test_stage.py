@@ -9,8 +9,7 @@ import pytest
 import sagline as sl
 from sagline.viewer import solids
 from sagline.viewer.server import Server, started, stop
-from sagline.viewer.settings import Settings
-from sagline.viewer.snapshot import taken_at
+from sagline.viewer.snapshot import Settings, taken_at
 from sagline.viewer.stage import Stage
 from sagline.viewer.tension_scale import TensionScale
 from sagline.viewer.viewer import home_pose

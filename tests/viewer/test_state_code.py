@@ -12,15 +12,12 @@ import pytest
 
 import sagline as sl
 from sagline.core.arrays import Array
+from sagline.viewer.feature import View
 from sagline.viewer.panel import mass_range
-from sagline.viewer.playback import Playback
-from sagline.viewer.run import Run
-from sagline.viewer.settings import METHODS, MODELS, Settings
-from sagline.viewer.snapshot import Snapshot, taken_at
-from sagline.viewer.source import Source
-from sagline.viewer.state_code import code_of
+from sagline.viewer.playback import Playback, Run
+from sagline.viewer.snapshot import METHODS, MODELS, Settings, Snapshot, taken_at
+from sagline.viewer.state_code import Source, code_of
 from sagline.viewer.tension_scale import TensionScale
-from sagline.viewer.view import View
 from sagline.viewer.viewer import Viewer
 from sagline.viewer.wording import remembers
 from tests.tiers import extended, wide

@@ -6,8 +6,7 @@ import pytest
 import sagline as sl
 from sagline import vibration
 from sagline.viewer import lines, solids
-from sagline.viewer.settings import Settings
-from sagline.viewer.snapshot import taken_at
+from sagline.viewer.snapshot import Settings, taken_at
 from sagline.viewer.swing import Swing, mode_of
 from tests.tiers import wide
 

@@ -11,19 +11,14 @@ import pytest
 import sagline as sl
 from sagline.control import State
 from sagline.viewer.channel import Channel
-from sagline.viewer.playback import Playback
-from sagline.viewer.played import Beside
-from sagline.viewer.player import Player
-from sagline.viewer.run import Run
+from sagline.viewer.features.timeline import TimelineShow, TimelineStage
+from sagline.viewer.playback import Playback, Run
+from sagline.viewer.player import Beside, Player
 from sagline.viewer.server import started, stop
 from sagline.viewer.session import Session
 from sagline.viewer.session_log import Follower
-from sagline.viewer.timeline_columns import MOST as MOST_COLUMNS
-from sagline.viewer.timeline_columns import columns, told
-from sagline.viewer.timeline_show import TimelineShow
-from sagline.viewer.timeline_spans import MOST, outside, spans_of
-from sagline.viewer.timeline_stage import TimelineStage
-from sagline.viewer.timeline_track import Chart, Limit, Mark, Track
+from sagline.viewer.timeline import MOST_COLUMNS as MOST_COLUMNS
+from sagline.viewer.timeline import MOST_SPANS, Chart, Limit, Mark, Track, columns, outside, spans_of, told
 from sagline.viewer.viewer import Viewer
 from sagline.viewer.wording import ForceUnit
 from tests.effort import least_seconds
@@ -101,10 +96,10 @@ def test_spans_cover_all_that_is_wrong_and_no_more_than_their_pixels(seed: int) 
         assert span.end == time[min(stop, count - 1)]  # a sample lasts until the next
         covered[first:stop] = True
         good = np.flatnonzero(~wrong[first:stop]) + first
-        near = (time[-1] - time[0]) / MOST
+        near = (time[-1] - time[0]) / MOST_SPANS
         assert all(time[k + 1] - time[k] <= near for k in good)
     assert np.all(covered[wrong])
-    assert len(spans) <= MOST + 1
+    assert len(spans) <= MOST_SPANS + 1
 
 
 def test_a_plan_says_where_it_has_no_answer_and_why() -> None:

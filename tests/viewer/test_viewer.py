@@ -14,7 +14,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 
 import sagline as sl
-from sagline.viewer.reading import Reading
+from sagline.viewer.feature import Reading
 from sagline.viewer.server import started, stop
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.stage import Stage

@@ -6,9 +6,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from sagline.viewer.cable_colors import cable_color
-from sagline.viewer.hull import Hull
-from sagline.viewer.wall import left, lit
+from sagline.viewer.hull import Hull, left, lit
+from sagline.viewer.tension_scale import cable_color
 from sagline.viewer.wording import ForceUnit
 
 SIDE = 41  # corners along each edge of a wall

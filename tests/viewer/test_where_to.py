@@ -5,8 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from sagline.viewer.space_panel import ways_told
-from sagline.viewer.where_to import NAMES, where_to
+from sagline.viewer.free_travel import NAMES, ways_told, where_to
 from sagline.viewer.wording import ForceUnit
 from tests.viewer.analytic import PER_METER, RADIUS, WALL, ball
 

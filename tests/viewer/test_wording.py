@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.viewer.settings import METHODS, MODELS, Settings
-from sagline.viewer.snapshot import taken_at
+from sagline.viewer.snapshot import METHODS, MODELS, Settings, taken_at
 from sagline.viewer.wording import ForceUnit, model_name, number, remembers
 
 

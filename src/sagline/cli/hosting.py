@@ -19,8 +19,8 @@ from sagline.robot.robot import Robot
 
 if TYPE_CHECKING:
     from sagline.calibration.result import Calibration
-    from sagline.viewer.played import Beside, Played
-    from sagline.viewer.source import Source
+    from sagline.viewer.player import Beside, Played
+    from sagline.viewer.state_code import Source
     from sagline.viewer.viewer import Viewer
 
 LATER = "trimesh"  # what the viewer loads when somebody asks for it

@@ -14,7 +14,7 @@ from sagline.files.simulation_file import FORMAT, load_simulation
 from sagline.robot.robot import Robot
 
 if TYPE_CHECKING:
-    from sagline.viewer.played import Beside, Played
+    from sagline.viewer.player import Beside, Played
 
 LOG: Final = ".mcap"
 
@@ -25,8 +25,7 @@ def played_in(robot: Robot, file: Path) -> Played:
     Raises:
         FileError: If it cannot be read, or is another robot's.
     """
-    from sagline.viewer.playback import Playback
-    from sagline.viewer.run import Run
+    from sagline.viewer.playback import Playback, Run
     from sagline.viewer.session_log import Follower
 
     if file.suffix.lower() == LOG:
@@ -53,7 +52,7 @@ def played_beside(robot: Robot, first: Path, second: Path) -> Beside:
     Raises:
         FileError: If it cannot be read, or is another robot's.
     """
-    from sagline.viewer.played import Beside
+    from sagline.viewer.player import Beside
 
     names = (first.name, second.name) if first.name != second.name else (str(first), str(second))
     return Beside(played_in(robot, second), names)

@@ -21,7 +21,7 @@ from sagline.cli.entries import (
     VERDICTS,
     VIBRATION,
 )
-from sagline.viewer.reading import Reading
+from sagline.viewer.feature import Reading
 from sagline.viewer.viewer import Viewer
 
 ENTRY_OF = {

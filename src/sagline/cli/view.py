@@ -140,7 +140,7 @@ def serve(
     from sagline.cli.hosting import check_viewer, hosted
 
     check_viewer()
-    from sagline.viewer.source import Source
+    from sagline.viewer.state_code import Source
 
     return hosted(robot, None, host, port, browser=browser, start=start, source=Source.of_robot(name, mass))
 
@@ -165,7 +165,7 @@ def view_run(robot: Robot, file: Path, host: str, port: int, *, browser: bool, b
     from sagline.files.simulation_file import FORMAT
 
     check_viewer()
-    from sagline.viewer.source import Source
+    from sagline.viewer.state_code import Source
 
     course = played_in(robot, file)
     other = None if beside is None else played_beside(course.robot, file, beside)
@@ -195,7 +195,7 @@ def view_calibration(file: Path, robot: str | None, host: str, port: int, *, bro
     found = load_calibration(file)
     if robot is not None:
         check_robot(file, "calibration", found.robot, load_robot(robot))
-    from sagline.viewer.source import Source
+    from sagline.viewer.state_code import Source
 
     source = Source.of_calibration(file)
     return hosted(found.robot, None, host, port, browser=browser, found=found, source=source)

@@ -52,7 +52,7 @@ def view_log(
     """
     check_viewer()
     from sagline.viewer.session_log import Follower
-    from sagline.viewer.source import Source
+    from sagline.viewer.state_code import Source
 
     follower = Follower(file, truth)
     with working(f"waiting for {file.name}" if live else f"reading {file.name}"):

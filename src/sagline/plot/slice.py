@@ -17,7 +17,7 @@ from sagline.core.numbers import n
 from sagline.plot.names import wrapped
 from sagline.plot.sheet import GAP_COLOR, axes_or_new, dressed
 from sagline.plot.style import current
-from sagline.viewer.cable_colors import CABLES, cable_color
+from sagline.viewer.tension_scale import CABLES, cable_color
 from sagline.workspaces.region import flat_axis
 from sagline.workspaces.slice import AXES, Plane, Slice, slice_of
 from sagline.workspaces.space import Workspace

@@ -1,10 +1,14 @@
-"""Tensions that somebody has chosen by hand, by a dot in the drawing of what is feasible."""
+"""Tensions chosen by hand in the field of feasible tensions."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Final
 
+import numpy as np
+
+from sagline.core.arrays import Array, locked
+from sagline.tension.polygon import Side, TensionPolygon
 from sagline.tension.quadratic_program import QuadraticProgram
 
 BY_HAND: Final = "chosen by hand"
@@ -18,3 +22,127 @@ class ByHand(QuadraticProgram):
     those nearest to them: with the pulls of sagging cables the former move a little, the point stays. Elsewhere the
     tensions stay as near to the chosen ones as balance and limits allow.
     """
+
+
+WIDTH, BORDER = 340, 26  # px
+HEIGHTS: Final = (0, 74, 190)  # px, by the number of redundant cables
+BEYOND: Final = 0.5  # how far a field without an end goes on, of the size of what is finite
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DotField:
+    """What is drawn of the feasible tensions.
+
+    Attributes:
+        polygon: All of them.
+        corners: Of what is drawn, in coordinates of the null space [N], shape (h, r), r 1 or 2; where the polygon has
+            no end the drawing has.
+        sides: The limit that each side of it is, from corner k to corner k + 1 (at corner k for an interval).
+        low: Lowest coordinates of the drawing [N], shape (r,).
+        high: Highest [N], shape (r,).
+    """
+
+    polygon: TensionPolygon
+    corners: Array
+    sides: tuple[Side | None, ...]
+    low: Array
+    high: Array
+
+    @classmethod
+    def of(cls, polygon: TensionPolygon, dot: Array, before: DotField | None = None) -> DotField:
+        """The field of a polygon that is not empty, of one or two redundant cables.
+
+        Args:
+            polygon: The polygon.
+            dot: Coordinates that are to be seen [N], shape (r,); NaN for none.
+            before: A field of the same pose, whose place in the drawing it keeps; None for none.
+        """
+        corners, sides = polygon.vertices, polygon.sides
+        if before is not None:
+            low, high = before.low, before.high
+        else:
+            low, high = _extent(polygon, dot)
+        if not polygon.bounded:
+            corners, sides = _clipped(corners, sides, low, high)
+        return cls(polygon, locked(np.ascontiguousarray(corners)), sides, low, high)
+
+    @property
+    def redundant(self) -> int:
+        """How many redundant cables there are, 1 or 2."""
+        return int(self.corners.shape[1])
+
+    @property
+    def height(self) -> int:
+        """Of the drawing [px]."""
+        return HEIGHTS[self.redundant]
+
+    @property
+    def middle(self) -> Array:
+        """Coordinates in the middle of the drawing [N], shape (r,)."""
+        return np.asarray(0.5 * (self.low + self.high))
+
+    @property
+    def scale(self) -> float:
+        """Pixels a newton."""
+        room = np.array([WIDTH, self.height])[: self.redundant] - 2.0 * BORDER
+        return float(np.min(room / np.maximum(self.high - self.low, 1e-9)))
+
+    def place(self, at: Array) -> tuple[float, float]:
+        """Where coordinates (r,) are in the drawing [px], from its left upper corner on."""
+        away = self.scale * (at - self.middle)
+        return 0.5 * WIDTH + float(away[0]), 0.5 * self.height - float(away[1] if self.redundant > 1 else 0.0)
+
+    def nearest(self, at: Array) -> Array:
+        """The point of the field that is nearest to coordinates (r,)."""
+        if self.redundant == 1:
+            return np.clip(at, self.corners.min(axis=0), self.corners.max(axis=0))
+        starts, ends = self.corners, np.roll(self.corners, -1, axis=0)
+        along, away = ends - starts, at - starts
+        if np.all(along[:, 0] * away[:, 1] - along[:, 1] * away[:, 0] >= 0.0):  # corners go around counter-clockwise
+            return at
+        length = np.maximum((along**2).sum(axis=1), np.finfo(np.float64).tiny)
+        share = np.clip((along * away).sum(axis=1) / length, 0.0, 1.0)
+        feet = starts + share[:, None] * along
+        return np.asarray(feet[int(np.argmin(np.linalg.norm(feet - at, axis=1)))])
+
+    def tension(self, at: Array) -> Array:
+        """Chord tensions at coordinates (r,) of the field [N], shape (m,)."""
+        return np.maximum(self.polygon.origin + at @ self.polygon.basis, 0.0)
+
+
+def _extent(polygon: TensionPolygon, dot: Array) -> tuple[Array, Array]:
+    """Lowest and highest coordinates to draw (r,)."""
+    if polygon.bounded:
+        return polygon.vertices.min(axis=0), polygon.vertices.max(axis=0)
+    known = np.array([side is not None for side in polygon.sides])
+    if polygon.vertices.shape[1] == 2:
+        known &= np.roll(known, 1)  # a corner between two limits
+    points = np.vstack(
+        (polygon.vertices[known], dot[None] if np.isfinite(dot).all() else polygon.vertices[:0], np.zeros_like(dot))
+    )
+    low, high = points.min(axis=0), points.max(axis=0)
+    size = float(np.max(high - low)) or float(np.abs(polygon.origin).max()) or 1.0
+    return low - BEYOND * size, high + BEYOND * size
+
+
+def _clipped(
+    corners: Array, sides: tuple[Side | None, ...], low: Array, high: Array
+) -> tuple[Array, tuple[Side | None, ...]]:
+    """What of a field is within a box; sides that the box makes are no limits."""
+    if corners.shape[1] == 1:
+        return np.clip(corners, low, high), sides
+    for axis, sign, end in ((0, 1.0, high[0]), (0, -1.0, -low[0]), (1, 1.0, high[1]), (1, -1.0, -low[1])):
+        inside = sign * corners[:, axis] <= end
+        kept: list[Array] = []
+        named: list[Side | None] = []
+        for k, corner in enumerate(corners):
+            after = (k + 1) % len(corners)
+            if inside[k]:
+                kept.append(corner)
+                named.append(sides[k])
+            if inside[k] != inside[after]:
+                share = (sign * end - corner[axis]) / (corners[after][axis] - corner[axis])
+                kept.append(corner + share * (corners[after] - corner))
+                named.append(None if inside[k] else sides[k])
+        corners, sides = np.array(kept).reshape(-1, 2), tuple(named)
+    return corners, sides

@@ -1,21 +1,55 @@
-"""What a calibration says in the page, as HTML: its verdict, its numbers, what was read at a pose."""
+"""Colors and text of a calibration."""
 
 from __future__ import annotations
 
 from html import escape
+from typing import Final
 
 import numpy as np
 
+from sagline.calibration.chi_squared import exceeded_with
 from sagline.calibration.findings import Direction
 from sagline.calibration.result import Calibration
 from sagline.calibration.sensors import reading_deviations
 from sagline.calibration.status import CalibrationStatus
 from sagline.calibration.words import chi_squared_in_words, outlier_in_words
-from sagline.core.arrays import Array
+from sagline.core.arrays import Array, Indices
 from sagline.core.numbers import counted, n
 from sagline.viewer.channel import chosen_by
-from sagline.viewer.fit_scale import freedoms
-from sagline.viewer.readout import block, box, sentence
+from sagline.viewer.readout import block, box, css_color, sentence
+from sagline.viewer.stage import INFEASIBLE, PLATFORM, REST
+from sagline.viewer.tension_scale import Colors
+
+QUANTILES: Final = (0.95, 0.999)  # of chi squared, between the colors
+COLORS: Final = np.array([PLATFORM, REST, INFEASIBLE], dtype=np.uint8)
+NAMES: Final = ("as expected", "one in 20", "one in 1,000")
+
+
+def freedoms(found: Calibration) -> Indices:
+    """Readings of each pose beyond those that its lengths take, shape (N,), >= 1."""
+    read = np.isfinite(found.residuals).sum(axis=1) - found.robot.cable_count
+    return np.asarray(np.maximum(read, 1)).astype(np.int64)
+
+
+def bands(found: Calibration) -> Indices:
+    """The color of each pose, 0 for what is expected, shape (N,)."""
+    limits = exceeded_with(1.0 - np.array(QUANTILES)[:, None], freedoms(found))
+    return np.asarray((found.chi_squared_of_pose > limits).sum(axis=0)).astype(np.int64)
+
+
+def colors(found: Calibration) -> Colors:
+    """Red, green and blue of each pose, shape (N, 3)."""
+    return np.asarray(COLORS[bands(found)])
+
+
+def key(counts: Indices) -> str:
+    """HTML that says which color is which, and how many poses have it."""
+    marks = "".join(
+        f'<span class="key"><span class="swatch" style="background:{css_color(color)}"></span> {name}: {count}</span>'
+        for color, name, count in zip(COLORS, NAMES, counts, strict=True)
+    )
+    return block(f"<b>Chi squared of the poses</b><br>{marks}")
+
 
 MOST_LISTED = 12  # outliers
 

@@ -1,13 +1,15 @@
-"""The hull of the region where the platform may go, in faces of one color each; it is there in a tenth of a second."""
+"""Boundary of a region of feasible positions, as patches of the scene."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from html import escape
-from typing import Final, NamedTuple
+from itertools import pairwise
+from typing import Any, Final, NamedTuple
 
 import numpy as np
+import viser
 from scipy.spatial.transform import Rotation
 
 from sagline.cables.model import CableModel
@@ -15,10 +17,10 @@ from sagline.core.arrays import Array, Flags, Indices
 from sagline.core.numbers import counted, n
 from sagline.robot.robot import Robot
 from sagline.tension.minimum_norm import MinimumNorm
-from sagline.viewer.cable_colors import cable_color
-from sagline.viewer.margin_scale import MarginScale
-from sagline.viewer.patches import Patch
 from sagline.viewer.readout import css_color
+from sagline.viewer.slices import MarginScale
+from sagline.viewer.tension_scale import cable_color
+from sagline.viewer.wording import ForceUnit
 from sagline.workspaces.criteria.margin import LeastMargin
 from sagline.workspaces.levels import Levels
 from sagline.workspaces.nearest import nearest_to
@@ -26,6 +28,63 @@ from sagline.workspaces.orientations import Orientations
 from sagline.workspaces.outline import Outline, outline
 from sagline.workspaces.region import Region, region_of
 from sagline.workspaces.wrench_sets import WrenchSet
+
+OPACITY: Final = 0.35  # the robot inside is seen
+
+
+class Patch(NamedTuple):
+    """Faces of one color.
+
+    Attributes:
+        vertices: Corners, each in a face [m], shape (V, 3).
+        faces: Shape (F, 3).
+        color: Red, green and blue, 0 to 255.
+        opacity: 0 to 1.
+    """
+
+    vertices: Array
+    faces: Indices
+    color: tuple[int, int, int]
+    opacity: float = OPACITY
+
+    @classmethod
+    def of(cls, vertices: Array, faces: Indices, color: tuple[int, int, int]) -> Patch:
+        """A patch of some faces of a larger net, with no more of its corners than they have."""
+        used, index = np.unique(faces, return_inverse=True)
+        return cls(vertices[used], index.reshape(-1, 3), color)
+
+
+class Patches:
+    """Patches that are drawn, in place of those before."""
+
+    def __init__(self, scene: viser.SceneApi, name: str) -> None:
+        """Begin with none, under a name in the scene."""
+        self._scene, self._name = scene, name
+        self.meshes: list[Any] = []
+
+    def show(self, patches: list[Patch], side: Any = "double") -> None:
+        """Draw these and no others, while the server is `atomic`, so that corners and faces change together.
+
+        Args:
+            patches: What is drawn.
+            side: Which side of faces: "front", "back" or "double".
+        """
+        while len(self.meshes) > len(patches):
+            self.meshes.pop().remove()
+        for k, patch in enumerate(patches):
+            corners, faces = patch.vertices.astype(np.float32), patch.faces.astype(np.uint32)
+            if k < len(self.meshes):
+                mesh = self.meshes[k]
+                mesh.vertices, mesh.faces, mesh.side = corners, faces, side
+                mesh.color, mesh.opacity = patch.color, patch.opacity
+                continue
+            self.meshes.append(
+                self._scene.add_mesh_simple(
+                    f"{self._name}/{k}", corners, faces, color=patch.color, opacity=patch.opacity, side=side,
+                    cast_shadow=False, receive_shadow=False,
+                )
+            )  # fmt: skip
+
 
 CELLS: Final = 30  # along each edge of a cube; another box has as many cells, which are cubes too
 MOST_CELLS: Final = 64  # along the longest edge
@@ -203,3 +262,65 @@ def _empty(found: Outline, asked: Asked, region: Region, rough: bool) -> str:
 def _most(cables: Indices) -> Indices:
     """Of each face the cable that most of its corners have; of three different ones the first."""
     return np.where(cables[:, 1] == cables[:, 2], cables[:, 1], cables[:, 0])
+
+
+BESIDE: Final = 0.01  # of the reach: so far from the wall its light is drawn, or the wall would hide it here and there
+REACH: Final = 0.16  # of the robot's size: from here on a wall is lit
+_RINGS: Final = (0.0, 0.4, 0.7, 1.0)  # of the reach
+_LIGHT: Final = (0.6, 0.35, 0.15)  # opacity in each ring, of which two lie behind each other
+
+
+def lit(hull: Hull, position: Array, reach: float) -> list[Patch]:
+    """What of a wall is lit: the nearer, the more.
+
+    Args:
+        hull: The wall.
+        position: Where the platform is [m], shape (3,).
+        reach: From how far on [m].
+
+    Returns:
+        Patches in the colors of the cables that limit there; none where the wall is farther away. The faces of the
+        robot's box are no wall.
+    """
+    near = np.linalg.norm(hull.vertices - position, axis=1) < reach + hull.longest
+    own = np.flatnonzero(near[hull.faces].any(axis=1) & ~hull.on_box)
+    corners, owner = _quartered(hull.vertices[hull.faces[own]]), np.repeat(hull.owner[own], 4)
+    away = np.linalg.norm(corners.mean(axis=1) - position, axis=1) / reach
+    patches = []
+    for (least, most), opacity in zip(pairwise(_RINGS), _LIGHT, strict=True):
+        ring = (away >= least) & (away < most)
+        for cable in np.unique(owner[ring]).tolist():
+            chosen = _on_both_sides(corners[ring & (owner == cable)], BESIDE * reach)
+            faces = np.arange(3 * len(chosen)).reshape(-1, 3)
+            patches.append(Patch(chosen.reshape(-1, 3), faces, cable_color(cable), opacity))
+    return patches
+
+
+def left(margin: float, cable: int, unit: ForceUnit) -> str:
+    """How much is left at the platform, and which cable limits it, in words.
+
+    Args:
+        margin: Of the loads [N].
+        cable: That limits it, -1 for none.
+        unit: Of forces.
+    """
+    by = f", cable {cable}" if cable >= 0 else ""
+    if not np.isfinite(margin):
+        return "nothing limits it" if margin > 0.0 else "nothing holds it"
+    return f"{unit.written(margin)} left{by}" if margin >= 0.0 else f"{unit.written(-margin)} too much{by}"
+
+
+def _on_both_sides(corners: Array, distance: float) -> Array:
+    """Triangles (F, 3, 3) twice, so far [m] before and behind where they are."""
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    away = distance * (normal / np.maximum(length, np.finfo(np.float64).tiny))[:, None]
+    return np.concatenate((corners + away, corners - away))
+
+
+def _quartered(corners: Array) -> Array:
+    """Each triangle (F, 3, 3) in four, one after the other."""
+    first, second, third = (corners[:, k] for k in range(3))
+    one, two, three = 0.5 * (first + second), 0.5 * (second + third), 0.5 * (third + first)
+    parts = ((first, one, three), (one, second, two), (three, two, third), (one, two, three))
+    return np.stack([np.stack(part, axis=1) for part in parts], axis=1).reshape(-1, 3, 3)

@@ -13,7 +13,7 @@ from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 from sagline.viewer import readout
 from sagline.viewer.by_hand import BY_HAND, ByHand
-from sagline.viewer.settings import METHODS, MODELS, Settings
+from sagline.viewer.snapshot import METHODS, MODELS, Settings
 from sagline.viewer.tension_scale import TensionScale
 from sagline.viewer.wording import remembers
 

@@ -1,22 +1,229 @@
-"""A simulation as a timeline plays it."""
+"""Plans and simulations as the timeline plays them."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from typing import Final
 
 import numpy as np
 
 from sagline.core.arrays import Array
-from sagline.dynamics.simulation import Simulation
+from sagline.core.errors import InvalidValueError
+from sagline.core.numbers import n
+from sagline.core.progress import Progress
+from sagline.dynamics.simulation import Occurrence, Simulation
+from sagline.kinematics.confirm import Confirmation, confirm
+from sagline.kinematics.plan import Plan
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.viewer.moment import Moment
-from sagline.viewer.moment_words import happened
-from sagline.viewer.stage import ACTUAL
-from sagline.viewer.tension_scale import force_unit
-from sagline.viewer.timeline_spans import outside
-from sagline.viewer.timeline_track import Chart, Mark, Track, cable_names, tension_limits
+from sagline.viewer.drawn import Drawn
+from sagline.viewer.readout import block, box, css_color, pose_line, sentence
+from sagline.viewer.snapshot import Snapshot
+from sagline.viewer.stage import ACTUAL, WANTED
+from sagline.viewer.tension_scale import TensionScale, force_unit
+from sagline.viewer.timeline import Chart, Mark, Track, cable_names, infeasible, outside, tension_limits
+from sagline.viewer.wording import ForceUnit, number
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Moment(Drawn):
+    """A robot in motion.
+
+    Attributes:
+        simulation: The simulation.
+        index: Number of the sample.
+    """
+
+    simulation: Simulation
+    index: int
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+        return self.simulation.robot
+
+    @property
+    def pose(self) -> Pose:
+        """Where the platform is."""
+        return self.simulation.pose[self.index]
+
+    @property
+    def time(self) -> float:
+        """Since the start [s]."""
+        return float(self.simulation.time[self.index] - self.simulation.time[0])
+
+    @property
+    def past(self) -> tuple[Occurrence, ...]:
+        """What has happened."""
+        now = float(self.simulation.time[self.index])
+        return tuple(event for event in self.simulation.events if event.time <= now)
+
+    @property
+    def broken(self) -> list[int]:
+        """Cables that have broken."""
+        return [event.cable for event in self.past if event.kind == "break" and event.cable is not None]
+
+    @property
+    def tension(self) -> Array:
+        """Tensions at the frame ends [N], shape (m,); NaN of a broken cable."""
+        tension: Array = self.simulation.tensions[self.index].copy()
+        tension[self.broken] = np.nan
+        return tension
+
+    @property
+    def length(self) -> Array:
+        """Unstrained lengths off the drums [m], shape (m,)."""
+        return np.asarray(self.simulation.length[self.index])
+
+    @property
+    def nodes(self) -> Array | None:
+        """Positions of the cables at their nodes [m], shape (m, P, 3); None of cables without."""
+        return None if self.simulation.nodes is None else np.asarray(self.simulation.nodes[self.index])
+
+
+CABLES = {
+    "none": "massless cables",
+    "lumped": "cables with mass, as chains of nodes",
+    "modal": "cables with mass, as their linear modes",
+}
+
+
+def verdict(moment: Moment) -> str:
+    """What kind of simulation it is, the numbers of the moment, and what has happened."""
+    simulation, unit = moment.simulation, force_unit(moment.robot)
+    speed = float(np.linalg.norm(simulation.twist[moment.index, :3]))
+    rows = [
+        ("Cables", CABLES.get(simulation.cable_mass, simulation.cable_mass)),
+        ("Time", f"{moment.time:.3f} s"),
+        ("Speed", n(speed, ".3g", "m/s")),
+        ("Tensions", f"{unit.bare(np.nanmin(moment.tension))} to {unit.written(np.nanmax(moment.tension))}"),
+        ("Energy error", n(simulation.energy.error[moment.index], ".2g", "J", size=_size(moment))),
+    ]
+    rows += [("Event", happened(event, unit)) for event in moment.past]
+    text = "".join(f"<dt>{name}</dt><dd>{what}</dd>" for name, what in rows)
+    return box("quiet", "Simulated", f"<dl>{text}</dl>")
+
+
+def numbers(moment: Moment, scale: TensionScale) -> str:
+    """The pose, and tension and length of every cable."""
+    unit, colors = force_unit(moment.robot), scale.colors(moment.tension)
+    length = moment.simulation.length[moment.index]
+    rows = "".join(
+        f'<tr><td><span class="swatch" style="background:{css_color(colors[i])}"></span> {i}</td>'
+        f"<td>{unit.bare(moment.tension[i])}</td><td>{number(length[i], '.4f')}</td></tr>"
+        for i in range(moment.robot.cable_count)
+    )
+    head = f"<tr><th>cable</th><th>at the winch<br>[{unit.name}]</th><th>length<br>[m]</th></tr>"
+    return block(f"{pose_line(moment.pose)}<table>{head}{rows}</table>")
+
+
+def polygon() -> str:
+    """Why there are no tensions to choose from."""
+    return sentence("In motion nothing is chosen: tensions follow from lengths and from where the platform is.")
+
+
+def happened(event: Occurrence, unit: ForceUnit) -> str:
+    """An event in words."""
+    what = event.kind if event.cable is None else f"{event.kind} of cable {event.cable}"
+    before, after = unit.bare(event.tension_before), unit.written(event.tension_after)
+    return f"{what} at {event.time:.3f} s: {before} before, then at most {after}"
+
+
+def _size(moment: Moment) -> float:
+    energy = moment.simulation.energy
+    return float(np.nanmax(np.abs(energy.kinetic) + np.abs(energy.potential)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Run:
+    """A plan of N poses with where the platform really goes.
+
+    Attributes:
+        plan: The plan.
+        confirmation: Its lengths wound onto exact cables.
+        time: Time of each sample [s], shape (N,), from 0 on; one second a sample for poses without a path.
+    """
+
+    plan: Plan
+    confirmation: Confirmation
+    time: Array
+
+    name = "run"
+    still = "A run is what it was planned as; drag the platform to ask what if."
+
+    @classmethod
+    def of(cls, plan: Plan, progress: Progress | None = None) -> Run:
+        """The run of a plan.
+
+        Args:
+            plan: The plan.
+            progress: Told how many of its poses are confirmed, of how many.
+
+        Raises:
+            InvalidValueError: If it is the plan of a single pose.
+        """
+        if not plan.state.pose.shape:
+            raise InvalidValueError(
+                "run", "a plan of a single pose", "a plan of poses in a row", "Save a plan of a path."
+            )
+        time = np.arange(len(plan.state.pose), dtype=np.float64) if plan.path is None else plan.path.time
+        return cls(plan, confirm(plan, progress=progress), time - time[0])
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+        return self.plan.state.one_robot
+
+    @property
+    def home(self) -> Pose:
+        """Where it begins."""
+        return self.plan.state.pose[0]
+
+    @property
+    def duration(self) -> float:
+        """Time of the last sample [s]."""
+        return float(self.time[-1])
+
+    def index_at(self, time: float) -> int:
+        """The sample at or before a time."""
+        return _sample_at(self.time, time)
+
+    def snapshot(self, index: int) -> Snapshot:
+        """One sample."""
+        plan = _sample(self.plan, index)
+        rest = self.confirmation.pose[index] if plan.feasible else None
+        return Snapshot(plan.state.one_robot, plan.state.pose, plan, rest)
+
+    def sight(self, time: float) -> Snapshot:
+        """The sample at or before a time [s]."""
+        return self.snapshot(self.index_at(time))
+
+    def track(self) -> Track:
+        """The tensions that are limited and the lengths, and where there are none."""
+        plan, robot, unit = self.plan, self.robot, force_unit(self.robot)
+        name = "Chord tension" if robot.tension_limits_of == "chord" else "Tension at the winch"
+        limits = tension_limits(robot, unit.newtons, at=robot.tension_limits_of)
+        cables = cable_names(robot)
+        tension = Chart(
+            name, unit.name, unit.decimals, cables, lambda rows: plan.state.limited_tension[rows] / unit.newtons, limits
+        )
+        length = Chart("Unstrained length", "m", 4, cables, lambda rows: plan.unstrained_length[rows])
+        paths = (("desired", WANTED), ("actual", ACTUAL))
+        return Track(self.time, (tension, length), infeasible(plan, self.time, unit), (), paths)
+
+    def traces(self, most: int, error_scale: float) -> tuple[Array, Array]:
+        """Desired and actual positions (n, 3), n <= most, the error drawn some times as large; NaN in gaps."""
+        rows = np.unique(np.linspace(0, len(self.time) - 1, most).astype(np.intp))
+        wanted = self.plan.state.pose.position[rows]
+        return wanted, wanted + error_scale * self.confirmation.position_error[rows]
+
+
+def _sample(plan: Plan, i: int) -> Plan:
+    """The plan of one of its poses."""
+    values = {field.name: getattr(plan, field.name) for field in fields(plan)}
+    entries = {name: value[i] for name, value in values.items() if isinstance(value, np.ndarray)}
+    return replace(plan, state=plan.state[i], path=None, **entries)
+
 
 FAILURES: Final = ("break", "stall", "slack", "saturate")  # of what can happen
 
@@ -56,8 +263,7 @@ class Playback:
 
     def sight(self, time: float) -> Moment:
         """The sample at or before a time [s]."""
-        index = int(np.searchsorted(self.time, time, side="right")) - 1
-        return Moment(self.simulation, min(max(index, 0), self.time.size - 1))
+        return Moment(self.simulation, _sample_at(self.time, time))
 
     def traces(self, most: int, error_scale: float) -> tuple[Array, Array]:
         """No desired positions, and the actual ones (n, 3), n <= most."""
@@ -92,3 +298,8 @@ class Playback:
             if event.kind == "break":
                 held[simulation.time >= event.time, event.cable] = np.nan
         return held
+
+
+def _sample_at(times: Array, time: float) -> int:
+    """Number of the sample at or before a time; of the first one before it."""
+    return int(np.clip(np.searchsorted(times, time, side="right") - 1, 0, len(times) - 1))

@@ -1,14 +1,98 @@
-"""What is played: on which clock, and where on it; or nothing."""
+"""Player of a run, a simulation or a log, and its clock."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
 
+from sagline.core.arrays import Array
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
 from sagline.viewer.drawn import Drawn
-from sagline.viewer.played import Beside, Played
 from sagline.viewer.snapshot import Snapshot
-from sagline.viewer.timeline import Timeline
+from sagline.viewer.timeline import Track
+
+
+class Played(Protocol):
+    """Something that lasts, and can be looked at at any time of it."""
+
+    @property
+    def name(self) -> str:
+        """What it is, in a word."""
+
+    @property
+    def robot(self) -> Robot:
+        """Whose it is."""
+
+    @property
+    def home(self) -> Pose:
+        """Where it begins."""
+
+    @property
+    def duration(self) -> float:
+        """Time of its end [s]."""
+
+    @property
+    def still(self) -> str:
+        """What to say in place of what would change the robot."""
+
+    def sight(self, time: float) -> Snapshot | Drawn:
+        """What there is to see at a time [s]."""
+
+    def traces(self, most: int, error_scale: float) -> tuple[Array, Array]:
+        """Desired and actual positions (n, 3), n <= most, the error drawn some times as large; NaN in gaps."""
+
+    def track(self) -> Track:
+        """What the timeline shows of it."""
+
+
+class Beside(NamedTuple):
+    """Another run beside what is played, with the same clock.
+
+    Attributes:
+        played: The other one.
+        names: What both are called on the timeline, what is played first.
+    """
+
+    played: Played
+    names: tuple[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class Timeline:
+    """Where a playback is.
+
+    Attributes:
+        duration: Time of the end [s].
+        time: Time shown [s], 0 to duration.
+        playing: Whether time goes on.
+    """
+
+    duration: float
+    time: float = 0.0
+    playing: bool = False
+
+    def advanced(self, elapsed: float, speed: float) -> Timeline:
+        """After a while of real time [s] at a speed [times]; stops at the end."""
+        if not self.playing:
+            return self
+        time = self.time + max(elapsed, 0.0) * speed
+        return Timeline(self.duration, min(time, self.duration), time < self.duration)
+
+    def extended(self, duration: float) -> Timeline:
+        """With an end that has moved on [s]; who stood at the end stands there again."""
+        time = duration if self.time >= self.duration and not self.playing else self.time
+        return Timeline(duration, time, self.playing)
+
+    def toggled(self) -> Timeline:
+        """Play, from the start again if at the end; or pause."""
+        time = 0.0 if not self.playing and self.time >= self.duration else self.time
+        return Timeline(self.duration, time, not self.playing)
+
+    def scrubbed(self, time: float) -> Timeline:
+        """At another time [s], paused; a time outside is taken as the nearer end."""
+        return Timeline(self.duration, min(max(time, 0.0), self.duration), False)
 
 
 class Kept(NamedTuple):

@@ -1,4 +1,4 @@
-"""The solid parts of a robot as triangles: frame, winches, platform."""
+"""Solids of a robot, and ellipsoids of errors."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial.transform import Rotation
 
-from sagline.core.arrays import Array
+from sagline.core.arrays import Array, Indices
 from sagline.robot.bounds import bounds as bounds
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
@@ -187,3 +188,57 @@ def _hull(points: Array) -> Solid:
     inward = np.einsum("fi,fi->f", normal, hull.equations[:, :3]) < 0.0
     corners[inward] = corners[inward][:, ::-1]
     return Solid(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
+
+
+THINNEST: Final = 0.03  # of its longest axis: a flat one is still seen
+
+
+class Ellipsoids(NamedTuple):
+    """Some ellipsoids.
+
+    Attributes:
+        middle: Where they are [m], shape (k, 3).
+        turn: Their axes, as quaternions, scalar first, shape (k, 4).
+        radius: One standard error along each of their axes [m], shape (k, 3).
+        which: Whose they are, shape (k,).
+    """
+
+    middle: Array
+    turn: Array
+    radius: Array
+    which: Indices
+
+    @classmethod
+    def of(cls, points: Array, covariance: Array) -> Ellipsoids:
+        """Those of points, without those of which nothing is known or everything.
+
+        Args:
+            points: The points [m], shape (m, 3).
+            covariance: Of the coordinates of each [m^2], shape (m, 3, 3).
+        """
+        known = np.isfinite(covariance).all(axis=(1, 2)) & covariance.any(axis=(1, 2))
+        which = np.flatnonzero(known).astype(np.int64)
+        squares, axes = np.linalg.eigh(covariance[which])
+        mirrored = np.linalg.det(axes) < 0.0
+        axes[mirrored, :, 0] *= -1.0
+        turn = Rotation.from_matrix(axes).as_quat()[:, [3, 0, 1, 2]] if len(which) else np.zeros((0, 4))
+        return cls(points[which], turn, np.sqrt(np.maximum(squares, 0.0)), which)
+
+    def drawn(self, factor: float) -> Array:
+        """Their radii as they are drawn, some times as large [m], shape (k, 3)."""
+        longest = self.radius.max(axis=1, keepdims=True)
+        return np.asarray(factor * np.maximum(self.radius, THINNEST * longest))
+
+
+def readable(radius: Array, size: float) -> float:
+    """A round factor with which the largest radius is drawn about as large as a size [m]; 1 for none."""
+    largest = float(radius.max(initial=0.0))
+    return max(round_below(size / largest), 1.0) if largest > 0.0 else 1.0
+
+
+def ball() -> Solid:
+    """A ball of radius 1."""
+    from trimesh.creation import icosphere  # a fifth of what starts the viewer, and few see a ball
+
+    mesh = icosphere(subdivisions=2)
+    return Solid(np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64))

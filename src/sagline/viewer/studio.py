@@ -1,11 +1,11 @@
-"""Where pictures are taken: a scene of a client's own, that hides the server's and that nobody else sees."""
+"""Off-screen scenes, pictures of them, and the legend beneath."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 from math import atan, tan
-from typing import Final, Literal, NamedTuple
+from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 import viser
@@ -13,9 +13,38 @@ from scipy.spatial.transform import Rotation
 
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
-from sagline.viewer.played import Played
+from sagline.viewer.channel import Told
+from sagline.viewer.feature import View
+from sagline.viewer.player import Played
+from sagline.viewer.readout import spaced
 from sagline.viewer.stage import TRACE_POINTS, Stage
-from sagline.viewer.view import View
+from sagline.viewer.tension_scale import force_unit
+
+HEIGHT: Final = 4.0  # of the size of its text
+_STOPS = 16  # of the bar's colors
+
+
+def strip_of(view: View, *remarks: str) -> dict[str, Any]:
+    """What there is to say about a view, as JSON knows it.
+
+    Args:
+        view: What is shown.
+        remarks: To be said beneath the title before all else.
+    """
+    settings, scale = view.settings, view.scale
+    unit = force_unit(view.snapshot.robot)
+    drawn = [(settings.sag_scale, "sag"), (settings.error_scale, "errors")]
+    larger = [f"{what} drawn {factor:g} times as large" for factor, what in drawn if factor != 1.0]
+    shares = np.linspace(0.0, 1.0, _STOPS)
+    colors = scale.colors(scale.low * (scale.high / scale.low) ** shares)
+    return {
+        "title": view.snapshot.robot.name,
+        "remark": ", ".join((*remarks, *larger)),
+        "colors": ["#{:02x}{:02x}{:02x}".format(*map(int, color)) for color in colors],
+        "ticks": [[f"{tick / unit.newtons:g}", place] for tick, place in spaced(scale)],
+        "legend": f"Chord tension [{unit.name}]",
+    }
+
 
 PATIENCE: Final = 30.0  # s to wait for a picture
 NAMES: Final = ("/names", "/platform/notice")  # nodes that are in no picture
@@ -167,3 +196,76 @@ def studio(
         yield Studio(client, server, shot, view, played, line_width)
     finally:
         client.scene.reset()
+
+
+TEXT: Final = 8.0  # pt
+LINE: Final = 0.3  # pt on paper for a pixel on a screen: about one for a cable
+TOPIC: Final = "picture"
+
+
+class Paper(NamedTuple):
+    """Where a picture is printed.
+
+    Attributes:
+        width: Of the picture [in].
+        dots: An inch.
+    """
+
+    width: float
+    dots: int
+
+    @property
+    def pixels(self) -> int:
+        """Columns of the picture."""
+        return round(self.width * self.dots)
+
+
+# widths of the IEEE's columns; what is finer than 300 dots an inch is for lines
+PAPERS: Final = {
+    "Column, 89 mm at 600 dpi": Paper(3.5, 600),
+    "Page, 182 mm at 300 dpi": Paper(7.16, 300),
+    "Page, 182 mm at 600 dpi": Paper(7.16, 600),
+}
+
+
+def pictured(
+    client: viser.ClientHandle,
+    server: viser.ViserServer,
+    told: Told,
+    view: View,
+    paper: Paper,
+    name: str,
+    extent: tuple[Array, Array],
+    *,
+    strip: bool,
+) -> None:
+    """Have a client's page save a picture of what is shown, from where its camera is, without gizmo and names.
+
+    Args:
+        client: Who asked.
+        server: The server.
+        told: What that page is told.
+        view: What is shown.
+        paper: For where.
+        name: Of the file, without its suffix.
+        extent: Lowest and highest corner of what there is to see [m].
+        strip: Whether it is said beneath what it is, and what its colors mean.
+
+    Raises:
+        InvalidValueError: If the client has told no camera that could be.
+        RuntimeError: If the client goes, or gives no picture.
+        TimeoutError: If it gives none for too long.
+    """
+    text = TEXT * paper.dots / 72.0
+    beneath = round(HEIGHT * text) if strip else 0
+    shot = Shot.of(client.camera, *extent, paper.pixels)
+    about = {
+        **strip_of(view), "name": name, "dots": paper.dots, "text": text, "strip": beneath,
+        "width": shot.width, "height": shot.height + beneath,
+    }  # fmt: skip
+    try:
+        with studio(client, server, shot, view, LINE * paper.dots / 72.0) as scene:
+            told.tell(TOPIC, about)
+            scene.take("png")
+    finally:
+        told.tell(TOPIC, None)

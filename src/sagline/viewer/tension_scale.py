@@ -1,9 +1,10 @@
-"""The colors of tensions: one scale for a robot, from its lowest to its highest allowed tension."""
+"""Colors of cables and of tensions."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from math import isfinite, log, log10
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,26 @@ from numpy.typing import NDArray
 from sagline.core.arrays import Array
 from sagline.robot.robot import Robot
 from sagline.viewer.wording import ForceUnit
+
+Color = tuple[int, int, int]  # red, green and blue, 0 to 255
+
+# Hues far apart first, each seen on white and on dark: robots have eight cables, seldom more than twelve.
+CABLES: Final[tuple[Color, ...]] = (
+    (14, 147, 132), (232, 160, 32), (122, 92, 196), (94, 156, 60), (206, 84, 128), (24, 135, 196),
+    (158, 104, 66), (150, 146, 20), (70, 96, 210), (210, 100, 56), (44, 170, 110), (176, 80, 176),
+    (80, 140, 150), (196, 146, 96), (124, 164, 30), (160, 60, 80),
+)  # fmt: skip
+NONE: Final[Color] = (150, 155, 162)  # where no cable decides
+
+
+def cable_color(cable: int) -> Color:
+    """The color of a cable.
+
+    Args:
+        cable: Its number; negative for none.
+    """
+    return NONE if cable < 0 else CABLES[cable % len(CABLES)]
+
 
 Colors = NDArray[np.uint8]
 

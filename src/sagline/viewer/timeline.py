@@ -1,41 +1,334 @@
-"""The clock of a run: play, pause, speed, scrub. It knows times, no samples and no browser."""
+"""Charts, marks and spans of the timeline, and their columns as the page gets them."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import isfinite
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sagline.core.arrays import Array
+from sagline.kinematics.plan import Plan
+from sagline.kinematics.status import PoseStatus
+from sagline.robot.robot import Robot
+from sagline.viewer.wording import ForceUnit
+
+# Cables by number, here and nowhere else: no color of the platform, of its path, of a tension or of a verdict.
+# Each holds 3 : 1 on the panels of both themes.
+COLORS: Final = ("#0e9384", "#8a8a12", "#9a6f52", "#1897b8", "#5e9a3c", "#7d8794")  # lines beyond them are dashed
+_ENDS: Final = {"chord": "the chord", "frame_end": "the frame end"}
 
 
-@dataclass(frozen=True, slots=True)
-class Timeline:
-    """Where a playback is.
+class Limit(NamedTuple):
+    """A limit of what is drawn.
 
     Attributes:
-        duration: Time of the end [s].
-        time: Time shown [s], 0 to duration.
-        playing: Whether time goes on.
+        value: Where it is, in the unit of the chart.
+        name: What it is.
+        upper: Whether values are to stay below it.
     """
 
-    duration: float
-    time: float = 0.0
-    playing: bool = False
+    value: float
+    name: str
+    upper: bool
 
-    def advanced(self, elapsed: float, speed: float) -> Timeline:
-        """After a while of real time [s] at a speed [times]; stops at the end."""
-        if not self.playing:
-            return self
-        time = self.time + max(elapsed, 0.0) * speed
-        return Timeline(self.duration, min(time, self.duration), time < self.duration)
 
-    def extended(self, duration: float) -> Timeline:
-        """With an end that has moved on [s]; who stood at the end stands there again."""
-        time = duration if self.time >= self.duration and not self.playing else self.time
-        return Timeline(duration, time, self.playing)
+class Span(NamedTuple):
+    """A time in which something is wrong.
 
-    def toggled(self) -> Timeline:
-        """Play, from the start again if at the end; or pause."""
-        time = 0.0 if not self.playing and self.time >= self.duration else self.time
-        return Timeline(self.duration, time, not self.playing)
+    Attributes:
+        start: When it begins [s].
+        end: When it ends [s].
+        why: What is wrong, in words.
+    """
 
-    def scrubbed(self, time: float) -> Timeline:
-        """At another time [s], paused; a time outside is taken as the nearer end."""
-        return Timeline(self.duration, min(max(time, 0.0), self.duration), False)
+    start: float
+    end: float
+    why: str
+
+
+class Mark(NamedTuple):
+    """Something that happened.
+
+    Attributes:
+        time: When [s].
+        text: What, in words.
+        bad: Whether it is a fault or a failure.
+    """
+
+    time: float
+    text: str
+    bad: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Chart:
+    """A quantity of each cable, or along each axis, over time.
+
+    Attributes:
+        title: What it is.
+        unit: Its unit.
+        decimals: How many of them are told.
+        names: Of the lines: numbers of cables, or axes.
+        values: Finds those of some samples when they are asked for, shape (n, k); NaN where there is none.
+        limits: Of the values.
+    """
+
+    title: str
+    unit: str
+    decimals: int
+    names: tuple[str, ...]
+    values: Callable[[slice], Array]
+    limits: tuple[Limit, ...] = ()
+
+    @property
+    def of_cables(self) -> bool:
+        """Whether its lines are cables."""
+        return self.names[0] == "0"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Track:
+    """Something played, as the timeline shows it.
+
+    Attributes:
+        time: Of the samples [s], from 0 on, shape (N,).
+        charts: What there is over time; tensions first.
+        spans: Where something is wrong, in order.
+        marks: What happened, in order.
+        paths: Names and colors of the ways and platforms that are drawn in the scene.
+    """
+
+    time: Array
+    charts: tuple[Chart, ...]
+    spans: tuple[Span, ...] = ()
+    marks: tuple[Mark, ...] = ()
+    paths: tuple[tuple[str, tuple[int, int, int]], ...] = ()
+
+    def within(self, start: float, end: float) -> slice:
+        """The samples from a time to another [s], and the one before and the one after."""
+        first, stop = np.searchsorted(self.time, [start, end])
+        return slice(max(int(first) - 1, 0), int(stop) + 1)
+
+    def step_from(self, time: float, steps: int) -> float:
+        """The time of the sample so many after the one at or before a time [s]."""
+        now = int(np.searchsorted(self.time, time, side="right")) - 1
+        return float(self.time[min(max(now + steps, 0), self.time.size - 1)])
+
+
+def cable_names(robot: Robot) -> tuple[str, ...]:
+    """The names of the lines of a chart of cables."""
+    return tuple(map(str, range(robot.cable_count)))
+
+
+def tension_limits(robot: Robot, newtons: float, *, at: str) -> tuple[Limit, ...]:
+    """The limits that all cables keep; where they differ, the first that one may reach.
+
+    Args:
+        robot: The robot.
+        newtons: The unit of the chart [N].
+        at: Which tension is drawn, "chord" or "frame_end"; limits of the other one say so.
+    """
+    low, high = float(robot.tension_min.max()), float(robot.tension_max.min())
+    other = "" if at == robot.tension_limits_of else f", of {_ENDS[robot.tension_limits_of]}"
+    lower = (Limit(low / newtons, f"lowest allowed{other}", upper=False),) if low > 0.0 else ()
+    upper = (Limit(high / newtons, f"highest allowed{other}", upper=True),) if isfinite(high) else ()
+    return lower + upper
+
+
+MOST_SPANS: Final = 400  # spans on a timeline: those nearer than its length over that are one
+
+
+def spans_of(time: Array, wrong: NDArray[np.bool_], why: Callable[[slice], str]) -> tuple[Span, ...]:
+    """The runs of samples that are wrong, as times; a sample lasts until the next.
+
+    Args:
+        time: Of the samples [s], shape (N,).
+        wrong: Which are, shape (N,).
+        why: Says what is wrong with some samples.
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], wrong, [False])).astype(np.int8))).reshape(-1, 2)
+    if not edges.size:
+        return ()
+    until = np.minimum(edges[:, 1], time.size - 1)
+    apart = time[edges[1:, 0]] - time[until[:-1]] > (time[-1] - time[0]) / MOST_SPANS
+    first = edges[np.concatenate(([True], apart)), 0]
+    end = edges[np.concatenate((apart, [True])), 1]
+    return tuple(
+        Span(float(time[a]), float(time[min(b, time.size - 1)]), why(slice(int(a), int(b))))
+        for a, b in zip(first, end, strict=True)
+    )
+
+
+def infeasible(plan: Plan, time: Array, unit: ForceUnit) -> tuple[Span, ...]:
+    """Where a plan of N poses has no answer."""
+
+    def why(rows: slice) -> str:
+        lost = ~plan.feasible[rows]
+        status = PoseStatus(int(plan.status[rows][lost][0]))
+        if status is not PoseStatus.INFEASIBLE:
+            return status.name.replace("_", " ").lower()
+        short = plan.shortfall[rows][lost]
+        known = short[np.isfinite(short)]
+        parts = ["not feasible"]
+        if np.isinf(short).any():
+            parts.append("no force alone would do")
+        elif known.size:
+            parts.append(f"short of up to {unit.written(float(known.max()))}")
+        blocking = np.flatnonzero(plan.blocking[rows][lost].any(axis=0))
+        return ": ".join(parts) + (f"; at their limits: {_cables(blocking)}" if blocking.size else "")
+
+    return spans_of(time, ~plan.feasible, why)
+
+
+def outside(robot: Robot, time: Array, tension: Array, unit: ForceUnit) -> tuple[Span, ...]:
+    """Where a tension at the winch, shape (N, m) [N], is not within its limits."""
+    below = np.asarray(tension < robot.tension_min)  # NaN is neither
+    above = np.asarray(tension > robot.tension_max)
+
+    def why(rows: slice) -> str:
+        parts = []
+        for which, word, limits, worst in (
+            (below[rows], "below", robot.tension_min, np.fmin),
+            (above[rows], "above", robot.tension_max, np.fmax),
+        ):
+            cables = np.flatnonzero(which.any(axis=0))
+            if cables.size:
+                reached = float(worst.reduce(tension[rows][:, cables], axis=None))
+                limit = unit.written(float(limits[cables[0]]))
+                parts.append(f"{_cables(cables)} {word} {limit}: {unit.written(reached)} at the winch")
+        return "; ".join(parts)
+
+    return spans_of(time, np.asarray((below | above).any(axis=1)), why)
+
+
+def _cables(which: NDArray[np.intp]) -> str:
+    return f"cable{'s' if which.size > 1 else ''} {', '.join(map(str, which))}"
+
+
+MOST_COLUMNS: Final = 1500  # columns
+MOST_MARKS: Final = 300
+_NEAR: Final = 0.6  # of the values' spread: a limit within this of them is drawn, one farther away is told
+_BORDER: Final = 0.05  # of the spread, above and below
+
+
+class Columns(NamedTuple):
+    """Samples, or groups of them.
+
+    Attributes:
+        time: When each begins [s], shape (C,).
+        low: Least value of each line in it, shape (C, k); NaN where there is none.
+        high: Largest value.
+    """
+
+    time: Array
+    low: Array
+    high: Array
+
+
+def columns(time: Array, values: Array, most: int = MOST_COLUMNS) -> Columns:
+    """As few columns as that of samples (N,) with values (N, k), of as many samples each, or one less."""
+    if time.size <= most:
+        return Columns(time, values, values)
+    starts = (np.arange(most) * time.size) // most
+    return Columns(time[starts], _extremes(np.fmin, values, starts), _extremes(np.fmax, values, starts))
+
+
+def told(
+    tracks: Sequence[tuple[str, Track]], chart: int, duration: float, window: tuple[float, float] | None = None
+) -> dict[str, Any]:
+    """Tracks with their names, as the page takes them.
+
+    Args:
+        tracks: The tracks; the first one's charts can be chosen.
+        chart: Which of them is shown.
+        duration: Of all of them [s].
+        window: From when to when they are looked at [s]; None for the whole.
+    """
+    start, end = (0.0, duration) if window is None else window
+    charts = [_matching(track, tracks[0][1].charts[chart], chart) for _, track in tracks]
+    parts = [_columns(track, shown, start, end) for (_, track), shown in zip(tracks, charts, strict=True)]
+    low, high, near = _range(parts, charts)
+    return {
+        "duration": duration,
+        "window": [start, end],
+        "charts": [f"{each.title} [{each.unit}]" for each in tracks[0][1].charts],
+        "chart": chart,
+        "range": [low, high],
+        "tracks": [
+            _told(name, track, shown, part, near, first=k == 0)
+            for k, ((name, track), shown, part) in enumerate(zip(tracks, charts, parts, strict=True))
+        ],
+    }
+
+
+def _columns(track: Track, chart: Chart, start: float, end: float) -> Columns:
+    rows = track.within(start, end)
+    return columns(track.time[rows], chart.values(rows))
+
+
+def _matching(track: Track, wanted: Chart, chart: int) -> Chart:
+    """The chart of a track that another one's is to be seen beside: of that title, or else in that place."""
+    same = [each for each in track.charts if each.title == wanted.title]
+    return same[0] if same else track.charts[chart if chart < len(track.charts) else 0]
+
+
+def _told(
+    name: str, track: Track, chart: Chart, part: Columns, near: Sequence[Limit], *, first: bool
+) -> dict[str, Any]:
+    digits = chart.decimals + 1
+    far = [f"{limit.name} {limit.value:g} {chart.unit}" for limit in chart.limits if limit not in near]
+    return {
+        "name": name,
+        "title": chart.title,
+        "unit": chart.unit,
+        "decimals": chart.decimals,
+        "cables": chart.of_cables,
+        "lines": [[line, COLORS[i % len(COLORS)], i >= len(COLORS)] for i, line in enumerate(chart.names)],
+        "end": float(track.time[-1]),
+        "times": np.round(part.time, 9).tolist(),
+        "low": [_known(line, digits) for line in part.low.T],
+        "high": None if part.high is part.low else [_known(line, digits) for line in part.high.T],
+        "limits": [[limit.value, limit.name, limit.upper] for limit in chart.limits if limit in near],
+        "far": ", ".join(far) if first else "",
+        "spans": [[span.start, span.end, span.why] for span in track.spans],
+        "marks": [[mark.time, mark.text, mark.bad] for mark in _shown(track)],
+        "paths": [[path, f"rgb{color}"] for path, color in track.paths],
+    }
+
+
+def _shown(track: Track) -> list[Any]:
+    """What happened; of too much what is bad, and of the rest the last."""
+    bad = [mark for mark in track.marks if mark.bad][-MOST_MARKS:]
+    rest = [mark for mark in track.marks if not mark.bad]
+    return sorted(bad + rest[len(rest) - (MOST_MARKS - len(bad)) :] if len(track.marks) > MOST_MARKS else track.marks)
+
+
+def _range(parts: Sequence[Columns], charts: Sequence[Chart]) -> tuple[float, float, list[Limit]]:
+    """Lowest and highest value of the axis, and the limits that lie on it."""
+    ends = [_ends(part) for part in parts]
+    low, high = min(end[0] for end in ends), max(end[1] for end in ends)
+    if low > high:
+        low, high = 0.0, 1.0
+    spread = max(high - low, 1e-6 * max(abs(high), 1.0))
+    limits = [limit for chart in charts for limit in chart.limits]
+    near = [limit for limit in limits if low - _NEAR * spread <= limit.value <= high + _NEAR * spread]
+    low, high = min([low, *(limit.value for limit in near)]), max([high, *(limit.value for limit in near)])
+    return low - _BORDER * spread, high + _BORDER * spread, near
+
+
+def _ends(part: Columns) -> tuple[float, float]:
+    low, high = part.low[np.isfinite(part.low)], part.high[np.isfinite(part.high)]
+    return (float(low.min()), float(high.max())) if low.size and high.size else (np.inf, -np.inf)
+
+
+def _extremes(which: np.ufunc, values: Array, starts: Any) -> Array:
+    """Of the samples from each start to the next, line by line."""
+    return np.stack([which.reduceat(np.ascontiguousarray(line), starts) for line in values.T], axis=1)
+
+
+def _known(line: Array, digits: int) -> list[float | None]:
+    return [value if np.isfinite(value) else None for value in np.round(line, digits).tolist()]

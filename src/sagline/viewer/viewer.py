@@ -19,46 +19,34 @@ from sagline.robot.pose import Pose
 from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot
 from sagline.statics.stiffness import modes
-from sagline.viewer import dynamics, moment_words, readout, session_words, solids
-from sagline.viewer.aside import Aside
-from sagline.viewer.calibration_show import CalibrationShow
+from sagline.viewer import playback, readout, session, solids, swing
+from sagline.viewer.camera import Framing
 from sagline.viewer.channel import Channel
-from sagline.viewer.cut_panel import CutPanel
-from sagline.viewer.cut_show import CutShow
-from sagline.viewer.dot_show import DotShow
 from sagline.viewer.drawn import Drawn
-from sagline.viewer.export_panel import ExportPanel
-from sagline.viewer.force_polygon_show import ForcePolygonShow
-from sagline.viewer.framing import Framing
+from sagline.viewer.feature import Aside, Reading, Show, View
+from sagline.viewer.features.calibration import CalibrationShow
+from sagline.viewer.features.cut import CutPanel, CutShow
+from sagline.viewer.features.export import ExportPanel
+from sagline.viewer.features.keyboard import KeysShow
+from sagline.viewer.features.missing import MissingShow, MissingStage
+from sagline.viewer.features.modes import ModeShow, ModesPanel
+from sagline.viewer.features.proof import ForcePolygonShow
+from sagline.viewer.features.push import PushShow
+from sagline.viewer.features.region import SpaceShow, SpaceStage, planes_of
+from sagline.viewer.features.state import StateShow, add_state_panel
+from sagline.viewer.features.tensions import DotShow
+from sagline.viewer.features.timeline import TimelineShow, TimelineStage
+from sagline.viewer.free_travel import SpacePanel
 from sagline.viewer.hull import hull_of
-from sagline.viewer.keys_show import KeysShow
-from sagline.viewer.linked_controls import LinkedControls
-from sagline.viewer.linking import Levers, Linking
-from sagline.viewer.missing_show import MissingShow
-from sagline.viewer.missing_stage import MissingStage
-from sagline.viewer.mode_show import ModeShow
-from sagline.viewer.modes_panel import ModesPanel
-from sagline.viewer.moment import Moment
+from sagline.viewer.link import Levers, LinkedControls, Linking
 from sagline.viewer.panel import Panel
-from sagline.viewer.played import Beside, Played
-from sagline.viewer.player import Player
-from sagline.viewer.push_show import PushShow
-from sagline.viewer.reading import Reading
+from sagline.viewer.playback import Moment
+from sagline.viewer.player import Beside, Played, Player
 from sagline.viewer.session import SessionMoment
-from sagline.viewer.settings import Settings
-from sagline.viewer.show import Show
-from sagline.viewer.snapshot import Snapshot, taken_at
-from sagline.viewer.source import Source
-from sagline.viewer.space_panel import SpacePanel
-from sagline.viewer.space_show import SpaceShow, planes_of
-from sagline.viewer.space_stage import SpaceStage
+from sagline.viewer.snapshot import Settings, Snapshot, taken_at
 from sagline.viewer.stage import TRACE_POINTS, Stage
-from sagline.viewer.state_panel import add_state_panel
-from sagline.viewer.state_show import StateShow
+from sagline.viewer.state_code import Source
 from sagline.viewer.tension_scale import TensionScale
-from sagline.viewer.timeline_show import TimelineShow
-from sagline.viewer.timeline_stage import TimelineStage
-from sagline.viewer.view import View
 from sagline.viewer.wording import remembers
 
 FRAME_TIME = 1.0 / 60.0  # s: no update comes sooner after the one before
@@ -200,7 +188,7 @@ class Viewer:
 
     def _mode_show(self, mode: str) -> ModeShow:
         panel = ModesPanel(self._server.gui, self._panel.readings, self._wake.set, self._channel, mode)
-        return ModeShow(panel, self._stage, Aside(self._soon), dynamics.vibrating, self._ready)
+        return ModeShow(panel, self._stage, Aside(self._soon), swing.vibrating, self._ready)
 
     def _space_show(self) -> SpaceShow:
         panel = SpacePanel(self._server.gui, self._panel.readings, planes_of(self._robot), self._wake.set)
@@ -334,10 +322,10 @@ class Viewer:
     def _words(self, snapshot: Snapshot | Drawn) -> tuple[str, str]:
         """Verdict and numbers."""
         if isinstance(snapshot, SessionMoment):
-            return session_words.verdict(snapshot), session_words.numbers(snapshot, self._scale)
+            return session.verdict(snapshot), session.numbers(snapshot, self._scale)
         if isinstance(snapshot, Drawn):
             assert isinstance(snapshot, Moment)
-            return moment_words.verdict(snapshot), moment_words.numbers(snapshot, self._scale)
+            return playback.verdict(snapshot), playback.numbers(snapshot, self._scale)
         return readout.verdict(snapshot, capacity=self._ready(Reading.MARGIN)), self._numbers(snapshot)
 
     def _numbers(self, snapshot: Snapshot) -> str:

@@ -1,0 +1,263 @@
+"""Cameras of clients: views that show all, and what is seen at a place."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import viser
+from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
+
+from sagline.core.arrays import Array
+from sagline.viewer.solids import Solid
+
+
+class Eye(NamedTuple):
+    """A camera.
+
+    Attributes:
+        place: Where it is [m], shape (3,).
+        axes: Right, down and forward, one a column, shape (3, 3).
+        reach: Half of the picture's width and height at a distance of 1, shape (2,).
+        pixels: Width and height of the picture [px], shape (2,).
+    """
+
+    place: Array
+    axes: Array
+    reach: Array
+    pixels: Array
+
+    @classmethod
+    def of(cls, camera: Any) -> Eye | None:
+        """The camera of a client as viser knows it; None as long as it has not told a sensible one."""
+        try:
+            turn, place = np.asarray(camera.wxyz, dtype=np.float64), np.asarray(camera.position, dtype=np.float64)
+            pixels = np.array([camera.image_width, camera.image_height], dtype=np.float64)
+            high = float(np.tan(0.5 * camera.fov))
+        except (AssertionError, TypeError, ValueError):  # viser asserts that a camera has been told
+            return None
+        sound = turn.shape == (4,) and place.shape == (3,) and pixels.min() > 0.0 and high > 0.0
+        if not (sound and np.isfinite([*turn, *place, *pixels, high]).all() and np.linalg.norm(turn) > 0.0):
+            return None
+        axes = Rotation.from_quat(np.roll(turn, -1)).as_matrix()
+        return cls(place, axes, high * np.array([pixels[0] / pixels[1], 1.0]), pixels)
+
+    def ray(self, at: tuple[float, float]) -> Array:
+        """Direction in which a point of the picture lies, at a depth of 1, shape (3,).
+
+        Args:
+            at: The point, from 0, 0 at the left upper corner to 1, 1.
+        """
+        across, down = self.reach * (2.0 * np.asarray(at) - 1.0)
+        return np.asarray(self.axes @ np.array([across, down, 1.0]))
+
+    def seen(self, points: Array) -> tuple[Array, Array]:
+        """Where points (..., 3) are in the picture [px], shape (..., 2), and how deep [m]; behind the eye is < 0."""
+        across, down, deep = np.moveaxis((points - self.place) @ self.axes, -1, 0)
+        ahead = np.where(deep == 0.0, np.nan, deep)
+        flat = np.stack((across / ahead, down / ahead), axis=-1) / self.reach
+        return np.asarray(0.5 * (flat + 1.0) * self.pixels), deep
+
+
+def met(solid: Solid, start: Array, direction: Array) -> float | None:
+    """How many times a direction a ray goes until it meets a surface; None where it misses.
+
+    Args:
+        solid: The surface.
+        start: Where the ray starts [m], shape (3,).
+        direction: Where it goes, shape (3,).
+
+    Source:
+        Moeller & Trumbore, J. Graphics Tools 2, 1997.
+    """
+    first, second, third = np.moveaxis(solid.vertices[solid.faces], 1, 0)
+    one, two, gap = second - first, third - first, start - first
+    across = np.cross(direction, two)
+    volume = np.einsum("fi,fi->f", one, across)
+    flat = np.abs(volume) <= 1e-14 * np.abs(one).max() * np.abs(two).max() * np.abs(direction).max()
+    volume = np.where(flat, np.nan, volume)
+    other = np.cross(gap, one)
+    u, v = np.einsum("fi,fi->f", gap, across) / volume, other @ direction / volume
+    far = np.einsum("fi,fi->f", two, other) / volume
+    hit = (u >= 0.0) & (v >= 0.0) & (u + v <= 1.0) & (far > 0.0)
+    return float(far[hit].min()) if hit.any() else None
+
+
+def chosen_line(eye: Eye, at: tuple[float, float], lines: Array, within: float) -> int | None:
+    """Which line is nearest to a point of the picture, if one is near; of several at it the one in front.
+
+    Args:
+        eye: Who looks.
+        at: The point, from 0, 0 at the left upper corner to 1, 1.
+        lines: Points along the lines [m], shape (m, P, 3).
+        within: How near [px].
+    """
+    places, deep = eye.seen(lines)
+    pixel = np.asarray(at) * eye.pixels
+    start, run = places[:, :-1] - pixel, np.diff(places, axis=1)
+    length = np.maximum(np.einsum("mpi,mpi->mp", run, run), 1e-12)
+    share = np.clip(-np.einsum("mpi,mpi->mp", start, run) / length, 0.0, 1.0)
+    away = np.linalg.norm(start + share[..., None] * run, axis=-1)
+    ahead = (deep[:, :-1] > 0.0) & (deep[:, 1:] > 0.0)
+    away = np.where(ahead & np.isfinite(away), away, np.inf)
+    nearest = away.min(axis=1)
+    if not nearest.min() <= within:
+        return None
+    depth = np.take_along_axis(deep, away.argmin(axis=1)[:, None], axis=1)[:, 0]
+    as_near = nearest <= nearest.min() + 1.0  # px: cables that cross there
+    return int(np.argmin(np.where(as_near, depth, np.inf)))
+
+
+def place_of(value: Any) -> tuple[float, float] | None:
+    """The point of a picture that a page has told, from 0, 0 at the left upper corner to 1, 1; None for nonsense."""
+    try:
+        x, y = (float(each) for each in value)
+    except (TypeError, ValueError, OverflowError):
+        return None
+    return (x, y) if abs(x) < 10.0 and abs(y) < 10.0 else None  # NaN neither
+
+
+TOWARD: Final = np.array([0.42, -0.86, 0.36]) / np.linalg.norm([0.42, -0.86, 0.36])  # from the box to the camera
+FIELD = 0.7  # rad, of view, upright: a longer lens than viser's bends less
+BORDER = 1.06  # of the box, to stay off the edges
+_USUAL = 1.3  # width over height until a client has told its own
+_MOVED = 1e-3  # of the box: a camera farther from where it was put has been moved by hand
+_UP: Final = np.array([0.0, 0.0, 1.0])
+
+
+def fitted(low: Array, high: Array, aspect: float, field: float = FIELD) -> tuple[Array, Array]:
+    """The nearest camera that sees a whole box from the usual side.
+
+    Args:
+        low: Lowest corner of the box [m].
+        high: Highest corner [m].
+        aspect: Width over height of the picture, > 0.
+        field: Upright field of view [rad].
+
+    Returns:
+        Where the camera is and the point that it looks at [m].
+    """
+    right = np.cross(_UP, TOWARD)
+    right /= np.linalg.norm(right)
+    axes = np.stack((right, np.cross(TOWARD, right), -TOWARD))
+    middle = 0.5 * (low + high)
+    corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
+    x, y, depth = axes @ (BORDER * (corners - middle)).T
+    slope = np.tan(0.5 * field)
+    far = max(_nearest(x, depth, slope * aspect), _nearest(y, depth, slope))
+    target = middle + _centered(x, far + depth) * axes[0] + _centered(y, far + depth) * axes[1]
+    return target + far * TOWARD, target
+
+
+def _nearest(place: Array, depth: Array, slope: float) -> float:
+    """How far a camera has to stand for points to lie just within both edges: |x - X| = slope (t + z)."""
+    return 0.5 * float(np.max(place / slope - depth) + np.max(-place / slope - depth))
+
+
+def _centered(place: Array, distance: Array) -> float:
+    """Where the camera has to look for points to reach as far to one edge as to the other."""
+
+    def off(middle: float) -> float:
+        seen = (place - middle) / distance
+        return float(seen.max() + seen.min())
+
+    return float(brentq(off, place.min(), place.max(), xtol=1e-9 * float(np.ptp(place))))
+
+
+class Framing:
+    """Keeps a box in the picture of every client that has not moved its camera."""
+
+    def __init__(self, server: viser.ViserServer, low: Array, high: Array) -> None:
+        """Aim the cameras of a server's clients, those to come included."""
+        self._server = server
+        self._low, self._high = low, high
+        size = float(np.linalg.norm(high - low))
+        self._near = _MOVED * size
+        self.farthest = 100.0 * size + float(np.abs([low, high]).max())  # m: no camera is asked for there
+        self._places: dict[int, list[Array]] = {}  # where each client's camera has been put
+        self._wanted: dict[int, Array] = {}  # what each client that is not known yet looks from and at
+        self._led: set[int] = set()  # clients that look from where they were asked to, and are let be
+        self._lock = threading.Lock()  # clients' cameras are heard in a pool of threads
+        camera = server.initial_camera
+        self._first, camera.look_at = fitted(low, high, _USUAL)
+        camera.position = self._first
+        camera.up, camera.fov = _UP, FIELD
+        camera.near, camera.far = 0.002 * size, 20.0 * size
+        server.on_client_connect(self._meet)
+        server.on_client_disconnect(self._part)
+
+    def look(self, client: int, camera: Array) -> None:
+        """Have a client look from a place at another, as if its camera had been moved by hand.
+
+        Args:
+            client: Number of the client; one that is not known yet looks from there as soon as it is.
+            camera: Both places [m], shape (6,).
+        """
+        with self._lock:
+            self._wanted[client] = camera
+            known = self._server.get_clients().get(client)
+        if known is not None:
+            self._follow(known.camera)
+
+    def moved(self, client: int) -> Array | None:
+        """What a client looks from and at [m], shape (6,), if its camera has been moved; None if it has not."""
+        known = self._server.get_clients().get(client)
+        if known is None:
+            return None
+        with self._lock:  # a camera that is just being put somewhere has not been moved by hand
+            try:
+                camera = np.array([known.camera.position, known.camera.look_at], dtype=np.float64).reshape(6)
+            except (TypeError, ValueError):
+                return None  # nonsense
+            places = np.array([self._first, *self._places.get(client, [])])
+        still = len(places) == 1 or np.linalg.norm(places - camera[:3], axis=1).min() < self._near
+        return None if still or not np.all(np.abs(camera) <= self.farthest) else camera
+
+    def _meet(self, client: viser.ClientHandle) -> None:
+        client.camera.on_update(self._follow)
+        self._follow(client.camera)
+
+    def _part(self, client: viser.ClientHandle) -> None:
+        with self._lock:
+            self._places.pop(client.client_id, None)
+            self._wanted.pop(client.client_id, None)
+            self._led.discard(client.client_id)
+
+    def _follow(self, camera: viser.CameraHandle) -> None:
+        """Fit the box anew when the picture has other proportions, unless someone looks from elsewhere."""
+        try:
+            shape = np.array([camera.image_width, camera.image_height, camera.fov], dtype=np.float64)
+            place = np.array(camera.position, dtype=np.float64).reshape(3)
+        except (TypeError, ValueError):
+            return  # nonsense
+        if not (np.all((shape > 0.0) & (shape < [1e5, 1e5, 3.0])) and 0.05 < shape[0] / shape[1] < 20.0):
+            return  # a hidden window, or nonsense
+        with self._lock:
+            self._fit(camera, place, float(shape[0] / shape[1]), float(shape[2]))
+
+    def _fit(self, camera: viser.CameraHandle, place: Array, aspect: float, field: float) -> None:
+        places = self._places.setdefault(camera.client.client_id, [])
+        wanted = self._wanted.pop(camera.client.client_id, None)
+        if wanted is not None:
+            places.append(self._first)  # from now on it is where nobody has put it
+            self._led.add(camera.client.client_id)
+            with camera.client.atomic():
+                camera.position, camera.look_at = wanted[:3], wanted[3:]
+            return
+        if camera.client.client_id in self._led:
+            return  # whatever a page that has not heard yet still tells of its camera
+        known = np.array([self._first, *places])
+        if places and not np.linalg.norm(known - place, axis=1).min() < self._near:
+            return
+        position, target = fitted(self._low, self._high, aspect, field)
+        if camera.client.client_id not in self._server.get_clients():
+            return
+        stands = bool(np.linalg.norm(position - place) < self._near)
+        if not (stands and places):
+            places.append(position)
+        if stands:
+            return
+        with camera.client.atomic():
+            camera.position, camera.look_at = position, target

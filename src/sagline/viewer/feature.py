@@ -1,0 +1,154 @@
+"""View, and the interface of its features."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final, Protocol, TypeVar
+
+from sagline.core.arrays import Array
+from sagline.core.errors import SaglineError
+from sagline.viewer.drawn import Drawn
+from sagline.viewer.player import Played
+from sagline.viewer.snapshot import Settings, Snapshot
+from sagline.viewer.tension_scale import TensionScale
+
+
+class Reading(Enum):
+    """What can come after the cables: what it takes may still be compiled."""
+
+    MARGIN = "capacity margin"
+    POLYGON = "polygon of feasible tensions"
+    SHARING = "what further ways of sharing choose"
+    FREQUENCIES = "natural frequencies"
+    REST = "where the platform rests if the model is approximate"
+    MODES = "modes with cable mass"
+    SIMULATION = "what follows when a cable is cut"
+    WORKSPACE = "margins over a set of loads"
+    VERDICTS = "whether a pose is feasible at all"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """What is shown, and how it is drawn.
+
+    Attributes:
+        snapshot: The robot.
+        settings: What is set.
+        scale: Colors of tensions.
+        ghost: Whether straight cables are drawn beside the real ones.
+        wrench: External wrench on a platform that is dragged, shape (6,); None for none.
+        played: What is played, if that is shown; None for a pose of one's own.
+        playing: Whether its time goes on.
+    """
+
+    snapshot: Snapshot | Drawn
+    settings: Settings
+    scale: TensionScale
+    ghost: bool
+    wrench: Array | None = None
+    played: Played | None = None
+    playing: bool = False
+
+
+class Show(Protocol):
+    """A part of the page; all of it belongs to the thread that serves."""
+
+    @property
+    def moving(self) -> bool:
+        """Whether pictures follow each other without anybody's doing."""
+
+    @property
+    def waiting(self) -> bool:
+        """Whether something is to come without anybody's doing."""
+
+    def follow(self, view: View) -> None:
+        """Something is shown."""
+
+    def tick(self) -> None:
+        """Some time has passed."""
+
+
+T = TypeVar("T")
+
+PATIENCE = 2.0  # s: what takes longer is told how long it has taken
+NICENESS: Final = 10  # a drag comes first where both want a processor: it is then drawn up to twice as often
+
+
+class Aside:
+    """One piece of work at a time, in a thread of its own."""
+
+    def __init__(self, soon: Callable[[Callable[[], None]], None]) -> None:
+        """Begin with none; `soon` takes what the serving thread is to do, from any thread."""
+        self._soon = soon
+        self._asked = 0
+        self._began: float | None = None
+        self._next: Callable[[], None] | None = None
+
+    @property
+    def busy(self) -> bool:
+        """Whether something is being worked out."""
+        return self._began is not None
+
+    @property
+    def waited(self) -> float:
+        """For how long it has been [s]; 0 as long as nobody minds."""
+        elapsed = 0.0 if self._began is None else time.monotonic() - self._began
+        return elapsed if elapsed > PATIENCE else 0.0
+
+    def ask(self, task: Callable[[], T], done: Callable[[T], None], failed: Callable[[str], None]) -> None:
+        """Have something worked out in place of what was asked before; from the serving thread.
+
+        Args:
+            task: The work, which touches nothing that anybody else changes.
+            done: Given its result, in the serving thread, unless something else has been asked for meanwhile.
+            failed: Given the message of a `SaglineError` in the same way.
+        """
+        self._asked += 1
+        mine = self._asked
+
+        def end(tell: Callable[[], None]) -> None:
+            self._began = None
+            if mine == self._asked:
+                tell()
+            if self._next is not None:
+                start, self._next = self._next, None
+                start()
+
+        def work() -> None:
+            _give_way()
+            try:
+                result = task()
+            except SaglineError as error:
+                message = str(error)
+                self._soon(lambda: end(lambda: failed(message)))
+                return
+            except BaseException as error:
+                mistake = error
+
+                def fail() -> None:
+                    raise mistake
+
+                self._soon(fail)
+                return
+            self._soon(lambda: end(lambda: done(result)))
+
+        def start() -> None:
+            self._began = time.monotonic()
+            threading.Thread(target=work, daemon=True).start()
+
+        if self._began is None:
+            start()
+        else:
+            self._next = start
+
+
+def _give_way() -> None:
+    """Let this thread have a processor where no other wants it."""
+    if sys.platform == "linux":  # elsewhere this would be the whole process
+        os.nice(NICENESS)

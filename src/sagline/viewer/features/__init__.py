@@ -1,0 +1,1 @@
+"""Features of the viewer, one a file."""

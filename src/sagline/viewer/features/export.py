@@ -1,0 +1,218 @@
+"""Export of pictures and films."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from math import ceil, log10
+from typing import Any, Final
+
+import numpy as np
+import viser
+
+from sagline.core.arrays import Array
+from sagline.core.errors import InvalidValueError, SaglineError
+from sagline.files.names import file_stem
+from sagline.viewer.channel import Channel, Told
+from sagline.viewer.feature import View
+from sagline.viewer.player import Played
+from sagline.viewer.readout import headline
+from sagline.viewer.snapshot import Snapshot
+from sagline.viewer.studio import HEIGHT as STRIP
+from sagline.viewer.studio import PAPERS, Shot, pictured, strip_of, studio
+
+WIDTH, HEIGHT, TEXT = 1920, 1080, 26  # px
+RATE = 30.0  # pictures a second
+LONGEST = 120.0  # s of film: more pictures than that fill a browser's memory
+LINE_WIDTH = 1.4  # for those of a screen
+TOPIC: Final = "film"  # what the film is, once
+CLOCK: Final = "film clock"  # what its strip says, before each picture
+
+
+def filmed(
+    client: viser.ClientHandle,
+    server: viser.ViserServer,
+    told: Told,
+    played: Played,
+    view: View,
+    speed: float,
+    name: str,
+    extent: tuple[Array, Array],
+    cancelled: Callable[[], bool],
+) -> None:
+    """Have a client's page film what is played from its beginning to its end, from where its camera is.
+
+    Args:
+        client: Who asked.
+        server: The server, whose scene is hidden from that client meanwhile; others see and drag what they did.
+        told: What that page is told.
+        played: The run, or simulation.
+        view: How it is drawn.
+        speed: Time of what is played a second of film.
+        name: Of the file, without its suffix.
+        extent: Lowest and highest corner of what there is to see [m].
+        cancelled: Whether nobody wants it any more.
+
+    Raises:
+        InvalidValueError: If the film would be too long.
+        RuntimeError: If the client goes, or gives no picture.
+        TimeoutError: If it gives none for too long.
+    """
+    times = moments(played.duration, speed)
+    strip = round(STRIP * TEXT)
+    pace = () if speed == 1.0 else (f"{speed:g} × its speed",)
+    about = {
+        **strip_of(view, played.name, *pace), "name": name, "count": len(times), "rate": RATE,
+        "width": WIDTH, "height": HEIGHT, "text": TEXT, "strip": strip,
+    }  # fmt: skip
+    shot = Shot.of(client.camera, *extent, WIDTH, HEIGHT - strip)
+    told.tell(CLOCK, None)  # pictures without a clock are none of the film's
+    told.tell(TOPIC, about)
+    try:
+        with studio(client, server, shot, view, LINE_WIDTH, played) as scene:
+            for time in times:
+                if cancelled():
+                    return
+                sight = replace(view, snapshot=played.sight(float(time)))
+                scene.show(sight)
+                told.tell(CLOCK, _clock(sight, float(time), speed))
+                scene.take("jpeg")
+    finally:
+        told.tell(TOPIC, None)  # nothing more comes; a page that has all pictures records them nevertheless
+
+
+def moments(duration: float, speed: float) -> Array:
+    """Times of a film's pictures [s], from 0 to the end, shape (n,), n >= 2.
+
+    Raises:
+        InvalidValueError: If the film would be too long.
+    """
+    length = duration / speed
+    if length > LONGEST:
+        step = "Choose a higher speed above: the film has the speed at which it plays."
+        raise InvalidValueError("film", f"{length:,.0f} s long at this speed", f"at most {LONGEST:g} s", step)
+    return np.linspace(0.0, duration, max(2, 1 + round(length * RATE)))
+
+
+def _clock(view: View, time: float, speed: float) -> dict[str, Any]:
+    """What changes in the strip from picture to picture."""
+    digits = max(1, ceil(-log10(speed / RATE)))
+    said = headline(view.snapshot) if isinstance(view.snapshot, Snapshot) else view.snapshot.notice
+    return {"time": f"{time:.{digits}f} s", "said": "" if view.snapshot.feasible else said}
+
+
+class Visitor:
+    """Who takes something away: one thing at a time."""
+
+    def __init__(self, client: viser.ClientHandle) -> None:
+        """Begin with nothing."""
+        self.client = client
+        self.told = Told(client.gui)
+        self.taking = threading.Lock()
+        self.cancelled = threading.Event()
+
+
+Send = Callable[[Visitor], None]
+
+
+class ExportPanel:
+    """Buttons for a picture, the scene, and a film of the run; who asks waits in a thread of viser, others do not."""
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        channel: Channel,
+        view: Callable[[], View | None],
+        played: Callable[[], tuple[Played | None, float]],
+        extent: tuple[Array, Array],
+    ) -> None:
+        """Build the panel.
+
+        Args:
+            server: The server.
+            channel: Where pages tell that they do not want a film any more.
+            view: What is shown now.
+            played: What is played now, if anything is, and its time a second.
+            extent: Lowest and highest corner of what there is to see [m].
+        """
+        self._server, self._view, self._played, self._extent = server, view, played, extent
+        self._visitors: dict[int, Visitor] = {}
+        gui = server.gui
+        with gui.add_folder("Take away", expand_by_default=False):
+            self._paper = gui.add_dropdown("Picture for", tuple(PAPERS))
+            self._strip = gui.add_checkbox("With legend", True, hint="The robot's name and the colors of tensions.")
+            buttons = [
+                (gui.add_button("Picture (PNG)", icon=viser.Icon.CAMERA), self._send_picture),
+                (gui.add_button("Scene (GLB)", icon=viser.Icon.BOX), self._send_scene),
+            ]
+            self._film: Any = gui.add_button("Film", icon=viser.Icon.MOVIE, visible=False)
+            buttons.append((self._film, self._send_film))
+        for button, send in buttons:
+            button.on_click(partial(self._sent, send))
+        channel.on(TOPIC, self._cancel)
+        server.on_client_disconnect(self._part)
+
+    def offer_film(self, of: str | None) -> None:
+        """Offer a film of what is played, or none."""
+        self._film.visible = of is not None
+        self._film.label = f"Film of the {of}"
+
+    def _send_picture(self, visitor: Visitor) -> None:
+        view, paper = self._view(), PAPERS.get(self._paper.value)
+        if view is not None and paper is not None:
+            told, strip = visitor.told, bool(self._strip.value)
+            pictured(visitor.client, self._server, told, view, paper, self._name(), self._extent, strip=strip)
+
+    def _send_scene(self, visitor: Visitor) -> None:
+        from sagline.viewer.export import scene_as_glb  # trimesh: a fifth of what starts the viewer
+
+        view = self._view()
+        if view is not None:
+            glb = scene_as_glb(view.snapshot, view.scale, view.settings.sag_scale)
+            visitor.client.send_file_download(f"{self._name()}.glb", glb, save_immediately=True)
+
+    def _send_film(self, visitor: Visitor) -> None:
+        view, (played, speed) = self._view(), self._played()
+        if played is not None and view is not None:
+            visitor.cancelled.clear()
+            client, name = visitor.client, f"{self._name()}-{played.name}"
+            told, cancelled = visitor.told, visitor.cancelled.is_set
+            filmed(client, self._server, told, played, view, speed, name, self._extent, cancelled)
+
+    def _cancel(self, _: Any, client: int) -> None:
+        """A page does not want its film any more."""
+        if client in self._visitors:
+            self._visitors[client].cancelled.set()
+
+    def _part(self, client: viser.ClientHandle) -> None:
+        self._visitors.pop(client.client_id, None)
+
+    def _name(self) -> str:
+        view = self._view()
+        return "sagline" if view is None else file_stem(view.snapshot.robot.name)
+
+    def _sent(self, send: Send, event: viser.GuiEvent[Any]) -> None:
+        """Send something to the client that asked; one that has gone, or gives no picture, gets nothing."""
+        client = event.client
+        if client is None:
+            return
+        visitor = self._visitors.setdefault(client.client_id, Visitor(client))
+        if not visitor.taking.acquire(blocking=False):
+            return  # pressed twice
+        try:
+            send(visitor)
+        except (RuntimeError, TimeoutError, SaglineError) as error:
+            if client.client_id in self._server.get_clients():
+                client.add_notification(
+                    "Nothing to take away", _why(error), with_close_button=True, auto_close_seconds=8.0
+                )
+        finally:
+            visitor.taking.release()
+
+
+def _why(error: Exception) -> str:
+    if isinstance(error, TimeoutError):
+        return "The page gave no picture for too long: keep it in view until the pictures are taken."
+    return str(error)

@@ -1,0 +1,139 @@
+"""Keyboard control of the platform, and text for screen readers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from sagline.core.arrays import Array
+from sagline.core.errors import SaglineError
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.viewer import solids
+from sagline.viewer.channel import Channel
+from sagline.viewer.drawn import Drawn
+from sagline.viewer.feature import View
+from sagline.viewer.readout import headline
+from sagline.viewer.tension_scale import force_unit
+from sagline.viewer.wording import number
+
+
+class Spoken(NamedTuple):
+    """A sentence in parts.
+
+    Attributes:
+        head: The verdict in a word or two: when it changes, it is said soon.
+        text: All of it.
+        place: Where the platform is.
+    """
+
+    head: str
+    text: str
+    place: str
+
+
+def spoken(view: View) -> Spoken:
+    """What there is to say of what is shown."""
+    snapshot = view.snapshot
+    place = place_of(snapshot.pose)
+    if isinstance(snapshot, Drawn):
+        head = snapshot.notice or f"As in the {'recording' if view.played is None else view.played.name}"
+        return Spoken(head, _with(head, _tensions(snapshot.robot, snapshot.tension)), place)
+    head = headline(snapshot)
+    told = _tensions(snapshot.robot, snapshot.tension) if snapshot.feasible else snapshot.reason
+    return Spoken(head, _with(head, told), place)
+
+
+def described(robot: Robot) -> str:
+    """What the picture shows, whatever its pose."""
+    return f"{robot.name}: a platform of {number(robot.mass, '.4g')} kg on {robot.cable_count} cables"
+
+
+def place_of(pose: Pose) -> str:
+    """Position and, where it is turned, angles of a platform, as one says them."""
+    x, y, z = (number(value, ".2f") for value in pose.position)
+    angles = [number(value, ".0f") for value in pose.rotation.as_euler("ZYX", degrees=True)]
+    place = f"x {x}, y {y}, z {z} m"
+    return place if angles == ["0"] * 3 else f"{place}, turned {', '.join(angles)} degrees about z, y, x"
+
+
+def _with(head: str, told: str) -> str:
+    return f"{head}, {told}" if told else head
+
+
+def _tensions(robot: Robot, tension: Array) -> str:
+    known = tension[np.isfinite(tension)]
+    if not known.size:
+        return ""
+    unit = force_unit(robot)
+    form = ".0f" if unit.newtons == 1.0 else ".1f"
+    low, high = (number(value / unit.newtons, form) for value in (known.min(), known.max()))
+    return f"tensions {low} to {high} {unit.name}"
+
+
+STEP: Final = 0.01  # of the robot's size: how far one key moves
+TURN: Final = np.radians(1.0)  # how far one key turns
+MOST: Final = 100.0  # steps at once: keys that were held while nobody listened
+
+
+class KeysShow:
+    """Says what is shown, and hears keys; all of it belongs to the thread that serves."""
+
+    moving = False
+    waiting = False
+
+    def __init__(self, channel: Channel, robot: Robot, go: Callable[[Pose], None], go_home: Callable[[], None]) -> None:
+        """Say what the picture is of.
+
+        Args:
+            channel: To the pages.
+            robot: The robot.
+            go: Puts the platform to a pose, or refuses by a `SaglineError`.
+            go_home: Puts it home.
+        """
+        self._channel, self._go, self._go_home = channel, go, go_home
+        self._step = solids.round_below(STEP * solids.size_of(robot))
+        self._pose: Pose | None = None
+        channel.tell("scene", {"what": described(robot), "step": self._step, "turn": round(float(np.degrees(TURN)), 3)})
+        channel.on("nudge", self._nudge)
+        channel.on("home", lambda *_: self._go_home())
+
+    def follow(self, view: View) -> None:
+        """Tell the verdict."""
+        self._pose = view.snapshot.pose
+        self._channel.tell("spoken", spoken(view)._asdict())
+
+    def tick(self) -> None:
+        """Nothing comes of time."""
+
+    def _nudge(self, value: Any, _: int) -> None:
+        """Move by steps along x, y, z, and turn by steps about z, y, x."""
+        steps = _steps(value)
+        if steps is None or self._pose is None:
+            return
+        pose = nudged(self._pose, self._step * steps[:3], TURN * steps[:2:-1])
+        try:
+            self._go(pose)
+        except SaglineError as error:
+            self._channel.tell("nudge-told", str(error))
+        else:
+            self._pose = pose  # more may come before this is shown
+            self._channel.tell("nudge-told", None)
+
+
+def nudged(pose: Pose, way: Array, turn: Array) -> Pose:
+    """A pose moved along a way [m], and turned about its origin by a rotation vector in world axes [rad]."""
+    rotation = Rotation.from_rotvec(turn) * pose.rotation if turn.any() else pose.rotation
+    return Pose(pose.position + way, rotation)
+
+
+def _steps(value: Any) -> Array | None:
+    """Six numbers of a page, of a size that keys bring; None if it sent anything else."""
+    if not isinstance(value, list) or len(value) != 6:
+        return None
+    if not all(isinstance(each, int | float) and abs(each) <= MOST for each in value):  # NaN neither
+        return None
+    return np.array(value, dtype=np.float64)

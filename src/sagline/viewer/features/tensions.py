@@ -1,0 +1,400 @@
+"""Drawing of the feasible tensions, in which tensions are chosen by hand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from html import escape
+from string import ascii_uppercase
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from sagline.core.arrays import Array
+from sagline.core.errors import InvalidValueError
+from sagline.kinematics.inverse import inverse
+from sagline.kinematics.inverse_solver import InverseSolver
+from sagline.kinematics.plan import Plan
+from sagline.kinematics.polygon import polygon_at, tension_polygon
+from sagline.kinematics.status import PoseStatus
+from sagline.tension.minimum_norm import MinimumNorm
+from sagline.tension.options import kernel_options, takes_default_kernel
+from sagline.tension.polygon import TensionPolygon
+from sagline.viewer import playback, session
+from sagline.viewer.by_hand import BY_HAND, WIDTH, ByHand, DotField
+from sagline.viewer.channel import Channel, chosen_by
+from sagline.viewer.feature import Reading, View
+from sagline.viewer.panel import Panel
+from sagline.viewer.readout import LATER, block, sentence
+from sagline.viewer.session import SessionMoment
+from sagline.viewer.snapshot import METHODS, Snapshot
+from sagline.viewer.tension_scale import force_unit
+from sagline.viewer.wording import method_name, number
+
+NEAR: Final = 10.0  # px: marks that are closer share one
+
+
+class Mark(NamedTuple):
+    """A way of sharing.
+
+    Attributes:
+        name: As it is chosen.
+        letter: That marks it.
+        tension: Its chord tensions [N], shape (m,); NaN where it has none.
+        missing: Why it has none; "" where it has.
+    """
+
+    name: str
+    letter: str
+    tension: Array
+    missing: str = ""
+
+
+class Marks:
+    """The answers of all ways at a pose, kept for as long as nothing but the way changes.
+
+    A robot that is moved is given solvers of its own, which answer a dozen times as fast; it takes them longer to be
+    made than to answer once without, and so a robot whose mass follows a slider has none.
+    """
+
+    def __init__(self) -> None:
+        """Begin with none."""
+        self._key: tuple[object, ...] = ()
+        self._found: tuple[Mark, ...] = ()
+        self._solvers: dict[str, InverseSolver] | None = None
+
+    def at(self, plan: Plan, *, further: bool, verdicts: bool = True) -> tuple[Mark, ...]:
+        """The answers at the pose of a plan, at rest under its wrench.
+
+        Args:
+            plan: A single pose.
+            further: Whether ways can be had whose kernels are compiled apart.
+            verdicts: Whether solvers can be had: they say of poses without an answer why.
+        """
+        state = plan.state
+        place = (state.pose.position.tobytes(), state.pose.quaternion.tobytes(), state.wrench.tobytes())
+        key = (id(state.robot), type(state.cables.model), further, verdicts, *place)
+        if key != self._key:
+            ways = [
+                (name, letter)
+                for (name, method), letter in zip(METHODS.items(), ascii_uppercase, strict=False)
+                if further or takes_default_kernel(method)
+            ]
+            if key[:4] != self._key[:4]:
+                self._solvers = None
+            elif self._solvers is None and verdicts:
+                self._solvers = _solvers(plan, [name for name, _ in ways])
+            self._key, self._robot = key, state.robot  # and the id stays this robot's
+            self._found = tuple(_mark(plan, name, letter, (self._solvers or {}).get(name)) for name, letter in ways)
+        return self._found
+
+
+def grouped(marks: tuple[Mark, ...], field: DotField) -> list[tuple[tuple[float, float], list[Mark]]]:
+    """Marks that have an answer, with those that would lie on each other together, each at its place [px]."""
+    groups: list[tuple[tuple[float, float], list[Mark]]] = []
+    for mark in marks:
+        if mark.missing:
+            continue
+        x, y = field.place(field.polygon.coordinates(mark.tension))
+        home = next((group for (u, v), group in groups if np.hypot(u - x, v - y) < NEAR), None)
+        if home is None:
+            groups.append(((x, y), [mark]))
+        else:
+            home.append(mark)
+    return groups
+
+
+def _solvers(plan: Plan, names: list[str]) -> dict[str, InverseSolver]:
+    """A solver for each way that can be had for the robot of a plan."""
+    robot, model = plan.state.one_robot, plan.state.cables.model
+    found = {}
+    for name in names:
+        with suppress(InvalidValueError):  # `inverse` tells why, and what it does otherwise
+            found[name] = InverseSolver(robot, model, METHODS[name].alone)
+    return found
+
+
+def _mark(plan: Plan, name: str, letter: str, solver: InverseSolver | None) -> Mark:
+    state = plan.state
+    robot, pose = state.one_robot, state.pose
+    if solver is not None:
+        step = solver.step(pose.position, pose.quaternion, state.wrench)
+        tension, status = step.chord_tension, step.status
+    else:
+        try:
+            found = inverse(robot, pose, state.cables.model, METHODS[name], state.wrench)
+        except InvalidValueError as error:
+            return Mark(name, letter, np.full(robot.cable_count, np.nan), str(error))
+        tension, status = found.chord_tension, PoseStatus(int(found.status))
+    return Mark(name, letter, tension, "" if status is PoseStatus.SOLVED else status.text)
+
+
+MOST_REDUNDANT: Final = 2  # dimensions of a drawing
+SHARING: Final = "sharing"  # topic of a way of sharing that is chosen
+
+
+def polygon_figure(
+    snapshot: Snapshot, marks: tuple[Mark, ...] = (), field: DotField | None = None, back: str = ""
+) -> str:
+    """HTML: the polygon with the chosen tensions in it; for one redundant cable the interval; else a sentence.
+
+    Args:
+        snapshot: What is shown.
+        marks: What ways of sharing would choose; they can be chosen there.
+        field: What can be chosen by hand; None where nothing can.
+        back: The way of sharing that a button leads back to; "" for no button.
+    """
+    if remark := why_none(snapshot):
+        return sentence(remark)
+    drawn = field_of(snapshot) if field is None else field
+    if drawn is None:
+        return sentence("No tensions within the limits balance the platform: there is nothing to choose from.")
+    return (
+        block(_drawing(snapshot, drawn, marks, movable=field is not None))
+        + sentence(_told(snapshot, drawn, movable=field is not None))
+        + _key(snapshot, marks, back)
+    )
+
+
+def polygon_later() -> str:
+    """HTML: that the polygon is not there yet."""
+    return sentence(LATER.capitalize())
+
+
+def why_none(snapshot: Snapshot) -> str:
+    """Why the feasible tensions of a robot have no drawing; "" where they have."""
+    redundant = snapshot.robot.cable_count - snapshot.robot.degrees_of_freedom
+    if redundant > MOST_REDUNDANT:
+        return f"{redundant} redundant cables: their feasible tensions have no picture in a plane."
+    return "As many cables as freedoms: the balance leaves nothing to choose." if redundant == 0 else ""
+
+
+def field_of(snapshot: Snapshot, before: DotField | None = None) -> DotField | None:
+    """What there is to choose from, with the pulls of the cables as they hang; None where there is nothing.
+
+    Args:
+        snapshot: A robot with one or two redundant cables.
+        before: A field of the same pose, whose place in the drawing it keeps; None for none.
+    """
+    polygon = _polygon(snapshot)
+    if polygon is None or not len(polygon.vertices):
+        return None
+    return DotField.of(polygon, polygon.coordinates(snapshot.tension), before)
+
+
+def _polygon(snapshot: Snapshot) -> TensionPolygon | None:
+    plan = snapshot.plan
+    if plan is None:
+        return None
+    robot, state = snapshot.robot, plan.state
+    if snapshot.feasible:
+        options = kernel_options(robot, state.cables.model, MinimumNorm())
+        return polygon_at(robot, snapshot.pose, options, state.wrench, state.chord_tension, state.pull, feasible=True)
+    try:
+        return tension_polygon(robot, snapshot.pose, state.cables.model, state.wrench)
+    except InvalidValueError:  # a pose without a balance
+        return None
+
+
+def _drawing(snapshot: Snapshot, field: DotField, marks: tuple[Mark, ...], *, movable: bool) -> str:
+    corners, places = field.corners, [field.place(corner) for corner in field.corners]
+    outline = " ".join(f"{x:.1f},{y:.1f}" for x, y in places)
+    if field.redundant == 2:
+        area = f'<polygon points="{outline}" class="polygon"/>'
+        names = "".join(_side(field, k, places[k], places[(k + 1) % len(corners)]) for k in range(len(corners)))
+    else:
+        area = f'<polyline points="{outline}" class="interval"/>'
+        names = "".join(_end(field, k, places[k], places[1 - k]) for k in range(2))
+    where = f' data-scale="{field.scale!r}" data-middle="{" ".join(map(repr, field.middle.tolist()))}"'
+    kind = f'class="field" data-dot=""{where}' if movable else 'role="img" aria-label="feasible tensions"'
+    return (
+        f'<svg viewBox="0 0 {WIDTH} {field.height}" {kind}>{area}{names}{_marks(field, marks)}'
+        f"{_dot(snapshot, field, movable=movable)}</svg>"
+    )
+
+
+def _dot(snapshot: Snapshot, field: DotField, *, movable: bool) -> str:
+    """The chosen tensions, where there are any: what is dragged, with room for a finger."""
+    point = field.polygon.coordinates(snapshot.tension)
+    if not np.isfinite(point).all():  # no tensions were chosen where the way of sharing found none
+        return ""
+    x, y = field.place(point)
+    dot = f'<circle cx="{x:.1f}" cy="{y:.1f}" r="5.5" class="dot"/>'
+    if not movable:
+        return dot
+    unit, tension, plan = force_unit(snapshot.robot), snapshot.tension, snapshot.plan
+    told = f"{unit.bare(tension.min())} to {unit.written(tension.max())}"
+    told += "" if plan is None else f", {method_name(plan.tension)}"
+    share = (point[0] - field.low[0]) / max(float(field.high[0] - field.low[0]), 1e-9)
+    return (
+        '<g class="handle" tabindex="0" role="slider" aria-label="Tensions, in the field of all that are feasible" '
+        f'aria-roledescription="slider of {field.redundant} dimensions" aria-valuemin="0" aria-valuemax="100" '
+        f'aria-valuenow="{100.0 * share:.0f}" aria-valuetext="{escape(told)}">'
+        f'<circle cx="{x:.1f}" cy="{y:.1f}" r="18" class="reach"/>{dot}</g>'
+    )
+
+
+def _marks(field: DotField, marks: tuple[Mark, ...]) -> str:
+    """A small mark for each way of sharing, with its letter; those in one place share it."""
+    parts = []
+    for (x, y), group in grouped(marks, field):
+        letters, names = "".join(mark.letter for mark in group), ", ".join(mark.name for mark in group)
+        right, above = x < 0.7 * WIDTH, 5.0 if field.redundant == 2 else 10.0
+        parts.append(
+            f'<g class="way" {chosen_by(SHARING, group[0].name)}><title>{escape(names)}</title>'
+            f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3"/>'
+            f'<text x="{x + (6 if right else -6):.1f}" y="{y - above:.1f}" class="letter" '
+            f'text-anchor="{"start" if right else "end"}">{letters}</text></g>'
+        )
+    return "".join(parts)
+
+
+def _told(snapshot: Snapshot, field: DotField, *, movable: bool) -> str:
+    unit = force_unit(snapshot.robot)
+    how = "Drag the dot, or move it with the arrow keys." if movable else "Dot: the chosen tensions."
+    if field.redundant == 1:
+        ends = field.polygon.vertices[:, 0]
+        point = float(field.polygon.coordinates(snapshot.tension)[0])
+        span = f"{ends.min():.4g} to {ends.max():.4g} N" if np.isfinite(ends).all() else "without an end"
+        told = f"One redundant cable: λ may be {span}; chosen: {number(point, '.4g')} N."
+        return f"{told} {how}" if movable else told
+    if not field.polygon.bounded:
+        return f"{how} Sides: the limit that each is; one without a name is none, there it goes on."
+    width, height = np.ptp(field.corners, axis=0)
+    return f"{how} Sides: the limit that each is. Width {unit.written(width)}, height {unit.written(height)}."
+
+
+def _key(snapshot: Snapshot, marks: tuple[Mark, ...], back: str) -> str:
+    """The ways of sharing by their letters, to choose; and what is chosen by hand, and how to take it back."""
+    if not marks:
+        return ""
+    by_hand = snapshot.plan is not None and isinstance(snapshot.plan.tension, ByHand)
+    parts = []
+    for mark in marks:
+        name = escape(mark.name)
+        if mark.missing:
+            parts.append(f'<span class="quiet" title="{escape(mark.missing)}">{mark.letter} {name}: none here</span>')
+            continue
+        chosen = mark.name == back and not by_hand
+        parts.append(
+            f'<button {chosen_by(SHARING, mark.name)} aria-pressed="{str(chosen).lower()}">'
+            f"<b>{mark.letter}</b> {name}</button>"
+        )
+    remark = ""
+    if by_hand:
+        again = f" <button {chosen_by(SHARING, back)}>Back to {escape(back)}</button>" if back else ""
+        kept = "where the platform is dragged, the tensions stay as near to these as balance and limits allow"
+        remark = f'<div class="hand"><b>{BY_HAND.capitalize()}</b>: {kept}.{again}</div>'
+    return block(f'{remark}<div class="ways">{"".join(parts)}</div>')
+
+
+def _side(field: DotField, k: int, start: tuple[float, float], end: tuple[float, float]) -> str:
+    """The name of a side, outside of it; none for a side that is too short to name, or no limit."""
+    side = field.sides[k]
+    if side is None or np.hypot(end[0] - start[0], end[1] - start[1]) < 22.0:
+        return ""
+    x, y = 0.5 * (start[0] + end[0]), 0.5 * (start[1] + end[1])
+    nx, ny = start[1] - end[1], end[0] - start[0]  # outward: corners go around counter-clockwise, and y points down
+    nx, ny = nx / np.hypot(nx, ny), ny / np.hypot(nx, ny)
+    anchor = "start" if nx > 0.35 else "end" if nx < -0.35 else "middle"  # the text leaves its side, not along it
+    x, y = x + 7.0 * nx, y + 9.0 * ny + 3.0
+    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{side.cable} {side.limit}</text>'
+
+
+def _end(field: DotField, k: int, at: tuple[float, float], other: tuple[float, float]) -> str:
+    """The name of an end of an interval, below it; of one that is none, an arrow head."""
+    side, (x, y) = field.sides[k], at
+    if side is None:
+        back = 8.0 if other[0] > x else -8.0
+        return f'<path d="M{x + back:.1f} {y - 5:.1f}L{x:.1f} {y:.1f}L{x + back:.1f} {y + 5:.1f}" class="interval"/>'
+    tick = f'<line x1="{x:.1f}" x2="{x:.1f}" y1="{y - 8:.1f}" y2="{y + 8:.1f}" class="interval"/>'
+    return f'{tick}<text x="{x:.1f}" y="{y + 22:.1f}" text-anchor="middle">{side.cable} {side.limit}</text>'
+
+
+DOT: Final = "dot"  # topic of the dot: {"at": coordinates [N]}, or {"by": steps, in shares of the drawing}
+OVER: Final = 2e-3  # of the drawing: sides are aimed at from so far beyond
+FARTHEST: Final = 1.0  # share of the drawing that a step may be
+
+
+class DotShow:
+    """Draws the field and moves the dot; all of it belongs to the thread that serves."""
+
+    moving = False
+    waiting = False
+
+    def __init__(self, panel: Panel, channel: Channel, ready: Callable[[Reading], bool]) -> None:
+        """Begin with nothing.
+
+        Args:
+            panel: Where the drawing is, and which way of sharing is chosen.
+            channel: What brings the dot from the page.
+            ready: Whether a reading can be had without waiting.
+        """
+        self._panel, self._ready = panel, ready
+        self._marks = Marks()
+        self._field: DotField | None = None  # where the dot can go
+        self._key: tuple[object, ...] = ()  # of the pose that the field is of
+        self._aim: Array | None = None  # coordinates that were chosen last, (r,)
+        channel.on(DOT, self._hear_dot)
+        channel.on(SHARING, self._hear_sharing)
+
+    def follow(self, view: View) -> None:
+        """Draw what there is to choose from."""
+        snapshot = view.snapshot
+        before, self._field = self._field, None
+        if not isinstance(snapshot, Snapshot):
+            recorded = isinstance(snapshot, SessionMoment)
+            self._panel.show_polygon(session.polygon() if recorded else playback.polygon())
+        elif not self._ready(Reading.POLYGON):
+            self._panel.show_polygon(polygon_later())
+        elif view.played is not None or snapshot.plan is None or why_none(snapshot):
+            self._panel.show_polygon(polygon_figure(snapshot))
+        else:
+            state = snapshot.plan.state
+            place = (state.pose.position.tobytes(), state.pose.quaternion.tobytes(), state.wrench.tobytes())
+            key = (*place, view.settings.changes, type(state.cables.model))
+            self._field = field_of(snapshot, before if key == self._key else None)
+            if key != self._key or not isinstance(snapshot.plan.tension, ByHand):
+                self._aim = None
+            self._key = key
+            if self._field is not None and self._aim is None:
+                self._aim = self._field.polygon.coordinates(snapshot.tension)
+            further, verdicts = self._ready(Reading.SHARING), self._ready(Reading.VERDICTS)
+            marks = self._marks.at(snapshot.plan, further=further, verdicts=verdicts) if self._field else ()
+            self._panel.show_polygon(polygon_figure(snapshot, marks, self._field, self._panel.way))
+
+    def tick(self) -> None:
+        """Nothing comes by itself."""
+
+    def _hear_dot(self, value: Any, _: int) -> None:
+        """The dot has been dragged, or stepped; what is no such thing, or comes too late, is not heard."""
+        field = self._field
+        if field is None or not isinstance(value, dict):
+            return
+        at, by = (_numbers(value.get(name), field.redundant) for name in ("at", "by"))
+        if at is None:
+            if by is None or self._aim is None or not np.isfinite(self._aim).all():
+                return
+            at = self._aim + np.clip(by, -FARTHEST, FARTHEST) * float(np.max(field.high - field.low))
+        self._aim = field.nearest(at)
+        self._panel.choose_by_hand(ByHand(target=field.tension(self._aim + self._beyond(field, at - self._aim))))
+
+    @staticmethod
+    def _beyond(field: DotField, away: Array) -> Array:
+        """A little of the way out of the field: with other pulls its sides are a little farther."""
+        far = float(np.linalg.norm(away))
+        return away * min(1.0, OVER * float(np.max(field.high - field.low)) / far) if far > 0.0 else away
+
+    def _hear_sharing(self, value: Any, _: int) -> None:
+        """A way of sharing has been chosen by its mark."""
+        if self._field is not None and isinstance(value, str) and value in METHODS:
+            self._panel.choose_way(value)
+
+
+def _numbers(value: Any, count: int) -> Array | None:
+    """So many finite numbers, or None for anything else."""
+    if not isinstance(value, list) or len(value) < count:
+        return None
+    if not all(type(part) in (int, float) and abs(part) < 1e12 for part in value):
+        return None
+    return np.array(value[:count], dtype=np.float64)

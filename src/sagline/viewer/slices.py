@@ -1,0 +1,158 @@
+"""Slices through a region of feasible positions, and the colors of their margins."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from math import floor, log10
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from contourpy import LineType, contour_generator
+from numpy.typing import NDArray
+
+from sagline.core.arrays import Array, Indices
+from sagline.viewer.readout import block, css_color
+from sagline.viewer.tension_scale import Colors
+from sagline.viewer.wording import ForceUnit
+from sagline.workspaces.slice import Slice
+
+INSIDE: Final = 4  # bands above 0, the last without an end
+OUTSIDE: Final = 2  # bands below 0, the first without a beginning
+# Lightness tells them apart as well as hue does, for all eyes and on both backgrounds.
+_COLORS: Final = np.array(
+    [[196, 92, 40], [222, 150, 104], [126, 196, 186], [64, 160, 150], [22, 122, 116], [8, 84, 84]], dtype=np.uint8
+)
+
+
+@dataclass(frozen=True, slots=True)
+class MarginScale:
+    """Bands of margins.
+
+    Attributes:
+        step: Width of a band [N], > 0.
+    """
+
+    step: float
+
+    @classmethod
+    def up_to(cls, largest: float) -> MarginScale:
+        """Bands of a round width of which the last but one ends about at the largest margin [N]."""
+        coarse = largest / INSIDE if np.isfinite(largest) and largest > 0.0 else 1.0
+        power = 10.0 ** floor(log10(coarse))
+        return cls(max(times * power for times in (1.0, 2.0, 5.0) if times * power <= coarse * (1.0 + 1e-9)))
+
+    @property
+    def edges(self) -> Array:
+        """Margins between the bands [N], rising; one of them is 0."""
+        return self.step * np.arange(1.0 - OUTSIDE, INSIDE)
+
+    def bands(self, margin: Array) -> Indices:
+        """The band of each margin, 0 the farthest outside; what is 0 but for rounding is inside."""
+        steps = np.floor(np.asarray(margin) / self.step + 1e-6)
+        return np.asarray(np.clip(steps, -OUTSIDE, INSIDE - 1)).astype(np.int64) + OUTSIDE
+
+    def colors(self, margin: Array) -> Colors:
+        """The color of each margin, shape (..., 3)."""
+        return np.asarray(_COLORS[self.bands(margin)])
+
+    def key(self, unit: ForceUnit) -> str:
+        """HTML that says which color is which margin."""
+        edges = [bare(edge, unit) for edge in self.edges]
+        between = [f"{low} to {high}" for low, high in pairwise(edges)]
+        names = [f"below {edges[0]}", *between, f"above {edges[-1]}"]
+        marks = "".join(
+            f'<span class="key"><span class="swatch" style="background:{css_color(color)}"></span> {name}</span>'
+            for color, name in zip(_COLORS, names, strict=True)
+        )
+        return block(f"<b>Margin [{unit.name}]</b> &nbsp;{marks}")
+
+
+def bare(edge: float, unit: ForceUnit) -> str:
+    """A margin between bands [N], without its unit."""
+    return f"{edge / unit.newtons:g}".replace("-", "−")
+
+
+APART = 0.12  # of the slice's longer side: the least distance between two of the margins that stand on its lines
+FINER = 3  # points of the picture for one of the grid, each way
+INSIDE_OPACITY, OUTSIDE_OPACITY = 150, 90  # of 255: the robot behind it is seen
+
+
+class Mark(NamedTuple):
+    """A margin in words, on its line.
+
+    Attributes:
+        text: It.
+        place: Where [m], shape (3,).
+    """
+
+    text: str
+    place: Array
+
+
+class Picture(NamedTuple):
+    """What is drawn of a slice.
+
+    Attributes:
+        image: Red, green, blue and opacity, the first row the lowest, shape (h, w, 4).
+        boundary: Segments of the line where the margin is 0, in the world [m], shape (b, 2, 3).
+        lines: Segments between the other bands, shape (s, 2, 3).
+        marks: What stands on the lines.
+    """
+
+    image: NDArray[np.uint8]
+    boundary: Array
+    lines: Array
+    marks: list[Mark]
+
+
+def picture_of(cut: Slice, scale: MarginScale, unit: ForceUnit) -> Picture:
+    """Colors and lines of a slice, each line with its margin."""
+    margin = np.clip(cut.margin, scale.edges[0] - scale.step, scale.edges[-1] + scale.step)  # infinite ones have lines
+    fine = _finer(_finer(margin).T).T
+    opacity = np.where(fine >= 0.0, INSIDE_OPACITY, OUTSIDE_OPACITY).astype(np.uint8)
+    found = contour_generator(cut.across, cut.up, margin, line_type=LineType.ChunkCombinedOffset)
+    lines = [(float(edge), _segments(found.lines(float(edge)), cut)) for edge in scale.edges]
+    boundary = next(own for edge, own in lines if edge == 0.0)
+    others = np.concatenate([own for edge, own in lines if edge != 0.0])
+    marks = _marks(sorted(lines, key=lambda line: abs(line[0])), cut, unit)
+    return Picture(np.dstack((scale.colors(fine), opacity)), boundary, others, marks)
+
+
+def _marks(lines: list[tuple[float, Array]], cut: Slice, unit: ForceUnit) -> list[Mark]:
+    """Where margins stand: each at that end of its line which is farthest in a direction of its own, 0 before all."""
+    room = APART * max(float(np.ptp(cut.across)), float(np.ptp(cut.up)))
+    marks: list[Mark] = []
+    for k, (edge, segments) in enumerate(lines):
+        middles = segments.mean(axis=1)
+        taken = [np.linalg.norm(middles - mark.place, axis=1) < room for mark in marks]
+        free = middles[~np.logical_or.reduce([np.zeros(len(middles), dtype=bool), *taken])]
+        if len(free):
+            way = 2.0 * np.pi * (0.1 + k / len(lines))
+            along = free[:, list(cut.plane.axes)] @ np.array([np.cos(way), np.sin(way)])
+            marks.append(Mark(f"{bare(edge, unit)} {unit.name}", free[along.argmax()]))
+    return marks
+
+
+def _finer(values: Array) -> Array:
+    """Points between those of each row, and beyond its ends, so that each stands for a pixel of the same width."""
+    count = values.shape[1]
+    places = np.clip((np.arange(FINER * (count - 1)) + 0.5) / FINER, 0.0, count - 1.0)
+    first = np.minimum(places.astype(np.intp), count - 2)
+    share = places - first
+    return np.asarray((1.0 - share) * values[:, first] + share * values[:, first + 1])
+
+
+def _segments(found: Any, cut: Slice) -> Array:
+    """Pieces of lines (s, 2, 3) in the world."""
+    (points,), (offsets,) = found  # one chunk
+    if points is None:
+        return np.empty((0, 2, 3))
+    starts = np.ones(len(points), dtype=bool)
+    starts[offsets[1:] - 1] = False  # the last of each line begins nothing
+    first = np.flatnonzero(starts)
+    pairs = np.stack((points[first], points[first + 1]), axis=1)
+    placed = np.empty((len(pairs), 2, 3))
+    placed[..., cut.plane.normal] = cut.plane.at
+    placed[..., list(cut.plane.axes)] = pairs
+    return placed
