@@ -130,7 +130,7 @@ def put(client: Client, server: Server, framing: Framing) -> viser.CameraHandle:
 
 def framed(client: Client, page: Shown) -> viser.CameraHandle:
     """The camera of a client of a page, once it has been put to where it sees all."""
-    return put(client, page.server, page.viewer._framing)
+    return put(client, page.server, page.viewer.page.framing)
 
 
 def tell(page: Shown | Server, client: Client, topic: str, value: Any) -> None:

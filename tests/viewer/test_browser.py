@@ -16,6 +16,7 @@ from playwright.sync_api import Browser, ConsoleMessage, Error, FloatRect, Page
 from viser._messages import ViewerCameraMessage
 
 import sagline as sl
+from sagline.viewer.features.modes import ModesFeature
 from sagline.viewer.playback import Run
 from sagline.viewer.server import started, stop
 from sagline.viewer.stage import PLATFORM
@@ -212,11 +213,11 @@ def test_every_text_can_be_read(browser: Browser, theme: Literal["light", "dark"
         page.get_by_text("parabolic").wait_for()
         least_contrast(page)
         page.keyboard.press("Escape")
-        viewer._stage.gizmo.position = np.array([7.4, 5.4, 1.5])
+        viewer.page.stage.gizmo.position = np.array([7.4, 5.4, 1.5])
         viewer.refresh()
         page.get_by_text("Not feasible", exact=True).wait_for()
         least_contrast(page)
-        viewer._stage.gizmo.position = np.array([np.nan, 0.0, 0.0])
+        viewer.page.stage.gizmo.position = np.array([np.nan, 0.0, 0.0])
         viewer.refresh()
         page.get_by_text("Not possible", exact=True).first.wait_for()  # the modes say so too
         least_contrast(page)
@@ -224,7 +225,7 @@ def test_every_text_can_be_read(browser: Browser, theme: Literal["light", "dark"
         page.get_by_text("Reset View").wait_for()
         least_contrast(page)
         page.locator(".tabler-icon-arrow-back").first.click()
-        stop(viewer._server)
+        stop(viewer.page.server)
         page.get_by_text("Disconnected: is sagline view still running?").wait_for()
         least_contrast(page)
 
@@ -272,9 +273,9 @@ def test_a_frequency_that_is_clicked_moves(browser: Browser) -> None:
     with opened(browser, sl.load_robot("article-suspended")) as (page, viewer):
         page.get_by_role("tab", name="Modes").click()
         page.locator("tr[data-send='mode'][data-value='2']").click()
-        await_that(page, lambda: viewer._modes.moving)
+        await_that(page, lambda: viewer.page.feature(ModesFeature).moving)
         page.get_by_text("Hz, with cable mass").wait_for()
-        swing = viewer._modes.swing
+        swing = viewer.page.feature(ModesFeature).swing
         assert swing is not None
         found = sl.vibration(swing.state, up_to=20.0)
         page.get_by_text(f"{found.frequency[1]:.3f} Hz, with cable mass", exact=True).wait_for()
@@ -284,7 +285,10 @@ def test_a_frequency_that_is_clicked_moves(browser: Browser) -> None:
         await_that(page, lambda: page.locator("tr.chosen").count() == 1)
         mark = page.locator("svg.response g[data-send='mode'][data-value='1'] rect")
         mark.click()
-        await_that(page, lambda: viewer._modes.swing is not None and viewer._modes.swing.mode.name == "1")
+        await_that(
+            page,
+            lambda: (now := viewer.page.feature(ModesFeature).swing) is not None and now.mode.name == "1",
+        )
         page.locator("tr[data-send='mode'][data-value='massless 1']").hover()
         page.mouse.down()
         page.evaluate("(() => { const list = document.querySelector('.modes'); list.innerHTML += ''; })()")
@@ -292,7 +296,7 @@ def test_a_frequency_that_is_clicked_moves(browser: Browser) -> None:
         page.get_by_text(f"{found.massless_frequency[0]:.3f} Hz, massless").wait_for()
         assert page.evaluate(OVERFLOWING) == []
         page.locator("tr[data-send='mode'][data-value='massless 1']").click()  # once more: at rest
-        await_that(page, lambda: not viewer._modes.moving)
+        await_that(page, lambda: not viewer.page.feature(ModesFeature).moving)
 
 
 def test_the_modes_can_be_read_in_the_light_and_in_the_dark_on_a_small_screen(browser: Browser) -> None:
@@ -318,8 +322,8 @@ def test_a_cable_is_cut_and_the_break_is_played(browser: Browser) -> None:
         page.get_by_role("button", name="Cut", exact=True).click()
         page.get_by_text("Simulated", exact=True).wait_for()
         page.get_by_text("break of cable 0 at 0.000 s").wait_for()
-        assert viewer._player.played is not None
-        await_that(page, lambda: viewer._player.clock.time == viewer._player.played.duration)  # type: ignore[union-attr]
+        assert viewer.page.player.played is not None
+        await_that(page, lambda: viewer.page.player.clock.time == viewer.page.player.played.duration)  # type: ignore[union-attr]
         page.get_by_role("button", name="Play").wait_for()
         least_contrast(page)
         assert page.evaluate(OVERFLOWING) == []

@@ -107,7 +107,7 @@ def test_a_film_shows_the_run_with_clock_and_legend(
         film_button.click()
         page.get_by_role("button", name="Cancel").click()
         page.locator("#sagline-film").wait_for(state="detached")
-        (client,) = viewer._server.get_clients().values()
+        (client,) = viewer.page.server.get_clients().values()
         await_that(page, lambda: not client.scene._handle_from_node_name)
         with page.expect_download(timeout=1e3 * PATIENCE) as download:
             film_button.click()
@@ -115,7 +115,7 @@ def test_a_film_shows_the_run_with_clock_and_legend(
         download.value.save_as(tmp_path / "film.mp4")
         page.locator("#sagline-film").wait_for(state="detached")
         assert any(note.startswith("Filming") for note in page.evaluate("[...window.notes]"))
-        assert viewer._player.following
+        assert viewer.page.player.following
         assert not client.scene._handle_from_node_name
         length, (first, last) = played(page, tmp_path / "film.mp4")
     assert length == pytest.approx(4.0, abs=1e-3)  # two pictures, each for two seconds, however long they took

@@ -9,6 +9,7 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 import sagline as sl
+from sagline.viewer.features.keyboard import KeyboardFeature
 from sagline.viewer.playback import Run
 from sagline.viewer.viewer import Viewer
 from tests.chromium import NEEDED, PATIENCE, launched
@@ -77,7 +78,7 @@ def place(viewer: Viewer) -> np.ndarray:
 
 def keys_move(page: Page, viewer: Viewer) -> None:
     """The platform goes where keys send it, and home; what is said follows; a field keeps its keys."""
-    start, step = place(viewer), viewer._keys._step
+    start, step = place(viewer), viewer.page.feature(KeyboardFeature)._step
     scene = page.get_by_role("application")
     scene.focus()
     for key, way in (

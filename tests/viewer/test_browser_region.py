@@ -9,7 +9,7 @@ from PIL import Image
 from playwright.sync_api import Browser, Page
 
 import sagline as sl
-from sagline.viewer.features.region import SpaceShow
+from sagline.viewer.features.region import RegionFeature
 from sagline.viewer.viewer import Viewer
 from tests.chromium import NEEDED, launched
 from tests.tiers import extended
@@ -27,7 +27,7 @@ def browser() -> Iterator[Browser]:
     yield from launched(FLAGS)
 
 
-def in_full(show: SpaceShow) -> bool:
+def in_full(show: RegionFeature) -> bool:
     """Whether the region that is drawn is that of what is shown, and not a rough one."""
     return show._made is not None and not show._made.rough and show._made.key == show._key
 
@@ -54,7 +54,7 @@ def scene(page: Page) -> np.ndarray:
 
 def near_the_wall(viewer: Viewer) -> np.ndarray:
     """A position inside, half a cell from the wall, as high as the platform is."""
-    show = viewer._space
+    show = viewer.page.feature(RegionFeature)
     assert viewer.view is not None
     assert show._levels is not None
     assert show._region is not None
@@ -76,7 +76,7 @@ def near_the_wall(viewer: Viewer) -> np.ndarray:
 def test_a_region_follows_a_slider_and_lights_up(browser: Browser, name: str, screen: tuple[int, int]) -> None:
     with opened(browser, sl.load_robot(name), width=screen[0], theme="dark") as (page, viewer):
         page.set_viewport_size({"width": screen[0], "height": screen[1]})
-        show = viewer._space
+        show = viewer.page.feature(RegionFeature)
         page.get_by_role("tab", name="Workspace").click()
         page.get_by_text("Nothing is computed until something is asked for.").wait_for()
         empty = scene(page)
@@ -87,7 +87,7 @@ def test_a_region_follows_a_slider_and_lights_up(browser: Browser, name: str, sc
         slide(page, "Platform + load", 8.0)
         await_that(page, lambda: viewer.view is not None and viewer.view.snapshot.robot.mass > mass)
         await_that(page, lambda: in_full(show) and show._panel._told.content != before)  # nothing was asked for again
-        viewer._stage.place(sl.Pose(near_the_wall(viewer), np.eye(3)))
+        viewer.page.stage.place(sl.Pose(near_the_wall(viewer), np.eye(3)))
         viewer.refresh()
         await_that(page, lambda: show._stage._wall.meshes != [])
         page.get_by_text("left, cable").first.wait_for()

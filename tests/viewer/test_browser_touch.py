@@ -11,6 +11,9 @@ from viser._messages import ViewerCameraMessage
 
 import sagline as sl
 from sagline.viewer.camera import Eye, fitted
+from sagline.viewer.features.cut import CutFeature
+from sagline.viewer.features.modes import ModesFeature
+from sagline.viewer.features.push import PushFeature
 from sagline.viewer.viewer import Viewer
 from tests.chromium import NEEDED, launched
 from tests.tiers import extended
@@ -30,7 +33,7 @@ def browser() -> Iterator[Browser]:
 
 
 def eye_of(viewer: Viewer) -> Eye | None:
-    return next((Eye.of(client.camera) for client in viewer._server.get_clients().values()), None)
+    return next((Eye.of(client.camera) for client in viewer.page.server.get_clients().values()), None)
 
 
 def on_page(page: Page, viewer: Viewer, points: np.ndarray) -> np.ndarray:
@@ -47,7 +50,7 @@ def settle(page: Page, viewer: Viewer, told: list[ViewerCameraMessage]) -> None:
     def stands() -> bool:
         if not told:
             return False
-        last, scene, framing = told[-1], box(page, SCENE), viewer._framing
+        last, scene, framing = told[-1], box(page, SCENE), viewer.page.framing
         if (last.image_width, last.image_height) != (int(scene["width"]), int(scene["height"])):
             return False
         wanted = fitted(framing._low, framing._high, last.image_width / last.image_height, last.fov)[0]
@@ -77,25 +80,27 @@ def test_a_mouse_pulls_cuts_and_shakes(browser: Browser, name: str, size: tuple[
     told: list[ViewerCameraMessage] = []
     with opened(browser, sl.load_robot(name), width=size[0], height=size[1], cameras=told) as (page, viewer):
         settle(page, viewer, told)
-        start = viewer._stage.dragged_pose()
+        start = viewer.page.stage.dragged_pose()
         eye = eye_of(viewer)
         assert eye is not None
         # pull, at the middle of the platform, where its gizmo has its handles
-        middle = start.transform(viewer._push._stage.body.vertices).mean(axis=0)
+        middle = start.transform(viewer.page.feature(PushFeature)._stage.body.vertices).mean(axis=0)
         x, y = on_page(page, viewer, middle)
         uncovered(page, x, y)
         page.mouse.move(x, y)
         page.keyboard.down("Control")
         page.mouse.down()
         page.mouse.move(x + 15, y - 10, steps=3)
-        await_that(page, lambda: viewer._push.pushed is not None)
+        await_that(page, lambda: viewer.page.feature(PushFeature).pushed is not None)
         page.mouse.move(x + 30, y - 20, steps=3)
         away = 0.9 * np.hypot(30.0, 20.0)
         await_that(page, lambda: pulled(page, viewer) > away)
         page.mouse.up()
         page.keyboard.up("Control")
-        await_that(page, lambda: viewer._push.pushed is None)
-        np.testing.assert_array_equal(viewer._stage.dragged_pose().position, start.position)  # the gizmo did not move
+        await_that(page, lambda: viewer.page.feature(PushFeature).pushed is None)
+        np.testing.assert_array_equal(
+            viewer.page.stage.dragged_pose().position, start.position
+        )  # the gizmo did not move
         now = eye_of(viewer)
         assert now is not None
         np.testing.assert_allclose(now.place, eye.place, rtol=1e-12)  # nor did the camera, but for how pages round
@@ -107,28 +112,29 @@ def test_a_mouse_pulls_cuts_and_shakes(browser: Browser, name: str, size: tuple[
         x, y = free_place(places, inside["x"], inside["x"] + inside["width"], inside["y"] + inside["height"])
         uncovered(page, x, y)
         page.mouse.click(x, y)
-        await_that(page, lambda: viewer._cuts._chosen)
+        await_that(page, lambda: viewer.page.feature(CutFeature)._chosen)
         page.get_by_role("button", name="Cut cable").click()
-        await_that(page, lambda: viewer._player.played is not None and viewer._player.clock.time > 0.5)
+        await_that(page, lambda: viewer.page.player.played is not None and viewer.page.player.clock.time > 0.5)
         page.get_by_text("Simulated", exact=True).wait_for()
         page.get_by_role("button", name="Calm").click()
-        await_that(page, lambda: viewer._player.played is None)
+        await_that(page, lambda: viewer.page.player.played is None)
         # shake
         page.locator("button.shake").first.click()
-        await_that(page, lambda: viewer._modes.moving)
-        assert viewer._modes.swing is not None
-        assert viewer._modes.swing.mode.name == "massless 1"
+        await_that(page, lambda: viewer.page.feature(ModesFeature).moving)
+        swing = viewer.page.feature(ModesFeature).swing
+        assert swing is not None
+        assert swing.mode.name == "massless 1"
         page.locator("button.shake").first.click()
-        await_that(page, lambda: not viewer._modes.moving)
+        await_that(page, lambda: not viewer.page.feature(ModesFeature).moving)
 
 
 def pulled(page: Page, viewer: Viewer) -> float:
     """How long the arrow of the pull is on the page [px]."""
-    found = viewer._push.pushed
+    found = viewer.page.feature(PushFeature).pushed
     if found is None:
         return 0.0
     grabbed = found.state.pose.transform(found.push.at)
-    ends = np.stack((grabbed, grabbed + found.push.force / viewer._push._stiffness))
+    ends = np.stack((grabbed, grabbed + found.push.force / viewer.page.feature(PushFeature)._stiffness))
     return float(np.linalg.norm(np.diff(on_page(page, viewer, ends), axis=0)))
 
 

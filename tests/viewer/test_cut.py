@@ -13,7 +13,7 @@ import sagline as sl
 from sagline.viewer import swing
 from sagline.viewer.camera import Eye
 from sagline.viewer.features import cut
-from sagline.viewer.features.cut import Before
+from sagline.viewer.features.cut import Before, CutFeature
 from sagline.viewer.playback import Moment, Playback
 from sagline.viewer.player import Played, Player
 from sagline.viewer.server import started, stop
@@ -112,7 +112,7 @@ def test_what_was_put_on_meanwhile_is_not_played_over() -> None:
     try:
         given, first, second = Playback(made.simulation()), made.simulation(50), made.simulation(60)
         viewer = Viewer(server, given.robot, given)
-        cuts, player = viewer._cuts, viewer._player
+        cuts, player = viewer.page.feature(CutFeature), viewer.page.player
         cuts._asked, before = 1, Before(given.home, player.kept())
         cuts._play(1, first, 3, before)
         cuts._play(1, second, 3, before)
@@ -130,7 +130,7 @@ def test_cut_by_cut_all_is_put_back() -> None:
     try:
         given = Playback(made.simulation())
         viewer = Viewer(server, given.robot, given)
-        cuts, player = viewer._cuts, viewer._player
+        cuts, player = viewer.page.feature(CutFeature), viewer.page.player
         for number in (1, 2):
             cuts._asked = number
             cuts._play(number, made.simulation(50), 3, Before(given.home, player.kept()))

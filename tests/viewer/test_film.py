@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 import sagline as sl
-from sagline.viewer.features.export import moments
+from sagline.viewer.features.export import ExportFeature, moments
 from sagline.viewer.studio import Shot
 from sagline.viewer.viewer import Viewer
 from tests.refusal import refused
@@ -36,7 +36,7 @@ def pixel() -> bytes:
 
 
 def taking(page: Shown) -> bool:
-    return any(visitor.taking.locked() for visitor in tuple(page.viewer._export._visitors.values()))
+    return any(visitor.taking.locked() for visitor in tuple(page.viewer.page.feature(ExportFeature)._visitors.values()))
 
 
 def said(messages: Iterable[dict[str, Any]], topic: str) -> list[Any]:
@@ -89,7 +89,11 @@ def test_a_film_is_told_picture_by_picture_and_can_be_cancelled(film: Shown) -> 
                 asked += 1
                 if asked == 5:
                     tell(film, client, "film", "cancel")
-                    await_that(lambda: any(v.cancelled.is_set() for v in film.viewer._export._visitors.values()))
+                    await_that(
+                        lambda: any(
+                            v.cancelled.is_set() for v in film.viewer.page.feature(ExportFeature)._visitors.values()
+                        )
+                    )
                 rendered(client, message, pixel())
             if None in said([message], "film"):
                 break

@@ -14,6 +14,7 @@ import pytest
 
 import sagline as sl
 from sagline.viewer.feature import View
+from sagline.viewer.features.state import StateFeature
 from sagline.viewer.link import name_of, pose_part, short
 from sagline.viewer.playback import Run
 from sagline.viewer.state_code import Source
@@ -135,7 +136,7 @@ def test_another_page_comes_to_the_same(one: Shown, other: Shown, count: int) ->
 def test_all_controls_of_the_page_are_in_it(one: Shown, other: Shown) -> None:
     handles = [each for each in controls(one.server) if hasattr(each, "label")]
     wanted = {id(each) for each in handles if each.label != "sagline" and not each._impl.is_button}
-    named = one.viewer._linked._controls._handles()
+    named = one.viewer.page.feature(StateFeature).linking._controls._handles()
     assert {id(each) for each in named.values()} == wanted
     assert all(name.startswith(short(each.label)) for name, each in named.items())
     assert {"slice", "cable-model", "mode", "modes-up-to"} <= set(named)
@@ -167,9 +168,9 @@ def test_a_link_is_of_all_that_was_set_before_it_was_asked_for(one: Shown) -> No
 
         def set_and_ask() -> None:
             mass.value = 120.0
-            one.viewer._channel._heard["copy"](["both", "link"], number)
+            one.viewer.page.channel._heard["copy"](["both", "link"], number)
 
-        one.viewer._soon(set_and_ask)  # before what is set is shown
+        one.viewer.page.later(set_and_ask)  # before what is set is shown
         assert "&platform-load=120" in here.answered("copy", "both")["text"]
         here.client.set(mass, usual)
         await_that(lambda: view(one).snapshot.robot.mass == usual)

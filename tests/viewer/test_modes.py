@@ -13,6 +13,7 @@ import sagline as sl
 from sagline import InvalidValueError, vibration
 from sagline.viewer import lines, playback, readout, swing
 from sagline.viewer.feature import Aside
+from sagline.viewer.features.modes import ModesFeature
 from sagline.viewer.playback import Playback
 from sagline.viewer.snapshot import Settings, taken_at
 from sagline.viewer.swing import PERIOD, mode_of
@@ -60,7 +61,7 @@ def heard_for(client: Client, seconds: float) -> list[Any]:
 
 @extended
 def test_a_mode_moves_at_the_rate_of_the_page_and_stops(page: Shown) -> None:
-    show = page.viewer._modes
+    show = page.viewer.page.feature(ModesFeature)
     await_that(lambda: show.moving and not show.waiting)  # the response is there too
     assert show.swing is not None
     found = vibration(show.swing.state, up_to=20.0)
@@ -98,7 +99,7 @@ def test_the_list_says_what_every_frequency_is(page: Shown) -> None:
         await_that(lambda: any('"massless 1" class="chosen' in row for row in rows_of(page)))
         rows = rows_of(page)
         assert sum('class="chosen' in row for row in rows) == 1
-        found = vibration(page.viewer._modes.swing.state, up_to=20.0)  # type: ignore[union-attr]
+        found = vibration(page.viewer.page.feature(ModesFeature).swing.state, up_to=20.0)  # type: ignore[union-attr]
         assert len(rows) == found.frequency.size + 6
         plain = [re.sub('data-value="[^"]*"', "", row) for row in rows]
         assert all(("cable mass" in row) != ("massless" in row) for row in plain)
@@ -125,7 +126,7 @@ def test_while_the_platform_is_dragged_nothing_swings_and_then_its_new_modes_do(
             time.sleep(0.03)
         await_that(lambda: page.position[0] == 0.0)
         await_that(lambda: moves(page))
-        swing = page.viewer._modes.swing
+        swing = page.viewer.page.feature(ModesFeature).swing
         assert swing is not None
         assert swing.mode.frequency == pytest.approx(1.77012, abs=1e-5)  # as finite elements have it
         assert swing.state.pose.position[0] == 0.0

@@ -128,7 +128,7 @@ def test_the_page_shows_three_platforms_and_goes_on_with_the_log(tmp_path: Path,
     server = started(port=0)
     try:
         viewer = Viewer(server, ROBOT, session)
-        viewer._player.scrub_to(session.duration)
+        viewer.page.player.scrub_to(session.duration)
         viewer._update()
         assert viewer.view is not None
         assert isinstance(viewer.view.snapshot, SessionMoment)
@@ -144,7 +144,7 @@ def test_the_page_shows_three_platforms_and_goes_on_with_the_log(tmp_path: Path,
         viewer._work_off()
         viewer._update()
         assert viewer.view.snapshot.index == 200  # who looked at the end sees the new end
-        assert viewer._player.clock.time == pytest.approx(2.0)
+        assert viewer.page.player.clock.time == pytest.approx(2.0)
     finally:
         stop(server)
 

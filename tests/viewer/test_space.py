@@ -12,7 +12,7 @@ import pytest
 import sagline as sl
 from sagline import SaglineError
 from sagline.viewer.feature import Reading
-from sagline.viewer.features.region import SpaceShow, planes_of
+from sagline.viewer.features.region import RegionFeature, planes_of
 from sagline.viewer.hull import Asked, Hull
 from sagline.viewer.server import Server
 from sagline.viewer.tension_scale import cable_color
@@ -50,14 +50,14 @@ MAKER = Maker()
 def page() -> Iterator[Shown]:
     def made(server: Server) -> Viewer:
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("sagline.viewer.viewer.hull_of", lambda *arguments: MAKER.hull(*arguments))
+            patch.setattr("sagline.viewer.features.region.hull_of", lambda *arguments: MAKER.hull(*arguments))
             return Viewer(server, ROBOT, pose=POSE)
 
     yield from shown(made)
 
 
-def show_of(page: Shown) -> SpaceShow:
-    return page.viewer._space
+def show_of(page: Shown) -> RegionFeature:
+    return page.viewer.page.feature(RegionFeature)
 
 
 def meshes(page: Shown, name: str) -> list[Any]:

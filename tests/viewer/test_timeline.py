@@ -10,13 +10,14 @@ import pytest
 
 import sagline as sl
 from sagline.control import State
-from sagline.viewer.channel import Channel
-from sagline.viewer.features.timeline import TimelineShow, TimelineStage
+from sagline.viewer.features.timeline import TimelineFeature
+from sagline.viewer.page import Page
 from sagline.viewer.playback import Playback, Run
 from sagline.viewer.player import Beside, Player
 from sagline.viewer.server import started, stop
 from sagline.viewer.session import Session
 from sagline.viewer.session_log import Follower
+from sagline.viewer.state_code import Source
 from sagline.viewer.timeline import MOST_COLUMNS as MOST_COLUMNS
 from sagline.viewer.timeline import MOST_SPANS, Chart, Limit, Mark, Track, columns, outside, spans_of, told
 from sagline.viewer.viewer import Viewer
@@ -292,11 +293,11 @@ def test_a_window_is_looked_at_and_the_whole_again(page: Shown) -> None:
 
 
 def test_a_window_follows_a_clock_to_its_end_however_long_nobody_looked() -> None:
-    player = Player(Run.of(PLAN), lambda *_: None)
     server = started(port=0)
     try:
-        channel = Channel(server.gui, lambda task: task())
-        show = TimelineShow(channel, player, TimelineStage(server.scene, ROBOT))
+        page = Page(server, ROBOT, Run.of(PLAN), lambda _: True, None, None, "", None, Source(), None)
+        channel, player = page.channel, page.player
+        show = TimelineFeature(page)
 
         def window() -> Any:
             show.tick()

@@ -186,7 +186,7 @@ def heard_or_cut_off(page: Shown, client: int, heard: list[int]) -> bool:
 @extended
 def test_a_pose_that_is_none_is_refused_and_forgotten(page: Shown) -> None:
     asked: list[int] = []
-    page.viewer._channel.on("asked", lambda _, number: asked.append(number))
+    page.viewer.page.channel.on("asked", lambda _, number: asked.append(number))
     for position, wxyz in (
         ([np.nan, 0.0, 2.0], [1, 0, 0, 0]),
         ([1e9, 0.0, 2.0], [1, 0, 0, 0]),
@@ -211,9 +211,9 @@ def test_what_a_slider_does_not_reach_is_refused_once_and_not_asked_again() -> N
     server = started(port=0)
     try:
         viewer = Viewer(server, ROBOT)
-        viewer._panel._mass.value = 1e9  # after the settings were read
-        viewer._panel.show_what_if("")
-        assert not viewer._panel._forgetting.visible
+        viewer.page.panel._mass.value = 1e9  # after the settings were read
+        viewer.page.panel.show_what_if("")
+        assert not viewer.page.panel._forgetting.visible
     finally:
         stop(server)
 

@@ -6,10 +6,10 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from enum import Enum
-from typing import Final, Protocol, TypeVar
+from typing import Final, TypeVar
 
 from sagline.core.arrays import Array
 from sagline.core.errors import SaglineError
@@ -56,22 +56,34 @@ class View:
     playing: bool = False
 
 
-class Show(Protocol):
-    """A part of the page; all of it belongs to the thread that serves."""
+class Feature:
+    """A feature of the page, made once with the `Page`: its controls, what it draws and says, what it does on a change.
+
+    All of it belongs to the thread that serves; this one does nothing.
+    """
 
     @property
     def moving(self) -> bool:
-        """Whether pictures follow each other without anybody's doing."""
+        """Whether pictures follow each other by themselves."""
+        return False
 
     @property
     def waiting(self) -> bool:
-        """Whether something is to come without anybody's doing."""
+        """Whether a result is still to come."""
+        return False
+
+    def depends(self, view: View) -> Hashable:
+        """All that `follow` depends on: it is called only when this has changed; by default at every view."""
+        return view
 
     def follow(self, view: View) -> None:
-        """Something is shown."""
+        """Draw and say what there is at a view."""
 
     def tick(self) -> None:
-        """Some time has passed."""
+        """Do what time brings."""
+
+    def put_on(self, played: Played | None) -> None:
+        """Take note of something else that is played, or nothing."""
 
 
 T = TypeVar("T")

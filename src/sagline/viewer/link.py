@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 from urllib.parse import parse_qsl, quote, urlencode
 from zlib import crc32
 
@@ -19,11 +19,9 @@ from sagline.files.typed import STRONGEST, numbers, pose_of
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.viewer.by_hand import ByHand
-from sagline.viewer.camera import Framing
 from sagline.viewer.channel import NAME
 from sagline.viewer.feature import View
-from sagline.viewer.player import Player
-from sagline.viewer.state_code import Source
+from sagline.viewer.page import Page
 
 LONGEST: Final = 4000  # characters
 STEP: Final = "Copy the link anew."
@@ -225,42 +223,13 @@ def _one_of(text: str, allowed: tuple[str, ...], name: str) -> str:
 MASS, SHARING, HAND = "platform-load", "tensions", "by-hand"  # names of controls, and of what one of them stands for
 
 
-class Levers(NamedTuple):
-    """What a link moves beside the controls.
-
-    Attributes:
-        check: Refuses a pose that is out of reach.
-        go: Puts the platform to a pose.
-        pull: Puts a wrench on it.
-        choose: Chooses tensions by hand.
-        refresh: Shows all that anew.
-    """
-
-    check: Callable[[Pose], None]
-    go: Callable[[Pose], None]
-    pull: Callable[[Array | None], None]
-    choose: Callable[[ByHand], None]
-    refresh: Callable[[], None]
-
-
 class Linking:
     """Makes links and follows them; all of it belongs to the thread that serves."""
 
-    def __init__(
-        self, robot: Robot, source: Source, controls: LinkedControls, framing: Framing, player: Player, levers: Levers
-    ) -> None:
-        """Begin.
-
-        Args:
-            robot: The robot that the page was opened with.
-            source: Where it came from.
-            controls: Of the page.
-            framing: Knows where each client's camera is.
-            player: What is played.
-            levers: What else a link moves.
-        """
-        self._robot, self._controls, self._framing, self._player = robot, controls, framing, player
-        self._loaded, self._levers = source.mass is not None, levers
+    def __init__(self, page: Page, controls: LinkedControls) -> None:
+        """Begin; `controls` are those of the page."""
+        self._page, self._robot, self._controls = page, page.robot, controls
+        self._framing, self._player, self._loaded = page.framing, page.player, page.source.mass is not None
 
     def told(self, view: View, client: int) -> str:
         """A link to a view, through the camera of a client."""
@@ -301,13 +270,13 @@ class Linking:
             method = ByHand(target=numbers_of(hand, HAND, "N", self._robot.cable_count, STRONGEST))
         put = self._controls.read(parts)
         put()
-        self._levers.pull(wrench)
+        self._page.wrench = wrench
         if method is not None:
-            self._levers.choose(method)
+            self._page.panel.choose_by_hand(method)
         place()
         if camera is not None:
             self._framing.look(client, camera)
-        self._levers.refresh()
+        self._page.refresh()
 
     def _place(self, parts: dict[str, str]) -> Callable[[], None]:
         """Where to go to, or to which time."""
@@ -316,8 +285,8 @@ class Linking:
             raise InvalidValueError("the link", "with both or none", "a pose or a time", STEP)
         if pose is not None:
             wanted = pose_of(pose, "the pose of the link", STEP)
-            self._levers.check(wanted)
-            return lambda: self._levers.go(wanted)
+            self._page.check_near(wanted)
+            return lambda: self._page.go(wanted)
         if self._player.played is None:
             step = "Open it beside the same run: sagline view ROBOT RUN."
             raise InvalidValueError("the link", "of a moment of a run", "a pose, where nothing is played", step)

@@ -1,1 +1,35 @@
-"""Features of the viewer, one a file."""
+"""Features of the viewer, one a file; a new one is added to `FEATURES`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from sagline.viewer.feature import Feature
+from sagline.viewer.features.cut import CutFeature
+from sagline.viewer.features.export import ExportFeature
+from sagline.viewer.features.keyboard import KeyboardFeature
+from sagline.viewer.features.missing import MissingFeature
+from sagline.viewer.features.modes import ModesFeature
+from sagline.viewer.features.proof import ProofFeature
+from sagline.viewer.features.push import PushFeature
+from sagline.viewer.features.region import RegionFeature
+from sagline.viewer.features.state import StateFeature
+from sagline.viewer.features.tensions import TensionsFeature
+from sagline.viewer.features.timeline import TimelineFeature
+from sagline.viewer.page import Page
+
+# in the order in which their controls stand on the page and in which they follow a view; the state knows all controls
+FEATURES: Final[tuple[Callable[[Page], Feature], ...]] = (
+    ModesFeature,
+    RegionFeature,
+    PushFeature,
+    CutFeature,
+    ExportFeature,
+    TimelineFeature,
+    KeyboardFeature,
+    TensionsFeature,
+    MissingFeature,
+    ProofFeature,
+    StateFeature,
+)

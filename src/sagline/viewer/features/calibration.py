@@ -12,10 +12,9 @@ from sagline.calibration.relative import Anchors, anchor_covariance, relative_co
 from sagline.calibration.result import Calibration
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError, SaglineError
-from sagline.robot.pose import Pose
 from sagline.viewer import calibration_words, solids
-from sagline.viewer.channel import Channel
-from sagline.viewer.feature import View
+from sagline.viewer.feature import Feature, View
+from sagline.viewer.page import Page
 from sagline.viewer.readout import refused, sentence
 from sagline.viewer.solids import Ellipsoids, ball, readable
 from sagline.viewer.stage import TRACE_WIDTH, TRUTH
@@ -61,6 +60,11 @@ class CalibrationPanel:
         self._largest = MOST * factor
         for handle in (self._ellipsoids, self._relative, self._factor, self._poses, self._row):
             handle.on_update(lambda _: changed())
+
+    @property
+    def values(self) -> tuple[Hashable, ...]:
+        """All that is chosen."""
+        return self.ellipsoids, self.relative, self._factor.value, self.poses, self.row
 
     @property
     def ellipsoids(self) -> bool:
@@ -216,39 +220,22 @@ MOST_NAMED: Final = 8  # outliers that have their names in the scene
 LARGE: Final = 0.04  # of the robot's size: the largest ellipsoid at first
 
 
-class CalibrationShow:
+class CalibrationFeature(Feature):
     """Follows what its panel says; all of it belongs to the thread that serves."""
 
-    moving = waiting = False
-
-    def __init__(
-        self,
-        server: viser.ViserServer,
-        readings: Any,
-        found: Calibration,
-        changed: Callable[[], None],
-        soon: Callable[[Callable[[], None]], None],
-        go: Callable[[Pose], None],
-        channel: Channel,
-    ) -> None:
-        """Build tab and scene.
-
-        Args:
-            server: Where.
-            readings: The tabs that it is one of.
-            found: The calibration.
-            changed: Called, from any thread, when something is chosen.
-            soon: Takes what the serving thread is to do, from any thread.
-            go: Puts the platform somewhere.
-            channel: Tells which row of a list is clicked.
-        """
-        self._found, self._go = found, go
+    def __init__(self, page: Page, found: Calibration) -> None:
+        """Build tab and scene of a calibration."""
+        server = page.server
+        self._found, self._go = found, page.go
         size = solids.size_of(found.robot)
         self._panel = CalibrationPanel(
-            server.gui, readings, readable(self._anchors("frame_anchors", relative=False).radius, LARGE * size), changed
+            server.gui,
+            page.panel.readings,
+            readable(self._anchors("frame_anchors", relative=False).radius, LARGE * size),
+            page.refresh,
         )
-        self._stage = CalibrationStage(server.scene, size, lambda k: soon(lambda: self._pick(k)))
-        channel.on(TOPIC, lambda row, _: self._panel.toggle(row))
+        self._stage = CalibrationStage(server.scene, size, lambda k: page.later(lambda: self._pick(k)))
+        page.channel.on(TOPIC, lambda row, _: self._panel.toggle(row))
         bands = calibration_words.bands(found)
         self._panel.tell(
             calibration_words.verdict(found),
@@ -262,8 +249,9 @@ class CalibrationShow:
         self._poses: bool | None = None
         self._row: str | None = None
 
-    def tick(self) -> None:
-        """Nothing comes by itself."""
+    def depends(self, view: View) -> Hashable:
+        """The panel alone."""
+        return self._panel.values
 
     def follow(self, view: View) -> None:
         """Draw and say what the panel asks for, whatever else is shown."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -16,12 +16,11 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.viewer import lines, swing
 from sagline.viewer.camera import Eye, chosen_line, place_of
-from sagline.viewer.channel import Channel
-from sagline.viewer.feature import Aside, Reading, View
+from sagline.viewer.feature import Aside, Feature, Reading, View
+from sagline.viewer.page import Page
 from sagline.viewer.playback import Playback
-from sagline.viewer.player import Kept, Player
+from sagline.viewer.player import Kept
 from sagline.viewer.readout import box, refused, sentence
-from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.tension_scale import force_unit
 
 
@@ -200,52 +199,37 @@ class Before(NamedTuple):
     kept: Kept
 
 
-class CutShow:
+class CutFeature(Feature):
     """Cuts what is shown; all of it belongs to the thread that serves."""
 
-    moving = False
-
-    def __init__(
-        self,
-        server: viser.ViserServer,
-        channel: Channel,
-        panel: CutPanel,
-        player: Player,
-        soon: Callable[[Callable[[], None]], None],
-        go: Callable[[Pose], None],
-        ready: Callable[[Reading], bool],
-    ) -> None:
-        """Begin with nothing.
-
-        Args:
-            server: Where its mark is.
-            channel: Brings clicks on the scene.
-            panel: Which cable; its buttons are to call `choose`, `cut` and `calm`.
-            player: What plays what follows.
-            soon: Takes what the serving thread is to do, from any thread.
-            go: Puts the platform somewhere.
-            ready: Whether a reading can be had without waiting.
-        """
-        self._server, self._player, self._soon, self._go, self._ready = server, player, soon, go, ready
-        self._panel = panel
+    def __init__(self, page: Page) -> None:
+        """Build panel and mark."""
+        server, soon = page.server, page.later
+        self._page, self._server, self._player, self._soon = page, server, page.player, soon
+        self._go, self._ready = page.go, page.ready
+        self._panel = CutPanel(
+            server.gui, page.robot, lambda: soon(self.choose), lambda: soon(self.cut), lambda: soon(self.calm)
+        )
         self._stage = CutStage(server, lambda: soon(self.cut))
         self._aside = Aside(soon)
-        self._view: View | None = None
         self._chosen = False  # whether a cable is marked
         self._asked = self._playing = 0  # numbers of the cut that was asked for last, and of that which is played
         self._number = 0  # of what is played of it, by the player
         self._before: list[Before] = []  # a cut, and one that followed it, and so on
-        channel.on(TOPIC, self._pick)
+        page.channel.on(TOPIC, self._pick)
 
     @property
     def waiting(self) -> bool:
         """Whether something is simulated."""
         return self._aside.busy
 
+    def depends(self, view: View) -> Hashable:
+        """Nothing while no cable is marked."""
+        return view if self._chosen else None
+
     def follow(self, view: View) -> None:
         """This is what would be cut."""
-        self._view = view
-        state = self._state()
+        state = self._page.state
         if self._chosen and state is not None:
             course = view.snapshot.courses(view.settings.sag_scale)[self._panel.cable]
             self._stage.show(course, before_text(state, self._panel.cable), self._panel.cable)
@@ -259,7 +243,7 @@ class CutShow:
 
     def cut(self) -> None:
         """Simulate what comes when a cable of the robot that is shown breaks, and play it as it comes."""
-        state, panel, view = self._state(), self._panel, self._view
+        state, panel, view = self._page.state, self._panel, self._page.view
         if state is None or view is None:
             panel.say(sentence("A cable is cut at rest, where the platform is held: drag it there first."))
             return
@@ -308,13 +292,6 @@ class CutShow:
         whole = float(simulation.time[-1] - simulation.time[0]) >= swing.LASTS - simulation.step
         self._panel.say(outcome_text(simulation, cable, whole=whole))
 
-    def _state(self) -> Equilibrium | None:
-        """The rest that is shown, if one is."""
-        snapshot = None if self._view is None else self._view.snapshot
-        if not isinstance(snapshot, Snapshot) or snapshot.plan is None or not snapshot.feasible:
-            return None
-        return snapshot.plan.state
-
     def choose(self) -> None:
         """A cable is chosen in the panel: mark it."""
         self._chosen = True
@@ -323,9 +300,9 @@ class CutShow:
         """A page tells where its scene is clicked: whatever a client has sent."""
         at, found = place_of(value), self._server.get_clients().get(client)
         eye = None if found is None else Eye.of(found.camera)
-        if at is None or eye is None or self._view is None or self._state() is None:
+        if at is None or eye is None or self._page.view is None or self._page.state is None:
             return
-        courses = self._view.snapshot.courses(self._view.settings.sag_scale)
+        courses = self._page.view.snapshot.courses(self._page.view.settings.sag_scale)
         cable = chosen_line(eye, at, courses, NEAR)
         self._chosen = cable is not None
         if cable is not None:

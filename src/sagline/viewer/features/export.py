@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import replace
 from functools import partial
 from math import ceil, log10
@@ -15,8 +15,9 @@ import viser
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.files.names import file_stem
-from sagline.viewer.channel import Channel, Told
-from sagline.viewer.feature import View
+from sagline.viewer.channel import Told
+from sagline.viewer.feature import Feature, View
+from sagline.viewer.page import Page
 from sagline.viewer.player import Played
 from sagline.viewer.readout import headline
 from sagline.viewer.snapshot import Snapshot
@@ -117,27 +118,13 @@ class Visitor:
 Send = Callable[[Visitor], None]
 
 
-class ExportPanel:
+class ExportFeature(Feature):
     """Buttons for a picture, the scene, and a film of the run; who asks waits in a thread of viser, others do not."""
 
-    def __init__(
-        self,
-        server: viser.ViserServer,
-        channel: Channel,
-        view: Callable[[], View | None],
-        played: Callable[[], tuple[Played | None, float]],
-        extent: tuple[Array, Array],
-    ) -> None:
-        """Build the panel.
-
-        Args:
-            server: The server.
-            channel: Where pages tell that they do not want a film any more.
-            view: What is shown now.
-            played: What is played now, if anything is, and its time a second.
-            extent: Lowest and highest corner of what there is to see [m].
-        """
-        self._server, self._view, self._played, self._extent = server, view, played, extent
+    def __init__(self, page: Page) -> None:
+        """Build the panel."""
+        server, channel = page.server, page.channel
+        self._page, self._server, self._extent = page, server, page.extent
         self._visitors: dict[int, Visitor] = {}
         gui = server.gui
         with gui.add_folder("Take away", expand_by_default=False):
@@ -153,14 +140,19 @@ class ExportPanel:
             button.on_click(partial(self._sent, send))
         channel.on(TOPIC, self._cancel)
         server.on_client_disconnect(self._part)
+        self.put_on(page.player.played)
 
-    def offer_film(self, of: str | None) -> None:
+    def depends(self, view: View) -> Hashable:
+        """Nothing that is shown."""
+        return None
+
+    def put_on(self, played: Played | None) -> None:
         """Offer a film of what is played, or none."""
-        self._film.visible = of is not None
-        self._film.label = f"Film of the {of}"
+        self._film.visible = played is not None
+        self._film.label = f"Film of the {None if played is None else played.name}"
 
     def _send_picture(self, visitor: Visitor) -> None:
-        view, paper = self._view(), PAPERS.get(self._paper.value)
+        view, paper = self._page.view, PAPERS.get(self._paper.value)
         if view is not None and paper is not None:
             told, strip = visitor.told, bool(self._strip.value)
             pictured(visitor.client, self._server, told, view, paper, self._name(), self._extent, strip=strip)
@@ -168,13 +160,13 @@ class ExportPanel:
     def _send_scene(self, visitor: Visitor) -> None:
         from sagline.viewer.export import scene_as_glb  # trimesh: a fifth of what starts the viewer
 
-        view = self._view()
+        view = self._page.view
         if view is not None:
             glb = scene_as_glb(view.snapshot, view.scale, view.settings.sag_scale)
             visitor.client.send_file_download(f"{self._name()}.glb", glb, save_immediately=True)
 
     def _send_film(self, visitor: Visitor) -> None:
-        view, (played, speed) = self._view(), self._played()
+        view, played, speed = self._page.view, self._page.player.played, self._page.player.speed
         if played is not None and view is not None:
             visitor.cancelled.clear()
             client, name = visitor.client, f"{self._name()}-{played.name}"
@@ -190,7 +182,7 @@ class ExportPanel:
         self._visitors.pop(client.client_id, None)
 
     def _name(self) -> str:
-        view = self._view()
+        view = self._page.view
         return "sagline" if view is None else file_stem(view.snapshot.robot.name)
 
     def _sent(self, send: Send, event: viser.GuiEvent[Any]) -> None:

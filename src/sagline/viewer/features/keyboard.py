@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -13,9 +12,9 @@ from sagline.core.errors import SaglineError
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.viewer import solids
-from sagline.viewer.channel import Channel
 from sagline.viewer.drawn import Drawn
-from sagline.viewer.feature import View
+from sagline.viewer.feature import Feature, View
+from sagline.viewer.page import Page
 from sagline.viewer.readout import headline
 from sagline.viewer.tension_scale import force_unit
 from sagline.viewer.wording import number
@@ -79,22 +78,13 @@ TURN: Final = np.radians(1.0)  # how far one key turns
 MOST: Final = 100.0  # steps at once: keys that were held while nobody listened
 
 
-class KeysShow:
+class KeyboardFeature(Feature):
     """Says what is shown, and hears keys; all of it belongs to the thread that serves."""
 
-    moving = False
-    waiting = False
-
-    def __init__(self, channel: Channel, robot: Robot, go: Callable[[Pose], None], go_home: Callable[[], None]) -> None:
-        """Say what the picture is of.
-
-        Args:
-            channel: To the pages.
-            robot: The robot.
-            go: Puts the platform to a pose, or refuses by a `SaglineError`.
-            go_home: Puts it home.
-        """
-        self._channel, self._go, self._go_home = channel, go, go_home
+    def __init__(self, page: Page) -> None:
+        """Build nothing; say what the picture is of."""
+        channel, robot = page.channel, page.robot
+        self._channel, self._go, self._go_home = channel, page.go_near, page.go_home
         self._step = solids.round_below(STEP * solids.size_of(robot))
         self._pose: Pose | None = None
         channel.tell("scene", {"what": described(robot), "step": self._step, "turn": round(float(np.degrees(TURN)), 3)})
@@ -105,9 +95,6 @@ class KeysShow:
         """Tell the verdict."""
         self._pose = view.snapshot.pose
         self._channel.tell("spoken", spoken(view)._asdict())
-
-    def tick(self) -> None:
-        """Nothing comes of time."""
 
     def _nudge(self, value: Any, _: int) -> None:
         """Move by steps along x, y, z, and turn by steps about z, y, x."""

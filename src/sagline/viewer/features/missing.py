@@ -12,15 +12,14 @@ import viser
 from sagline.core.errors import SaglineError
 from sagline.core.numbers import n
 from sagline.kinematics.status import PoseStatus
-from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.tension.singular import unresisted_motion
 from sagline.viewer import lines, solids
-from sagline.viewer.channel import Channel, chosen_by
-from sagline.viewer.feature import Aside, Reading, View
+from sagline.viewer.channel import chosen_by
+from sagline.viewer.feature import Aside, Feature, Reading, View
 from sagline.viewer.features.tensions import SHARING
 from sagline.viewer.missing import Missing, NearestHeld, missing_of, nearest_held
-from sagline.viewer.panel import Panel
+from sagline.viewer.page import Page
 from sagline.viewer.readout import block
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.stage import INFEASIBLE
@@ -216,37 +215,20 @@ class MissingStage:
 Key = tuple[object, ...]
 
 
-class MissingShow:
+class MissingFeature(Feature):
     """Explains what is shown; all of it belongs to the thread that serves."""
 
-    moving = False
-
-    def __init__(
-        self,
-        panel: Panel,
-        stage: MissingStage,
-        aside: Aside,
-        channel: Channel,
-        go: Callable[[Pose], None],
-        ready: Callable[[Reading], bool],
-    ) -> None:
-        """Begin with nothing.
-
-        Args:
-            panel: Where it is told.
-            stage: Where it is drawn.
-            aside: What looks for the nearest pose.
-            channel: What brings the wish to go there.
-            go: Puts the platform to a pose.
-            ready: Whether a reading can be had without waiting.
-        """
-        self._panel, self._stage, self._aside, self._go, self._ready = panel, stage, aside, go, ready
+    def __init__(self, page: Page) -> None:
+        """Build nothing yet."""
+        self._panel, self._go, self._ready = page.panel, page.go, page.ready
+        self._stage = MissingStage(page.server.scene, page.robot, page.scale)
+        self._aside = Aside(page.later)
         self.missing: Missing | None = None  # at the pose that is shown
         self._key: Key = ()  # of the pose that is shown; () while it is feasible
         self._found: tuple[Key, NearestHeld | None] = ((), None)
         self._told: Callable[[], None] = _nothing
         self._look: Callable[[], None] = _nothing
-        channel.on(GO, self._hear)
+        page.channel.on(GO, self._hear)
 
     @property
     def waiting(self) -> bool:
@@ -290,9 +272,6 @@ class MissingShow:
         if self._ready(Reading.WORKSPACE) and not self._aside.busy and self._found[0] != key:
             look()
         tell()
-
-    def tick(self) -> None:
-        """Nothing comes of time."""
 
     def _clear(self) -> None:
         self._key, self._found = (), ((), None)

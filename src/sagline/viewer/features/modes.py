@@ -19,10 +19,10 @@ from sagline.dynamics.vibration_status import VibrationStatus
 from sagline.robot.equilibrium import Equilibrium
 from sagline.viewer.channel import Channel, chosen_by
 from sagline.viewer.drawn import Drawn
-from sagline.viewer.feature import Aside, Reading, View
+from sagline.viewer.feature import Aside, Feature, Reading, View
+from sagline.viewer.page import Page
 from sagline.viewer.readout import block, refused, sentence, waiting
-from sagline.viewer.stage import Stage
-from sagline.viewer.swing import PERIOD, Swing, mode_of
+from sagline.viewer.swing import PERIOD, Swing, mode_of, vibrating
 from sagline.viewer.wording import number
 
 Place = Callable[[Array], Array]
@@ -225,27 +225,13 @@ Vibrate = Callable[[Equilibrium, float], Vibration]
 RESTED = 0.25  # s without a change: what is dragged is not worked out on its way
 
 
-class ModeShow:
+class ModesFeature(Feature):
     """Follows what is shown; all of it belongs to the thread that serves."""
 
-    def __init__(
-        self,
-        panel: ModesPanel,
-        stage: Stage,
-        aside: Aside,
-        vibrate: Vibrate,
-        ready: Callable[[Reading], bool],
-    ) -> None:
-        """Begin with nothing.
-
-        Args:
-            panel: Where the modes are listed and chosen.
-            stage: Where they move.
-            aside: What works them out.
-            vibrate: Gives the vibration of a state up to a frequency [Hz].
-            ready: Whether a reading can be had without waiting.
-        """
-        self._panel, self._stage, self._aside, self._vibrate, self._ready = panel, stage, aside, vibrate, ready
+    def __init__(self, page: Page) -> None:
+        """Build the tab."""
+        self._panel = ModesPanel(page.server.gui, page.panel.readings, page.refresh, page.channel, page.mode)
+        self._stage, self._aside, self._ready = page.stage, Aside(page.later), page.ready
         self._key: Hashable = None
         self._state: Equilibrium | None = None
         self._due: float | None = None
@@ -281,7 +267,7 @@ class ModeShow:
         if self._due is not None and now >= self._due and self._state is not None:
             self._due = None
             state, up_to = self._state, self._panel.up_to
-            self._aside.ask(lambda: self._vibrate(state, up_to), self._found, self._panel.refuse)
+            self._aside.ask(lambda: vibrating(state, up_to), self._found, self._panel.refuse)
         if self._aside.waited:
             self._panel.wait(self._aside.waited)
         if self.swing is not None:

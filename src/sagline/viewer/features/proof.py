@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-import viser
 
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.robot.equilibrium import Equilibrium
-from sagline.viewer.feature import View
-from sagline.viewer.missing import Missing
+from sagline.viewer.feature import Feature, View
+from sagline.viewer.features.missing import MissingFeature
+from sagline.viewer.page import Page
 from sagline.viewer.readout import block, sentence
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.tension_scale import NONE, Color, cable_color, force_unit
@@ -273,37 +272,19 @@ NOT_AT_REST: Final = "In motion, and in a log, forces do not add up to nothing: 
 UNKNOWN: Final = "There are no tensions here, and no force is known that would do: nothing to add up."
 
 
-class ForcePolygonShow:
+class ProofFeature(Feature):
     """Follows what is shown; all of it belongs to the thread that serves."""
 
-    moving = False
-    waiting = False
-
-    def __init__(
-        self,
-        server: viser.ViserServer,
-        readings: Any,
-        size: float,
-        changed: Callable[[], None],
-        missing: Callable[[], Missing | None],
-    ) -> None:
-        """Build the tab.
-
-        Args:
-            server: The page.
-            readings: The panel that gets the tab.
-            size: The robot's [m].
-            changed: Called, from any thread, when the arrows are wanted or not.
-            missing: What is missing at the pose that is shown; None for nothing.
-        """
-        self._scene, self._size, self._missing = server.scene, size, missing
+    def __init__(self, page: Page) -> None:
+        """Build the tab."""
+        self._page, self._scene, self._size = page, page.server.scene, page.size
         self._arrows: Any = None
-        with readings.add_tab("Proof"):
-            self._wanted: Any = server.gui.add_checkbox(
+        with page.panel.readings.add_tab("Proof"):
+            self._wanted: Any = page.server.gui.add_checkbox(
                 "Forces in the scene", False, hint="As arrows at the platform, the longest always of the same length."
             )
-            self._told = server.gui.add_html("")
-        self._wanted.on_update(lambda _: changed())
+            self._told = page.server.gui.add_html("")
+        self._wanted.on_update(lambda _: page.refresh())
 
     def follow(self, view: View) -> None:
         """Add up the forces of what is shown."""
@@ -314,9 +295,6 @@ class ForcePolygonShow:
             self._told.content = force_polygon_figure(state, lacking)
         self._draw(state if self._wanted.value else None, lacking)
 
-    def tick(self) -> None:
-        """Nothing comes of time."""
-
     def _balance(self, view: View) -> tuple[Equilibrium | None, Array | None]:
         """What is in balance, and the wrench that nobody gives."""
         snapshot = view.snapshot
@@ -324,7 +302,7 @@ class ForcePolygonShow:
             return None, None
         if snapshot.plan is not None and snapshot.feasible:
             return snapshot.plan.state, None
-        missing = self._missing()
+        missing = self._page.feature(MissingFeature).missing
         return (None, None) if missing is None else (missing.state, missing.wrench)
 
     def _draw(self, state: Equilibrium | None, lacking: Array | None) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
@@ -18,11 +18,10 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.viewer import solids
 from sagline.viewer.camera import Eye, met, place_of
-from sagline.viewer.channel import Channel
-from sagline.viewer.feature import Reading, View
+from sagline.viewer.feature import Feature, Reading, View
+from sagline.viewer.page import Page
 from sagline.viewer.push import Push, Pushed, Reserve, pushed, radii
 from sagline.viewer.readout import LATER, box, refused, sentence
-from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.solids import THINNEST, ball, readable
 from sagline.viewer.tension_scale import TensionScale, force_unit
 from sagline.viewer.wording import ForceUnit
@@ -155,6 +154,11 @@ class PushPanel:
         for handle in (self._force, self._direction, self._at, self._ellipsoid):
             handle.on_update(lambda event: changed() if event.client is not None else None)
         self._let_go.on_click(lambda _: let_go())
+
+    @property
+    def pushes(self) -> bool:
+        """Whether there is a force."""
+        return bool(self._force.value != 0.0)
 
     @property
     def keeps(self) -> bool:
@@ -310,55 +314,34 @@ class Hold:
     at: Array
 
 
-class PushShow:
+class PushFeature(Feature):
     """Follows a hand or its panel; all of it belongs to the thread that serves."""
 
-    moving = waiting = False
-
-    def __init__(
-        self,
-        server: viser.ViserServer,
-        robot: Robot,
-        channel: Channel,
-        wake: Callable[[], None],
-        soon: Callable[[Callable[[], None]], None],
-        ready: Callable[[Reading], bool],
-    ) -> None:
-        """Begin with nothing.
-
-        Args:
-            server: Where its panel and its arrow are.
-            robot: The robot.
-            channel: Brings what a hand does.
-            wake: Called, from any thread, when everything is to be shown anew.
-            soon: Takes what the serving thread is to do, from any thread.
-            ready: Whether a reading can be had without waiting.
-        """
-        self._server, self._ready = server, ready
-        self._panel = PushPanel(server.gui, robot, wake, lambda: soon(self.let_go))
+    def __init__(self, page: Page) -> None:
+        """Build panel and arrow."""
+        server, robot, channel, soon = page.server, page.robot, page.channel, page.later
+        self._page, self._server, self._ready = page, server, page.ready
+        self._panel = PushPanel(server.gui, robot, page.refresh, lambda: soon(self.let_go))
         self._stage = PushStage(server.scene, robot)
         self._size = solids.size_of(robot)
         scale = TensionScale.of(robot)
         self._stiffness = float(np.sqrt(scale.low * scale.high)) / (FAR * self._size)  # N/m of the pull
-        self._state: Equilibrium | None = None
         self._hold: Hold | None = None
         self.pushed: Pushed | None = None
         channel.on(TOPIC, self._hear)
         server.on_client_disconnect(lambda client: soon(lambda: self._leave(client.client_id)))
 
+    def depends(self, view: View) -> Hashable:
+        """Nothing while nobody pushes."""
+        return view if self._panel.pushes else None
+
     def follow(self, view: View) -> None:
         """Something is shown: answer the push there, if there is one."""
-        snapshot = view.snapshot
-        held = isinstance(snapshot, Snapshot) and snapshot.plan is not None and snapshot.feasible
-        self._state = snapshot.plan.state if held and isinstance(snapshot, Snapshot) and snapshot.plan else None
         try:
             self._answer(view)
         except SaglineError as error:
             self._clear()
             self._panel.refuse(str(error))
-
-    def tick(self) -> None:
-        """Nothing comes by itself."""
 
     def let_go(self) -> None:
         """No force any more."""
@@ -370,14 +353,14 @@ class PushShow:
         if push is None:
             self._clear()
             return
-        if self._state is None or not self._ready(Reading.REST) or not self._ready(Reading.FREQUENCIES):
+        if self._page.state is None or not self._ready(Reading.REST) or not self._ready(Reading.FREQUENCIES):
             self._clear()
             late = "A push is answered as soon as forward kinematics and stiffness are compiled."
             self._panel.say(
-                sentence("A push is answered where the platform is held at rest." if self._state is None else late)
+                sentence("A push is answered where the platform is held at rest." if self._page.state is None else late)
             )
             return
-        found = pushed(self._state, push, anew=self._ready(Reading.VERDICTS))
+        found = pushed(self._page.state, push, anew=self._ready(Reading.VERDICTS))
         drawn_for = readable(radii(found.compliance)[0], LARGE * self._size) if self._ellipsoid(found) else None
         self._stage.show(self._drawing(found, view.settings.error_scale, drawn_for))
         self._panel.say(response_text(found, drawn_for))
@@ -417,8 +400,10 @@ class PushShow:
             self._grab(eye, at, client)
         elif self._hold is None or self._hold.client != client:
             return
-        elif phase in ("move", "end") and self._state is not None:
-            self._panel.hold(Push(self._stiffness * self._pulled(eye, at, self._hold.at, self._state), self._hold.at))
+        elif phase in ("move", "end") and self._page.state is not None:
+            self._panel.hold(
+                Push(self._stiffness * self._pulled(eye, at, self._hold.at, self._page.state), self._hold.at)
+            )
         if phase == "cancel" or (phase == "end" and not (self._panel.keeps or value.get("keep") is True)):
             self.let_go()
         elif phase == "end":
@@ -426,17 +411,17 @@ class PushShow:
 
     def _grab(self, eye: Eye, at: tuple[float, float], client: int) -> None:
         """Take hold of the place of the platform that is seen there, if it is there and held."""
-        if self._state is None:
+        if self._page.state is None:
             return
-        back = self._state.pose.matrix.T
-        start = back @ (eye.place - self._state.pose.position)
+        back = self._page.state.pose.matrix.T
+        start = back @ (eye.place - self._page.state.pose.position)
         direction = back @ eye.ray(at)
         far = met(self._stage.body, start, direction)
         if far is not None:
             self._hold = Hold(client, start + far * direction)
             return
         points = self._stage.body.vertices[self._stage.body.faces].mean(axis=1)  # a thin one is easily missed
-        places, deep = eye.seen(self._state.pose.transform(points))
+        places, deep = eye.seen(self._page.state.pose.transform(points))
         away = np.linalg.norm(places - np.asarray(at) * eye.pixels, axis=1)
         away[~(deep > 0.0)] = np.inf  # behind the eye
         if away.min() <= NEAR:

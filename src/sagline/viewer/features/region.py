@@ -13,9 +13,10 @@ from sagline.core.arrays import Array, locked
 from sagline.core.errors import SaglineError
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.viewer.feature import Aside, Reading, View
+from sagline.viewer.feature import Aside, Feature, Reading, View
 from sagline.viewer.free_travel import NAMES, SpacePanel, WhereTo, free_ways, where_to
-from sagline.viewer.hull import CELLS, REACH, Asked, Hull, Patch, Patches, left, lit
+from sagline.viewer.hull import CELLS, REACH, Asked, Hull, Patch, Patches, hull_of, left, lit
+from sagline.viewer.page import Page
 from sagline.viewer.readout import LATER
 from sagline.viewer.slices import MarginScale, Picture, picture_of
 from sagline.viewer.stage import INFEASIBLE, PLATFORM, REST
@@ -187,29 +188,14 @@ def planes_of(robot: Robot) -> tuple[int, ...]:
     return (2, 1, 0) if flat is None else (flat,)
 
 
-class SpaceShow:
+class RegionFeature(Feature):
     """Follows what is shown; all of it belongs to the thread that serves."""
 
-    moving = False
-
-    def __init__(
-        self,
-        panel: SpacePanel,
-        stage: SpaceStage,
-        aside: Aside,
-        make: MakeHull,
-        ready: Callable[[Reading], bool],
-    ) -> None:
-        """Begin with nothing.
-
-        Args:
-            panel: What is wanted.
-            stage: Where it is drawn.
-            aside: What works the hull out.
-            make: Gives the hull, and tells how far it is.
-            ready: Whether a reading can be had without waiting.
-        """
-        self._panel, self._stage, self._aside, self._make, self._ready = panel, stage, aside, make, ready
+    def __init__(self, page: Page) -> None:
+        """Build the tab."""
+        self._panel = SpacePanel(page.server.gui, page.panel.readings, planes_of(page.robot), page.refresh)
+        self._stage = SpaceStage(page.server, page.size)
+        self._aside, self._ready = Aside(page.later), page.ready
         self._key: Hashable = None  # of what margins are of
         self._asked: Asked | None = None
         self._levels: Levels | None = None
@@ -226,6 +212,10 @@ class SpaceShow:
     def waiting(self) -> bool:
         """Whether something is to come without anybody's doing."""
         return self._aside.busy
+
+    def depends(self, view: View) -> Hashable:
+        """Nothing while nothing is asked for."""
+        return view if self._panel.anything else None
 
     def follow(self, view: View) -> None:
         """A robot is shown at a pose; its workspace is that of this orientation."""
@@ -291,7 +281,7 @@ class SpaceShow:
 
     def _ask(self, *, rough: bool) -> None:
         """Have a hull of what is shown made beside the page."""
-        asked, key, make = self._asked, self._key, self._make
+        asked, key = self._asked, self._key
         assert asked is not None
         self._share = 0.0
 
@@ -307,7 +297,7 @@ class SpaceShow:
                 self._have(_Made(key, rough=False, hull=None))
                 self._panel.refuse(message)
 
-        self._aside.ask(lambda: make(asked, rough, told), lambda hull: self._have(_Made(key, rough, hull)), failed)
+        self._aside.ask(lambda: hull_of(asked, rough, told), lambda hull: self._have(_Made(key, rough, hull)), failed)
 
     def _have(self, made: _Made | None) -> None:
         """A hull is there, or cannot be had."""

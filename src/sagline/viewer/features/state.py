@@ -11,13 +11,11 @@ import viser
 from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.files.typed import pose_of
 from sagline.robot.pose import Pose
-from sagline.robot.robot import Robot
-from sagline.viewer.channel import Channel
-from sagline.viewer.feature import View
-from sagline.viewer.link import Linking
-from sagline.viewer.player import Player
+from sagline.viewer.feature import Feature, View
+from sagline.viewer.link import LinkedControls, Linking
+from sagline.viewer.page import Page
 from sagline.viewer.readout import block
-from sagline.viewer.state_code import Source, code_of
+from sagline.viewer.state_code import code_of
 from sagline.viewer.wording import number
 
 FIRST: Final = -0.9  # among the controls: above all but what is played
@@ -55,33 +53,16 @@ def _short(value: float, form: str) -> str:
 LONGEST_NAME = 40  # characters of what a page calls its question
 
 
-class StateShow:
+class StateFeature(Feature):
     """Tells pages where the platform is, and hears where it shall go; all of it belongs to the thread that serves."""
 
-    moving = False
-    waiting = False
-
-    def __init__(
-        self,
-        channel: Channel,
-        player: Player,
-        robot: Robot,
-        source: Source,
-        go: Callable[[Pose], None],
-        linking: Linking,
-    ) -> None:
-        """Begin with nothing.
-
-        Args:
-            channel: To the pages.
-            player: What is played.
-            robot: The robot that the page was opened with.
-            source: Where that came from.
-            go: Puts the platform to a pose, or refuses by a `SaglineError`.
-            linking: Makes links and follows them.
-        """
-        self._linking = linking
-        self._channel, self._player, self._robot, self._source, self._go = channel, player, robot, source, go
+    def __init__(self, page: Page) -> None:
+        """Build the panel; last of all, as it knows the controls that there are."""
+        channel = page.channel
+        add_state_panel(page.server.gui)
+        self.linking = Linking(page, LinkedControls(page.server.gui))
+        self._channel, self._player, self._robot, self._source = channel, page.player, page.robot, page.source
+        self._go = page.go_near
         self._view: View | None = None
         self._time = 0.0
         self._asked: deque[tuple[Any, int]] = deque()  # what is to be given as text, and to whom
@@ -120,7 +101,7 @@ class StateShow:
         """Follow a link."""
 
         def follow(text: str) -> dict[str, str]:
-            self._linking.follow(text, client)
+            self.linking.follow(text, client)
             return {}
 
         self._answer(client, "link-told", value, follow)
@@ -129,7 +110,7 @@ class StateShow:
         if self._view is None:
             raise InvalidValueError("the view", "not there yet", "something on the screen", "Wait until it stands.")
         if what == "link":
-            return {"text": self._linking.told(self._view, client)}
+            return {"text": self.linking.told(self._view, client)}
         if what != "code":
             raise InvalidValueError("what to copy", repr(what), "code or link", "Press one of the buttons.")
         if self._view.played is not None and not (self._player.given and self._source.played):

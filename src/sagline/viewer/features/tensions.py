@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import suppress
 from html import escape
 from string import ascii_uppercase
@@ -22,9 +21,9 @@ from sagline.tension.options import kernel_options, takes_default_kernel
 from sagline.tension.polygon import TensionPolygon
 from sagline.viewer import playback, session
 from sagline.viewer.by_hand import BY_HAND, WIDTH, ByHand, DotField
-from sagline.viewer.channel import Channel, chosen_by
-from sagline.viewer.feature import Reading, View
-from sagline.viewer.panel import Panel
+from sagline.viewer.channel import chosen_by
+from sagline.viewer.feature import Feature, Reading, View
+from sagline.viewer.page import Page
 from sagline.viewer.readout import LATER, block, sentence
 from sagline.viewer.session import SessionMoment
 from sagline.viewer.snapshot import METHODS, Snapshot
@@ -316,27 +315,18 @@ OVER: Final = 2e-3  # of the drawing: sides are aimed at from so far beyond
 FARTHEST: Final = 1.0  # share of the drawing that a step may be
 
 
-class DotShow:
+class TensionsFeature(Feature):
     """Draws the field and moves the dot; all of it belongs to the thread that serves."""
 
-    moving = False
-    waiting = False
-
-    def __init__(self, panel: Panel, channel: Channel, ready: Callable[[Reading], bool]) -> None:
-        """Begin with nothing.
-
-        Args:
-            panel: Where the drawing is, and which way of sharing is chosen.
-            channel: What brings the dot from the page.
-            ready: Whether a reading can be had without waiting.
-        """
-        self._panel, self._ready = panel, ready
+    def __init__(self, page: Page) -> None:
+        """Build nothing yet."""
+        self._panel, self._ready = page.panel, page.ready
         self._marks = Marks()
         self._field: DotField | None = None  # where the dot can go
         self._key: tuple[object, ...] = ()  # of the pose that the field is of
         self._aim: Array | None = None  # coordinates that were chosen last, (r,)
-        channel.on(DOT, self._hear_dot)
-        channel.on(SHARING, self._hear_sharing)
+        page.channel.on(DOT, self._hear_dot)
+        page.channel.on(SHARING, self._hear_sharing)
 
     def follow(self, view: View) -> None:
         """Draw what there is to choose from."""
@@ -362,9 +352,6 @@ class DotShow:
             further, verdicts = self._ready(Reading.SHARING), self._ready(Reading.VERDICTS)
             marks = self._marks.at(snapshot.plan, further=further, verdicts=verdicts) if self._field else ()
             self._panel.show_polygon(polygon_figure(snapshot, marks, self._field, self._panel.way))
-
-    def tick(self) -> None:
-        """Nothing comes by itself."""
 
     def _hear_dot(self, value: Any, _: int) -> None:
         """The dot has been dragged, or stepped; what is no such thing, or comes too late, is not heard."""

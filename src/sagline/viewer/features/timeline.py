@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Hashable
 from math import isfinite
 from typing import Any, Final
 
@@ -11,10 +12,10 @@ import viser
 
 from sagline.robot.robot import Robot
 from sagline.viewer import lines, solids
-from sagline.viewer.channel import Channel
 from sagline.viewer.drawn import Drawn
-from sagline.viewer.feature import View
-from sagline.viewer.player import Played, Player
+from sagline.viewer.feature import Feature, View
+from sagline.viewer.page import Page
+from sagline.viewer.player import Played
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.stage import GHOST, GHOST_WIDTH, NEAR
 from sagline.viewer.tension_scale import linear
@@ -81,20 +82,15 @@ NARROWEST: Final = 1e-6  # of the whole, that a window is wide
 _MOST_STEPS: Final = 1_000_000
 
 
-class TimelineShow:
+class TimelineFeature(Feature):
     """Follows a player, and moves it; all of it belongs to the thread that serves."""
 
-    moving = False
-
-    def __init__(self, channel: Channel, player: Player, stage: TimelineStage) -> None:
-        """Begin to speak and to listen.
-
-        Args:
-            channel: To the pages; browser/timeline.js is at its other end.
-            player: What is played.
-            stage: Where what is pointed at, and a second run, are drawn.
-        """
-        self._channel, self._player, self._stage = channel, player, stage
+    def __init__(self, page: Page) -> None:
+        """Begin to speak and to listen; browser/timeline.js is at the other end."""
+        player, channel, beside = page.player, page.channel, page.player.beside
+        name = "" if beside is None else beside.names[1]
+        self._channel, self._player = channel, player
+        self._stage = TimelineStage(page.server.scene, page.robot, name)
         self._played: Played | None = None  # of which the track is
         self._number = player.number
         self._track: Track | None = None
@@ -118,6 +114,11 @@ class TimelineShow:
     def waiting(self) -> bool:
         """Whether the pages do not know yet where the clock is."""
         return bool(self._clock != self._now())
+
+    def depends(self, view: View) -> Hashable:
+        """Nothing while no cable is pointed at, and no second run drawn."""
+        beside = view.played is not None and self._player.beside is not None
+        return view if beside or self._cable is not None else None
 
     def follow(self, view: View) -> None:
         """Draw what is beside, and what is pointed at."""
