@@ -50,13 +50,7 @@ class DotField:
 
     @classmethod
     def of(cls, polygon: TensionPolygon, dot: Array, before: DotField | None = None) -> DotField:
-        """The field of a polygon that is not empty, of one or two redundant cables.
-
-        Args:
-            polygon: The polygon.
-            dot: Coordinates that are to be seen [N], shape (r,); NaN for none.
-            before: A field of the same pose, whose place in the drawing it keeps; None for none.
-        """
+        """The field of a polygon that is not empty, of one or two redundant cables."""
         corners, sides = polygon.vertices, polygon.sides
         if before is not None:
             low, high = before.low, before.high

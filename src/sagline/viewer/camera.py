@@ -45,11 +45,7 @@ class Eye(NamedTuple):
         return cls(place, axes, high * np.array([pixels[0] / pixels[1], 1.0]), pixels)
 
     def ray(self, at: tuple[float, float]) -> Array:
-        """Direction in which a point of the picture lies, at a depth of 1, shape (3,).
-
-        Args:
-            at: The point, from 0, 0 at the left upper corner to 1, 1.
-        """
+        """Direction in which a point of the picture lies, at a depth of 1, shape (3,)."""
         across, down = self.reach * (2.0 * np.asarray(at) - 1.0)
         return np.asarray(self.axes @ np.array([across, down, 1.0]))
 
@@ -63,11 +59,6 @@ class Eye(NamedTuple):
 
 def met(solid: Solid, start: Array, direction: Array) -> float | None:
     """How many times a direction a ray goes until it meets a surface; None where it misses.
-
-    Args:
-        solid: The surface.
-        start: Where the ray starts [m], shape (3,).
-        direction: Where it goes, shape (3,).
 
     Source:
         Moeller & Trumbore, J. Graphics Tools 2, 1997.
@@ -86,14 +77,7 @@ def met(solid: Solid, start: Array, direction: Array) -> float | None:
 
 
 def chosen_line(eye: Eye, at: tuple[float, float], lines: Array, within: float) -> int | None:
-    """Which line is nearest to a point of the picture, if one is near; of several at it the one in front.
-
-    Args:
-        eye: Who looks.
-        at: The point, from 0, 0 at the left upper corner to 1, 1.
-        lines: Points along the lines [m], shape (m, P, 3).
-        within: How near [px].
-    """
+    """Which line is nearest to a point of the picture, if one is near; of several at it the one in front."""
     places, deep = eye.seen(lines)
     pixel = np.asarray(at) * eye.pixels
     start, run = places[:, :-1] - pixel, np.diff(places, axis=1)
@@ -129,12 +113,6 @@ _UP: Final = np.array([0.0, 0.0, 1.0])
 
 def fitted(low: Array, high: Array, aspect: float, field: float = FIELD) -> tuple[Array, Array]:
     """The nearest camera that sees a whole box from the usual side.
-
-    Args:
-        low: Lowest corner of the box [m].
-        high: Highest corner [m].
-        aspect: Width over height of the picture, > 0.
-        field: Upright field of view [rad].
 
     Returns:
         Where the camera is and the point that it looks at [m].
@@ -189,12 +167,7 @@ class Framing:
         server.on_client_disconnect(self._part)
 
     def look(self, client: int, camera: Array) -> None:
-        """Have a client look from a place at another, as if its camera had been moved by hand.
-
-        Args:
-            client: Number of the client; one that is not known yet looks from there as soon as it is.
-            camera: Both places [m], shape (6,).
-        """
+        """Have a client look from a place at another, as if its camera had been moved by hand."""
         with self._lock:
             self._wanted[client] = camera
             known = self._server.get_clients().get(client)

@@ -27,21 +27,12 @@ class Told:
     """What pages are told about topics; values are what JSON knows."""
 
     def __init__(self, gui: viser.GuiApi) -> None:
-        """Begin with nothing.
-
-        Args:
-            gui: A server's, for all pages and those that come later; or a client's, for that alone.
-        """
+        """Begin with nothing."""
         self._gui = gui
         self._told: dict[str, Any] = {}  # HTML, by topic
 
     def tell(self, topic: str, value: Any) -> None:
-        """Tell something about a topic, in place of what was told before.
-
-        Args:
-            topic: The topic.
-            value: The value; None for nothing any more.
-        """
+        """Tell something about a topic, in place of what was told before."""
         content = f"{NAME}:{topic}:{json.dumps(value, separators=(',', ':'), allow_nan=False)}"
         if topic not in self._told:
             self._told[topic] = self._gui.add_html(content, visible=False)
@@ -53,12 +44,7 @@ class Channel(Told):
     """Topics that pages tell something about, and are told something about."""
 
     def __init__(self, gui: viser.GuiApi, soon: Callable[[Callable[[], None]], None]) -> None:
-        """Open it.
-
-        Args:
-            gui: Where.
-            soon: Takes what the serving thread is to do, from any thread.
-        """
+        """Open it."""
         super().__init__(gui)
         self._soon = soon
         self._heard: dict[str, Heard] = {}
@@ -70,12 +56,7 @@ class Channel(Told):
             self._hear(event.target.value, event.client_id)
 
     def on(self, topic: str, heard: Heard) -> None:
-        """Have the serving thread hear what pages tell about a topic.
-
-        Args:
-            topic: The topic.
-            heard: Given the value, which is whatever a client has sent, and the number of the client.
-        """
+        """Have the serving thread hear what pages tell about a topic."""
         self._heard[topic] = heard
 
     def answer(self, client: int, topic: str, value: Any) -> None:

@@ -114,13 +114,7 @@ class Aside:
         return elapsed if elapsed > PATIENCE else 0.0
 
     def ask(self, task: Callable[[], T], done: Callable[[T], None], failed: Callable[[str], None]) -> None:
-        """Have something worked out in place of what was asked before; from the serving thread.
-
-        Args:
-            task: The work, which touches nothing that anybody else changes.
-            done: Given its result, in the serving thread, unless something else has been asked for meanwhile.
-            failed: Given the message of a `SaglineError` in the same way.
-        """
+        """Have something worked out in place of what was asked before; from the serving thread."""
         self._asked += 1
         mine = self._asked
 

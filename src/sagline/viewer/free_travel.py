@@ -54,10 +54,6 @@ class WhereTo:
 def free_ways(robot: Robot, flat: int | None) -> Indices:
     """Ways along axes of the world that the platform may move along.
 
-    Args:
-        robot: The robot.
-        flat: An axis along which positions are all the same; None for none.
-
     Returns:
         Indices of `WAYS`, shape (K,).
     """
@@ -69,13 +65,6 @@ def free_ways(robot: Robot, flat: int | None) -> Indices:
 
 def where_to(find: Find, start: Array, which: Indices, low: Array, high: Array) -> WhereTo:
     """Follow straight ways to the boundary.
-
-    Args:
-        find: Gives levels and margins at positions, the platform turned as it is.
-        start: Where the platform is [m], shape (3,).
-        which: Ways to follow, indices of `WAYS`, shape (K,).
-        low: Lowest corner of the box that the ways end at [m], shape (3,).
-        high: Highest corner [m], shape (3,).
 
     Returns:
         How far each goes until the margin changes its sign: for a platform inside to where it has to stop, for one
@@ -120,14 +109,7 @@ class SpacePanel:
     """A tab: what is drawn, the loads, and readings."""
 
     def __init__(self, gui: viser.GuiApi, readings: Any, planes: tuple[int, ...], changed: Callable[[], None]) -> None:
-        """Build the tab.
-
-        Args:
-            gui: Where.
-            readings: The tabs that it is one of.
-            planes: Axes at right angles to which the robot can be sliced.
-            changed: Called, from any thread, when something is chosen.
-        """
+        """Build the tab."""
         with readings.add_tab("Workspace"):
             self._force = gui.add_number(
                 "Force ± [N]", 0.0, min=0.0, hint="Further load that is to be borne, of this size along each axis."
@@ -154,11 +136,7 @@ class SpacePanel:
 
     @property
     def loads(self) -> tuple[float, float]:
-        """Force [N] and moment [N m] that are to be borne besides, along and about each axis.
-
-        Raises:
-            InvalidValueError: If a client sent what is none.
-        """
+        """Force [N] and moment [N m] that are to be borne besides, along and about each axis."""
         return _checked(self._force, "N"), _checked(self._moment, "N m")
 
     @property
@@ -256,11 +234,7 @@ def _end(crossed: bool, cable: int, inside: bool) -> str:
 
 
 def _checked(field: Any, unit: str) -> float:
-    """The number of a field.
-
-    Raises:
-        InvalidValueError: If a client sent one that is none, or negative.
-    """
+    """The number of a field."""
     value = float(field.value)
     if not 0.0 <= value < 1e12:
         raise InvalidValueError(field.label, value, f"0 {unit} or more", "Type a load, 0 for none.")

@@ -63,12 +63,7 @@ class Patches:
         self.meshes: list[Any] = []
 
     def show(self, patches: list[Patch], side: Any = "double") -> None:
-        """Draw these and no others, while the server is `atomic`, so that corners and faces change together.
-
-        Args:
-            patches: What is drawn.
-            side: Which side of faces: "front", "back" or "double".
-        """
+        """Draw these and no others, while the server is `atomic`, so that corners and faces change together."""
         while len(self.meshes) > len(patches):
             self.meshes.pop().remove()
         for k, patch in enumerate(patches):
@@ -155,9 +150,6 @@ class Hull:
     def by_margin(self, scale: MarginScale) -> list[Patch]:
         """The faces by the margin there, on a scale.
 
-        Args:
-            scale: Of margins.
-
         Returns:
             A patch for each color that there is.
         """
@@ -171,12 +163,7 @@ class Hull:
 
 
 def region_in(asked: Asked, rough: bool) -> Region:
-    """Where is looked, with as many cells as a cube of `CELLS` along each edge has; rough: an eighth of them.
-
-    Args:
-        asked: What the hull is of.
-        rough: Whether the hull is only the first.
-    """
+    """Where is looked, with as many cells as a cube of `CELLS` along each edge has; rough: an eighth of them."""
     box = region_of(asked.robot, None, CELLS)
     cells = max(_cells_of(box.high - box.low)) if box.flat is None else MOST_CELLS
     return region_of(asked.robot, None, cells // ROUGH if rough else cells)
@@ -184,11 +171,6 @@ def region_in(asked: Asked, rough: bool) -> Region:
 
 def hull_of(asked: Asked, rough: bool, told: Callable[[int, int], None]) -> Hull:
     """The hull of a robot's region at one orientation.
-
-    Args:
-        asked: What it is of.
-        rough: Whether it is to be there at once, with cells twice as long; parts that are thinner may be missing.
-        told: Called with how much is done, of how much, about; what it raises ends the work.
 
     Returns:
         The hull.
@@ -273,11 +255,6 @@ _LIGHT: Final = (0.6, 0.35, 0.15)  # opacity in each ring, of which two lie behi
 def lit(hull: Hull, position: Array, reach: float) -> list[Patch]:
     """What of a wall is lit: the nearer, the more.
 
-    Args:
-        hull: The wall.
-        position: Where the platform is [m], shape (3,).
-        reach: From how far on [m].
-
     Returns:
         Patches in the colors of the cables that limit there; none where the wall is farther away. The faces of the
         robot's box are no wall.
@@ -297,13 +274,7 @@ def lit(hull: Hull, position: Array, reach: float) -> list[Patch]:
 
 
 def left(margin: float, cable: int, unit: ForceUnit) -> str:
-    """How much is left at the platform, and which cable limits it, in words.
-
-    Args:
-        margin: Of the loads [N].
-        cable: That limits it, -1 for none.
-        unit: Of forces.
-    """
+    """How much is left at the platform, and which cable limits it, in words."""
     by = f", cable {cable}" if cable >= 0 else ""
     if not np.isfinite(margin):
         return "nothing limits it" if margin > 0.0 else "nothing holds it"

@@ -26,12 +26,6 @@ def points_per_cable(robot: Robot) -> int:
 def wraps(robot: Robot, pose: Pose, wrap_angle: Array | None) -> Array:
     """Points of the cables from their frame anchors over their pulleys to where they leave them [m].
 
-    Args:
-        robot: The robot.
-        pose: One pose.
-        wrap_angle: Psi [rad], shape (m,); None for straight cables, which touch where their chords do; where no chord
-            does, as for an end inside the pulley, a cable leaves where it enters.
-
     Returns:
         Shape (m, WRAP_POINTS, 3); (m, 1, 3), the frame anchors, where no cable has a pulley.
     """
@@ -109,13 +103,7 @@ def resampled(points: Array, count: int) -> Array:
 
 
 def segments(points: Array, *, dashed: bool, shown: NDArray[np.bool_] | None = None) -> Array:
-    """Consecutive points (m, P, 3) as segments (m (P - 1), 2, 3).
-
-    Args:
-        points: Points along lines.
-        dashed: Whether every other segment has no length.
-        shown: Which points are shown, shape (m, P); a segment without both ends has no length.
-    """
+    """Consecutive points (m, P, 3) as segments (m (P - 1), 2, 3)."""
     pairs = np.stack((points[:, :-1], points[:, 1:]), axis=2)
     if dashed:
         pairs[:, 1::2, 1] = pairs[:, 1::2, 0]

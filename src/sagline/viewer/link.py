@@ -34,11 +34,7 @@ def link_text(parts: dict[str, str]) -> str:
 
 
 def parts_of(text: str) -> dict[str, str]:
-    """The parts of such a text.
-
-    Raises:
-        InvalidValueError: If it is none, or tells something twice.
-    """
+    """The parts of such a text."""
     try:
         pairs = parse_qsl(text, keep_blank_values=True, strict_parsing=True, max_num_fields=200, errors="strict")
     except (ValueError, UnicodeError):
@@ -56,11 +52,7 @@ def name_of(robot: Robot) -> str:
 
 
 def check_robot(told: str, robot: Robot) -> None:
-    """Refuse a link of another robot.
-
-    Raises:
-        InvalidValueError: If it is of another, or of one that only has the same name.
-    """
+    """Refuse a link of another robot."""
     name, own = told.rpartition(":")[0], name_of(robot)
     if told != own:
         what = "another robot of this name" if name == robot.name else repr(name[:60] or told[:60])
@@ -80,11 +72,7 @@ def listed(values: Array) -> str:
 
 
 def numbers_of(text: str, item: str, unit: str, count: int, largest: float) -> Array:
-    """So many numbers between commas.
-
-    Raises:
-        InvalidValueError: If they are others, or too large.
-    """
+    """So many numbers between commas."""
     parts = text.split(",", maxsplit=count)
     if len(parts) != count:
         raise InvalidValueError(item, repr(text[:60]), f"{count} numbers", STEP)
@@ -126,14 +114,7 @@ class LinkedControls:
         return found
 
     def read(self, told: dict[str, str]) -> Callable[[], None]:
-        """What sets the controls as a link tells, and all others to what is usual.
-
-        Args:
-            told: What is other than usual.
-
-        Raises:
-            InvalidValueError: If there is no such control, or it has no such value.
-        """
+        """What sets the controls as a link tells, and all others to what is usual."""
         handles = self._handles()
         unknown = next((name for name in told if name not in handles), None)
         if unknown is not None:
@@ -175,11 +156,7 @@ def _option(option: str) -> str:
 
 
 def _value(handle: Any, name: str, text: str) -> Any:
-    """A control's value from its text.
-
-    Raises:
-        InvalidValueError: If it is none of the control's.
-    """
+    """A control's value from its text."""
     if isinstance(handle, _NUMBERS):
         number = _number(text, name, handle.min, handle.max)
         return int(number) if isinstance(handle.value, int) else number
@@ -252,11 +229,7 @@ class Linking:
         return link_text({**parts, **controls})
 
     def follow(self, text: str, client: int) -> None:
-        """Bring the page, and the camera of a client, to what a link tells.
-
-        Raises:
-            SaglineError: If it is no such link, of another robot, or tells what cannot be; nothing has changed then.
-        """
+        """Bring the page, and the camera of a client, to what a link tells."""
         parts = parts_of(text)
         check_robot(parts.pop("robot"), self._robot)
         place = self._place(parts)

@@ -149,12 +149,6 @@ class NearestHeld(NamedTuple):
 def nearest_held(robot: Robot, pose: Pose, model: CableModel, wrench: Array | None) -> NearestHeld | None:
     """Look for it.
 
-    Args:
-        robot: The robot.
-        pose: Where it cannot be held.
-        model: Cable model.
-        wrench: External wrench on the platform, shape (6,); None for none.
-
     Returns:
         The pose; None where none was found within the robot's region.
     """

@@ -60,11 +60,7 @@ class Panel:
         return bool(self._ghost.value)
 
     def settings(self) -> Settings:
-        """What is set.
-
-        Raises:
-            InvalidValueError: If a client sent what no slider gives.
-        """
+        """What is set."""
         mass = _slid(self._mass)
         return Settings(
             mass=self._own_mass if mass == written_mass(self._own_mass) else mass,
@@ -186,11 +182,7 @@ class Panel:
 
 
 def _slid(slider: Any) -> float:
-    """The value of a slider.
-
-    Raises:
-        InvalidValueError: If a client sent one that the slider does not reach.
-    """
+    """The value of a slider."""
     value, low, high = float(slider.value), float(slider.min), float(slider.max)
     if not low <= value <= high:
         raise InvalidValueError(slider.label, value, f"{low:g} to {high:g}", "Move the slider.")

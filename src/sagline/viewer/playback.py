@@ -153,15 +153,7 @@ class Run:
 
     @classmethod
     def of(cls, plan: Plan, progress: Progress | None = None) -> Run:
-        """The run of a plan.
-
-        Args:
-            plan: The plan.
-            progress: Told how many of its poses are confirmed, of how many.
-
-        Raises:
-            InvalidValueError: If it is the plan of a single pose.
-        """
+        """The run of a plan."""
         if not plan.state.pose.shape:
             raise InvalidValueError(
                 "run", "a plan of a single pose", "a plan of poses in a row", "Save a plan of a path."

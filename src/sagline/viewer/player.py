@@ -128,13 +128,7 @@ class Player:
         put_on: Callable[[Played | None], None],
         beside: Beside | None = None,
     ) -> None:
-        """Put something on, or nothing.
-
-        Args:
-            given: What the page was opened with; None for nothing.
-            put_on: Told what is played whenever something else is put on.
-            beside: What has the same clock as what was given.
-        """
+        """Put something on, or nothing."""
         self._put_on, self._given, self._beside = put_on, given, beside
         self.speed, self.number = 1.0, 0
         self.play(given)

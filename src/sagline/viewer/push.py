@@ -108,16 +108,8 @@ class Pushed:
 def pushed(state: Equilibrium, push: Push, *, anew: bool = True) -> Pushed:
     """What answers a force.
 
-    Args:
-        state: A single rest.
-        push: The force, not zero.
-        anew: Whether to look how large it may become with tensions that are shared anew.
-
     Returns:
         Pushed; within the model of the state's cables.
-
-    Raises:
-        InvalidValueError: If that model knows no force.
     """
     if isinstance(state.cables.model, Straight):
         raise InvalidValueError("push: cable model", "straight", "one that stretches", "Choose another cable model.")
@@ -136,9 +128,6 @@ def pushed(state: Equilibrium, push: Push, *, anew: bool = True) -> Pushed:
 
 def radii(compliance: Array) -> tuple[Array, Array]:
     """How far a place goes for 1 N in the directions in which it gives way least to most.
-
-    Args:
-        compliance: Of the place [m/N], shape (3, 3).
 
     Returns:
         Radii [m/N], ascending, (3,), and the directions in which it goes, one a column, (3, 3); NaN if not known.

@@ -37,12 +37,7 @@ def sentence(text: str) -> str:
 
 
 def verdict(snapshot: Snapshot, *, capacity: bool = True) -> str:
-    """Feasible or not, in one colored box; where not, why.
-
-    Args:
-        snapshot: What is shown.
-        capacity: Whether the spare force can be computed already.
-    """
+    """Feasible or not, in one colored box; where not, why."""
     if snapshot.feasible:
         return box("good", "Feasible", _summary(snapshot, capacity=capacity))
     return box("bad", headline(snapshot), escape(snapshot.reason))

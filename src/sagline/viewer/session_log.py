@@ -43,15 +43,7 @@ class Follower:
     """Reads a log, and that of a twin beside it, as far as they go, and further when they have grown."""
 
     def __init__(self, file: os.PathLike[str] | str, truth: os.PathLike[str] | str | None = None) -> None:
-        """Name the files.
-
-        Args:
-            file: The log.
-            truth: The log of the twin; None: there is none.
-
-        Raises:
-            FileError: If a package is missing.
-        """
+        """Name the files."""
         self._reader = LogReader(file)
         self._truth = None if truth is None else LogReader(truth)
         self._parts: list[dict[str, Any]] = []
@@ -72,9 +64,6 @@ class Follower:
 
         Returns:
             All that there is so far; None if there was nothing new, or is nothing at all.
-
-        Raises:
-            FileError: If a file cannot be read, or is no log.
         """
         grown = self._reader.more()
         if self._truth is not None and self._truth.more():

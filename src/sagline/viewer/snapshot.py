@@ -59,11 +59,7 @@ class Settings:
     error_scale: float = 1.0
 
     def __post_init__(self) -> None:
-        """Check what no robot checks.
-
-        Raises:
-            InvalidValueError: If a number is not finite or out of its range.
-        """
+        """Check what no robot checks."""
         checked(self.density, "cable density", "times", above=0.0)
         checked(self.stiffness, "cable stiffness", "times", above=0.0)
         checked(self.sag_scale, "drawn sag", "times", low=0.0)
@@ -75,11 +71,7 @@ class Settings:
         return self.mass, self.density, self.stiffness
 
     def applied(self, robot: Robot) -> Robot:
-        """The robot with its load and cables changed.
-
-        Raises:
-            InvalidValueError: If the mass is none.
-        """
+        """The robot with its load and cables changed."""
         if self.mass == robot.mass and self.density == self.stiffness == 1.0:
             return robot
         cables = robot.cables
@@ -211,16 +203,7 @@ def taken_at(
     confirmed: bool = True,
     wrench: Array | None = None,
 ) -> Snapshot:
-    """A robot, already changed by the settings, held at rest at a pose.
-
-    Args:
-        robot: The robot.
-        pose: One pose.
-        settings: Model and method.
-        previous: The plan before, for a method that remembers; others never see it.
-        confirmed: Whether to find where the platform really rests, if the model is approximate.
-        wrench: External wrench, shape (6,), as `inverse` takes it; None for none.
-    """
+    """A robot, already changed by the settings, held at rest at a pose."""
     reference = _remembered(previous, settings.tension)
     try:
         plan = inverse(robot, pose, settings.model, settings.tension, wrench, reference)

@@ -210,12 +210,7 @@ class Ellipsoids(NamedTuple):
 
     @classmethod
     def of(cls, points: Array, covariance: Array) -> Ellipsoids:
-        """Those of points, without those of which nothing is known or everything.
-
-        Args:
-            points: The points [m], shape (m, 3).
-            covariance: Of the coordinates of each [m^2], shape (m, 3, 3).
-        """
+        """Those of points, without those of which nothing is known or everything."""
         known = np.isfinite(covariance).all(axis=(1, 2)) & covariance.any(axis=(1, 2))
         which = np.flatnonzero(known).astype(np.int64)
         squares, axes = np.linalg.eigh(covariance[which])

@@ -44,15 +44,7 @@ class Stage:
     def __init__(
         self, scene: viser.SceneApi, robot: Robot, home: Pose, *, live: bool = True, pixel: float = 0.0
     ) -> None:
-        """Build the scene with the platform at home.
-
-        Args:
-            scene: Where.
-            robot: The robot.
-            home: Where its platform is at first.
-            live: Whether it is dragged and its parts are named, or it is only a picture.
-            pixel: What lines that are wide so many pixels are wide so many of in the scene [m]; 0 for on the screen.
-        """
+        """Build the scene with the platform at home."""
         self._scene, self._live, self._pixel = scene, live, pixel
         self._build_lights()
         self._low, self._high = solids.bounds(robot)
@@ -89,11 +81,7 @@ class Stage:
         return corners.min(axis=0) - _BELOW * self._size, corners.max(axis=0) + _ABOVE * self._size
 
     def dragged_pose(self) -> Pose:
-        """Where the gizmo is.
-
-        Raises:
-            InvalidValueError: If a client sent what is no pose, or one far outside of the robot.
-        """
+        """Where the gizmo is."""
         position = np.asarray(self._gizmo.position, dtype=np.float64).reshape(-1)
         wxyz = np.asarray(self._gizmo.wxyz, dtype=np.float64).reshape(-1)
         length = float(np.linalg.norm(wxyz)) if wxyz.size == 4 else 0.0
@@ -103,11 +91,7 @@ class Stage:
         return Pose.from_quaternion(position, unit(np.roll(wxyz, -1)))
 
     def check_near(self, position: Array) -> None:
-        """Refuse what is no position, or one far outside of the robot.
-
-        Raises:
-            InvalidValueError: If it is such a one.
-        """
+        """Refuse what is no position, or one far outside of the robot."""
         far = FAR * self._size
         if not np.all(np.abs(position - 0.5 * (self._low + self._high)) < far):
             raise InvalidValueError(

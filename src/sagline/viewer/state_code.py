@@ -66,14 +66,7 @@ SHOWN: Final = "print(tension)  # [N], cable by cable"
 
 
 def code_of(view: View, robot: Robot, source: Source, time: float = 0.0) -> str:
-    """Lines of Python whose last names hold what is on the screen: `robot`, `pose`, `tension`.
-
-    Args:
-        view: What is shown.
-        robot: The robot that the page was opened with.
-        source: Where that came from.
-        time: Of what is played [s].
-    """
+    """Lines of Python whose last names hold what is on the screen: `robot`, `pose`, `tension`."""
     snapshot = view.snapshot
     if isinstance(snapshot, Drawn):
         lines = _of_moment(snapshot, source)

@@ -25,12 +25,7 @@ _STOPS = 16  # of the bar's colors
 
 
 def strip_of(view: View, *remarks: str) -> dict[str, Any]:
-    """What there is to say about a view, as JSON knows it.
-
-    Args:
-        view: What is shown.
-        remarks: To be said beneath the title before all else.
-    """
+    """What there is to say about a view, as JSON knows it."""
     settings, scale = view.settings, view.scale
     unit = force_unit(view.snapshot.robot)
     drawn = [(settings.sag_scale, "sag"), (settings.error_scale, "errors")]
@@ -74,18 +69,7 @@ class Shot(NamedTuple):
 
     @classmethod
     def of(cls, camera: viser.CameraHandle, low: Array, high: Array, width: int, height: int = 0) -> Shot:
-        """A picture of as much of a box as a client's window shows, whatever the window's proportions.
-
-        Args:
-            camera: The client's, who may tell anything.
-            low: Lowest corner of the box [m].
-            high: Highest corner [m].
-            width: Columns of the picture.
-            height: Its rows; 0 for as many as the box asks for.
-
-        Raises:
-            InvalidValueError: If the client has told no camera that could be.
-        """
+        """A picture of as much of a box as a client's window shows, whatever the window's proportions."""
         right, up, far, forward = _seen(camera, low, high)
         rows = height or round(width / float(np.clip(right / up, *SHAPES)))
         slope = BORDER * max(up, right * rows / width)
@@ -152,12 +136,7 @@ class Studio:
             self._stage.show(view.snapshot, view.scale, settings.sag_scale, settings.error_scale, ghost=view.ghost)
 
     def take(self, kind: Literal["png", "jpeg"]) -> None:
-        """Have the page take a picture, and keep it; returns when it has.
-
-        Raises:
-            RuntimeError: If the client goes, or gives no picture.
-            TimeoutError: If it gives none for too long.
-        """
+        """Have the page take a picture, and keep it; returns when it has."""
         self._render(self._shot.height, self._shot.width, kind)
 
     def _render(self, height: int, width: int, kind: Literal["png", "jpeg"]) -> None:
@@ -178,20 +157,7 @@ def studio(
     line_width: float,
     played: Played | None = None,
 ) -> Iterator[Studio]:
-    """A studio while inside.
-
-    Args:
-        client: Who asked.
-        server: Whose scene it hides: names, and with something played all that belongs to the view of the moment.
-        shot: The pictures to come.
-        view: What is shown.
-        line_width: Of lines, for those of a screen.
-        played: What is played in the pictures; None for what is shown.
-
-    Raises:
-        RuntimeError: If the client goes, or gives no picture.
-        TimeoutError: If it gives none for too long.
-    """
+    """A studio while inside."""
     try:
         yield Studio(client, server, shot, view, played, line_width)
     finally:
@@ -239,23 +205,7 @@ def pictured(
     *,
     strip: bool,
 ) -> None:
-    """Have a client's page save a picture of what is shown, from where its camera is, without gizmo and names.
-
-    Args:
-        client: Who asked.
-        server: The server.
-        told: What that page is told.
-        view: What is shown.
-        paper: For where.
-        name: Of the file, without its suffix.
-        extent: Lowest and highest corner of what there is to see [m].
-        strip: Whether it is said beneath what it is, and what its colors mean.
-
-    Raises:
-        InvalidValueError: If the client has told no camera that could be.
-        RuntimeError: If the client goes, or gives no picture.
-        TimeoutError: If it gives none for too long.
-    """
+    """Have a client's page save a picture of what is shown, from where its camera is, without gizmo and names."""
     text = TEXT * paper.dots / 72.0
     beneath = round(HEIGHT * text) if strip else 0
     shot = Shot.of(client.camera, *extent, paper.pixels)

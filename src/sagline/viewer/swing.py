@@ -40,11 +40,6 @@ def vibrating(state: Equilibrium, up_to: float) -> Vibration:
 def cut(state: Equilibrium, cable: int, cable_mass: str) -> Iterator[Simulation]:
     """What follows when a cable breaks, the others keeping their lengths, in parts that grow as they are simulated.
 
-    Args:
-        state: The rest.
-        cable: Which breaks.
-        cable_mass: "none" or "lumped".
-
     Yields:
         The motion so far, from the moment before the break on; what has been told is told again the same.
     """

@@ -25,11 +25,7 @@ NONE: Final[Color] = (150, 155, 162)  # where no cable decides
 
 
 def cable_color(cable: int) -> Color:
-    """The color of a cable.
-
-    Args:
-        cable: Its number; negative for none.
-    """
+    """The color of a cable."""
     return NONE if cable < 0 else CABLES[cable % len(CABLES)]
 
 

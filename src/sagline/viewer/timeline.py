@@ -125,13 +125,7 @@ def cable_names(robot: Robot) -> tuple[str, ...]:
 
 
 def tension_limits(robot: Robot, newtons: float, *, at: str) -> tuple[Limit, ...]:
-    """The limits that all cables keep; where they differ, the first that one may reach.
-
-    Args:
-        robot: The robot.
-        newtons: The unit of the chart [N].
-        at: Which tension is drawn, "chord" or "frame_end"; limits of the other one say so.
-    """
+    """The limits that all cables keep; where they differ, the first that one may reach."""
     low, high = float(robot.tension_min.max()), float(robot.tension_max.min())
     other = "" if at == robot.tension_limits_of else f", of {_ENDS[robot.tension_limits_of]}"
     lower = (Limit(low / newtons, f"lowest allowed{other}", upper=False),) if low > 0.0 else ()
@@ -143,13 +137,7 @@ MOST_SPANS: Final = 400  # spans on a timeline: those nearer than its length ove
 
 
 def spans_of(time: Array, wrong: NDArray[np.bool_], why: Callable[[slice], str]) -> tuple[Span, ...]:
-    """The runs of samples that are wrong, as times; a sample lasts until the next.
-
-    Args:
-        time: Of the samples [s], shape (N,).
-        wrong: Which are, shape (N,).
-        why: Says what is wrong with some samples.
-    """
+    """The runs of samples that are wrong, as times; a sample lasts until the next."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], wrong, [False])).astype(np.int8))).reshape(-1, 2)
     if not edges.size:
         return ()
@@ -240,14 +228,7 @@ def columns(time: Array, values: Array, most: int = MOST_COLUMNS) -> Columns:
 def told(
     tracks: Sequence[tuple[str, Track]], chart: int, duration: float, window: tuple[float, float] | None = None
 ) -> dict[str, Any]:
-    """Tracks with their names, as the page takes them.
-
-    Args:
-        tracks: The tracks; the first one's charts can be chosen.
-        chart: Which of them is shown.
-        duration: Of all of them [s].
-        window: From when to when they are looked at [s]; None for the whole.
-    """
+    """Tracks with their names, as the page takes them."""
     start, end = (0.0, duration) if window is None else window
     charts = [_matching(track, tracks[0][1].charts[chart], chart) for _, track in tracks]
     parts = [_columns(track, shown, start, end) for (_, track), shown in zip(tracks, charts, strict=True)]

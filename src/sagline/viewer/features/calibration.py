@@ -29,14 +29,7 @@ class CalibrationPanel:
     """A tab."""
 
     def __init__(self, gui: viser.GuiApi, readings: Any, factor: float, changed: Callable[[], None]) -> None:
-        """Build the tab.
-
-        Args:
-            gui: Where.
-            readings: The tabs that it is one of.
-            factor: How many times as large errors are drawn at first.
-            changed: Called, from any thread, when something is chosen.
-        """
+        """Build the tab."""
         with readings.add_tab("Calibration"):
             self._verdict = gui.add_html("")
             self._ellipsoids: Any = gui.add_checkbox("Errors of the anchors", True)
@@ -78,11 +71,7 @@ class CalibrationPanel:
 
     @property
     def factor(self) -> float:
-        """How many times as large errors are drawn.
-
-        Raises:
-            InvalidValueError: If a client sent what is none.
-        """
+        """How many times as large errors are drawn."""
         value = float(self._factor.value)
         if not 1.0 <= value <= self._largest:
             raise InvalidValueError("Drawn ×", value, f"1 to {self._largest:g}", "Type a factor.")
@@ -128,13 +117,7 @@ class CalibrationStage:
     """What is drawn of a calibration."""
 
     def __init__(self, scene: viser.SceneApi, size: float, picked: Callable[[int], None]) -> None:
-        """Begin with nothing.
-
-        Args:
-            scene: Where.
-            size: Of the robot [m].
-            picked: Given the number of a pose that is clicked, among those drawn; from any thread.
-        """
+        """Begin with nothing."""
         self._scene, self._size, self._picked = scene, size, picked
         self._ball = ball()
         self._ellipsoids: dict[str, list[Any]] = {}
@@ -143,14 +126,7 @@ class CalibrationStage:
         self._chosen: Any = None
 
     def show_ellipsoids(self, where: str, some: Ellipsoids, moved_from: Array, factor: float) -> None:
-        """Draw ellipsoids in place of those before, with lines from where the points were.
-
-        Args:
-            where: Node they hang on: "" for the world, "/platform" for the platform.
-            some: The ellipsoids; without any nothing is drawn.
-            moved_from: Where their points were [m], shape (k, 3).
-            factor: How many times as large errors and moves are drawn.
-        """
+        """Draw ellipsoids in place of those before, with lines from where the points were."""
         self.hide_ellipsoids(where)
         if not len(some.which):
             return
@@ -173,13 +149,7 @@ class CalibrationStage:
             handle.remove()
 
     def show_poses(self, places: Array, colors: Colors, names: dict[int, str]) -> None:
-        """Draw poses as dots to be clicked, some of them with a name.
-
-        Args:
-            places: Where [m], shape (k, 3).
-            colors: Of each, shape (k, 3).
-            names: Of those that have one, by their numbers.
-        """
+        """Draw poses as dots to be clicked, some of them with a name."""
         self.hide_poses()
         if not len(places):
             return

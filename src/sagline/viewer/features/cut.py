@@ -41,12 +41,7 @@ class Peak(NamedTuple):
 
 
 def peak_of(simulation: Simulation, cut: int) -> Peak:
-    """The highest tension of the cables that are left, at any step.
-
-    Args:
-        simulation: From the cut on.
-        cut: Which is no more there.
-    """
+    """The highest tension of the cables that are left, at any step."""
     highest = simulation.tensions.max(axis=0) if simulation.largest_tension is None else simulation.largest_tension
     left = np.where(np.arange(len(highest)) == cut, -np.inf, highest)
     cable = int(np.argmax(left))
@@ -61,13 +56,7 @@ def before_text(state: Equilibrium, cable: int) -> str:
 
 
 def outcome_text(simulation: Simulation, cut: int, *, whole: bool) -> str:
-    """What follows, as HTML: how far the platform swings, and which tension peaks.
-
-    Args:
-        simulation: From the cut on, as far as it is known.
-        cut: Which cable is no more there.
-        whole: Whether there is no more to come.
-    """
+    """What follows, as HTML: how far the platform swings, and which tension peaks."""
     unit, peak = force_unit(simulation.robot), peak_of(simulation, cut)
     away = np.linalg.norm(simulation.pose.position - simulation.pose.position[0], axis=1)
     far = int(np.argmax(away))

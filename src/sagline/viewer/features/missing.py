@@ -32,14 +32,7 @@ OTHERWISE: Final = "AnalyticCenter"  # finds tensions wherever there are any
 
 
 def explanation(snapshot: Snapshot, missing: Missing | None, nearest: NearestHeld | None, *, looking: bool) -> str:
-    """HTML: the missing force, the limits that cables stand at, and the nearest pose that is held, to go to.
-
-    Args:
-        snapshot: What is shown, not feasible.
-        missing: What is missing; None where that is not the reason.
-        nearest: The nearest pose; None where none is known.
-        looking: Whether one is being looked for.
-    """
+    """HTML: the missing force, the limits that cables stand at, and the nearest pose that is held, to go to."""
     rows = _missing_rows(snapshot, missing) if missing is not None else _other_rows(snapshot)
     if nearest is not None:
         place = ", ".join(number(x, ".3f") for x in nearest.pose.position)

@@ -34,14 +34,7 @@ MARK = 12  # px, of a mode's mark
 
 
 def response_figure(curves: ResponseCurves, modes: list[ListedMode], words: str, chosen: str) -> str:
-    """HTML: both curves on logarithmic axes, a mark for every mode with cable mass, which can be clicked.
-
-    Args:
-        curves: What to draw.
-        modes: As they are listed.
-        words: What the curves are of, with their unit.
-        chosen: Name of the mode that moves, "" for none.
-    """
+    """HTML: both curves on logarithmic axes, a mark for every mode with cable mass, which can be clicked."""
     low = max(min(curves.with_mass.min(), curves.massless.min()), LOWEST * curves.static)
     high = min(max(curves.with_mass.max(), curves.massless.max()), TOP_OF_AXIS * curves.static)
     decades = 10.0 ** floor(log10(low)), 10.0 ** ceil(log10(high))

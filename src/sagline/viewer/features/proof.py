@@ -44,11 +44,7 @@ class Pull:
 
 
 def cable_forces(state: Equilibrium) -> Array:
-    """What the cables pull the platform with, at their ends as they hang there [N], shape (m, 3).
-
-    Args:
-        state: A single pose.
-    """
+    """What the cables pull the platform with, at their ends as they hang there [N], shape (m, 3)."""
     back = (state.exit_point - state.pose.transform(state.one_robot.platform_anchors))[:, :2]
     far = np.linalg.norm(back, axis=1, keepdims=True)
     level = np.divide(back, far, out=np.zeros_like(back), where=far > 0.0)
@@ -57,12 +53,7 @@ def cable_forces(state: Equilibrium) -> Array:
 
 
 def pulls_of(state: Equilibrium, missing: Array | None = None) -> tuple[Pull, ...]:
-    """All forces on a platform: of its cables, going around, then weight, load, and what is missing.
-
-    Args:
-        state: A single pose, in balance with what is missing.
-        missing: A wrench that the state has and nobody gives, shape (6,); None for none.
-    """
+    """All forces on a platform: of its cables, going around, then weight, load, and what is missing."""
     robot, pose = state.one_robot, state.pose
     center = pose.transform(robot.center_of_mass)
     ends = pose.transform(robot.platform_anchors)
@@ -80,12 +71,7 @@ def pulls_of(state: Equilibrium, missing: Array | None = None) -> tuple[Pull, ..
 
 
 def residual(state: Equilibrium, pulls: tuple[Pull, ...]) -> tuple[float, float]:
-    """What the forces do not add up to along the platform's free motions: force [N] and moment [N m].
-
-    Args:
-        state: The pose.
-        pulls: All forces.
-    """
+    """What the forces do not add up to along the platform's free motions: force [N] and moment [N m]."""
     whole = np.concatenate((sum(each.force for each in pulls), sum(each.moment for each in pulls)))
     freedom = state.one_robot.freedom
     rest = freedom.T @ (freedom @ whole)
@@ -143,12 +129,7 @@ class Box(NamedTuple):
 
 
 def force_polygon_figure(state: Equilibrium, missing: Array | None = None) -> str:
-    """HTML: the polygon from two sides with what does not close, and the forces and moments as numbers.
-
-    Args:
-        state: A single pose, in balance; with a missing wrench, if one is.
-        missing: That wrench, shape (6,); the gap in the polygon.
-    """
+    """HTML: the polygon from two sides with what does not close, and the forces and moments as numbers."""
     pulls = pulls_of(state, missing)
     corners = np.vstack((np.zeros(3), np.cumsum([each.force for each in pulls], axis=0)))
     views = [Projection("xyz"[right] + "xyz"[up], corners[:, [right, up]]) for right, up in SIDES]

@@ -171,11 +171,7 @@ class PushPanel:
         return bool(self._ellipsoid.value)
 
     def push(self) -> Push | None:
-        """What is pushed; None for nothing.
-
-        Raises:
-            InvalidValueError: If a client sent what is no force.
-        """
+        """What is pushed; None for nothing."""
         size = self._unit.newtons * float(_numbers(self._force.value, 1, "force", "a number >= 0")[0])
         if size == 0.0:
             return None
@@ -208,11 +204,7 @@ class PushPanel:
 
 
 def _numbers(value: Any, count: int, item: str, allowed: str) -> Array:
-    """Finite numbers of a field, which a client may have filled with anything.
-
-    Raises:
-        InvalidValueError: If they are not.
-    """
+    """Finite numbers of a field, which a client may have filled with anything."""
     try:
         found = np.asarray(value, dtype=np.float64).reshape(-1)
     except (TypeError, ValueError, OverflowError):
@@ -223,12 +215,7 @@ def _numbers(value: Any, count: int, item: str, allowed: str) -> Array:
 
 
 def response_text(pushed: Pushed, drawn_for: float | None) -> str:
-    """All of it, as HTML.
-
-    Args:
-        pushed: The push and its answer.
-        drawn_for: Force that the ellipsoid is drawn for [N]; None where none is drawn.
-    """
+    """All of it, as HTML."""
     unit = force_unit(pushed.state.one_robot)
     shared = LATER if pushed.shared is None else f"{left(pushed, pushed.shared, unit)}, the platform kept where it is"
     rows = [

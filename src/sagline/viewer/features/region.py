@@ -51,12 +51,7 @@ class SpaceStage:
         self._names: list[Any] = []
 
     def show_hull(self, patches: list[Patch], *, opened: bool) -> None:
-        """Draw a hull in place of the one before; none for nothing.
-
-        Args:
-            patches: Its faces.
-            opened: Whether those are left out that are nearer than the robot, which hide a slice.
-        """
+        """Draw a hull in place of the one before; none for nothing."""
         with self._server.atomic():
             self._hull.show(patches, "back" if opened else "double")
 
@@ -179,11 +174,7 @@ class _Made(NamedTuple):
 
 
 def planes_of(robot: Robot) -> tuple[int, ...]:
-    """Axes at right angles to which a robot's space can be sliced: of a planar one its own.
-
-    Args:
-        robot: The robot.
-    """
+    """Axes at right angles to which a robot's space can be sliced: of a planar one its own."""
     flat = region_of(robot, None, CELLS).flat
     return (2, 1, 0) if flat is None else (flat,)
 

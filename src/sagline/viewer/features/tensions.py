@@ -63,13 +63,7 @@ class Marks:
         self._solvers: dict[str, InverseSolver] | None = None
 
     def at(self, plan: Plan, *, further: bool, verdicts: bool = True) -> tuple[Mark, ...]:
-        """The answers at the pose of a plan, at rest under its wrench.
-
-        Args:
-            plan: A single pose.
-            further: Whether ways can be had whose kernels are compiled apart.
-            verdicts: Whether solvers can be had: they say of poses without an answer why.
-        """
+        """The answers at the pose of a plan, at rest under its wrench."""
         state = plan.state
         place = (state.pose.position.tobytes(), state.pose.quaternion.tobytes(), state.wrench.tobytes())
         key = (id(state.robot), type(state.cables.model), further, verdicts, *place)
@@ -135,14 +129,7 @@ SHARING: Final = "sharing"  # topic of a way of sharing that is chosen
 def polygon_figure(
     snapshot: Snapshot, marks: tuple[Mark, ...] = (), field: DotField | None = None, back: str = ""
 ) -> str:
-    """HTML: the polygon with the chosen tensions in it; for one redundant cable the interval; else a sentence.
-
-    Args:
-        snapshot: What is shown.
-        marks: What ways of sharing would choose; they can be chosen there.
-        field: What can be chosen by hand; None where nothing can.
-        back: The way of sharing that a button leads back to; "" for no button.
-    """
+    """HTML: the polygon with the chosen tensions in it; for one redundant cable the interval; else a sentence."""
     if remark := why_none(snapshot):
         return sentence(remark)
     drawn = field_of(snapshot) if field is None else field
@@ -169,12 +156,7 @@ def why_none(snapshot: Snapshot) -> str:
 
 
 def field_of(snapshot: Snapshot, before: DotField | None = None) -> DotField | None:
-    """What there is to choose from, with the pulls of the cables as they hang; None where there is nothing.
-
-    Args:
-        snapshot: A robot with one or two redundant cables.
-        before: A field of the same pose, whose place in the drawing it keeps; None for none.
-    """
+    """What there is to choose from, with the pulls of the cables as they hang; None where there is nothing."""
     polygon = _polygon(snapshot)
     if polygon is None or not len(polygon.vertices):
         return None
