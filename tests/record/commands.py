@@ -6,6 +6,7 @@ import contextlib
 import json
 import os
 import tempfile
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
 from unittest.mock import patch
@@ -77,9 +78,19 @@ VARIANTS: Final = (
 )
 
 
+def _undated(value: Any, day: str) -> Any:
+    """The same data with the date of the run replaced by the word "today"."""
+    if isinstance(value, dict):
+        return {key: _undated(each, day) for key, each in value.items()}
+    if isinstance(value, list):
+        return [_undated(each, day) for each in value]
+    return "today" if value == day else value
+
+
 def record() -> dict[str, Any]:
     """Make a dictionary: each command with its exit code, its JSON, and the files that it made or changed."""
     found: dict[str, Any] = {}
+    day = datetime.now(UTC).date().isoformat()
     before: dict[str, Any] = {}
     runner = CliRunner()
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder), patch.dict(os.environ, COLUMNS="80"):
@@ -93,5 +104,5 @@ def record() -> dict[str, Any]:
             written = {name: values for name, values in after.items() if before.get(name) != values}
             entry["files"] = list(written) if command.startswith(VARIANTS) else written
             before = after
-            found[command] = entry
+            found[command] = _undated(entry, day)
     return found

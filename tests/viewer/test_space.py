@@ -13,7 +13,7 @@ import sagline as sl
 from sagline import SaglineError
 from sagline.viewer.feature import Reading
 from sagline.viewer.features.region import RegionFeature, planes_of
-from sagline.viewer.hull import Asked, Hull
+from sagline.viewer.hull import Asked, Hull, hull_of
 from sagline.viewer.server import Server
 from sagline.viewer.tension_scale import cable_color
 from sagline.viewer.viewer import Viewer
@@ -48,12 +48,9 @@ MAKER = Maker()
 
 @pytest.fixture(scope="module")
 def page() -> Iterator[Shown]:
-    def made(server: Server) -> Viewer:
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("sagline.viewer.features.region.hull_of", lambda *arguments: MAKER.hull(*arguments))
-            return Viewer(server, ROBOT, pose=POSE)
-
-    yield from shown(made)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("sagline.viewer.features.region.hull_of", lambda *arguments: MAKER.hull(*arguments))
+        yield from shown(lambda server: Viewer(server, ROBOT, pose=POSE))
 
 
 def show_of(page: Shown) -> RegionFeature:
@@ -216,7 +213,10 @@ def test_a_wall_lights_up_near_the_platform_and_says_what_is_left(page: Shown, c
 
 
 @extended
-def test_thirty_updates_a_second_while_a_slider_is_dragged_that_a_region_follows() -> None:
+def test_thirty_updates_a_second_while_a_slider_is_dragged_that_a_region_follows(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(MAKER, "hull", hull_of)
     robot = sl.load_robot("cogiro")
     with contextmanager(shown)(lambda server: Viewer(server, robot)) as page:
         mass = handle(page, "Platform + load [kg]")
