@@ -10,7 +10,7 @@ from typing import Any, TypeVar, cast
 import numba
 import numpy as np
 
-from sagline.kernels.jit import folder_of
+from sagline.kernels.jit import folder_of, kept
 from sagline.kernels.memory import Memory
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -23,12 +23,7 @@ def compiled(caller: F, module: str = "tests") -> F:
         caller: The function.
         module: Module of the only kernel it calls; all kernels if it is none of theirs.
     """
-    before = getattr(numba.config, "CACHE_DIR")  # noqa: B009 - set by numba at run time, unknown to type checkers
-    setattr(numba.config, "CACHE_DIR", str(folder_of(module) / "callers"))  # noqa: B010
-    try:
-        return cast("F", numba.njit(error_model="numpy", cache=True)(caller))
-    finally:
-        setattr(numba.config, "CACHE_DIR", before)  # noqa: B010
+    return kept(cast("F", numba.njit(error_model="numpy")(caller)), folder_of(module) / "callers")
 
 
 @cache

@@ -65,18 +65,61 @@ def test_other_users_of_numba_keep_their_cache_folder() -> None:
     assert not str(getattr(numba.config, "CACHE_DIR")).startswith(str(jit.FOLDER))  # noqa: B009
 
 
+def doubled(value: float) -> float:
+    return 2.0 * value
+
+
+def cached_in(folder: Path) -> Any:
+    """The function above as a new process would have it: compiled, or read from a folder."""
+    return jit.kept(numba.njit(doubled), folder)
+
+
+def test_machine_code_is_read_again_wherever_its_source_lies(tmp_path: Path) -> None:
+    assert cached_in(tmp_path)(2.0) == 4.0
+    again = cached_in(tmp_path)
+    assert again(2.0) == 4.0
+    assert sum(again.stats.cache_hits.values()) == 1
+
+
+@pytest.mark.parametrize("damage", ["flipped", "cut", "empty"])
+def test_a_damaged_file_is_noticed_and_replaced(
+    tmp_path: Path, damage: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cached_in(tmp_path)(2.0) == 4.0
+    (file,) = tmp_path.iterdir()
+    content = file.read_bytes()
+    middle = len(content) // 2
+    flipped = content[:middle] + bytes([content[middle] ^ 16]) + content[middle + 1 :]
+    file.write_bytes({"flipped": flipped, "cut": content[:middle], "empty": b""}[damage])
+    again = cached_in(tmp_path)
+    assert again(2.0) == 4.0
+    assert not again.stats.cache_hits
+    assert str(file) in capsys.readouterr().err
+    assert sum(1 for _ in tmp_path.iterdir()) == 1
+    last = cached_in(tmp_path)
+    assert last(2.0) == 4.0
+    assert last.stats.cache_hits
+
+
+def test_a_folder_that_cannot_be_written_costs_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "file").touch()
+    for value in (2.0, 2):  # two versions
+        assert cached_in(tmp_path / "file" / "kernels")(value) == 4.0
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 1
+    assert str(tmp_path / "file") in lines[0]
+    assert "NUMBA_CACHE_DIR" in lines[0]
+
+
 def test_an_entry_is_compiled_when_its_own_machine_code_is_there(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from sagline.kernels.cable.batch import batch_end
 
     monkeypatch.setattr(jit, "folder_of", lambda _: tmp_path)
-    (tmp_path / "cable").mkdir()
-    (tmp_path / "cable" / "batch.batch_from_length-9.py311.1.nbc").touch()  # another's
+    (tmp_path / "batch.batch_from_length-9.py311.1.nbc").touch()  # another's
     assert not jit.is_compiled(batch_end)
-    (tmp_path / "cable" / "batch.batch_end-9.py311.nbi").touch()  # an index without code
-    assert not jit.is_compiled(batch_end)
-    (tmp_path / "cable" / "batch.batch_end-9.py311.1.nbc").touch()
+    (tmp_path / "batch.batch_end-9.py311.1.nbc").touch()
     assert jit.is_compiled(batch_end)
     assert not jit.is_compiled(batch_end, versions=2)
 

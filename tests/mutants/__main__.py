@@ -9,7 +9,6 @@ second. A mistake that no test catches is listed as SURVIVED.
 from __future__ import annotations
 
 import argparse
-import hashlib
 import os
 import re
 import shutil
@@ -142,17 +141,6 @@ def copy_project(copy: Path) -> None:
         shutil.copy(ROOT / name, copy / name)
     if FOLDER.is_dir():
         shutil.copytree(FOLDER, copy / "cache" / "kernels")
-    # numba names its folders NAME_<sha1 of the folder of the source>: give them the names for the copy
-    folders = [folder for top in ("src", "tests") for folder in (ROOT / top).rglob("*") if folder.is_dir()]
-    moved = {_sha1(folder): _sha1(copy / folder.relative_to(ROOT)) for folder in folders}
-    for cached in list((copy / "cache").glob("**/*_*")):
-        name, _, source = cached.name.rpartition("_")
-        if cached.is_dir() and source in moved:
-            cached.rename(cached.with_name(f"{name}_{moved[source]}"))
-
-
-def _sha1(folder: Path) -> str:
-    return hashlib.sha1(str(folder).encode()).hexdigest()
 
 
 def main() -> int:

@@ -146,18 +146,16 @@ class Side:
         """Move what it has compiled to where this process looks, if nothing is there; waits while this one compiles."""
         from numba.core.compiler_lock import global_compiler_lock
 
+        from sagline.kernels.cache import SUFFIX
         from sagline.kernels.jit import FOLDER
 
         made = self._folder / FOLDER.name
         with global_compiler_lock:
-            for index in made.rglob("*.nbi"):
-                target = FOLDER / index.relative_to(made)
-                if target.exists():
-                    continue
-                target.parent.mkdir(parents=True, exist_ok=True)
-                for code in index.parent.glob(f"{index.stem}.*.nbc"):
-                    os.replace(code, target.parent / code.name)
-                os.replace(index, target)
+            for code in made.rglob(f"*{SUFFIX}"):
+                target = FOLDER / code.relative_to(made)
+                if not target.exists():
+                    target.parent.mkdir(parents=True, exist_ok=True)
+                    os.replace(code, target)
 
 
 def main(names: Sequence[str]) -> None:

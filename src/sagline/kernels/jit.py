@@ -17,6 +17,8 @@ from typing import Any, TypeVar, cast
 from numba import config, njit, typeof
 from platformdirs import user_cache_path
 
+from sagline.kernels.cache import SUFFIX, KernelCache
+
 F = TypeVar("F", bound=Callable[..., object])
 
 KERNELS = __name__.rpartition(".")[0]
@@ -111,14 +113,16 @@ def _compiled(function: F, **options: Any) -> F:
     Kernels allocate nothing (`sagline.kernels.memory`), and so need no counting of references (_nrt), which would take
     a quarter of their time where arrays come in NamedTuples.
     """
-    # numba reads its cache folder while it decorates: set for that moment only, other users of numba keep theirs.
-    before = getattr(config, "CACHE_DIR")  # noqa: B009 - set by numba at run time, unknown to type checkers
-    setattr(config, "CACHE_DIR", str(folder_of(function.__module__)))  # noqa: B010
-    every: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
-    try:
-        return cast("F", njit(**{**every, **options})(function))
-    finally:
-        setattr(config, "CACHE_DIR", before)  # noqa: B010
+    every: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
+    return kept(cast("F", njit(**{**every, **options})(function)), folder_of(function.__module__))
+
+
+def kept(compiled: F, folder: Path) -> F:
+    """A compiled function whose machine code is kept in a folder."""
+    dispatcher: Any = compiled
+    if not config.DISABLE_JIT:
+        dispatcher._cache = KernelCache(dispatcher.py_func, folder)
+    return compiled
 
 
 def machine_code(compiled: Callable[..., object], arguments: tuple[object, ...]) -> Callable[..., object]:
@@ -136,4 +140,4 @@ def machine_code(compiled: Callable[..., object], arguments: tuple[object, ...])
 def is_compiled(function: Callable[..., object], versions: int = 1) -> bool:
     """Whether the machine code of an entry is on disk, in at least so many versions for different types."""
     name = f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}"
-    return sum(1 for _ in folder_of(function.__module__).rglob(f"{name}-*.nbc")) >= versions
+    return sum(1 for _ in folder_of(function.__module__).glob(f"{name}-*{SUFFIX}")) >= versions

@@ -1,0 +1,97 @@
+"""Compiled kernels on disk: one file per kernel and argument types, written whole, its content checked by a digest.
+
+A file that is damaged is compiled again and replaced; a folder that cannot be used costs the time to compile, and one
+line on standard error.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import pickle
+import sys
+import uuid
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba.core.compiler import CompileResult
+from numba.core.serialize import dumps
+
+DIGEST = hashlib.sha256().digest_size
+SUFFIX = ".nbc"
+
+
+class KernelCache:
+    """Machine code of one kernel, in place of numba's own cache, which is keyed by paths and trusts what it reads."""
+
+    def __init__(self, function: Callable[..., object], folder: Path) -> None:
+        """Use a folder for a function; nothing is read or written yet."""
+        self.cache_path = str(folder)
+        self._folder, self._code = folder, function.__code__
+        module = Path(self._code.co_filename).stem
+        python = f"py{sys.version_info[0]}{sys.version_info[1]}"
+        self._name = f"{module}.{function.__qualname__}-{self._code.co_firstlineno}.{python}"
+        self._enabled = True
+
+    def enable(self) -> None:
+        """Read and write files."""
+        self._enabled = True
+
+    def disable(self) -> None:
+        """Leave files alone."""
+        self._enabled = False
+
+    def flush(self) -> None:
+        """Remove the files of this kernel."""
+        for file in self._folder.glob(f"{self._name}.*{SUFFIX}"):
+            file.unlink(missing_ok=True)
+
+    def load_overload(self, signature: object, target_context: Any) -> Any:
+        """Machine code for argument types; None if there is none that can be used."""
+        if not self._enabled:
+            return None
+        target_context.refresh()
+        file = self._file(signature, target_context.codegen())
+        try:
+            content = file.read_bytes()
+        except OSError:
+            return None  # nothing there, or no way to it: saving says which
+        if hashlib.sha256(content[DIGEST:]).digest() != content[:DIGEST]:
+            say_once(f"sagline: {file} is damaged; its kernel is compiled again")
+            return None
+        return CompileResult._rebuild(target_context, *pickle.loads(content[DIGEST:]))
+
+    def save_overload(self, signature: object, compiled: Any) -> None:
+        """Write machine code for argument types, if it can be written."""
+        if not self._enabled or compiled.lifted or compiled.library.has_dynamic_globals:
+            return
+        payload = dumps(compiled._reduce())
+        file = self._file(signature, compiled.codegen)
+        unfinished = file.with_name(f"{file.name}.{uuid.uuid4().hex}")
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            try:
+                unfinished.write_bytes(hashlib.sha256(payload).digest() + payload)
+                os.replace(unfinished, file)
+            except BaseException:
+                unfinished.unlink(missing_ok=True)
+                raise
+        except OSError as error:
+            say_once(
+                f"sagline: compiled kernels cannot be kept in {self._folder.parent} ({error.strerror}), so each run "
+                "compiles them; set NUMBA_CACHE_DIR to a folder that can be written"
+            )
+
+    def _file(self, signature: object, codegen: Any) -> Path:
+        """File for argument types, a processor and a version of numba."""
+        key = repr((numba.__version__, str(signature), codegen.magic_tuple(), self._code.co_code))
+        return self._folder / f"{self._name}.{hashlib.sha256(key.encode()).hexdigest()[:16]}{SUFFIX}"
+
+
+@cache
+def say_once(line: str) -> None:
+    """Write a line to standard error; the same line once in a process."""
+    print(line, file=sys.stderr, flush=True)
