@@ -17,9 +17,10 @@ from pathlib import Path
 from typing import Any
 
 import numba
-from numba.core.compiler import CompileResult
-from numba.core.serialize import dumps
+from numba.core import compiler, serialize
 
+_result: Any = compiler.CompileResult  # numba has no types
+_dumps: Any = serialize.dumps
 DIGEST = hashlib.sha256().digest_size
 SUFFIX = ".nbc"
 
@@ -62,13 +63,13 @@ class KernelCache:
         if hashlib.sha256(content[DIGEST:]).digest() != content[:DIGEST]:
             say_once(f"sagline: {file} is damaged; its kernel is compiled again")
             return None
-        return CompileResult._rebuild(target_context, *pickle.loads(content[DIGEST:]))
+        return _result._rebuild(target_context, *pickle.loads(content[DIGEST:]))
 
     def save_overload(self, signature: object, compiled: Any) -> None:
         """Write machine code for argument types, if it can be written."""
         if not self._enabled or compiled.lifted or compiled.library.has_dynamic_globals:
             return
-        payload = dumps(compiled._reduce())
+        payload = _dumps(compiled._reduce())
         file = self._file(signature, compiled.codegen)
         unfinished = file.with_name(f"{file.name}.{uuid.uuid4().hex}")
         try:

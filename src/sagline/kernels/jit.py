@@ -14,7 +14,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from numba import config, njit, typeof
+from numba import njit, typeof
 from platformdirs import user_cache_path
 
 from sagline.kernels.cache import SUFFIX, KernelCache
@@ -120,7 +120,7 @@ def _compiled(function: F, **options: Any) -> F:
 def kept(compiled: F, folder: Path) -> F:
     """A compiled function whose machine code is kept in a folder."""
     dispatcher: Any = compiled
-    if not config.DISABLE_JIT:
+    if hasattr(dispatcher, "py_func"):  # not with NUMBA_DISABLE_JIT
         dispatcher._cache = KernelCache(dispatcher.py_func, folder)
     return compiled
 
