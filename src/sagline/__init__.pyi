@@ -66,11 +66,11 @@ from .dynamics.to_shape import to_shape as to_shape
 from .dynamics.vibrating import vibration as vibration
 from .dynamics.vibration import Vibration as Vibration
 from .dynamics.vibration_status import VibrationStatus as VibrationStatus
-from .files.c_source import export_c as export_c
 from .files.calibration_file import load_calibration as load_calibration
 from .files.caspr import load_caspr as load_caspr
+from .files.controller_source import export_c as export_c
+from .files.controller_source import export_scl as export_scl
 from .files.execution_file import load_execution as load_execution
-from .files.imported import Imported as Imported
 from .files.log_file import load_log as load_log
 from .files.measurements import load_measurements as load_measurements
 from .files.mesh_file import load_mesh as load_mesh
@@ -78,10 +78,10 @@ from .files.mjcf import dump_mjcf as dump_mjcf
 from .files.path_file import load_path as load_path
 from .files.plan_file import load_plan as load_plan
 from .files.plan_file import save_plan as save_plan
-from .files.plc_source import export_scl as export_scl
 from .files.robot_file import dump_robot as dump_robot
 from .files.robot_file import load_robot as load_robot
-from .files.scene_file import load_scene as load_scene
+from .files.robot_file import load_scene as load_scene
+from .files.robot_xml import Imported as Imported
 from .files.simulation_file import load_simulation as load_simulation
 from .files.wirex import load_wirex as load_wirex
 from .files.workspace_file import load_workspace as load_workspace

@@ -17,13 +17,12 @@ from zstandard import compress
 
 import sagline as sl
 from sagline.control import Execution
-from sagline.files.execution_layout import columns_of
-from sagline.files.mcap_layout import HEAD, JSON, RECORD, head_of
-from sagline.files.mcap_log import save_execution
+from sagline.files.execution_file import save_execution
+from sagline.files.mcap_layout import HEAD, JSON, RECORD, columns_of, head_of
 from sagline.files.packed import pack
 from tests.abuse.damage import DAMAGES, LONGEST, SLOWEST, Damage
 from tests.files.executions import execution
-from tests.files.test_mcap_log import assert_same
+from tests.files.test_mcap import assert_same
 from tests.tiers import extended, wide
 
 CUT = 20_000  # bytes of the log's end that a killed process does not write

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.files.whole import write_text, written_together
+from sagline.files.writing import write_text, written_together
 from sagline.plot.sheet import sheet
 from tests.abuse.commands import COMMANDS, Written, ended, prepare, tree
 from tests.files.plans import a_plan

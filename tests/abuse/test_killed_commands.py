@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sagline.files.whole import write_text
+from sagline.files.writing import write_text
 from tests.abuse.commands import COMMANDS, Written, prepare, tree
 from tests.cli.interrupts import heard
 from tests.tiers import extended

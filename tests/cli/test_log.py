@@ -17,9 +17,9 @@ import sagline as sl
 from sagline import Plan
 from sagline.cli import view_log
 from sagline.cli.main import app
-from sagline.files.mcap_log import Recorder
+from sagline.files.mcap_writer import Recorder
 from tests.files.executions import cycles_of, events_of, execution, plan_of
-from tests.files.test_mcap_log import assert_same
+from tests.files.test_mcap import assert_same
 from tests.refusal import refused
 from tests.tiers import extended, wide
 
@@ -134,7 +134,7 @@ def test_what_is_no_log_is_not_waited_for(tmp_path: Path, said: bytes | None) ->
 def test_a_growing_log_is_followed_from_before_it_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In place of the page: what it would be given."""
     monkeypatch.setattr("sagline.cli.view_log.LOOK", 0.05)
-    monkeypatch.setattr("sagline.files.mcap_log.CHUNK", 0.2)
+    monkeypatch.setattr("sagline.files.mcap_writer.CHUNK", 0.2)
     lengths: list[int] = []
     file = tmp_path / "run.mcap"
 

@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 
 import sagline as sl
 from sagline.cli.main import app
-from sagline.files.mcap_log import Recorder
+from sagline.files.mcap_writer import Recorder
 from tests.calibration.made_up import made_up
 from tests.files.executions import execution
 from tests.kinematics.winches import wound

@@ -14,8 +14,8 @@ from typer.testing import CliRunner
 import sagline as sl
 from sagline.cli.main import app
 from sagline.cli.twin import Watch
-from sagline.files.mcap_log import Recorder
 from sagline.files.mcap_reader import read_log
+from sagline.files.mcap_writer import Recorder
 from sagline.twin import Machine, Server
 from tests.plc.samples import a_command
 from tests.tiers import extended

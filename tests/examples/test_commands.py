@@ -17,8 +17,8 @@ from typer.testing import CliRunner
 import sagline as sl
 from sagline.cli.examples import KINDS, example_files
 from sagline.cli.main import app
-from sagline.files.mcap_log import Recorder
 from sagline.files.mcap_reader import read_log
+from sagline.files.mcap_writer import Recorder
 from sagline.report.blocks import Chapter
 from tests.abuse.command_lines import commands
 from tests.calibration.made_up import made_up

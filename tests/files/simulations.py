@@ -7,7 +7,7 @@ import numpy as np
 import sagline as sl
 from sagline import Occurrence, dump_robot
 from sagline.core.arrays import Array
-from sagline.files.simulation_layout import LARGEST, NODES, SAMPLES, TIME
+from sagline.files.simulation_file import LARGEST, NODES, SAMPLES, TIME
 
 ROBOT = sl.load_robot("article-suspended")
 SAMPLE_COUNT, NODE_COUNT = 7, 5

@@ -15,9 +15,8 @@ from sagline import dump_robot
 from sagline.calibration.findings import CrossValidation, Direction, Outlier
 from sagline.files import calibration_file, format
 from sagline.files.calibration_file import FORMAT
-from sagline.files.dataset import read_dataset
+from sagline.files.netcdf import Seal, read_dataset
 from sagline.files.robot_file import parse_robot
-from sagline.files.seal import Seal
 from sagline.robot.provenance import Provenance
 from tests.calibration.made_up import made_up
 from tests.files.wording import wording

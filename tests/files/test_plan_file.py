@@ -18,8 +18,8 @@ from syrupy.assertion import SnapshotAssertion
 import sagline as sl
 from sagline import FileError, SaglineWarning, dump_robot
 from sagline.files import format, plan_file
+from sagline.files.netcdf import Seal
 from sagline.files.robot_file import parse_robot
-from sagline.files.seal import Seal
 from tests.files.plans import OUTSIDE, SUSPENDED, a_plan, assert_same
 from tests.files.wording import wording
 from tests.refusal import refused

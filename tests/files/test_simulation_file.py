@@ -15,9 +15,9 @@ from syrupy.assertion import SnapshotAssertion
 import sagline as sl
 from sagline import EnergyBalance, Occurrence
 from sagline.files import format, simulation_file
+from sagline.files.netcdf import Seal, seal
 from sagline.files.robot_file import parse_robot
-from sagline.files.seal import Seal, seal
-from sagline.files.simulation_layout import EVENTS, LARGEST, NODES, SAMPLES, TIME
+from sagline.files.simulation_file import EVENTS, LARGEST, NODES, SAMPLES, TIME
 from tests.files.plans import a_plan
 from tests.files.simulations import HAPPENED, ROBOT, a_simulation, assert_same
 from tests.files.wording import wording

@@ -8,7 +8,7 @@ from syrupy.assertion import SnapshotAssertion
 
 import sagline as sl
 from sagline import Mesh, dump_robot
-from sagline.files.workspace_layout import QUANTITIES
+from sagline.files.workspace_file import QUANTITIES
 from tests.files.wording import wording
 from tests.refusal import refused
 from tests.tiers import extended, wide

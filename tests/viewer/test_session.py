@@ -10,7 +10,7 @@ import viser
 
 import sagline as sl
 from sagline.control import Event, EventKind, State
-from sagline.files.mcap_log import Recorder
+from sagline.files.mcap_writer import Recorder
 from sagline.viewer.player import Timeline
 from sagline.viewer.readout import css_color
 from sagline.viewer.server import started, stop

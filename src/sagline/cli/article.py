@@ -11,7 +11,7 @@ import typer
 from sagline.cli.entries import FORWARD, INVERSE
 from sagline.cli.options import JsonOption, OutOption
 from sagline.cli.terminal import counting, note, show_json
-from sagline.files.whole import check_files
+from sagline.files.writing import check_files
 
 
 def article(

@@ -14,7 +14,7 @@ from sagline.cli.entries import FORWARD, INVERSE, READINGS, STARTING_LENGTHS
 from sagline.cli.options import JsonOption, Model, ModelOption, RobotArgument
 from sagline.cli.terminal import note, show, show_json, show_pieces, working
 from sagline.core.errors import FileError, InvalidValueError, printable
-from sagline.files.whole import check_files, made_folder, write_text
+from sagline.files.writing import check_files, made_folder, write_text
 
 if TYPE_CHECKING:
     from sagline.cables.model import CableModel
@@ -230,10 +230,9 @@ def _plan_poses(asked: Asked, count: int, seed: int, log: Path | None, *, as_jso
 
 def _log(file: Path, deviations: Deviations) -> WinchLog:
     """The log, its sensors as the command line has them where it says something."""
-    from sagline.files.log_file import load_log
-    from sagline.files.log_sensors import sensors_of_comments
+    from sagline.files.log_file import load_log, sensors_of_comments
+    from sagline.files.reading import read_text
     from sagline.files.table import TABLE_LIMIT
-    from sagline.files.text import read_text
 
     given = deviations.given()
     if not given:

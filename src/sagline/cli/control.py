@@ -54,7 +54,7 @@ def control(
             link = stack.enter_context(closing(_link(robot, plc, modbus=modbus)))
             record = None
             if log is not None:
-                from sagline.files.mcap_log import Recorder
+                from sagline.files.mcap_writer import Recorder
 
                 record = stack.enter_context(Recorder(log, robot))
             controller = Controller(robot, link, pace=Pace(), record=record, shadow=shadow)

@@ -14,11 +14,11 @@ from sagline.cli.options import Format
 from sagline.cli.terminal import note, show_data, working
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.core.numbers import n
-from sagline.files.whole import write_text
+from sagline.files.writing import write_text
 
 if TYPE_CHECKING:
     from sagline.cables.cable import Cable
-    from sagline.files.imported import Imported
+    from sagline.files.robot_xml import Imported
     from sagline.robot.robot import Robot
 
 LEAST = 1e-6  # m: a distance that is told is no smaller
@@ -65,8 +65,8 @@ def convert(
             --linear-density "20 g/m" --axial-stiffness "50 kN"
         sagline convert cogiro --format mjcf --out cogiro.xml
     """
+    from sagline.files.pose_text import FARTHEST, numbers
     from sagline.files.robot_file import dump_robot
-    from sagline.files.typed import FARTHEST, numbers
 
     if out is not None and Path(source).exists() and out.resolve() == Path(source).resolve():
         raise FileError(out, "is the file to convert", "Name another file with --out.")
@@ -92,8 +92,8 @@ def convert(
 
 
 def _read(source: str, cables: Cable | None, cable_set: str | None) -> Imported:
-    from sagline.files.imported import Imported
     from sagline.files.robot_file import load_robot
+    from sagline.files.robot_xml import Imported
 
     path = Path(source)
     is_caspr = path.suffix.lower() == ".xml" or path.is_dir()

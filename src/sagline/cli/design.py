@@ -12,7 +12,7 @@ from sagline.cli.options import JsonOption, RobotArgument
 from sagline.cli.results import figure_files, listed, write_figures
 from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
-from sagline.files.whole import check_files
+from sagline.files.writing import check_files
 
 if TYPE_CHECKING:
     from sagline.optimization.front import Front

@@ -12,7 +12,7 @@ import typer
 
 from sagline.cli.terminal import show
 from sagline.core.errors import FileError
-from sagline.files.whole import check_folder, made_folder, written_whole
+from sagline.files.writing import check_folder, made_folder, written_whole
 
 KINDS = (".py", ".yaml", ".csv", ".wcrfx")
 

@@ -14,7 +14,7 @@ from sagline.cli.options import JsonOption, OutOption
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.core.errors import InvalidValueError, nearest
 from sagline.core.numbers import n
-from sagline.files.whole import check_files
+from sagline.files.writing import check_files
 
 if TYPE_CHECKING:
     from sagline.article.experiment import Experiment, Tell
@@ -55,8 +55,8 @@ def experiment(
     """
     from sagline.article.experiment import PROTOTYPE, in_process
     from sagline.cli.values import whole_of
-    from sagline.files.json_text import plain
     from sagline.files.robot_file import load_robot
+    from sagline.files.writing import plain
     from sagline.report.experiment import NAMES, experiment_chapter, write_experiment
     from sagline.twin.machine import MOST_SEED
 

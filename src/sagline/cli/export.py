@@ -31,7 +31,7 @@ def export_c(
         sagline export-c article-prototype --out sagline.c
         sagline export-c own_robot.yaml --out robot.c --float
     """
-    from sagline.files.c_source import export_c
+    from sagline.files.controller_source import export_c
     from sagline.files.robot_file import load_robot
 
     loaded = load_robot(robot)
@@ -57,7 +57,7 @@ def export_scl(
         sagline export-scl article-prototype --out plc.scl
     """
     from sagline.control.link import groups_of
-    from sagline.files.plc_source import export_scl
+    from sagline.files.controller_source import export_scl
     from sagline.files.robot_file import load_robot
 
     loaded = load_robot(robot)

@@ -13,10 +13,10 @@ from sagline.cli.entries import FIT, FORWARD
 from sagline.cli.options import JsonOption, Model, ModelOption, OutOption, PayloadOption, RobotArgument, WrenchOption
 from sagline.cli.tables import Grid, csv_text, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
-from sagline.files.whole import check_files, made_folder, write_text
+from sagline.files.writing import check_files, made_folder, write_text
 
 if TYPE_CHECKING:
-    from sagline.files.lengths_file import Lengths
+    from sagline.files.measurements import Lengths
     from sagline.kinematics.forward_solution import ForwardSolution
     from sagline.robot.robot import Robot
 
@@ -51,9 +51,9 @@ def forward(
         sagline forward my_robot.yaml counts.csv --counts
     """
     from sagline.cli.values import loaded
-    from sagline.files.names import file_stem
+    from sagline.files.pose_text import wrench_of
     from sagline.files.robot_file import load_robot
-    from sagline.files.typed import wrench_of
+    from sagline.files.writing import file_stem
     from sagline.kinematics.forward import forward as solve
     from sagline.kinematics.forward_status import ForwardStatus
 
@@ -87,13 +87,13 @@ def forward(
 
 
 def _measured(file: Path, robot: Robot) -> Lengths:
-    from sagline.files.lengths_file import load_lengths
+    from sagline.files.measurements import load_lengths
 
     return load_lengths(file, robot.cable_count, float(np.linalg.norm(np.ptp(robot.frame_anchors, axis=0))))
 
 
 def _counted(file: Path, robot: Robot) -> Lengths:
-    from sagline.files.lengths_file import Lengths, load_counts
+    from sagline.files.measurements import Lengths, load_counts
     from sagline.kinematics.encoder import lengths_from_counts
 
     read = load_counts(file, robot.cable_count)

@@ -15,7 +15,7 @@ from sagline.cli.options import Winding
 from sagline.cli.tables import csv_text
 from sagline.cli.terminal import note, show_data, working
 from sagline.core.errors import FileError
-from sagline.files.whole import write_text
+from sagline.files.writing import write_text
 
 if TYPE_CHECKING:
     from sagline.core.arrays import Array

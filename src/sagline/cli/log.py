@@ -13,7 +13,7 @@ from sagline.cli.options import JsonOption
 from sagline.cli.tables import Grid, show_table
 from sagline.cli.terminal import show, show_json, working
 from sagline.core.numbers import n
-from sagline.files.whole import check_file
+from sagline.files.writing import check_file
 
 if TYPE_CHECKING:
     from sagline.control.events import Event

@@ -38,7 +38,7 @@ from sagline.cli.twin import twin
 from sagline.cli.vibrate import vibrate
 from sagline.cli.view import view
 from sagline.cli.workspace import workspace
-from sagline.files.whole import finished_files
+from sagline.files.writing import finished_files
 
 DEBUG = "--debug"
 MOST_NAMES = 6  # of files, told when something failed after them

@@ -15,8 +15,7 @@ from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.core.errors import InvalidValueError
 from sagline.dynamics.frequency_map import frequency_map
-from sagline.files.names import file_stem
-from sagline.files.whole import check_files, made_folder
+from sagline.files.writing import check_files, file_stem, made_folder
 from sagline.robot.pose import Pose
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from sagline.cli.entries import INVERSE
 from sagline.cli.terminal import note, show, working
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.core.numbers import n
-from sagline.files.whole import write_text
+from sagline.files.writing import write_text
 
 if TYPE_CHECKING:
     from sagline.core.arrays import Array

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 from sagline.cli.entries import FORWARD
 from sagline.cli.terminal import working
 from sagline.core.errors import FileError
-from sagline.files.dataset import is_of
+from sagline.files.netcdf import is_of
 from sagline.files.plan_file import load_plan
 from sagline.files.simulation_file import FORMAT, load_simulation
 from sagline.robot.robot import Robot

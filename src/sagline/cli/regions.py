@@ -9,8 +9,8 @@ import numpy as np
 
 from sagline.cli.values import quantity
 from sagline.core.errors import InvalidValueError
+from sagline.files.pose_text import FARTHEST, wrench_of
 from sagline.files.quantity import in_si
-from sagline.files.typed import FARTHEST, wrench_of
 from sagline.robot.pose_box import PoseBox
 from sagline.workspaces.wrench_sets import Accelerations, WrenchBox, WrenchPolytope, WrenchSet
 

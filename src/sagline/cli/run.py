@@ -9,7 +9,7 @@ from sagline.cli.entries import FORWARD, INVERSE, SIGNED_MARGINS
 from sagline.cli.options import JsonOption, OutOption
 from sagline.cli.results import figure_files, write_figures
 from sagline.cli.terminal import show, working
-from sagline.files.whole import check_files
+from sagline.files.writing import check_files
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

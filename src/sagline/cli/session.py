@@ -18,7 +18,7 @@ from sagline.control.guard import interrupt_calls
 from sagline.control.states import State
 from sagline.core.errors import InvalidValueError, SaglineError, nearest
 from sagline.files.path_file import load_path
-from sagline.files.typed import pose_of
+from sagline.files.pose_text import pose_of
 from sagline.robot.pose import Pose
 
 FAILED: Final = 1  # exit code where a fault ended it

@@ -11,7 +11,7 @@ from sagline.cli.entries import INVERSE
 from sagline.cli.options import robot_completions
 from sagline.cli.terminal import show, working
 from sagline.core.errors import FileError, InvalidValueError
-from sagline.files.whole import check_file, write_text
+from sagline.files.writing import check_file, write_text
 
 if TYPE_CHECKING:
     from sagline.robot.robot import Robot
@@ -49,7 +49,7 @@ def share(
         sagline share output/cogiro-catenary.nc
         sagline share run.mcap
     """
-    from sagline.files.names import file_stem
+    from sagline.files.writing import file_stem
     from sagline.robot.robot import Robot
     from sagline.share.page import course_page, robot_page
 
@@ -73,7 +73,7 @@ def _found(source: Path) -> Robot | Course:
     """A robot, or what is to be played."""
     from sagline.files.calibration_file import FORMAT as CALIBRATION
     from sagline.files.calibration_file import load_calibration
-    from sagline.files.dataset import is_of
+    from sagline.files.netcdf import is_of
     from sagline.files.plan_file import load_plan
     from sagline.files.robot_file import load_robot
     from sagline.files.simulation_file import FORMAT as SIMULATION

@@ -29,7 +29,7 @@ from sagline.cli.terminal import note, show, show_json, working
 from sagline.cli.track import check_unit
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.core.numbers import n
-from sagline.files.whole import check_files, made_folder
+from sagline.files.writing import check_files, made_folder
 
 if TYPE_CHECKING:
     from sagline.cli.line import Line
@@ -101,10 +101,10 @@ def simulate(
     """
     from sagline.cli.values import damping_of, loaded, quantity
     from sagline.dynamics.simulate import simulate as integrated
-    from sagline.files.names import file_stem
     from sagline.files.path_file import load_path
+    from sagline.files.pose_text import wrench_of
     from sagline.files.robot_file import load_robot
-    from sagline.files.typed import wrench_of
+    from sagline.files.writing import file_stem
     from sagline.robot.several import anything_behind
 
     load, robot = wrench_of(wrench), loaded(load_robot(name), payload)

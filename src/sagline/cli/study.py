@@ -19,8 +19,7 @@ from sagline.cli.terminal import note, show, show_json
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.core.progress import Progress
-from sagline.files.names import file_stem
-from sagline.files.whole import made_folder
+from sagline.files.writing import file_stem, made_folder
 from sagline.kinematics.confirm import Confirmation, confirm
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Gap, Plan

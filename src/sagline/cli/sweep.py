@@ -15,7 +15,7 @@ from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.core.numbers import counted
-from sagline.files.whole import check_folder, made_folder
+from sagline.files.writing import check_folder, made_folder
 
 if TYPE_CHECKING:
     from sagline.sweep.request import Request

@@ -27,7 +27,7 @@ from sagline.cli.tables import Grid, show_table
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
-from sagline.files.whole import check_files, made_folder
+from sagline.files.writing import check_files, made_folder
 
 if TYPE_CHECKING:
     from sagline.core.arrays import Array
@@ -61,9 +61,9 @@ def tension(
         sagline tension cogiro --pose 0,0,2,10,0,0 --variable frame_end --no-figures
     """
     from sagline.cli.values import loaded, middle_of
-    from sagline.files.names import file_stem
+    from sagline.files.pose_text import pose_of, wrench_of
     from sagline.files.robot_file import load_robot
-    from sagline.files.typed import pose_of, wrench_of
+    from sagline.files.writing import file_stem
     from sagline.kinematics.inverse import inverse
     from sagline.kinematics.polygon import tension_polygon
     from sagline.tension.margin import capacity_margin

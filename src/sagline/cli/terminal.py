@@ -16,7 +16,7 @@ from rich.text import Text
 
 from sagline.core.errors import FileError, SaglineWarning, printable
 from sagline.core.numbers import SPACE
-from sagline.files.json_text import json_text
+from sagline.files.writing import json_text
 
 if TYPE_CHECKING:
     from sagline.cli.line import Line

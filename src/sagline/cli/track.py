@@ -26,7 +26,7 @@ from sagline.cli.options import (
 from sagline.cli.results import figure_files, write_figures
 from sagline.cli.terminal import working
 from sagline.core.errors import FileError
-from sagline.files.whole import check_files, write_text
+from sagline.files.writing import check_files, write_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -76,8 +76,8 @@ def track(
     from sagline.cli.study import run_along, run_name, tell, write_plans
     from sagline.cli.values import loaded
     from sagline.files.path_file import load_path
+    from sagline.files.pose_text import wrench_of
     from sagline.files.robot_file import load_robot
-    from sagline.files.typed import wrench_of
     from sagline.motion.planar import article_path
 
     load = wrench_of(wrench)

@@ -17,7 +17,7 @@ from sagline.cli.terminal import note, show, working
 
 if TYPE_CHECKING:
     from sagline.dynamics.simulator import Reading
-    from sagline.files.mcap_log import Recorder
+    from sagline.files.mcap_writer import Recorder
     from sagline.twin.machine import Machine
     from sagline.twin.server import Server
     from sagline.twin.snapshot import Report
@@ -94,7 +94,7 @@ def twin(
             server = stack.enter_context(closing(Server(machine, host=host, port=first, modbus=modbus)))
         watch = Watch(machine)
         if log is not None:
-            from sagline.files.mcap_log import Recorder
+            from sagline.files.mcap_writer import Recorder
 
             watch.recorder = stack.enter_context(Recorder(log, real, period=SCAN))
         _greet(name, server, host, modbus=modbus)

@@ -25,7 +25,7 @@ from sagline.cli.results import figure_files, listed, write_figures
 from sagline.cli.tables import Grid, csv_text, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.core.errors import InvalidValueError
-from sagline.files.whole import check_files, made_folder, write_text
+from sagline.files.writing import check_files, made_folder, write_text
 
 if TYPE_CHECKING:
     from sagline.dynamics.mode_list import ListedMode
@@ -85,9 +85,9 @@ def vibrate(
     from sagline.dynamics.mode_list import listed_modes
     from sagline.dynamics.vibrating import vibration
     from sagline.dynamics.vibration_status import VibrationStatus
-    from sagline.files.names import file_stem
+    from sagline.files.pose_text import pose_of, wrench_of
     from sagline.files.robot_file import load_robot
-    from sagline.files.typed import pose_of, wrench_of
+    from sagline.files.writing import file_stem
     from sagline.kinematics.inverse import inverse
     from sagline.kinematics.status import PoseStatus
 

@@ -82,8 +82,8 @@ def view(
     from sagline.cli.played import LOG
     from sagline.cli.values import loaded, port_of
     from sagline.cli.view_log import view_log
+    from sagline.files.pose_text import pose_of, wrench_of
     from sagline.files.robot_file import load_robot
-    from sagline.files.typed import pose_of, wrench_of
 
     number = port_of(port)
     log = next((file for file in (run, Path(robot)) if file is not None and file.suffix.lower() == LOG), None)
@@ -161,7 +161,7 @@ def view_run(robot: Robot, file: Path, host: str, port: int, *, browser: bool, b
     """
     from sagline.cli.hosting import check_viewer, hosted
     from sagline.cli.played import played_beside, played_in
-    from sagline.files.dataset import is_of
+    from sagline.files.netcdf import is_of
     from sagline.files.simulation_file import FORMAT
 
     check_viewer()
@@ -203,7 +203,7 @@ def view_calibration(file: Path, robot: str | None, host: str, port: int, *, bro
 
 def _is_calibration(file: Path) -> bool:
     from sagline.files.calibration_file import FORMAT as CALIBRATION
-    from sagline.files.dataset import is_of
+    from sagline.files.netcdf import is_of
 
     return file.suffix.lower() == ".nc" and is_of(file, CALIBRATION)
 

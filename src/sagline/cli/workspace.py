@@ -17,7 +17,7 @@ from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import counted
-from sagline.files.whole import check_files, made_folder
+from sagline.files.writing import check_files, made_folder
 
 if TYPE_CHECKING:
     from sagline.interference.pairs import Obstacle
@@ -91,7 +91,7 @@ class Asked(NamedTuple):
 def around(name: str) -> tuple[Obstacle, ...]:
     """What stands around: the scene of a robot file, a mesh file, nothing for a preset's name."""
     from sagline.files.mesh_file import load_mesh
-    from sagline.files.scene_file import load_scene
+    from sagline.files.robot_file import load_scene
 
     path = Path(name)
     if path.suffix.lower() in (".yaml", ".yml"):
@@ -151,8 +151,8 @@ def workspace(
     """
     from sagline.cli.regions import box_of, wrenches_of
     from sagline.cli.values import loaded, quantity
-    from sagline.files.names import file_stem
     from sagline.files.robot_file import load_robot
+    from sagline.files.writing import file_stem
     from sagline.workspaces.orientations import Tilts
     from sagline.workspaces.proof import prove
     from sagline.workspaces.proof_verdict import ProofVerdict

@@ -15,7 +15,7 @@ from sagline.core.arrays import locked
 # The ring that draws is far out, and loads when something is shown, by its name: an import would close a circle here.
 _PAGES = "sagline.notebook.html"
 # Files know all results, so no result imports them: the module is loaded by its name when a result is saved.
-_FORMATS: Final = "sagline.files.formats"
+_FORMATS: Final = "sagline.files.format"
 
 
 def formats() -> Any:
@@ -60,7 +60,7 @@ class Result(ByFields, Shown):
 
 
 class Saved:
-    """A result with a file format, see `sagline.files.formats`."""
+    """A result with a file format, see `sagline.files.format`."""
 
     __slots__ = ()
 

@@ -1,8 +1,9 @@
-"""Calibrations in NetCDF: every number with its unit, and the robot as it was and as it was found."""
+"""Calibrations in NetCDF: every number with its unit, and the robots before and after."""
 
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -14,29 +15,173 @@ from sagline.calibration.findings import CrossValidation, Direction, Outlier
 from sagline.calibration.result import Calibration
 from sagline.calibration.sensors import Sensors
 from sagline.calibration.status import CalibrationStatus, Omission
-from sagline.calibration.unknowns import Parameters
+from sagline.calibration.unknowns import KINDS, Parameters
+from sagline.core.arguments import choice, text
 from sagline.core.arrays import locked
-from sagline.files.calibration_checks import check_calibration
-from sagline.files.calibration_layout import (
-    CROSS_VALIDATION,
-    DIRECTIONS,
-    FOUND,
-    LEFT_OUT,
-    OUTLIERS,
-    PARAMETERS,
-    PLACED,
-    READ,
-    SENSORS,
-)
-from sagline.files.dataset import labeled_dataset
+from sagline.core.errors import InvalidValueError
 from sagline.files.format import Format
-from sagline.files.plan_file import choice_attributes, choice_of
+from sagline.files.netcdf import choice_attributes, choice_of, labeled_dataset
 from sagline.files.robot_file import dump_robot, parse_robot
-from sagline.files.variables import Quantity
+from sagline.files.variables import STEP, Known, Quantity, check_indices, check_labels, check_variable
+from sagline.kernels.calibration.kinds import KIND_ROWS
 from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
 
 if TYPE_CHECKING:
     from xarray import Dataset
+
+READ: Final = ("lengths", "counts")  # by Parameters.counted: what was read of the winches
+P: Final = ("parameter",)
+N: Final = ("pose",)
+PARAMETERS: Final = (
+    Quantity("parameter_name", "names", P, "", "kind of each number", values=str),
+    Quantity("parameter_label", "labels", P, "", "what each number is called", values=str),
+    Quantity("parameter_unit", "units", P, "", "unit of each number, 1 for none", values=str),
+    Quantity("parameter_cable", "cables", P, "", "cable of each number, -1 for one of all", values=int),
+    Quantity("parameter_place", "where", ("kind_row", "cable"), "", "number of each row of kinds, -1", values=int),
+    Quantity("prior", "prior", P, "", "what was known beforehand, in the units of the numbers"),
+    Quantity("prior_deviation", "prior_deviation", P, "", "its standard deviation", infinite=True),
+    Quantity("prior_stated", "stated", P, "", "whether tolerances or the caller said so", values=bool),
+    Quantity("logarithmic", "logarithmic", P, "", "whether the logarithm was looked for", values=bool),
+)
+FOUND: Final = (
+    Quantity("length_offset", "length_offset", ("cable",), "m", "to be added to lengths that the machine believes"),
+    Quantity("status", "status", (), "", "how the calibration ended", codes=CalibrationStatus),
+    Quantity("value", "values", P, "", "what was found, in the units of the numbers"),
+    Quantity(
+        "covariance",
+        "covariance",
+        (*P, "other_parameter"),
+        "",
+        "covariance of the values",
+        known=Known.SOMEWHERE,
+        infinite=True,
+    ),
+    Quantity("chi_squared", "chi_squared", (), "1", "sum of squares of residuals in deviations", low=0.0),
+    Quantity("degrees_of_freedom", "degrees_of_freedom", (), "", "what chi_squared is compared with", values=int),
+    Quantity("iterations", "iterations", (), "", "iterations of the least squares", values=int),
+    Quantity("row", "rows", N, "", "rows of the log that were used", values=int),
+    Quantity("position", "poses.position", (*N, "axis"), "m", "where the platform stood"),
+    Quantity("quaternion", "poses.quaternion", (*N, "quaternion_part"), "1", "rotation from platform to world"),
+    Quantity("unstrained_length", "unstrained_length", (*N, "cable"), "m", "true lengths of the cables", low=0.0),
+    Quantity(
+        "residual",
+        "residuals",
+        (*N, "reading"),
+        "",
+        "readings less predictions: lengths [m], load cells [N], position [m], rotation [rad]",
+        known=Known.SOMEWHERE,
+    ),
+    Quantity("chi_squared_of_pose", "chi_squared_of_pose", N, "1", "share of each pose in chi_squared", low=0.0),
+    Quantity("weight", "weights", N, "1", "less than 1 for a pose that does not fit the rest", low=0.0),
+)
+SENSORS: Final = {  # name in the file -> attribute, unit; each of one number, or one a cable or axis
+    "length_deviation": ("cable", "m"),
+    "tension_deviation": ("cable", "N"),
+    "position_deviation": ("axis", "m"),
+    "rotation_deviation": ("axis", "rad"),
+}
+PLACED: Final = (
+    Quantity("measuring_position", "frame.position", ("axis",), "m", "where the measuring system stands"),
+    Quantity("measuring_quaternion", "frame.quaternion", ("quaternion_part",), "1", "its rotation to the world"),
+    Quantity("target", "target", ("axis",), "m", "the measured point of the platform"),
+)
+LEFT_OUT: Final = (
+    Quantity("left_out_row", "", ("omission",), "", "rows of the log that were left out", values=int),
+    Quantity("left_out_reason", "", ("omission",), "", "why", codes=Omission),
+)
+OUTLIERS: Final = (
+    Quantity("outlier_row", "row", ("outlier",), "", "row of the log", values=int),
+    Quantity("outlier_cable", "cable", ("outlier",), "", "its cable, -1 for the whole pose", values=int),
+    Quantity("outlier_quantity", "quantity", ("outlier",), "", "what does not fit", values=str),
+    Quantity("outlier_size", "size", ("outlier",), "", "by how much [m, N or rad]"),
+    Quantity("outlier_deviations", "deviations", ("outlier",), "1", "the same in standard deviations"),
+)
+CROSS_VALIDATION: Final = (
+    Quantity("folds", "folds", (), "", "parts of the poses that were predicted from the others", values=int),
+    *(
+        Quantity(f"left_out_{name}", name, (), unit, f"root mean square {what}", known=Known.SOMEWHERE, low=0.0)
+        for name, unit, what in (
+            ("tension", "N", "of load cells at poses left out"),
+            ("position", "m", "of positions at poses left out"),
+            ("tension_before", "N", "of load cells with the robot as it was"),
+            ("position_before", "m", "of positions with the robot as it was"),
+        )
+    ),
+)
+
+
+def directions(group: str) -> tuple[Quantity, ...]:
+    """Variables of the directions that data leave open, or hardly tell.
+
+    Args:
+        group: "gauge" or "cannot_tell_apart".
+    """
+    return (
+        Quantity(f"{group}_name", "name", (group,), "", "what each is", values=str),
+        Quantity(f"{group}_vector", "vector", (group, *P), "", "combination of the numbers, in their units"),
+        Quantity(f"{group}_known", "known", (group,), "1", "share of its prior deviation that is left", low=0.0),
+        Quantity(f"{group}_step", "step", (group,), "", "what to do about it", values=str),
+    )
+
+
+DIRECTIONS: Final = {group: directions(group) for group in ("gauge", "cannot_tell_apart")}
+
+
+UNITS = ("m", "kg/m", "N", "kg", "rad", "1")
+OUTLYING = ("length", "load cell", "position", "rotation")
+
+
+def check_calibration(data: Dataset, robot: Robot, before: Robot, sensors: Sequence[Quantity]) -> None:
+    """Refuse a data set that is no calibration, whatever its file looked like.
+
+    Args:
+        data: The data set.
+        robot: The robot that was found.
+        before: The robot as it was.
+        sensors: Variables of the sensors' deviations.
+
+    Raises:
+        KeyError: If a variable or attribute is missing.
+        InvalidValueError: If one is not what the layout says; the message names its first wrong value.
+    """
+    m = robot.cable_count
+    if before.cable_count != m:
+        raise InvalidValueError("robot_before", f"of {before.cable_count} cables", f"of {m}, as robot", STEP)
+    check_labels(data)
+    quantities = [*FOUND, *PARAMETERS, *PLACED, *sensors, *OUTLIERS, *LEFT_OUT, *_all(DIRECTIONS)]
+    if "folds" in data.variables:
+        quantities += CROSS_VALIDATION
+    sizes = {str(name): size for name, size in data.sizes.items()}
+    fixed = {"cable": m, "reading": 2 * m + 6, "kind_row": KIND_ROWS, "other_parameter": sizes.get("parameter", 0)}
+    for quantity in quantities:
+        check_variable(quantity, data.variables[quantity.name], (), sizes | fixed, np.array(True))
+    for name, low, high in (
+        ("parameter_cable", -1, m),
+        ("parameter_place", -1, sizes["parameter"]),
+        ("outlier_cable", -1, m),
+        ("row", 0, sys.maxsize),
+        ("outlier_row", 0, sys.maxsize),
+        ("left_out_row", 0, sys.maxsize),
+    ):
+        check_indices(name, data.variables[name].values, low, high)
+    for name, words in (("parameter_name", KINDS), ("parameter_unit", UNITS), ("outlier_quantity", OUTLYING)):
+        for word in data.variables[name].values:
+            choice(str(word), name, words)
+    choice(str(data.attrs["read"]), "read", READ)
+    for name in ("log", "date"):
+        text(data.attrs[name], name)
+    reasons = [choice(word, "left_out", _NAMES) for word in text(data.attrs["left_out"], "left_out").split()]
+    for code in np.unique(data.variables["left_out_reason"].values).tolist():
+        choice(Omission(code).name.lower(), "left_out_reason", reasons)
+
+
+_NAMES = {reason.name.lower(): reason for reason in Omission}
+
+
+def _all(groups: dict[str, tuple[Quantity, ...]]) -> list[Quantity]:
+    return [one for columns in groups.values() for one in columns]
+
 
 _NONE: Final = -1  # cable of an outlier that is a whole pose
 

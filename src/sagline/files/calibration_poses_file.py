@@ -11,7 +11,7 @@ import numpy as np
 from sagline.calibration.paid import can_count, counts_of
 from sagline.core.arguments import file_path
 from sagline.core.arrays import Array
-from sagline.files.whole import write_text
+from sagline.files.writing import write_text
 from sagline.files.yaml_text import dump_mapping
 from sagline.robot.drum import drums_of
 

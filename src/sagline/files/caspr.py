@@ -13,9 +13,17 @@ from sagline.cables.cable import Cable
 from sagline.core.arguments import file_path, optional, text
 from sagline.core.arrays import Array
 from sagline.core.errors import FileError, InvalidValueError
-from sagline.files.imported import STEEL_ROPE_DENSITY, STEEL_ROPE_STIFFNESS, Imported, imported
-from sagline.files.text import exists
-from sagline.files.xml_text import number, numbers, only_child, read_xml
+from sagline.files.reading import exists
+from sagline.files.robot_xml import (
+    STEEL_ROPE_DENSITY,
+    STEEL_ROPE_STIFFNESS,
+    Imported,
+    imported,
+    number,
+    numbers,
+    only_child,
+    read_xml,
+)
 from sagline.robot.pattern import MotionPattern
 from sagline.robot.robot import Robot
 from sagline.robot.winch import UPRIGHT, Winch

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from dataclasses import fields
+from io import FileIO
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -15,15 +16,16 @@ from sagline.control.states import State
 from sagline.core.arguments import brief, file_path, instance, integer
 from sagline.core.arrays import locked
 from sagline.core.errors import FileError, InvalidValueError, SaglineWarning
-from sagline.files.dataset import labeled_dataset, numbered, write_dataset
-from sagline.files.execution_layout import CABLE, CYCLES, EVENTS, EVERY, NONE, ROWS, SMALL, TIME
 from sagline.files.format import Format
-from sagline.files.mcap_log import save_execution
+from sagline.files.mcap_layout import CABLE, CYCLES, EVENTS, EVERY, NONE, ROWS, SMALL, TIME, columns_of
 from sagline.files.mcap_reader import AGAIN, Ending, Log, read_log
-from sagline.files.packed_dataset import unpack_dataset
+from sagline.files.mcap_writer import BLOCK, McapFile, check_packages
+from sagline.files.netcdf import labeled_dataset, numbered, write_dataset
+from sagline.files.packed import unpack_dataset
 from sagline.files.plan_file import plan_dataset, plan_of
 from sagline.files.robot_file import dump_robot
 from sagline.files.variables import PARTS, Quantity
+from sagline.files.writing import written_whole
 from sagline.kinematics.plan import Plan
 from sagline.robot.robot import Robot
 
@@ -196,6 +198,33 @@ def save(execution: Execution, file: os.PathLike[str] | str) -> None:
     if path.suffix.lower() not in ways:
         raise FileError(path, "is no name for an execution", "Let it end in .mcap, or in .nc.")
     ways[path.suffix.lower()](execution, path)
+
+
+def save_execution(execution: Execution, file: os.PathLike[str] | str) -> None:
+    """Write an execution to a log in MCAP, whole or not at all, with plan and robot inside and every number as it is.
+
+    Args:
+        execution: The execution.
+        file: The file, "run.mcap" for instance; a regular file that exists is replaced, anything else is refused.
+
+    Raises:
+        FileError: If the file cannot be written, or a package is missing; what was there before is untouched.
+        InvalidValueError: If the execution is none.
+    """
+    done, target = instance(execution, Execution, "execution"), file_path(file)
+    check_packages()
+    with written_whole(target) as partial_file, FileIO(partial_file, "wb") as stream:
+        mcap = McapFile(stream, done.robot, done.period)
+        number = NONE if done.plan is None else mcap.begin(done.plan)
+        columns = columns_of(done)
+        for first in range(0, max(len(done), 1), BLOCK):
+            rows = {name: values[first : first + BLOCK] for name, values in columns.items()}
+            mcap.block(rows, number, done.zero)
+            mcap.close_chunk()
+        for event in done.events:
+            mcap.event(event)
+        mcap.end(number, done.status.name, done.reason)
+        mcap.finish()
 
 
 def save_dataset(execution: Execution, file: os.PathLike[str] | str) -> None:

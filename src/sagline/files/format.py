@@ -1,16 +1,16 @@
-"""NetCDF files of one kind of result: how a result is written and read."""
+"""NetCDF formats of results, found by the type of the result."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar
 
 from sagline.core.arguments import file_path, instance
-from sagline.files.content import Content
-from sagline.files.dataset import file_errors, read_dataset, write_dataset
+from sagline.files.netcdf import Content, file_errors, read_dataset, write_dataset
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -69,3 +69,28 @@ class Format(Content, Generic[T]):
         assert self.unpack is not None
         with file_errors(path):
             return self.unpack(path, data)
+
+
+# A module is loaded when a result of its type is saved. Each has a function save(result, file).
+MODULES: Final = {
+    "Calibration": "calibration_file",
+    "CalibrationPoses": "calibration_poses_file",
+    "Execution": "execution_file",
+    "FrequencyMap": "frequency_map_file",
+    "Plan": "plan_file",
+    "Simulation": "simulation_file",
+    "Surface": "mesh_file",
+    "WinchLog": "log_file",
+    "Workspace": "workspace_file",
+}
+
+
+def module_of(result: object) -> Any:
+    """The module of files that writes a result, or what it derives from; KeyError if there is none."""
+    names = [kind.__name__ for kind in type(result).__mro__]
+    return import_module(f"sagline.files.{MODULES[next((name for name in names if name in MODULES), names[0])]}")
+
+
+def save(result: object, file: os.PathLike[str] | str) -> None:
+    """Write a result to a file of the format of its type, whole or not at all."""
+    module_of(result).save(result, file)

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Final
 
 from sagline.dynamics.frequency_map import FrequencyMap
 from sagline.dynamics.vibration_status import VibrationStatus
-from sagline.files.dataset import labeled_dataset
 from sagline.files.format import Format
+from sagline.files.netcdf import labeled_dataset
 from sagline.files.robot_file import dump_robot
 from sagline.files.variables import Known, Quantity
 

@@ -1,17 +1,105 @@
-"""What stands where in a log in MCAP: its topics, their schemas, its attachments."""
+"""Contents of a log in MCAP: quantities of a cycle, topics with their schemas, attachments, and drawn scenes."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterator
 from importlib.metadata import version
-from typing import Any, Final, NamedTuple
+from itertools import combinations
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sagline.control.events import Event, EventKind
+from sagline.control.execution import Execution
 from sagline.control.states import State
+from sagline.core.arrays import Array
+from sagline.files.variables import Known, Quantity
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+
+if TYPE_CHECKING:
+    from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
+    from foxglove_schemas_protobuf.SceneEntity_pb2 import SceneEntity
+    from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
+
+ROWS: Final = "time"
+NONE: Final = -1  # of a code: there is none
+GROUP, CABLE, AXIS, TURN = ("group",), ("cable",), ("axis",), ("quaternion_part",)
+
+
+def _real(name: str, place: str, parts: tuple[str, ...], unit: str, what: str) -> Quantity:
+    return Quantity(name, place, parts, unit, what, known=Known.SOMEWHERE, infinite=True)
+
+
+def _whole(name: str, place: str, parts: tuple[str, ...], what: str) -> Quantity:
+    return Quantity(name, place, parts, "", what, values=int)
+
+
+TIME: Final = _real("time", "time", (), "s", "time on the clock of the link")
+CYCLES: Final = (
+    Quantity("answered", "answered", (), "", "whether there was a sample", values=bool),
+    Quantity("state", "state", (), "", "state of the controller at the end of the cycle", codes=State),
+    _real("late", "late", (), "s", "by how much the cycle began too late"),
+    _real("clock", "clock", (), "s", "where on the plan the cycle was, from its start; none beside it"),
+    _real("position", "position", AXIS, "m", "position of the platform origin, estimated from the encoders"),
+    _real("quaternion", "quaternion", TURN, "1", "rotation from platform to world, estimated, scalar last"),
+    _whole("estimate", "estimate", (), f"code of the estimate; {NONE}: none"),
+    _whole("mode", "mode", (), f"code of the command's mode; {NONE}: none was sent"),
+    _real("set_length", "set_length", CABLE, "m", "set point of the unstrained length, with the zero of homing"),
+    _real("set_rate", "set_rate", CABLE, "m/s", "set point of its rate"),
+    _real("set_tension", "set_tension", CABLE, "N", "set point of the tension at the drum"),
+    _real("planned_tension", "planned_tension", CABLE, "N", "tension at the frame end planned for the sample"),
+    _real("correction", "correction", CABLE, "m", "what the tension loop has in the set point of the length"),
+    _real("age", "samples.age", GROUP, "s", "since the newest good block came in"),
+    _whole("counter", "samples.counter", GROUP, "of the blocks"),
+    _real("plc_time", "samples.plc_time", GROUP, "s", "when the PLC wrote its block, on its own clock"),
+    _whole("owner", "samples.owner", GROUP, "who has the grant; 0: nobody"),
+    _whole("echo", "samples.echo", GROUP, "counter of the last command that the PLC took"),
+    _whole("group_status", "samples.status", GROUP, "bits of the PLC's status"),
+    _whole("group_fault", "samples.fault", GROUP, "code of why the PLC acts by itself; 0: it does not"),
+    _whole("discarded", "samples.discarded", GROUP, "blocks that were no good so far"),
+    _real("length", "samples.length", CABLE, "m", "unstrained length off the drum as read, without the zero of homing"),
+    _real("rate", "samples.rate", CABLE, "m/s", "its rate"),
+    _real("torque", "samples.torque", CABLE, "N m", "of the motor at its shaft, positive where it lets cable out"),
+    _real("tension", "samples.tension", CABLE, "N", "tension at the frame end as the load cell reads it"),
+    _real("filtered", "samples.filtered", CABLE, "N", "the same behind the PLC's filter"),
+    _whole("counts", "samples.counts", CABLE, "of the encoder"),
+    _whole("winch_state", "samples.state", CABLE, "code of the winch's state"),
+    _whole("winch_fault", "samples.winch_fault", CABLE, "the drive's own code; 0: none"),
+)
+EVERY: Final = (TIME, *CYCLES)
+SMALL: Final = frozenset({"estimate", "mode"})  # whole numbers that are kept in a byte
+# Digits behind the point that a log keeps of what is recorded while the machine runs. They are finer than what
+# measures: an encoder's step is 72 nm and its whole counts are kept, a load cell's noise is 1 N. With all digits of
+# that noise fourteen minutes would be twice as large.
+DECIMALS: Final = {
+    "time": 6, "late": 6, "clock": 6, "age": 5, "plc_time": 5, "position": 7, "quaternion": 8, "length": 7,
+    "set_length": 8, "correction": 8, "rate": 5, "set_rate": 7, "torque": 3, "tension": 2, "filtered": 2,
+    "set_tension": 3, "planned_tension": 3,
+}  # fmt: skip
+EVENTS: Final = {  # of what happened
+    "time": "when it happened, on the clock of the link [s]",
+    "cycle": "in which cycle of the controller, from 0",
+    "kind": "state, fault or note",
+    "name": "the state that was entered, or the fault",
+    "state": "of the controller after it",
+    "text": "what the operator was told",
+}
+
+
+def columns_of(execution: Execution) -> dict[str, NDArray[Any]]:
+    """What there is of every cycle.
+
+    Args:
+        execution: N cycles.
+
+    Returns:
+        Arrays whose first axis is N, by the name of the quantity.
+    """
+    return {quantity.name: quantity.of(execution) for quantity in EVERY}
+
 
 NANO: Final = 1e9  # of the log's own clock in a second
 FORMAT: Final = 1  # raised whenever an older sagline could misread a log
@@ -150,3 +238,93 @@ def _listed(values: NDArray[Any]) -> list[Any]:
 
 def _text(said: dict[str, Any]) -> bytes:
     return json.dumps(said, separators=(",", ":"), ensure_ascii=False).encode()
+
+
+WORLD, PLATFORM = "world", "platform"
+FINE, COARSE = 2.0**20, 2.0**10  # 1/m: what is drawn is rounded to such steps, of whose bytes most are zero
+POINTS: Final = 7  # of a cable
+_THICKNESS: Final = 3.0  # px
+_STEEL, _BLUE, _CABLE = (0.47, 0.5, 0.54), (0.23, 0.53, 0.79), (0.55, 0.36, 0.17)  # red, green, blue, 0 to 1
+
+
+def transform(stamp: int, position: Array, quaternion: Array) -> FrameTransform:
+    """Where the platform is, as Foxglove has it.
+
+    Args:
+        stamp: When [ns].
+        position: Of its origin [m], shape (3,).
+        quaternion: Its rotation to the world, scalar last, shape (4,).
+    """
+    from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
+
+    found = FrameTransform(parent_frame_id=WORLD, child_frame_id=PLATFORM)
+    found.timestamp.FromNanoseconds(stamp)
+    for target, values in ((found.translation, position), (found.rotation, quaternion)):
+        for name, value in zip("xyzw", np.rint(values * FINE) / FINE, strict=False):
+            setattr(target, name, value)
+    return found
+
+
+class Scene:
+    """A robot as lines; what does not change is made once."""
+
+    def __init__(self, robot: Robot) -> None:
+        """Draw frame and platform."""
+        self._robot = robot
+        self._frame = _corners(robot.frame_anchors)
+        self._body = _corners(robot.platform_anchors)
+
+    def at(self, stamp: int, position: Array, quaternion: Array, tension: Array) -> SceneUpdate:
+        """All of it: who looks in later sees all too.
+
+        Args:
+            stamp: When [ns].
+            position: Of the platform's origin [m], shape (3,).
+            quaternion: Its rotation to the world, scalar last, shape (4,).
+            tension: At the frame ends [N], shape (m,): how much the cables sag.
+        """
+        from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
+
+        scene = SceneUpdate()
+        _lines(scene.entities.add(), stamp, "frame", WORLD, _STEEL, self._frame)
+        _lines(scene.entities.add(), stamp, "platform", PLATFORM, _BLUE, self._body)
+        ends = Pose.from_quaternion(position, quaternion).transform(self._robot.platform_anchors)
+        _lines(scene.entities.add(), stamp, "cables", WORLD, _CABLE, self._cables(ends, tension))
+        return scene
+
+    def _cables(self, ends: Array, tension: Array) -> Array:
+        """Points along the cables (m, POINTS, 3): parabolas, which no eye tells from what they are."""
+        robot, share = self._robot, np.linspace(0.0, 1.0, POINTS)[:, None]
+        start = robot.frame_anchors[:, None]
+        run = ends[:, None] - start
+        points = np.asarray(start + share * run)
+        chord = np.linalg.norm(run[:, 0], axis=1)
+        span = np.hypot(run[:, 0, 0], run[:, 0, 1])
+        weight = robot.cables.linear_density * robot.gravity  # N/m
+        deep = 0.5 * weight * span * chord / np.maximum(tension, weight * chord)  # m, times share (1 - share)
+        points[:, :, 2] -= np.where(np.isfinite(deep), deep, 0.0)[:, None] * (share * (1.0 - share))[:, 0]
+        return points
+
+
+def _lines(entity: SceneEntity, stamp: int, name: str, frame: str, color: tuple[float, ...], courses: Array) -> None:
+    """Polylines (k, P, 3)."""
+    entity.id, entity.frame_id = name, frame
+    entity.timestamp.FromNanoseconds(stamp)
+    for course in np.rint(courses * COARSE) / COARSE:
+        line: Any = entity.lines.add()
+        line.thickness, line.scale_invariant = _THICKNESS, True
+        line.color.r, line.color.g, line.color.b = color
+        line.color.a = line.pose.orientation.w = 1.0
+        for x, y, z in course.tolist():
+            line.points.add(x=x, y=y, z=z)
+
+
+def _corners(points: Array) -> Array:
+    """Lines from every point to every other that no third is nearer to than both are to one another (e, 2, 3)."""
+    distance = np.linalg.norm(points[:, None] - points[None], axis=2)
+    near = [
+        (i, j)
+        for i, j in combinations(range(len(points)), 2)
+        if (np.maximum(distance[i], distance[j]) >= distance[i, j] * (1.0 - 1e-9)).all()
+    ]
+    return points[np.array(near, dtype=np.intp).reshape(-1, 2)]

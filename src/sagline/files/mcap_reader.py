@@ -19,11 +19,10 @@ from sagline.control.events import Event
 from sagline.core.arguments import file_path
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.core.memory import check_memory
-from sagline.files.execution_layout import EVERY
-from sagline.files.kinds import kind_of
-from sagline.files.mcap_file import check_packages
-from sagline.files.mcap_layout import END, EVENT, FORMAT, HEAD, PLAN, RECORD, TRUTH, event_of
+from sagline.files.mcap_layout import END, EVENT, EVERY, FORMAT, HEAD, PLAN, RECORD, TRUTH, event_of
+from sagline.files.mcap_writer import check_packages
 from sagline.files.packed import unpack
+from sagline.files.reading import kind_of
 from sagline.files.robot_file import parse_robot
 from sagline.robot.robot import Robot
 

@@ -1,16 +1,113 @@
-"""Measurements of one cable in CSV: where its ends are, how long it is, how hard it pulls."""
+"""Measurements in CSV: lengths or counts of all cables, or ends, length and tension of one cable."""
 
 from __future__ import annotations
 
 import os
-from typing import NamedTuple
+from pathlib import Path
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from sagline.core.arguments import file_path
 from sagline.core.arrays import Array, locked
+from sagline.files.reading import read_text
 from sagline.files.table import TABLE_LIMIT, Table, line_error
-from sagline.files.text import read_text
+
+# of each kind of column the other one, and what to do where a file has that
+_OTHERS: Final = {"L": ("C", "these are counts: add --counts"), "C": ("L", "these are lengths: leave out --counts")}
+
+
+class Lengths(NamedTuple):
+    """N samples of the unstrained lengths of m cables.
+
+    Attributes:
+        time: [s], shape (N,); None where the file has none.
+        unstrained_length: [m], shape (N, m).
+    """
+
+    time: Array | None
+    unstrained_length: Array
+
+
+class Counts(NamedTuple):
+    """N samples of the counts of m encoders.
+
+    Attributes:
+        time: [s], shape (N,); None where the file has none.
+        counts: Shape (N, m).
+    """
+
+    time: Array | None
+    counts: Array
+
+
+def load_lengths(file: os.PathLike[str] | str, cable_count: int, size: float = np.inf) -> Lengths:
+    """Read a CSV file with a column for each cable, L0, L1, ..., and perhaps the time.
+
+    Units stand in brackets, `time [s],L0 [mm],L1 [mm]`; without, they are s and m.
+
+    Args:
+        file: The file.
+        cable_count: Number of cables m of the robot.
+        size: Largest extent of the robot [m]; lengths a hundred times longer must have another unit.
+
+    Returns:
+        Times, if there are any, and lengths in SI.
+
+    Raises:
+        FileError: If it cannot be read, a column is missing or unknown, a length is not positive or in
+            millimeters without saying so, or the times do not increase; the message names the line.
+    """
+    table, names = _read(file, "L", "m", cable_count)
+    for name in names:
+        table.refuse(table.columns[name] <= 0.0, name, table.columns[name], "m", "> 0 m")
+        table.refuse_millimeters(name, size, f"the robot's {size:.3g} m")
+    return Lengths(*_samples(table, names))
+
+
+def load_counts(file: os.PathLike[str] | str, cable_count: int) -> Counts:
+    """Read a CSV file with a column for each encoder, C0, C1, ..., and perhaps the time.
+
+    Args:
+        file: The file.
+        cable_count: Number of cables m of the robot.
+
+    Returns:
+        Times [s], if there are any, and counts.
+
+    Raises:
+        FileError: If it cannot be read, a column is missing or unknown, or the times do not increase; the message
+            names the line.
+    """
+    return Counts(*_samples(*_read(file, "C", "", cable_count)))
+
+
+def _read(file: os.PathLike[str] | str, letter: str, unit: str, cable_count: int) -> tuple[Table, list[str]]:
+    """A table with a column for each cable, and their names."""
+    path = Path(file)
+    names = _columns(letter, cable_count)
+    other, hint = _OTHERS[letter]
+    units, strangers = {"time": "s", **dict.fromkeys(names, unit)}, dict.fromkeys(_columns(other, cable_count), hint)
+    table = Table.read(path, read_text(path, TABLE_LIMIT), units, strangers)
+    if missing := [name for name in names if name not in table.columns]:
+        raise line_error(path, table.header, f"missing column {', '.join(missing)}; the robot has {cable_count} cables")
+    if not table.lines:
+        raise line_error(path, table.header, "no rows below the columns' names; allowed: at least one")
+    return table, names
+
+
+def _columns(letter: str, cable_count: int) -> list[str]:
+    return [f"{letter}{k}" for k in range(cable_count)]
+
+
+def _samples(table: Table, names: list[str]) -> tuple[Array | None, Array]:
+    """Times, and a row a sample."""
+    time = table.columns.get("time")
+    if time is not None:
+        late = np.diff(time, prepend=-np.inf) <= 0.0
+        table.refuse(late, "time", time, "s", "a time after that of the row before")
+    return time, locked(np.stack([table.columns[name] for name in names], axis=-1))
+
 
 UNITS = {"span": "m", "rise": "m", "length": "m", "tension": "N"}
 

@@ -1,10 +1,4 @@
-"""Courses of numbers in few bytes, and back to the last bit.
-
-What a machine does is smooth: each number is nearly foretold by those before it. A column is taken as whole numbers
-(decimals where all of it has few, else the bits of its floats, which are ordered as the numbers are), and differences
-of an order from 0 to 5 are kept. They are small, so that their upper bytes are nearly all zero; bytes of equal weight
-stand together, and zstandard makes nothing of zeros.
-"""
+"""Lossless compression of columns of numbers, and of data sets inside other files."""
 
 from __future__ import annotations
 
@@ -12,12 +6,15 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import prod
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sagline.core.memory import check_memory
+
+if TYPE_CHECKING:
+    from xarray import Dataset
 
 MOST_ORDER: Final = 5
 LEVEL: Final = 9  # of zstandard: above it takes much longer and saves little
@@ -199,3 +196,53 @@ def _values(column: _Column, planes: bytes) -> NDArray[Any]:
     if column.type != "float64":
         return whole.astype(column.type)
     return whole.view(np.float64) if column.decimals < 0 else _decimal(whole, column.decimals)
+
+
+def pack_dataset(data: Dataset) -> bytes:
+    """A data set in few bytes.
+
+    Args:
+        data: The data set, of numbers, flags and labels.
+
+    Returns:
+        The bytes; `unpack_dataset` reads them.
+    """
+    numbers: dict[str, Any] = {}
+    variables: dict[str, Any] = {}
+    for name, variable in data.variables.items():
+        values = np.asarray(variable.values)
+        labels = None if values.dtype.name in TYPES else values.tolist()
+        if labels is None:
+            numbers[str(name)] = values
+        variables[str(name)] = [variable.dims, variable.attrs, labels]
+    # a plain number is no array, and JSON knows neither those of numpy
+    head = json.dumps({"attributes": data.attrs, "variables": variables}, default=lambda value: value.tolist())
+    text = head.encode()
+    return b"".join((len(text).to_bytes(4, "little"), text, pack(numbers)))
+
+
+def unpack_dataset(data: bytes) -> Dataset:
+    """The data set that `pack_dataset` packed.
+
+    Args:
+        data: The bytes.
+
+    Raises:
+        ValueError: If the bytes are none of its.
+        InvalidValueError: If they hold more than fits into memory.
+    """
+    from xarray import Coordinates, Dataset
+
+    end = 4 + int.from_bytes(data[:4], "little")
+    try:
+        head = json.loads(data[4:end])
+        numbers = unpack(data[end:])
+        coordinates: dict[str, Any] = {}
+        variables: dict[str, Any] = {}
+        for name, (dimensions, attributes, labels) in head["variables"].items():
+            values = numbers[name] if labels is None else labels
+            part = coordinates if name in dimensions or name == "time" else variables
+            part[name] = (tuple(dimensions), values, attributes)
+        return Dataset(variables, Coordinates(coordinates, indexes={}), head["attributes"])
+    except (AttributeError, KeyError, TypeError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise ValueError(f"no packed data set ({error})") from None

@@ -1,27 +1,26 @@
-"""Plans in NetCDF: every number with its unit, and the robot, the model and the version inside."""
+"""Plans in NetCDF: every quantity with its unit, and the robot, the model and the version inside."""
 
 from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from sagline.cables.model import CableState
 from sagline.cables.models import MODELS
+from sagline.cables.status import CableStatus
 from sagline.core.arrays import locked
 from sagline.core.errors import FileError, InvalidValueError, SaglineWarning
-from sagline.files.dataset import labeled_dataset, numbered
 from sagline.files.format import Format
-from sagline.files.plan_checks import check_plan
-from sagline.files.plan_layout import JERK, MACHINE, MOTION, PROOF, QUANTITIES, TIME, WINDING
+from sagline.files.netcdf import choice_attributes, choice_of, labeled_dataset, numbered
 from sagline.files.robot_file import dump_robot, parse_robot
-from sagline.files.variables import Quantity
+from sagline.files.variables import STEP, Known, Quantity, check_labels, check_variable
 from sagline.kinematics.plan import Plan
+from sagline.kinematics.status import PoseStatus
 from sagline.motion.path import Path
 from sagline.robot.contact import Contact
 from sagline.robot.equilibrium import Equilibrium
@@ -32,11 +31,261 @@ from sagline.tension.methods import METHODS
 if TYPE_CHECKING:
     from xarray import Dataset
 
+QUANTITIES = (
+    Quantity(
+        "unstrained_length",
+        "unstrained_length",
+        ("cable",),
+        "m",
+        "unstrained length L to wind",
+        known=Known.SOLVED,
+        low=0.0,
+    ),
+    Quantity(
+        "chord_tension",
+        "chord_tension",
+        ("cable",),
+        "N",
+        "tension along the chord, T_x / cos phi",
+        known=Known.SOLVED,
+        low=0.0,
+    ),
+    Quantity(
+        "horizontal_tension",
+        "state.cables.horizontal_tension",
+        ("cable",),
+        "N",
+        "horizontal tension T_x",
+        known=Known.SOLVED,
+        low=0.0,
+    ),
+    Quantity(
+        "vertical_force",
+        "state.cables.vertical_force",
+        ("cable",),
+        "N",
+        "vertical force T_z on the cable at its platform end, up positive",
+        known=Known.SOLVED,
+    ),
+    Quantity(
+        "span", "state.cables.span", ("cable",), "m", "horizontal distance from frame end to platform end", low=0.0
+    ),
+    Quantity("rise", "state.cables.rise", ("cable",), "m", "height of the platform end above the frame end"),
+    Quantity("cable_status", "state.cables.status", ("cable",), "", "how each cable's calculation ended", CableStatus),
+    Quantity("pose_status", "status", (), "", "how each pose's calculation ended", PoseStatus),
+    Quantity(
+        "shortfall",
+        "shortfall",
+        (),
+        "N",
+        "smallest change of the force that would make the pose feasible",
+        known=Known.SOMEWHERE,
+        low=0.0,
+        infinite=True,
+    ),
+    Quantity(
+        "wrench_residual",
+        "wrench_residual",
+        ("residual_part",),
+        "N, N m",
+        "norms of the unbalanced force and moment in the free motions",
+        known=Known.SOLVED,
+        low=0.0,
+    ),
+    Quantity(
+        "blocking",
+        "blocking",
+        ("cable",),
+        "",
+        "whether the cable's limits stand against the needed wrench",
+        values=bool,
+    ),
+    Quantity(
+        "wrench",
+        "state.wrench",
+        ("wrench_part",),
+        "N, N m",
+        "external and inertial wrench about the center of mass in world axes, without gravity",
+    ),
+    Quantity("position", "state.pose.position", ("axis",), "m", "position of the platform origin in the world"),
+    Quantity(
+        "quaternion",
+        "state.pose.quaternion",
+        ("quaternion_part",),
+        "1",
+        "rotation from platform to world, scalar last",
+    ),
+)
+
+# of a plan whose cables have something behind them
+MACHINE = (
+    Quantity(
+        "free_length",
+        "free_length",
+        ("cable",),
+        "m",
+        "unstrained length of the hanging cable",
+        known=Known.SOLVED,
+        low=0.0,
+    ),
+    Quantity(
+        "free_chord_tension",
+        "state.cables.chord_tension",
+        ("cable",),
+        "N",
+        "tension along the chord of the hanging cable, from where it leaves its pulley",
+        known=Known.SOLVED,
+        low=0.0,
+    ),
+    Quantity(
+        "wrap_angle",
+        "wrap_angle",
+        ("cable",),
+        "rad",
+        "angle over which the cable lies on its pulley",
+        known=Known.SOLVED,
+        low=0.0,
+    ),
+    Quantity(
+        "wrapped_length",
+        "state.contact.wrapped_length",
+        ("cable",),
+        "m",
+        "unstrained length on the pulley",
+        known=Known.SOLVED,
+        low=0.0,
+    ),
+    Quantity(
+        "dead_length",
+        "state.contact.dead_length",
+        ("cable",),
+        "m",
+        "unstrained length between pulley and drum",
+        known=Known.SOLVED,
+        low=0.0,
+    ),
+    Quantity(
+        "chord_sine",
+        "state.contact.chord_sine",
+        ("cable",),
+        "1",
+        "sine of the slope of the chord that touches the pulley",
+        known=Known.SOLVED,
+    ),
+)
+
+# of one whose friction counts
+WINDING = Quantity(
+    "winding",
+    "state.contact.winding",
+    ("cable",),
+    "1",
+    "direction of friction: 1 winding in, -1 paying out, 0 standing",
+    low=-1.0,
+)
+
+# of a plan that has them: one of a file written before they were kept has none. A proof more is a line here.
+PROOF = (
+    Quantity(
+        "farkas",
+        "farkas",
+        ("wrench_part",),
+        "1, 1/m",
+        "vector y that proves a pose infeasible: along it the cables give less than is needed, at any tensions",
+        known=Known.SOMEWHERE,
+    ),
+    Quantity(
+        "needed",
+        "needed",
+        ("wrench_part",),
+        "N, N m",
+        "wrench J tau that the chord tensions must supply",
+        known=Known.SOMEWHERE,
+    ),
+    Quantity(
+        "bracket",
+        "bracket",
+        ("bracket_part",),
+        "N",
+        "what is proved and what suffices of the smallest change of the force that would make the pose feasible",
+        known=Known.SOMEWHERE,
+        low=0.0,
+        infinite=True,
+    ),
+    Quantity(
+        "relief",
+        "relief",
+        ("axis",),
+        "N",
+        "smallest force that, added to the wrench, makes the pose feasible",
+        known=Known.SOMEWHERE,
+    ),
+    Quantity(
+        "at_border",
+        "at_border",
+        (),
+        "",
+        "whether the tensions were searched for at the border of feasibility, where the way of sharing had no say",
+        values=bool,
+    ),
+)
+
+# of a path only
+TIME = Quantity("time", "path.time", (), "s", "time from the start of the path")
+MOTION = (
+    Quantity("twist", "path.twist", ("twist_part",), "m/s, rad/s", "velocity of the platform origin, angular velocity"),
+    Quantity(
+        "twist_rate",
+        "path.twist_rate",
+        ("twist_part",),
+        "m/s^2, rad/s^2",
+        "acceleration of the platform origin, angular acceleration",
+    ),
+)
+# of a path whose jerk is known
+JERK = Quantity("jerk", "path.jerk", ("twist_part",), "m/s^3, rad/s^3", "rate of twist_rate")
+
+
+def present(data: Dataset) -> tuple[Quantity, ...]:
+    """The quantities that a data set has, or should have.
+
+    Args:
+        data: The data set.
+
+    Returns:
+        All that a plan has, the proofs that are there, and those of a path if there is one.
+    """
+    motion = (TIME, *MOTION) if TIME.name in data.variables else ()
+    machine = MACHINE if MACHINE[0].name in data.variables else ()
+    beside = (some for some in (WINDING, *PROOF, JERK) if some.name in data.variables)
+    return (*QUANTITIES, *machine, *motion, *beside)
+
+
+def check_plan(data: Dataset, cables: int) -> None:
+    """Refuse a data set that is no plan, whatever its file looked like.
+
+    Args:
+        data: The data set.
+        cables: How many cables the robot has.
+
+    Raises:
+        KeyError: If a variable is missing.
+        InvalidValueError: If one is not what the layout says; the message names its first wrong value.
+    """
+    status = data.variables["pose_status"]
+    rows = tuple(str(name) for name in status.dims)
+    if rows not in ((), ("pose",)):
+        raise InvalidValueError("pose_status: dimensions", rows, "none, or pose", STEP)
+    sizes = {"cable": cables, "pose": status.size}
+    check_labels(data)
+    solved = np.asarray(status.values == PoseStatus.SOLVED)
+    for quantity in sorted(present(data), key=lambda quantity: quantity.codes is None):  # what a status means, first
+        check_variable(quantity, data.variables[quantity.name], rows, sizes, solved)
+
+
 RESTS = "rests"  # of a path whose rests are known
 FREE = {"unstrained_length": "free_length", "chord_tension": "free_chord_tension"}  # of cables over pulleys
 STATE_ARRAYS = ("span", "rise", "unstrained_length", "horizontal_tension", "vertical_force", "chord_tension")
-
-Choice = TypeVar("Choice")
 
 
 def save_plan(plan: Plan, file: os.PathLike[str] | str) -> None:
@@ -128,62 +377,6 @@ def _attributes(plan: Plan) -> dict[str, Any]:
         **choice_attributes("tension", plan.tension, METHODS),
         "robot": dump_robot(plan.state.one_robot),
     }
-
-
-def choice_attributes(key: str, choice: Any, choices: Mapping[str, type[Any]]) -> dict[str, Any]:
-    """A model, method or the like as attributes: its name, and each of its options that is set.
-
-    Args:
-        key: What the attributes begin with.
-        choice: What was chosen.
-        choices: What can be read back, by name.
-
-    Returns:
-        Attributes.
-
-    Raises:
-        InvalidValueError: If it is none of these.
-    """
-    if choices.get(type(choice).__name__) is not type(choice):
-        raise InvalidValueError(key, type(choice).__name__, ", ".join(choices), "Only these can be read back.")
-    options = {f"{key}_{field.name}": getattr(choice, field.name) for field in fields(choice)}
-    return {key: type(choice).__name__, **{name: value for name, value in options.items() if value is not None}}
-
-
-def choice_of(
-    path: FilePath, attributes: Mapping[str, Any], key: str, choices: Mapping[str, type[Choice]], **known: Any
-) -> Choice:
-    """What `choice_attributes` wrote.
-
-    Args:
-        path: The file, for messages.
-        attributes: Of the file.
-        key: What the attributes begin with.
-        choices: What it may be, by name.
-        **known: Options that are elsewhere in the file.
-
-    Returns:
-        What was chosen.
-
-    Raises:
-        FileError: If it is none of these, or an option is of another kind.
-    """
-    name = attributes[key]
-    if name not in choices:
-        refused = InvalidValueError(key, repr(name), ", ".join(choices), "Read it with a newer sagline.")
-        raise FileError.of(path, refused)
-    choice: Any = choices[name]
-    given = {field.name: attributes.get(f"{key}_{field.name}") for field in fields(choice)}
-    try:
-        options = {option: _plain(value) for option, value in given.items() if value is not None}
-        found: Choice = choice(**{**options, **known})
-    except TypeError as error:  # a text where a number belongs
-        raise FileError(path, f"{key}: {error}", "Write it again; it was edited.") from None
-    return found
-
-
-def _plain(value: Any) -> Any:
-    return value.item() if isinstance(value, np.generic) else value
 
 
 def plan_of(path: FilePath, data: Dataset, where: str = "robot") -> Plan:

@@ -1,4 +1,4 @@
-"""Robot files: YAML with units in, YAML in SI out."""
+"""Robot files: YAML with units in, YAML in SI out, and the scene around the robot."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ from typing import Any
 from sagline.core.arguments import brief, file_path, instance
 from sagline.core.arrays import Array
 from sagline.core.errors import FileError, InvalidValueError, nearest
-from sagline.files.robot_schema import SWIVEL_AXES, RobotEntry
-from sagline.files.schema import validated
-from sagline.files.text import exists, read_text
-from sagline.files.yaml_text import YAML_LIMIT, dump_mapping, parse_mapping
+from sagline.files.mesh_file import load_mesh, meters
+from sagline.files.reading import exists, read_text
+from sagline.files.robot_schema import SWIVEL_AXES, Place, RobotEntry
+from sagline.files.yaml_text import YAML_LIMIT, dump_mapping, parse_mapping, validated
+from sagline.interference.pairs import Obstacle
 from sagline.robot.catalogue import preset_text, robot_names
 from sagline.robot.robot import Robot
 from sagline.robot.winch import Winch
@@ -184,3 +185,48 @@ def _is_name(text: str, path: Path) -> bool:
     if text in robot_names():
         return True
     return path.suffix not in {".yaml", ".yml"} and path.name == text and not exists(path)
+
+
+def load_scene(file: str | os.PathLike[str]) -> tuple[Obstacle, ...]:
+    """What stands around a robot, from the `scene` of its file.
+
+    A scene is a list; positions are in the world, a quantity is a number in SI or a text with its unit:
+
+        scene:
+          - {name: table, box: [1.2, 0.8, 70 cm], center: [2, 0, 0.35], turned: 30 deg}
+          - {name: pole, capsule: [[1, 0, 0], [1, 0, 3]], radius: 5 cm}
+          - {name: lamp, sphere: [0, 0, 2.8], radius: 20 cm}
+          - {name: hall, mesh: hall.stl, unit: mm, position: [0, 0, -1], turned: 90 deg}
+
+    `turned` is about z, `mesh` a file beside the robot's, as by `load_mesh`. The scene is the file's: a `Robot` has
+    none, and `dump_robot` writes none.
+
+    Args:
+        file: The robot file.
+
+    Returns:
+        Boxes, capsules, spheres and meshes in the order of the file; none if it has no scene.
+
+    Raises:
+        FileError: If the file or a mesh cannot be read, or says something wrong; the message names the key.
+
+    Examples:
+        >>> import sagline as sl
+        >>> around = sl.load_scene("my_robot.yaml")  # doctest: +SKIP
+        >>> sl.clearance(plan.state, around).distance  # doctest: +SKIP
+    """
+    path = file_path(file, "file")
+    entry = robot_entry(read_text(path, YAML_LIMIT), path)
+    return tuple(_obstacle(place, f"scene[{k}]", path) for k, place in enumerate(entry.scene))
+
+
+def _obstacle(place: Place, item: str, path: Path) -> Obstacle:
+    try:
+        kind = place.kind(item)
+        if kind != "mesh":
+            return place.solid(item, kind)
+        pose = place.pose(item)
+        meters(place.unit, f"{item}.unit")
+    except InvalidValueError as error:
+        raise FileError.of(path, error) from None
+    return load_mesh(place.mesh_file(path), place.unit, place.name).placed(pose)

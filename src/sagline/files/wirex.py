@@ -14,8 +14,15 @@ from sagline.cables.cable import Cable
 from sagline.core.arguments import file_path, optional
 from sagline.core.arrays import Array
 from sagline.core.errors import FileError, InvalidValueError
-from sagline.files.imported import STEEL_ROPE_DENSITY, STEEL_ROPE_STIFFNESS, Imported, imported
-from sagline.files.xml_text import number, only_child, read_xml
+from sagline.files.robot_xml import (
+    STEEL_ROPE_DENSITY,
+    STEEL_ROPE_STIFFNESS,
+    Imported,
+    imported,
+    number,
+    only_child,
+    read_xml,
+)
 from sagline.robot.inertia import box_inertia
 from sagline.robot.pattern import MOTION_PATTERNS, PLANAR, ROTATING, MotionPattern
 from sagline.robot.robot import Robot

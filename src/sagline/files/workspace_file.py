@@ -1,28 +1,38 @@
-"""Workspaces in NetCDF: surface, grid, what limits them where, loads and criteria, and the robot inside."""
+"""Workspaces in NetCDF: surface, grid, limiting criteria, loads, obstacles, and the robot inside."""
 
 from __future__ import annotations
 
 import json
 import os
+from collections.abc import Sequence
+from dataclasses import fields
+from pathlib import Path
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from sagline.cables.models import MODELS
-from sagline.core.arrays import locked
-from sagline.files.criteria_attributes import criteria_attributes, criteria_of
-from sagline.files.dataset import labeled_dataset
+from sagline.core.arguments import choice
+from sagline.core.arrays import locked, number
 from sagline.files.format import Format
-from sagline.files.plan_file import choice_attributes, choice_of
+from sagline.files.netcdf import choice_attributes, choice_of, labeled_dataset
 from sagline.files.robot_file import dump_robot, parse_robot
-from sagline.files.variables import Quantity
-from sagline.files.workspace_checks import check_workspace
-from sagline.files.workspace_layout import QUANTITIES, TYPES
+from sagline.files.variables import Quantity, check_indices, check_labels, check_variable
+from sagline.interference.mesh import Mesh
+from sagline.interference.obstacles import Box, Capsule, Sphere
 from sagline.robot.pose import Pose
 from sagline.robot.pose_box import PoseBox
 from sagline.tension.methods import METHODS
 from sagline.workspaces.components import Components
+from sagline.workspaces.criteria.clearance import Clearance
+from sagline.workspaces.criteria.criterion import Criterion
+from sagline.workspaces.criteria.frame import InFrame
+from sagline.workspaces.criteria.frequency import LeastFrequency
+from sagline.workspaces.criteria.margin import LeastMargin
+from sagline.workspaces.criteria.position_error import PositionError
+from sagline.workspaces.criteria.sag import MaximumSag
+from sagline.workspaces.criteria.stiffness import LeastStiffness
 from sagline.workspaces.nearest import Nearest
 from sagline.workspaces.orientations import Orientations
 from sagline.workspaces.space import Workspace
@@ -31,6 +41,155 @@ from sagline.workspaces.wrench_sets import WrenchSet
 
 if TYPE_CHECKING:
     from xarray import Dataset
+
+CRITERIA: Final[dict[str, type[Criterion]]] = {
+    kind.__name__: kind
+    for kind in (LeastMargin, MaximumSag, PositionError, LeastStiffness, LeastFrequency, Clearance, InFrame)
+}
+NODES: Final = ("x", "y", "z")  # of the grid
+FINE: Final = ("fine_x", "fine_y", "fine_z")  # of the grid that tells components apart
+
+QUANTITIES: Final = (
+    *(Quantity(name, name, (name,), "m", f"{name} of the nodes of the grid") for name in NODES),
+    Quantity("level", "level", NODES, "1", "least value of the criteria over their scales, >= 0 inside", infinite=True),
+    Quantity("vertex_position", "surface.vertices", ("vertex", "axis"), "m", "vertices of the surface"),
+    Quantity("face", "surface.faces", ("side", "corner"), "", "vertices of each triangle, outward", values=int),
+    Quantity("limiting", "limiting", ("vertex",), "", "criterion that decides there, -1 for the box", values=int),
+    Quantity("limiting_cable", "limiting_cable", ("vertex",), "", "cable that decides, -1 for none", values=int),
+    Quantity("margin", "margin", ("vertex",), "N", "margin of the loads there", infinite=True),
+    Quantity("component_volume", "components.volume", ("component",), "", "of each component, in units of volume"),
+    Quantity("vertex_component", "components.vertices", ("vertex",), "", "component of each vertex", values=int),
+    *(Quantity(fine, f"components.{fine[-1]}", (fine,), "m", f"{fine[-1]} of finer nodes") for fine in FINE),
+    Quantity("component_nodes", "components.nodes", FINE, "", "component of each node, -1 outside", values=int),
+    Quantity("rotation", "orientations.quaternion", ("turn", "quaternion_part"), "1", "rotations of the platform"),
+    Quantity("wrench_center", "wrenches.center", ("wrench_part",), "N, N m", "a wrench of the set"),
+    Quantity("wrench_segment", "wrenches.segments", ("segment", "wrench_part"), "N, N m", "half of each segment"),
+    Quantity("wrench_ellipsoid", "wrenches.ellipsoids", ("ellipsoid", "wrench_part", "column"), "N, N m", "semi-axes"),
+    Quantity("corner_wrench", "wrenches.corners", ("polytope_corner", "wrench_part"), "N, N m", "corners of polytopes"),
+    Quantity("polytope_size", "wrenches.sizes", ("polytope",), "", "corners of each polytope", values=int),
+    Quantity(
+        "largest_acceleration",
+        "wrenches.accelerations",
+        ("acceleration_part",),
+        "m/s2, rad/s2",
+        "largest accelerations",
+    ),
+)
+TYPES: Final[dict[str, Any]] = {"limiting": np.int8, "vertex_component": np.int32, "component_nodes": np.int32}
+
+
+UNITS = ("m³", "m²")
+
+
+def check_workspace(data: Dataset, cables: int) -> None:
+    """Refuse a data set that is no workspace, whatever its file looked like.
+
+    Args:
+        data: The data set.
+        cables: How many its robot has.
+
+    Raises:
+        KeyError: If a variable or attribute is missing.
+        InvalidValueError: If one is not what the layout says; the message names its first wrong value.
+    """
+    choice(data.attrs["volume_units"], "volume_units", UNITS)
+    choice(data.attrs["need"], "need", ("all", "any"))
+    for name in ("volume", "volume_error", "box_tilt"):
+        number(data.attrs[name], name, "", low=0.0)
+    check_labels(data)
+    sizes = {str(name): size for name, size in data.sizes.items()} | {"corner": 3, "column": 6, "acceleration_part": 2}
+    for quantity in QUANTITIES:
+        check_variable(quantity, data.variables[quantity.name], (), sizes, np.array(True))
+    criteria = sum(f"criterion_{k}" in data.attrs for k in range(len(data.attrs)))
+    for name, low, high in (
+        ("face", 0, sizes["vertex"]),
+        ("limiting", -1, criteria),
+        ("limiting_cable", -1, cables),
+        ("vertex_component", 0, sizes["component"]),
+        ("component_nodes", -1, sizes["component"]),
+    ):
+        check_indices(name, data.variables[name].values, low, high)
+
+
+KINDS: Final[dict[str, type[Any]]] = {kind.__name__: kind for kind in (Box, Capsule, Sphere, Mesh)}
+
+
+def criteria_attributes(criteria: Sequence[Criterion]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Criteria as attributes, and the obstacles among them as variables.
+
+    Args:
+        criteria: The criteria.
+
+    Returns:
+        Attributes and variables.
+
+    Raises:
+        InvalidValueError: If one of them, or of its obstacles, is none of sagline's.
+    """
+    attributes: dict[str, Any] = {}
+    variables: dict[str, Any] = {}
+    for k, one in enumerate(criteria):
+        key = f"criterion_{k}"
+        attributes |= choice_attributes(key, one, CRITERIA)
+        if isinstance(one, PositionError):
+            del attributes[f"{key}_model"]
+            attributes |= choice_attributes(f"{key}_of_model", one.model, MODELS)
+        if isinstance(one, Clearance):
+            obstacles: Any = one.obstacles  # a tuple, once they are checked
+            attributes[f"{key}_obstacles"] = len(obstacles)
+            for j, obstacle in enumerate(obstacles):
+                own, parts = _obstacle(f"{key}_obstacle_{j}", obstacle)
+                attributes |= own
+                variables |= parts
+    return attributes, variables
+
+
+def criteria_of(path: Path, data: Dataset) -> tuple[Criterion, ...]:
+    """What `criteria_attributes` wrote.
+
+    Args:
+        path: The file, for messages.
+        data: The data set.
+
+    Returns:
+        The criteria, in their order.
+
+    Raises:
+        FileError: If one is of a kind that this sagline does not know.
+    """
+    found: list[Criterion] = []
+    while (key := f"criterion_{len(found)}") in data.attrs:
+        known: dict[str, Any] = {}
+        if data.attrs[key] == PositionError.__name__:
+            known["model"] = choice_of(path, data.attrs, f"{key}_of_model", MODELS)
+        if data.attrs[key] == Clearance.__name__:
+            count = int(data.attrs[f"{key}_obstacles"])
+            known["obstacles"] = tuple(_obstacle_of(data, f"{key}_obstacle_{j}") for j in range(count))
+        found.append(choice_of(path, data.attrs, key, CRITERIA, **known))
+    return tuple(found)
+
+
+def _obstacle(key: str, obstacle: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+    """One of them: texts and numbers as attributes, arrays as variables with dimensions of their own."""
+    attributes: dict[str, Any] = {key: type(obstacle).__name__}
+    variables: dict[str, Any] = {}
+    for field in fields(obstacle):
+        value = getattr(obstacle, field.name)
+        if isinstance(value, np.ndarray):
+            name = f"{key}_{field.name}"
+            variables[name] = (tuple(f"{name}_{axis}" for axis in range(value.ndim)), value)
+        else:
+            attributes[f"{key}_{field.name}"] = value
+    return attributes, variables
+
+
+def _obstacle_of(data: Dataset, key: str) -> Any:
+    kind = KINDS[data.attrs[key]]
+    values = {}
+    for field in fields(kind):
+        name = f"{key}_{field.name}"
+        values[field.name] = data[name].values if name in data.variables else data.attrs[name]
+    return kind(**values)
 
 
 def load_workspace(file: os.PathLike[str] | str) -> Workspace:

@@ -12,9 +12,8 @@ from sagline.cables.cable import Cable
 from sagline.core.arguments import choice, file_path
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.quantity import in_si
-from sagline.files.schema import Entry, validated
-from sagline.files.text import read_text
-from sagline.files.yaml_text import YAML_LIMIT, parse_mapping
+from sagline.files.reading import read_text
+from sagline.files.yaml_text import YAML_LIMIT, Entry, parse_mapping, validated
 from sagline.optimization.free import Free
 from sagline.optimization.free_anchors import FreeAnchors
 from sagline.optimization.free_cable import CableChoice, FreeCable

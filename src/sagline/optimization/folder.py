@@ -25,11 +25,9 @@ import numpy as np
 from sagline.core.arguments import file_path
 from sagline.core.arrays import Array
 from sagline.core.errors import FileError
-from sagline.files.json_text import json_text
 from sagline.files.quantity import plain_number
-from sagline.files.staging import is_taken
-from sagline.files.text import exists, read_text
-from sagline.files.whole import check_file, check_files, made_folder, write_text
+from sagline.files.reading import exists, read_text
+from sagline.files.writing import check_file, check_files, is_taken, json_text, made_folder, write_text
 from sagline.optimization.request import Request
 
 REQUEST, EVALUATIONS = "design.json", "evaluations.csv"

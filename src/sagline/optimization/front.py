@@ -13,9 +13,8 @@ import numpy as np
 from sagline.core.arguments import file_path
 from sagline.core.arrays import Array, Flags, Indices
 from sagline.core.results import Result
-from sagline.files.names import file_stem
 from sagline.files.robot_file import dump_robot
-from sagline.files.whole import made_folder, written_together
+from sagline.files.writing import file_stem, made_folder, written_together
 from sagline.optimization.free import Part
 from sagline.optimization.goals import Goal
 from sagline.robot.robot import Robot

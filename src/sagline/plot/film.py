@@ -16,7 +16,7 @@ from sagline.core.arguments import file_path, instance, whole_number
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.dynamics.mode_list import WITH_MASS, ListedMode, listed_modes
 from sagline.dynamics.vibration import Vibration
-from sagline.files.whole import written_whole
+from sagline.files.writing import written_whole
 from sagline.plot.sheet import BLUE, GAP_COLOR, LABEL, TICK, VERMILLION, sheet
 from sagline.viewer.swing import PERIOD, Swing
 

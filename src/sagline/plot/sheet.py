@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from sagline.core.arguments import brief, file_path, optional
 from sagline.core.errors import FileError, InvalidValueError
-from sagline.files.whole import written_whole
+from sagline.files.writing import written_whole
 from sagline.plot.fonts import with_fonts
 from sagline.plot.names import break_labels
 from sagline.plot.style import PLAIN, Using, current

@@ -8,8 +8,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from sagline.files.json_text import json_text, plain
-from sagline.files.whole import check_files, made_folder, written_together
+from sagline.files.writing import check_files, json_text, made_folder, plain, written_together
 from sagline.report.blocks import Chapter
 from sagline.report.page import page
 from sagline.report.parts import selection

@@ -11,8 +11,7 @@ from sagline.article.experiment import SPEED, STOP, Experiment
 from sagline.control.events import EventKind
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
-from sagline.files.json_text import json_text, plain
-from sagline.files.whole import made_folder, written_together
+from sagline.files.writing import json_text, made_folder, plain, written_together
 from sagline.plot.sheet import BLUE, COLORS, TICK, VERMILLION
 from sagline.report.blocks import Chapter, Finding, Panel, Table, Verdict
 from sagline.report.drawing import Drawings, axes, legend, thinned

@@ -15,13 +15,12 @@ from sagline.core.arguments import brief, file_path, whole_number
 from sagline.core.arrays import Array, number
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.core.memory import check_memory
+from sagline.files.netcdf import Choice
 from sagline.files.path_file import load_path
-from sagline.files.plan_file import Choice
 from sagline.files.quantity import in_si
+from sagline.files.reading import read_text
 from sagline.files.robot_file import load_robot
-from sagline.files.schema import Entry, validated
-from sagline.files.text import read_text
-from sagline.files.yaml_text import YAML_LIMIT, parse_mapping
+from sagline.files.yaml_text import YAML_LIMIT, Entry, parse_mapping, validated
 from sagline.robot.catalogue import robot_names
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot

@@ -22,10 +22,9 @@ from numpy.typing import NDArray
 from sagline.cables.models import MODELS
 from sagline.core.arrays import locked
 from sagline.core.errors import FileError, InvalidValueError
-from sagline.files.content import Content
-from sagline.files.plan_file import choice_attributes, choice_of
+from sagline.files.netcdf import Content, choice_attributes, choice_of
 from sagline.files.robot_file import dump_robot, parse_robot
-from sagline.files.staging import staging
+from sagline.files.writing import staging
 from sagline.robot.pose import Pose
 from sagline.sweep.quantities import Variable, variables_of
 from sagline.sweep.request import Request

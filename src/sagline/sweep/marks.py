@@ -9,7 +9,7 @@ from typing import IO, Final, NamedTuple
 import numpy as np
 
 from sagline.core.errors import FileError
-from sagline.files.staging import is_taken
+from sagline.files.writing import is_taken
 from sagline.sweep.folder import STEP, SweepFolder
 from sagline.sweep.work import Counts
 

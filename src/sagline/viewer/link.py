@@ -13,9 +13,9 @@ import viser
 
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
+from sagline.files.pose_text import STRONGEST, numbers, pose_of
 from sagline.files.quantity import plain_number
 from sagline.files.robot_file import dump_robot
-from sagline.files.typed import STRONGEST, numbers, pose_of
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.viewer.by_hand import ByHand

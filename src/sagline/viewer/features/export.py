@@ -14,7 +14,7 @@ import viser
 
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError, SaglineError
-from sagline.files.names import file_stem
+from sagline.files.writing import file_stem
 from sagline.viewer.channel import Told
 from sagline.viewer.feature import Feature, View
 from sagline.viewer.page import Page

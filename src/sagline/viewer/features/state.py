@@ -9,7 +9,7 @@ from typing import Any, Final
 import viser
 
 from sagline.core.errors import InvalidValueError, SaglineError
-from sagline.files.typed import pose_of
+from sagline.files.pose_text import pose_of
 from sagline.robot.pose import Pose
 from sagline.viewer.feature import Feature, View
 from sagline.viewer.link import LinkedControls, Linking

@@ -4,7 +4,7 @@ import pytest
 from syrupy.assertion import SnapshotAssertion
 
 from sagline import FileError, InvalidValueError
-from sagline.files.xml_text import number, numbers, read_xml
+from sagline.files.robot_xml import number, numbers, read_xml
 from tests.files.wording import wording
 from tests.refusal import refused
 

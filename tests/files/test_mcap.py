@@ -19,10 +19,10 @@ from mcap_protobuf.decoder import DecoderFactory
 import sagline as sl
 from sagline.control import EventKind, ExecutionStatus, Recorder
 from sagline.control.execution import Execution, Samples
-from sagline.files import mcap_log
-from sagline.files.execution_layout import DECIMALS, EVERY, columns_of
-from sagline.files.mcap_file import PACKAGES
+from sagline.files import mcap_writer
+from sagline.files.mcap_layout import DECIMALS, EVERY, columns_of
 from sagline.files.mcap_reader import LogReader, read_log
+from sagline.files.mcap_writer import PACKAGES
 from sagline.files.plan_file import plan_dataset
 from tests.effort import AGAIN
 from tests.files.executions import cycles_of, events_of, execution, plan_of
@@ -48,7 +48,7 @@ def assert_same(one: Execution, other: Execution) -> None:
 
 
 def recorded(file: Path, count: int = 201, epoch: int = 0) -> None:
-    with mcap_log.Recorder(file, ROBOT, epoch=epoch) as recorder:
+    with mcap_writer.Recorder(file, ROBOT, epoch=epoch) as recorder:
         recorder.begins(plan_of())
         for cycle in cycles_of(plan_of(), count):
             recorder.cycle(cycle)
@@ -89,7 +89,7 @@ def test_a_recorder_keeps_the_digits_that_are_told(tmp_path: Path) -> None:
 
 def test_a_session_of_several_plans_is_read_whole_or_plan_by_plan(tmp_path: Path) -> None:
     plans = (plan_of(), plan_of(1.0))
-    with mcap_log.Recorder(tmp_path / "run.mcap", ROBOT, epoch=0) as recorder:
+    with mcap_writer.Recorder(tmp_path / "run.mcap", ROBOT, epoch=0) as recorder:
         for k, plan in enumerate(plans):
             recorder.begins(plan)
             for cycle in cycles_of(plan):
@@ -141,7 +141,7 @@ def test_other_tools_read_cycles_events_transforms_and_scenes(tmp_path: Path) ->
 @extended
 def test_a_chunk_is_closed_every_second_and_is_in_the_file_at_once(tmp_path: Path) -> None:
     reader = LogReader(tmp_path / "run.mcap")
-    with mcap_log.Recorder(tmp_path / "run.mcap", ROBOT, epoch=0) as recorder:
+    with mcap_writer.Recorder(tmp_path / "run.mcap", ROBOT, epoch=0) as recorder:
         handed = time.monotonic()
         for cycle in cycles_of(plan_of(), 7):
             recorder.cycle(cycle)
@@ -160,7 +160,7 @@ def test_a_chunk_is_closed_every_second_and_is_in_the_file_at_once(tmp_path: Pat
 VICTIM = """
 import os, sys, time
 sys.path.insert(0, {root!r})
-from sagline.files.mcap_log import Recorder
+from sagline.files.mcap_writer import Recorder
 from tests.files.executions import cycles_of, events_of, plan_of
 plan = plan_of()
 recorder = Recorder({file!r}, plan.state.one_robot)
@@ -230,7 +230,7 @@ def stopped(recorder: Recorder) -> str:
 
 def test_a_full_disk_stops_recording_and_nothing_else(tmp_path: Path) -> None:
     disk = Disk(20_000)
-    recorder = mcap_log.Recorder(tmp_path / "run.mcap", ROBOT, epoch=0, stream=disk)
+    recorder = mcap_writer.Recorder(tmp_path / "run.mcap", ROBOT, epoch=0, stream=disk)
     for cycle in cycles_of(plan_of()):
         recorder.cycle(cycle)
         if recorder.stopped:
@@ -250,15 +250,15 @@ def test_a_full_disk_stops_recording_and_nothing_else(tmp_path: Path) -> None:
 
 def test_a_device_that_is_full_is_told_before_anything_moves(tmp_path: Path) -> None:
     with refused(kind=sl.FileError, file=tmp_path / "run.mcap") as caught:
-        mcap_log.Recorder(tmp_path / "run.mcap", ROBOT, stream=Disk(10))
+        mcap_writer.Recorder(tmp_path / "run.mcap", ROBOT, stream=Disk(10))
     assert "No space" in caught.value.reason
     with refused(kind=sl.FileError, file="/dev/full") as caught:
-        mcap_log.Recorder("/dev/full", ROBOT)
+        mcap_writer.Recorder("/dev/full", ROBOT)
     assert "device" in caught.value.reason
 
 
 def test_a_full_queue_stops_recording_without_waiting(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mcap_log, "ROOM", 20)
+    monkeypatch.setattr(mcap_writer, "ROOM", 20)
     gate = threading.Event()
 
     class Slow(Disk):
@@ -268,7 +268,7 @@ def test_a_full_queue_stops_recording_without_waiting(tmp_path: Path, monkeypatc
             return super().write(data)
 
     disk = Slow(1 << 24)
-    recorder = mcap_log.Recorder(tmp_path / "run.mcap", ROBOT, epoch=0, stream=disk)
+    recorder = mcap_writer.Recorder(tmp_path / "run.mcap", ROBOT, epoch=0, stream=disk)
     recorder.begins(plan_of())
     longest = 0.0
     for cycle in cycles_of(plan_of(), 200):
@@ -288,7 +288,7 @@ def test_a_full_queue_stops_recording_without_waiting(tmp_path: Path, monkeypatc
 def test_the_truth_of_a_twin_is_kept_to_the_last_bit(tmp_path: Path) -> None:
     rng = np.random.default_rng(3)
     rows = [(0.01 * k, rng.normal(size=3), rng.normal(size=4)) for k in range(150)]
-    with mcap_log.Recorder(tmp_path / "twin.mcap", ROBOT, epoch=5_000_000_000) as recorder:
+    with mcap_writer.Recorder(tmp_path / "twin.mcap", ROBOT, epoch=5_000_000_000) as recorder:
         for row in rows:
             recorder.truth(*row)
     log = read_log(tmp_path / "twin.mcap")
@@ -300,9 +300,9 @@ def test_the_truth_of_a_twin_is_kept_to_the_last_bit(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("package", PACKAGES)
 def test_a_missing_package_is_one_sentence(tmp_path: Path, package: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sagline.files.mcap_file.find_spec", lambda name: None if name == package else object())
+    monkeypatch.setattr("sagline.files.mcap_writer.find_spec", lambda name: None if name == package else object())
     (tmp_path / "run.mcap").write_bytes(b"before")
-    for use in (execution().save, lambda file: mcap_log.Recorder(file, ROBOT), sl.load_execution):
+    for use in (execution().save, lambda file: mcap_writer.Recorder(file, ROBOT), sl.load_execution):
         with refused(kind=sl.FileError, file=f"package {package}") as caught:
             use(tmp_path / "run.mcap")
         assert '"sagline[log]"' in caught.value.next_step
@@ -318,7 +318,7 @@ def test_fourteen_minutes_with_the_plan_inside_are_twenty_megabytes(tmp_path: Pa
     durations = [73.0, *10 * [3.0, 73.0]]
     plan = sl.inverse(ROBOT, sl.quintic_path(stops, durations=durations))
     assert len(plan.status) == 83_301
-    with mcap_log.Recorder(tmp_path / "run.mcap", ROBOT, epoch=0) as recorder:
+    with mcap_writer.Recorder(tmp_path / "run.mcap", ROBOT, epoch=0) as recorder:
         recorder.begins(plan)
         for cycle in cycles_of(plan, 84_000):
             while recorder._queue.qsize() > 3000:
@@ -352,7 +352,7 @@ def test_times_of_day_are_those_of_cycles(tmp_path: Path) -> None:
     """An event before the first of them has the time 0 of a link that was made long before."""
     early = events_of(0.0)[0]
     (first,) = cycles_of(plan_of(), 1)
-    with mcap_log.Recorder(tmp_path / "run.mcap", ROBOT) as log:
+    with mcap_writer.Recorder(tmp_path / "run.mcap", ROBOT) as log:
         log.event(early)
         time.sleep(0.3)
         began = time.time_ns()

@@ -7,13 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from sagline.files.staging import LOCK, staging
-from sagline.files.whole import write_text
+from sagline.files.writing import LOCK, staging, write_text
 
 WRITER = """
 import sys, time
 from pathlib import Path
-from sagline.files.whole import written_whole
+from sagline.files.writing import written_whole
 with written_whole(Path(sys.argv[1])) as partial:
     partial.write_text("half")
     print("writing", flush=True)

@@ -6,7 +6,7 @@ import pytest
 from syrupy.assertion import SnapshotAssertion
 
 from sagline import FileError
-from sagline.files.text import exists, read_bytes, read_text
+from sagline.files.reading import exists, read_bytes, read_text
 from tests.files.wording import wording
 from tests.refusal import refused
 

@@ -1,24 +1,152 @@
-"""Files that are written whole or not at all, and never over what is no file.
-
-A name that is written to is free or a regular file's. Folders, devices, pipes and sockets are refused, and so are
-links: what a link leads to is never replaced by way of its name, and the link is not replaced either. Links among the
-folders above are followed. A file that is replaced keeps its permissions; other names of the same file (hard links)
-keep what was there before.
-"""
+"""Atomic file writing."""
 
 from __future__ import annotations
 
+import json
+import math
 import os
+import re
 import shutil
 import stat
+import sys
+import tempfile
+import unicodedata
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
-from pathlib import Path
+from hashlib import sha256
+from pathlib import Path, PurePath
+from typing import Any
 
-from sagline.core.errors import FileError
-from sagline.files.kinds import kind_of
-from sagline.files.staging import SUFFIX, staging
+import numpy as np
+
+from sagline.core.errors import FileError, is_seen
+from sagline.files.reading import kind_of
+
+LONGEST = 120  # bytes: with the words and the suffix that follow it stays below the 255 of common file systems
+UNNAMED = "robot"
+_DEVICES = re.compile(r"(con|prn|aux|nul|com[\d¹²³]|lpt[\d¹²³])(\..*)?", re.IGNORECASE)  # in every folder of Windows
+
+
+def file_stem(name: str, *words: str) -> str:
+    """A name for files of a robot, without a suffix: never a path, never empty, hidden, too long or a device.
+
+    Letters and digits of all scripts, dots, hyphens and underscores stay, and spaces become hyphens. Where anything
+    else was in the name, or it was too long, eight digits of its digest follow, so that two robots do not share files.
+
+    Args:
+        name: What the robot is called; any text.
+        *words: What else the file is about, "catenary" or "poses": letters, digits and hyphens.
+
+    Returns:
+        The name, its parts joined by hyphens.
+
+    Examples:
+        >>> from sagline.files.writing import file_stem
+        >>> file_stem("hall camera", "catenary")
+        'hall-camera-catenary'
+        >>> file_stem("../../evil", "poses")
+        'evil-0fbfd372-poses'
+    """
+    plain = unicodedata.normalize("NFC", name)
+    spaced = "".join(c if _stays(c) else " " for c in plain)
+    stem = _cut("-".join(spaced.split())).strip(".-")
+    if _DEVICES.fullmatch(stem):
+        stem = f"{UNNAMED}-{stem}"
+    if not stem or stem != "-".join(plain.split(" ")):
+        stem = f"{stem or UNNAMED}-{sha256(name.encode('utf-8', 'surrogatepass')).hexdigest()[:8]}"
+    return "-".join((stem, *words))
+
+
+def _stays(character: str) -> bool:
+    return character in "._-" or unicodedata.category(character)[0] in "LMN"  # letters, their marks, numbers
+
+
+def _cut(text: str) -> str:
+    return text.encode()[:LONGEST].decode(errors="ignore")
+
+
+PREFIX, SUFFIX = ".sagline-", ".part"
+LOCK = "lock"  # held as long as the folder is in use: the system frees it, however the process ends
+TRIES = 100
+
+
+@contextmanager
+def staging(folder: Path) -> Iterator[Path]:
+    """A folder of its own inside a folder, to write to; it is gone when the block ends.
+
+    What processes that were killed have left there is removed first.
+
+    Args:
+        folder: Where; its file system is that of the files to be, so that a file can be moved in one step.
+
+    Yields:
+        The new folder.
+
+    Raises:
+        OSError: If it cannot be created.
+    """
+    for left in folder.glob(f"{PREFIX}*{SUFFIX}"):
+        _remove_if_left(left)
+    place, lock = _new_place(folder)
+    try:
+        yield place
+    finally:
+        os.close(lock)
+        shutil.rmtree(place, ignore_errors=True)
+
+
+def _new_place(folder: Path) -> tuple[Path, int]:
+    """A new folder and the lock that says that it is in use; one that another process takes for left is given up."""
+    for _ in range(TRIES):
+        place = Path(tempfile.mkdtemp(prefix=PREFIX, suffix=SUFFIX, dir=folder))
+        try:
+            lock = _opened(place)
+        except FileNotFoundError:
+            continue
+        if is_taken(lock, if_unknown=True) and os.fstat(lock).st_nlink:
+            return place, lock
+        os.close(lock)
+    raise TimeoutError(f"other processes remove what is written in {folder}")
+
+
+def _remove_if_left(place: Path) -> None:
+    """Remove a folder that nobody is using any more; one that cannot be removed stays."""
+    with suppress(OSError):
+        if place.is_symlink():
+            return
+        lock = _opened(place)
+        if is_taken(lock, if_unknown=False):
+            shutil.rmtree(place, ignore_errors=True)
+        os.close(lock)
+
+
+def _opened(place: Path) -> int:
+    flags = os.O_RDWR | os.O_CREAT
+    for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC"):  # neither a link nor a fifo planted there does harm
+        flags |= getattr(os, name, 0)
+    return os.open(place / LOCK, flags, 0o600)
+
+
+def is_taken(lock: int, *, if_unknown: bool) -> bool:
+    """Whether a lock could be taken: False where another process holds it.
+
+    Args:
+        lock: The open file.
+        if_unknown: The answer where the file system, or Windows, knows no locks.
+    """
+    if sys.platform == "win32":
+        return if_unknown
+    import fcntl
+
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:
+        return if_unknown
+    return True
+
 
 _finished: ContextVar[list[Path] | None] = ContextVar("finished", default=None)
 
@@ -236,3 +364,46 @@ def _next_step(target: Path) -> str:
     if not target.parent.is_dir():
         return f"Create the folder {target.parent} first, or name another."
     return "Check the permissions of its folder and the space on the disk, or name another folder."
+
+
+_OTHERS = re.compile(r"[^\n -~]+")  # beside ASCII that prints; json escapes what of it is below the space
+
+
+def plain(what: Any) -> Any:
+    """What JSON knows: arrays as lists, keys and paths as texts, None for numbers that are not finite.
+
+    Args:
+        what: Dictionaries, sequences, arrays, numbers, texts and paths, in one another.
+
+    Returns:
+        The same in dictionaries, lists, numbers, texts and None; anything else is left for `json` to refuse.
+    """
+    match what:
+        case dict():
+            return {str(key): plain(value) for key, value in what.items()}
+        case list() | tuple():
+            return [plain(value) for value in what]
+        case np.ndarray() | np.generic():
+            return plain(what.tolist())
+        case float():
+            return what if math.isfinite(what) else None
+        case PurePath():
+            return str(what)
+        case _:
+            return what
+
+
+def json_text(what: Any) -> str:
+    """One JSON document, for `plain` data and all that `plain` makes so; safe for a terminal, whatever texts hold.
+
+    Args:
+        what: As for `plain`.
+
+    Returns:
+        The document, without a line end.
+
+    Raises:
+        TypeError: If something in it has no form in JSON.
+    """
+    text = json.dumps(plain(what), indent=2, ensure_ascii=False, allow_nan=False)
+    return _OTHERS.sub(lambda found: "".join(c if is_seen(c) else json.dumps(c)[1:-1] for c in found[0]), text)

@@ -8,8 +8,8 @@ from numpy.testing import assert_allclose
 
 import sagline as sl
 from sagline import Surface
-from sagline.files import surface_file
-from sagline.files.surface_file import save as save_surface
+from sagline.files import mesh_file
+from sagline.files.mesh_file import save as save_surface
 from tests.interference.scenes import box_mesh
 from tests.refusal import refused
 
@@ -89,7 +89,7 @@ def test_vtk_is_left_to_the_package_that_is_installed(
         setattr(package, kind.__name__, kind)
         with monkeypatch.context() as patch:
             patch.setitem(sys.modules, name, package)
-            patch.setattr(surface_file, "find_spec", lambda asked, name=name: name if asked == name else None)
+            patch.setattr(mesh_file, "find_spec", lambda asked, name=name: name if asked == name else None)
             SURFACE.export(tmp_path / f"hull.{ending}")
         assert (tmp_path / f"hull.{ending}").read_text() == expected
         (tmp_path / f"hull.{ending}").unlink()
@@ -101,7 +101,7 @@ def test_what_cannot_be_written_is_said_and_what_was_there_stays(
 ) -> None:
     with refused(next_step="Take .stl, .glb, .ply, .vtk, .vtu.", kind=sl.FileError, file=tmp_path / "hull.obj"):
         SURFACE.export(tmp_path / "hull.obj")
-    monkeypatch.setattr(surface_file, "find_spec", lambda _: None)
+    monkeypatch.setattr(mesh_file, "find_spec", lambda _: None)
     old = tmp_path / "hull.vtk"
     old.write_text("old")
     with refused(kind=sl.FileError, file=old) as caught:

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import example, given
 
 import sagline as sl
-from sagline.files.names import file_stem
+from sagline.files.writing import file_stem
 
 # what Windows keeps for itself, whatever follows the first dot: learn.microsoft.com, "Naming Files, Paths, Namespaces"
 DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{port}{k}" for port in ("COM", "LPT") for k in "0123456789¹²³")}

@@ -10,7 +10,7 @@ import pytest
 from syrupy.assertion import SnapshotAssertion
 
 from sagline import FileError
-from sagline.files.whole import (
+from sagline.files.writing import (
     check_folder,
     finished_files,
     made_folder,

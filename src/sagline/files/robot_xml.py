@@ -1,9 +1,10 @@
-"""XML files of other tools: read without trusting them, their numbers checked one by one."""
+"""XML robot files of other tools: safe reading, checked numbers, and the record of what was lost."""
 
 from __future__ import annotations
 
 import codecs
 import re
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, NoReturn
 from xml.etree.ElementTree import Element, TreeBuilder
@@ -14,7 +15,8 @@ import numpy as np
 from sagline.core.arrays import Array, locked
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.quantity import plain_number, within_reach
-from sagline.files.text import error_at_line, read_bytes
+from sagline.files.reading import error_at_line, read_bytes
+from sagline.robot.robot import Robot
 
 _LIMIT: Final = 4.0  # MB; the largest of CASPR's files has 0.1
 _ENCODING = re.compile(r"utf-?8|utf-?16|us-ascii|ascii|latin-?1|iso-8859-1?[0-9]|(windows-|cp)125[0-8]", re.IGNORECASE)
@@ -154,3 +156,35 @@ def _refuse_entity(name: str, *_: object) -> NoReturn:
 def _check_encoding(version: str, encoding: str | None, standalone: int) -> None:
     if encoding is not None and not _ENCODING.fullmatch(encoding):
         raise _RefusedError(f"is in an unknown encoding, {encoding}", "Save it as UTF-8.")
+
+
+# Where a file gives no material: a 4 mm steel rope, as assumed for the preset cogiro.
+STEEL_ROPE_DENSITY: Final = 0.065  # kg/m
+STEEL_ROPE_STIFFNESS: Final = 700e3  # N
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Imported:
+    """A robot read from another tool's file, and what the reading cost.
+
+    Attributes:
+        robot: The robot; `robot.assumed` holds what the file does not give, field by field, with the reason, and
+            `robot.notes` what was lost.
+        lost: What the file gives and the robot does not hold, one sentence each.
+    """
+
+    robot: Robot
+    lost: tuple[str, ...]
+
+
+def imported(robot: Robot, lost: tuple[str, ...]) -> Imported:
+    """A robot whose notes tell what was lost, so that its file does too.
+
+    Args:
+        robot: The robot that was read.
+        lost: What the file gives and the robot does not hold, one sentence each.
+
+    Returns:
+        Both; the robot's notes begin with "Not taken over:" where something was lost.
+    """
+    return Imported(robot.replace(notes=" ".join(("Not taken over:", *lost))) if lost else robot, lost)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from tests.files.test_c_source import any_cables, reference
+from tests.files.test_controller_source_c import any_cables, reference
 
 
 def as_python(scl: str) -> Callable[..., dict[str, Any]]:

@@ -1,14 +1,49 @@
-"""Files in: bytes of regular files of a size that fits, and text in UTF-8."""
+"""Reading of regular files of limited size: bytes, and text in UTF-8."""
 
 from __future__ import annotations
 
 import codecs
 import re
+import stat
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 from sagline.core.errors import FileError
-from sagline.files.kinds import kind_of
+
+
+class Kind(NamedTuple):
+    """What is no regular file.
+
+    Attributes:
+        text: What it is.
+        next_step: What to do about it.
+    """
+
+    text: str
+    next_step: str
+
+
+_DEVICE = Kind("a device, not a file", "Name a file.")
+_KINDS = {
+    stat.S_IFDIR: Kind("a folder", "Give the name of a file in it."),
+    stat.S_IFCHR: _DEVICE,
+    stat.S_IFBLK: _DEVICE,
+    stat.S_IFIFO: Kind("a pipe, not a file", "Name a file."),
+    stat.S_IFSOCK: Kind("a socket, not a file", "Name a file."),
+}
+
+
+def kind_of(mode: int) -> Kind | None:
+    """What something is that is no regular file.
+
+    Args:
+        mode: As `os.stat` gives it.
+
+    Returns:
+        What it is; None for a regular file.
+    """
+    return None if stat.S_ISREG(mode) else _KINDS.get(stat.S_IFMT(mode), Kind("no file", "Name a file."))
+
 
 MEGABYTE: Final = 1_000_000
 _OTHER_TEXT: Final = {codecs.BOM_UTF16_LE: "UTF-16", codecs.BOM_UTF16_BE: "UTF-16"}

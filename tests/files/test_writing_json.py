@@ -5,7 +5,7 @@ from unicodedata import category
 import numpy as np
 import pytest
 
-from sagline.files.json_text import json_text
+from sagline.files.writing import json_text
 
 GIVEN = {
     "lengths": np.array([[1.0, np.nan], [-np.inf, 2.5e-300]]),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sagline import InvalidValueError
-from sagline.files.typed import pose_of
+from sagline.files.pose_text import pose_of
 from tests.refusal import refused
 
 

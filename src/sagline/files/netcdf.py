@@ -1,0 +1,381 @@
+"""NetCDF files: atomic writing with a digest at the end, and reading of undamaged files only."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, fields
+from enum import Enum
+from hashlib import sha256
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO, Final, Literal, TypeVar
+
+import numpy as np
+
+from sagline.core.errors import FileError, InvalidValueError
+from sagline.files.reading import kind_of
+from sagline.files.variables import PARTS
+from sagline.files.writing import written_whole
+
+if TYPE_CHECKING:
+    from xarray import Dataset
+
+_HEAD, _TAIL = b"\nsagline sha256 ", b"\n"
+_LENGTH = len(_HEAD) + sha256().digest_size * 2 + len(_TAIL)
+_BLOCK = 1 << 20  # bytes read at once
+
+
+class Seal(Enum):
+    """What the end of a file says about the rest."""
+
+    WHOLE = "the file is as it was written"
+    BROKEN = "something in it has changed since it was written"
+    MISSING = "it carries no digest"
+
+
+def seal(file: Path) -> None:
+    """Put the digest of a file at its end.
+
+    Args:
+        file: The file.
+
+    Raises:
+        OSError: If it cannot be read or written.
+    """
+    with file.open("rb+") as handle:
+        handle.write(_line(handle, file.stat().st_size))
+
+
+def seal_of(file: Path) -> Seal:
+    """What the end of a file says about the rest.
+
+    Args:
+        file: The file.
+
+    Returns:
+        Whether its digest is there, and right.
+
+    Raises:
+        OSError: If it cannot be read.
+    """
+    with file.open("rb") as handle:
+        before = max(0, file.stat().st_size - _LENGTH)
+        handle.seek(before)
+        found = handle.read()
+        if not (found.startswith(_HEAD) and found.endswith(_TAIL)):
+            return Seal.MISSING
+        handle.seek(0)
+        return Seal.WHOLE if found == _line(handle, before) else Seal.BROKEN
+
+
+def _line(handle: BinaryIO, size: int) -> bytes:
+    """The last line of a file whose content is read from here; the place behind it is where to write the line."""
+    found = sha256()
+    while size > 0 and (block := handle.read(min(_BLOCK, size))):
+        found.update(block)
+        size -= len(block)
+    return _HEAD + found.hexdigest().encode() + _TAIL
+
+
+OTHERS: Final = {
+    "sagline_format": ("a plan", "Read it with load_plan, or look at it: sagline view ROBOT FILE."),
+    "sagline_simulation_format": ("a simulation", "Read it with load_simulation, or play it: sagline view ROBOT FILE."),
+    "sagline_execution_format": ("an execution", "Open it with xarray.open_dataset; its plan is its group 'plan'."),
+    "sagline_workspace_format": ("a workspace", "Read it with load_workspace."),
+    "sagline_calibration_format": ("a calibration", "Read it with load_calibration."),
+    "sagline_frequency_map_format": ("a frequency map", "Open it with xarray.open_dataset."),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Content:
+    """One kind of content, in a reader's words.
+
+    Attributes:
+        name: What it is called: "plan".
+        made: What a file of it is: "run of sagline track".
+        give: Which file to give: "Give the .nc file that sagline track wrote."
+        again: What to do about a damaged file.
+        key: The attribute that has its format.
+        version: Newest version of the format; raised whenever an older sagline could misread the file.
+    """
+
+    name: str
+    made: str
+    give: str
+    again: str
+    key: str
+    version: int
+
+    def format_of(self, path: Path, attributes: Mapping[str, Any]) -> int:
+        """The format of a file.
+
+        Args:
+            path: The file.
+            attributes: Of its data set.
+
+        Returns:
+            The format, from 1 on.
+
+        Raises:
+            FileError: If it is of something else, or of a format that this sagline does not read.
+        """
+        found = attributes.get(self.key)
+        if found is None:
+            raise FileError(path, *self._instead(attributes))
+        if not isinstance(found, int | np.integer) or found < 1:
+            step = "Write it again; it was edited, or damaged."
+            raise FileError(path, f"is of format {found!r}, which never was", step, item=self.key)
+        if found > self.version:
+            raise FileError(
+                path,
+                f"is of format {found}, written by {attributes.get('source')}; this is sagline {version('sagline')}, "
+                f"which reads up to {self.version}",
+                "Install a newer sagline.",
+                item=self.key,
+            )
+        return int(found)
+
+    def _instead(self, attributes: Mapping[str, Any]) -> tuple[str, str]:
+        """What a file is of instead, and what to do with it."""
+        for key, (what, step) in OTHERS.items():
+            if key in attributes:
+                return f"is {what} of sagline, no {self.name}", step
+        return f"is no {self.name} of sagline, it names no {self.key}", "Check that this is the file you mean."
+
+    def check_sealed(self, path: Path, found: Seal) -> None:
+        """Refuse a file without a digest.
+
+        Args:
+            path: The file.
+            found: What its end says.
+
+        Raises:
+            FileError: If it has none.
+        """
+        if found is Seal.MISSING:
+            raise FileError(path, "is not as it was written: its digest is missing", self.again, item="digest")
+
+    def attributes(self, title: str) -> dict[str, Any]:
+        """What every file of it says of itself.
+
+        Args:
+            title: Of this file.
+        """
+        return {"title": title, "source": f"sagline {version('sagline')}", self.key: self.version}
+
+
+Choice = TypeVar("Choice")
+_BEGIN: Final = b"\x89HDF\r\n\x1a\n"  # of every file in NetCDF-4
+_KINDS: Final = {
+    **dict.fromkeys((".yaml", ".yml"), "a YAML file"),
+    **dict.fromkeys((".xml", ".wcrfx"), "an XML file"),
+    **{f".{kind}": f"a {kind.upper()} file" for kind in ("csv", "json", "png", "svg")},
+}
+INFLATION = 1000  # times the size of a file that its numbers may take in memory: nobody packs them so well
+HEADERS: Final = 1 << 18  # bytes, more than all names and attributes take beside texts, such as the robot
+
+
+def labeled_dataset(
+    variables: Mapping[str, Any], attributes: Mapping[str, Any], coordinates: Mapping[str, Any] | None = None
+) -> Dataset:
+    """Make a data set whose dimensions carry labels, without indexes: whoever reads the file builds those needed.
+
+    Args:
+        variables: Dimensions, values and attributes of each variable, by name.
+        attributes: Attributes of the data set.
+        coordinates: Coordinates besides the labels of `PARTS`.
+
+    Returns:
+        The data set.
+    """
+    from xarray import Coordinates, Dataset
+
+    parts = {dimension for dimensions, *_ in variables.values() for dimension in dimensions} & PARTS.keys()
+    labels = {part: (part, list(PARTS[part])) for part in sorted(parts)}
+    return Dataset(variables, Coordinates({**labels, **(coordinates or {})}, indexes={}), attributes)
+
+
+def numbered(dimension: str, count: int) -> tuple[str, Any, dict[str, str]]:
+    """Coordinate that counts cables or the like from 0."""
+    return dimension, np.arange(count), {"long_name": f"{dimension}, counted from 0"}
+
+
+def write_dataset(data: Dataset, file: Path, groups: Mapping[str, Dataset] | None = None) -> None:
+    """Write a data set, with a digest over all values and attributes at the end, behind what NetCDF reads.
+
+    Args:
+        data: The data set; one of its attributes is the robot.
+        file: The file; a regular file that exists is replaced, anything else is refused.
+        groups: Data sets that stand in groups of their own inside, each with its robot.
+
+    Raises:
+        FileError: If the file cannot be written; what was there before is untouched.
+    """
+    parts: list[tuple[str | None, Dataset]] = [(None, data), *(groups or {}).items()]
+    texts = [value for _, part in parts for value in part.attrs.values() if isinstance(value, str)]
+    size = sum(part.nbytes + HEADERS for _, part in parts) + sum(len(text.encode()) for text in texts)
+    with written_whole(file, size=size) as partial:
+        try:
+            for group, part in parts:
+                # _FillValue None: numbers are stored as they are, and NaN needs no second meaning
+                encoding = {str(name): {"_FillValue": None} for name in part.variables}
+                mode: Literal["w", "a"] = "w" if group is None else "a"
+                # absolute: xarray takes ~ for the home
+                part.to_netcdf(partial.absolute(), mode, group=group, engine="h5netcdf", encoding=encoding)
+        except RuntimeError as error:  # what h5py makes of a disk that fills up meanwhile
+            raise OSError(str(error)) from error
+        seal(partial)
+
+
+def read_dataset(path: Path, content: Content) -> tuple[Dataset, Seal]:
+    """A whole file.
+
+    Args:
+        path: The file.
+        content: What it should be of, for the messages.
+
+    Returns:
+        What is in it, and whether it carries a digest: one that is wrong is refused before anything else is read.
+
+    Raises:
+        FileError: If it is missing, no file, not readable, damaged, or no NetCDF file.
+    """
+    found = _seal(path, content)
+    return _opened(path, content), found
+
+
+@contextmanager
+def file_errors(path: Path) -> Iterator[None]:
+    """Tell what is wrong with the values of a file with the file that has them.
+
+    Args:
+        path: The file.
+
+    Raises:
+        FileError: If a variable or an attribute is missing, or a value is none that will do.
+    """
+    try:
+        yield
+    except KeyError as error:
+        step = "Write it again; it is incomplete or was edited."
+        raise FileError(path, f"has no {error.args[0]}", step, item=str(error.args[0])) from None
+    except InvalidValueError as error:
+        raise FileError.of(path, error) from None
+
+
+def is_of(path: Path, content: Content) -> bool:
+    """Whether a file says that it is of this content; nothing else of it is looked at.
+
+    Args:
+        path: The file; of one that is none, or cannot be read, `read_dataset` says why.
+        content: What it may be of.
+    """
+    from h5py import File
+
+    try:
+        if kind_of(path.stat().st_mode):
+            return False
+        with File(path) as file:
+            return content.key in file.attrs
+    except (OSError, RuntimeError, ValueError):
+        return False
+
+
+def _seal(path: Path, content: Content) -> Seal:
+    """What a file's end says, before anything else in it is believed."""
+    try:
+        if kind := kind_of(path.stat().st_mode):  # opening a pipe would wait for its writer
+            raise FileError(path, f"is {kind.text}", kind.next_step)
+        found = seal_of(path)
+    except FileNotFoundError:
+        raise FileError(path, "does not exist", "Check its name.") from None
+    except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
+        reason = getattr(error, "strerror", None) or error
+        raise FileError(path, f"cannot be read ({reason})", "Check its name and its permissions.") from None
+    if found is Seal.BROKEN:
+        raise FileError(path, "is not as it was written: it was damaged or edited", content.again)
+    return found
+
+
+def _opened(path: Path, content: Content) -> Dataset:
+    from h5py import File
+    from xarray import open_dataset
+
+    size = path.stat().st_size
+    try:
+        with File(path) as file:  # h5netcdf writes to stderr about a file of which this cannot be read
+            dict(file.attrs)
+        with open_dataset(path.absolute(), engine="h5netcdf", decode_times=False, mask_and_scale=False) as data:
+            if data.nbytes > INFLATION * size:
+                raise ValueError(f"{size} bytes that say to hold {data.nbytes:.2g}")
+            return data.load()
+    except Exception as error:  # h5py, h5netcdf and xarray have no error of their own for a damaged file: any will do
+        raise FileError(path, *_cause(path, content)) from error
+
+
+def _cause(path: Path, content: Content) -> tuple[str, str]:
+    """Why a file is none of ours, and what to do; what the libraries say of it is for those who know its format."""
+    with path.open("rb") as file:
+        begin = file.read(len(_BEGIN))
+    if begin == _BEGIN:
+        return "is damaged, or was cut off", content.again
+    kind = _KINDS.get(path.suffix.lower(), "empty" if not begin else "another kind of file")
+    return f"is {kind}, no {content.made}", content.give
+
+
+def choice_attributes(key: str, choice: Any, choices: Mapping[str, type[Any]]) -> dict[str, Any]:
+    """A model, method or the like as attributes: its name, and each of its options that is set.
+
+    Args:
+        key: What the attributes begin with.
+        choice: What was chosen.
+        choices: What can be read back, by name.
+
+    Returns:
+        Attributes.
+
+    Raises:
+        InvalidValueError: If it is none of these.
+    """
+    if choices.get(type(choice).__name__) is not type(choice):
+        raise InvalidValueError(key, type(choice).__name__, ", ".join(choices), "Only these can be read back.")
+    options = {f"{key}_{field.name}": getattr(choice, field.name) for field in fields(choice)}
+    return {key: type(choice).__name__, **{name: value for name, value in options.items() if value is not None}}
+
+
+def choice_of(
+    path: Path, attributes: Mapping[str, Any], key: str, choices: Mapping[str, type[Choice]], **known: Any
+) -> Choice:
+    """What `choice_attributes` wrote.
+
+    Args:
+        path: The file, for messages.
+        attributes: Of the file.
+        key: What the attributes begin with.
+        choices: What it may be, by name.
+        **known: Options that are elsewhere in the file.
+
+    Returns:
+        What was chosen.
+
+    Raises:
+        FileError: If it is none of these, or an option is of another kind.
+    """
+    name = attributes[key]
+    if name not in choices:
+        refused = InvalidValueError(key, repr(name), ", ".join(choices), "Read it with a newer sagline.")
+        raise FileError.of(path, refused)
+    choice: Any = choices[name]
+    given = {field.name: attributes.get(f"{key}_{field.name}") for field in fields(choice)}
+    try:
+        options = {option: _plain(value) for option, value in given.items() if value is not None}
+        found: Choice = choice(**{**options, **known})
+    except TypeError as error:  # a text where a number belongs
+        raise FileError(path, f"{key}: {error}", "Write it again; it was edited.") from None
+    return found
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if isinstance(value, np.generic) else value

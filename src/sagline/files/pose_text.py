@@ -1,0 +1,151 @@
+"""Poses and wrenches as people write them: on the command line, in the viewer and in YAML."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from sagline.core.arrays import Array, checked
+from sagline.core.errors import InvalidValueError
+from sagline.files.quantity import in_si, plain_number
+from sagline.files.yaml_text import Entry
+from sagline.robot.pose import Pose
+
+FARTHEST, STRONGEST = 1e6, 1e12  # m; N and N m: beyond all machines, far below what overflows
+QUATERNION_TOLERANCE: Final = 1e-3  # of a length 1, printed with three decimals; more is a mistake
+POSE_STEP: Final = "Give meters, and degrees about z, y and x: --pose 1,0,1.5 or --pose 1,0,1.5,10,0,0."
+WRENCH_STEP: Final = (
+    "Give newtons, and newton meters about the center of mass: --wrench 0,0,-50 or --wrench 0,0,-50,0,5,0."
+)
+
+
+def numbers(parts: Sequence[str], item: str, unit: str, largest: float) -> list[float]:
+    """Plain decimal numbers.
+
+    Args:
+        parts: Their texts.
+        item: What they are, for the message.
+        unit: Their unit, for the message.
+        largest: Largest absolute value.
+
+    Raises:
+        InvalidValueError: If one is no such number, or too large.
+    """
+    found = []
+    for part in parts:
+        number = plain_number(part)
+        if number is None or not abs(number) <= largest:  # NaN neither
+            raise InvalidValueError(item, repr(part), f"decimal numbers up to {largest:g} {unit}", f"Correct {item}.")
+        found.append(number)
+    return found
+
+
+def pose_of(text: str, item: str = "--pose", step: str = POSE_STEP) -> Pose:
+    """A pose from X,Y,Z in meters, or X,Y,Z,A,B,C with the angles about z, y and x in degrees.
+
+    Args:
+        text: The text.
+        item: What it is, for the message.
+        step: What a message tells to do.
+
+    Raises:
+        InvalidValueError: If it is none.
+    """
+    place = _three_or_six(text, item, "m or degrees", FARTHEST, step)
+    return Pose.from_euler(place[:3], *np.radians(place[3:]))
+
+
+def wrench_of(text: str | None, item: str = "--wrench", step: str = WRENCH_STEP) -> Array | None:
+    """A wrench from "fx,fy,fz" in N, or "fx,fy,fz,mx,my,mz" with moments in N m; None for none.
+
+    Args:
+        text: The text.
+        item: What it is, for the message.
+        step: What a message tells to do.
+
+    Raises:
+        InvalidValueError: If it is none.
+    """
+    return None if text is None else np.array(_three_or_six(text, item, "N or N m", STRONGEST, step))
+
+
+def _three_or_six(text: str, item: str, unit: str, largest: float, step: str) -> list[float]:
+    """Plain numbers between commas; of three, three zeros follow."""
+    parts = text.split(",", maxsplit=6)
+    if len(parts) not in (3, 6):
+        raise InvalidValueError(item, repr(text), "three or six numbers", step)
+    whole = numbers(parts, item, unit, largest)
+    return whole + [0.0] * (6 - len(whole))
+
+
+UNITS_STEP: Final = "Check its unit: numbers are meters, millimeters are written as 1500 mm."
+
+
+class _Euler(Entry):
+    alpha: Any = 0.0
+    beta: Any = 0.0
+    gamma: Any = 0.0
+
+
+class PoseEntry(Entry):
+    """What a file says of a pose."""
+
+    position: Any
+    euler: _Euler | None = None
+    quaternion: Any = None
+
+
+def pose_of_entry(entry: PoseEntry, item: str) -> Pose:
+    """The pose that a file means.
+
+    Args:
+        entry: What it says.
+        item: What messages call it.
+
+    Returns:
+        A single pose.
+
+    Raises:
+        InvalidValueError: If it is none, or farther away than any machine.
+    """
+    position = numbers_of(entry.position, 3, "m", f"{item}.position")
+    if (far := float(np.abs(position).max())) > FARTHEST:
+        raise InvalidValueError(f"{item}.position", f"{far:g} m away", f"up to {FARTHEST:g} m", UNITS_STEP)
+    if entry.quaternion is None:
+        euler = entry.euler or _Euler()
+        angles = [in_si(angle, "rad", f"{item}.euler.{name}") for name, angle in euler]
+        return Pose.from_euler(position, *numbers_of(angles, 3, "rad", f"{item}.euler"))
+    if entry.euler is not None:
+        raise InvalidValueError(
+            item, "given with euler and quaternion", "one of the two, or none", "Leave one of them out."
+        )
+    quaternion = numbers_of(entry.quaternion, 4, "", f"{item}.quaternion")
+    length = float(np.linalg.norm(quaternion))
+    if abs(length - 1.0) > QUATERNION_TOLERANCE:
+        raise InvalidValueError(
+            f"the length of {item}.quaternion", f"{length:.6g}", f"1 to {QUATERNION_TOLERANCE:g}", f"Correct {item}."
+        )
+    return Pose.from_quaternion(position, quaternion / length)
+
+
+def numbers_of(value: Any, count: int, unit: str, item: str) -> Array:
+    """So many numbers in SI.
+
+    Args:
+        value: What a file says.
+        count: How many they must be.
+        unit: Their unit in SI.
+        item: What messages call them.
+
+    Returns:
+        Array of shape (count,).
+
+    Raises:
+        InvalidValueError: If they are something else.
+    """
+    numbers = checked(in_si(value, unit, item), item, unit)
+    if numbers.shape != (count,):
+        raise InvalidValueError(item, f"of shape {numbers.shape}", f"a list of {count} numbers", f"Correct {item}.")
+    return numbers
