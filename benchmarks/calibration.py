@@ -11,12 +11,10 @@ from scipy.optimize import least_squares
 
 import sagline as sl
 from benchmarks.measure import Row, best_seconds, print_table
-from sagline.calibration.calibrate import readings_of, sensors_there
-from sagline.calibration.gauss_newton import best_step
-from sagline.calibration.least_squares import passed
+from sagline.calibration.calibrate import active_sensors, readings_table
+from sagline.calibration.least_squares import best_step, evaluate_step
 from sagline.calibration.parameters import external, parameters_of, robot_with
-from sagline.calibration.problem import Log, Problem, State
-from sagline.calibration.start import start_of
+from sagline.calibration.problem import Log, Problem, State, start_of
 from sagline.core.arrays import Array
 from sagline.robot.drum import drums_of
 from tests.calibration.synthetic import Truth, true_robot, usual_sensors, with_drums
@@ -33,9 +31,9 @@ MILLION = 1_000_000
 
 def problem_of(log: sl.WinchLog) -> Problem:
     """What a calibration of the CoGiRo by a log is to find."""
-    sensors = sensors_there(log)
+    sensors = active_sensors(log)
     return Problem(
-        COGIRO, sl.Catenary(), sensors, parameters_of(COGIRO, UNKNOWNS, sensors, counted=True), readings_of(log)
+        COGIRO, sl.Catenary(), sensors, parameters_of(COGIRO, UNKNOWNS, sensors, counted=True), readings_table(log)
     )
 
 
@@ -124,10 +122,10 @@ def large() -> Iterator[Row]:
             np.tile(state.poses, (times, 1))[:rows],
         )
         kept = np.ones(rows, dtype=np.bool_)
-        begin, normal = passed(problem, begin, None, kept)
+        begin, normal = evaluate_step(problem, begin, None, kept)
         step, _ = best_step(problem, begin, normal)
         begun = time.process_time()
-        passed(problem, begin, step, kept)
+        evaluate_step(problem, begin, step, kept)
         seconds = time.process_time() - begun
         memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
         yield Row(

@@ -12,7 +12,7 @@ import numpy as np
 
 import sagline as sl
 from sagline.calibration.findings import CrossValidation, Direction, Outlier
-from sagline.calibration.unknowns import KINDS, Parameters
+from sagline.calibration.parameters import KINDS, Parameters
 from sagline.core.arrays import Array, locked
 
 NAMES = ("frame_anchors", "length_zero", "axial_stiffness", "mass", "center_of_mass")

@@ -38,7 +38,7 @@ def _cells(log: sl.WinchLog) -> Array:
     return log.load_cells
 
 
-def _exchanged(values: Array, i: int, j: int) -> Array:
+def _swap_columns(values: Array, i: int, j: int) -> Array:
     values = values.copy()
     values[:, [i, j]] = values[:, [j, i]]
     return values
@@ -46,21 +46,21 @@ def _exchanged(values: Array, i: int, j: int) -> Array:
 
 def swapped_encoders(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> Mistake:
     i, j = _two(log, rng)
-    changed = log.replace(**{_column(log): _exchanged(log.readings, i, j)})
+    changed = log.replace(**{_column(log): _swap_columns(log.readings, i, j)})
     return Mistake(changed, (f"the encoders of cables {i} and {j} are swapped",))
 
 
 def swapped_cables(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> Mistake:
     i, j = _two(log, rng)
-    cells = _exchanged(_cells(log), i, j)
-    changed = log.replace(**{_column(log): _exchanged(log.readings, i, j), "load_cells": cells})
+    cells = _swap_columns(_cells(log), i, j)
+    changed = log.replace(**{_column(log): _swap_columns(log.readings, i, j), "load_cells": cells})
     return Mistake(changed, (f"the cables {i} and {j} are swapped",))
 
 
 def swapped_cells(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> Mistake:
     i, j = _two(log, rng)
     return Mistake(
-        log.replace(load_cells=_exchanged(_cells(log), i, j)), (f"the load cells of cables {i} and {j} are swapped",)
+        log.replace(load_cells=_swap_columns(_cells(log), i, j)), (f"the load cells of cables {i} and {j} are swapped",)
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import sagline as sl
-from sagline.calibration.unknowns import KINDS, Parameters
+from sagline.calibration.parameters import KINDS, Parameters
 from sagline.core.arrays import Array, locked
 from sagline.kernels.calibration import kinds
 from sagline.robot.drum import drums_of

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import sagline as sl
-from sagline.calibration.unknowns import KINDS
+from sagline.calibration.parameters import KINDS
 from sagline.core.arrays import Array
 from tests.calibration.reference import counts_of
 from tests.kinematics.feasible import box_poses
@@ -151,7 +151,7 @@ def log_of(
         slips: (Row, cable) -> what slipped there beside the noise [m]: more is believed to be out than is.
     """
     rng = np.random.default_rng(seed)
-    pose, length, tension = _standing(truth.robot, count, sets, rng)
+    pose, length, tension = _feasible(truth.robot, count, sets, rng)
     m, sensors = truth.robot.cable_count, truth.sensors
     believed = length - truth.length_offset + noise * sensors.length_deviation * rng.normal(size=(count, m))
     for (row, cable), size in (slips or {}).items():
@@ -178,7 +178,7 @@ def log_of(
     return Synthetic(log, pose, length, tension)
 
 
-def _standing(robot: sl.Robot, count: int, sets: int, rng: np.random.Generator) -> tuple[sl.Pose, Array, Array]:
+def _feasible(robot: sl.Robot, count: int, sets: int, rng: np.random.Generator) -> tuple[sl.Pose, Array, Array]:
     """Poses, lengths and tensions, (count, ...)."""
     wanted = -(-count // sets)
     methods: list[sl.TensionMethod] = [sl.MinimumNorm()]

@@ -5,7 +5,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from sagline.calibration.information import Information, deviations_of, ground, most_telling
+from sagline.calibration.information import Information, choose_informative, deviations_of, prior_information
 from sagline.core.arrays import Array, Indices
 from tests.tiers import wide
 
@@ -32,7 +32,7 @@ def test_choice_against_an_exhaustive_search(count: int) -> None:
     for seed in range(25):
         rows = rows_of(seed)
         best = max(log_det(rows, which) for which in combinations(range(len(rows)), count))
-        found = log_det(rows, most_telling(rows, np.eye(5), count).order)
+        found = log_det(rows, choose_informative(rows, np.eye(5), count).order)
         assert SURELY * best <= found <= best + 1e-9
         shares.append(found / best)
     assert min(shares) >= NEAR
@@ -44,12 +44,12 @@ def test_an_exchange_finds_what_greed_misses() -> None:
     rows = np.array([[[3.0, 3.0]], [[4.0, 0.0]], [[0.0, 4.0]]])
     rows[0] *= 1.01
     assert log_det(rows, (0,)) > log_det(rows, (1,))
-    assert sorted(most_telling(rows, np.eye(2), 2).order) == [1, 2]
+    assert sorted(choose_informative(rows, np.eye(2), 2).order) == [1, 2]
 
 
 def test_gains_and_deviations_written_out() -> None:
     rows = rows_of(3, candidates=20)
-    choice = most_telling(rows, np.eye(5), 12)
+    choice = choose_informative(rows, np.eye(5), 12)
     assert len(set(choice.order)) == 12
     for k in range(1, 13):
         flat = rows[choice.order[:k]].reshape(-1, 5)
@@ -72,7 +72,7 @@ def test_taken_and_left_again() -> None:
 
 
 def test_candidates_that_tell_nothing_are_taken_once_each() -> None:
-    assert sorted(most_telling(np.zeros((4, 2, 3)), np.eye(3), 4).order) == [0, 1, 2, 3]
+    assert sorted(choose_informative(np.zeros((4, 2, 3)), np.eye(3), 4).order) == [0, 1, 2, 3]
 
 
 def test_deviations_of_what_is_open() -> None:
@@ -89,7 +89,7 @@ def test_deviations_of_what_is_open() -> None:
 def test_readings_of_any_precision(precision: float) -> None:
     rows = rows_of(7, candidates=12, numbers=6) * precision
     rows[..., 5] = rows[..., 4]  # never told apart
-    choice = most_telling(rows, ground(rows), 8)
+    choice = choose_informative(rows, prior_information(rows), 8)
     assert len(set(choice.order)) == 8
     found = deviations_of(rows[choice.order], np.ones(6))
     told = rows.reshape(-1, 6)[:, :5] / precision

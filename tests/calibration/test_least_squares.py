@@ -5,12 +5,11 @@ import pytest
 from scipy.optimize import least_squares
 
 import sagline as sl
-from sagline.calibration.calibrate import readings_of, sensors_there
-from sagline.calibration.least_squares import moved, passed, solve
+from sagline.calibration.calibrate import active_sensors, readings_table
+from sagline.calibration.least_squares import evaluate_step, moved, solve
+from sagline.calibration.log import load_cells_of
 from sagline.calibration.parameters import external, parameters_of, robot_with
-from sagline.calibration.problem import Fit, Log, Problem, State, machine_at, said_lengths
-from sagline.calibration.sensors import load_cells_of
-from sagline.calibration.start import start_of
+from sagline.calibration.problem import Fit, Log, Problem, State, machine_at, reported_lengths, start_of
 from sagline.core.arrays import Array
 from tests.calibration import reference
 from tests.calibration.machines import robots, standing
@@ -23,14 +22,14 @@ UNKNOWNS = [sl.Unknown(name, deviation=error) for name, error in ERRORS.items()]
 
 
 def problem_of(made: Synthetic, unknowns: list[sl.Unknown], nominal: sl.Robot) -> Problem:
-    sensors = sensors_there(made.log)
+    sensors = active_sensors(made.log)
     parameters = parameters_of(nominal, unknowns, sensors, counted=made.log.counts is not None)
-    return Problem(nominal, sl.Catenary(), sensors, parameters, readings_of(made.log))
+    return Problem(nominal, sl.Catenary(), sensors, parameters, readings_table(made.log))
 
 
 def fitted(problem: Problem, made: Synthetic, *, robust: bool = False) -> Fit:
     kept = np.ones(len(made.log), dtype=np.bool_)
-    begun = passed(problem, start_of(problem, made.log.commanded), None, kept)
+    begun = evaluate_step(problem, start_of(problem, made.log.commanded), None, kept)
     return solve(problem, begun, kept, robust=robust)
 
 
@@ -91,7 +90,7 @@ def test_no_number_falls_below_the_least_that_it_may_be_and_the_others_fit_best_
     shifted = made._replace(log=made.log.replace(counts=made.log.readings - 200.0))
     problem = problem_of(shifted, [sl.Unknown("pulley_radius", deviation=0.02, shared=False)], small)
     kept = np.ones(12, dtype=np.bool_)
-    begun = passed(problem, start_of(problem, made.log.commanded), None, kept)
+    begun = evaluate_step(problem, start_of(problem, made.log.commanded), None, kept)
     fit = solve(problem, begun, kept, robust=False)
     assert fit.converged
     numbers = fit.state.numbers
@@ -155,7 +154,7 @@ def missed_after(name: str, share: float) -> tuple[float, float]:
     before = State(problem.prior, machine_at(problem, problem.prior), lengths, reference.pose_rows(pose))
     step = share * 0.02 * problem.scale * np.cos(np.arange(len(problem.prior)))
     after, part = machine_at(problem, problem.prior + step), slice(0, len(lengths))
-    found, starts = moved(problem, before, None, step, after, said_lengths(problem, after, part), part)
+    found, starts = moved(problem, before, None, step, after, reported_lengths(problem, after, part), part)
     rest = sl.forward(after.robot, found, sl.Pose.from_quaternion(starts[:, :3], starts[:, 3:]), model)
     assert rest.stable.all()
     ended = reference.pose_rows(rest.pose)

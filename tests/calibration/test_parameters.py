@@ -5,8 +5,7 @@ import pytest
 
 import sagline as sl
 from sagline import InvalidValueError
-from sagline.calibration.parameters import parameters_of
-from sagline.calibration.unknowns import Parameters
+from sagline.calibration.parameters import Parameters, parameters_of
 from tests.calibration.synthetic import usual_sensors, with_drums
 from tests.refusal import refused
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.calibration.screening import lengths_of, reading_count, screened
+from sagline.calibration.screening import lengths_of, reading_count, screen
 from sagline.core.arrays import Array
 from tests.calibration.synthetic import Synthetic, log_of, true_robot, usual_sensors, with_drums
 from tests.refusal import refused
@@ -30,7 +30,7 @@ def changed(values: Array | None, index: Any, value: float) -> Array:
 
 
 def left_out(log: sl.WinchLog, **options: float) -> dict[str, list[int]]:
-    found = screened(ROBOT, log, **options)
+    found = screen(ROBOT, log, **options)
     assert len(found.log) == len(found.rows)
     np.testing.assert_array_equal(found.log.readings, log.readings[found.rows])
     omitted = np.concatenate([found.rows, *found.left_out.values()])
@@ -40,7 +40,7 @@ def left_out(log: sl.WinchLog, **options: float) -> dict[str, list[int]]:
 
 def test_every_row_of_an_honest_log_is_kept(honest: Synthetic) -> None:
     assert left_out(honest.log) == {}
-    assert screened(ROBOT, honest.log).log is honest.log
+    assert screen(ROBOT, honest.log).log is honest.log
 
 
 def test_lengths_are_those_of_the_counts(honest: Synthetic) -> None:
@@ -110,7 +110,7 @@ def test_slack_rows_are_left_out(honest: Synthetic) -> None:
     assert left_out(log.replace(load_cells=changed(log.load_cells, (4, 6), 15.0))) == {"SLACK": [4]}
     assert left_out(log.replace(load_cells=changed(log.load_cells, (4, 6), 15.01))) == {}
     biased = with_drums(load_cell_bias=20.0)
-    found = screened(biased, log.replace(load_cells=changed(log.load_cells, (4, 6), 35.0)))
+    found = screen(biased, log.replace(load_cells=changed(log.load_cells, (4, 6), 35.0)))
     assert found.left_out[sl.Omission.SLACK].tolist() == [4]
 
 
@@ -132,14 +132,14 @@ def test_counts_on_no_drum_are_told_by_row_and_cable(honest: Synthetic, rows: sl
     row = len(log) - 1
     off = log.replace(counts=changed(log.counts, (row, 5), 4e6))
     with refused(f"row {row}, cable 5: count", "4000000", "-inf to 1261589", kind=sl.InvalidValueError):
-        screened(robot, off)
+        screen(robot, off)
 
 
 def test_what_does_not_fit_the_robot_is_refused(honest: Synthetic) -> None:
     with refused("log", "of 8 cables", "7 cables, those of falcon-7", kind=sl.InvalidValueError):
-        screened(sl.load_robot("falcon-7"), honest.log)
+        screen(sl.load_robot("falcon-7"), honest.log)
     with refused("the robot", kind=sl.InvalidValueError) as caught:
-        screened(sl.load_robot("cogiro"), honest.log)
+        screen(sl.load_robot("cogiro"), honest.log)
     assert "winches" in caught.value.value
     with refused("speed_limit", "0 m/s", kind=sl.InvalidValueError):
-        screened(ROBOT, honest.log, 0.0)
+        screen(ROBOT, honest.log, 0.0)

@@ -11,8 +11,8 @@ from rich.console import Console
 from typer.testing import CliRunner, Result
 
 import sagline as sl
-from sagline.calibration import chosen_poses
-from sagline.calibration.words import in_words
+from sagline.calibration import planning
+from sagline.calibration.summary import in_words
 from sagline.cli import terminal
 from sagline.cli.main import app
 from sagline.core.numbers import SPACE
@@ -115,7 +115,7 @@ def test_it_is_written_for_a_narrow_terminal(run: Run, monkeypatch: pytest.Monke
     plan = sl.calibration_poses(robot, 6, ("length_zero", "mass"), sl.Sensors(tension_deviation=5.0))
     for words, text in (
         (["winches.csv", "--folds", "0"], in_words(found, 60).replace(SPACE, " ")),
-        (["--plan", "6", "--tension-deviation", "5 N"], chosen_poses.in_words(plan, 60)),
+        (["--plan", "6", "--tension-deviation", "5 N"], planning.in_words(plan, 60)),
     ):
         lines = [line.rstrip() for line in run("robot.yaml", *words, *FEW).stdout.splitlines()]
         assert lines[: len(text.splitlines())] == text.splitlines()

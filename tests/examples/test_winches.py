@@ -8,8 +8,8 @@ import numpy as np
 from scipy.stats import chi2
 
 import sagline as sl
-from sagline.calibration.screening import screened
-from sagline.calibration.suspicions import suspicions
+from sagline.calibration.diagnostics import diagnose_log
+from sagline.calibration.screening import screen
 from sagline.core.arrays import Array
 from tests.calibration.example_log import EXAMPLES, example_log, example_truth, text_of
 from tests.tiers import extended
@@ -57,8 +57,8 @@ def test_the_log_is_what_the_true_robot_reads(tmp_path: Path) -> None:
 @extended
 def test_every_row_is_fit_and_nothing_is_suspected() -> None:
     robot, log = sl.load_robot(DRAWN), sl.load_log(LOG)
-    assert len(screened(robot, log).log) == len(log) == 60
-    assert suspicions(robot, log) == ()
+    assert len(screen(robot, log).log) == len(log) == 60
+    assert diagnose_log(robot, log) == ()
 
 
 @extended

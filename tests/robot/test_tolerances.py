@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sagline import Cable, InvalidValueError, Robot, Winch
-from sagline.calibration.unknowns import KINDS
+from sagline.calibration.parameters import KINDS
 from sagline.robot.provenance import Provenance
 from sagline.robot.tolerances import UNCERTAIN, value_of
 from tests.refusal import refused

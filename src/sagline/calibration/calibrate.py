@@ -9,19 +9,16 @@ import numpy as np
 
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
-from sagline.calibration.conclusion import concluded
-from sagline.calibration.cross_validation import cross_validated
+from sagline.calibration.diagnostics import GOOD, diagnose_log, fits_without_measured_poses, frame_mismatch, wrong_units
+from sagline.calibration.evaluation import evaluate
+from sagline.calibration.findings import Omission
 from sagline.calibration.least_squares import misfit
-from sagline.calibration.log import WinchLog
-from sagline.calibration.parameters import chosen, parameters_of
+from sagline.calibration.log import Sensors, WinchLog
+from sagline.calibration.parameters import Parameters, Unknown, chosen, parameters_of
 from sagline.calibration.problem import Log, Problem
 from sagline.calibration.result import Calibration
-from sagline.calibration.screening import reading_count, screened
-from sagline.calibration.search import found_from
-from sagline.calibration.sensors import Sensors
-from sagline.calibration.status import Omission
-from sagline.calibration.suspicions import GOOD, fits_unmeasured, measured_elsewhere, suspicions, wrong_units
-from sagline.calibration.unknowns import Parameters, Unknown
+from sagline.calibration.screening import reading_count, screen
+from sagline.calibration.search import cross_validate, search_from_priors
 from sagline.core.arguments import callback, instance, whole_number
 from sagline.core.arrays import Array, Indices
 from sagline.core.errors import InvalidValueError
@@ -55,7 +52,7 @@ def calibrate(
         robot: The robot as it is believed to be: its numbers are where the search begins, and priors. How far they may
             be off is what its `tolerances` say, or `Unknown(name, deviation=...)`, or what is usual of the kind.
         log: Readings at poses where it stood.
-        unknowns: What is looked for: names of `KINDS` in `sagline.calibration.unknowns`, or `Unknown`s.
+        unknowns: What is looked for: names of `KINDS` in `sagline.calibration.parameters`, or `Unknown`s.
         model: Cable model, the exact one or the weightless one.
         robust: Whether poses that do not fit the rest count less.
         folds: Into how many parts the poses are divided to see how well those are predicted that were left out: no more
@@ -97,27 +94,27 @@ def calibrate(
         raise InvalidValueError("folds", "1", "0 for none, or >= 2", "Give 5, say.")
     asked = chosen(unknowns)  # before any work
     _refuse(wrong_units(robot, log))
-    fit_for = screened(robot, log)
-    sensors = sensors_there(fit_for.log)
+    fit_for = screen(robot, log)
+    sensors = active_sensors(fit_for.log)
     parameters = parameters_of(robot, asked, sensors, counted=log.counts is not None)
     _check_count(fit_for.log, parameters, fit_for.left_out)
-    problem = Problem(robot, model, sensors, parameters, readings_of(fit_for.log))
+    problem = Problem(robot, model, sensors, parameters, readings_table(fit_for.log))
     try:
-        found = found_from(problem, fit_for.log.commanded, robust=robust, progress=progress)
+        found = search_from_priors(problem, fit_for.log.commanded, robust=robust, progress=progress)
     except InvalidValueError:
-        _refuse(suspicions(robot, _in_known_axes(log, parameters), model))
+        _refuse(diagnose_log(robot, _in_known_axes(log, parameters), model))
         _refuse_unlike(robot, fit_for.log, parameters, model)
         raise
     if not found.fit.converged or misfit(found.fit.normal) > GOOD:
-        _refuse(suspicions(robot, _in_known_axes(log, parameters), model))
+        _refuse(diagnose_log(robot, _in_known_axes(log, parameters), model))
         _refuse_unlike(robot, fit_for.log, parameters, model)
     elif Omission.OTHER_EQUILIBRIUM in found.left_out:
-        _refuse(measured_elsewhere(fit_for.log, found.left_out[Omission.OTHER_EQUILIBRIUM], parameters.names))
-    validation = cross_validated(problem, found, folds, robust=robust, progress=progress) if folds else None
-    return concluded(problem, found, fit_for.rows, fit_for.left_out, log.source, validation)
+        _refuse(frame_mismatch(fit_for.log, found.left_out[Omission.OTHER_EQUILIBRIUM], parameters.names))
+    validation = cross_validate(problem, found, folds, robust=robust, progress=progress) if folds else None
+    return evaluate(problem, found, fit_for.rows, fit_for.left_out, log.source, validation)
 
 
-def sensors_there(log: WinchLog) -> Sensors:
+def active_sensors(log: WinchLog) -> Sensors:
     """The sensors that read anything in a log."""
     silent = {
         name: None
@@ -131,7 +128,7 @@ def sensors_there(log: WinchLog) -> Sensors:
     return log.sensors.replace(**silent)
 
 
-def readings_of(log: WinchLog) -> Log:
+def readings_table(log: WinchLog) -> Log:
     """The readings of a log as the least squares take them."""
     count, m = log.readings.shape
 
@@ -165,8 +162,8 @@ def _in_known_axes(log: WinchLog, parameters: Parameters) -> WinchLog:
 
 def _refuse_unlike(robot: Robot, log: WinchLog, parameters: Parameters, model: CableModel) -> None:
     """Refuse measured poses where everything fits but them."""
-    if fits_unmeasured(robot, log, model):
-        _refuse(measured_elsewhere(log, np.arange(len(log)), parameters.names))
+    if fits_without_measured_poses(robot, log, model):
+        _refuse(frame_mismatch(log, np.arange(len(log)), parameters.names))
 
 
 def _refuse(sentences: Iterable[str]) -> None:

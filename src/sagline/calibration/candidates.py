@@ -80,8 +80,8 @@ def candidates_of(
         statuses: list[Codes] = []
         first, missing = 0, count
         for _ in range(ROUNDS):
-            drawn = _drawn(robot, box, -(-missing // sets), rng)
-            own, status = _standing(_narrowed(robot, model, drawn, kept), model, drawn, sets, rng, progress)
+            drawn = _random_poses(robot, box, -(-missing // sets), rng)
+            own, status = _feasible(_with_margins(robot, model, drawn, kept), model, drawn, sets, rng, progress)
             found.append(own._replace(place=own.place + first))
             statuses.append(status)
             first += len(drawn)
@@ -89,15 +89,15 @@ def candidates_of(
             if missing <= 0 or not found[0].place.size:
                 break
         if found[0].place.size:
-            return _joined(found).part(slice(count))
+            return _concatenated(found).part(slice(count))
     raise _none_feasible(robot, np.concatenate(statuses))
 
 
-def _joined(parts: list[Candidates]) -> Candidates:
+def _concatenated(parts: list[Candidates]) -> Candidates:
     return Candidates(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
 
-def _drawn(robot: Robot, box: PoseBox, count: int, rng: np.random.Generator) -> Pose:
+def _random_poses(robot: Robot, box: PoseBox, count: int, rng: np.random.Generator) -> Pose:
     """Poses of a box; every other one, from the second on, nearer to its borders."""
     share, part = rng.uniform(size=(count, 3)), rng.uniform(size=count)
     share[1::2] = 0.5 - 0.5 * np.cos(np.pi * share[1::2])
@@ -114,17 +114,17 @@ def _drawn(robot: Robot, box: PoseBox, count: int, rng: np.random.Generator) -> 
     return Pose.from_quaternion(position, turned)
 
 
-def _narrowed(robot: Robot, model: CableModel, poses: Pose, kept: float) -> Robot:
+def _with_margins(robot: Robot, model: CableModel, poses: Pose, kept: float) -> Robot:
     """The robot with finite limits, and a part of the range between them kept clear at both ends."""
     low, high = robot.tension_min, robot.tension_max
     if np.isinf(high).any():
-        least = np.nan_to_num(_planned(robot, model, poses[:GROUP], MinimumNorm())[2])
+        least = np.nan_to_num(_solve(robot, model, poses[:GROUP], MinimumNorm())[2])
         high = np.where(np.isinf(high), UNLIMITED * max(float(least.max(initial=0.0)), float(low.max()), 1.0), high)
     clear = kept * (high - low)
     return robot.replace(tension_min=low + clear, tension_max=high - clear)
 
 
-def _standing(
+def _feasible(
     robot: Robot, model: CableModel, poses: Pose, sets: int, rng: np.random.Generator, progress: Progress | None
 ) -> tuple[Candidates, Codes]:
     """The feasible ones among poses with sets of tensions, and how each was solved."""
@@ -132,7 +132,7 @@ def _standing(
     for part in blocks(len(poses), GROUP, progress):
         corners = np.where(rng.uniform(size=(sets, robot.cable_count)) < 0.5, robot.tension_min, robot.tension_max)
         group = poses[part]
-        every = [_planned(robot, model, group, QuadraticProgram(target=corner)) for corner in corners]
+        every = [_solve(robot, model, group, QuadraticProgram(target=corner)) for corner in corners]
         status, lengths, tensions = (np.stack(parts, axis=1) for parts in zip(*every, strict=True))
         statuses.append(status.ravel())
         usable = (status == PoseStatus.SOLVED) & _in_range(robot, lengths, tensions)
@@ -141,10 +141,10 @@ def _standing(
         found.append(
             Candidates(pose_rows(group)[which], lengths[which, number], tensions[which, number], place, place % 2 == 0)
         )
-    return _joined(found), np.concatenate(statuses)
+    return _concatenated(found), np.concatenate(statuses)
 
 
-def _planned(robot: Robot, model: CableModel, poses: Pose, method: TensionMethod) -> tuple[Codes, Array, Array]:
+def _solve(robot: Robot, model: CableModel, poses: Pose, method: TensionMethod) -> tuple[Codes, Array, Array]:
     """How each pose was solved, its lengths and its tensions at the frame ends."""
     try:
         plan = inverse(robot, poses, model, method)
@@ -182,3 +182,65 @@ def _none_feasible(robot: Robot, statuses: Codes) -> InvalidValueError:
     why = beyond if reason is PoseStatus.SOLVED else reason.text.split(";")[0]
     value = f"without a pose that {robot.name} can hold among {len(statuses):,} tried ({why})"
     return InvalidValueError("box", value, "a box with feasible poses", "Give box=PoseBox(low, high, tilt) of others.")
+
+
+PASSES: Final = 50  # over all pairs of legs; a tour of a hundred places takes a handful
+_ROUNDING: Final = 1e-9  # of the largest distance
+
+
+def shortest_tour(places: Array) -> Indices:
+    """An order in which all places are visited once, on a short way that need not come back.
+
+    Args:
+        places: Shape (N, d), N >= 1.
+
+    Returns:
+        Indices of the places in that order, shape (N,).
+
+    Source:
+        Croes 1958, "A method for solving traveling-salesman problems" (2-opt).
+    """
+    count = len(places)
+    apart = np.zeros((count + 1, count + 1))  # the last is nowhere: the way begins and ends there at no cost
+    apart[:count, :count] = np.linalg.norm(places[:, None] - places[None], axis=-1)
+    order = np.concatenate(([count], _nearest_neighbor_tour(apart[:count, :count]), [count]))
+    for _ in range(PASSES):
+        if not _reverse_segments(order, apart, _ROUNDING * apart.max()):
+            break
+    found: Indices = order[1:-1]
+    return found
+
+
+def length_of(places: Array, order: Indices) -> float:
+    """How long a tour is, in the unit of the places.
+
+    Args:
+        places: Shape (N, d).
+        order: Indices, shape (N,).
+    """
+    return float(np.linalg.norm(np.diff(places[order], axis=0), axis=-1).sum())
+
+
+def _nearest_neighbor_tour(apart: Array) -> Indices:
+    """From the farthest place on, always to the nearest one."""
+    order = np.empty(len(apart), dtype=np.int64)
+    left = np.ones(len(apart), dtype=np.bool_)
+    here = int(np.argmax(apart.sum(axis=1)))
+    for k in range(len(apart)):
+        order[k] = here
+        left[here] = False
+        here = int(np.argmin(np.where(left, apart[here], np.inf)))
+    return order
+
+
+def _reverse_segments(order: Indices, apart: Array, floor: float) -> bool:
+    """Turn around every stretch that makes the way shorter so, in place; whether there was one."""
+    changed = False
+    for i in range(len(order) - 2):
+        before, first, lasts, after = order[i], order[i + 1], order[i + 1 : -1], order[i + 2 :]
+        saved = apart[before, first] + apart[lasts, after] - apart[before, lasts] - apart[first, after]
+        best = int(np.argmax(saved))
+        if saved[best] > floor:
+            order[i + 1 : i + 2 + best] = order[i + 1 : i + 2 + best][::-1].copy()
+            changed = True
+    return changed

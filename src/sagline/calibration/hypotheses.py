@@ -9,13 +9,10 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from sagline.cables.model import CableModel
-from sagline.calibration.gauss_newton import best_step
-from sagline.calibration.least_squares import passed, solve
+from sagline.calibration.least_squares import best_step, evaluate_step, solve
 from sagline.calibration.log import WinchLog
-from sagline.calibration.parameters import parameters_of
-from sagline.calibration.problem import Begun, Log, Problem, State, machine_at, said_lengths
-from sagline.calibration.start import start_of
-from sagline.calibration.unknowns import Unknown
+from sagline.calibration.parameters import Unknown, parameters_of
+from sagline.calibration.problem import Evaluated, Log, Problem, State, machine_at, reported_lengths, start_of
 from sagline.core.arrays import Array, Indices
 from sagline.core.errors import InvalidValueError
 from sagline.robot.drum import drums_of
@@ -24,7 +21,7 @@ from sagline.robot.robot import Robot
 
 MOST_ROWS: Final = 24  # on which changes are tried: three readings of a load cell for each unknown
 STEPS: Final = 12  # of the least squares: where a robot fits, half of them are enough
-SETTLED: Final = 1.0  # of the sum of squares: how well a robot fits is wanted to some percent
+TOLERANCE: Final = 1.0  # of the sum of squares: how well a robot fits is wanted to some percent
 FEWEST_ROWS: Final = 8  # the same where nobody says at which poses
 # What is known of a robot beforehand, wider than it is: the question is whether any robot like it fits. Shares of the
 # values where logarithms are looked for.
@@ -58,7 +55,7 @@ class Change(NamedTuple):
     late: int = 0
 
 
-class Tried(NamedTuple):
+class TrialResult(NamedTuple):
     """What came of a change.
 
     Attributes:
@@ -92,7 +89,7 @@ class Trial:
     rows: Indices
     found: dict[tuple[Change, int], Pose] = field(default_factory=dict)
 
-    def result(self, change: Change) -> Tried:
+    def result(self, change: Change) -> TrialResult:
         """How well any robot like this one fits the readings.
 
         Args:
@@ -102,12 +99,12 @@ class Trial:
         try:
             state, normal = _fitted(problem, start_of(problem, poses))
         except (InvalidValueError, np.linalg.LinAlgError):  # with such readings it goes astray
-            return Tried(np.inf, np.inf, moved)
+            return TrialResult(np.inf, np.inf, moved)
         quality = float(np.median(normal.squares / np.maximum(normal.readings, 1)))
         off = state.numbers - problem.prior
         zeros = np.array([name == "length_zero" for name in problem.parameters.names])
         departure = float(np.mean((off / problem.prior_deviation) ** 2))
-        return Tried(quality, departure, moved + off[zeros])
+        return TrialResult(quality, departure, moved + off[zeros])
 
     def promise(self, change: Change, steps: int) -> float:
         """What the least squares promise of the sum of squares for each row after some steps; infinite for nothing.
@@ -122,7 +119,7 @@ class Trial:
         try:
             state = start_of(problem, poses)
             for _ in range(steps + 1):
-                state, normal = passed(problem, state, step, kept)
+                state, normal = evaluate_step(problem, state, step, kept)
                 kept = kept & np.isfinite(normal.squares)
                 step, gain = best_step(problem, state, normal)
         except (InvalidValueError, np.linalg.LinAlgError):
@@ -130,7 +127,7 @@ class Trial:
         there = int(np.count_nonzero(kept))
         return float(normal.squares[kept].sum() - gain) / there if 2 * there > len(kept) else np.inf
 
-    def promising(self, changes: Iterable[Change], steps: int, most: int) -> list[Change]:
+    def most_promising(self, changes: Iterable[Change], steps: int, most: int) -> list[Change]:
         """The changes that promise more than none does, the best first.
 
         Args:
@@ -157,8 +154,8 @@ class Trial:
         rows = self.rows[(self.rows + late >= 0) & (self.rows + late < len(log))]
         rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(most, len(rows))).round().astype(np.int64))]
         none = np.full((len(rows), max(m, 4)), np.nan)
-        read = _exchanged(log.readings[rows], change.lengths)
-        cells = none[:, :m] if log.load_cells is None else _exchanged(log.load_cells[rows + late], change.cells)
+        read = _swap_columns(log.readings[rows], change.lengths)
+        cells = none[:, :m] if log.load_cells is None else _swap_columns(log.load_cells[rows + late], change.cells)
         counted, winches = log.counts is not None, self.robot.winches
         if (cable := change.flipped) is not None:
             zero = winches.count_zero[cable] if counted and winches is not None else read[:, cable].max()
@@ -209,21 +206,21 @@ class Trial:
         return found
 
 
-def _fitted(problem: Problem, state: State) -> Begun:
+def _fitted(problem: Problem, state: State) -> Evaluated:
     """A few steps of the least squares: a robot that fits is found in half of them, of others only that it does not."""
-    begun = passed(problem, state, None, np.ones(len(state.poses), dtype=np.bool_))
-    fit = solve(problem, begun, np.isfinite(begun[1].squares), robust=False, steps=STEPS, settled=SETTLED)
+    begun = evaluate_step(problem, state, None, np.ones(len(state.poses), dtype=np.bool_))
+    fit = solve(problem, begun, np.isfinite(begun[1].squares), robust=False, steps=STEPS, settled=TOLERANCE)
     return fit.state, fit.normal
 
 
 def _offsets(problem: Problem, poses: Pose | None) -> tuple[Array, Array]:
     state = start_of(problem, poses)
-    off = said_lengths(problem, machine_at(problem, problem.prior), slice(None)) - state.lengths
+    off = reported_lengths(problem, machine_at(problem, problem.prior), slice(None)) - state.lengths
     middle = np.median(off, axis=0)
     return middle, np.median(np.abs(off - middle), axis=0)
 
 
-def _exchanged(values: Array, two: tuple[int, int] | None) -> Array:
+def _swap_columns(values: Array, two: tuple[int, int] | None) -> Array:
     values = values.copy()
     if two is not None:
         values[:, list(two)] = values[:, list(two[::-1])]

@@ -35,7 +35,7 @@ class Information:
         self.chosen: list[int] = []
         self._known = known
         self._unit = np.eye(rows.shape[1])
-        self.covariance, self._heard = self._summed()
+        self.covariance, self._heard = self._recompute()
 
     def gains(self) -> Array:
         """By how much each candidate would raise the log det of what is known, shape (N,); -1 for what was taken."""
@@ -62,16 +62,16 @@ class Information:
     def leave(self, candidate: int) -> None:
         """One less; all is summed anew, because what alone told of a number leaves little but rounding behind."""
         self.chosen.remove(candidate)
-        self.covariance, self._heard = self._summed()
+        self.covariance, self._heard = self._recompute()
 
-    def _summed(self) -> tuple[Array, Array]:
+    def _recompute(self) -> tuple[Array, Array]:
         """Covariance, and J C J^T of each candidate, from nothing."""
-        root = np.linalg.inv(np.linalg.cholesky(self._known + told_by(self.rows[self.chosen])))
+        root = np.linalg.inv(np.linalg.cholesky(self._known + information_of(self.rows[self.chosen])))
         shares = self.rows @ root.T
         return root.T @ root, shares @ shares.transpose(0, 2, 1)
 
 
-def ground(rows: Array) -> Array:
+def prior_information(rows: Array) -> Array:
     """What is taken as known of each number where priors are its unit: 1, but no less than rounding of what is told.
 
     Args:
@@ -97,7 +97,7 @@ class Choice(NamedTuple):
     deviation: Array
 
 
-def most_telling(rows: Array, known: Array, count: int) -> Choice:
+def choose_informative(rows: Array, known: Array, count: int) -> Choice:
     """Candidates that tell most together: the best beside those before it; if few, each exchanged for a better one.
 
     The greedy choice alone is within 1 - 1/e of the best: a log det is submodular.
@@ -157,7 +157,7 @@ def deviations_of(rows: Array, held: Array) -> Array:
     return found
 
 
-def told_by(rows: Array) -> Array:
+def information_of(rows: Array) -> Array:
     """What readings tell together: the sum of J^T J.
 
     Args:

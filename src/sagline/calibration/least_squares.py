@@ -6,28 +6,30 @@ it)/sigma_L)^2, and over the numbers of ((value - prior)/its deviation)^2; docs/
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
+from scipy.linalg import LinAlgError, cho_factor, cho_solve, eigh
+from scipy.spatial.transform import Rotation
+from scipy.special import chdtr, chdtrc, chdtri
 
-from sagline.calibration.carried import carried
-from sagline.calibration.chi_squared import exceeded_with
-from sagline.calibration.gauss_newton import best_step
-from sagline.calibration.observing import BLOCK, NO_LOAD, Machine, Observed, observed_rows
-from sagline.calibration.paid import counts_of, paid_slopes
-from sagline.calibration.problem import Begun, Fit, Normal, Problem, State, machine_at, said_lengths
-from sagline.calibration.sensors import Sensors, reading_deviations
-from sagline.calibration.turn import left_jacobian
+from sagline.calibration.log import Sensors, reading_deviations
+from sagline.calibration.observations import BLOCK, NO_LOAD, Machine, Observed, counts_of, whitened_rows, winch_slopes
+from sagline.calibration.parameters import left_jacobian
+from sagline.calibration.problem import Evaluated, Fit, Normal, Problem, State, machine_at, reported_lengths
 from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.progress import Progress, blocks
 from sagline.kernels.calibration import kinds
 from sagline.kernels.calibration.terms import Readings
 from sagline.kinematics.forward_rows import solve_rows
+from sagline.robot.robot import Robot
 
 STEPS: Final = 60
 HALVINGS: Final = 12
-SETTLED: Final = 1e-5  # of the sum of squares: a step that promises less is within 3e-3 standard deviations of the best
+TOLERANCE: Final = (
+    1e-5  # of the sum of squares: a step that promises less is within 3e-3 standard deviations of the best
+)
 ROUNDING: Final = 1e-12  # of the sum of squares
 QUANTILE: Final = 0.99  # of chi squared of a pose: beyond it a pose counts less
 NEARLY: Final = 1e-3  # of the sum of squares: as near is near enough where rounding hides the rest
@@ -35,7 +37,7 @@ GROSS: Final = 0.1  # weight of a pose that would spoil the first step
 LESS: Final = 0.9  # of the scale of misfits, where it is worth another look
 
 
-def rows_at(
+def whitened_at(
     problem: Problem,
     state: State,
     said: Array,
@@ -60,14 +62,14 @@ def rows_at(
     if free_of_noise and machine.drums is not None:
         along = state.lengths[part]
         counts = counts_of(machine.drums, along)
-    paid = paid_slopes(machine.robot, parameters, counts, along)
+    paid = winch_slopes(machine.robot, parameters, counts, along)
     readings = Readings(said, log.cells[part], log.positions[part], log.rotations[part])
     turning = parameters.where[kinds.TURN : kinds.TURN + 3, 0]
     turn = left_jacobian(state.numbers[turning]) if turning[0] >= 0 else None
     if direction is not None and turn is not None:
         direction = direction.copy()
         direction[turning] = turn @ direction[turning]
-    rows = observed_rows(machine, parameters, readings, paid, state.poses[part], state.lengths[part], direction)
+    rows = whitened_rows(machine, parameters, readings, paid, state.poses[part], state.lengths[part], direction)
     if direction is None and turn is not None:
         rows.matrix[..., turning] = rows.matrix[..., turning] @ turn
     return rows
@@ -90,7 +92,7 @@ def limits_of(readings: Indices, scale: float) -> Array:
     return limits
 
 
-def weigh(squares: Array, readings: Indices, scale: float) -> Array:
+def pose_weights(squares: Array, readings: Indices, scale: float) -> Array:
     """With which weights poses count: less where they fit worse than all but a hundredth of their like."""
     if not np.isfinite(scale):
         return np.ones(len(squares))
@@ -125,15 +127,15 @@ def moved(
     if known is not None:
         off = np.einsum("nij,nj->ni", known.back, known.misfit - known.matrix @ step)
         return said + off, before.poses[part]
-    was = said_lengths(problem, before.machine, part)
-    rows = rows_at(problem, before, was, part, step)
+    was = reported_lengths(problem, before.machine, part)
+    rows = whitened_at(problem, before, was, part, step)
     off = np.einsum("nij,nj->ni", rows.back, rows.misfit - rows.matrix[..., 0])
     more = off - (before.lengths[part] - was)
     motion = rows.motion[:, -1] + np.einsum("ni,nik->nk", more, rows.motion[:, :-1])
     return said + off, carried(before.machine.robot, machine.robot, before.poses[part], motion)
 
 
-def passed(
+def evaluate_step(
     problem: Problem,
     before: State,
     step: Array | None,
@@ -141,7 +143,7 @@ def passed(
     scale: float = np.inf,
     known: Observed | None = None,
     progress: Progress | None = None,
-) -> Begun:
+) -> Evaluated:
     """One pass over the log: every pose solved after a step of the numbers, and what they all say there.
 
     Args:
@@ -164,7 +166,7 @@ def passed(
     matrix, gradient = np.zeros((width, width)), np.zeros(width)
     squares, readings, weights = np.full(count, np.inf), np.zeros(count, dtype=np.int64), np.zeros(count)
     for part in blocks(count, BLOCK, progress):
-        said, starts = said_lengths(problem, machine, part), before.poses[part]
+        said, starts = reported_lengths(problem, machine, part), before.poses[part]
         if step is not None:
             after.lengths[part], starts = moved(problem, before, known, step, machine, said, part)
         lengths = after.lengths[part]
@@ -173,11 +175,11 @@ def passed(
         solved = solve_rows(machine.robot, problem.model, asked, locked(starts.copy()), NO_LOAD)
         there = solved.stable & ~lost
         after.poses[part][there] = solved.poses[there]
-        rows = rows_at(problem, after, said, part)
+        rows = whitened_at(problem, after, said, part)
         there &= ~np.isnan(rows.misfit).any(axis=1)
         found, number = squares_of(machine.sensors, rows, said, lengths)
         squares[part], readings[part] = np.where(there, found, np.inf), number
-        weights[part] = np.where(there, weigh(squares[part], number, scale), 0.0)
+        weights[part] = np.where(there, pose_weights(squares[part], number, scale), 0.0)
         share, flat, misses = np.sqrt(weights[part]), rows.matrix, rows.misfit
         if not (share == 1.0).all():
             flat, misses = flat[there] * share[there, None, None], misses[there] * share[there, None]
@@ -187,7 +189,7 @@ def passed(
     return after, Normal(matrix, gradient, squares, readings, weights, rows if count <= BLOCK else None)
 
 
-def cost_of(problem: Problem, begun: Begun, kept: Flags, scale: float) -> float:
+def cost_of(problem: Problem, begun: Evaluated, kept: Flags, scale: float) -> float:
     """What is made small; infinite where a pose that counts finds no equilibrium."""
     state, normal = begun
     squares = normal.squares[kept]
@@ -201,12 +203,12 @@ def cost_of(problem: Problem, begun: Begun, kept: Flags, scale: float) -> float:
 
 def solve(
     problem: Problem,
-    begun: Begun,
+    begun: Evaluated,
     kept: Flags,
     *,
     robust: bool,
     steps: int = STEPS,
-    settled: float = SETTLED,
+    settled: float = TOLERANCE,
     progress: Progress | None = None,
 ) -> Fit:
     """Gauss-Newton from a state, steps halved until the sum of squares falls.
@@ -226,9 +228,9 @@ def solve(
         How it ended.
     """
     scale = np.inf
-    if robust and weigh(begun[1].squares, begun[1].readings, max(misfit(begun[1]), 1.0))[kept].min() < GROSS:
+    if robust and pose_weights(begun[1].squares, begun[1].readings, max(misfit(begun[1]), 1.0))[kept].min() < GROSS:
         scale = max(misfit(begun[1]), 1.0)
-        begun = passed(problem, begun[0], None, kept, scale, progress=progress)
+        begun = evaluate_step(problem, begun[0], None, kept, scale, progress=progress)
     for iteration in range(steps):
         before = scale
         if robust and (now := max(misfit(begun[1]), 1.0)) < LESS * scale:
@@ -240,7 +242,7 @@ def solve(
         better = None
         for halving in range(HALVINGS):
             try:
-                trial = passed(problem, begun[0], step * 0.5**halving, kept, scale, begun[1].rows, progress)
+                trial = evaluate_step(problem, begun[0], step * 0.5**halving, kept, scale, begun[1].rows, progress)
             except InvalidValueError:  # a negative radius, say
                 continue
             if cost_of(problem, trial, kept, scale) <= cost + ROUNDING * abs(cost):
@@ -250,3 +252,88 @@ def solve(
             return Fit(*begun, promised <= NEARLY, iteration)
         begun = better
     return Fit(*begun, False, steps)
+
+
+OPEN: Final = 1e-13  # of the largest: smaller eigenvalues are rounding
+
+
+def best_step(problem: Problem, state: State, normal: Normal) -> tuple[Array, float]:
+    """The Gauss-Newton step, internal (P,), and what it promises of the sum of squares.
+
+    Along directions that neither data nor priors tell there is no step, and none leads below the least that a number
+    may be: where it would, the others go where they fit best beside that.
+    """
+    scale, deviation = problem.scale, problem.prior_deviation
+    known = np.where(np.isfinite(deviation), scale / deviation, 0.0) ** 2
+    missed = (state.numbers - problem.prior) / scale
+    downhill = scale * normal.gradient - known * missed
+    matrix = scale[:, None] * normal.matrix * scale + np.diag(known)
+    step = _lowest(matrix, downhill, positive=bool(known.all()))
+    room = (problem.least - state.numbers) / scale
+    if (step < room).any():
+        step = _lowest_within(matrix, downhill, room)
+    promised = float(2.0 * step @ downhill - step @ matrix @ step)
+    return np.where(step <= room, problem.least - state.numbers, scale * step), promised
+
+
+def _lowest(matrix: Array, downhill: Array, *, positive: bool) -> Array:
+    """Where x^T M x - 2 b^T x is least; zero along what is not told."""
+    if positive:
+        try:
+            return np.asarray(cho_solve(cho_factor(matrix), downhill))
+        except LinAlgError:  # what priors tell is rounding beside the readings
+            pass
+    values, vectors = _significant_eigenpairs(matrix)
+    return np.asarray(vectors @ ((vectors.T @ downhill) / values))
+
+
+def _lowest_within(matrix: Array, downhill: Array, room: Array) -> Array:
+    """The same of all x >= room (P,), which are zero or less."""
+    from scipy.optimize import lsq_linear  # of use to few, and a quarter of a second to load
+
+    values, vectors = _significant_eigenpairs(matrix)
+    root = np.sqrt(values)
+    found = lsq_linear(root[:, None] * vectors.T, vectors.T @ downhill / root, (room, np.inf), method="bvls")
+    return np.where(found.active_mask < 0, room, found.x)  # there, not near there
+
+
+def _significant_eigenpairs(matrix: Array) -> tuple[Array, Array]:
+    """Eigenvalues that are more than rounding, and their vectors: columns."""
+    values, vectors = eigh(matrix)
+    told = values > OPEN * values[-1]
+    return values[told], vectors[:, told]
+
+
+def below(squares: Any, freedoms: Any) -> Array:
+    """Probability that chance has no more."""
+    return np.asarray(chdtr(freedoms, squares))
+
+
+def above(squares: Any, freedoms: Any) -> Array:
+    """Probability that chance has more."""
+    return np.asarray(chdtrc(freedoms, squares))
+
+
+def exceeded_with(probability: Any, freedoms: Any) -> Array:
+    """What chance exceeds with a probability, small ones kept to the last digit; of no freedoms, as of one."""
+    return np.asarray(chdtri(np.maximum(freedoms, 1), probability))
+
+
+def carried(before: Robot, after: Robot, poses: Array, motion: Array) -> Array:
+    """Pose rows after a motion about the center of mass, which may be elsewhere in the platform then.
+
+    Args:
+        before: The robot.
+        after: The same with another center of mass.
+        poses: Pose rows (N, POSE_COLUMNS).
+        motion: Of the center of mass and about it, world axes [m, rad], (N, 6).
+
+    Returns:
+        Pose rows; they have moved along the motions alone that the robot is free to make.
+    """
+    turned = Rotation.from_quat(poses[:, 3:])
+    turning = Rotation.from_rotvec(motion[:, 3:]) * turned
+    first, last = (np.array(robot.center_of_mass) for robot in (before, after))  # scipy takes no locked array
+    shift = motion[:, :3] + turned.apply(first) - turning.apply(last)
+    free = before.freedom[:, :3]
+    return np.hstack((poses[:, :3] + shift @ free.T @ free, turning.as_quat()))

@@ -1,23 +1,160 @@
-"""Which poses do not fit the rest, and what of them: a cable that slipped, a load cell, a measured position."""
+"""A pose of a log explained: the best fit where some lengths or readings are off by anything."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
+from scipy.linalg import cho_factor, cho_solve
 from scipy.special import gammaln
 
 from sagline.cables.model import CableModel
-from sagline.calibration.chi_squared import above, exceeded_with
-from sagline.calibration.explaining import Explained, Stand, Suspect, explained
 from sagline.calibration.findings import Outlier
-from sagline.calibration.plain_slopes import bench_of, said_at
-from sagline.calibration.problem import Problem, State, said_lengths
-from sagline.calibration.sensors import Sensors, reading_deviations
-from sagline.core.arrays import Array, Flags, Indices
+from sagline.calibration.least_squares import above, exceeded_with
+from sagline.calibration.log import Sensors, reading_deviations
+from sagline.calibration.observations import NO_LOAD, Reference, misfit_at, reference_of
+from sagline.calibration.problem import Problem, State, reported_lengths
+from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.kernels.calibration.terms import Readings
+from sagline.kinematics.forward_rows import solve_rows
 from sagline.robot.robot import Robot
+
+_SETTLED: Final = 1e-3  # of a sum of squares
+_HALVINGS: Final = 6
+
+
+class Suspect(NamedTuple):
+    """What may have gone wrong at a pose.
+
+    Attributes:
+        quantity: Of `Outlier`.
+        cable: Its number, or None.
+        which: Lengths, then readings that it changes, of 2 m + 6.
+    """
+
+    quantity: str
+    cable: int | None
+    which: Indices
+
+
+class SuspectFit(NamedTuple):
+    """A pose, where some things are taken to be off by what fits best.
+
+    Attributes:
+        squares: Sum of squares that is left.
+        sizes: By how much each thing is off.
+        deviations: The same in standard deviations.
+    """
+
+    squares: float
+    sizes: list[float]
+    deviations: list[float]
+
+
+class PoseReadings(NamedTuple):
+    """A pose of the log.
+
+    Attributes:
+        bench: What it is compared with.
+        deviation: Of lengths and readings, (2 m + 6,).
+        readings: What was read there, of one row.
+        pose: Where it is, (1, POSE_COLUMNS).
+        lengths: With which true lengths [m], (1, m).
+    """
+
+    bench: Reference
+    deviation: Array
+    readings: Readings
+    pose: Array
+    lengths: Array
+
+
+class PoseFit(NamedTuple):
+    """A platform at some lengths, beside what was read.
+
+    Attributes:
+        pose: (1, POSE_COLUMNS).
+        lengths: [m], (1, m).
+        residual: Readings less predictions, (m + 6,).
+        by_length: Their slopes, (m + 6, m).
+        squares: Sum of squares of all but what may be off.
+    """
+
+    pose: Array
+    lengths: Array
+    residual: Array
+    by_length: Array
+    squares: float
+
+    @classmethod
+    def of(cls, stand: PoseReadings, counts: Flags, pose: Array, lengths: Array) -> PoseFit:
+        """The platform at a pose."""
+        residual, by_length = misfit_at(stand.bench, stand.readings, pose, lengths)
+        missed = np.concatenate((stand.readings.lengths[0] - lengths[0], residual)) / stand.deviation
+        return cls(pose, lengths, residual, by_length, float(np.sum(missed[counts] ** 2)))
+
+
+def fit_suspects(stand: PoseReadings, taken: Sequence[Suspect], there: Flags, rounds: int) -> SuspectFit:
+    """The best fit of a pose where some lengths and readings are off by anything, as the others are not.
+
+    With one round it is that of the slopes, with more that of the pose itself.
+    """
+    which = np.concatenate([one.which for one in taken]).astype(np.int64) if taken else np.zeros(0, dtype=np.int64)
+    counts = np.concatenate((np.ones(stand.lengths.shape[1], dtype=np.bool_), there))
+    counts[which] = False
+    state = PoseFit.of(stand, counts, stand.pose, stand.lengths)
+    fit, wanted = _fitted(stand, state, taken, which, there)
+    for _ in range(rounds - 1):
+        better = _better(stand, state, counts, wanted)
+        if better is None:
+            break
+        gained = state.squares - better.squares
+        state = better
+        fit, wanted = _fitted(stand, state, taken, which, there)
+        if gained < _SETTLED:
+            break
+    return fit if rounds == 1 else fit._replace(squares=state.squares)
+
+
+def _fitted(
+    stand: PoseReadings, state: PoseFit, taken: Sequence[Suspect], which: Indices, there: Flags
+) -> tuple[SuspectFit, Array]:
+    """The best fit by the slopes at a state, and the true lengths that it asks for, (m,)."""
+    m, said = state.lengths.shape[1], stand.readings.lengths[0]
+    slopes, variance = state.by_length[there], stand.deviation[:m] ** 2
+    missed = state.residual[there] - slopes @ (said - state.lengths[0])
+    columns = np.hstack((-slopes, np.eye(m + 6)[there]))[:, which]
+    factor = cho_factor(np.diag(stand.deviation[m:][there] ** 2) + (slopes * variance) @ slopes.T)
+    inverse = np.linalg.pinv(columns.T @ cho_solve(factor, columns), hermitian=True)
+    off = inverse @ (columns.T @ cho_solve(factor, missed))
+    rest = missed - columns @ off
+    slipped = np.zeros(2 * m + 6)
+    slipped[which] = off
+    wanted: Array = said - slipped[:m] + variance * (slopes.T @ cho_solve(factor, rest))
+    sizes, deviations, first = [], [], 0
+    for one in taken:
+        part = slice(first, first + len(one.which))
+        own, spread = off[part], np.linalg.pinv(inverse[part, part], hermitian=True)
+        sizes.append(float(own[0]) if one.cable is not None else float(np.linalg.norm(own)))
+        deviations.append(float(np.sqrt(max(own @ spread @ own, 0.0))))
+        first = part.stop
+    return SuspectFit(float(rest @ cho_solve(factor, rest)), sizes, deviations), wanted
+
+
+def _better(stand: PoseReadings, state: PoseFit, counts: Flags, wanted: Array) -> PoseFit | None:
+    """The state on the way to other lengths whose sum of squares is smaller; None if there is none."""
+    for halving in range(_HALVINGS):
+        lengths = state.lengths + 0.5**halving * (wanted - state.lengths)
+        if (lengths <= 0.0).any():
+            continue
+        found = solve_rows(stand.bench.robot, stand.bench.model, locked(lengths), locked(state.pose.copy()), NO_LOAD)
+        if found.stable[0]:
+            new = PoseFit.of(stand, counts, found.poses, lengths)
+            if new.squares < state.squares:
+                return new
+    return None
+
 
 CHANCE: Final = 0.01  # of one outlier among all poses of a log that has none
 EXAMINED: Final = 100  # poses, the worst of them: where there are more, the calibration is wrong and not the poses
@@ -54,7 +191,7 @@ def outliers_in(problem: Problem, state: State, which: Indices, rows: Indices, *
         count: How many poses the whole log has.
     """
     log, machine = problem.log, state.machine
-    said = said_lengths(problem, machine, slice(None))[which]
+    said = reported_lengths(problem, machine, slice(None))[which]
     readings = Readings(said, log.cells[which], log.positions[which], log.rotations[which])
     stands = state.poses[which], state.lengths[which]
     return outliers_of(machine.robot, problem.model, machine.sensors, readings, *stands, rows, count=count)
@@ -95,31 +232,31 @@ def outliers_of(
     deviation = reading_deviations(sensors, m)
     silent = [np.isnan(part) for part in (readings.cells, readings.positions, readings.rotations[:, :3])]
     there = ~np.concatenate(silent, axis=1) & np.isfinite(deviation[m:])
-    bench = bench_of(robot, model, sensors)
+    bench = reference_of(robot, model, sensors)
     found: list[Outlier] = []
     for place, row in enumerate(map(int, rows)):
         one = slice(place, place + 1)
-        stand = Stand(bench, deviation, Readings(*(part[one] for part in readings)), poses[one], lengths[one])
+        stand = PoseReadings(bench, deviation, Readings(*(part[one] for part in readings)), poses[one], lengths[one])
         found += _outliers_at(stand, row, there[place], count)
     return tuple(found)
 
 
-def _outliers_at(stand: Stand, row: int, there: Flags, count: int) -> list[Outlier]:
+def _outliers_at(stand: PoseReadings, row: int, there: Flags, count: int) -> list[Outlier]:
     m = stand.lengths.shape[1]
-    whole = explained(stand, (), there, 1)
+    whole = fit_suspects(stand, (), there, 1)
     suspects = _suspects(m, there)
     taken: list[Suspect] = []
     before = whole.squares
     for _ in range(_MOST):
-        first = [explained(stand, (*taken, one), there, 1) for one in suspects]
+        first = [fit_suspects(stand, (*taken, one), there, 1) for one in suspects]
         rough = [_rarity(before, fit, one) for fit, one in zip(first, suspects, strict=True)]
         near_best = np.array(rough) < min(rough) + _WORTH
         close = [suspects[k] for k in np.flatnonzero(near_best)]
-        fits = [explained(stand, (*taken, one), there, _ROUNDS) for one in close]
+        fits = [fit_suspects(stand, (*taken, one), there, _ROUNDS) for one in close]
         if min(fit.squares for fit in fits) > _limit(there, (*taken, close[0]), count):  # none is right, or far from it
             likely = ~near_best & (np.array([fit.squares for fit in first]) < _BENT * before)
             more = [suspects[k] for k in np.flatnonzero(likely)]
-            fits += [explained(stand, (*taken, one), there, _ROUNDS) for one in more]
+            fits += [fit_suspects(stand, (*taken, one), there, _ROUNDS) for one in more]
             close += more
         rare = [_rarity(before, fit, one) for fit, one in zip(fits, close, strict=True)]
         best = int(np.argmin(rare))
@@ -146,7 +283,7 @@ def _limit(there: Flags, taken: Sequence[Suspect], count: int) -> float:
     return float(exceeded_with(CHANCE / count, int(there.sum()) - used))
 
 
-def _rarity(before: float, after: Explained, suspect: Suspect) -> float:
+def _rarity(before: float, after: SuspectFit, suspect: Suspect) -> float:
     """Logarithm of the probability that chance alone would make so much better what is left."""
     half, drop = 0.5 * len(suspect.which), max(before - after.squares, 0.0)
     if drop < _DROP:
@@ -164,10 +301,10 @@ def _suspects(m: int, there: Flags) -> list[Suspect]:
     return found
 
 
-def _whole(stand: Stand, row: int, squares: float) -> Outlier:
+def _whole(stand: PoseReadings, row: int, squares: float) -> Outlier:
     """The pose as a whole, by the kind of reading that is the farthest off."""
     m = stand.lengths.shape[1]
-    residual, _ = said_at(stand.bench, stand.readings, stand.pose, stand.lengths)
+    residual, _ = misfit_at(stand.bench, stand.readings, stand.pose, stand.lengths)
     off = np.concatenate((stand.readings.lengths[0] - stand.lengths[0], residual))
     parts = (slice(0, m), slice(m, 2 * m), slice(2 * m, 2 * m + 3), slice(2 * m + 3, 2 * m + 6))
     shares = [float(np.nansum((off[part] / stand.deviation[part]) ** 2)) for part in parts]

@@ -8,9 +8,8 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.calibration.log import WinchLog
-from sagline.calibration.sensors import load_cells_of
-from sagline.calibration.status import Omission
+from sagline.calibration.findings import Omission
+from sagline.calibration.log import WinchLog, load_cells_of
 from sagline.core.arguments import instance
 from sagline.core.arrays import Array, Flags, Indices, locked, number
 from sagline.core.errors import InvalidValueError
@@ -24,7 +23,7 @@ PULLING: Final = 3.0  # standard deviations above nothing that a load cell must 
 OTHERWISE: Final = 0.5  # share of the rows in which a cable's load cell is read where it is missed in the others
 
 
-class Screened(NamedTuple):
+class ScreenedLog(NamedTuple):
     """The rows of a log that are fit, and those that are not.
 
     Attributes:
@@ -38,7 +37,7 @@ class Screened(NamedTuple):
     left_out: Mapping[Omission, Indices]
 
 
-def screened(robot: Robot, log: WinchLog, speed_limit: float = SPEED_LIMIT) -> Screened:
+def screen(robot: Robot, log: WinchLog, speed_limit: float = SPEED_LIMIT) -> ScreenedLog:
     """The rows of a log at which the platform stood on taut cables and every sensor was read, once.
 
     Left out, in this order, are rows
@@ -77,7 +76,7 @@ def screened(robot: Robot, log: WinchLog, speed_limit: float = SPEED_LIMIT) -> S
         if (wrong & kept).any():
             found[reason] = locked(np.flatnonzero(wrong & kept))
             kept &= ~wrong
-    return Screened(log if kept.all() else log.rows(kept), locked(np.flatnonzero(kept)), found)
+    return ScreenedLog(log if kept.all() else log.rows(kept), locked(np.flatnonzero(kept)), found)
 
 
 def lengths_of(robot: Robot, log: WinchLog) -> Array:

@@ -6,17 +6,28 @@ from collections.abc import Mapping
 from typing import Final, NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from sagline.calibration.chi_squared import exceeded_with
-from sagline.calibration.least_squares import passed, solve
-from sagline.calibration.observing import NO_LOAD
+from sagline.calibration.findings import CrossValidation, Omission
+from sagline.calibration.least_squares import evaluate_step, exceeded_with, solve
+from sagline.calibration.log import load_cells_of
+from sagline.calibration.observations import BLOCK, NO_LOAD, Machine
 from sagline.calibration.outliers import EXAMINED, outliers_in
-from sagline.calibration.problem import Begun, Fit, Problem, State, said_lengths
-from sagline.calibration.start import held_lengths, start_of
-from sagline.calibration.status import Omission
-from sagline.core.arrays import Flags, Indices, locked
+from sagline.calibration.problem import (
+    Evaluated,
+    Fit,
+    Problem,
+    State,
+    held_lengths,
+    machine_at,
+    reported_lengths,
+    start_of,
+)
+from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.core.errors import InvalidValueError
-from sagline.core.progress import Progress
+from sagline.core.progress import Progress, blocks
+from sagline.kernels.calibration import kinds
+from sagline.kinematics.forward_rows import solve_rows
 from sagline.kinematics.start import search
 from sagline.robot.pose import Pose
 
@@ -39,7 +50,9 @@ class Found(NamedTuple):
     left_out: Mapping[Omission, Indices]
 
 
-def found_from(problem: Problem, commanded: Pose | None, *, robust: bool, progress: Progress | None = None) -> Found:
+def search_from_priors(
+    problem: Problem, commanded: Pose | None, *, robust: bool, progress: Progress | None = None
+) -> Found:
     """Search from the priors; poses that end elsewhere get a second chance, and are left out if they do not take it.
 
     Args:
@@ -54,53 +67,53 @@ def found_from(problem: Problem, commanded: Pose | None, *, robust: bool, progre
     """
     state = start_of(problem, commanded)
     kept = np.ones(len(state.poses), dtype=np.bool_)
-    begun = passed(problem, state, None, kept)
+    begun = evaluate_step(problem, state, None, kept)
     left_out: dict[Omission, Indices] = {}
-    if (lost := _lost(begun)).any():
-        begun = passed(problem, _again(problem, state, lost), None, kept)
-    if (lost := _lost(begun)).any():
+    if (lost := _without_equilibrium(begun)).any():
+        begun = evaluate_step(problem, _restart(problem, state, lost), None, kept)
+    if (lost := _without_equilibrium(begun)).any():
         left_out[Omission.NO_EQUILIBRIUM] = locked(np.flatnonzero(lost))
         kept &= ~lost
     if not kept.any():
         step = "Correct the lengths, or the robot: its anchors, and the zeros of its lengths."
         raise InvalidValueError("log", "without a pose at which this robot rests", "one at least", step)
     fit = solve(problem, begun, kept, robust=robust, progress=progress)
-    if (strange := _strange(fit, kept)).any():
-        begun = passed(problem, _again(problem, fit.state, strange), None, kept)
+    if (strange := _improbable(fit, kept)).any():
+        begun = evaluate_step(problem, _restart(problem, fit.state, strange), None, kept)
         if (begun[1].squares[strange] < fit.normal.squares[strange]).any():
             fit = solve(problem, begun, kept, robust=robust, progress=progress)
-            strange = _strange(fit, kept)
-        elsewhere = _elsewhere(problem, fit.state, strange)
+            strange = _improbable(fit, kept)
+        elsewhere = _other_equilibrium(problem, fit.state, strange)
         if robust:
-            elsewhere &= ~_slipped(problem, fit.state, elsewhere)
+            elsewhere &= ~_single_cable_outliers(problem, fit.state, elsewhere)
         if elsewhere.any():
             left_out[Omission.OTHER_EQUILIBRIUM] = locked(np.flatnonzero(elsewhere))
             kept &= ~elsewhere
             if not kept.any():
                 step = "Check that it is this robot's log, its lengths and load cells, or begin with better anchors."
                 raise InvalidValueError("log", "without a pose at which this robot reads so", "one at least", step)
-            begun = passed(problem, fit.state, None, kept)
+            begun = evaluate_step(problem, fit.state, None, kept)
             fit = solve(problem, begun, kept, robust=robust, progress=progress)
     return Found(fit, kept, left_out)
 
 
-def _lost(begun: Begun) -> Flags:
+def _without_equilibrium(begun: Evaluated) -> Flags:
     """Which poses find no equilibrium, (N,)."""
     lost: Flags = ~np.isfinite(begun[1].squares)
     return lost
 
 
-def _strange(fit: Fit, kept: Flags) -> Flags:
+def _improbable(fit: Fit, kept: Flags) -> Flags:
     """Which poses fit so badly that no noise does it, (N,)."""
     limit = exceeded_with(STRANGE, fit.normal.readings)
     strange: Flags = kept & (fit.normal.squares > limit)
     return strange
 
 
-def _again(problem: Problem, state: State, which: Flags) -> State:
+def _restart(problem: Problem, state: State, which: Flags) -> State:
     """A state in which some poses begin anew, where the lengths that the winches say put the platform."""
     machine = state.machine
-    said = said_lengths(problem, machine, slice(None))
+    said = reported_lengths(problem, machine, slice(None))
     found = search(machine.robot, problem.model, locked(said[which].copy()), NO_LOAD, None)
     poses, lengths = state.poses.copy(), state.lengths.copy()
     poses[which] = np.where(found.stable[:, None], found.poses, poses[which])
@@ -108,7 +121,7 @@ def _again(problem: Problem, state: State, which: Flags) -> State:
     return state._replace(poses=poses, lengths=lengths)
 
 
-def _slipped(problem: Problem, state: State, which: Flags) -> Flags:
+def _single_cable_outliers(problem: Problem, state: State, which: Flags) -> Flags:
     """Which of some poses, if they are few, are as they were read but for single cables: outliers that count little."""
     rows, slipped = np.flatnonzero(which), np.zeros(len(which), dtype=np.bool_)
     if 0 < len(rows) <= min(EXAMINED, FEW * len(which)):
@@ -117,10 +130,116 @@ def _slipped(problem: Problem, state: State, which: Flags) -> Flags:
     return slipped
 
 
-def _elsewhere(problem: Problem, state: State, which: Flags) -> Flags:
+def _other_equilibrium(problem: Problem, state: State, which: Flags) -> Flags:
     """Which of some poses are far from where the lengths that the winches say put the platform, (N,)."""
-    said = said_lengths(problem, state.machine, slice(None))[which]
+    said = reported_lengths(problem, state.machine, slice(None))[which]
     found = search(state.machine.robot, problem.model, locked(said), NO_LOAD, None)
     far = which.copy()
     far[which] = np.linalg.norm(found.poses[:, :3] - state.poses[which, :3], axis=1) > FAR
     return far
+
+
+class Missed(NamedTuple):
+    """What was read less what the lengths that were read predict, squares of it summed.
+
+    Attributes:
+        cells: Of load cells [N^2].
+        cell_count: How many of them.
+        positions: Of positions [m^2].
+        position_count: How many of them.
+    """
+
+    cells: float = 0.0
+    cell_count: int = 0
+    positions: float = 0.0
+    position_count: int = 0
+
+    def plus(self, other: Missed) -> Missed:
+        """Both together."""
+        cells, positions = self.cells + other.cells, self.positions + other.positions
+        return Missed(cells, self.cell_count + other.cell_count, positions, self.position_count + other.position_count)
+
+    @property
+    def tension(self) -> float:
+        """Root of the mean square of a load cell [N]."""
+        return float(np.sqrt(self.cells / self.cell_count)) if self.cell_count else np.nan
+
+    @property
+    def position(self) -> float:
+        """Root of the mean square of the distance from a measured position [m]."""
+        return float(np.sqrt(self.positions / self.position_count)) if self.position_count else np.nan
+
+
+def cross_validate(
+    problem: Problem, found: Found, folds: int, *, robust: bool, progress: Progress | None = None
+) -> CrossValidation | None:
+    """Calibrate without each part of the poses, and predict what was read there by the lengths that were read.
+
+    The parts are runs of poses that follow each other, so that rows of one pose with several tensions stay together,
+    but for those where a part ends.
+    Each calibration begins where that of all poses ended, and so it ends where it would from anywhere near.
+
+    Args:
+        problem: The problem.
+        found: How the calibration by all poses ended.
+        folds: How many parts, >= 2.
+        robust: Whether poses count less that do not fit.
+        progress: Told of every pass.
+
+    Returns:
+        Errors, of poses that fit and those that do not; None where there are fewer than two poses to part.
+    """
+    places = np.flatnonzero(found.kept)
+    folds = min(folds, len(places))
+    if folds < 2:
+        return None
+    now, before = Missed(), Missed()
+    drawn = machine_at(problem, problem.prior)
+    for part in np.array_split(places, folds):
+        left = np.zeros(len(found.kept), dtype=np.bool_)
+        left[part] = True
+        rest = found.kept & ~left
+        begun = evaluate_step(problem, found.fit.state, None, rest, progress=progress)
+        fit = solve(problem, begun, rest, robust=robust, progress=progress)
+        whole = slice(int(part[0]), int(part[-1]) + 1)
+        now = now.plus(missed_by(problem, fit.state.machine, found.fit.state.poses, left, whole))
+        before = before.plus(missed_by(problem, drawn, found.fit.state.poses, left, whole))
+    # nobody knew then where the system stood that measured
+    unplaced = (problem.parameters.where[kinds.SHIFT : kinds.TARGET + 3, 0] >= 0).any()
+    there = np.nan if unplaced else before.position
+    return CrossValidation(folds, now.tension, now.position, before.tension, there)
+
+
+def missed_by(problem: Problem, machine: Machine, starts: Array, which: Flags, whole: slice) -> Missed:
+    """What a robot's predictions miss at some poses; poses at which it finds no equilibrium are not among them.
+
+    Args:
+        problem: What was read.
+        machine: The robot and its sensors.
+        starts: Pose rows near which it stands, (N, POSE_COLUMNS).
+        which: The poses, (N,).
+        whole: Where they are among all.
+    """
+    found = Missed()
+    for own in blocks(whole.stop - whole.start, BLOCK):
+        part = slice(whole.start + own.start, whole.start + own.stop)
+        try:
+            said = reported_lengths(problem, machine, part)
+        except InvalidValueError:  # counts run off drums that are too wrong
+            continue
+        there = which[part] & np.isfinite(said).all(axis=1) & (said > 0.0).all(axis=1)
+        asked = locked(np.where(there[:, None], said, np.nan))
+        solved = solve_rows(machine.robot, problem.model, asked, locked(starts[part].copy()), NO_LOAD)
+        there &= solved.stable
+        tension = solved.solution(
+            machine.robot, problem.model, np.zeros(6), (len(said),)
+        ).state.cables.frame_end_tension
+        sensors, (gain, bias) = machine.sensors, load_cells_of(machine.robot)
+        cells = (problem.log.cells[part] - (gain * tension + bias))[there]
+        cells = cells[~np.isnan(cells)]
+        turned = Rotation.from_quat(solved.poses[there, 3:]).apply(sensors.target.copy())
+        point = solved.poses[there, :3] + turned - sensors.frame.position
+        apart = np.linalg.norm(problem.log.positions[part][there] - point @ sensors.frame.matrix, axis=1)
+        apart = apart[~np.isnan(apart)]
+        found = found.plus(Missed(float(cells @ cells), cells.size, float(apart @ apart), apart.size))
+    return found

@@ -18,8 +18,8 @@ from sagline.files.writing import check_files, made_folder, write_text
 
 if TYPE_CHECKING:
     from sagline.cables.model import CableModel
-    from sagline.calibration.chosen_poses import CalibrationPoses
     from sagline.calibration.log import WinchLog
+    from sagline.calibration.planning import CalibrationPoses
     from sagline.calibration.result import Calibration
 
 ROBOTS: Final = (".yaml", ".yml")
@@ -166,9 +166,9 @@ def _fit(asked: Asked, log: Path | None, model: CableModel, folds: int, *, robus
     Raises:
         SaglineError: If an input is wrong or a file cannot be written.
     """
-    from sagline.calibration import parameters, words
+    from sagline.calibration import parameters, summary
     from sagline.calibration.calibrate import calibrate
-    from sagline.calibration.status import CalibrationStatus
+    from sagline.calibration.findings import CalibrationStatus
     from sagline.files.robot_file import load_robot
 
     if log is None:
@@ -185,7 +185,7 @@ def _fit(asked: Asked, log: Path | None, model: CableModel, folds: int, *, robus
     if as_json:
         show_json({**_record(found), "files": files})
     else:
-        _show_lines(lambda width: words.in_words(found, width))
+        _show_lines(lambda width: summary.in_words(found, width))
         _tell_files(files)
         _tell_offset(found, files)
     if found.status is CalibrationStatus.FOUND:
@@ -202,9 +202,9 @@ def _plan_poses(asked: Asked, count: int, seed: int, log: Path | None, *, as_jso
     Raises:
         SaglineError: If an input is wrong or the file cannot be written.
     """
-    from sagline.calibration import chosen_poses, parameters
-    from sagline.calibration.poses import calibration_poses
-    from sagline.calibration.sensors import Sensors
+    from sagline.calibration import parameters, planning
+    from sagline.calibration.log import Sensors
+    from sagline.calibration.planning import calibration_poses
     from sagline.files.robot_file import load_robot
 
     for item, value in (("LOG", log), ("--plot", asked.plot)):
@@ -223,7 +223,7 @@ def _plan_poses(asked: Asked, count: int, seed: int, log: Path | None, *, as_jso
     if as_json:
         show_json({**_record_of_poses(chosen), "files": list(asked.files)})
         return 0
-    _show_lines(lambda width: f"{chosen_poses.in_words(chosen, width)}\n{chosen_poses.table(chosen, width)}")
+    _show_lines(lambda width: f"{planning.in_words(chosen, width)}\n{planning.table(chosen, width)}")
     _tell_files(list(asked.files))
     return 0
 
@@ -243,7 +243,7 @@ def _log(file: Path, deviations: Deviations) -> WinchLog:
 
 def _written(found: Calibration, asked: Asked, line: Any) -> list[Path]:
     """Write what is to be written; a robot only where it was found. Returns the files."""
-    from sagline.calibration.status import CalibrationStatus
+    from sagline.calibration.findings import CalibrationStatus
     from sagline.files.robot_file import dump_robot
 
     files = []
@@ -268,10 +268,10 @@ def _written(found: Calibration, asked: Asked, line: Any) -> list[Path]:
 
 def _show_lines(text: Callable[[int], str]) -> None:
     """A text that is written for a width, in that of the terminal where it is narrow."""
-    from sagline.calibration import words
+    from sagline.calibration import summary
 
     show_pieces(
-        lambda _, width: [(Text(printable(line)), 0) for line in text(min(width, words.WIDTH)).splitlines()],
+        lambda _, width: [(Text(printable(line)), 0) for line in text(min(width, summary.WIDTH)).splitlines()],
     )
 
 

@@ -236,7 +236,7 @@ def _readings(name: str = ROBOT) -> None:
     import numpy as np
 
     import sagline as sl
-    from sagline.calibration.observing import observed
+    from sagline.calibration.observations import predicted_rows
     from sagline.calibration.parameters import parameters_of
     from sagline.core.arrays import locked
     from sagline.statics.tables import pose_rows
@@ -244,7 +244,7 @@ def _readings(name: str = ROBOT) -> None:
     state, sensors = _hung_state(name), sl.Sensors()
     parameters = parameters_of(state.one_robot, ["mass"], sensors, counted=False)
     lengths = locked(np.atleast_2d(state.unstrained_length))
-    observed(state.one_robot, sl.Catenary(), parameters, sensors, pose_rows(state.pose), lengths)
+    predicted_rows(state.one_robot, sl.Catenary(), parameters, sensors, pose_rows(state.pose), lengths)
 
 
 def _readings_over_pulleys() -> None:

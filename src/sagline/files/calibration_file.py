@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from sagline.cables.models import MODELS
-from sagline.calibration.findings import CrossValidation, Direction, Outlier
+from sagline.calibration.findings import CalibrationStatus, CrossValidation, Direction, Omission, Outlier
+from sagline.calibration.log import Sensors
+from sagline.calibration.parameters import KINDS, Parameters
 from sagline.calibration.result import Calibration
-from sagline.calibration.sensors import Sensors
-from sagline.calibration.status import CalibrationStatus, Omission
-from sagline.calibration.unknowns import KINDS, Parameters
 from sagline.core.arguments import choice, text
 from sagline.core.arrays import locked
 from sagline.core.errors import InvalidValueError

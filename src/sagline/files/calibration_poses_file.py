@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sagline.calibration.paid import can_count, counts_of
+from sagline.calibration.observations import counts_of, has_drum_data
 from sagline.core.arguments import file_path
 from sagline.core.arrays import Array
 from sagline.files.writing import write_text
@@ -16,7 +16,7 @@ from sagline.files.yaml_text import dump_mapping
 from sagline.robot.drum import drums_of
 
 if TYPE_CHECKING:
-    from sagline.calibration.chosen_poses import CalibrationPoses
+    from sagline.calibration.planning import CalibrationPoses
     from sagline.robot.pose import Pose
 
 HEAD: Final = """\
@@ -49,7 +49,7 @@ def save(plan: CalibrationPoses, file: os.PathLike[str] | str) -> None:
         "frame_end_tension": plan.frame_end_tension,
         "unstrained_length": plan.unstrained_length,
     }
-    if can_count(plan.robot):
+    if has_drum_data(plan.robot):
         rows["counts"] = counts_of(drums_of(plan.robot), plan.unstrained_length)
     poses = [
         {name: _rounded(row, _DECIMALS[name]) for name, row in zip(rows, each, strict=True)}

@@ -11,8 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from sagline.calibration.log import WinchLog
-from sagline.calibration.sensors import Sensors
+from sagline.calibration.log import Sensors, WinchLog
 from sagline.core.arguments import file_path, instance, optional
 from sagline.core.arrays import Array, locked
 from sagline.core.errors import FileError, InvalidValueError

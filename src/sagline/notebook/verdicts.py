@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sagline.calibration.result import Calibration
-from sagline.calibration.words import chi_squared_in_words
+from sagline.calibration.summary import chi_squared_text
 from sagline.core.numbers import n
 from sagline.core.results import Result
 from sagline.dynamics.simulation import Simulation
@@ -167,7 +167,7 @@ def _(space: Workspace) -> Told:
 
 @told.register
 def _(found: Calibration) -> Told:
-    verdict = f"{len(found.values)} numbers from {len(found.rows)} poses; {chi_squared_in_words(found)}"
+    verdict = f"{len(found.values)} numbers from {len(found.rows)} poses; {chi_squared_text(found)}"
     return Told(f"Calibration of {found.robot.name}", verdict, None, tuple(str(found).splitlines()))
 
 

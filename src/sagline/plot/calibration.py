@@ -11,7 +11,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
 from sagline.calibration.result import Calibration
-from sagline.calibration.words import chi_squared_in_words
+from sagline.calibration.summary import chi_squared_text
 from sagline.core.arguments import choice, instance
 from sagline.core.arrays import locked, number
 from sagline.core.errors import InvalidValueError
@@ -156,7 +156,7 @@ def _residuals(figure: SubFigure, found: Calibration) -> None:
         place, columns = "outside lower center", fitting(names, width, style.tick)
     figure.legend(handles.values(), names, loc=place, ncols=columns, fontsize=style.tick, frameon=False)
     figure.align_ylabels(panels)
-    told = wrapped(f"{found.robot.name}: {chi_squared_in_words(found)}", current().label)
+    told = wrapped(f"{found.robot.name}: {chi_squared_text(found)}", current().label)
     figure.suptitle(told, fontsize=current().label)
 
 

@@ -7,12 +7,11 @@ from typing import Final
 
 import numpy as np
 
-from sagline.calibration.chi_squared import exceeded_with
-from sagline.calibration.findings import Direction
+from sagline.calibration.findings import CalibrationStatus, Direction
+from sagline.calibration.least_squares import exceeded_with
+from sagline.calibration.log import reading_deviations
 from sagline.calibration.result import Calibration
-from sagline.calibration.sensors import reading_deviations
-from sagline.calibration.status import CalibrationStatus
-from sagline.calibration.words import chi_squared_in_words, outlier_in_words
+from sagline.calibration.summary import chi_squared_text, outlier_text
 from sagline.core.arrays import Array, Indices
 from sagline.core.numbers import counted, n
 from sagline.viewer.channel import chosen_by
@@ -63,7 +62,7 @@ def verdict(found: Calibration) -> str:
     text = "" if kind == "good" else f"{escape(found.status.text)}<br>"
     of = f"{len(found.values)} numbers from {counted(len(found.rows), 'pose')}"
     out = (f"<br>{counted(len(rows), 'row')} left out: {escape(why.text)}" for why, rows in found.left_out.items())
-    return box(kind, head, f"{text}{of}; {escape(chi_squared_in_words(found))}{''.join(out)}")
+    return box(kind, head, f"{text}{of}; {escape(chi_squared_text(found))}{''.join(out)}")
 
 
 def kinds(found: Calibration) -> str:
@@ -93,7 +92,7 @@ def outliers(found: Calibration, chosen: int | None) -> str:
         return sentence("No outliers.")
     rows = "".join(
         f'<tr {chosen_by("row", one.row)} class="{"chosen" if one.row == chosen else ""}"><td>'
-        f"<button {chosen_by('row', one.row)}>{escape(outlier_in_words(one))}</button></td></tr>"
+        f"<button {chosen_by('row', one.row)}>{escape(outlier_text(one))}</button></td></tr>"
         for one in found.outliers[:MOST_LISTED]
     )
     rest = len(found.outliers) - MOST_LISTED

@@ -8,8 +8,8 @@ from typing import Any, Final
 import numpy as np
 import viser
 
-from sagline.calibration.relative import Anchors, anchor_covariance, relative_covariance, without_motion
 from sagline.calibration.result import Calibration
+from sagline.calibration.summary import Anchors, anchor_covariance, relative_covariance, without_motion
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.viewer import calibration_words, solids

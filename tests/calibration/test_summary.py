@@ -8,8 +8,7 @@ import pytest
 
 import sagline as sl
 from sagline.calibration.findings import CrossValidation, Direction, Outlier
-from sagline.calibration.relative import anchor_covariance, relative_covariance
-from sagline.calibration.words import in_words, rows_in_words
+from sagline.calibration.summary import anchor_covariance, in_words, relative_covariance, row_ranges
 from sagline.core.arrays import Array
 from tests.calibration.made_up import MOTIONS, STEP, made_up, motions, parameters
 from tests.refusal import refused
@@ -190,9 +189,9 @@ def test_nothing_is_wider_than_80_columns_or_hidden(found: sl.Calibration, count
 
 
 def test_rows_that_follow_each_other_are_a_span() -> None:
-    assert rows_in_words([3]) == "row 3"
-    assert rows_in_words([3, 17, 18, 19, 40]) == "rows 3, 17 to 19, 40"
-    assert rows_in_words(range(0, 2000, 2)).endswith("14 and 992 more")
+    assert row_ranges([3]) == "row 3"
+    assert row_ranges([3, 17, 18, 19, 40]) == "rows 3, 17 to 19, 40"
+    assert row_ranges(range(0, 2000, 2)).endswith("14 and 992 more")
 
 
 def test_a_correlation_has_ones_and_the_signs_of_the_covariance(found: sl.Calibration) -> None:

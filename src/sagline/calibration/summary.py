@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from textwrap import wrap
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 
-from sagline.calibration.findings import Direction, Findings, Outlier
-from sagline.calibration.relative import Anchors, anchor_covariance, relative_covariance
-from sagline.calibration.status import CalibrationStatus
-from sagline.calibration.unknowns import KINDS
-from sagline.core.arrays import Indices
+from sagline.calibration.findings import CalibrationStatus, Direction, Findings, Outlier
+from sagline.calibration.parameters import KINDS, Parameters
+from sagline.core.arrays import Array, Indices
 from sagline.core.numbers import SPACE, counted, n, plus_minus
 
 WIDTH: Final = 80
@@ -61,7 +59,7 @@ def table(found: Findings) -> str:
     )
 
 
-def outlier_in_words(outlier: Outlier) -> str:
+def outlier_text(outlier: Outlier) -> str:
     """What does not fit: of which row of the log and which cable, by how much.
 
     Args:
@@ -73,7 +71,7 @@ def outlier_in_words(outlier: Outlier) -> str:
     return f"row {outlier.row}{where}: {outlier.quantity} {size} off ({times} deviations)"
 
 
-def rows_in_words(rows: Sequence[int] | Indices) -> str:
+def row_ranges(rows: Sequence[int] | Indices) -> str:
     """Numbers of rows, those that follow each other as a span: "rows 3, 17 to 19 and 5 more".
 
     Args:
@@ -91,7 +89,7 @@ def rows_in_words(rows: Sequence[int] | Indices) -> str:
     return f"{'row' if len(rows) == 1 else 'rows'} {', '.join(names)}{more}"
 
 
-def chi_squared_in_words(found: Findings) -> str:
+def chi_squared_text(found: Findings) -> str:
     """The sum of squares beside what it should be.
 
     Args:
@@ -112,14 +110,14 @@ def _verdict(found: Findings, width: int) -> Iterator[str]:
     iterations = counted(found.iterations, "iteration")
     if found.status is CalibrationStatus.FOUND:
         yield from _wrapped(f"Found: {what}{when}", width)
-        yield from _wrapped(f"{chi_squared_in_words(found)}; {iterations}", width, "  ")
+        yield from _wrapped(f"{chi_squared_text(found)}; {iterations}", width, "  ")
     elif found.status is CalibrationStatus.DOUBTFUL:
         text = found.status.text.removeprefix("found, but ").removeprefix("chi squared says that ")
-        yield from _wrapped(f"DOUBTFUL: {chi_squared_in_words(found)}: {text}", width)
+        yield from _wrapped(f"DOUBTFUL: {chi_squared_text(found)}: {text}", width)
         yield from _wrapped(f"{what}{when}; {iterations}", width, "  ")
     else:
         yield from _wrapped(f"{found.status.text[:1].upper()}{found.status.text[1:]}", width)
-        yield from _wrapped(f"{what}{when}; {iterations}; {chi_squared_in_words(found)}", width, "  ")
+        yield from _wrapped(f"{what}{when}; {iterations}; {chi_squared_text(found)}", width, "  ")
 
 
 def _rows(found: Findings, width: int) -> Iterator[str]:
@@ -131,7 +129,7 @@ def _rows(found: Findings, width: int) -> Iterator[str]:
         return
     yield f"Rows: {len(found.rows):,} of {len(found.rows) + count:,} were used, {count:,} left out:"
     for reason, rows in left.items():
-        yield from _wrapped(f"{reason.text}: {rows_in_words(rows)}", width, "  ")
+        yield from _wrapped(f"{reason.text}: {row_ranges(rows)}", width, "  ")
 
 
 def _values(found: Findings, width: int) -> Iterator[str]:
@@ -248,7 +246,7 @@ def _outliers(found: Findings, width: int) -> Iterator[str]:
         if outlier.row in place:
             position = found.poses.position[place[outlier.row]]
             at = f", at ({', '.join(n(x, '.2f') for x in position)}) m".replace(" ", SPACE)
-        yield from _wrapped(f"- {outlier_in_words(outlier)}{at}", width, "  ", "    ")
+        yield from _wrapped(f"- {outlier_text(outlier)}{at}", width, "  ", "    ")
     if len(found.outliers) > MOST_OUTLIERS:
         yield f"  and {len(found.outliers) - MOST_OUTLIERS:,} more"
 
@@ -272,3 +270,70 @@ def _cross_validation(found: Findings, width: int) -> Iterator[str]:
 def _wrapped(text: str, width: int, indent: str = "", further: str = "") -> list[str]:
     """A sentence in lines."""
     return wrap(text, width, initial_indent=indent, subsequent_indent=further or indent + "  ", break_on_hyphens=False)
+
+
+Anchors = Literal["frame_anchors", "platform_anchors"]
+_TURNS: Final = {"frame_anchors": (2,), "platform_anchors": (0, 1, 2)}  # axes about which nothing would notice
+
+
+def anchor_covariance(parameters: Parameters, covariance: Array, which: Anchors) -> Array | None:
+    """Covariance of the coordinates of all anchors of the frame or of the platform.
+
+    Args:
+        parameters: What was found.
+        covariance: Of its values, (P, P).
+        which: Anchors of what.
+
+    Returns:
+        [m^2], shape (m, 3, m, 3), zero of coordinates that nobody asked for; None where none was asked for.
+    """
+    first = KINDS[which].first
+    numbers = parameters.where[first : first + 3].T.reshape(-1).astype(np.int64)
+    if (numbers < 0).all():
+        return None
+    asked = numbers >= 0
+    whole = np.zeros((numbers.size, numbers.size))
+    whole[np.ix_(asked, asked)] = covariance[np.ix_(numbers[asked], numbers[asked])]
+    m = numbers.size // 3
+    return whole.reshape(m, 3, m, 3)
+
+
+def without_motion(points: Array, which: Anchors) -> Array:
+    """What takes out of small moves of anchors that which moves all of them together.
+
+    Shifts are taken out, and turns of which no reading could tell: of the frame those about the vertical, of the
+    platform all three, since its own axes are where its anchors say.
+
+    Args:
+        points: The anchors [m], shape (m, 3).
+        which: Anchors of what.
+
+    Returns:
+        A projection of their coordinates, shape (3 m, 3 m).
+
+    Source:
+        Baarda 1973, "S-transformations and criterion matrices", with the anchors all alike.
+    """
+    m = len(points)
+    ways = [np.tile(axis, m) for axis in np.eye(3)]
+    ways += [np.cross(np.eye(3)[axis], points - points.mean(axis=0)).reshape(-1) for axis in _TURNS[which]]
+    basis, size, _ = np.linalg.svd(np.stack(ways, axis=1), full_matrices=False)
+    basis = basis[:, size > 1e-9 * size[0]]
+    return np.asarray(np.eye(3 * m) - basis @ basis.T)
+
+
+def relative_covariance(points: Array, covariance: Array, which: Anchors) -> Array:
+    """What is left of the covariance of anchors without what moves all of them together.
+
+    Args:
+        points: The anchors [m], shape (m, 3).
+        covariance: Of their coordinates [m^2], shape (m, 3, m, 3).
+        which: Anchors of what.
+
+    Returns:
+        The same shape [m^2]; NaN where an infinite one makes it unknown.
+    """
+    if not np.isfinite(covariance).all():
+        return np.full(covariance.shape, np.nan)
+    kept, size = without_motion(points, which), points.size
+    return np.asarray(kept @ covariance.reshape(size, size) @ kept.T).reshape(covariance.shape)

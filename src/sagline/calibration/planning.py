@@ -1,33 +1,191 @@
-"""The poses and tensions worth measuring."""
+"""Poses to calibrate a robot by, and how a person reads them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from textwrap import wrap
 from typing import Final
 
 import numpy as np
 
 from sagline.cables.catenary import Catenary
 from sagline.calibration.calibrate import UNKNOWNS
-from sagline.calibration.candidates import Candidates, candidates_of
-from sagline.calibration.chosen_poses import CalibrationPoses
-from sagline.calibration.further import Situation, most_helpful, usual_cells
-from sagline.calibration.information import Choice, deviations_of, ground, most_telling, told_by
-from sagline.calibration.observing import observed
-from sagline.calibration.paid import can_count
-from sagline.calibration.parameters import parameters_of, slopes_of_values
-from sagline.calibration.sensors import Sensors
-from sagline.calibration.tour import short_tour
-from sagline.calibration.unknowns import KINDS, Parameters, Unknown
+from sagline.calibration.candidates import Candidates, candidates_of, length_of, shortest_tour
+from sagline.calibration.information import Choice, choose_informative, deviations_of, information_of, prior_information
+from sagline.calibration.log import Sensors
+from sagline.calibration.observations import has_drum_data, predicted_rows
+from sagline.calibration.parameters import KINDS, Parameters, Unknown, parameters_of, slopes_of_values
+from sagline.calibration.recommendations import Situation, error_text, most_helpful, typical_load_cell_deviation
 from sagline.core.arguments import callback, instance, optional, whole_number
 from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_memory
+from sagline.core.numbers import SPACE, counted, n
 from sagline.core.progress import Progress
+from sagline.core.results import Result, Saved
 from sagline.robot.pattern import ROTATING
 from sagline.robot.pose import Pose
 from sagline.robot.pose_box import PoseBox
 from sagline.robot.robot import Robot
+
+WIDTH: Final = 80
+COLUMNS: Final = (20, 9, 13, 13, 15)  # of the table of errors
+NARROW: Final = (16, 8, 9, 11, 13)  # the same in a narrow terminal
+WIDE: Final = 2 + sum(COLUMNS)
+KILO: Final = 1e4  # N: tensions from here on are written in kN
+FAR: Final = 100.0  # m: positions from here on are written with one decimal less
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class CalibrationPoses(Result, Saved):
+    """Result of `calibration_poses`, in an order that is short to drive.
+
+    Attributes:
+        robot: The robot.
+        sensors: What will measure it.
+        parameters: What is to be found.
+        poses: Where to stand, N of them.
+        frame_end_tension: With which tensions [N], (N, m).
+        unstrained_length: All cable off the drums there [m], (N, m).
+        expected_error: Standard error of each number to be found, in its unit, (P,).
+        random_error: The same of random poses of the same number, their median, (P,).
+        share_of_random: What part of the errors of random poses is left, in the directions that readings tell of:
+            geometric mean. Single numbers hide it where the readings leave, say, the place of the world open.
+        gain: log det of what the first k poses chosen tell, in the order of choosing, (N,).
+        enough: From how many poses on another one changes no error by more than a hundredth; N if none.
+        most_helpful: Which further measurement would help most, in words.
+    """
+
+    robot: Robot
+    sensors: Sensors
+    parameters: Parameters
+    poses: Pose
+    frame_end_tension: Array
+    unstrained_length: Array
+    expected_error: Array
+    random_error: Array
+    share_of_random: float
+    gain: Array
+    enough: int
+    most_helpful: str
+
+    def __len__(self) -> int:
+        """Number of poses N."""
+        return len(self.poses)
+
+    def __str__(self) -> str:
+        """What to expect of them, in lines of at most 80 columns."""
+        return in_words(self)
+
+    def table(self) -> str:
+        """Poses and tensions, one a line."""
+        return table(self)
+
+
+def in_words(plan: CalibrationPoses, width: int = WIDTH) -> str:
+    """What to expect of poses to calibrate by, beside random ones, in lines of at most 80 columns.
+
+    Args:
+        plan: The poses.
+        width: Columns of a line; numbers are not broken.
+    """
+    return "\n".join((*_head(plan, width), *_errors(plan, width), *_advice(plan, width))).replace(SPACE, " ")
+
+
+def table(plan: CalibrationPoses, width: int = WIDTH) -> str:
+    """Poses and tensions in the order to drive, one a line; more cables than fit go on in the next.
+
+    Args:
+        plan: The poses.
+        width: Columns of a line.
+    """
+    position, tension = plan.poses.position, plan.frame_end_tension
+    angles = np.degrees(plan.poses.rotation.as_euler("ZYX"))
+    decimals = 1 if np.abs(position).max() >= FAR else 2
+    kilo = tension.max() >= KILO
+    poses = [
+        _column("", range(len(plan)), 0),
+        *(_column(axis, position[:, k], decimals) for k, axis in enumerate("xyz")),
+        *(_column(name, angles[:, k], 1) for k, name in enumerate(("alpha", "beta", "gamma"))),
+    ]
+    cells = [_column(f"T{i}", row / (1e3 if kilo else 1.0), 1 if kilo else 0) for i, row in enumerate(tension.T)]
+    left = sum(len(column[0]) for column in poses)
+    most = max((width - left) // max(len(column[0]) for column in cells), 1)
+    parts = [cells[first : first + most] for first in range(0, len(cells), most)]
+    units = f"x, y, z in m; alpha about z, beta about y, gamma about x in °; tensions in {'kN' if kilo else 'N'}"
+    lines = wrap(units, width)
+    for k in range(len(plan) + 1):
+        begin = "".join(column[k] for column in poses)
+        for part in parts:
+            lines.append(begin + "".join(column[k] for column in part))
+            begin = " " * left
+    return "\n".join(lines)
+
+
+def _column(head: str, values: Iterable[float], decimals: int) -> list[str]:
+    """A column of numbers below its head, all of one width."""
+    cells = [head, *(f"{round(float(value), decimals) + 0.0:.{decimals}f}" for value in values)]
+    width = 1 + max(map(len, cells))
+    return [f"{cell:>{width}}" for cell in cells]
+
+
+def _head(plan: CalibrationPoses, width: int) -> Iterator[str]:
+    places = plan.poses.position[_first_of_each(plan.poses.position)]
+    way = n(length_of(places, np.arange(len(places))), ".3g", "m")
+    what = f"{counted(len(plan), 'pose')} to find {counted(len(plan.parameters.names), 'number')} of {plan.robot.name}"
+    yield from wrap(f"{what}: {counted(len(places), 'place')}, {way} to drive", width)
+    yield from wrap(f"read by {' and '.join(_sensors(plan))}", width, initial_indent="  ", subsequent_indent="  ")
+
+
+def _first_of_each(position: Array) -> Array:
+    """Flags of the poses that are not at the place of the one before."""
+    moved: Array = np.concatenate(([True], (np.diff(position, axis=0) != 0.0).any(axis=1)))
+    return moved
+
+
+def _sensors(plan: CalibrationPoses) -> Iterator[str]:
+    read = plan.sensors
+    for words, deviation, unit in (
+        ("lengths", read.length_deviation, "m"),
+        ("load cells", read.tension_deviation, "N"),
+        ("positions", read.position_deviation, "m"),
+        ("rotations", read.rotation_deviation, "rad"),
+    ):
+        if deviation is not None:
+            yield f"{words} ({error_text(float(np.max(deviation)), unit)})"
+
+
+def _errors(plan: CalibrationPoses, width: int) -> Iterator[str]:
+    """Root mean squares of the errors of each kind."""
+    names = np.array(plan.parameters.names)
+    first, *others = COLUMNS if width >= WIDE else NARROW
+    heads = (*zip(("numbers", "before", "afterwards", "random poses"), others, strict=True),)
+    title = "standard errors of" if width >= WIDE else "errors of"
+    yield f"  {title:<{first}}" + "".join(f"{head:>{own}}" for head, own in heads)
+    for name in dict.fromkeys(plan.parameters.names):
+        for unit in dict.fromkeys(np.array(plan.parameters.units)[names == name]):
+            mine = (names == name) & (np.array(plan.parameters.units) == unit)
+            errors = (plan.parameters.prior_deviation, plan.expected_error, plan.random_error)
+            before, after, usual = (error_text(float(np.sqrt(np.mean(one[mine] ** 2))), str(unit)) for one in errors)
+            cells = zip((mine.sum(), before, after, usual), others, strict=True)
+            yield f"  {name:<{first}}" + "".join(f"{cell:>{own}}" for cell, own in cells)
+
+
+def _advice(plan: CalibrationPoses, width: int) -> Iterator[str]:
+    share, times = plan.share_of_random, plan.share_of_random**-2
+    yield from wrap(
+        f"In the directions that readings tell of, the errors are {n(share, '.2f')} of those of random poses, of which "
+        f"it would take {n(times, '.2g')} times as many.",
+        width,
+    )
+    if plan.enough < len(plan):
+        text = f"From {counted(plan.enough, 'pose')} on, another one lowers no error by more than 1{SPACE}%."
+    else:
+        text = f"More poses still help: each lowers some error by more than 1{SPACE}%."
+    yield from wrap(text, width)
+    yield from wrap(plan.most_helpful, width)
+
 
 MOST: Final = 1_000  # poses; nobody stands at more
 MOST_CANDIDATES: Final = 20_000
@@ -90,11 +248,11 @@ def calibration_poses(
     callback(progress, "progress")
     where = _box(robot, box)
     standing = candidates_of(robot, _CATENARY, where, tried, drawn, progress)
-    read = sensors or _usual_sensors(robot, standing.tensions)
+    read = sensors or _default_sensors(robot, standing.tensions)
     if read.tension_deviation is None and read.position_deviation is None and read.rotation_deviation is None:
         step = "Give Sensors(tension_deviation=...), or leave sensors out."
         raise InvalidValueError("sensors", "lengths alone", "load cells, positions or rotations beside them", step)
-    parameters = parameters_of(robot, unknowns, read, counted=can_count(robot))
+    parameters = parameters_of(robot, unknowns, read, counted=has_drum_data(robot))
     check_memory(
         f"{tried:,} candidates",
         8.0 * 3.0 * tried * (robot.cable_count + 6) * len(parameters.names),
@@ -102,13 +260,13 @@ def calibration_poses(
     )
     slopes = slopes_of_values(robot, parameters)
     scale, held = _scale(parameters, slopes)
-    rows = observed(robot, _CATENARY, parameters, read, standing.poses, standing.lengths).matrix * scale
+    rows = predicted_rows(robot, _CATENARY, parameters, read, standing.poses, standing.lengths).matrix * scale
     stable = np.flatnonzero(np.isfinite(rows).all(axis=(1, 2)))
     standing, rows = standing.part(stable), _read(rows[stable])
     _refuse(robot, parameters, size, tried, rows)
-    known, unit = ground(rows), scale * np.abs(slopes)
-    choice = most_telling(rows, known, size)
-    order = choice.order[_driven(standing.part(choice.order))]
+    known, unit = prior_information(rows), scale * np.abs(slopes)
+    choice = choose_informative(rows, known, size)
+    order = choice.order[_driving_order(standing.part(choice.order))]
     chosen, told, random = standing.part(order), rows[order], _random(rows, standing.usual, size, drawn)
     return CalibrationPoses(
         robot=robot,
@@ -121,7 +279,7 @@ def calibration_poses(
         random_error=locked(np.median([deviations_of(other, held) for other in random], axis=0) * unit),
         share_of_random=_share(known, told, random),
         gain=locked(choice.gain),
-        enough=_enough(choice),
+        enough=_sufficient_count(choice),
         most_helpful=most_helpful(Situation(robot, _CATENARY, parameters, read, scale, slopes, known, chosen, told)),
     )
 
@@ -139,11 +297,11 @@ def _box(robot: Robot, box: PoseBox | None) -> PoseBox:
     return found
 
 
-def _usual_sensors(robot: Robot, tensions: Array) -> Sensors:
+def _default_sensors(robot: Robot, tensions: Array) -> Sensors:
     winches = robot.winches
     if winches is not None and (winches.load_cell_deviation > 0.0).all():
         return Sensors(tension_deviation=winches.load_cell_deviation)
-    return Sensors(tension_deviation=usual_cells(tensions))
+    return Sensors(tension_deviation=typical_load_cell_deviation(tensions))
 
 
 def _scale(parameters: Parameters, slopes: Array) -> tuple[Array, Array]:
@@ -174,11 +332,11 @@ def _refuse(robot: Robot, parameters: Parameters, count: int, tried: int, rows: 
             raise InvalidValueError(f"unknown: {name}", "seen by no reading", "what readings tell of", step)
 
 
-def _driven(chosen: Candidates) -> Indices:
+def _driving_order(chosen: Candidates) -> Indices:
     """An order that is short to drive: through the positions, at each from the least sum of tensions to the largest."""
     _, first, place = np.unique(chosen.place, return_index=True, return_inverse=True)
     rank = np.empty(len(first), dtype=np.int64)
-    rank[short_tour(chosen.poses[first, :3])] = np.arange(len(first))
+    rank[shortest_tour(chosen.poses[first, :3])] = np.arange(len(first))
     return np.lexsort((chosen.tensions.sum(axis=1), rank[place]))
 
 
@@ -191,7 +349,7 @@ def _random(rows: Array, usual: Flags, count: int, seed: int) -> list[Array]:
 
 def _share(known: Array, told: Array, random: list[Array]) -> float:
     """Errors by what is told, as a share of those of random poses, in directions that these lower by half or more."""
-    own, *others = (told_by(each) for each in (told, *random))
+    own, *others = (information_of(each) for each in (told, *random))
     size, vectors = np.linalg.eigh(np.mean(others, axis=0))
     seen = vectors[:, size > SEEN]
     if not seen.size:
@@ -200,7 +358,7 @@ def _share(known: Array, told: Array, random: list[Array]) -> float:
     return float(np.exp(0.5 * np.log(variance[0] / np.median(variance[1:], axis=0)).mean()))
 
 
-def _enough(choice: Choice) -> int:
+def _sufficient_count(choice: Choice) -> int:
     """From how many poses on another one lowers no error by more than a hundredth."""
     lowered = (1.0 - choice.deviation[1:] / choice.deviation[:-1]).max(axis=1)
     still = np.flatnonzero(lowered > ENOUGH)

@@ -7,9 +7,8 @@ import pytest
 
 import sagline as sl
 from sagline import dump_robot
-from sagline.calibration.parameters import parameters_of
-from sagline.calibration.provenance import provenance_of
-from sagline.calibration.unknowns import KINDS
+from sagline.calibration.evaluation import provenance_of
+from sagline.calibration.parameters import KINDS, parameters_of
 from tests.calibration.machines import sensors, with_drums
 
 

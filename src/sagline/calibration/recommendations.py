@@ -9,10 +9,10 @@ import numpy as np
 
 from sagline.cables.model import CableModel
 from sagline.calibration.candidates import Candidates
-from sagline.calibration.information import Information, told_by
-from sagline.calibration.observing import observed
-from sagline.calibration.sensors import Sensors
-from sagline.calibration.unknowns import Parameters
+from sagline.calibration.information import Information, information_of
+from sagline.calibration.log import Sensors
+from sagline.calibration.observations import predicted_rows
+from sagline.calibration.parameters import Parameters
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.robot.robot import Robot
@@ -23,7 +23,7 @@ NEARLY: Final = 0.9  # of the most that the logarithms of the errors fall by: wh
 WORTH: Final = 0.99  # of the errors: what leaves more is not worth the while
 
 
-class Beside(NamedTuple):
+class Tool(NamedTuple):
     """A tool for one kind of unknowns.
 
     Attributes:
@@ -37,14 +37,14 @@ class Beside(NamedTuple):
     share: bool
 
 
-BESIDE: Final[dict[str, Beside]] = {
-    "mass": Beside("weighing the platform to 0.1 %", 1e-3, True),
-    "linear_density": Beside("weighing a length of the cable to 1 %", 0.01, True),
-    "axial_stiffness": Beside("stretching a length of the cable on a test bench, to 2 %", 0.02, True),
-    "pulley_radius": Beside("a caliper on the pulleys, to 0.1 mm", 1e-4, False),
-    "drum_radius": Beside("a caliper on the drums, to 0.1 mm", 1e-4, False),
-    "load_cell_gain": Beside("a known weight on each load cell, to 0.5 %", 5e-3, True),
-    "load_cell_bias": Beside("reading each load cell without load, to 1 N", 1.0, False),
+BESIDE: Final[dict[str, Tool]] = {
+    "mass": Tool("weighing the platform to 0.1 %", 1e-3, True),
+    "linear_density": Tool("weighing a length of the cable to 1 %", 0.01, True),
+    "axial_stiffness": Tool("stretching a length of the cable on a test bench, to 2 %", 0.02, True),
+    "pulley_radius": Tool("a caliper on the pulleys, to 0.1 mm", 1e-4, False),
+    "drum_radius": Tool("a caliper on the drums, to 0.1 mm", 1e-4, False),
+    "load_cell_gain": Tool("a known weight on each load cell, to 0.5 %", 5e-3, True),
+    "load_cell_bias": Tool("reading each load cell without load, to 1 N", 1.0, False),
 }
 
 
@@ -76,17 +76,19 @@ class Situation(NamedTuple):
     @property
     def told(self) -> Array:
         """Information afterwards, shape (P, P)."""
-        told: Array = self.known + told_by(self.rows)
+        told: Array = self.known + information_of(self.rows)
         return told
 
     def read_by(self, sensors: Sensors) -> Array:
         """What the poses tell when other sensors read, in the scale, shape (N, m + 6, P)."""
         poses, lengths = self.standing.poses, self.standing.lengths
-        rows: Array = observed(self.robot, self.model, self.parameters, sensors, poses, lengths).matrix * self.scale
+        rows: Array = (
+            predicted_rows(self.robot, self.model, self.parameters, sensors, poses, lengths).matrix * self.scale
+        )
         return rows
 
 
-class Further(NamedTuple):
+class Recommendation(NamedTuple):
     """A measurement that was not foreseen.
 
     Attributes:
@@ -108,9 +110,9 @@ def most_helpful(situation: Situation) -> str:
         One sentence.
     """
     before = _deviations(situation.told)
-    best: Further | None = None
+    best: Recommendation | None = None
     most = -np.log(WORTH)
-    for further in _further(situation):  # from the least costly of its kind on
+    for further in _options(situation):  # from the least costly of its kind on
         fall = float(np.log(before / _deviations(further.known)).mean())
         if fall > most / (1.0 if best is None else NEARLY):
             best, most = further, fall
@@ -118,27 +120,27 @@ def most_helpful(situation: Situation) -> str:
         return "No further measurement known here lowers the errors by more than a hundredth."
     return (
         f"Most helpful beside the poses: {best.words}; it leaves {n(np.exp(-most), '.2f')} of the errors on average, "
-        f"{_of_a_kind(situation, before, _deviations(best.known))}."
+        f"{_largest_reduction(situation, before, _deviations(best.known))}."
     )
 
 
-def _further(situation: Situation) -> Iterator[Further]:
+def _options(situation: Situation) -> Iterator[Recommendation]:
     """All that is thought of and not there."""
     parameters, sensors = situation.parameters, situation.sensors
     for name, beside in BESIDE.items():
         if name in parameters.names:
-            yield Further(beside.words, situation.told + _held(situation, name, beside))
+            yield Recommendation(beside.words, situation.told + _tool_information(situation, name, beside))
     if sensors.tension_deviation is None:
-        deviation = usual_cells(situation.standing.tensions)
+        deviation = typical_load_cell_deviation(situation.standing.tensions)
         rows = situation.read_by(sensors.replace(tension_deviation=deviation))
-        yield Further(f"load cells, of {n(deviation, '.2g', 'N')}", situation.known + told_by(rows))
+        yield Recommendation(f"load cells, of {n(deviation, '.2g', 'N')}", situation.known + information_of(rows))
     if "frame_anchors" in parameters.names:
         yield from _anchors(situation)
     if sensors.position_deviation is None:
         yield from _positions(situation)
 
 
-def _held(situation: Situation, name: str, beside: Beside) -> Array:
+def _tool_information(situation: Situation, name: str, beside: Tool) -> Array:
     mine = np.flatnonzero([other == name for other in situation.parameters.names])
     size = situation.parameters.prior[mine] if beside.share else np.ones(len(mine))
     told = np.zeros(len(situation.scale))
@@ -146,7 +148,7 @@ def _held(situation: Situation, name: str, beside: Beside) -> Array:
     return np.diag(told)
 
 
-def _anchors(situation: Situation) -> Iterator[Further]:
+def _anchors(situation: Situation) -> Iterator[Recommendation]:
     """One frame anchor, or three, measured."""
     names, cables = np.array(situation.parameters.names), situation.parameters.cables
     m = situation.robot.cable_count
@@ -154,20 +156,20 @@ def _anchors(situation: Situation) -> Iterator[Further]:
     for cable in range(m):
         where = np.flatnonzero((names == "frame_anchors") & (cables == cable))
         rows[cable, range(3), where] = situation.scale[where] / TOTAL_STATION
-    yield from _best_of(situation, rows, rows, {1: "frame anchor {} measured", 3: "frame anchors {} measured"})
+    yield from _best_subset(situation, rows, rows, {1: "frame anchor {} measured", 3: "frame anchors {} measured"})
 
 
-def _positions(situation: Situation) -> Iterator[Further]:
+def _positions(situation: Situation) -> Iterator[Recommendation]:
     """The position measured at three of the poses, or six."""
     read = situation.sensors.replace(position_deviation=TOTAL_STATION)
     alone = situation.read_by(read.replace(tension_deviation=None, rotation_deviation=None))
     words = dict.fromkeys((3, 6), "the position at poses {} measured")
-    yield from _best_of(situation, alone, situation.read_by(read), words, situation.rows)
+    yield from _best_subset(situation, alone, situation.read_by(read), words, situation.rows)
 
 
-def _best_of(
+def _best_subset(
     situation: Situation, rows: Array, beside: Array, words: dict[int, str], instead: Array | None = None
-) -> Iterator[Further]:
+) -> Iterator[Recommendation]:
     """So many of some rows as there are words for, chosen by what they tell.
 
     Args:
@@ -181,11 +183,11 @@ def _best_of(
     for _ in range(min(max(words), len(rows))):
         found.take(found.best()[0])
         if (size := len(found.chosen)) in words:
-            known = situation.told + told_by(beside[found.chosen])
+            known = situation.told + information_of(beside[found.chosen])
             if instead is not None:
-                known = known - told_by(instead[found.chosen])
+                known = known - information_of(instead[found.chosen])
             listed = ", ".join(map(str, sorted(found.chosen)))
-            yield Further(f"{words[size].format(listed)} to {error_in_words(TOTAL_STATION, 'm')}", known)
+            yield Recommendation(f"{words[size].format(listed)} to {error_text(TOTAL_STATION, 'm')}", known)
 
 
 def _deviations(known: Array) -> Array:
@@ -193,18 +195,18 @@ def _deviations(known: Array) -> Array:
     return found
 
 
-def _of_a_kind(situation: Situation, before: Array, after: Array) -> str:
+def _largest_reduction(situation: Situation, before: Array, after: Array) -> str:
     """By how much the errors of the kind fall that fall most."""
     names = np.array(situation.parameters.names)
     name = min(dict.fromkeys(names), key=lambda name: float(np.log(after / before)[names == name].mean()))
     mine = names == name
     unit = situation.parameters.units[int(np.argmax(mine))]
     size = situation.scale * np.abs(situation.slopes)
-    one, other = (error_in_words(float(np.sqrt(np.mean((each * size)[mine] ** 2))), unit) for each in (before, after))
+    one, other = (error_text(float(np.sqrt(np.mean((each * size)[mine] ** 2))), unit) for each in (before, after))
     return f"those of {name} fall from {one} to {other}"
 
 
-def error_in_words(value: float, unit: str) -> str:
+def error_text(value: float, unit: str) -> str:
     """An error to two digits; lengths in millimeters.
 
     Args:
@@ -214,7 +216,7 @@ def error_in_words(value: float, unit: str) -> str:
     return n(1e3 * value, ".2g", "mm") if unit == "m" else n(value, ".2g", unit)
 
 
-def usual_cells(tensions: Array) -> float:
+def typical_load_cell_deviation(tensions: Array) -> float:
     """Standard deviation of load cells as one would buy them for these tensions [N].
 
     Args:

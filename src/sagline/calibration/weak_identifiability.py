@@ -9,9 +9,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from sagline.calibration.findings import Direction
-from sagline.calibration.gauge import Frame, frame_of
-from sagline.calibration.steps import easiest, easy_place
-from sagline.calibration.unknowns import Parameters
+from sagline.calibration.identifiability import PriorUnits, easiest_measurement, measurement_rank, prior_units
+from sagline.calibration.parameters import Parameters
 from sagline.core.arrays import Array, Flags, Indices, locked
 
 LITTLE: Final = 0.5  # of the prior's deviation: where more is left, the readings said little
@@ -46,19 +45,19 @@ def cannot_tell_apart(triangle: Array, parameters: Parameters, gauge: tuple[Dire
         Directions of which more than `LITTLE` of the prior's deviation is left, the least known first; then numbers
         whose correlation is beyond `ALIKE`, and single numbers that those of all cables imitate as well.
     """
-    frame = frame_of(parameters)
+    frame = prior_units(parameters)
     complement = _complement(frame, gauge)
     if not complement.shape[1]:
         return ()
     seen = (triangle * frame.scale) @ complement
     groups = _groups(parameters, frame)
-    little = _little(triangle, seen, complement, parameters, frame, groups)
+    little = _weak_directions(triangle, seen, complement, parameters, frame, groups)
     names = [one.name for one in little]
-    alike = _alike(seen, complement, parameters, frame, groups)
+    alike = _correlated_pairs(seen, complement, parameters, frame, groups)
     return (*little, *(one for one in alike if one.name not in names))
 
 
-def _complement(frame: Frame, gauge: tuple[Direction, ...]) -> Array:
+def _complement(frame: PriorUnits, gauge: tuple[Direction, ...]) -> Array:
     """Orthonormal directions of what is unknown and told, in standard deviations of the priors, (P, k)."""
     count = len(frame.scale)
     fixed = np.eye(count)[:, np.setdiff1d(np.arange(count), frame.free)]
@@ -69,7 +68,7 @@ def _complement(frame: Frame, gauge: tuple[Direction, ...]) -> Array:
     return found
 
 
-def _groups(parameters: Parameters, frame: Frame) -> list[Group]:
+def _groups(parameters: Parameters, frame: PriorUnits) -> list[Group]:
     """The numbers by kind and axis."""
     members: dict[str, list[int]] = {}
     for index in map(int, frame.free):
@@ -78,15 +77,15 @@ def _groups(parameters: Parameters, frame: Frame) -> list[Group]:
     return [Group(name, np.array(each)) for name, each in members.items()]
 
 
-def _little(
-    triangle: Array, seen: Array, complement: Array, parameters: Parameters, frame: Frame, groups: list[Group]
+def _weak_directions(
+    triangle: Array, seen: Array, complement: Array, parameters: Parameters, frame: PriorUnits, groups: list[Group]
 ) -> list[Direction]:
     """Directions of which little is told; those that the same numbers make are one, with their count."""
     _, sizes, rows = np.linalg.svd(seen, full_matrices=True)
     sizes = np.concatenate((sizes, np.zeros(len(rows) - len(sizes))))
     left = 1.0 / np.hypot(1.0, sizes)
     vectors = complement @ rows.T
-    kinds = np.array([easy_place(name) for name in parameters.names])
+    kinds = np.array([measurement_rank(name) for name in parameters.names])
     member = np.array([np.isin(np.arange(len(kinds)), group.members) for group in groups], dtype=np.float64)
     alike: dict[tuple[str, ...], list[int]] = {}
     for index in map(int, np.argsort(-left, kind="stable")):
@@ -97,7 +96,7 @@ def _little(
         alone = len(names) == 1 and names[0] in parameters.labels
         if alone:
             index = parameters.labels.index(names[0])
-            names = (names[0], *_imitators(triangle * frame.scale, index, groups))
+            names = (names[0], *_substitutes(triangle * frame.scale, index, groups))
         many = f" ({len(each)} directions)" if len(each) > 1 else ""
         worst = each[0]
         found.append(_direction(names, many, vectors[:, worst] * left[worst], float(left[worst]), frame, alone=alone))
@@ -134,7 +133,7 @@ def _words(
     return tuple(names)
 
 
-def _imitators(scaled: Array, index: int, groups: list[Group]) -> tuple[str, ...]:
+def _substitutes(scaled: Array, index: int, groups: list[Group]) -> tuple[str, ...]:
     """The numbers of one other group, or of two, that do nearly all that a number does to the readings."""
     others = [group for group in groups if index not in group.members]
     for count in (1, 2):
@@ -152,8 +151,8 @@ def _imitators(scaled: Array, index: int, groups: list[Group]) -> tuple[str, ...
     return ()
 
 
-def _alike(
-    seen: Array, complement: Array, parameters: Parameters, frame: Frame, groups: list[Group]
+def _correlated_pairs(
+    seen: Array, complement: Array, parameters: Parameters, frame: PriorUnits, groups: list[Group]
 ) -> list[Direction]:
     """Pairs of numbers, the worst of each two groups; and single numbers with groups that imitate them."""
     known = np.isfinite(parameters.prior_deviation)[:, None] * complement
@@ -163,19 +162,19 @@ def _alike(
     size = np.sqrt(np.maximum(scatter.diagonal(), _TINY))
     likeness = np.abs(scatter) / np.outer(size, size)
     np.fill_diagonal(likeness, 0.0)
-    imitated = {many.name: _imitated(scatter, many.members) for many in groups if len(many.members) > 1}
+    imitated = {many.name: _is_substituted(scatter, many.members) for many in groups if len(many.members) > 1}
     found = []
     for first, one in enumerate(groups):
         for other in groups[first:]:
             pair = _pair(likeness, one, other)
             if pair is not None:
                 names = (parameters.labels[pair[0]], parameters.labels[pair[1]])
-                found.append(_widest(scatter, np.array(pair), names, frame))
+                found.append(_least_known_combination(scatter, np.array(pair), names, frame))
             elif min(len(one.members), len(other.members)) == 1 and one is not other:
                 single, many = (one, other) if len(one.members) == 1 else (other, one)
                 if len(many.members) > 1 and imitated[many.name][single.members[0]]:
                     members = np.concatenate((single.members, many.members))
-                    found.append(_widest(scatter, members, (single.name, many.name), frame))
+                    found.append(_least_known_combination(scatter, members, (single.name, many.name), frame))
     return sorted(found, key=lambda one: -one.known)
 
 
@@ -186,7 +185,7 @@ def _pair(likeness: Array, one: Group, other: Group) -> tuple[int, int] | None:
     return (int(one.members[row]), int(other.members[column])) if block[row, column] > ALIKE else None
 
 
-def _imitated(scatter: Array, many: Indices) -> Flags:
+def _is_substituted(scatter: Array, many: Indices) -> Flags:
     """Whether what the numbers of many cables do is all but what each does, (P,): their multiple correlation."""
     within, between = scatter[np.ix_(many, many)], scatter[many]
     ridge = (_SINGULAR * float(np.trace(within)) + _TINY) * np.eye(len(many))
@@ -195,7 +194,7 @@ def _imitated(scatter: Array, many: Indices) -> Flags:
     return imitated
 
 
-def _widest(scatter: Array, members: Indices, names: tuple[str, ...], frame: Frame) -> Direction:
+def _least_known_combination(scatter: Array, members: Indices, names: tuple[str, ...], frame: PriorUnits) -> Direction:
     """The combination of some numbers that is known least."""
     values, vectors = np.linalg.eigh(scatter[np.ix_(members, members)])
     left = float(np.sqrt(max(values[-1], 0.0)))
@@ -205,10 +204,10 @@ def _widest(scatter: Array, members: Indices, names: tuple[str, ...], frame: Fra
 
 
 def _direction(
-    names: tuple[str, ...], many: str, vector: Array, left: float, frame: Frame, *, alone: bool = False
+    names: tuple[str, ...], many: str, vector: Array, left: float, frame: PriorUnits, *, alone: bool = False
 ) -> Direction:
     """A direction by its names; where it is one number alone, which others imitate, that is what to measure."""
     vector = vector * np.sign(vector[np.argmax(np.abs(vector))])
-    step = easiest(re.split(r"[ .[]", name)[0] for name in (names[:1] if alone else names))
+    step = easiest_measurement(re.split(r"[ .[]", name)[0] for name in (names[:1] if alone else names))
     name = " with ".join((names[0], " and ".join(names[1:]))) if names[1:] else names[0]
     return Direction(name + many, locked(frame.units * vector), min(left, 1.0), step)

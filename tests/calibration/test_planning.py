@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.calibration import chosen_poses
-from sagline.calibration.observing import observed
-from sagline.calibration.parameters import parameters_of
-from sagline.calibration.unknowns import KINDS
+from sagline.calibration import planning
+from sagline.calibration.observations import predicted_rows
+from sagline.calibration.parameters import KINDS, parameters_of
 from sagline.core.arrays import Array
 from tests.calibration import reference
 from tests.calibration.machines import robots
@@ -39,7 +38,7 @@ def told(plan: sl.CalibrationPoses, pose: sl.Pose, lengths: Array) -> Array:
     """What poses tell of the numbers of a plan, in units of what is known of them beforehand, (P, P)."""
     numbers = plan.parameters
     unit = numbers.prior_deviation / np.where(numbers.logarithmic, numbers.prior, 1.0)
-    matrix = observed(plan.robot, sl.Catenary(), numbers, plan.sensors, pose_rows(pose), lengths).matrix
+    matrix = predicted_rows(plan.robot, sl.Catenary(), numbers, plan.sensors, pose_rows(pose), lengths).matrix
     flat = (matrix * unit).reshape(-1, len(unit))
     found: Array = flat.T @ flat
     return found
@@ -323,7 +322,9 @@ def _errors_at(plan: sl.CalibrationPoses, unknowns: list[sl.Unknown]) -> Array:
     numbers = parameters_of(plan.robot, unknowns, plan.sensors, counted=plan.parameters.counted)
     unit = np.where(numbers.logarithmic, numbers.prior, 1.0)
     rows = pose_rows(plan.poses)
-    matrix = observed(plan.robot, sl.Catenary(), numbers, plan.sensors, rows, plan.unstrained_length).matrix / unit
+    matrix = (
+        predicted_rows(plan.robot, sl.Catenary(), numbers, plan.sensors, rows, plan.unstrained_length).matrix / unit
+    )
     flat = matrix.reshape(-1, len(unit))
     errors: Array = np.sqrt(np.diag(np.linalg.inv(np.diag(numbers.prior_deviation**-2.0) + flat.T @ flat)))
     return errors
@@ -355,8 +356,8 @@ def test_words_fit_a_terminal(name: str) -> None:
     text, lines = str(plan), plan.table().splitlines()
     assert max(map(len, text.splitlines())) <= 80, text
     assert max(map(len, lines)) <= 80, lines
-    narrow = chosen_poses.in_words(plan, 60)
-    assert max(map(len, [*narrow.splitlines(), *chosen_poses.table(plan, 60).splitlines()])) <= 60, narrow
+    narrow = planning.in_words(plan, 60)
+    assert max(map(len, [*narrow.splitlines(), *planning.table(plan, 60).splitlines()])) <= 60, narrow
     assert narrow.split() == text.replace("standard errors", "errors").split()
     assert re.findall(rf"\d+|{name}", text.partition(":")[0]) == ["6", str(len(plan.parameters.names)), name]
     per = 1 if robot.cable_count <= 8 else 2

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.calibration.suspicions import suspicions
+from sagline.calibration.diagnostics import diagnose_log
 from tests.calibration.mistakes import (
     MISTAKES,
     Maker,
@@ -69,7 +69,7 @@ def honest(count: int, anchors: float) -> Iterator[Honest]:
     ],
 )
 def test_honest_logs_raise_no_alarm(count: int, anchors: float) -> None:
-    alarms = {name: told for name, robot, log in honest(count, anchors) if (told := suspicions(robot, log))}
+    alarms = {name: told for name, robot, log in honest(count, anchors) if (told := diagnose_log(robot, log))}
     assert alarms == {}
 
 
@@ -84,7 +84,7 @@ def told_wrongly(makers: tuple[Maker, ...], seeds: range) -> list[str]:
             if make is millimeters and log.counts is not None:
                 continue
             made = make(log, robot, np.random.default_rng(seed))
-            told = suspicions(robot, made.log)
+            told = diagnose_log(robot, made.log)
             if len(told) != 1 or not all(words in told[0] for words in made.told) or len(told[0]) > 220:
                 wrong.append(f"{make.__name__}, seed {seed}: {made.told} but {told}")
     return wrong
@@ -112,7 +112,7 @@ def test_mistakes_are_told_without_commanded_poses(make: Maker) -> None:
     robot = ROBOTS[0]
     log = log_of(true_robot(robot, USUAL, 5), 60, 5).log.replace(commanded=None)
     made = make(log, robot, np.random.default_rng(5))
-    (told,) = suspicions(robot, made.log)
+    (told,) = diagnose_log(robot, made.log)
     assert all(words in told for words in made.told), told
 
 
@@ -126,7 +126,7 @@ def test_a_mistake_is_told_of_a_log_with_rows_that_are_not_fit() -> None:
     assert cells is not None
     gaps = cells.copy()
     gaps[[3, 17, 18, 40], 2] = np.nan
-    (told,) = suspicions(robot, made.log.replace(load_cells=gaps))
+    (told,) = diagnose_log(robot, made.log.replace(load_cells=gaps))
     assert all(words in told for words in made.told), told
 
 
@@ -134,8 +134,8 @@ def test_a_mistake_is_told_of_a_log_with_rows_that_are_not_fit() -> None:
 def test_lengths_alone_say_nothing(changes: dict[str, Any]) -> None:
     robot = ROBOTS[1]
     log = log_of(true_robot(robot, USUAL, 3), 20, 3).log.replace(**changes)
-    assert suspicions(robot, log) == ()
-    assert suspicions(robot, log.rows(slice(0, 0))) == ()
+    assert diagnose_log(robot, log) == ()
+    assert diagnose_log(robot, log.rows(slice(0, 0))) == ()
 
 
 def test_what_is_none_is_refused() -> None:
@@ -147,6 +147,6 @@ def test_what_is_none_is_refused() -> None:
         (ROBOTS[1], log, wrong),
     ):
         with pytest.raises(sl.InvalidValueError):
-            suspicions(robot, given, model)
+            diagnose_log(robot, given, model)
     with refused("log", "of 8 cables", kind=sl.InvalidValueError):
-        suspicions(sl.load_robot("falcon-7"), log)
+        diagnose_log(sl.load_robot("falcon-7"), log)

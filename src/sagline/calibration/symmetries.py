@@ -10,8 +10,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from sagline.calibration.sensors import Sensors
-from sagline.calibration.turn import left_jacobian
+from sagline.calibration.log import Sensors
+from sagline.calibration.parameters import left_jacobian
 from sagline.core.arrays import Array, Flags
 from sagline.core.errors import InvalidValueError
 from sagline.kernels.calibration import kinds
@@ -84,7 +84,7 @@ def symmetries(robot: Robot, sensors: Sensors, turn: Array, *, counted: bool) ->
     drums[kinds.DRUM, np.arange(m), m + np.arange(m)] = 1.0
     table = np.concatenate((np.stack([one.change for one in each], axis=-1), drums), axis=-1)
     asked = np.concatenate(([one.lengths for one in each], np.zeros(2 * m)))
-    shift, share = (np.einsum("rm,rmg->mg", term, table) for term in _paid_terms(robot, counted))
+    shift, share = (np.einsum("rm,rmg->mg", term, table) for term in _length_terms(robot, counted))
     matters = np.ones((kinds.KIND_ROWS, m), dtype=np.bool_)
     matters[kinds.PER_CABLE :, 1:] = False
     matters[kinds.SHIFT :] = False  # few measured points leave open what many do not: the readings decide
@@ -95,7 +95,7 @@ def symmetries(robot: Robot, sensors: Sensors, turn: Array, *, counted: bool) ->
     return Symmetries(tuple(each), table, np.concatenate((shift, share - asked)), matters)
 
 
-def _paid_terms(robot: Robot, counted: bool) -> tuple[Array, Array]:
+def _length_terms(robot: Robot, counted: bool) -> tuple[Array, Array]:
     """How the length off each drum follows what is known of the winch, as a + b L.
 
     Args:

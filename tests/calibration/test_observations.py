@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.calibration.observing import observed
-from sagline.calibration.unknowns import KINDS
+from sagline.calibration.observations import predicted_rows
+from sagline.calibration.parameters import KINDS
 from sagline.core.arrays import Array
 from tests.calibration import reference
 from tests.calibration.machines import Standing, robots, sensors, standing
@@ -49,7 +49,7 @@ def told(name: str, kind: str) -> Array:
     """What `observed` says of a kind, not whitened any more: lengths are known to a nanometer."""
     machine, pose, lengths = stand(name)
     asked = reference.parameters(machine, (kind,))
-    seen = observed(machine.robot, sl.Catenary(), asked, machine.sensors, pose_rows(pose), lengths)
+    seen = predicted_rows(machine.robot, sl.Catenary(), asked, machine.sensors, pose_rows(pose), lengths)
     assert not seen.misfit.any()
     found: Array = seen.matrix * deviations(machine)[:, None]
     return found
@@ -108,7 +108,7 @@ def test_whitening_by_what_lengths_are_off(robot: str) -> None:
     machine, pose, lengths = stand(robot)
     loose = machine.sensors.replace(length_deviation=LENGTH)
     asked = reference.parameters(machine, ("frame_anchors", "mass"))
-    seen = observed(machine.robot, sl.Catenary(), asked, loose, pose_rows(pose), lengths)
+    seen = predicted_rows(machine.robot, sl.Catenary(), asked, loose, pose_rows(pose), lengths)
     by_lengths = reference.by_lengths(machine, pose, lengths, sl.Catenary())
     scatter = np.diag(deviations(machine) ** 2) + LENGTH**2 * by_lengths @ np.swapaxes(by_lengths, -1, -2)
     slopes = np.concatenate((differences(robot, "frame_anchors"), differences(robot, "mass")), axis=-1)
@@ -124,7 +124,7 @@ def test_a_sensor_that_is_not_there_tells_nothing(robot: str, absent: str) -> No
     rows = {"tension_deviation": slice(0, 8), "position_deviation": slice(8, 11), "rotation_deviation": slice(11, 14)}
     without = machine.sensors.replace(**{absent: None}, length_deviation=LENGTH)
     asked = reference.parameters(machine, ("frame_anchors", "measuring_frame", "target"))
-    seen = observed(machine.robot, sl.Catenary(), asked, without, pose_rows(pose), lengths)
+    seen = predicted_rows(machine.robot, sl.Catenary(), asked, without, pose_rows(pose), lengths)
     by_lengths = reference.by_lengths(machine, pose, lengths, sl.Catenary())
     there = np.delete(np.arange(14), rows[absent])
     kinds = ("frame_anchors", "measuring_frame", "target")
@@ -142,7 +142,7 @@ def test_a_sensor_that_is_not_there_tells_nothing(robot: str, absent: str) -> No
 def test_a_number_of_all_cables_is_the_sum_of_theirs(kind: str) -> None:
     machine, pose, lengths = stand("layers")
     asked = reference.parameters(machine, (kind,), shared=(kind,))
-    seen = observed(machine.robot, sl.Catenary(), asked, machine.sensors, pose_rows(pose), lengths)
+    seen = predicted_rows(machine.robot, sl.Catenary(), asked, machine.sensors, pose_rows(pose), lengths)
     each = told("layers", kind)
     wanted = each.reshape(*each.shape[:2], 8, -1).sum(axis=2)
     agree(seen.matrix * deviations(machine)[:, None], wanted)

@@ -5,7 +5,7 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from sagline.calibration.tour import length_of, short_tour
+from sagline.calibration.candidates import length_of, shortest_tour
 from tests.tiers import wide
 
 
@@ -13,7 +13,7 @@ from tests.tiers import wide
 def test_tours_against_all_orders(seed: int) -> None:
     places = np.random.default_rng(seed).uniform(size=(7, 3))
     best = min(length_of(places, np.array(order)) for order in permutations(range(7)))
-    found = short_tour(places)
+    found = shortest_tour(places)
     assert sorted(found) == list(range(7))
     assert best - 1e-12 <= length_of(places, found) <= 1.1 * best
 
@@ -21,19 +21,19 @@ def test_tours_against_all_orders(seed: int) -> None:
 def test_a_row_of_places_is_driven_along() -> None:
     places = np.zeros((30, 3))
     places[:, 1] = np.random.default_rng(1).permutation(30)
-    assert length_of(places, short_tour(places)) == pytest.approx(29.0)
+    assert length_of(places, shortest_tour(places)) == pytest.approx(29.0)
 
 
 def test_many_places_are_no_way_for_long() -> None:
     places = np.random.default_rng(2).uniform(size=(300, 2))
     # 0.7124 sqrt(N A) is the best tour of many places; 2-opt is some 5 % longer, nearest neighbors alone 25 %
-    assert length_of(places, short_tour(places)) <= 1.12 * 0.7124 * np.sqrt(300.0)
+    assert length_of(places, shortest_tour(places)) <= 1.12 * 0.7124 * np.sqrt(300.0)
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_few_places(count: int) -> None:
-    assert sorted(short_tour(np.eye(3)[:count])) == list(range(count))
+    assert sorted(shortest_tour(np.eye(3)[:count])) == list(range(count))
 
 
 def test_places_that_coincide() -> None:
-    assert sorted(short_tour(np.ones((5, 3)))) == list(range(5))
+    assert sorted(shortest_tour(np.ones((5, 3)))) == list(range(5))

@@ -11,9 +11,8 @@ import numpy as np
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.calibration.hypotheses import Change, Trial
-from sagline.calibration.log import WinchLog
-from sagline.calibration.screening import screened
-from sagline.calibration.sensors import load_cells_of
+from sagline.calibration.log import WinchLog, load_cells_of
+from sagline.calibration.screening import screen
 from sagline.core.arguments import instance
 from sagline.core.arrays import Array, Flags, Indices
 from sagline.robot.robot import Robot
@@ -29,7 +28,7 @@ SHIFTS: Final = 5  # rows by which load cells may be early or late
 _FULLY: Final = 3  # changes of those that promise most which are tried to the end
 
 
-def suspicions(robot: Robot, log: WinchLog, model: CableModel = _CATENARY) -> tuple[str, ...]:
+def diagnose_log(robot: Robot, log: WinchLog, model: CableModel = _CATENARY) -> tuple[str, ...]:
     """What looks wrong with a log, in sentences with the next step; none for an honest one.
 
     First the sizes of readings: lengths and positions in mm, load cells in kN. Then whether some robot, nearly this
@@ -55,10 +54,10 @@ def suspicions(robot: Robot, log: WinchLog, model: CableModel = _CATENARY) -> tu
     instance(model, CableModel, "model")
     if found := tuple(wrong_units(robot, log)):
         return found  # what else there is shows when they are right
-    rows = screened(robot, log).rows
+    rows = screen(robot, log).rows
     if not len(rows) or (log.load_cells is None and log.position is None):
         return ()
-    return tuple(_mistakes(Trial(robot, model, log, rows)))
+    return tuple(_single_mistake(Trial(robot, model, log, rows)))
 
 
 def wrong_units(robot: Robot, log: WinchLog) -> Iterator[str]:
@@ -110,7 +109,7 @@ def wrong_units(robot: Robot, log: WinchLog) -> Iterator[str]:
         )
 
 
-def fits_unmeasured(robot: Robot, log: WinchLog, model: CableModel) -> bool:
+def fits_without_measured_poses(robot: Robot, log: WinchLog, model: CableModel) -> bool:
     """Whether some robot like this one reads what lengths and load cells say, whatever was measured.
 
     Args:
@@ -124,7 +123,7 @@ def fits_unmeasured(robot: Robot, log: WinchLog, model: CableModel) -> bool:
     return Trial(robot, model, own, np.arange(len(log))).result(Change()).quality <= GOOD
 
 
-def measured_elsewhere(log: WinchLog, left_out: Indices, asked: Collection[str]) -> Iterator[str]:
+def frame_mismatch(log: WinchLog, left_out: Indices, asked: Collection[str]) -> Iterator[str]:
     """A sentence about measured poses that fit nowhere, though everything else does.
 
     Args:
@@ -162,28 +161,29 @@ def _spread(position: Array) -> float:
     return float(np.max(high - low))
 
 
-def _mistakes(trial: Trial) -> Iterator[str]:
+def _single_mistake(trial: Trial) -> Iterator[str]:
     """The one mistake without which a robot fits the readings."""
     whole = trial.result(Change())
     far = _far(trial, whole.zeros)
     if whole.quality <= GOOD:
         if far.any():
-            yield _of_zeros(whole.zeros, far)
+            yield _zero_text(whole.zeros, far)
         return
     enough = max(GOOD, min(POOR, 0.01 * whole.quality))
-    for changes, steps in ((_of_lengths(trial), 0), (_of_cells(trial), 1)):
-        for change in trial.promising(changes, steps, _FULLY):
+    for changes, steps in ((_length_changes(trial), 0), (_load_cell_changes(trial), 1)):
+        for change in trial.most_promising(changes, steps, _FULLY):
             found = trial.result(change)
             if found.quality > enough or found.departure > NEAR:
                 continue
             if change.moved:
-                yield _of_zeros(found.zeros, _far(trial, found.zeros))
+                yield _zero_text(found.zeros, _far(trial, found.zeros))
             else:
-                yield f"{_told(change, trial.log)} (misfit {_root(whole.quality)}, then {_root(found.quality)})"
+                before, after = _misfit_text(whole.quality), _misfit_text(found.quality)
+                yield f"{_change_text(change, trial.log)} (misfit {before}, then {after})"
             return
 
 
-def _of_lengths(trial: Trial) -> Iterator[Change]:
+def _length_changes(trial: Trial) -> Iterator[Change]:
     """What may be wrong with lengths or counts, alone or with the load cells of the same cables."""
     m = trial.robot.cable_count
     for two in combinations(range(m), 2):
@@ -200,7 +200,7 @@ def _of_lengths(trial: Trial) -> Iterator[Change]:
             yield Change(moved=tuple(np.flatnonzero(far).tolist()))
 
 
-def _of_cells(trial: Trial) -> Iterator[Change]:
+def _load_cell_changes(trial: Trial) -> Iterator[Change]:
     """What may be wrong with the load cells alone."""
     if trial.log.load_cells is None:
         return
@@ -226,7 +226,7 @@ def _far(trial: Trial, zeros: Array) -> Flags:
     return np.asarray(np.abs(zeros) > FAR * _usual(trial))
 
 
-def _of_zeros(zeros: Array, far: Flags) -> str:
+def _zero_text(zeros: Array, far: Flags) -> str:
     """Cables whose zeros are far off."""
     cables = np.flatnonzero(far).tolist()
     listed = ", ".join(
@@ -235,7 +235,7 @@ def _of_zeros(zeros: Array, far: Flags) -> str:
     return f"lengths have a zero far off: {listed}; correct length_zero of the winches there, or home the robot again"
 
 
-def _told(change: Change, log: WinchLog) -> str:
+def _change_text(change: Change, log: WinchLog) -> str:
     kind = "count" if log.counts is not None else "length"
     if change.lengths is not None:
         i, j = change.lengths
@@ -254,6 +254,6 @@ def _told(change: Change, log: WinchLog) -> str:
     return f"load cells come {rows} {way} the lengths they belong to, it seems: move their columns {where} by {rows}"
 
 
-def _root(quality: float) -> str:
+def _misfit_text(quality: float) -> str:
     """A quality in standard deviations, in words."""
     return f"{np.sqrt(quality):.3g} standard deviations" if np.isfinite(quality) else "without bound"

@@ -8,10 +8,10 @@ import pytest
 
 import sagline as sl
 from sagline.calibration.findings import Direction
-from sagline.calibration.gauge import folded, frame_of, gauge_of
-from sagline.calibration.hardly_told import cannot_tell_apart
-from sagline.calibration.observing import observed
-from sagline.calibration.unknowns import Parameters
+from sagline.calibration.identifiability import append_rows, gauge_of, prior_units
+from sagline.calibration.observations import predicted_rows
+from sagline.calibration.parameters import Parameters
+from sagline.calibration.weak_identifiability import cannot_tell_apart
 from sagline.core.arrays import Array
 from tests.calibration import reference
 from tests.calibration.machines import standing
@@ -33,11 +33,11 @@ def told(robot: str, unknowns: tuple[str, ...], *, positions: bool = False) -> T
     sensors = sl.Sensors(5e-4, 5.0, 1e-3 if positions else None)
     shared = tuple(name for name in unknowns if name in ("pulley_radius", "axial_stiffness", "linear_density"))
     parameters = reference.parameters(machine, unknowns, shared=shared)
-    matrix = observed(machine.robot, sl.Catenary(), parameters, sensors, pose_rows(pose), lengths).matrix
-    triangle = folded(np.zeros((0, len(parameters.names))), matrix)
+    matrix = predicted_rows(machine.robot, sl.Catenary(), parameters, sensors, pose_rows(pose), lengths).matrix
+    triangle = append_rows(np.zeros((0, len(parameters.names))), matrix)
     gauge = gauge_of(triangle, parameters, parameters.prior, machine.robot, sensors)
-    rows = matrix.reshape(-1, matrix.shape[2]) * frame_of(parameters).scale
-    left = np.array([one.vector for one in gauge]).reshape(len(gauge), rows.shape[1]) / frame_of(parameters).units
+    rows = matrix.reshape(-1, matrix.shape[2]) * prior_units(parameters).scale
+    left = np.array([one.vector for one in gauge]).reshape(len(gauge), rows.shape[1]) / prior_units(parameters).units
     basis = np.linalg.qr(left.T)[0]
     outside = np.eye(rows.shape[1]) - basis @ basis.T
     scatter: Array = outside @ np.linalg.inv(rows.T @ rows + np.eye(rows.shape[1])) @ outside
@@ -82,7 +82,7 @@ def test_rope_and_platform_weigh_alike() -> None:
 )
 def test_what_is_left_of_the_prior(robot: str, unknowns: tuple[str, ...]) -> None:
     parameters, scatter, found = told(robot, unknowns)
-    units = frame_of(parameters).units
+    units = prior_units(parameters).units
     for one in found:
         vector = one.vector / units
         np.testing.assert_allclose(np.linalg.norm(vector), one.known, rtol=1e-9)

@@ -9,8 +9,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import sagline as sl
-from sagline.calibration.expected import known_of, moved_at
 from sagline.calibration.parameters import offset_with, parameters_of, robot_with
+from sagline.calibration.result import known_of, moved_at
 from sagline.core.arrays import Array
 from tests.calibration.reference import counts_of, pose_rows
 from tests.calibration.synthetic import log_of, true_robot, with_drums

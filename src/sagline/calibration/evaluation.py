@@ -8,22 +8,21 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from sagline.calibration.chi_squared import above, below, exceeded_with
-from sagline.calibration.findings import CrossValidation, Outlier
-from sagline.calibration.gauge import OPEN, folded, gauge_of
-from sagline.calibration.hardly_told import cannot_tell_apart
-from sagline.calibration.least_squares import QUANTILE, rows_at
-from sagline.calibration.observing import BLOCK
+from sagline.calibration.findings import CalibrationStatus, CrossValidation, Omission, Outlier
+from sagline.calibration.identifiability import OPEN, append_rows, gauge_of
+from sagline.calibration.least_squares import QUANTILE, above, below, exceeded_with, whitened_at
+from sagline.calibration.observations import BLOCK
 from sagline.calibration.outliers import misfitting, outliers_in
-from sagline.calibration.parameters import external
-from sagline.calibration.problem import Fit, Problem, said_lengths
-from sagline.calibration.provenance import provenance_of
+from sagline.calibration.parameters import KINDS, Parameters, external
+from sagline.calibration.problem import Fit, Problem, reported_lengths
 from sagline.calibration.result import Calibration
 from sagline.calibration.search import Found
-from sagline.calibration.status import CalibrationStatus, Omission
+from sagline.calibration.weak_identifiability import cannot_tell_apart
 from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.core.progress import blocks
 from sagline.robot.pose import Pose
+from sagline.robot.provenance import Provenance
+from sagline.robot.tolerances import UNCERTAIN
 
 DOUBTFUL: Final = 1e-4  # chi squared that would be so far from what is to be expected that rarely is none
 ODD: Final = 0.1  # share of the poses that may fit badly, or not at all, before the whole is in doubt
@@ -32,7 +31,7 @@ TOLERATED: Final = 1.1  # of chi squared to what is to be expected: no model is 
 LITTLE: Final = 1e-6  # of a direction: a number that has so little of it is told all the same
 
 
-def concluded(
+def evaluate(
     problem: Problem,
     found: Found,
     rows: Indices,
@@ -140,10 +139,10 @@ def said_by_all(problem: Problem, fit: Fit) -> Said:
     state, width = fit.state, len(fit.state.numbers)
     residuals, triangle = [], np.zeros((0, width))
     for part in blocks(len(state.poses), BLOCK):
-        said = said_lengths(problem, state.machine, part)
-        rows = rows_at(problem, state, said, part, free_of_noise=True)
+        said = reported_lengths(problem, state.machine, part)
+        rows = whitened_at(problem, state, said, part, free_of_noise=True)
         residuals.append(np.hstack((said - state.lengths[part], rows.residual)))
-        triangle = folded(triangle, rows.matrix * np.sqrt(fit.normal.weights[part])[:, None, None])
+        triangle = append_rows(triangle, rows.matrix * np.sqrt(fit.normal.weights[part])[:, None, None])
     return Said(np.concatenate(residuals), triangle)
 
 
@@ -159,7 +158,7 @@ def covariance_of(problem: Problem, triangle: Array, slopes: Array) -> tuple[Arr
     """
     scale, deviation = problem.scale, problem.prior_deviation
     known = np.where(np.isfinite(deviation), scale / deviation, 0.0)
-    _, sizes, rows = np.linalg.svd(folded(triangle * scale, np.diag(known)))
+    _, sizes, rows = np.linalg.svd(append_rows(triangle * scale, np.diag(known)))
     told = sizes > OPEN * sizes[0]
     unit = rows[: len(told)][told].T / sizes[told] * (scale * slopes)[:, None]
     covariance: Array = unit @ unit.T
@@ -184,3 +183,26 @@ def _is_doubtful(chi_squared: float, free: int, readings: Indices, *, robust: bo
     ratio = chi_squared / max(free - cut, 1.0)
     rare = min(above(chi_squared + cut, free), below(chi_squared + cut, free)) < 0.5 * DOUBTFUL
     return bool(rare and not 1.0 / TOLERATED < ratio < TOLERATED)
+
+
+def provenance_of(
+    parameters: Parameters, standard_error: Array, status: CalibrationStatus, log: str, date: str
+) -> Provenance:
+    """Where the numbers of a calibrated robot come from, each with its standard error.
+
+    Args:
+        parameters: What was looked for.
+        standard_error: Of what was found, in the units of the parameters, (P,).
+        status: How it ended; one that is not FOUND is noted.
+        log: Where the readings come from.
+        date: When it was done, ISO 8601.
+    """
+    errors: dict[str, Array] = {}
+    for name in dict.fromkeys(parameters.names):
+        if name not in UNCERTAIN or (name == "length_zero" and not parameters.counted):
+            continue
+        first, axes = KINDS[name].first, len(KINDS[name].axes)
+        error = standard_error[np.asarray(parameters.where[first : first + axes], dtype=np.int64)].T
+        own = error if UNCERTAIN[name].each else error[0]
+        errors[name] = own if UNCERTAIN[name].axes else own[..., 0]
+    return Provenance(log, date, errors, "" if status is CalibrationStatus.FOUND else status.text)

@@ -9,9 +9,9 @@ import pytest
 
 import sagline as sl
 from sagline.calibration.findings import Direction
-from sagline.calibration.gauge import folded, frame_of, gauge_of, told
-from sagline.calibration.observing import observed
-from sagline.calibration.unknowns import KINDS, Parameters
+from sagline.calibration.identifiability import append_rows, gauge_of, prior_units, told
+from sagline.calibration.observations import predicted_rows
+from sagline.calibration.parameters import KINDS, Parameters
 from sagline.core.arrays import Array
 from tests.calibration import reference
 from tests.calibration.machines import Standing, robots, standing, with_drums
@@ -164,7 +164,7 @@ def by_differences(case: Case) -> Array:
     parts += [total[: case.positions, m : m + 3] / 1e-3] if case.positions else []
     parts += [total[:, m + 3 :] / 1e-3] if case.rotations else []
     rows = np.vstack([part.reshape(-1, total.shape[2]) for part in parts])
-    rows = rows * frame_of(parameters).scale
+    rows = rows * prior_units(parameters).scale
     size = np.linalg.norm(rows, axis=1, keepdims=True)
     found: Array = rows[size[:, 0] > 0.0] / size[size[:, 0] > 0.0]  # stiff poses are as wrong as they are large
     return found
@@ -177,8 +177,8 @@ def triangle_of(case: Case) -> Array:
     for part, given in ((slice(0, case.positions), sensors), (slice(case.positions, None), None)):
         read = given or (sensors if case.positions in (0, POSES) else sensors.replace(position_deviation=None))
         if len(lengths[part]):
-            rows = observed(machine.robot, sl.Catenary(), parameters, read, pose_rows(pose[part]), lengths[part])
-            triangle = folded(triangle, rows.matrix)
+            rows = predicted_rows(machine.robot, sl.Catenary(), parameters, read, pose_rows(pose[part]), lengths[part])
+            triangle = append_rows(triangle, rows.matrix)
     return triangle
 
 
@@ -206,7 +206,7 @@ def test_differences_leave_as_many_open_and_the_same(name: str) -> None:
     values = np.concatenate((values, np.zeros(rows.shape[1] - len(values))))
     assert len(found) == np.sum(values < 1e-7 * values[0])
     vectors = np.array([one.vector for one in found]).reshape(len(found), rows.shape[1])
-    vectors = vectors / frame_of(asked(case)).units
+    vectors = vectors / prior_units(asked(case)).units
     assert np.abs(rows @ vectors.T).max(initial=0.0) < 1e-6 * values[0]
     assert np.linalg.matrix_rank(vectors, tol=1e-3) == len(found)
 
@@ -214,7 +214,7 @@ def test_differences_leave_as_many_open_and_the_same(name: str) -> None:
 def test_63_unknowns_of_the_cogiro() -> None:
     case = CASES["63 of the CoGiRo"]
     assert len(asked(case).names) == 63
-    values = np.linalg.svd(triangle_of(case) * frame_of(asked(case)).scale)[1]
+    values = np.linalg.svd(triangle_of(case) * prior_units(asked(case)).scale)[1]
     assert np.sum(values < 1e-12 * values[0]) == 11
     assert values[51] > 1e-6 * values[0]
 
@@ -232,13 +232,13 @@ def test_an_anchor_stated_to_be_known_is_fixed() -> None:
 def test_rows_in_parts_fold_into_the_same_triangle() -> None:
     rng = np.random.default_rng(2)
     rows = rng.normal(size=(40, 7, 5))
-    whole = folded(np.zeros((0, 5)), rows)
+    whole = append_rows(np.zeros((0, 5)), rows)
     parts = np.zeros((0, 5))
     for start in range(0, 40, 9):
-        parts = folded(parts, rows[start : start + 9])
+        parts = append_rows(parts, rows[start : start + 9])
     np.testing.assert_allclose(parts.T @ parts, whole.T @ whole, rtol=1e-12)
     rows[3, 2] = np.nan
-    assert np.isfinite(folded(np.zeros((0, 5)), rows)).all()
+    assert np.isfinite(append_rows(np.zeros((0, 5)), rows)).all()
 
 
 @pytest.mark.parametrize(

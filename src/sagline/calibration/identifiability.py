@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from sagline.calibration.findings import Direction
-from sagline.calibration.generators import Generator, Symmetries, symmetries
-from sagline.calibration.sensors import Sensors
-from sagline.calibration.steps import easiest
-from sagline.calibration.unknowns import KINDS, Parameters
+from sagline.calibration.log import Sensors
+from sagline.calibration.parameters import KINDS, Parameters
+from sagline.calibration.symmetries import Generator, Symmetries, symmetries
 from sagline.core.arrays import Array, Indices, locked
 from sagline.kernels.calibration import kinds
 from sagline.robot.robot import Robot
@@ -25,7 +24,7 @@ _TINY: Final = 1e-300
 _NAMED: Final = 3  # numbers that a direction without a name shows
 
 
-class Frame(NamedTuple):
+class PriorUnits(NamedTuple):
     """The unknowns in standard deviations of their priors.
 
     Attributes:
@@ -39,7 +38,7 @@ class Frame(NamedTuple):
     free: Indices
 
 
-def folded(triangle: Array, matrix: Array) -> Array:
+def append_rows(triangle: Array, matrix: Array) -> Array:
     """Triangular factor of all rows so far and some more: by reflections, so that nothing is squared.
 
     Singular values down to rounding are told apart, which sums of products cannot below the root of that.
@@ -56,7 +55,7 @@ def folded(triangle: Array, matrix: Array) -> Array:
     return np.asarray(np.linalg.qr(np.vstack((triangle, rows)), mode="r"))
 
 
-def frame_of(parameters: Parameters) -> Frame:
+def prior_units(parameters: Parameters) -> PriorUnits:
     """The priors as a measure of directions; where nothing is known, what is usual of a number nobody gives.
 
     Beside a prior as wide as nothing the others would be rounding: it counts as `_WIDE`.
@@ -68,10 +67,10 @@ def frame_of(parameters: Parameters) -> Frame:
     scale = units / np.where(parameters.logarithmic, np.abs(parameters.prior), 1.0)
     common = np.array([KINDS[name].deviation for name in parameters.names])
     fixed = parameters.stated & (scale < _FIXED * common)
-    return Frame(scale, units, np.flatnonzero(~fixed).astype(np.int64))
+    return PriorUnits(scale, units, np.flatnonzero(~fixed).astype(np.int64))
 
 
-def open_directions(triangle: Array, frame: Frame) -> Array:
+def open_directions(triangle: Array, frame: PriorUnits) -> Array:
     """Unit vectors, in standard deviations of the priors, that change nothing that is read: columns, (P, d)."""
     vectors = np.zeros((len(frame.scale), 0))
     if not frame.free.size:
@@ -113,40 +112,42 @@ def gauge_of(
     Returns:
         As many directions as the readings leave open; none where all is told.
     """
-    frame = frame_of(parameters)
+    frame = prior_units(parameters)
     size = np.linalg.norm(triangle, axis=0) * frame.scale
     alone = [int(index) for index in frame.free if size[index] <= OPEN * size.max()]
     unit = np.eye(len(size))
     found = [_direction(*_largest(unit[index], parameters), frame) for index in alone]
     frame = frame._replace(free=np.setdiff1d(frame.free, alone))
     left = open_directions(triangle, frame)
-    known = symmetries(robot, sensors, turn_of(parameters, values), counted=parameters.counted)
+    known = symmetries(robot, sensors, rotation_of_frame(parameters, values), counted=parameters.counted)
     known = known._replace(matters=known.matters & ~np.isin(parameters.where, alone))
-    vectors, named = _explained(left, frame, parameters.where, known)
+    vectors, named = _symmetric_part(left, frame, parameters.where, known)
     found += [_direction(name, vector, step, frame) for vector, (name, step) in zip(vectors.T, named, strict=True)]
-    explained = np.linalg.qr(vectors)[0]
-    rest = left - explained @ (explained.T @ left)
+    fit_suspects = np.linalg.qr(vectors)[0]
+    rest = left - fit_suspects @ (fit_suspects.T @ left)
     basis, size, _ = np.linalg.svd(rest, full_matrices=False)
     for vector in _sparse(basis[:, size > 0.5]).T:
         found.append(_direction(*_largest(vector, parameters), frame))
     return tuple(found)
 
 
-def turn_of(parameters: Parameters, values: Array) -> Array:
+def rotation_of_frame(parameters: Parameters, values: Array) -> Array:
     """Rotation vector of the measuring system, by which it is looked for [rad], (3,); zero where it is known."""
     where = parameters.where[kinds.TURN : kinds.TURN + 3, 0]
     return np.where(where >= 0, values[where], 0.0)
 
 
-def _direction(name: str, vector: Array, step: str, frame: Frame) -> Direction:
+def _direction(name: str, vector: Array, step: str, frame: PriorUnits) -> Direction:
     unit = vector / np.linalg.norm(vector)
     unit = unit * np.sign(unit[np.argmax(np.abs(unit))])
     return Direction(name, locked(frame.units * unit), 1.0, step)
 
 
-def _explained(left: Array, frame: Frame, where: Indices, known: Symmetries) -> tuple[Array, list[tuple[str, str]]]:
+def _symmetric_part(
+    left: Array, frame: PriorUnits, where: Indices, known: Symmetries
+) -> tuple[Array, list[tuple[str, str]]]:
     """Of the open directions those that symmetries are, (P, d), with names and steps."""
-    vectors, shares = _possible(frame, where, known)
+    vectors, shares = _admissible_symmetries(frame, where, known)
     if not vectors.shape[1] or not left.shape[1]:
         return np.zeros((len(frame.scale), 0)), []
     basis, upper = np.linalg.qr(vectors)
@@ -157,7 +158,7 @@ def _explained(left: Array, frame: Frame, where: Indices, known: Symmetries) -> 
     return found, [_named(column, known.each) for column in mixed.T]
 
 
-def _possible(frame: Frame, where: Indices, known: Symmetries) -> tuple[Array, Array]:
+def _admissible_symmetries(frame: PriorUnits, where: Indices, known: Symmetries) -> tuple[Array, Array]:
     """Combinations of symmetries that move unknowns alone: as vectors (P, k), and shares of the symmetries (g, k).
 
     Both count in standard deviations. What is known stays, what is shared moves alike, and the drums pay out as much as
@@ -227,4 +228,36 @@ def _largest(vector: Array, parameters: Parameters) -> tuple[str, Array, str]:
     name = " with ".join(parameters.labels[index] for index in moved[:_NAMED])
     if len(moved) > _NAMED:
         name += f" and {len(moved) - _NAMED} more"
-    return name, vector, easiest(parameters.names[index] for index in moved)
+    return name, vector, easiest_measurement(parameters.names[index] for index in moved)
+
+
+STEPS: Final = {  # the easiest first
+    "pulley_radius": "measure the pulley with a caliper",
+    "mass": "weigh the platform",
+    "linear_density": "weigh some meters of the cable",
+    "drum_radius": "measure the drum and its cable with a caliper, or pay out a length along a tape",
+    "dead_cable": "measure the run from drum to pulley with a tape",
+    "load_cell_bias": "read the load cell without load",
+    "load_cell_gain": "check the load cell with a known weight",
+    "axial_stiffness": "take poses of very different tensions, or pull a piece of the cable",
+    "center_of_mass": "balance the platform, or take poses of more tilt",
+    "platform_anchors": "measure the platform's anchors",
+    "length_zero": "home at a pose that is measured",
+    "target": "measure the target on the platform, or take poses of more tilt",
+    "measuring_frame": "measure more poses, some of them turned",
+    "frame_anchors": "measure frame anchors with a total station",
+}
+
+
+def measurement_rank(name: str) -> int:
+    """Place of a kind among those that are easier to measure."""
+    return list(STEPS).index(name)
+
+
+def easiest_measurement(names: Iterable[str]) -> str:
+    """What tells numbers of some kinds apart with the least work.
+
+    Args:
+        names: Of `unknowns.KINDS`.
+    """
+    return STEPS[min(names, key=measurement_rank)]
