@@ -9,8 +9,8 @@ import numpy as np
 import sagline as sl
 from benchmarks.measure import Row, best_seconds, print_table
 from sagline.core.arrays import Array, Indices, locked
-from sagline.interference.clearance_rows import ClearanceRows
-from sagline.interference.rows import cable_rows
+from sagline.interference.clearance import ClearanceRows
+from sagline.interference.pairs import cable_rows
 from sagline.kernels.interference import shapes
 from sagline.kernels.interference.hanging_distance import least_distances, memory_for_pieces
 from tests.interference.scenes import box_mesh

@@ -16,7 +16,7 @@ from rich.console import Console
 import sagline as sl
 from benchmarks.measure import Row, show
 from sagline.sweep.folder import make_folder
-from sagline.sweep.tasks import measured_size, task
+from sagline.sweep.work import measured_size, task
 
 ROBOT = Path(__file__).parents[1] / "examples" / "own_planar.yaml"
 PUBLISHED = 5844.0  # s, of as many requests on eight workers, 57,952 of which were lost

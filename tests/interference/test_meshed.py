@@ -70,7 +70,7 @@ def test_a_mesh_as_platform_is_its_box() -> None:
 
 
 def test_batches_with_meshes_are_their_poses_and_the_least_is_the_same_without_the_rest() -> None:
-    from sagline.interference.clearance_rows import ClearanceRows
+    from sagline.interference.clearance import ClearanceRows
 
     robot = sl.load_robot("cogiro")
     state = sl.inverse(robot, sl.Pose([[1.0, 0.5, 1.5], [0.0, 0.0, 2.0], [-1.0, 1.0, 1.0]], LEVEL)).state

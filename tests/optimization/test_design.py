@@ -150,7 +150,7 @@ def test_a_package_that_is_missing_is_named_with_its_extra(monkeypatch: pytest.M
     def gone(module: str) -> None:
         raise ModuleNotFoundError(f"No module named {module!r}", name=module)
 
-    monkeypatch.setattr("sagline.optimization.extras.import_module", gone)
+    monkeypatch.setattr("sagline.optimization.search.import_module", gone)
     with refused("the package cma", "missing", kind=sl.InvalidValueError) as caught:
         search(pair(), [apart()])
     assert '"sagline[design]"' in caught.value.next_step

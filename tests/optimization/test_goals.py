@@ -8,7 +8,7 @@ import pytest
 import sagline as sl
 from sagline import FreeCable
 from sagline.optimization.candidates import Candidates
-from sagline.optimization.planned import planned
+from sagline.optimization.rating import planned
 from tests.tension.reference import random_poses
 from tests.tiers import extended
 

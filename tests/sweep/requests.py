@@ -8,8 +8,8 @@ import numpy as np
 
 import sagline as sl
 from sagline.sweep import folder as sweep_folder
-from sagline.sweep import marks as sweep_marks
-from sagline.sweep.quantities import variables_of
+from sagline.sweep import result as sweep_result
+from sagline.sweep.request import variables_of
 
 PLANAR = Path(__file__).parents[2] / "examples" / "own_planar.yaml"
 
@@ -40,7 +40,7 @@ def chunks(folder: Path, request: sl.sweep.Request) -> dict[str, tuple[int, int]
 
 def marked(folder: Path) -> list[int]:
     """Tasks of the file `done`, in its order."""
-    lines = (folder / sweep_marks.NAME).read_text().splitlines()
+    lines = (folder / sweep_result.NAME).read_text().splitlines()
     return [int(line.split()[0]) for line in lines if line and not line.startswith("#")]
 
 

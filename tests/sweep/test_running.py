@@ -13,9 +13,9 @@ import pytest
 from syrupy.assertion import SnapshotAssertion
 
 import sagline as sl
-from sagline.sweep import cluster, running, tasks
+from sagline.sweep import cluster, running, work
 from sagline.sweep import folder as sweep_folder
-from sagline.sweep import marks as sweep_marks
+from sagline.sweep import result as sweep_result
 from tests.refusal import refused
 from tests.sweep.requests import bits, chunks, in_tasks, marked, planar
 from tests.tiers import extended, wide
@@ -124,7 +124,7 @@ def test_what_the_marks_say_is_found_again_on_the_disk(tmp_path: Path, reference
     folder = in_tasks(tmp_path / "sweep", planar(), SIZE)
     first = sl.sweep.run(planar(), folder, workers=1)
     before = chunks(folder, planar())
-    (folder / sweep_marks.NAME).write_bytes(text.encode("latin-1"))
+    (folder / sweep_result.NAME).write_bytes(text.encode("latin-1"))
     found = sl.sweep.run(planar(), folder, workers=1)
     assert chunks(folder, planar()) == before
     assert (found.counts, found.done) == (first.counts, first.done)
@@ -194,7 +194,7 @@ def test_what_is_no_folder_of_this_sweep_is_left_as_it_is(tmp_path: Path, what: 
 
 def test_one_process_at_a_time_works_on_a_sweep(tmp_path: Path, snapshot: SnapshotAssertion) -> None:
     folder = in_tasks(tmp_path / "sweep", planar(), SIZE)
-    with sweep_marks.marking(sweep_folder.open_folder(folder)), refused(kind=sl.FileError, file=folder) as caught:
+    with sweep_result.marking(sweep_folder.open_folder(folder)), refused(kind=sl.FileError, file=folder) as caught:
         sl.sweep.run(planar(), folder, workers=1)
     assert str(caught.value).replace(str(folder), "FOLDER") == snapshot
 
@@ -254,12 +254,12 @@ def test_without_zarr_a_sentence_says_what_to_install(tmp_path: Path, monkeypatc
 
 def test_tasks_take_as_long_as_they_should(monkeypatch: pytest.MonkeyPatch) -> None:
     times = iter(np.repeat(np.arange(0.0, 1e3, 0.01), 1))
-    monkeypatch.setattr(tasks, "numbers_of", lambda request, part: {})
-    monkeypatch.setattr("sagline.sweep.tasks.time.process_time", lambda: next(times))
+    monkeypatch.setattr(work, "numbers_of", lambda request, part: {})
+    monkeypatch.setattr("sagline.sweep.work.time.process_time", lambda: next(times))
     request = planar(2000, 1000)
-    size = tasks.measured_size(request)  # 10 ms for 4,000 requests
+    size = work.measured_size(request)  # 10 ms for 4,000 requests
     assert size.wrenches == 1000
-    assert size.poses * size.wrenches * 0.01 / 4000 == pytest.approx(tasks.SECONDS, rel=0.05)
+    assert size.poses * size.wrenches * 0.01 / 4000 == pytest.approx(work.SECONDS, rel=0.05)
 
 
 def test_the_folder_opens_with_xarray_and_units(tmp_path: Path) -> None:

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.sweep.work import Part, counts_of, numbers_of
+from sagline.sweep.request import Part
+from sagline.sweep.work import counts_of, numbers_of
 from tests.sweep.requests import PLANAR, planar
 from tests.tiers import wide
 

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 import sagline as sl
 from sagline.core.arrays import Array
-from sagline.workspaces.pose_cells import PRECISION, Prover
+from sagline.workspaces.proof import PRECISION, Prover
 from sagline.workspaces.wrench_sets import load_of
 
 CORNERS = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)

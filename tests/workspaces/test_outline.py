@@ -6,8 +6,8 @@ import pytest
 import sagline as sl
 from sagline import LeastMargin, MinimumNorm, Orientations, Surface, WrenchSet
 from sagline.core.arrays import Array, locked
+from sagline.workspaces.boundary import Outline, outline
 from sagline.workspaces.levels import Levels
-from sagline.workspaces.outline import Outline, outline
 from sagline.workspaces.region import Region, region_of
 from sagline.workspaces.wrench_sets import NO_LOAD
 from tests.tiers import extended, wide

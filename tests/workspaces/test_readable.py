@@ -10,7 +10,7 @@ import pytest
 from syrupy.assertion import SnapshotAssertion
 
 import sagline as sl
-from sagline.workspaces.pose_cells import Prover
+from sagline.workspaces.proof import Prover
 from tests.tiers import extended
 
 POSE = sl.Pose([[0.0, 0.0, 2.0], [1.0, 1.0, 3.0], [7.0, 5.4, 5.9]], np.eye(3))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sagline.core.arrays import Array, Indices
-from sagline.workspaces.slice import Plane, slice_of
+from sagline.workspaces.region import Plane, slice_of
 
 
 class Told(NamedTuple):

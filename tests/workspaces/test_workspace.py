@@ -6,8 +6,7 @@ from numpy.testing import assert_allclose
 
 import sagline as sl
 from sagline.core.arrays import Array
-from sagline.workspaces.criteria.criterion import Judged, no_cable
-from sagline.workspaces.criteria.given import Given
+from sagline.workspaces.criterion import Given, Judged, no_cable
 from sagline.workspaces.space import BY_BOX
 from tests.refusal import refused
 from tests.tiers import extended

@@ -21,7 +21,7 @@ from sagline.files.writing import check_files, made_folder
 
 if TYPE_CHECKING:
     from sagline.interference.pairs import Obstacle
-    from sagline.workspaces.criteria.criterion import Criterion
+    from sagline.workspaces.criterion import Criterion
     from sagline.workspaces.proof import Proof
     from sagline.workspaces.space import Workspace
 
@@ -63,12 +63,14 @@ class Asked(NamedTuple):
             SaglineError: If one is none, or the scene cannot be read.
         """
         from sagline.cli.values import quantity
-        from sagline.workspaces.criteria.clearance import Clearance
-        from sagline.workspaces.criteria.frame import InFrame
-        from sagline.workspaces.criteria.frequency import LeastFrequency
-        from sagline.workspaces.criteria.margin import LeastMargin
-        from sagline.workspaces.criteria.sag import MaximumSag
-        from sagline.workspaces.criteria.stiffness import LeastStiffness
+        from sagline.workspaces.criteria import (
+            Clearance,
+            InFrame,
+            LeastFrequency,
+            LeastMargin,
+            LeastStiffness,
+            MaximumSag,
+        )
 
         found: list[Criterion] = []
         if self.reserve is not None:
@@ -154,8 +156,7 @@ def workspace(
     from sagline.files.robot_file import load_robot
     from sagline.files.writing import file_stem
     from sagline.workspaces.orientations import Tilts
-    from sagline.workspaces.proof import prove
-    from sagline.workspaces.proof_verdict import ProofVerdict
+    from sagline.workspaces.proof import ProofVerdict, prove
     from sagline.workspaces.workspace import workspace
 
     asked = Asked(reserve, max_sag, min_stiffness, min_frequency, clearance, scene, in_frame)

@@ -24,19 +24,20 @@ from sagline.interference.obstacles import Box, Capsule, Sphere
 from sagline.robot.pose import Pose
 from sagline.robot.pose_box import PoseBox
 from sagline.tension.methods import METHODS
-from sagline.workspaces.components import Components
-from sagline.workspaces.criteria.clearance import Clearance
-from sagline.workspaces.criteria.criterion import Criterion
-from sagline.workspaces.criteria.frame import InFrame
-from sagline.workspaces.criteria.frequency import LeastFrequency
-from sagline.workspaces.criteria.margin import LeastMargin
-from sagline.workspaces.criteria.position_error import PositionError
-from sagline.workspaces.criteria.sag import MaximumSag
-from sagline.workspaces.criteria.stiffness import LeastStiffness
+from sagline.workspaces.criteria import (
+    Clearance,
+    InFrame,
+    LeastFrequency,
+    LeastMargin,
+    LeastStiffness,
+    MaximumSag,
+    PositionError,
+)
+from sagline.workspaces.criterion import Criterion
 from sagline.workspaces.nearest import Nearest
 from sagline.workspaces.orientations import Orientations
 from sagline.workspaces.space import Workspace
-from sagline.workspaces.surface import Surface
+from sagline.workspaces.surface import Components, Surface
 from sagline.workspaces.wrench_sets import WrenchSet
 
 if TYPE_CHECKING:

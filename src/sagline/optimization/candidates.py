@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from sagline.core.arguments import brief
-from sagline.core.arrays import Array, Flags, Indices
+from sagline.core.arguments import brief, choice, whole_number
+from sagline.core.arrays import Array, Flags, Indices, number
 from sagline.core.errors import InvalidValueError
 from sagline.kernels import tables
-from sagline.optimization.free import Bound, Free, Part
-from sagline.optimization.free_cable import FreeCable
+from sagline.optimization.free import Bound, Free, FreeCable, Part
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.tables import cable_table
@@ -196,3 +196,65 @@ class Solid:
             inside = np.flatnonzero((np.abs(away) < self._half).all(axis=1))
             found[k] = inside[0] if inside.size else -1
         return found.reshape(points.shape[:-1])
+
+
+TAKEN = ("worst", "mean")
+MOST_SAMPLES = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class AnchorErrors:
+    """Errors of all anchors as a sample, the same for all candidates: normally distributed, each coordinate by itself.
+
+    Attributes:
+        deviation: Standard deviation of each coordinate [m].
+        samples: How many robots with errors stand for each candidate.
+        take: Which of their values is the candidate's, "worst" or "mean".
+        seed: Of the sample.
+    """
+
+    deviation: float
+    samples: int
+    take: str
+    seed: int
+
+    def __init__(self, deviation: float, *, samples: int = 8, take: str = "worst", seed: int = 0) -> None:
+        """Check them.
+
+        Args:
+            deviation: Standard deviation of each coordinate [m], > 0.
+            samples: How many, 1 to 1000.
+            take: "worst" or "mean".
+            seed: Of the sample, a whole number >= 0.
+
+        Raises:
+            InvalidValueError: If an argument is of the wrong kind, or out of range.
+
+        Examples:
+            >>> import sagline as sl
+            >>> print(sl.AnchorErrors(0.01, samples=4).take)
+            worst
+        """
+        values = {
+            "deviation": number(deviation, "deviation", "m", above=0.0),
+            "samples": whole_number(samples, "samples", 1, MOST_SAMPLES),
+            "take": choice(take, "take", TAKEN),
+            "seed": whole_number(seed, "seed", 0),
+        }
+        for field, value in values.items():
+            object.__setattr__(self, field, value)
+
+    def added(self, cables: Array) -> Array:
+        """Tables of robots whose anchors err.
+
+        Args:
+            cables: Tables of candidates, shape (N, m, CABLE_COLUMNS).
+
+        Returns:
+            Shape (N, samples, m, CABLE_COLUMNS).
+        """
+        many = np.repeat(cables[:, None], self.samples, axis=1)
+        ends = tables.PLATFORM_Z + 1  # both ends come first
+        errors = np.random.default_rng(self.seed).standard_normal((self.samples, cables.shape[1], ends))
+        many[..., :ends] += self.deviation * errors
+        return many

@@ -12,15 +12,13 @@ from sagline.cables.model import CableModel
 from sagline.core.arguments import callback, instance, whole_number
 from sagline.core.errors import InvalidValueError
 from sagline.core.progress import Progress
+from sagline.optimization.candidates import AnchorErrors
 from sagline.optimization.folder import recorded
 from sagline.optimization.free import Free
-from sagline.optimization.front import Front
+from sagline.optimization.front import Front, Ledger, Record
 from sagline.optimization.goals import Goal
-from sagline.optimization.ledger import Ledger, Record
-from sagline.optimization.poses import COUNTS, poses_of
-from sagline.optimization.request import MOST_EVALUATIONS, SEARCHES, Request, requested
-from sagline.optimization.robust import AnchorErrors
-from sagline.optimization.search import Task
+from sagline.optimization.request import COUNTS, MOST_EVALUATIONS, Request, poses_of, requested
+from sagline.optimization.search import SEARCHES, Task
 from sagline.robot.pose import Pose
 from sagline.robot.pose_box import PoseBox
 from sagline.robot.robot import Robot

@@ -14,12 +14,10 @@ from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.quantity import in_si
 from sagline.files.reading import read_text
 from sagline.files.yaml_text import YAML_LIMIT, Entry, parse_mapping, validated
-from sagline.optimization.free import Free
+from sagline.optimization.candidates import AnchorErrors
+from sagline.optimization.free import CableChoice, Free, FreeCable, FreeLimit
 from sagline.optimization.free_anchors import FreeAnchors
-from sagline.optimization.free_cable import CableChoice, FreeCable
-from sagline.optimization.free_limit import FreeLimit
 from sagline.optimization.goals import KINDS, Goal
-from sagline.optimization.robust import AnchorErrors
 from sagline.robot.pose_box import PoseBox
 from sagline.workspaces.wrench_sets import Accelerations, WrenchBox, WrenchSet
 

@@ -1,16 +1,19 @@
-"""What of a robot may change while a better one is searched, each part between bounds."""
+"""Design variables and their bounds: cables of a catalogue and tension limits."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple, Protocol
+from dataclasses import dataclass
+from typing import Any, Final, NamedTuple, Protocol
 
 import numpy as np
 
-from sagline.core.arguments import brief, integer
-from sagline.core.arrays import Array, Indices
+from sagline.cables.cable import Cable
+from sagline.core.arguments import brief, choice, instance, integer, label
+from sagline.core.arrays import Array, Indices, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.results import ByFields
+from sagline.kernels import tables
 from sagline.robot.robot import Robot
 
 
@@ -93,3 +96,181 @@ def cables_of_robot(cables: tuple[int, ...], robot: Robot, item: str) -> Indices
 def whose_text(cables: Indices, count: int) -> str:
     """How names say which cables are meant; nothing for all."""
     return "" if len(cables) == count else f"[{' '.join(map(str, cables))}]"
+
+
+SAME: Final = 1e-9  # relative: to which a robot's cable is one of a catalogue
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CableChoice:
+    """A cable of a catalogue.
+
+    Attributes:
+        name: What it is called.
+        cable: Its material, one cable's.
+        cost: Of a meter of it, in any currency; None where no goal asks.
+        tension_max: What it carries [N]; None: the robot's limits stay.
+    """
+
+    name: str
+    cable: Cable
+    cost: float | None
+    tension_max: float | None
+
+    def __init__(self, name: str, cable: Cable, *, cost: float | None = None, tension_max: float | None = None) -> None:
+        """Check them.
+
+        Args:
+            name: What it is called.
+            cable: Its material, numbers and no arrays.
+            cost: Of a meter, >= 0, or None.
+            tension_max: What it carries [N], > 0, or None.
+
+        Raises:
+            InvalidValueError: If the material is that of several cables, or an argument is of the wrong kind.
+        """
+        if instance(cable, Cable, "cable").linear_density.shape != ():
+            value = f"of shape {cable.linear_density.shape}"
+            raise InvalidValueError("cable", value, "one cable's material, numbers", "Give Cable(0.067, 44e3).")
+        if not float(cable.linear_density) > 0.0:
+            raise InvalidValueError("cable: linear_density", "0 kg/m", "> 0 kg/m", "Give its mass per length.")
+        limit = None if tension_max is None else number(tension_max, "tension_max", "N", above=0.0)
+        price = None if cost is None else number(cost, "cost", "per m", low=0.0)
+        values: dict[str, Any] = {"name": label(name, "name"), "cable": cable, "cost": price, "tension_max": limit}
+        for field, value in values.items():
+            object.__setattr__(self, field, value)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FreeCable(Free):
+    """The material of all cables, from a catalogue.
+
+    Attributes:
+        catalogue: The cables, best in the order of their weight: neighbors are tried after each other.
+    """
+
+    catalogue: tuple[CableChoice, ...]
+
+    def __init__(self, catalogue: Sequence[CableChoice]) -> None:
+        """Check it.
+
+        Args:
+            catalogue: Two cables or more; the robot's own is among them.
+
+        Raises:
+            InvalidValueError: If it is none.
+        """
+        given: Any = catalogue
+        if not isinstance(given, Sequence) or isinstance(given, str) or len(given) < 2:
+            step = "Give [CableChoice(name, cable), ...]."
+            raise InvalidValueError("catalogue", brief(given), "two cables or more", step)
+        entries = tuple(instance(one, CableChoice, f"catalogue[{k}]") for k, one in enumerate(given))
+        names = [one.name for one in entries]
+        if twice := [name for name in names if names.count(name) > 1]:
+            raise InvalidValueError("catalogue", f"with {twice[0]!r} twice", "names that differ", "Rename one of them.")
+        object.__setattr__(self, "catalogue", entries)
+
+    def bound(self, robot: Robot, item: str) -> Bound:
+        """What it means for a robot."""
+        own = robot.cables
+        for k, one in enumerate(self.catalogue):
+            pairs = ((own.linear_density, one.cable.linear_density), (own.axial_stiffness, one.cable.axial_stiffness))
+            limits = one.tension_max is None or bool(np.allclose(robot.tension_max, one.tension_max, rtol=SAME))
+            if limits and all(np.allclose(mine, its, rtol=SAME, atol=0.0) for mine, its in pairs):
+                part = Part("cable", "", 0.0, float(len(self.catalogue) - 1), float(k), len(self.catalogue))
+                return _Chosen((part,), self.catalogue)
+        density, stiffness = own.linear_density[0], own.axial_stiffness[0]
+        value = f"{1e3 * density:g} g/m, {stiffness:g} N, up to {robot.tension_max[0]:g} N"
+        step = "Add the robot's own cable: the search begins with it."
+        raise InvalidValueError(f"{item}: the robot's cable 0", value, "all cables alike, in the catalogue", step)
+
+
+class _Chosen(NamedTuple):
+    """A catalogue."""
+
+    parts: tuple[Part, ...]
+    catalogue: tuple[CableChoice, ...]
+
+    def write(self, cables: Array, values: Array) -> None:
+        """Set the material."""
+        which = values[:, 0].astype(np.int64)
+        density, stiffness = (
+            np.array([getattr(one.cable, name) for one in self.catalogue])
+            for name in ("linear_density", "axial_stiffness")
+        )
+        cables[:, :, tables.DENSITY] = density[which, None]
+        cables[:, :, tables.STIFFNESS] = stiffness[which, None]
+        limits = np.array([np.nan if one.tension_max is None else one.tension_max for one in self.catalogue])
+        given = ~np.isnan(limits[which])
+        cables[given, :, tables.TENSION_MAX] = limits[which][given, None]
+
+
+LIMITS: Final = {"tension_min": tables.TENSION_MIN, "tension_max": tables.TENSION_MAX}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FreeLimit(Free):
+    """A tension limit that may change, the same for all cables of it.
+
+    Attributes:
+        which: "tension_min" or "tension_max".
+        low: Least [N], >= 0.
+        high: Largest [N].
+        cables: Whose limit, numbers from 0; empty for all.
+    """
+
+    which: str
+    low: float
+    high: float
+    cables: tuple[int, ...]
+
+    def __init__(self, which: str, low: float, high: float, *, cables: Sequence[int] | None = None) -> None:
+        """Check them.
+
+        Args:
+            which: "tension_min" or "tension_max".
+            low: Least [N], >= 0.
+            high: Largest [N].
+            cables: Whose, numbers from 0; None for all.
+
+        Raises:
+            InvalidValueError: If low is not below high, or an argument is of the wrong kind.
+
+        Examples:
+            >>> import sagline as sl
+            >>> print(sl.FreeLimit("tension_max", 500.0, 3000.0).high, "N")
+            3000.0 N
+        """
+        lower, upper = number(low, "low", "N", low=0.0), number(high, "high", "N", low=0.0)
+        check_order(np.array([lower]), np.array([upper]), "N", strictly=True)
+        named = () if cables is None else cable_numbers(cables, "cables")
+        values = {"which": choice(which, "which", LIMITS), "low": lower, "high": upper, "cables": named}
+        for field, value in values.items():
+            object.__setattr__(self, field, value)
+
+    def bound(self, robot: Robot, item: str) -> Bound:
+        """What it means for a robot."""
+        cables = cables_of_robot(self.cables, robot, f"{item}: cables")
+        own = getattr(robot, self.which)[cables]
+        name = f"{self.which}{whose_text(cables, robot.cable_count)}"
+        if len(set(own.tolist())) > 1:
+            value = f"{own.min():g} to {own.max():g} N"
+            step = "Name the cables that share one: FreeLimit(..., cables=[0, 1])."
+            raise InvalidValueError(f"{item}: the robot's {name}", value, "the same for all of these cables", step)
+        start = float(own[0])
+        if not self.low <= start <= self.high:
+            allowed, step = f"{self.low:g} to {self.high:g} N", "Widen the bounds, or correct the robot."
+            raise InvalidValueError(f"{item}: the robot's {name}", f"{start:g} N", allowed, step)
+        return _Limited((Part(name, "N", self.low, self.high, start),), LIMITS[self.which], cables)
+
+
+class _Limited(NamedTuple):
+    """A limit: which column, of which cables."""
+
+    parts: tuple[Part, ...]
+    column: int
+    cables: Indices
+
+    def write(self, cables: Array, values: Array) -> None:
+        """Set it."""
+        cables[:, self.cables, self.column] = values

@@ -19,9 +19,8 @@ from sagline.core.results import Result
 from sagline.optimization.candidates import Candidates, free_parts
 from sagline.optimization.free import Free, Part
 from sagline.optimization.goals import Goal
-from sagline.optimization.inner import best_moved
-from sagline.optimization.poses import COUNTS, poses_of
-from sagline.optimization.rating import Rating
+from sagline.optimization.rating import Rating, best_moved
+from sagline.optimization.request import COUNTS, poses_of
 from sagline.robot.pose import Pose
 from sagline.robot.pose_box import PoseBox
 from sagline.robot.robot import Robot

@@ -1,11 +1,39 @@
-"""What every optimizer is given: where to begin, and whom to ask."""
+"""Optimizers: CMA-ES by the package cma, differential evolution by scipy, and NSGA-II by the package pymoo."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple, TypeAlias
+from importlib import import_module
+from types import MappingProxyType
+from typing import Any, Final, NamedTuple, TypeAlias
+
+import numpy as np
 
 from sagline.core.arrays import Array
+from sagline.core.errors import InvalidValueError
+
+
+def extra(module: str) -> Any:
+    """A module of one of the packages of `sagline[design]`.
+
+    Args:
+        module: Its full name.
+
+    Returns:
+        The module.
+
+    Raises:
+        InvalidValueError: If its package is not installed; the message says how to get it.
+    """
+    try:
+        return import_module(module)
+    except ModuleNotFoundError as error:
+        package = module.partition(".")[0]
+        if error.name is None or error.name.partition(".")[0] != package:
+            raise
+        step = 'Install it: pip install "sagline[design]"; or choose "differential_evolution", which needs nothing.'
+        raise InvalidValueError(f"the package {package}", "missing", "installed", step) from None
+
 
 Rate: TypeAlias = Callable[[Array], Array]  # points of the unit cube (N, d) to costs (N, g); the least are wanted
 
@@ -28,3 +56,130 @@ class Task(NamedTuple):
     goals: int
     seed: int
     evaluations: int
+
+
+def latin_hypercube(count: int, dimensions: int, seed: int) -> Array:
+    """Points of which every coordinate has one in each of `count` equal intervals.
+
+    Args:
+        count: How many points.
+        dimensions: Of the cube.
+        seed: Of the generator.
+
+    Returns:
+        Points from 0 to 1, shape (count, dimensions).
+
+    Source:
+        McKay, Beckman & Conover 1979.
+    """
+    random = np.random.default_rng(seed)
+    intervals = np.stack([random.permutation(count) for _ in range(dimensions)], axis=-1)
+    return np.asarray((intervals + random.random((count, dimensions))) / count)
+
+
+SPREAD: Final = 0.2  # first standard deviation, of the bounds' distance: they lie within some three of it
+GROWTH: Final = 2  # of the population, from each beginning to the next
+LEAST_DIMENSIONS: Final = 2  # numbers: with a single one the package fails; a second that means nothing goes along
+
+
+def search_cma(task: Task) -> None:
+    """Rate generation after generation until the evaluations are used up.
+
+    Args:
+        task: What is searched; one goal.
+
+    Source:
+        Hansen & Ostermeier 2001; restarts with a growing population: Auger & Hansen 2005.
+    """
+    cma = extra("cma")
+    first = np.concatenate((task.start[None], task.sample))
+    costs = task.rate(first)[:, 0]
+    order = iter(np.argsort(costs, kind="stable"))
+    left, population = task.evaluations - len(first), None
+    random = np.random.default_rng(task.seed)
+    while True:
+        strategy = _strategy(cma, first[next(order, 0)], random, population)
+        population = strategy.popsize * GROWTH
+        if left < strategy.popsize:
+            return
+        while left >= strategy.popsize and not strategy.stop():
+            points = strategy.ask()
+            found = task.rate(np.clip(points, 0.0, 1.0)[:, : len(task.start)])[:, 0]
+            strategy.tell(points, found.tolist())
+            left -= len(points)
+
+
+def _strategy(cma: Any, start: Array, random: np.random.Generator, population: int | None) -> Any:
+    """One run; its random numbers are its own, so that numpy's global ones stay as the caller has them."""
+    padded = np.concatenate((start, np.full(max(LEAST_DIMENSIONS - len(start), 0), 0.5)))
+    options = {
+        "bounds": [0.0, 1.0],
+        "randn": lambda *shape: random.standard_normal(shape),
+        "seed": np.nan,  # none: randn has its own
+        "verbose": -9,
+        **({} if population is None else {"popsize": population}),
+    }
+    return cma.CMAEvolutionStrategy(padded, SPREAD, options)
+
+
+def search_differential_evolution(task: Task) -> None:
+    """Rate generation after generation until the evaluations are used up.
+
+    Args:
+        task: What is searched; one goal.
+
+    Source:
+        Storn & Price 1997.
+    """
+    from scipy.optimize import differential_evolution
+
+    population = np.concatenate((task.start[None], task.sample))
+    generations = task.evaluations // len(population) - 1
+
+    def costs(points: Array) -> Array:  # scipy's points are columns
+        return task.rate(np.ascontiguousarray(points.T))[:, 0]
+
+    differential_evolution(
+        costs,
+        [(0.0, 1.0)] * len(task.start),
+        init=population,
+        maxiter=generations,
+        vectorized=True,
+        updating="deferred",
+        polish=False,
+        tol=0.0,
+        atol=0.0,
+        rng=np.random.default_rng(task.seed),
+    )
+
+
+def search_nsga2(task: Task) -> None:
+    """Rate generation after generation until the evaluations are used up.
+
+    Args:
+        task: What is searched.
+
+    Source:
+        Deb, Pratap, Agarwal & Meyarivan 2002.
+    """
+    evaluator, problems = extra("pymoo.core.evaluator"), extra("pymoo.core.problem")
+    static, termination = extra("pymoo.problems.static"), extra("pymoo.core.termination")
+    population = np.concatenate((task.start[None], task.sample))
+    dimensions = len(task.start)
+    problem = problems.Problem(n_var=dimensions, n_obj=task.goals, xl=np.zeros(dimensions), xu=np.ones(dimensions))
+    algorithm = extra("pymoo.algorithms.moo.nsga2").NSGA2(pop_size=len(population), sampling=population)
+    algorithm.setup(problem, termination=termination.NoTermination(), seed=task.seed)
+    left = task.evaluations
+    while left > 0:
+        asked = algorithm.ask()
+        if asked is None or not 0 < len(asked) <= left:  # none: it finds no point that it has not tried
+            return
+        costs = task.rate(asked.get("X"))
+        evaluator.Evaluator().eval(static.StaticProblem(problem, F=costs), asked)
+        algorithm.tell(infills=asked)
+        left -= len(asked)
+
+
+SEARCHES: Final[MappingProxyType[str, Callable[[Task], None]]] = MappingProxyType(
+    {"cma": search_cma, "differential_evolution": search_differential_evolution, "nsga2": search_nsga2}
+)

@@ -18,8 +18,7 @@ from sagline.plot.names import wrapped
 from sagline.plot.sheet import GAP_COLOR, axes_or_new, dressed
 from sagline.plot.style import current
 from sagline.viewer.tension_scale import CABLES, cable_color
-from sagline.workspaces.region import flat_axis
-from sagline.workspaces.slice import AXES, Plane, Slice, slice_of
+from sagline.workspaces.region import AXES, Plane, Slice, flat_axis, slice_of
 from sagline.workspaces.space import Workspace
 
 if TYPE_CHECKING:

@@ -15,8 +15,7 @@ from sagline.plot.sheet import GAP_COLOR, sheet
 from sagline.plot.slice import limit_colors, limit_name, slice
 from sagline.plot.style import current
 from sagline.robot.pose import Pose
-from sagline.workspaces.region import flat_axis
-from sagline.workspaces.slice import AXES
+from sagline.workspaces.region import AXES, flat_axis
 from sagline.workspaces.space import BY_BOX, Workspace, amount_of
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from sagline.files.robot_file import load_robot
 from sagline.plot.sheet import BLUE, VERMILLION
 from sagline.report.blocks import Chapter, Finding, Panel, Table, Verdict
 from sagline.report.drawing import Drawings, axes, legend
-from sagline.workspaces.slice import Plane, slice_of
+from sagline.workspaces.region import Plane, slice_of
 from sagline.workspaces.space import Workspace
 from sagline.workspaces.workspace import workspace
 

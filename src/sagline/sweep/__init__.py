@@ -1,7 +1,6 @@
 """Sweeps: every robot at every pose under every wrench, on the workers of Dask, into a folder that can be taken up."""
 
-from sagline.sweep.quantities import QUANTITIES
-from sagline.sweep.request import Request
+from sagline.sweep.request import QUANTITIES, Request
 from sagline.sweep.result import Sweep, load
 from sagline.sweep.running import run
 from sagline.sweep.work import Counts

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import logging
 import os
+import signal
 import socket
+import threading
 import time
 import uuid
 import warnings
@@ -15,7 +17,7 @@ from itertools import islice
 from typing import Any, Final
 
 from sagline.core.errors import InvalidValueError, SaglineError
-from sagline.sweep.tasks import task
+from sagline.sweep.work import task
 
 HERE: Final = "127.0.0.1"  # nobody else is served
 DASHBOARD: Final = 8787
@@ -77,7 +79,7 @@ def local_workers(workers: int, tell: Callable[[str], None]) -> Iterator[Any]:
             "dashboard_address": f"{HERE}:{DASHBOARD if free else 0}",
             "memory_limit": 0,
             "silence_logs": SILENT,
-            "preload": ["sagline.sweep.deaf"],
+            "preload": ["sagline.sweep.cluster"],
         }
         try:
             with settings.set(SETTINGS):
@@ -238,3 +240,14 @@ def _is_free(port: int) -> bool:
 
 def _first_line(error: BaseException) -> str:
     return next(iter(str(error).splitlines()), type(error).__name__)
+
+
+def dask_setup(worker: object) -> None:
+    """Hear no Ctrl-C: the task that runs is finished.
+
+    Args:
+        worker: Of Dask, which asks for this function by its name.
+    """
+    if threading.current_thread() is threading.main_thread():
+        with suppress(ValueError, OSError):
+            signal.signal(signal.SIGINT, signal.SIG_IGN)

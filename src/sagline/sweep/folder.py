@@ -26,9 +26,7 @@ from sagline.files.netcdf import Content, choice_attributes, choice_of
 from sagline.files.robot_file import dump_robot, parse_robot
 from sagline.files.writing import staging
 from sagline.robot.pose import Pose
-from sagline.sweep.quantities import Variable, variables_of
-from sagline.sweep.request import Request
-from sagline.sweep.work import Part
+from sagline.sweep.request import Part, Request, Variable, variables_of
 from sagline.tension.methods import METHODS
 from sagline.workspaces.wrench_sets import WrenchSet
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Sized
+from collections.abc import Iterable, Iterator, Sequence, Sized
 from dataclasses import dataclass
-from typing import Any, Final
+from enum import IntEnum
+from types import MappingProxyType
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,15 +18,75 @@ from sagline.core.arrays import Array, checked, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import counted
 from sagline.core.results import Result
+from sagline.kinematics.status import PoseStatus
 from sagline.kinematics.winding import without_guides
 from sagline.robot.pose import Pose
 from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot
-from sagline.sweep.quantities import QUANTITIES
 from sagline.tension.method import TensionMethod
 from sagline.tension.minimum_norm import MinimumNorm
 from sagline.tension.options import kernel_options
+from sagline.workspaces.margin import MarginStatus
 from sagline.workspaces.wrench_sets import WrenchSet, load_of
+
+
+class Variable(NamedTuple):
+    """One array of a sweep; its first dimensions are robot, pose and wrench.
+
+    Attributes:
+        name: Its name.
+        unit: Unit of its values, "" for none.
+        long_name: What it is, in a reader's words.
+        a_cable: Whether it has a value for each cable, along a fourth dimension.
+        codes: The status that it holds codes of, if any.
+        whole: Whether its values are whole numbers.
+    """
+
+    name: str
+    unit: str
+    long_name: str
+    a_cable: bool = False
+    codes: type[IntEnum] | None = None
+    whole: bool = False
+
+    @property
+    def type(self) -> str:
+        """The type of its values."""
+        return "int8" if self.whole or self.codes is not None else "float64"
+
+
+STATUS: Final = Variable("status", "", "how each request ended", codes=PoseStatus)
+PROOF: Final = Variable("proof", "N", "proved least change of the force that makes it feasible, 0 if it is")
+TENSION: Final = Variable("tension", "N", "tension along the chord, T_x / cos phi", a_cable=True)
+LENGTH: Final = Variable("length", "m", "unstrained length L, all cable off the drum", a_cable=True)
+ENOUGH: Final = Variable("enough", "N", "change of the force that suffices")
+MARGIN: Final = Variable("margin", "N", "how much more load the pose can take, below zero how much too much it is")
+LOW: Final = Variable("margin_low", "N", "lower end of the margin's bracket; feasible where it is not below zero")
+HIGH: Final = Variable("margin_high", "N", "upper end of the margin's bracket; infeasible where it is below zero")
+LIMITING: Final = Variable("limiting_cable", "", "cable whose limit moves the margin fastest, -1 for none", whole=True)
+MARGIN_STATUS: Final = Variable("margin_status", "", "what the margin's bracket says", codes=MarginStatus)
+
+QUANTITIES: Final = MappingProxyType(
+    {
+        "tension": (STATUS, PROOF, TENSION),
+        "length": (STATUS, PROOF, LENGTH),
+        "shortfall": (STATUS, PROOF, ENOUGH),
+        "margin": (MARGIN_STATUS, MARGIN, LOW, HIGH, LIMITING),
+    }
+)
+
+
+def variables_of(quantities: Iterable[str]) -> tuple[Variable, ...]:
+    """The variables of some quantities, each once.
+
+    Args:
+        quantities: Names of QUANTITIES.
+
+    Returns:
+        The variables, in the order of the quantities.
+    """
+    return tuple(dict.fromkeys(variable for name in quantities for variable in QUANTITIES[name]))
+
 
 MOST: Final = 1 << 40  # requests: a year on a hundred cores
 _CATENARY: Final = Catenary()
@@ -144,3 +206,31 @@ def _sequence(value: Any, item: str, allowed: str) -> tuple[Any, ...]:
     if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes):
         return tuple(value)
     raise InvalidValueError(item, brief(value), allowed, f"Give {item} as a list.")
+
+
+class Part(NamedTuple):
+    """A box of requests.
+
+    Attributes:
+        robot: Index of the robot.
+        poses: Which poses.
+        wrenches: Which wrenches.
+    """
+
+    robot: int
+    poses: slice
+    wrenches: slice
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """How many poses and wrenches."""
+        return self.poses.stop - self.poses.start, self.wrenches.stop - self.wrenches.start
+
+    def pieces(self, most: int) -> Iterator[Part]:
+        """The same box in boxes of at most so many requests."""
+        wide = min(self.shape[1], most)
+        tall = max(1, most // wide)
+        for first in range(self.poses.start, self.poses.stop, tall):
+            for left in range(self.wrenches.start, self.wrenches.stop, wide):
+                rows = slice(first, min(first + tall, self.poses.stop))
+                yield Part(self.robot, rows, slice(left, min(left + wide, self.wrenches.stop)))

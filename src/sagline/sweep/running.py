@@ -15,11 +15,9 @@ from sagline.core.errors import FileError, InvalidValueError
 from sagline.core.progress import Progress
 from sagline.sweep.cluster import check_address, cores, has_dask, local_workers, remote_workers, spread
 from sagline.sweep.folder import SweepFolder, check_made_here, check_packages, digest_of, make_folder, open_folder
-from sagline.sweep.marks import Mark, Marks, marking
 from sagline.sweep.request import Request
-from sagline.sweep.result import Sweep, load
-from sagline.sweep.tasks import found_counts, measured_size, task
-from sagline.sweep.work import Counts
+from sagline.sweep.result import Mark, Marks, Sweep, load, marking
+from sagline.sweep.work import Counts, found_counts, measured_size, task
 
 MOST_WORKERS: Final = 1024
 FEW: Final = 4  # tasks that are done before workers would have started

@@ -15,7 +15,7 @@ from sagline.robot.robot import Robot
 from sagline.viewer.readout import block, refused, sentence
 from sagline.viewer.slices import MarginScale
 from sagline.viewer.wording import ForceUnit
-from sagline.workspaces.slice import Find
+from sagline.workspaces.region import Find
 
 _STEPS: Final = 20  # along each way at first: a gap that is narrower than a step may be passed over
 _HALVINGS: Final = 14  # then: a way is known to some 1e-4 of its step

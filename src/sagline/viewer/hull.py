@@ -21,11 +21,11 @@ from sagline.viewer.readout import css_color
 from sagline.viewer.slices import MarginScale
 from sagline.viewer.tension_scale import cable_color
 from sagline.viewer.wording import ForceUnit
-from sagline.workspaces.criteria.margin import LeastMargin
+from sagline.workspaces.boundary import Outline, outline
+from sagline.workspaces.criteria import LeastMargin
 from sagline.workspaces.levels import Levels
 from sagline.workspaces.nearest import nearest_to
 from sagline.workspaces.orientations import Orientations
-from sagline.workspaces.outline import Outline, outline
 from sagline.workspaces.region import Region, region_of
 from sagline.workspaces.wrench_sets import WrenchSet
 

@@ -15,7 +15,7 @@ from sagline.core.arrays import Array, Indices
 from sagline.viewer.readout import block, css_color
 from sagline.viewer.tension_scale import Colors
 from sagline.viewer.wording import ForceUnit
-from sagline.workspaces.slice import Slice
+from sagline.workspaces.region import Slice
 
 INSIDE: Final = 4  # bands above 0, the last without an end
 OUTSIDE: Final = 2  # bands below 0, the first without a beginning

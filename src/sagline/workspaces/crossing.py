@@ -8,9 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.core.arrays import Array
+from sagline.core.arrays import Array, Indices
 from sagline.workspaces.grid import Level, evaluate
-from sagline.workspaces.surface import Indices
 
 TRIAL = 3  # steps of regula falsi, after which a bracket is to be an eighth
 ROUNDS = 100  # a jump takes some 45, by halving; what is continuous ends after 5 to 8

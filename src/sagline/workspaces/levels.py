@@ -12,8 +12,7 @@ from sagline.core.arrays import Array, Indices, locked
 from sagline.core.progress import blocks
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
-from sagline.workspaces.criteria.criterion import Criterion
-from sagline.workspaces.criteria.given import Given
+from sagline.workspaces.criterion import Criterion, Given
 from sagline.workspaces.margin_rows import MarginRows
 from sagline.workspaces.orientations import Orientations
 from sagline.workspaces.wrench_sets import WrenchSet

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.core.arguments import whole_number
-from sagline.core.arrays import Array, exactly, locked
+from sagline.core.arrays import Array, Indices, exactly, locked
 from sagline.core.errors import InvalidValueError
 from sagline.workspaces.crossing import Brackets, brackets, crossings, crossings_of, way_to_box
 from sagline.workspaces.grid import Level, evaluate
-from sagline.workspaces.surface import Indices, Surface
+from sagline.workspaces.surface import Surface
 
 ROUNDS: Final = 100  # of facets that replace one another along a ray: three are usual
 SHARP: Final = 1e-5  # of the level at a bracket's ends, which are a hundredth of a ray apart and less

@@ -15,13 +15,12 @@ from sagline.core.results import Result, Saved, formats
 from sagline.robot.pose_box import PoseBox
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
-from sagline.workspaces.components import Components
-from sagline.workspaces.criteria.criterion import Criterion
+from sagline.workspaces.criterion import Criterion
 from sagline.workspaces.levels import Levels
 from sagline.workspaces.nearest import Nearest
 from sagline.workspaces.orientations import Orientations
 from sagline.workspaces.region import flat_axis
-from sagline.workspaces.surface import Surface
+from sagline.workspaces.surface import Components, Surface
 from sagline.workspaces.wrench_sets import WrenchSet
 
 BY_BOX: Final = -1  # of `limiting`: the surface is the face of the box

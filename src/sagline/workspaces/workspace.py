@@ -19,9 +19,8 @@ from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 from sagline.tension.minimum_norm import MinimumNorm
 from sagline.workspaces.boundary import MOST_CELLS, boundary
-from sagline.workspaces.criteria.criterion import Criterion
-from sagline.workspaces.criteria.margin import LeastMargin
-from sagline.workspaces.criteria.sharing import check_sharing
+from sagline.workspaces.criteria import LeastMargin
+from sagline.workspaces.criterion import Criterion, check_sharing
 from sagline.workspaces.levels import Levels
 from sagline.workspaces.nearest import nearest_to
 from sagline.workspaces.orientations import Orientations, Tilts, orientations_of

@@ -10,7 +10,7 @@ from scipy.optimize import minimize
 
 import sagline as sl
 from sagline.core.arrays import Array, Indices, locked
-from sagline.interference.rows import cable_rows
+from sagline.interference.pairs import cable_rows
 from sagline.kernels.interference import shapes
 from sagline.kernels.interference.hanging_distance import least_distances, memory_for_pieces
 

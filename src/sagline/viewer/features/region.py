@@ -22,8 +22,7 @@ from sagline.viewer.slices import MarginScale, Picture, picture_of
 from sagline.viewer.stage import INFEASIBLE, PLATFORM, REST
 from sagline.viewer.tension_scale import force_unit
 from sagline.workspaces.levels import Levels
-from sagline.workspaces.region import Region, region_of
-from sagline.workspaces.slice import Plane, slice_of
+from sagline.workspaces.region import Plane, Region, region_of, slice_of
 from sagline.workspaces.wrench_sets import WrenchBox
 
 BOUNDARY, BETWEEN = INFEASIBLE, (120, 128, 138)

@@ -1,0 +1,319 @@
+"""Criteria of a workspace: margin, sag, position error, stiffness, frequency, clearance and frame."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import product
+from typing import Any, ClassVar, Final
+
+import numpy as np
+
+from sagline.cables.model import CableModel
+from sagline.core.arguments import brief, instance
+from sagline.core.arrays import Array, locked, number
+from sagline.core.errors import InvalidValueError
+from sagline.interference.clearance import ClearanceRows, check_obstacles
+from sagline.interference.pairs import Obstacle
+from sagline.kinematics.confirm import confirm
+from sagline.robot.bounds import bounds
+from sagline.robot.robot import Robot
+from sagline.statics.slopes import cable_slopes
+from sagline.statics.stiffness import compliance_of, modes
+from sagline.workspaces.criterion import Criterion, Given, Judged, no_cable
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LeastMargin(Criterion):
+    """The cables hold every wrench of the set, and so much more in any direction.
+
+    Every workspace has it with no reserve: `workspace` puts it first.
+
+    Attributes:
+        limit: Reserve [N], >= 0.
+    """
+
+    title: ClassVar[str] = "margin"
+    unit: ClassVar[str] = "N"
+    sense: ClassVar[str] = "≥"
+    limit: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check the limit."""
+        object.__setattr__(self, "limit", number(self.limit, "LeastMargin: limit", "N", low=0.0))
+
+    @property
+    def always(self) -> bool:
+        """Without a reserve every workspace has it."""
+        return self.limit == 0.0
+
+    def judge(self, given: Given) -> Judged:
+        """Margins above the reserve [N], and the cables that limit them."""
+        return Judged(locked(given.margin - self.limit), given.cable)
+
+    def scale(self, robot: Robot) -> float:
+        """The platform's weight; without gravity the strongest pull of a cable [N]."""
+        weight = robot.mass * robot.gravity
+        if weight > 0.0:
+            return weight
+        strongest = robot.tension_max[robot.tension_max < float("inf")]
+        return float(strongest.max(initial=0.0)) or float(robot.tension_min.max()) or 1.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MaximumSag(Criterion):
+    """No cable hangs further below its chord than this, under the middle load of the set.
+
+    Attributes:
+        limit: Largest sag [m], > 0.
+    """
+
+    title: ClassVar[str] = "sag"
+    unit: ClassVar[str] = "m"
+    sense: ClassVar[str] = "≤"
+    needs_tensions: ClassVar[bool] = True
+    limit: float
+
+    def __post_init__(self) -> None:
+        """Check the limit."""
+        object.__setattr__(self, "limit", number(self.limit, "MaximumSag: limit", "m", above=0.0))
+
+    def judge(self, given: Given) -> Judged:
+        """What is left up to the limit [m], and the cable that hangs deepest."""
+        sag = given.state.cables.sag
+        return Judged(given.spread(self.limit - sag.max(axis=1)), given.spread_cables(sag.argmax(axis=1)))
+
+    def scale(self, robot: Robot) -> float:
+        """The limit [m]."""
+        return self.limit
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PositionError(Criterion):
+    """A simpler cable model is good enough: the platform is no further from its place than this.
+
+    The lengths are those of the model, with its tensions, under the middle load of the set; the platform then rests
+    where exact cables of these lengths balance it, as by `confirm`.
+
+    Attributes:
+        model: The cable model, `Straight()` for instance.
+        limit: Largest distance between the platform origin and where it was planned [m], > 0.
+    """
+
+    title: ClassVar[str] = "position error"
+    unit: ClassVar[str] = "m"
+    sense: ClassVar[str] = "≤"
+    needs_tensions: ClassVar[bool] = True
+    model: CableModel
+    limit: float
+
+    def __post_init__(self) -> None:
+        """Check both."""
+        instance(self.model, CableModel, "PositionError: model")
+        object.__setattr__(self, "limit", number(self.limit, "PositionError: limit", "m", above=0.0))
+
+    def __str__(self) -> str:
+        """With the model."""
+        return f"{super(PositionError, self).__str__()} with {type(self.model).__name__}"
+
+    def judge(self, given: Given) -> Judged:
+        """What is left up to the limit [m]; NaN where the model has no lengths, or they hold nothing."""
+        found = confirm(given.planned(self.model))
+        error = np.where(found.held, np.linalg.norm(found.position_error, axis=1), np.nan)
+        return Judged(given.spread(self.limit - error), no_cable(len(given)))
+
+    def scale(self, robot: Robot) -> float:
+        """The limit [m]."""
+        return self.limit
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LeastStiffness(Criterion):
+    """A force on the center of mass moves it by no more than force over this, whatever its direction.
+
+    The stiffness of the softest direction, with lengths held and the platform free to turn as it gives way; 0 where
+    the platform is in no stable equilibrium. Under the middle load of the set.
+
+    Attributes:
+        limit: Least stiffness [N/m], > 0.
+    """
+
+    title: ClassVar[str] = "stiffness"
+    unit: ClassVar[str] = "N/m"
+    sense: ClassVar[str] = "≥"
+    needs_tensions: ClassVar[bool] = True
+    limit: float
+
+    def __post_init__(self) -> None:
+        """Check the limit."""
+        object.__setattr__(self, "limit", number(self.limit, "LeastStiffness: limit", "N/m", above=0.0))
+
+    def judge(self, given: Given) -> Judged:
+        """What there is above the limit [N/m]."""
+        freedom = given.robot.freedom
+        found = softest(freedom, cable_slopes(given.state).matrix)
+        return Judged(given.spread(found - self.limit), no_cable(len(given)))
+
+    def scale(self, robot: Robot) -> float:
+        """The limit [N/m]."""
+        return self.limit
+
+
+def softest(freedom: Array, matrix: Array) -> Array:
+    """Force on the center of mass over how far it gives way, in the direction where that is least.
+
+    Args:
+        freedom: Free motions, shape (n, 6).
+        matrix: Stiffness of the platform in world axes, shape (N, 6, 6).
+
+    Returns:
+        [N/m], shape (N,): 0 where nothing holds it, NaN for a matrix with NaN.
+    """
+    lost = np.asarray(np.isnan(matrix).any(axis=(1, 2)))
+    own = freedom @ np.where(lost[:, None, None], np.eye(6), matrix) @ freedom.T
+    own = 0.5 * (own + np.swapaxes(own, 1, 2))
+    size = np.sqrt(np.abs(np.einsum("kii->ki", own)))
+    size[size == 0.0] = 1.0
+    balanced = own / (size[:, :, None] * size[:, None, :])  # newtons and newton meters alike
+    stable = np.linalg.eigvalsh(balanced)[:, 0] > 0.0
+    compliance = compliance_of(freedom, matrix)[:, :3, :3]
+    known = np.asarray(stable & ~np.isnan(compliance).any(axis=(1, 2)))
+    given = np.where(known[:, None, None], compliance, np.eye(3))
+    largest = np.linalg.eigvalsh(0.5 * (given + np.swapaxes(given, 1, 2)))[:, -1]
+    return np.where(lost, np.nan, np.where(known, 1.0 / largest, 0.0))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LeastFrequency(Criterion):
+    """The platform swings no slower than this on cables whose own mass does not swing, as by `modes`.
+
+    Under the middle load of the set; 0 Hz where it is in no stable equilibrium.
+
+    Attributes:
+        limit: Least natural frequency [Hz], > 0.
+    """
+
+    title: ClassVar[str] = "frequency"
+    unit: ClassVar[str] = "Hz"
+    sense: ClassVar[str] = "≥"
+    needs_tensions: ClassVar[bool] = True
+    limit: float
+
+    def __post_init__(self) -> None:
+        """Check the limit."""
+        object.__setattr__(self, "limit", number(self.limit, "LeastFrequency: limit", "Hz", above=0.0))
+
+    def judge(self, given: Given) -> Judged:
+        """What there is above the limit [Hz]."""
+        lowest = modes(given.state).frequency[:, 0]
+        falling = np.isnan(lowest) & given.plan.feasible
+        return Judged(given.spread(np.where(falling, 0.0, lowest) - self.limit), no_cable(len(given)))
+
+    def scale(self, robot: Robot) -> float:
+        """The limit [Hz]."""
+        return self.limit
+
+
+_PRECISION: Final = 1e-6  # m: by no more may the level jump from pose to pose
+_CABLE: Final = re.compile(r"cable (\d+)")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Clearance(Criterion):
+    """Nothing comes nearer than this: no two cables, no cable and platform, none of them and an obstacle.
+
+    Cables as they hang, under the middle load of the set; what is measured against what: see `clearance`.
+
+    Attributes:
+        limit: Least distance [m], > 0.
+        obstacles: What stands around, Box, Capsule, Sphere and Mesh, one or several.
+    """
+
+    title: ClassVar[str] = "clearance"
+    unit: ClassVar[str] = "m"
+    sense: ClassVar[str] = "≥"
+    needs_tensions: ClassVar[bool] = True
+    limit: float
+    obstacles: Obstacle | Sequence[Obstacle] = ()
+
+    def __post_init__(self) -> None:
+        """Check both."""
+        object.__setattr__(self, "limit", number(self.limit, "Clearance: limit", "m", above=0.0))
+        given: Any = self.obstacles
+        several = (given,) if isinstance(given, Obstacle) else given
+        listed = isinstance(several, list | tuple)
+        if wrong := [each for each in several if not isinstance(each, Obstacle)] if listed else [given]:
+            step = 'Make them: Sphere(center, radius), Box(size, center), load_mesh("hall.stl").'
+            allowed = "Box, Capsule, Sphere or Mesh, one or several"
+            raise InvalidValueError("Clearance: obstacles", brief(wrong[0]), allowed, step)
+        object.__setattr__(self, "obstacles", tuple(several))
+
+    def judge(self, given: Given) -> Judged:
+        """Least distance above the limit [m], and the cable, or the first of two, that is nearest to something."""
+        rows = _rows(given.robot, self.obstacles)
+        value, pair = rows.least(given.state)
+        cables = np.array([*map(_cable_of, rows.pairs.names), -1])
+        return Judged(given.spread(value - self.limit), given.spread_cables(cables[pair]))
+
+    def scale(self, robot: Robot) -> float:
+        """The limit [m]."""
+        return self.limit
+
+
+@lru_cache(maxsize=4)
+def _rows(robot: Robot, obstacles: Obstacle | Sequence[Obstacle]) -> ClearanceRows:
+    """What is measured, made ready once for all poses of a robot, after the arguments are checked."""
+    checked = check_obstacles(obstacles, robot)
+    return ClearanceRows(robot, checked, precision=_PRECISION)
+
+
+def _cable_of(pair: tuple[str, str]) -> int:
+    """The first cable of a pair of names; -1 where there is none."""
+    return next((int(found[1]) for name in pair if (found := _CABLE.fullmatch(name))), -1)
+
+
+_CORNERS: Final = 0.5 * np.array(list(product((-1.0, 1.0), repeat=3)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class InFrame(Criterion):
+    """The platform's box and anchors stay within the frame's, this far from its faces.
+
+    The frame is the robot's frame_size, or what its anchors span down to the floor. Of a planar robot its plane counts.
+
+    Attributes:
+        limit: Least distance from the faces [m], >= 0.
+    """
+
+    title: ClassVar[str] = "frame"
+    unit: ClassVar[str] = "m"
+    sense: ClassVar[str] = "≥"
+    limit: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check the limit."""
+        object.__setattr__(self, "limit", number(self.limit, "InFrame: limit", "m", low=0.0))
+
+    def judge(self, given: Given) -> Judged:
+        """Least distance of a corner from the faces, above the limit [m]."""
+        robot = given.robot
+        low, high = bounds(robot)
+        axes = np.arange(3) if robot.plane_normal is None else np.flatnonzero(np.abs(robot.plane_normal) < 0.5)
+        corners = given.pose.transform(_points(robot))[..., axes]
+        room = np.minimum(corners - low[axes], high[axes] - corners).min(axis=(1, 2))
+        return Judged(locked(room - self.limit), no_cable(len(given)))
+
+    def scale(self, robot: Robot) -> float:
+        """A tenth of the frame's least edge that is not flat [m]."""
+        low, high = bounds(robot)
+        edges = (high - low)[high > low]
+        return 0.1 * float(edges.min(initial=np.inf)) if edges.size else 1.0
+
+
+def _points(robot: Robot) -> Array:
+    """Anchors and corners of the platform in its own frame, shape (k, 3)."""
+    if robot.platform_size is None:
+        return robot.platform_anchors
+    return np.vstack((robot.platform_anchors, _CORNERS * robot.platform_size))
