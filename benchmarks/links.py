@@ -18,7 +18,7 @@ from sagline.control.link import PERIOD, Command, Mode
 from sagline.core.arrays import Array
 from sagline.plc.block_link import BlockLink
 from sagline.plc.blocks import FROM_PLC
-from sagline.twin.mirrors import Mirrors
+from sagline.twin.block_servers import BlockServers
 
 GROUPS, WINCHES, OWNER = 4, 8, 7
 CYCLES = 600
@@ -34,8 +34,8 @@ def blocks(counter: int) -> list[bytes]:
 
 def serve(kind: str) -> None:
     """Be the servers, until stdin ends."""
-    mirrors = _mirrors(kind)
-    sys.stdout.write(",".join(mirrors.addresses) + "\n")
+    servers = _block_servers(kind)
+    sys.stdout.write(",".join(servers.addresses) + "\n")
     sys.stdout.flush()
     ended, counter = threading.Event(), 1
 
@@ -46,22 +46,22 @@ def serve(kind: str) -> None:
     threading.Thread(target=listen, daemon=True).start()
     while not ended.wait(sl.twin.SCAN):
         counter += 1
-        mirrors.publish(blocks(counter))
-    mirrors.close()
+        servers.publish(blocks(counter))
+    servers.close()
 
 
-def _mirrors(kind: str) -> Mirrors:
+def _block_servers(kind: str) -> BlockServers:
     if kind == "modbus":
-        from sagline.twin.modbus_mirrors import ModbusMirrors
+        from sagline.twin.modbus_servers import ModbusServers
 
-        return ModbusMirrors(blocks(1))
-    from sagline.twin.s7_mirrors import S7Mirrors
+        return ModbusServers(blocks(1))
+    from sagline.twin.s7_servers import S7Servers
 
-    mirrors = S7Mirrors(blocks(1))
+    servers = S7Servers(blocks(1))
     if kind == "slow":
-        for server in mirrors._servers:
+        for server in servers._servers:
             server.set_read_events_callback(lambda event: time.sleep(SLOW))
-    return mirrors
+    return servers
 
 
 @contextmanager

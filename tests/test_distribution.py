@@ -28,8 +28,8 @@ EXTRA_PACKAGES = (
     *("pymodbus", "pymoo", "skimage", "snap7", "trimesh", "viser", "zarr", "zstandard"),
 )
 MADE_FOR_EXTRAS = (
-    *("sagline.viewer", "sagline.cli.readings", "sagline.plc.modbus_wire", "sagline.plc.s7_wire"),
-    *("sagline.twin.modbus_mirrors", "sagline.twin.s7_mirrors", "sagline.share.log_course"),
+    *("sagline.viewer", "sagline.cli.readings", "sagline.share.log_course"),
+    *("sagline.twin.modbus_servers", "sagline.twin.s7_servers"),
 )
 USED = """
 import sys

@@ -29,9 +29,9 @@ INTERRUPTED: Final = 130  # exit code
 IN_PROCESS: Final = """\
 import sagline as sl
 from sagline.cli import control, main
-from sagline.control import pace
+from sagline.control import real_time
 control._link = lambda robot, plc, modbus: sl.twin.Machine(robot, seed=1).link()
-pace.Pace = lambda: None
+real_time.Pace = lambda: None
 main.app({words!r})
 """
 DRIVEN: Final = "home 0,0,1.5\ngoto 0.1,-0.2,1.4\njog 3 +5mm\noff\n"

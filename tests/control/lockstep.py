@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import sagline as sl
-from sagline.control.cycle import Cycle
+from sagline.control.evidence import Cycle
 from sagline.control.faults import faults_of
-from sagline.control.gains import Gains, gains_along
 from sagline.control.link import PERIOD, Command, GroupStatus, Mode, Sample, WinchState
+from sagline.control.null_space import Gains, gains_along
 from sagline.core.arrays import Array, Flags
 from tests.control.stops import HOME, TEN_POSES
 from tests.dynamics.machines import prototype

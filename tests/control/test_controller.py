@@ -13,7 +13,7 @@ import sagline as sl
 from sagline.control.controller import Controller
 from sagline.control.execution import ExecutionStatus
 from sagline.control.link import Command, Mode, Sample
-from sagline.control.pace import Pace
+from sagline.control.real_time import Pace
 from sagline.control.states import RefusedError, State
 from sagline.twin.injected import Injected
 from sagline.twin.machine import Machine

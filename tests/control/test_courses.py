@@ -8,8 +8,8 @@ from scipy.interpolate import CubicHermiteSpline, make_interp_spline
 
 import sagline as sl
 from sagline.control.checks import motion_along
-from sagline.control.courses import LEAD_SPEED, Along, Fade
 from sagline.control.link import RAMP
+from sagline.control.set_points import LEAD_SPEED, Along, Fade
 from sagline.control.states import RefusedError
 from tests.control.rigs import at, prototype, rig, spy_of
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sagline.control.ends import ends, finite, largest
+from sagline.control.extrema import ends, finite, largest
 
 ODD = (np.nan, np.inf, -np.inf)
 

@@ -8,7 +8,7 @@ from itertools import pairwise
 import pytest
 
 from sagline.control.controller import Controller
-from sagline.control.events import EventKind
+from sagline.control.recording import EventKind
 from sagline.control.states import TABLE, RefusedError, State
 from sagline.twin.machine import Machine
 from tests.control.rigs import HOME, at, rig

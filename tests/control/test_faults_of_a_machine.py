@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.control.events import EventKind
+from sagline.control.recording import EventKind
 from sagline.control.states import State
 from tests.control.rigs import Busy, at
 from tests.control.stops import HOME, PROTOTYPE

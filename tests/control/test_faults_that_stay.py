@@ -10,7 +10,7 @@ import pytest
 import sagline as sl
 from sagline.control.controller import Controller
 from sagline.control.link import Command, Missing, Sample
-from sagline.control.pace import Pace
+from sagline.control.real_time import Pace
 from sagline.control.states import RefusedError, State
 from sagline.control.tension_loop import TensionSettings
 from sagline.twin.machine import Machine

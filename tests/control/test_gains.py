@@ -5,8 +5,7 @@ import re
 import numpy as np
 
 import sagline as sl
-from sagline.control.gains import gains_along
-from sagline.control.null_space import null_space
+from sagline.control.null_space import gains_along, null_space
 from tests.control.stops import PROTOTYPE, stops
 from tests.refusal import refused
 

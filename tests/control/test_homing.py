@@ -12,7 +12,7 @@ import sagline as sl
 from sagline.control.controller import Controller
 from sagline.control.homing import WINDOW, Homing
 from sagline.control.link import Sample
-from sagline.control.load_cells import cell_errors
+from sagline.control.null_space import cell_errors
 from sagline.control.states import State
 from tests.control.rigs import HOME, prototype, rig, spy_of, state_of
 

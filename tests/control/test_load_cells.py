@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.control.load_cells import balance_slope, parity
+from sagline.control.null_space import balance_slope, parity
 from sagline.core.arrays import Array
 from tests.control.stops import PROTOTYPE, stops
 from tests.kinematics.feasible import feasible_plan

@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from sagline import ForwardStatus
-from sagline.control.events import EventKind
 from sagline.control.execution import ExecutionStatus
 from sagline.control.link import GroupStatus, Missing, Mode, Sample
+from sagline.control.recording import EventKind
 from sagline.control.states import State
 from sagline.core.arrays import Array
 from tests.control.rigs import Watcher, at, rig, spy_of, state_of

@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from sagline.control.pace import Histogram, Pace
+from sagline.control.real_time import Histogram, Pace
 
 
 class Clock:

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.control import warm
+from sagline.control import preloading
 from sagline.control.controller import Controller
-from sagline.control.courses import standing_at as found
 from sagline.control.execution import ExecutionStatus
 from sagline.control.link import Mode
-from sagline.control.pace import Pace
+from sagline.control.real_time import Pace
+from sagline.control.set_points import standing_at as found
 from sagline.control.states import RefusedError, State
 from sagline.twin.injected import Injected
 from tests.control.rigs import HOME, at, prototype, rig, spy_of, state_of, with_zero_errors
@@ -135,7 +135,7 @@ def test_one_part_that_is_refused_leaves_no_other_cold(monkeypatch: pytest.Monke
     tried = list[str]()
 
     def trying(name: str) -> Any:
-        good = getattr(warm, name)
+        good = getattr(preloading, name)
 
         def part(*arguments: Any) -> Any:
             tried.append(name)
@@ -145,7 +145,7 @@ def test_one_part_that_is_refused_leaves_no_other_cold(monkeypatch: pytest.Monke
 
     names = ["standing_at", "motion_along", "winch_jog", "PlatformJog"]
     for name in names:
-        monkeypatch.setattr(warm, name, trying(name))
+        monkeypatch.setattr(preloading, name, trying(name))
     nowhere = prototype().replace(tension_min=2000.0, tension_max=2100.0)  # no pose has such tensions
-    warm.load_all(nowhere, 0.01, sl.Catenary(), sl.Closest())
+    preloading.load_all(nowhere, 0.01, sl.Catenary(), sl.Closest())
     assert tried == names

@@ -15,7 +15,7 @@ import sagline as sl
 from sagline.control import Sample
 from sagline.plc.block_link import BlockLink
 from tests.plc.samples import a_sample, sample_blocks
-from tests.twin.blocks import Mirrors, ModbusMirrors, S7Mirrors
+from tests.twin.blocks import BlockServers, ModbusServers, S7Servers
 
 OWNER = 4711
 PATIENCE = 20.0  # s: for a machine that has much else to do; nothing waits so long where all is well
@@ -32,28 +32,28 @@ def until(condition: Callable[[], Any], patience: float = PATIENCE) -> None:
 class Kind(NamedTuple):
     """What carries the blocks."""
 
-    mirrors: Callable[[list[bytes]], Mirrors]
+    servers: Callable[[list[bytes]], BlockServers]
     link: Callable[..., BlockLink]
 
 
-S7 = Kind(S7Mirrors, sl.plc.S7Link)
-MODBUS = Kind(ModbusMirrors, sl.plc.ModbusLink)
+S7 = Kind(S7Servers, sl.plc.S7Link)
+MODBUS = Kind(ModbusServers, sl.plc.ModbusLink)
 BOTH = [pytest.param(S7, id="S7"), pytest.param(MODBUS, id="Modbus")]
 
 
 @contextmanager
 def plcs(kind: Kind = S7, sample: Sample | None = None) -> Iterator[Any]:
     """As many good groups as a sample has."""
-    mirrors = kind.mirrors(sample_blocks(a_sample(8) if sample is None else sample))
+    servers = kind.servers(sample_blocks(a_sample(8) if sample is None else sample))
     try:
-        yield mirrors
+        yield servers
     finally:
-        mirrors.close()
+        servers.close()
 
 
 @contextmanager
-def linked(kind: Kind, mirrors: Mirrors) -> Iterator[BlockLink]:
-    with closing(kind.link(mirrors.addresses, 8, timeout=PATIENCE)) as link:
+def linked(kind: Kind, servers: BlockServers) -> Iterator[BlockLink]:
+    with closing(kind.link(servers.addresses, 8, timeout=PATIENCE)) as link:
         yield link
 
 

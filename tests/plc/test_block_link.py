@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 
 from sagline.control import Mode, Sample
-from sagline.plc import group as plc_group
-from sagline.plc.block_link import BlockLink
+from sagline.plc import block_link
+from sagline.plc.block_link import BlockLink, Group
 from sagline.plc.blocks import CLAIM, FROM_PLC, TO_PLC, Block, Refusal
-from sagline.plc.group import Group
-from sagline.plc.modbus_wire import ModbusWire
-from sagline.plc.s7_wire import S7Wire
+from sagline.plc.modbus_link import ModbusWire
+from sagline.plc.s7_link import S7Wire
 from sagline.plc.wire import WireError
 from tests.control.protocol import OWNER_TIMEOUT
 from tests.plc.samples import (
@@ -38,7 +37,7 @@ from tests.tiers import extended, wide
 @pytest.mark.parametrize("kind", BOTH)
 def test_a_sample_comes_over_the_wire(kind: Kind) -> None:
     sample = status(7)
-    with plcs(kind, sample) as mirrors, linked(kind, mirrors) as link:
+    with plcs(kind, sample) as servers, linked(kind, servers) as link:
         got = taken(link)
         assert link.groups == ((0, 1), (2, 3), (4, 5), (6, 7))
     np.testing.assert_array_equal(got.length, sample.length)
@@ -49,13 +48,13 @@ def test_a_sample_comes_over_the_wire(kind: Kind) -> None:
 @extended
 @pytest.mark.parametrize("kind", BOTH)
 def test_a_group_whose_grant_is_not_ours_gets_the_claim_and_nothing_else(kind: Kind) -> None:
-    with plcs(kind, status(1, owner=99)) as mirrors, linked(kind, mirrors) as link:
+    with plcs(kind, status(1, owner=99)) as servers, linked(kind, servers) as link:
         link.exchange(a_command(8, owner=OWNER))
         written: list[tuple[bytes, bytes]] = [(b"", b"")] * 4
 
         def claimed() -> bool:
             written[:] = [
-                (w[0], w[1] if any(w[1]) else old[1]) for w, old in zip(mirrors.written(), written, strict=True)
+                (w[0], w[1] if any(w[1]) else old[1]) for w, old in zip(servers.written(), written, strict=True)
             ]
             return all(claim for _, claim in written)
 
@@ -68,10 +67,10 @@ def test_a_group_whose_grant_is_not_ours_gets_the_claim_and_nothing_else(kind: K
 @pytest.mark.parametrize("kind", wide(reversed(BOTH)))
 def test_a_group_whose_grant_is_ours_gets_the_command(kind: Kind) -> None:
     command = a_command(8, owner=OWNER)
-    with plcs(kind, status(1, owner=OWNER)) as mirrors, linked(kind, mirrors) as link:
+    with plcs(kind, status(1, owner=OWNER)) as servers, linked(kind, servers) as link:
         link.exchange(command)
-        until(lambda: all(any(command) for command, _ in mirrors.written()))
-        for i, (block, claim) in enumerate(mirrors.written()):
+        until(lambda: all(any(command) for command, _ in servers.written()))
+        for i, (block, claim) in enumerate(servers.written()):
             values = TO_PLC.read(block)
             assert not isinstance(values, Refusal)
             assert (values["counter"], values["mode"], values["owner"]) == (command.counter, Mode.FOLLOW, OWNER)
@@ -83,10 +82,10 @@ def test_a_group_whose_grant_is_ours_gets_the_command(kind: Kind) -> None:
 @pytest.mark.parametrize("kind", BOTH)
 def test_who_leaves_claims_nothing_back_and_his_last_command_is_written_before_the_link_closes(kind: Kind) -> None:
     owners = np.array([OWNER, 0, 99, OWNER])
-    with plcs(kind, a_sample(8, owner=owners)) as mirrors:
-        with linked(kind, mirrors) as link:
+    with plcs(kind, a_sample(8, owner=owners)) as servers:
+        with linked(kind, servers) as link:
             link.exchange(a_command(8, owner=OWNER, mode=Mode.LEAVE))
-        written = mirrors.written()
+        written = servers.written()
     assert [any(command) for command, _ in written] == [True, False, False, True]
     assert not any(any(claim) for _, claim in written)
 
@@ -94,11 +93,11 @@ def test_who_leaves_claims_nothing_back_and_his_last_command_is_written_before_t
 @extended
 @pytest.mark.parametrize("kind", BOTH)
 def test_who_only_reads_writes_nothing(kind: Kind) -> None:
-    with plcs(kind, status(1, owner=OWNER)) as mirrors, linked(kind, mirrors) as link:
+    with plcs(kind, status(1, owner=OWNER)) as servers, linked(kind, servers) as link:
         for counter in (2, 3):
-            mirrors.publish(sample_blocks(status(counter)))
+            servers.publish(sample_blocks(status(counter)))
             until(lambda counter=counter: np.all(taken(link).counter == counter))  # type: ignore[misc]
-        assert not any(any(command) or any(claim) for command, claim in mirrors.written())
+        assert not any(any(command) or any(claim) for command, claim in servers.written())
 
 
 def next_discarded(link: BlockLink, group: int) -> Sample:
@@ -110,27 +109,27 @@ def next_discarded(link: BlockLink, group: int) -> Sample:
 
 @pytest.mark.parametrize("spoil", wide([torn, foreign, of_another_version, of_another_group, repeated, older]))
 def test_a_block_that_is_no_news_is_counted_and_the_age_goes_on(spoil: Callable[[bytearray], None]) -> None:
-    with plcs(S7, status(10)) as mirrors, linked(S7, mirrors) as link:
-        mirrors.publish(bad(11, spoil))
+    with plcs(S7, status(10)) as servers, linked(S7, servers) as link:
+        servers.publish(bad(11, spoil))
         sample = next_discarded(link, 2)
         until(lambda: np.all(taken(link).counter == [11, 11, 10, 11]))
         assert taken(link).age[2] >= sample.age[2]
         np.testing.assert_array_equal(taken(link).length[4:6], status(10).length[4:6])
-        mirrors.publish(sample_blocks(status(12)))
+        servers.publish(sample_blocks(status(12)))
         until(lambda: np.all(taken(link).counter == 12))
 
 
 @extended
 def test_counters_begin_again_after_the_largest() -> None:
-    with plcs(S7, status(2**31 - 1)) as mirrors, linked(S7, mirrors) as link:
-        mirrors.publish(sample_blocks(status(1)))
+    with plcs(S7, status(2**31 - 1)) as servers, linked(S7, servers) as link:
+        servers.publish(sample_blocks(status(1)))
         until(lambda: np.all(taken(link).counter == 1))
 
 
 @extended
 def test_a_plc_that_begins_anew_is_believed_after_a_while_of_silence_and_one_that_stands_never() -> None:
-    with plcs(S7, status(1000)) as mirrors, linked(S7, mirrors) as link:
-        mirrors.publish([*sample_blocks(status(1))[:3], sample_blocks(status(1000))[3]])
+    with plcs(S7, status(1000)) as servers, linked(S7, servers) as link:
+        servers.publish([*sample_blocks(status(1))[:3], sample_blocks(status(1000))[3]])
         until(lambda: np.all(taken(link).counter[:3] == 1))
         sample = taken(link)
         assert sample.counter[3] == 1000
@@ -223,7 +222,7 @@ def block(counter: int) -> bytes:
 
 @pytest.mark.parametrize("error", [struct.error("short"), AttributeError("recv"), AssertionError(), OSError("gone")])
 def test_whatever_a_wire_raises_a_group_goes_on_and_says_why(error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(plc_group, "RETRY", 0.0)
+    monkeypatch.setattr(block_link, "RETRY", 0.0)
     counters, troubles = heard(block(7), error, block(8))
     assert counters == [7, 7, 8]
     assert (troubles[0], troubles[2]) == ("", "")
@@ -233,7 +232,7 @@ def test_whatever_a_wire_raises_a_group_goes_on_and_says_why(error: Exception, m
 def test_a_plc_that_begins_anew_with_a_connection_is_believed_at_once_and_on_the_same_one_it_is_not(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(plc_group, "RETRY", 0.0)
+    monkeypatch.setattr(block_link, "RETRY", 0.0)
     gone = WireError(Refusal("whoever is there hangs up", "Check it"))
     assert heard(block(1000), gone, block(1), block(2))[0] == [1000, 1000, 1, 2]
     assert heard(block(1000), block(1), block(2))[0] == [1000, 1000, 1000]

@@ -7,8 +7,18 @@ import struct
 import numpy as np
 import pytest
 
-from sagline.plc.blocks import BLOCKS, CLAIM, FROM_PLC, TO_PLC, TYPES, Block, Refusal
-from sagline.plc.packing import claim_block, command_blocks, sample_of
+from sagline.plc.blocks import (
+    BLOCKS,
+    CLAIM,
+    FROM_PLC,
+    TO_PLC,
+    TYPES,
+    Block,
+    Refusal,
+    claim_block,
+    command_blocks,
+    sample_of,
+)
 from tests.plc.samples import a_command, a_sample, sample_blocks
 
 

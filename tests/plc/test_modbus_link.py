@@ -18,27 +18,27 @@ from tests.plc.samples import a_sample, sample_blocks
 from tests.plc.servers import MODBUS, PATIENCE, S7, nobody, plcs, stranger
 from tests.refusal import refused
 from tests.tiers import extended
-from tests.twin.blocks import ModbusMirrors
+from tests.twin.blocks import ModbusServers
 
 
 def test_registers_are_the_bytes_of_the_blocks() -> None:
     sample = a_sample(8)
-    with plcs(MODBUS, sample) as mirrors:
-        host, _, port = mirrors.addresses[1].partition(":")
+    with plcs(MODBUS, sample) as servers:
+        host, _, port = servers.addresses[1].partition(":")
         with closing(ModbusTcpClient(host, port=int(port))) as client:
             registers = client.read_holding_registers(0, count=52, device_id=1).registers
             assert struct.pack(">52H", *registers) == sample_blocks(sample)[1]
             assert client.read_holding_registers(18, count=4, device_id=1).registers == registers[18:22]
             client.write_registers(200, [1, 2, 3, 4], device_id=1)
-            assert mirrors.written()[1][1] == struct.pack(">4H", 1, 2, 3, 4)
-            assert not any(mirrors.written()[1][1])  # who looked took it out
+            assert servers.written()[1][1] == struct.pack(">4H", 1, 2, 3, 4)
+            assert not any(servers.written()[1][1])  # who looked took it out
             assert client.read_holding_registers(52, count=1, device_id=1).isError()
 
 
 @extended
 def test_the_error_names_the_group_that_is_no_plc_and_why(snapshot: Any) -> None:
-    with plcs(MODBUS) as mirrors, plcs(S7) as others, stranger() as mute:
-        good, gone = list(mirrors.addresses), nobody()
+    with plcs(MODBUS) as servers, plcs(S7) as others, stranger() as mute:
+        good, gone = list(servers.addresses), nobody()
         errors = {
             "nobody": error_of([*good[:3], gone], 3, PATIENCE),
             "S7": error_of([*good[:3], others.addresses[3]], 3, PATIENCE),
@@ -77,7 +77,7 @@ def test_a_twin_that_cannot_listen_at_all_its_ports_listens_at_none(monkeypatch:
     really = ModbusTcpServer.serve_forever
     monkeypatch.setattr(ModbusTcpServer, "serve_forever", begin)
     with pytest.raises(RuntimeError, match="no port"):
-        ModbusMirrors(sample_blocks(a_sample(8)))
+        ModbusServers(sample_blocks(a_sample(8)))
     assert len(begun) == 2
     assert [server.transport for server in begun] == [None, None]
     assert "sagline modbus" not in [thread.name for thread in threading.enumerate()]

@@ -23,8 +23,8 @@ from tests.tiers import extended
 
 @extended
 def test_an_exchange_waits_for_nobody_and_a_silent_group_is_connected_anew() -> None:
-    with plcs(S7, status(1)) as mirrors, linked(S7, mirrors) as link:
-        server = mirrors._servers[1]
+    with plcs(S7, status(1)) as servers, linked(S7, servers) as link:
+        server = servers._servers[1]
         server.lock_area(SrvArea.DB, FROM_PLC.number)  # it answers no more
         times = []
 
@@ -40,18 +40,18 @@ def test_an_exchange_waits_for_nobody_and_a_silent_group_is_connected_anew() -> 
         assert trouble is not None
         assert re.search("answer", trouble.reason)
         server.unlock_area(SrvArea.DB, FROM_PLC.number)
-        mirrors.publish(sample_blocks(status(2)))
+        servers.publish(sample_blocks(status(2)))
         until(lambda: np.all(taken(link).counter == 2))
 
 
 @extended
 def test_the_slowest_group_sets_the_time_not_the_sum() -> None:
     wait = 0.03
-    with plcs(S7, status(1)) as mirrors:
-        for server in mirrors._servers:
+    with plcs(S7, status(1)) as servers:
+        for server in servers._servers:
             server.set_read_events_callback(lambda event: time.sleep(wait))
-        with linked(S7, mirrors) as link:
-            mirrors.publish(sample_blocks(status(2)))
+        with linked(S7, servers) as link:
+            servers.publish(sample_blocks(status(2)))
             link.exchange(a_command(8))
             until(lambda: np.all(taken(link).counter == 2))
             assert wait <= link.round_trip.min()
@@ -60,9 +60,9 @@ def test_the_slowest_group_sets_the_time_not_the_sum() -> None:
 
 @extended
 def test_it_asks_for_the_pdu_of_an_s7_1200_and_the_twin_grants_no_other() -> None:
-    with plcs() as mirrors:
+    with plcs() as servers:
         client = Client()
-        client.connect("127.0.0.1", 0, 1, tcp_port=int(mirrors.addresses[0].rpartition(":")[2]))
+        client.connect("127.0.0.1", 0, 1, tcp_port=int(servers.addresses[0].rpartition(":")[2]))
         assert client.get_pdu_length() == 240  # it asked for 480
         client.disconnect()
     asked: list[int] = []
@@ -135,15 +135,15 @@ def error_of(addresses: list[str], group: int, winches: int = 8, timeout: float 
 
 @extended
 def test_the_error_names_a_port_where_nothing_listens(snapshot: Any) -> None:
-    with plcs() as mirrors:
-        assert error_of([*mirrors.addresses[:2], nobody(), mirrors.addresses[3]], 2) == snapshot
+    with plcs() as servers:
+        assert error_of([*servers.addresses[:2], nobody(), servers.addresses[3]], 2) == snapshot
 
 
 @extended
 def test_the_error_names_a_port_that_does_not_answer_in_time(snapshot: Any) -> None:
-    with plcs() as mirrors, stranger() as mute:
+    with plcs() as servers, stranger() as mute:
         begin = time.monotonic()
-        text = error_of([mirrors.addresses[0], mute, *mirrors.addresses[2:]], 1, timeout=0.5)
+        text = error_of([servers.addresses[0], mute, *servers.addresses[2:]], 1, timeout=0.5)
         assert time.monotonic() - begin < 4.0  # the library alone waits 5 s
     assert text == snapshot
 
@@ -151,22 +151,22 @@ def test_the_error_names_a_port_that_does_not_answer_in_time(snapshot: Any) -> N
 @extended
 @pytest.mark.parametrize("answer", [b"HTTP/1.1 400 Bad Request\r\n\r\n", b"SSH-2.0\r\n", b"\x03\x00\x00\x04"])
 def test_the_error_names_a_port_that_does_not_speak_s7(answer: bytes) -> None:
-    with plcs() as mirrors, stranger(answer) as address:
-        text = error_of([address, *mirrors.addresses[1:]], 0)
+    with plcs() as servers, stranger(answer) as address:
+        text = error_of([address, *servers.addresses[1:]], 0)
     assert re.match(r"group 0 at ADDRESS: .* S7 \(", text)
 
 
 @extended
 def test_the_error_names_the_first_of_two_groups_in_the_wrong_order(snapshot: Any) -> None:
-    with plcs() as mirrors:
-        first, second, *others = mirrors.addresses
+    with plcs() as servers:
+        first, second, *others = servers.addresses
         assert error_of([second, first, *others], 0) == snapshot
 
 
 def test_the_error_names_the_layout_of_a_group_and_the_command_that_exports_this_one(snapshot: Any) -> None:
-    with plcs() as mirrors:
-        mirrors.publish(bad(1, of_another_version))
-        assert error_of(list(mirrors.addresses), 2) == snapshot
+    with plcs() as servers:
+        servers.publish(bad(1, of_another_version))
+        assert error_of(list(servers.addresses), 2) == snapshot
 
 
 @extended
@@ -181,8 +181,8 @@ def test_the_error_names_the_block_that_is_missing(snapshot: Any) -> None:
 
 @extended
 def test_the_error_names_the_number_of_winches_of_plc_and_robot(snapshot: Any) -> None:
-    with plcs() as mirrors:
-        assert error_of(list(mirrors.addresses), 3, winches=7) == snapshot
+    with plcs() as servers:
+        assert error_of(list(servers.addresses), 3, winches=7) == snapshot
 
 
 @pytest.mark.parametrize(("package", "link"), [("snap7", sl.plc.S7Link), ("pymodbus", sl.plc.ModbusLink)])
@@ -190,7 +190,7 @@ def test_a_package_that_is_missing_is_named_with_the_extra(
     package: str, link: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in [*sys.modules]:
-        if name.startswith((package, "sagline.plc.s7_wire", "sagline.plc.modbus_wire")):
+        if name.startswith((package, "sagline.plc.s7_link", "sagline.plc.modbus_link")):
             monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, package, None)
     with refused(f"package {package}", kind=sl.FileError) as caught:

@@ -1,16 +1,14 @@
 """Servers of the blocks of a twin, for tests of other folders, and the memory behind them."""
 
 from sagline.twin import Server
-from sagline.twin.mirrors import Mirrors
-from sagline.twin.modbus_mirrors import ModbusMirrors
-from sagline.twin.s7_mirrors import S7Mirrors
+from sagline.twin.block_servers import BlockServers
+from sagline.twin.modbus_servers import ModbusServers
+from sagline.twin.s7_servers import S7Servers
 from tests.plc.protocol import Block
 
-__all__ = ["Mirrors", "ModbusMirrors", "S7Mirrors", "memory"]
+__all__ = ["BlockServers", "ModbusServers", "S7Servers", "memory"]
 
 
 def memory(server: Server) -> list[dict[Block, bytearray]]:
     """Blocks of each group, as they are stored."""
-    mirrors = server._mirrors
-    assert isinstance(mirrors, S7Mirrors | ModbusMirrors)
-    return [each if isinstance(each, dict) else each.blocks for each in mirrors._memory]
+    return server._servers._memory

@@ -9,7 +9,7 @@ import pytest
 
 import sagline as sl
 from sagline.control import Command, Missing, Mode, Sample
-from sagline.twin.network import Network, Way
+from sagline.twin.link import Network, Way
 from tests.control.protocol import PERIOD
 from tests.twin.pilot import HOME, Pilot
 

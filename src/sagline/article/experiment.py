@@ -20,11 +20,10 @@ from sagline.article.machine import DRUM, ZERO, Errors, machine
 from sagline.article.table2 import Table2, table2
 from sagline.article.ten_poses import HOME
 from sagline.control.controller import Controller
-from sagline.control.events import Event, EventKind
 from sagline.control.execution import Execution, ExecutionStatus
 from sagline.control.link import PERIOD, Sample
 from sagline.control.null_space import null_space
-from sagline.control.recording import Recorded
+from sagline.control.recording import Event, EventKind, Recorded
 from sagline.control.states import RefusedError, State
 from sagline.control.tension_loop import TensionSettings
 from sagline.core.arrays import Array, locked

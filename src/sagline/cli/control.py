@@ -45,7 +45,7 @@ def control(
     """
     from sagline.cli.session import Session
     from sagline.control.controller import Controller
-    from sagline.control.pace import Pace
+    from sagline.control.real_time import Pace
     from sagline.files.robot_file import load_robot
 
     robot = load_robot(name)

@@ -93,9 +93,9 @@ def apart_over_s7(true: Robot, nominal: Robot, seed: int, tell: Tell) -> Experim
     from sagline.article.experiment import experiment as driven
     from sagline.article.ten_poses import HOME
     from sagline.control.controller import Controller
-    from sagline.control.pace import Pace
+    from sagline.control.real_time import Pace
     from sagline.plc.s7_link import S7Link
-    from sagline.twin.apart import apart
+    from sagline.twin.server import apart
 
     with (
         apart(with_cells(true), nominal, level(HOME), seed=seed) as twin,

@@ -16,8 +16,8 @@ from sagline.core.numbers import n
 from sagline.files.writing import check_file
 
 if TYPE_CHECKING:
-    from sagline.control.events import Event
     from sagline.control.execution import Execution
+    from sagline.control.recording import Event
     from sagline.core.arrays import Array
 
 MOST_EVENTS: Final = 20  # that are listed
@@ -133,7 +133,7 @@ def _states(done: Execution) -> list[list[str]]:
 
 def _extremes(done: Execution) -> list[Extreme]:
     """The largest errors; those of which there is one."""
-    from sagline.control.deviation import position_error
+    from sagline.control.execution import position_error
 
     errors: list[tuple[str, Array, str]] = [
         ("tension error", done.tension - done.planned_tension, "N"),

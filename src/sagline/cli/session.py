@@ -13,8 +13,8 @@ from sagline.cli.status_line import PROMPT, StatusLine
 from sagline.cli.terminal import note, show
 from sagline.cli.values import middle_of, quantity, whole_of
 from sagline.control.controller import Controller
-from sagline.control.events import Event, EventKind
-from sagline.control.guard import interrupt_calls
+from sagline.control.real_time import interrupt_calls
+from sagline.control.recording import Event, EventKind
 from sagline.control.states import State
 from sagline.core.errors import InvalidValueError, SaglineError, nearest
 from sagline.files.path_file import load_path

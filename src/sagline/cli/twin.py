@@ -18,9 +18,9 @@ from sagline.cli.terminal import note, show, working
 if TYPE_CHECKING:
     from sagline.dynamics.simulator import Reading
     from sagline.files.mcap_writer import Recorder
+    from sagline.twin.link import Report
     from sagline.twin.machine import Machine
     from sagline.twin.server import Server
-    from sagline.twin.snapshot import Report
 
 LOOK: Final = 0.1  # s, between two looks at what the PLCs do
 LATE: Final = 0.05  # s, by which a scan may be late without a word

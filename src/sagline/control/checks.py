@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from sagline.cables.model import CableModel
-from sagline.control.gains import Gains, gains_along
+from sagline.control.null_space import Gains, gains_along
 from sagline.control.states import RefusedError
 from sagline.core.arrays import Array, Indices, locked
 from sagline.dynamics.drives import lever_of

@@ -10,19 +10,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.cables.model import CableModel
-from sagline.control.aside import aside
 from sagline.control.checks import Motion, check_lead, check_motion, check_start, motion_along
 from sagline.control.connecting import Claim, Trouble
-from sagline.control.courses import Along, SetPoint, Standing
-from sagline.control.events import EventKind
 from sagline.control.execution import Execution
-from sagline.control.guard import interrupt_calls
 from sagline.control.homing import Homing, HomingJog, tension_limits
 from sagline.control.jogging import PlatformJog, checked_displacement, checked_winch, winch_jog
 from sagline.control.link import Link
 from sagline.control.loop import Loop
-from sagline.control.pace import Pace
-from sagline.control.recording import Recorder
+from sagline.control.real_time import Pace, aside, interrupt_calls
+from sagline.control.recording import EventKind, Recorder
+from sagline.control.set_points import Along, SetPoint, Standing
 from sagline.control.states import MOTION, RefusedError, State, check_transition
 from sagline.control.tension_loop import TensionSettings
 from sagline.core.arguments import instance

@@ -1,18 +1,50 @@
-"""What several rules for faults look at, worked out once a cycle."""
+"""Evidence that the fault rules share: one cycle of the controller, and what follows from all cycles so far."""
 
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from sagline.control.cycle import MOVING, Cycle
-from sagline.control.ends import ends, finite, largest
-from sagline.control.link import RAMP, WinchState, groups_of
-from sagline.control.load_cells import SIGMAS
+from sagline.control.extrema import ends, finite, largest
+from sagline.control.link import RAMP, Command, Mode, Sample, WinchState, groups_of
+from sagline.control.null_space import SIGMAS, NullSpace
 from sagline.core.arrays import Array, Flags
 from sagline.robot.robot import Robot
+
+MOVING: Final = 1e-3  # m/s: a set point that changes faster is in motion
+
+
+class Cycle(NamedTuple):
+    """One cycle, after the sample came in and before the next command goes out.
+
+    Attributes:
+        sample: What the machine said last.
+        before: What it had said in the cycle before; None in the first.
+        command: What was sent in the cycle before; None where nothing was, by those who only read.
+        tension: T_A, planned for this cycle [N], shape (m,); NaN where there is no plan, as before homing.
+        gains: Row of the plan's gains at this time; None where there is none.
+        correction: What the tension loop adds to the lengths of the plan [m], shape (m,).
+        late: How much later than planned the cycle began [s]; 0 on the clock of an in-process machine.
+        recording: Why recording has stopped; "" while it goes on, or where nothing is recorded.
+    """
+
+    sample: Sample
+    before: Sample | None
+    command: Command | None
+    tension: Array
+    gains: NullSpace | None
+    correction: Array
+    late: float = 0.0
+    recording: str = ""
+
+    @property
+    def moving(self) -> bool:
+        """Whether set points change."""
+        command = self.command
+        return command is not None and command.mode == Mode.FOLLOW and bool(abs(command.rate).max() > MOVING)
+
 
 SLACK_SHARE: Final = 0.3  # of the lower limit: a cable that pulls less is slack
 PLANNED_SHARE: Final = 0.9  # of the lower limit: from there on a plan wants the cable taut

@@ -6,8 +6,7 @@ from abc import ABC, abstractmethod
 from enum import IntEnum
 from typing import ClassVar
 
-from sagline.control.cycle import Cycle
-from sagline.control.evidence import Evidence
+from sagline.control.evidence import Cycle, Evidence
 
 
 class Reaction(IntEnum):

@@ -21,7 +21,7 @@ from sagline.control.faults_link import (
 )
 from sagline.control.faults_tension import CableBroken, OverTension, Slack
 from sagline.control.link import PERIOD
-from sagline.control.load_cells import cell_errors
+from sagline.control.null_space import cell_errors
 from sagline.control.tension_loop import TensionSettings
 from sagline.core.arguments import brief, instance
 from sagline.core.arrays import number

@@ -7,12 +7,11 @@ from typing import Final
 
 import numpy as np
 
-from sagline.control.cycle import Cycle
-from sagline.control.ends import largest
-from sagline.control.evidence import Evidence
+from sagline.control.evidence import Cycle, Evidence
+from sagline.control.extrema import largest
 from sagline.control.fault import Fault, Reaction
 from sagline.control.faults_tension import SLACK_SAMPLES
-from sagline.control.load_cells import SIGMAS
+from sagline.control.null_space import SIGMAS
 from sagline.core.arrays import Array
 
 STUCK_SAMPLES: Final = 50

@@ -6,10 +6,9 @@ from typing import Final
 
 import numpy as np
 
-from sagline.control.cycle import Cycle
-from sagline.control.evidence import PLANNED_SHARE, SLACK_SHARE, Evidence
+from sagline.control.evidence import PLANNED_SHARE, SLACK_SHARE, Cycle, Evidence
 from sagline.control.fault import Fault, Reaction
-from sagline.control.load_cells import SIGMAS
+from sagline.control.null_space import SIGMAS
 
 NEAR: Final = 0.9  # of the upper limit; a plan that goes beyond would stop here
 NEAR_SAMPLES, SLACK_SAMPLES = 5, 3

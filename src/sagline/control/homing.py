@@ -7,10 +7,10 @@ from typing import Final
 import numpy as np
 
 from sagline.cables.model import CableModel
-from sagline.control.courses import SetPoint, Standing
 from sagline.control.jogging import winch_lengths
 from sagline.control.link import Sample
-from sagline.control.load_cells import SIGMAS, cell_sigma
+from sagline.control.null_space import SIGMAS, cell_sigma
+from sagline.control.set_points import SetPoint, Standing
 from sagline.control.states import RefusedError
 from sagline.core.arrays import Array
 from sagline.kinematics.inverse import inverse

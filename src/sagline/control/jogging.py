@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from sagline.cables.model import CableModel
 from sagline.control.checks import Motion, check_lead
-from sagline.control.courses import Fade, SetPoint, smooth, smooth_slope
+from sagline.control.set_points import Fade, SetPoint, smooth, smooth_slope
 from sagline.control.states import RefusedError
 from sagline.core.arguments import whole_number
 from sagline.core.arrays import Array, checked, number

@@ -13,27 +13,23 @@ import numpy as np
 
 from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
-from sagline.control.aside import aside
 from sagline.control.checks import Motion
 from sagline.control.connecting import FRESH, Claim, Trouble, trouble
-from sagline.control.courses import Along, Course, Ramp, SetPoint, Standing, standing_at
-from sagline.control.cycle import Cycle
 from sagline.control.estimator import Estimator
-from sagline.control.events import Event, EventKind
+from sagline.control.evidence import Cycle
 from sagline.control.execution import Execution, ExecutionStatus, execution_of
 from sagline.control.fault import Fault, Reaction
 from sagline.control.faults import faults_of
-from sagline.control.guard import Garbage
 from sagline.control.homing import Homing
 from sagline.control.jogging import PlatformJog
-from sagline.control.journal import Journal
 from sagline.control.link import PERIOD, Command, Link, Missing, Mode, Sample
-from sagline.control.pace import Pace
-from sagline.control.recording import Recorded, Recorder, Tape
+from sagline.control.preloading import load_all
+from sagline.control.real_time import Garbage, Pace, aside
+from sagline.control.recording import Event, EventKind, Journal, Recorded, Recorder, Tape
 from sagline.control.sender import Sender
+from sagline.control.set_points import Along, Course, Ramp, SetPoint, Standing, standing_at
 from sagline.control.states import HOLDS_GRANT, MOTION, RefusedError, State, check_transition
 from sagline.control.tension_loop import TensionLoop, TensionSettings
-from sagline.control.warm import load_all
 from sagline.core.arguments import brief, instance, optional, whole_number
 from sagline.core.arrays import Array, number
 from sagline.core.errors import InvalidValueError

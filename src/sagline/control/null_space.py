@@ -1,15 +1,90 @@
-"""Which errors of tension lengths can mend without moving the platform, and by which lengths."""
+"""Null space of the structure matrix and parity of the load cells, at a pose and along a plan."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from bisect import bisect_right
+from dataclasses import dataclass
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from sagline.control.load_cells import parity
-from sagline.core.arrays import Array, locked
+from sagline.core.arguments import instance
+from sagline.core.arrays import Array, locked, number
+from sagline.core.errors import InvalidValueError
+from sagline.kinematics.plan import Plan
 from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.robot import Robot
+from sagline.robot.several import first_of
+from sagline.statics.slopes import cable_slopes, on_platform
 from sagline.statics.stiffness import stiffness
+from sagline.statics.tension_slopes import tension_slopes
+
+SIGMAS: Final = 5.0  # by which a reading may be off before it means something
+OWN_DEVIATION: Final = 1.0  # N, of a cell that does not say
+BIAS: Final = 2.0  # N, 0.1 % of a cell of 2 kN
+_LIFT: Final = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+_HIDDEN: Final = 1e-6  # of an error: what is less visible is not visible
+
+
+def cell_sigma(robot: Robot) -> Array:
+    """Standard deviation of what the load cells read, bias included [N], shape (m,)."""
+    return np.hypot(*cell_errors(robot))
+
+
+def cell_errors(robot: Robot) -> tuple[Array, Array]:
+    """Standard deviations of what good load cells read, and the biases they may have [N], both of shape (m,)."""
+    winches, none = robot.winches, np.zeros(robot.cable_count)
+    own, bias = (none, none) if winches is None else (winches.load_cell_deviation, np.abs(winches.load_cell_bias))
+    return np.where(own > 0.0, own, OWN_DEVIATION), np.maximum(bias, BIAS)
+
+
+def balance_slope(state: Equilibrium) -> Array:
+    """How the wrench of the cables changes with the tensions at the frame ends, the platform held.
+
+    Args:
+        state: An equilibrium, single or N of them.
+
+    Returns:
+        Its free parts, shape (..., n, m) [N/N, N m/N]; n the number of free motions.
+    """
+    slopes = cable_slopes(state)
+    wrench = on_platform(slopes.by_length, slopes.levers) / tension_slopes(state, slopes).by_length[..., None, :]
+    found: Array = -first_of(state.robot).freedom @ wrench  # the slopes are of the force on the cable
+    return found
+
+
+def parity(state: Equilibrium) -> Array:
+    """What the balance of the platform says of each load cell, whatever its load weighs.
+
+    Where the platform rests, tensions other than planned must leave the wrench as it is, but for a load that is not the
+    planned one. With V the projection on all that they must not do, less the direction of the load, row i is
+    V_i/sqrt(V_ii): times the tensions less the plan it is the error of cell i alone that is most like what is seen, as
+    far as it is visible. The cell with the largest is named. Without the load's direction taken out, a load of another
+    weight would be taken for a cell.
+
+    Args:
+        state: An equilibrium, single or N of them.
+
+    Returns:
+        Shape (..., m, m); zero rows for cells whose errors are not visible, NaN where the state has no lengths.
+
+    Raises:
+        InvalidValueError: If the state is no Equilibrium (of a plan: plan.state).
+
+    Source:
+        docs/model.md, section 12.
+    """
+    slope = balance_slope(instance(state, Equilibrium, "state"))
+    lost = np.isnan(slope).any(axis=(-1, -2), keepdims=True)
+    slope = np.where(lost, 0.0, slope)
+    inverse = np.linalg.pinv(slope)
+    load = inverse @ (first_of(state.robot).freedom @ _LIFT)
+    size = np.linalg.norm(load, axis=-1, keepdims=True)
+    load = load / np.where(size > 0.0, size, 1.0)
+    visible = inverse @ slope - load[..., :, None] * load[..., None, :]
+    own = np.einsum("...ii->...i", visible)
+    scale = np.where(own > _HIDDEN, 1.0 / np.sqrt(np.maximum(own, _HIDDEN)), 0.0)
+    return locked(np.where(lost, np.nan, scale[..., None] * visible))
 
 
 class NullSpace(NamedTuple):
@@ -53,3 +128,85 @@ def null_space(state: Equilibrium) -> NullSpace:
     inverse = np.where(lost, np.nan, np.linalg.pinv(np.where(lost, 0.0, slope)))
     projection = basis @ np.swapaxes(basis, -1, -2)
     return NullSpace(locked(projection), locked(slope @ inverse), locked(basis @ inverse), parity(state))
+
+
+EVERY: Final = 0.5  # s between rows: 3 cm at the article's speed
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Gains:
+    """A table of what the tension loop needs, one row a pose of the plan.
+
+    Attributes:
+        time: Of the poses [s], strictly increasing, shape (R,); 0 for a plan of a single pose.
+        rows: What is needed there, R of them.
+    """
+
+    time: Array
+    rows: tuple[NullSpace, ...]
+    _changes: tuple[float, ...]  # where the next row is as near, R - 1 of them
+
+    def at(self, time: float) -> NullSpace:
+        """The row of the nearest pose; before the first that one, after the last the last, where the robot waits.
+
+        Args:
+            time: On the path's clock [s].
+        """
+        return self.rows[bisect_right(self._changes, time)]
+
+
+def gains_along(plan: Plan, every: float = EVERY) -> Gains | None:
+    """Gains of the tension loop along a plan.
+
+    Args:
+        plan: Along a path, or of a single pose; feasible.
+        every: Time between two rows [s], > 0; the plan's samples nearest to these times are taken.
+
+    Returns:
+        The table; None for a robot without redundancy, which has no tension loop: its tensions follow from the load.
+
+    Raises:
+        InvalidValueError: If the plan is of poses without a path, or has one without lengths.
+
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("article-prototype")
+        >>> path = sl.quintic_path([(0, 0, 1.5), (0.3, 0, 1.5)], speed=0.1)
+        >>> gains = sl.control.gains_along(sl.inverse(robot, path))
+        >>> print(len(gains.rows), "rows")
+        13 rows
+
+    Source:
+        docs/model.md, section 12.
+    """
+    step = number(every, "every", "s", above=0.0)
+    state = instance(plan, Plan, "plan").state
+    robot = first_of(state.robot)
+    if robot.cable_count <= len(robot.freedom):
+        return None
+    if plan.path is None:
+        if state.pose.shape:
+            raise InvalidValueError("plan", "of poses without a path", "a plan with times", "Plan a path of them.")
+        time, row = np.zeros(1), null_space(state)
+        spaces = [row]
+    else:
+        chosen = _nearest(plan.path.time, step)
+        time, batch = plan.path.time[chosen], null_space(state[chosen])
+        spaces = [NullSpace(*parts) for parts in zip(*batch, strict=True)]
+    lost = [i for i, row in enumerate(spaces) if np.isnan(row.correction).any()]
+    if lost:
+        raise InvalidValueError(
+            "plan", f"without lengths or stiffness at {time[lost[0]]:g} s", "a feasible plan", "Change the path."
+        )
+    changes = tuple((0.5 * (time[1:] + time[:-1])).tolist())
+    return Gains(locked(np.array(time)), tuple(spaces), changes)
+
+
+def _nearest(time: Array, step: float) -> np.ndarray:
+    """Samples nearest to the first time and every step from there on, the last sample too; no sample twice."""
+    wanted = time[0] + step * np.arange(int((time[-1] - time[0]) / step) + 1)
+    after = np.clip(np.searchsorted(time, wanted), 1, max(time.size - 1, 1))
+    if time.size == 1:
+        return np.zeros(1, dtype=np.int64)
+    nearer = np.where(wanted - time[after - 1] <= time[after] - wanted, after - 1, after)
+    return np.unique(np.append(nearer, time.size - 1))

@@ -1,19 +1,49 @@
-"""What a controller keeps of each cycle, and hands to those who look on."""
+"""Events and the record of each cycle, for those who ask afterwards and those who watch."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from enum import StrEnum
 from math import nan
 from typing import Any, Final, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.control.events import Event
 from sagline.control.link import Command, Missing, Sample
 from sagline.control.states import State
 from sagline.core.arrays import Array, Indices
 from sagline.core.status import Status
 from sagline.kinematics.plan import Plan
+
+
+class EventKind(StrEnum):
+    """What an event is about."""
+
+    STATE = "state"  # it changed
+    FAULT = "fault"
+    NOTE = "note"  # for the operator; nothing follows from it
+
+
+class Event(NamedTuple):
+    """One thing that happened.
+
+    Attributes:
+        time: On the link's clock [s].
+        cycle: In which cycle of the controller, from 0.
+        kind: What it is about.
+        name: The state that was entered, or the fault.
+        state: Of the controller after it.
+        text: One line for the operator.
+    """
+
+    time: float
+    cycle: int
+    kind: EventKind
+    name: str
+    state: State
+    text: str
+
 
 # what a cycle leaves, of m winches and G groups: real numbers, and whole ones
 REAL_OWN: Final = ("time", "late", "clock")
@@ -161,3 +191,56 @@ def _columns(widths: dict[str, int]) -> dict[str, slice]:
 
 def _width(columns: dict[str, slice]) -> int:
     return max(int(part.stop) for part in columns.values())
+
+
+class Journal:
+    """Events as they come, and one who is told of everything.
+
+    Attributes:
+        events: So far.
+    """
+
+    def __init__(self, record: Recorder | None) -> None:
+        """Nothing has happened.
+
+        Args:
+            record: Who looks on.
+        """
+        self.events: list[Event] = []
+        self._record = record
+
+    @property
+    def watched(self) -> bool:
+        """Whether somebody looks on."""
+        return self._record is not None
+
+    def add(self, event: Event) -> str:
+        """Keep an event.
+
+        Args:
+            event: What happened.
+
+        Returns:
+            As of `tell`.
+        """
+        self.events.append(event)
+        return self.tell(lambda record: record.event(event))
+
+    def tell(self, what: Callable[[Recorder], object]) -> str:
+        """Tell the one who looks on, and nobody any more once that raises.
+
+        Args:
+            what: Calls a method of it.
+
+        Returns:
+            What to say of it where it has raised; "" where it has not.
+        """
+        if self._record is None:
+            return ""
+        try:
+            what(self._record)
+        except Exception as error:
+            self._record = None
+            why = f"{type(error).__name__}: {' '.join(str(error).split())[:160]}"
+            return f"recording has stopped, as the recorder raised {why}. The motion goes on without it."
+        return ""

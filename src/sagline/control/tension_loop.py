@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from sagline.control.ends import finite, largest
+from sagline.control.extrema import finite, largest
 from sagline.control.link import PERIOD
 from sagline.control.null_space import NullSpace
 from sagline.core.arguments import instance, whole_number

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.control.events import Event, EventKind
 from sagline.control.execution import Execution
+from sagline.control.recording import Event, EventKind
 from sagline.control.states import State
 from sagline.core.arrays import Array
 from sagline.files.variables import Known, Quantity

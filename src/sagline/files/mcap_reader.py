@@ -15,7 +15,7 @@ from typing import Any, Final, NamedTuple
 
 from numpy.typing import NDArray
 
-from sagline.control.events import Event
+from sagline.control.recording import Event
 from sagline.core.arguments import file_path
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.core.memory import check_memory

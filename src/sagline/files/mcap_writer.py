@@ -16,10 +16,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.control.events import Event
 from sagline.control.execution import ExecutionStatus, execution_of
 from sagline.control.link import PERIOD, groups_of
-from sagline.control.recording import Recorded, Tape
+from sagline.control.recording import Event, Recorded, Tape
 from sagline.core.arguments import file_path, instance
 from sagline.core.arrays import Array
 from sagline.core.errors import FileError

@@ -1,16 +1,30 @@
-"""The link to Siemens PLCs: data blocks by PUT and GET of the S7 protocol."""
+"""Link to Siemens PLCs: data blocks by PUT and GET of the S7 protocol; the only file of the links that knows snap7."""
 
 from __future__ import annotations
 
+import logging
+import socket
 from collections.abc import Sequence
-from typing import Final
+from contextlib import suppress
+from typing import TYPE_CHECKING, Final
 
 from sagline.plc.addresses import addresses_of
 from sagline.plc.block_link import BlockLink
-from sagline.plc.wire import needed
+from sagline.plc.blocks import LOAD, Block, Refusal
+from sagline.plc.wire import ANSWER, WireError, needed, refused
 from sagline.robot.robot import Robot
 
+if TYPE_CHECKING:
+    from snap7 import Client
+
 PORT: Final = 102
+PDU: Final = 240  # bytes, what an S7-1200 has: the blocks fit, one request each
+RACK: Final = 0
+FORBIDDEN: Final = 0x8104  # what a CPU says to PUT or GET that its settings do not permit
+_CLOSED: Final = Refusal("the connection was closed", "Connect again")
+SLOT: Final = 1  # of every S7-1200 and S7-1500
+
+logging.getLogger("snap7").addHandler(logging.NullHandler())  # the link reports errors
 
 
 class S7Link(BlockLink):
@@ -34,7 +48,100 @@ class S7Link(BlockLink):
             LinkError: If a PLC does not answer, or not as sagline's blocks would.
             FileError: If python-snap7 is not installed.
         """
-        with needed():
-            from sagline.plc.s7_wire import S7Wire
         places = addresses_of(addresses, PORT)
         super().__init__(places, robot, [S7Wire(*place) for place in places], timeout)
+
+
+class S7Wire:
+    """A connection to one PLC over S7."""
+
+    def __init__(self, host: str, port: int) -> None:
+        """Keep the address; `open` connects."""
+        with needed():
+            import snap7
+        self._library = snap7
+        self._host = host
+        self._port = port
+        self._client: Client | None = None
+
+    def open(self) -> None:
+        """Connect; the library waits up to 5 s."""
+        try:
+            self._client = client = self._library.Client()
+            client.set_param(self._library.type.Parameter.PDURequest, PDU)
+            client.connect(self._host, RACK, SLOT, tcp_port=self._port)
+            _socket(client).settimeout(ANSWER)
+        except Exception as error:  # of a stranger's answer the library may make anything
+            raise WireError(refused(error, "S7")) from error
+
+    def read(self, block: Block) -> bytes:
+        """The bytes of a block.
+
+        Args:
+            block: Which.
+        """
+        try:
+            return bytes(self._open.db_read(block.number, 0, block.size))
+        except Exception as error:
+            raise WireError(_no_access(error, block)) from error
+
+    def write(self, block: Block, data: bytes) -> None:
+        """Replace the bytes of a block.
+
+        Args:
+            block: Which.
+            data: All of them.
+        """
+        try:
+            self._open.db_write(block.number, 0, bytearray(data))
+        except Exception as error:
+            raise WireError(_no_access(error, block)) from error
+
+    def close(self) -> None:
+        """Disconnect."""
+        client, self._client = self._client, None
+        with suppress(Exception):  # of a connection that is given up nothing matters
+            if client is not None:
+                client.disconnect()
+
+    @property
+    def _open(self) -> Client:
+        if self._client is None:
+            raise WireError(_CLOSED)
+        return self._client
+
+    def abort(self) -> None:
+        """From another thread: end whatever waits."""
+        client = self._client
+        with suppress(OSError, WireError):
+            if client is not None:
+                _socket(client).shutdown(socket.SHUT_RDWR)
+
+    def reached(self) -> bool:
+        """Whether somebody is at the other end."""
+        client = self._client
+        with suppress(OSError, WireError):
+            if client is not None:
+                _socket(client).getpeername()
+                return True
+        return False
+
+
+def _socket(client: Client) -> socket.socket:
+    """What the library speaks through; it has no setting for how long to wait."""
+    connection = client.connection
+    if connection is None or connection.socket is None:
+        raise WireError(_CLOSED)
+    return connection.socket
+
+
+def _no_access(error: Exception, block: Block) -> Refusal:
+    """Why a block was not read or written."""
+    if isinstance(error, WireError):
+        return error.refusal
+    text = str(error)
+    if "(0x0a)" in text or "(0x05)" in text:
+        return Refusal(f"it has no DB{block.number} of {block.size} bytes", f"{LOAD}, without optimized access")
+    if "(0x03)" in text or "(0x01)" in text or getattr(error, "error_code", None) == FORBIDDEN:
+        return Refusal(f"it lets nobody at DB{block.number}", "Permit PUT/GET in its protection settings")
+    return refused(error, "S7")

@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sagline.control.deviation import null_space_error, position_error
-from sagline.control.events import EventKind
-from sagline.control.execution import Execution
+from sagline.control.execution import Execution, null_space_error, position_error
+from sagline.control.recording import EventKind
 from sagline.control.states import State
 from sagline.core.arguments import instance
 from sagline.plot.names import above, name_lines

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from sagline.article.experiment import SPEED, STOP, Experiment
-from sagline.control.events import EventKind
+from sagline.control.recording import EventKind
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.files.writing import json_text, made_folder, plain, written_together

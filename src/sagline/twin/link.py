@@ -1,16 +1,158 @@
-"""The in-process link: commands and samples over the machine's network, on the lockstep clock."""
+"""In-process link: commands and samples over a network with delay, jitter and losses, on the lockstep clock."""
 
 from __future__ import annotations
 
 from collections import deque
-from typing import Any, Final, Protocol
+from heapq import heappop, heappush
+from typing import Any, Final, NamedTuple, Protocol
 
 import numpy as np
 
-from sagline.control.link import Command, Missing, Sample, Sent, newer, sent_to
-from sagline.twin.network import Network, Way
+from sagline.control.link import Command, Missing, Sample, Sent, Whole, newer, sent_to
+from sagline.core.arrays import Array, number
+from sagline.core.errors import InvalidValueError
 from sagline.twin.plc_program import Order
-from sagline.twin.snapshot import FIRST, Snapshot
+
+TINY: Final = 1e-9  # s, of rounding
+
+
+class Network:
+    """How late messages arrive, and which do not.
+
+    Attributes:
+        ideal: Whether each arrives at once.
+    """
+
+    def __init__(self, delay: float, jitter: float, loss: float, seed: int) -> None:
+        """Say how it is.
+
+        Args:
+            delay: Of every message, each way [s], >= 0.
+            jitter: On top of it, evenly between 0 and this [s], >= 0; messages may overtake each other.
+            loss: Share of the messages that are lost, >= 0, < 1.
+            seed: Of all this; the generator is the network's own.
+
+        Raises:
+            InvalidValueError: If a value is out of its range.
+        """
+        self._delay = number(delay, "delay", "s", low=0.0)
+        self._jitter = number(jitter, "jitter", "s", low=0.0)
+        self._loss = number(loss, "loss", "", low=0.0)
+        if self._loss >= 1.0:
+            raise InvalidValueError("loss", f"{loss:g}", ">= 0, < 1", "Give the share, 0.01 for 1 %.")
+        self.ideal = not (self._delay or self._jitter or self._loss)
+        self._generator = np.random.default_rng((seed, 1))
+
+    def arrival(self, now: float) -> float | None:
+        """When a message that is sent now arrives [s]; None if it is lost."""
+        if self.ideal:
+            return now
+        lost, late = self._generator.random(2)
+        return None if lost < self._loss else now + self._delay + late * self._jitter
+
+
+class Way:
+    """Messages that are on their way from one to another."""
+
+    def __init__(self, network: Network) -> None:
+        """Begin empty."""
+        self._network, self._sent = network, 0
+        self._messages: list[tuple[float, int, Any]] = []
+
+    def send(self, now: float, message: Any) -> None:
+        """Send a message [s]."""
+        if (arrival := self._network.arrival(now)) is not None:
+            self._sent += 1
+            heappush(self._messages, (arrival, self._sent, message))
+
+    def arrived(self, now: float) -> list[tuple[float, Any]]:
+        """All that has arrived by now [s], the earliest first: when, and what."""
+        found = []
+        while self._messages and self._messages[0][0] <= now + TINY:
+            arrival, _, message = heappop(self._messages)
+            found.append((arrival, message))
+        return found
+
+
+FIRST: Final = 2  # of the arrays of a snapshot that are of groups rather than winches
+
+COUNTS, STATE, DRIVE_FAULT = range(3)  # rows of the second
+COUNTER, OWNER, ECHO, STATUS, FAULT = range(5)  # rows of the third
+
+
+class Snapshot:
+    """Blocks of all groups, in a few arrays.
+
+    Attributes:
+        arrays: Length, rate, torque, tension, filtered (5, m); counts, state, winch fault (3, m); counter, owner,
+            echo, status, fault (5, G); the PLCs' clocks [s] (G,).
+        owners: Who has the grants, as plain numbers.
+    """
+
+    __slots__ = ("arrays", "owners")
+
+    def __init__(self, arrays: tuple[Array, Whole, Whole, Array]) -> None:
+        """Keep what there is."""
+        self.arrays = arrays
+        self.owners: list[int] = arrays[FIRST][OWNER].tolist()
+
+    def counter(self, group: int) -> int:
+        """Of a group's block."""
+        return int(self.arrays[FIRST][COUNTER, group])
+
+    def keep(self, group: int, part: slice, before: Snapshot) -> None:
+        """Let a group say again what it said before.
+
+        Args:
+            group: Which, from 0.
+            part: Its winches.
+            before: What was said before.
+        """
+        for k, (array, old) in enumerate(zip(self.arrays, before.arrays, strict=True)):
+            where = part if k < FIRST else group
+            array[..., where] = old[..., where]
+        self.owners[group] = before.owners[group]
+
+
+class Report(NamedTuple):
+    """What the block of one group holds, for a server to put it where a controller reads it.
+
+    Attributes:
+        counter: Of the blocks, at the block's beginning.
+        counter_again: At its end: another one where the block is torn.
+        foreign: Whether the block is of another program.
+        plc_time: On the PLC's clock [s].
+        owner: Who has the grant.
+        echo: Counter of the last command taken.
+        status: Bits of `GroupStatus`.
+        fault: Code of `GroupFault`.
+        length: Of the group's winches [m].
+        rate: [m/s].
+        torque: [N m].
+        tension: [N].
+        filtered: [N].
+        counts: Of the encoders.
+        state: Codes of `WinchState`.
+        winch_fault: The drives' own codes.
+    """
+
+    counter: int
+    counter_again: int
+    foreign: bool
+    plc_time: float
+    owner: int
+    echo: int
+    status: int
+    fault: int
+    length: list[float]
+    rate: list[float]
+    torque: list[float]
+    tension: list[float]
+    filtered: list[float]
+    counts: list[int]
+    state: list[int]
+    winch_fault: list[int]
+
 
 HISTORY: Final = 100  # blocks of the past that a group which goes back still has
 

@@ -17,10 +17,21 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.twin.hardware import CELL, LENGTH, Hardware
 from sagline.twin.injected import KINDS, Injected, Schedule, fault
-from sagline.twin.link import MachineLink
-from sagline.twin.network import Network
+from sagline.twin.link import (
+    COUNTER,
+    COUNTS,
+    DRIVE_FAULT,
+    ECHO,
+    FAULT,
+    OWNER,
+    STATE,
+    STATUS,
+    MachineLink,
+    Network,
+    Report,
+    Snapshot,
+)
 from sagline.twin.plc_program import Limits, Order, Program
-from sagline.twin.snapshot import COUNTER, COUNTS, DRIVE_FAULT, ECHO, FAULT, OWNER, STATE, STATUS, Report, Snapshot
 from sagline.twin.start import check_step, limits_of, started
 
 LOSSES: Final = Damping(loss_time=1e-3, air_damping=0.2)  # ours; on the prototype as if the air took 2 N s/m

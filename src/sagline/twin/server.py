@@ -1,22 +1,30 @@
-"""A machine in real time behind servers of its own, for controllers in other processes."""
+"""Machine in real time behind servers of its own, for controllers in other processes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Final
+import gc
+import multiprocessing
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager, suppress
+from multiprocessing.connection import Connection
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
 from sagline.control.link import Command, Mode
-from sagline.control.pace import Pace
+from sagline.control.real_time import Pace
 from sagline.core.arguments import instance, whole_number
+from sagline.core.arrays import Array
+from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.plc.addresses import LAST_PORT
-from sagline.plc.blocks import AGAIN, CLAIM, FROM_PLC, TO_PLC, Refusal, winch_row
-from sagline.plc.packing import winch_rows
+from sagline.plc.blocks import AGAIN, CLAIM, FROM_PLC, TO_PLC, Refusal, winch_row, winch_rows
 from sagline.plc.wire import needed
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.twin.block_servers import LOOPBACK, BlockServers
+from sagline.twin.link import Report
 from sagline.twin.machine import Machine
-from sagline.twin.mirrors import LOOPBACK, Mirrors
-from sagline.twin.snapshot import Report
 
 if TYPE_CHECKING:
     from sagline.dynamics.simulator import Reading
@@ -59,8 +67,8 @@ class Server:
         self._groups = range(len(machine.groups))
         self._seen = [b""] * len(machine.groups)  # commands that were looked at
         first = [self._block(group) or SILENT for group in self._groups]
-        self._mirrors = _mirrors(first, place, first_port, instance(modbus, bool, "modbus"))
-        self.addresses = self._mirrors.addresses
+        self._servers = _block_servers(first, place, first_port, instance(modbus, bool, "modbus"))
+        self.addresses = self._servers.addresses
 
     @property
     def late(self) -> float:
@@ -81,7 +89,7 @@ class Server:
 
     def scan(self) -> None:
         """Let the PLCs take what was written, move the machine on by a period, and show what they say then."""
-        for group, (command, claim) in enumerate(self._mirrors.written()):
+        for group, (command, claim) in enumerate(self._servers.written()):
             asked = CLAIM.read(claim)
             if not isinstance(asked, Refusal):
                 self.machine.claim(group, asked["owner"])
@@ -91,11 +99,11 @@ class Server:
                 if order is not None:
                     self.machine.take(group, order)
         self.machine.advance()
-        self._mirrors.publish([self._block(group) for group in self._groups])
+        self._servers.publish([self._block(group) for group in self._groups])
 
     def close(self) -> None:
         """Listen no more."""
-        self._mirrors.close()
+        self._servers.close()
 
     def _command(self, group: int, data: bytes) -> Command | None:
         """What stands in DB102; None where it is no command, or torn."""
@@ -149,12 +157,94 @@ def block_of(group: int, report: Report) -> bytes:
     return FROM_PLC.pack(head | winch_rows(ROWS, columns))
 
 
-def _mirrors(blocks: list[bytes], host: str, port: int, modbus: bool) -> Mirrors:
+def _block_servers(blocks: list[bytes], host: str, port: int, modbus: bool) -> BlockServers:
     with needed():
         if modbus:
-            from sagline.twin.modbus_mirrors import ModbusMirrors
+            from sagline.twin.modbus_servers import ModbusServers
 
-            return ModbusMirrors(blocks, host, port)
-        from sagline.twin.s7_mirrors import S7Mirrors
+            return ModbusServers(blocks, host, port)
+        from sagline.twin.s7_servers import S7Servers
 
-        return S7Mirrors(blocks, host, port)
+        return S7Servers(blocks, host, port)
+
+
+SWITCHING_ON: Final = 60.0  # s, at most; kernels may have to be read from the disk
+
+
+class Apart(NamedTuple):
+    """A machine in another process.
+
+    Attributes:
+        addresses: "host:port" of each group's PLC.
+        place: Shared with it: the true position of the platform's origin [m].
+    """
+
+    addresses: tuple[str, ...]
+    place: Any
+
+    def position(self) -> Array:
+        """Where the platform's origin is after the last scan [m], shape (3,)."""
+        return np.array(self.place[:])
+
+
+@contextmanager
+def apart(robot: Robot, nominal: Robot, start: Pose, *, seed: int = 0) -> Iterator[Apart]:
+    """Switch a machine on in another process, in real time; it is killed at the end.
+
+    Args:
+        robot: The robot as it is.
+        nominal: As it was planned.
+        start: The pose at which the encoders were set.
+        seed: Of noise and clocks.
+
+    Yields:
+        The way to it.
+
+    Raises:
+        SaglineError: If it cannot be switched on; or it does not answer.
+    """
+    context = multiprocessing.get_context("spawn")
+    here, there = context.Pipe()
+    place = context.Array("d", 3)
+    process = context.Process(target=_serve, args=(robot, nominal, start, seed, there, place), daemon=True)
+    process.start()
+    there.close()
+    try:
+        yield Apart(_told(here), place)
+    finally:
+        process.kill()
+        process.join()
+        here.close()
+
+
+def _told(pipe: Connection) -> tuple[str, ...]:
+    """The addresses, or why there are none."""
+    answer: tuple[str, ...] | SaglineError | None = None
+    with suppress(EOFError):
+        answer = pipe.recv() if pipe.poll(SWITCHING_ON) else None
+    if isinstance(answer, tuple):
+        return answer
+    if answer is not None:
+        raise answer
+    step = "Try again; or in this process."
+    raise InvalidValueError("the twin's process", "gone, or silent for a minute", "one that answers", step)
+
+
+def _serve(robot: Robot, nominal: Robot, start: Pose, seed: int, pipe: Connection, place: Any) -> None:
+    """Be the machine until killed; Ctrl-C is for the controller, which stops the robot first."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        machine = Machine(robot, nominal=nominal, start=start, seed=seed, period=SCAN)
+        server = Server(machine)
+    except SaglineError as error:
+        pipe.send(error)
+        return
+
+    def watch(time: float, reading: Reading) -> None:
+        place[:] = reading.position.tolist()
+
+    with closing(server):
+        gc.collect()
+        gc.freeze()
+        pipe.send(tuple(server.addresses))
+        server.run(watch)

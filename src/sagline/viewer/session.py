@@ -8,7 +8,7 @@ from html import escape
 
 import numpy as np
 
-from sagline.control.events import Event, EventKind
+from sagline.control.recording import Event, EventKind
 from sagline.control.states import State
 from sagline.core.arrays import Array, Codes
 from sagline.core.numbers import n

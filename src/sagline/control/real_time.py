@@ -1,10 +1,17 @@
-"""Real time: when the next cycle begins, and how late it was."""
+"""Real time: ticks, planning in the background, garbage collection and Ctrl-C."""
 
 from __future__ import annotations
 
+import gc
+import signal
+import threading
 import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from math import inf
-from typing import Final
+from types import FrameType
+from typing import Final, TypeVar
 
 import numpy as np
 
@@ -96,3 +103,84 @@ class Pace:
         self._began = now
         self._next = (now if late > self.period else self._next) + self.period
         return late
+
+
+T = TypeVar("T")
+
+
+def aside(work: Callable[[], T], threaded: bool) -> Future[T]:
+    """Begin it in a thread of its own; on a lockstep clock, where nobody waits, do it at once.
+
+    Args:
+        work: Reads nothing that cycles change.
+        threaded: Whether time goes on beside it.
+
+    Returns:
+        What becomes of it; done already without a thread.
+    """
+    if threaded:
+        pool = ThreadPoolExecutor(1, "sagline planning")
+        begun = pool.submit(work)
+        pool.shutdown(wait=False)
+        return begun
+    done: Future[T] = Future()
+    try:
+        done.set_result(work())
+    except Exception as error:
+        done.set_exception(error)
+    return done
+
+
+class Garbage:
+    """Whether garbage is collected: not while something moves, as that takes longer than a cycle."""
+
+    def __init__(self) -> None:
+        """Leave it as it is."""
+        self._stopped = False
+
+    def stop(self) -> None:
+        """Collect none from here on; what there is now is not looked at any more."""
+        if not self._stopped and gc.isenabled():
+            self._stopped = True
+            gc.disable()
+            gc.freeze()
+
+    def go_on(self) -> None:
+        """Collect again, if it was so before."""
+        if self._stopped:
+            self._stopped = False
+            gc.unfreeze()
+            gc.enable()
+
+
+@contextmanager
+def interrupt_calls(stop: Callable[[], object]) -> Iterator[None]:
+    """Within, Ctrl-C calls a function and does nothing else, a second one nothing; at the end it interrupts.
+
+    It does so in the main thread alone, and not where Ctrl-C is ignored.
+
+    Args:
+        stop: Called between two instructions of Python, wherever they are.
+
+    Raises:
+        KeyboardInterrupt: At the end, if Ctrl-C was pressed.
+    """
+    before = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(before):
+        yield
+        return
+    pressed = False
+
+    def hear(number: int, frame: FrameType | None) -> None:
+        nonlocal pressed
+        if not pressed:
+            pressed = True
+            stop()
+
+    signal.signal(signal.SIGINT, hear)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if pressed:
+        raise KeyboardInterrupt

@@ -9,9 +9,9 @@ import numpy as np
 
 from sagline.cables.model import CableModel
 from sagline.control.checks import motion_along
-from sagline.control.courses import SetPoint, standing_at
 from sagline.control.homing import Homing
 from sagline.control.jogging import PlatformJog, winch_jog
+from sagline.control.set_points import SetPoint, standing_at
 from sagline.core.arrays import Array
 from sagline.core.errors import SaglineError
 from sagline.motion.rest_to_rest import septic_path

@@ -1,0 +1,98 @@
+"""Servers of the data blocks of a twin, one for each group, whatever protocol they speak."""
+
+from __future__ import annotations
+
+import socket
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
+from typing import Final
+
+from sagline.core.errors import InvalidValueError
+from sagline.plc.blocks import BLOCKS, CLAIM, FROM_PLC, TO_PLC, Block
+
+LOOPBACK: Final = "127.0.0.1"
+
+
+class BlockServers(ABC):
+    """Data blocks of all PLCs, which any client may read and write.
+
+    Attributes:
+        addresses: "host:port" of each group.
+    """
+
+    def __init__(self, blocks: Sequence[bytes], host: str = LOOPBACK, port: int = 0) -> None:
+        """Start one server for each group.
+
+        Args:
+            blocks: Initial content of DB101 of each group.
+            host: Address to listen at; by default reachable from this machine only.
+            port: Of the first group, the others follow; 0: any that are free.
+
+        Raises:
+            InvalidValueError: If a port is in use, or the address is none of this machine.
+        """
+        self._memory = [{kind: bytearray(kind.size) for kind in BLOCKS} for _ in blocks]
+        self.addresses: tuple[str, ...] = ()
+        try:
+            for i, block in enumerate(blocks):
+                self._memory[i][FROM_PLC][:] = block
+                number = check_free(host, port + i if port else 0)
+                self.addresses += (f"{number}:{self._listen(i, number, port + i if port else 0)}",)
+        except BaseException:
+            self.close()
+            raise
+
+    def publish(self, blocks: Sequence[bytes | None]) -> None:
+        """Replace DB101 of each group in one step; None leaves it as it is."""
+        for group, block in enumerate(blocks):
+            if block is not None:
+                with self._locked(group, FROM_PLC):
+                    self._memory[group][FROM_PLC][:] = block
+
+    def written(self) -> list[tuple[bytes, bytes]]:
+        """Contents of DB102 and DB103 of each group; claims are erased, as by a PLC that has read them."""
+        found = []
+        for group, memory in enumerate(self._memory):
+            with self._locked(group, TO_PLC):
+                command = bytes(memory[TO_PLC])
+            with self._locked(group, CLAIM):
+                claim = bytes(memory[CLAIM])
+                memory[CLAIM][:] = bytes(CLAIM.size)
+            found.append((command, claim))
+        return found
+
+    @abstractmethod
+    def close(self) -> None:
+        """Stop the servers and close all connections."""
+
+    @abstractmethod
+    def _listen(self, group: int, host: str, port: int) -> int:
+        """Start the server of a group; its port."""
+
+    @abstractmethod
+    def _locked(self, group: int, block: Block) -> AbstractContextManager[object]:
+        """Exclusive access to a block."""
+
+
+def check_free(host: str, port: int) -> str:
+    """IPv4 address of a host at which a port is free; python-snap7 shares ports, so two twins would share clients.
+
+    Raises:
+        InvalidValueError: If the port is in use, or the address is none of this machine.
+    """
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            number = socket.gethostbyname(host)
+            probe.bind((number, port))
+            probe.listen()
+        except (OSError, OverflowError, ValueError, TypeError) as error:  # the last two of what is no name
+            reason = getattr(error, "strerror", None) or str(error)
+            raise InvalidValueError(
+                "address of the twin",
+                f"{host!r}, port {port} ({reason})",
+                "a free port at an address of this machine",
+                "Choose another with --port, or end what listens there.",
+            ) from None
+    return number
