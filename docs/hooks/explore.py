@@ -11,9 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from sagline.cables.cable import Cable
-from sagline.cables.catenary import Catenary
-from sagline.cables.empirical import Empirical
 from sagline.cables.model import CableModel, CableState
+from sagline.cables.models import Catenary, Empirical
 
 if TYPE_CHECKING:  # the tests load this without MkDocs
     from mkdocs.config.defaults import MkDocsConfig

@@ -62,7 +62,7 @@ def stocked(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def short_of_work(stocked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Long commands stop once their arguments are accepted, or do a little of what they do."""
     short = sl.load_path(stocked / "short.yaml")
-    monkeypatch.setattr("sagline.motion.planar.article_path", lambda: short)
+    monkeypatch.setattr("sagline.motion.rest_to_rest.article_path", lambda: short)
     monkeypatch.setattr("sagline.cli.run.FIGURES", ())
     monkeypatch.setattr("sagline.cli.run.CELLS", 4)
     monkeypatch.setattr("sagline.cli.run._figures", lambda *_: ())

@@ -84,7 +84,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(autouse=True)
 def place(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
-    monkeypatch.setattr("sagline.motion.planar.article_path", lambda: sl.load_path("short.yaml"))
+    monkeypatch.setattr("sagline.motion.rest_to_rest.article_path", lambda: sl.load_path("short.yaml"))
     monkeypatch.setattr("sagline.cli.run.FIGURES", ())
     monkeypatch.setattr("sagline.cli.run.CELLS", 4)
     monkeypatch.setattr("sagline.cli.run._figures", lambda *_: ())

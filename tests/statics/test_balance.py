@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from sagline import Cable, CableGeometryError, Pose, Robot, article_balance, inertial_wrench, structure_matrix
 from sagline.core.arrays import Array
-from sagline.statics.wrench import external_wrench
+from sagline.statics.balance import external_wrench
 from tests.refusal import refused
 
 

@@ -11,7 +11,7 @@ from sagline.article.sag_constant import sag_study, stretch_study
 from sagline.article.sampling import ANGLE, GRAVITY, article_sampling
 from sagline.article.simulation import ROBOTS
 from sagline.cables.cable import Cable
-from sagline.cables.catenary import Catenary
+from sagline.cables.models import Catenary
 from sagline.files.robot_file import load_robot
 from sagline.robot.pose import Pose
 from sagline.statics.balance import article_balance, structure_matrix

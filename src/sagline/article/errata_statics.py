@@ -7,13 +7,12 @@ import numpy as np
 from sagline.article.erratum import Erratum, Quantity
 from sagline.article.sampling import GRAVITY
 from sagline.article.simulation import METHOD, ROBOTS
-from sagline.cables.catenary import Catenary
-from sagline.cables.empirical import Empirical
+from sagline.cables.models import Catenary, Empirical
 from sagline.core.arrays import Array
 from sagline.files.robot_file import load_robot
 from sagline.kinematics.confirm import confirm
 from sagline.kinematics.inverse import inverse
-from sagline.motion.planar import article_path
+from sagline.motion.rest_to_rest import article_path
 from sagline.robot.pose import Pose
 from sagline.statics.balance import article_balance
 

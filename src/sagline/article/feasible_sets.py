@@ -10,7 +10,7 @@ import numpy as np
 from sagline.article.fits import Line, fit_line
 from sagline.article.sampling import GRAVITY
 from sagline.cables.cable import Cable
-from sagline.cables.catenary import Catenary
+from sagline.cables.models import Catenary
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
 

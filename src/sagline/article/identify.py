@@ -11,9 +11,8 @@ from numpy.typing import ArrayLike
 
 from sagline.article.fits import fit_factor
 from sagline.cables.cable import Cable
-from sagline.cables.catenary import Catenary
-from sagline.cables.empirical import Empirical
 from sagline.cables.model import CableState
+from sagline.cables.models import Catenary, Empirical
 from sagline.core.arguments import instance
 from sagline.core.arrays import Array, Flags, checked, kernel_input, number
 from sagline.core.errors import InvalidValueError

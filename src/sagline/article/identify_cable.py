@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.cables.cable import Cable
-from sagline.cables.catenary import Catenary
+from sagline.cables.models import Catenary
 from sagline.core.arguments import brief, choice, optional
 from sagline.core.arrays import Array, checked, locked, number
 from sagline.core.errors import InvalidValueError

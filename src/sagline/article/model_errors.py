@@ -10,12 +10,8 @@ from numpy.typing import ArrayLike
 from sagline.article.identify import position_error
 from sagline.article.sampling import GRAVITY
 from sagline.cables.cable import Cable
-from sagline.cables.catenary import Catenary
-from sagline.cables.elastic import Elastic
-from sagline.cables.empirical import Empirical
 from sagline.cables.model import CableModel
-from sagline.cables.parabolic import Parabolic
-from sagline.cables.straight import Straight
+from sagline.cables.models import Catenary, Elastic, Empirical, Parabolic, Straight
 from sagline.core.arrays import Array, checked
 
 MODELS: tuple[CableModel, ...] = (Straight(), Elastic(), Empirical(), Parabolic(), Catenary())  # coarse to exact

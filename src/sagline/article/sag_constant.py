@@ -10,7 +10,7 @@ from sagline.article.feasible_sets import End
 from sagline.article.fits import fit_factor
 from sagline.article.sampling import GRAVITY, UNSTRETCHABLE, Sampling
 from sagline.cables.cable import Cable
-from sagline.cables.catenary import Catenary
+from sagline.cables.models import Catenary
 from sagline.core.arrays import Array
 
 

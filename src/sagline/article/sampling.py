@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.cables.cable import Cable
-from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableState
+from sagline.cables.models import Catenary
 from sagline.core.arrays import Array, checked
 
 GRAVITY = 9.81  # m/s^2, everywhere in the article's studies

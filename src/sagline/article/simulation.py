@@ -9,17 +9,17 @@ from typing import NamedTuple
 import numpy as np
 
 from sagline.article.model_errors import MODELS
-from sagline.cables.empirical import Empirical
 from sagline.cables.model import CableModel
+from sagline.cables.models import Empirical
 from sagline.core.arrays import Array
 from sagline.files.robot_file import load_robot
 from sagline.kinematics.confirm import Confirmation, confirm
 from sagline.kinematics.inverse import inverse
 from sagline.motion.path import Path
-from sagline.motion.planar import article_path
+from sagline.motion.rest_to_rest import article_path
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
-from sagline.tension.minimum_norm import MinimumNorm
+from sagline.tension.methods import MinimumNorm
 
 ROBOTS = ("article-suspended", "article-mixed")  # the article's first and second configuration
 # The article describes (55), closest to the set before, but its figures show cables near their minimum wherever they

@@ -12,17 +12,17 @@ from sagline.article.explanations import ErrorOf, Explanation, explanations, sub
 from sagline.article.fits import Line, fit_line
 from sagline.article.machine import ANCHORS, DEAD, PARAMETERS, PULLEY, ZERO, Errors, Parameter, machine, rest
 from sagline.article.table2 import Table2, table2
-from sagline.cables.empirical import Empirical
+from sagline.cables.models import Empirical
 from sagline.core.arrays import Array, locked
 from sagline.files.robot_file import load_robot
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan
-from sagline.motion.profile import QUINTIC
 from sagline.motion.rest_to_rest import quintic_path
+from sagline.motion.segments import QUINTIC
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.stiffness import stiffness
-from sagline.tension.minimum_norm import MinimumNorm
+from sagline.tension.methods import MinimumNorm
 
 HOME = (0.0, 0.0, 1.5)  # m, the prototype's home position
 METHOD = MinimumNorm("horizontal")

@@ -1,13 +1,96 @@
-"""All cable models, by name."""
+"""The five cable models, and all of them by name."""
 
 from __future__ import annotations
 
-from sagline.cables.catenary import Catenary
-from sagline.cables.elastic import Elastic
-from sagline.cables.empirical import Empirical
+from dataclasses import dataclass
+from typing import ClassVar
+
 from sagline.cables.model import CableModel
-from sagline.cables.parabolic import Parabolic
-from sagline.cables.straight import Straight
+from sagline.core.arrays import number
+from sagline.kernels import codes
+
+
+@dataclass(frozen=True, slots=True)
+class Straight(CableModel):
+    """A cable that neither stretches nor sags: L = D.
+
+    From a length it knows no tension: the answer is NaN, and the closure residual is |L - D|.
+
+    Source:
+        docs/model.md, section 3.
+    """
+
+    code: ClassVar[int] = codes.STRAIGHT
+    weightless: ClassVar[bool] = True
+
+
+@dataclass(frozen=True, slots=True)
+class Elastic(CableModel):
+    """A cable that stretches but has no weight: L = D/(1 + tau/EA).
+
+    Where L >= D it is slack and carries nothing.
+
+    Source:
+        docs/model.md, section 3.
+    """
+
+    code: ClassVar[int] = codes.ELASTIC
+    weightless: ClassVar[bool] = True
+
+
+@dataclass(frozen=True, slots=True)
+class Empirical(CableModel):
+    """The article's closed form: T_z = tan(phi) T_x + k_h rho D, and L of T_x by its equation (48).
+
+    Valid while the lowest point of the cable lies outside the span, T_x > w D/(2 |tan phi|); below that the
+    answer stands but its status says BELOW_VALIDITY. From a length, (48) is solved on its decreasing branch.
+
+    Attributes:
+        k_h: Intercept constant [m/s^2]; the published 4.845 in magnitude (exactly g/2 for a shallow cable).
+        k_p: Sag constant [m^2/s^4]; the published 4.385 (exactly g^2/24 for a shallow cable).
+
+    Source:
+        Gia Luan & Truong Thinh 2020, equations (21), (27), (28), (45), (48); docs/model.md, section 3.
+    """
+
+    code: ClassVar[int] = codes.EMPIRICAL
+    k_h: float = 4.845
+    k_p: float = 4.385
+
+    def __post_init__(self) -> None:
+        """Check the constants."""
+        object.__setattr__(self, "k_h", number(self.k_h, "k_h", "m/s^2"))
+        object.__setattr__(self, "k_p", number(self.k_p, "k_p", "m^2/s^4", low=0.0))
+
+    @property
+    def parameters(self) -> tuple[float, float]:
+        """k_h and k_p."""
+        return self.k_h, self.k_p
+
+
+@dataclass(frozen=True, slots=True)
+class Parabolic(CableModel):
+    """A shallow cable to first order: L = D (1 + (w D cos phi)^2/(24 tau^2))/(1 + tau/EA), T_z = tau sin phi + w D/2.
+
+    From a length: the positive root of its cubic in tau.
+
+    Source:
+        docs/model.md, section 3.
+    """
+
+    code: ClassVar[int] = codes.PARABOLIC
+
+
+@dataclass(frozen=True, slots=True)
+class Catenary(CableModel):
+    """Irvine's elastic catenary, solved to the last digits in both directions. The default everywhere.
+
+    Source:
+        Irvine 1981, ch. 2; cancellation-free forms in docs/model.md, section 2.
+    """
+
+    code: ClassVar[int] = codes.CATENARY
+
 
 MODELS: dict[str, type[CableModel]] = {
     model.__name__: model  # coarse to exact

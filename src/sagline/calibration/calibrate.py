@@ -7,8 +7,8 @@ from typing import Final
 
 import numpy as np
 
-from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
+from sagline.cables.models import Catenary
 from sagline.calibration.diagnostics import GOOD, diagnose_log, fits_without_measured_poses, frame_mismatch, wrong_units
 from sagline.calibration.evaluation import evaluate
 from sagline.calibration.findings import Omission

@@ -18,8 +18,7 @@ from sagline.robot.pose_box import PoseBox
 from sagline.robot.robot import Robot
 from sagline.statics.tables import pose_rows
 from sagline.tension.method import TensionMethod
-from sagline.tension.minimum_norm import MinimumNorm
-from sagline.tension.quadratic_program import QuadraticProgram
+from sagline.tension.methods import MinimumNorm, QuadraticProgram
 
 MOST_SETS: Final = 5  # of tensions at a pose
 ROUNDS: Final = 6  # of drawing poses, where much of the box is not feasible

@@ -8,8 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
+from sagline.cables.models import Catenary
 from sagline.calibration.hypotheses import Change, Trial
 from sagline.calibration.log import WinchLog, load_cells_of
 from sagline.calibration.screening import screen

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from sagline.cables.catenary import Catenary
+from sagline.cables.models import Catenary
 from sagline.calibration.calibrate import UNKNOWNS
 from sagline.calibration.candidates import Candidates, candidates_of, length_of, shortest_tour
 from sagline.calibration.information import Choice, choose_informative, deviations_of, information_of, prior_information

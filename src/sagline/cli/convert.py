@@ -125,7 +125,7 @@ def _material(density: str | None, stiffness: str | None) -> Cable | None:
 
 def _mjcf(robot: Robot, at: list[float] | None) -> tuple[str, str]:
     """The model, and what it costs this robot that its tendons neither sag nor weigh."""
-    from sagline.cables.elastic import Elastic
+    from sagline.cables.models import Elastic
     from sagline.files.mjcf import dump_mjcf
     from sagline.kinematics.confirm import confirm
     from sagline.kinematics.inverse import inverse

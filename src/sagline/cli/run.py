@@ -31,12 +31,11 @@ def run(folder: OutOption = Path("output"), as_json: JsonOption = False) -> int:
 
     Tensions are the least norm of the horizontal tensions T_x, as the article's figures show them.
     """
-    from sagline.cables.catenary import Catenary
-    from sagline.cables.empirical import Empirical
+    from sagline.cables.models import Catenary, Empirical
     from sagline.cli.study import run_along, run_name, tell, write_plans
     from sagline.files.robot_file import load_robot
-    from sagline.motion.planar import article_path
-    from sagline.tension.minimum_norm import MinimumNorm
+    from sagline.motion.rest_to_rest import article_path
+    from sagline.tension.methods import MinimumNorm
     from sagline.workspaces.space import amount_of
 
     models = Empirical(), Catenary()

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
+from sagline.cables.models import Catenary
 from sagline.cli.ending import OUTSIDE
 from sagline.cli.results import listed
 from sagline.cli.tables import Grid, show_table, written

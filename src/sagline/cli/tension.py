@@ -67,8 +67,7 @@ def tension(
     from sagline.kinematics.inverse import inverse
     from sagline.kinematics.polygon import tension_polygon
     from sagline.tension.margin import capacity_margin
-    from sagline.tension.methods import METHODS
-    from sagline.tension.minimum_norm import MinimumNorm
+    from sagline.tension.methods import METHODS, MinimumNorm
 
     load, place = wrench_of(wrench), None if pose is None else pose_of(pose)
     robot = loaded(load_robot(name), payload)

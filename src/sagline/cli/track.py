@@ -78,7 +78,7 @@ def track(
     from sagline.files.path_file import load_path
     from sagline.files.pose_text import wrench_of
     from sagline.files.robot_file import load_robot
-    from sagline.motion.planar import article_path
+    from sagline.motion.rest_to_rest import article_path
 
     load = wrench_of(wrench)
     machine = loaded(load_robot(robot), payload)

@@ -11,8 +11,8 @@ from typing import Final
 
 import numpy as np
 
-from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
+from sagline.cables.models import Catenary
 from sagline.control.checks import Motion
 from sagline.control.connecting import FRESH, Claim, Trouble, trouble
 from sagline.control.estimator import Estimator
@@ -37,8 +37,8 @@ from sagline.dynamics.drives import lever_of
 from sagline.kinematics.forward_status import ForwardStatus
 from sagline.kinematics.plan import Plan
 from sagline.robot.robot import Robot
-from sagline.tension.closest import Closest
 from sagline.tension.method import TensionMethod
+from sagline.tension.methods import Closest
 
 LEAVING: Final = 0.3  # s, at most, until all grants are given back
 MOST_SEED: Final = 2**128

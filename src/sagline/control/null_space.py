@@ -15,9 +15,8 @@ from sagline.kinematics.plan import Plan
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.robot import Robot
 from sagline.robot.several import first_of
-from sagline.statics.slopes import cable_slopes, on_platform
+from sagline.statics.slopes import cable_slopes, on_platform, tension_slopes
 from sagline.statics.stiffness import stiffness
-from sagline.statics.tension_slopes import tension_slopes
 
 SIGMAS: Final = 5.0  # by which a reading may be off before it means something
 OWN_DEVIATION: Final = 1.0  # N, of a cell that does not say

@@ -14,8 +14,7 @@ from sagline.dynamics.curves import Jet
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan
 from sagline.robot.robot import Robot
-from sagline.statics.balance import structure_matrix
-from sagline.statics.wrench import inertial_wrench
+from sagline.statics.balance import inertial_wrench, structure_matrix
 
 _NOTHING: Final = 1e-11  # of what a direction gains by the tension that it gains most by
 _BLOCK: Final = 40_000  # matrices taken apart at once

@@ -22,7 +22,7 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.robot.wheels import dead_cable
-from sagline.statics.wrench import inertial_wrench
+from sagline.statics.balance import inertial_wrench
 
 ROUNDING = 1e-12  # of the largest force and moment: less is none
 

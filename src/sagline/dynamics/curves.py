@@ -9,8 +9,7 @@ import numpy as np
 
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
-from sagline.motion.profile import QUINTIC
-from sagline.motion.segments import Segments
+from sagline.motion.segments import QUINTIC, Segments
 from sagline.robot.pose import Pose
 
 _STOPPED: Final = 1e-6  # of the largest speed

@@ -13,7 +13,7 @@ from sagline.dynamics.moves import Move, moves_of
 from sagline.motion.path import Path
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.robot import Robot
-from sagline.statics.wrench import inertial_wrench
+from sagline.statics.balance import inertial_wrench
 
 _NEAR: Final = 3.0  # times: excitations that differ by less both count
 _INSTANTS: Final = 2000  # of a move, where its inertia is taken

@@ -26,8 +26,7 @@ from sagline.motion.path import Path
 from sagline.motion.rest_to_rest import time_grid
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.statics.balance import structure_matrix
-from sagline.statics.wrench import inertial_wrench
+from sagline.statics.balance import inertial_wrench, structure_matrix
 
 _PLACES: Final = 201  # along a move, at which limits are looked at
 _ROUNDS: Final = 8  # of the cables' sag

@@ -25,8 +25,8 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.slopes import cable_slopes
 from sagline.statics.stiffness import compliance_of
-from sagline.tension.closest import Closest
 from sagline.tension.method import TensionMethod
+from sagline.tension.methods import Closest
 
 BLOCK: Final = 16  # poses at once: a twentieth of a second, after which an interrupt is heard
 _CLOSEST: Final = Closest()

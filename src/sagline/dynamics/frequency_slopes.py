@@ -8,8 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from sagline.cables.catenary import Catenary
-from sagline.cables.elastic import Elastic
+from sagline.cables.models import Catenary, Elastic
 from sagline.core.arguments import instance
 from sagline.core.arrays import Array, Flags, Indices, locked, number
 from sagline.core.errors import InvalidValueError

@@ -14,9 +14,8 @@ from sagline.core.results import Result
 from sagline.dynamics.damping import Damping
 from sagline.dynamics.flexibility import flexibility
 from sagline.robot.equilibrium import Equilibrium
-from sagline.statics.slopes import CableSlopes, cable_slopes, on_platform
+from sagline.statics.slopes import CableSlopes, cable_slopes, on_platform, tension_slopes
 from sagline.statics.stiffness import mass_matrix, modes
-from sagline.statics.tension_slopes import tension_slopes
 
 if TYPE_CHECKING:
     from scipy.signal import StateSpace

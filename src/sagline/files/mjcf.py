@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import eigh
 
-from sagline.cables.elastic import Elastic
+from sagline.cables.models import Elastic
 from sagline.core.arguments import instance
 from sagline.core.arrays import Array, checked
 from sagline.core.errors import InvalidValueError

@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sagline.cables.model import CableState
+from sagline.cables.model import CableState, CableStatus
 from sagline.cables.models import MODELS
-from sagline.cables.status import CableStatus
 from sagline.core.arrays import locked
 from sagline.core.errors import FileError, InvalidValueError, SaglineWarning
 from sagline.files.format import Format

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sagline.cables.catenary import Catenary
+from sagline.cables.models import Catenary
 from sagline.core.arguments import callback, instance
 from sagline.core.arrays import Array, Codes, Flags, locked
 from sagline.core.progress import Progress, blocks

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
+from sagline.cables.models import Catenary
 from sagline.core.arguments import instance, whole_number
 from sagline.core.arrays import Array, Indices, locked
 from sagline.core.errors import InvalidValueError
@@ -24,7 +24,7 @@ from sagline.kinematics.winding import settled
 from sagline.robot.behind import differs, with_behind
 from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.robot import Robot
-from sagline.statics.wrench import external_wrench
+from sagline.statics.balance import external_wrench
 
 START_BYTES = 250.0  # what each cable of a start takes while it is solved
 _SAME = 1e-6  # relative to the mean length, and in radians: closer poses are one

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
+from sagline.cables.models import Catenary
 from sagline.core.arguments import callback, instance, optional
 from sagline.core.arrays import LARGEST, SMALLEST, Array, locked, numbers
 from sagline.core.errors import InvalidValueError
@@ -26,8 +26,8 @@ from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot
 from sagline.robot.several import Robots, anything_behind, check_count, first_of, together
 from sagline.robot.wheels import dead_cable
+from sagline.statics.balance import external_wrench
 from sagline.statics.tables import pose_rows
-from sagline.statics.wrench import external_wrench
 
 _CATENARY = Catenary()
 

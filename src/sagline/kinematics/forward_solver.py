@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
+from sagline.cables.models import Catenary
 from sagline.core.arguments import instance, optional
 from sagline.core.arrays import LARGEST, SMALLEST, Array, Codes, checked, exactly, locked
 from sagline.core.errors import InvalidValueError

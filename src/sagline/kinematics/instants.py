@@ -11,7 +11,7 @@ from sagline.motion.path import Path
 from sagline.motion.sampled import spline_rates
 from sagline.robot.pose import Pose
 from sagline.robot.several import Robots
-from sagline.statics.wrench import inertial_wrench
+from sagline.statics.balance import inertial_wrench
 
 SHARE = 1e-5  # of the time in which the motion changes: differences over it are good to 1e-9
 LONGEST = 1e-2  # of the time between samples

@@ -9,8 +9,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
+from sagline.cables.models import Catenary
 from sagline.core.arguments import brief, callback, choice, instance
 from sagline.core.arrays import Array, exactly, locked
 from sagline.core.errors import InvalidValueError
@@ -28,11 +28,11 @@ from sagline.robot.pose import Pose
 from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot
 from sagline.robot.several import anything_behind, first_of, one_a_pose
+from sagline.statics.balance import external_wrench, inertial_wrench
 from sagline.statics.chords import refuse_missing_chords
 from sagline.statics.tables import pose_rows
-from sagline.statics.wrench import external_wrench, inertial_wrench
-from sagline.tension.closest import Closest
 from sagline.tension.method import TensionMethod, Variable, shared_tension
+from sagline.tension.methods import Closest
 from sagline.tension.options import kernel_options
 
 STANDING: Final = 1e-7  # of the fastest cable's rate: slower ones stand, rates are good to 1e-8

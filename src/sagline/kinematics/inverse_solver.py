@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
+from sagline.cables.models import Catenary
 from sagline.core.arguments import instance, optional
 from sagline.core.arrays import Array, exactly, locked
 from sagline.core.errors import InvalidValueError
@@ -27,8 +27,8 @@ from sagline.kinematics.winding import without_guides
 from sagline.robot.robot import Robot
 from sagline.robot.several import anything_behind
 from sagline.statics.tables import robot_terms
-from sagline.tension.closest import Closest
 from sagline.tension.method import TensionMethod
+from sagline.tension.methods import Closest
 from sagline.tension.options import kernel_options, takes_default_kernel
 
 _STATUSES = tuple(sorted(PoseStatus))  # by code; a lookup costs a tenth of a conversion

@@ -15,8 +15,8 @@ from sagline.robot.behind import with_behind
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.several import anything_behind, first_of, robot_at
 from sagline.statics.tables import pose_rows
-from sagline.tension.closest import Closest
 from sagline.tension.method import TensionMethod, shared_tension
+from sagline.tension.methods import Closest
 from sagline.tension.options import kernel_options
 
 

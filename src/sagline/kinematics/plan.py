@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.cables.status import CableStatus
+from sagline.cables.model import CableStatus
 from sagline.core.arrays import Array, Codes
 from sagline.core.results import Result, Saved
 from sagline.kinematics.length_rate import length_rate

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
+from sagline.cables.models import Catenary
 from sagline.core.arguments import instance
 from sagline.core.arrays import Array, Indices, locked
 from sagline.core.errors import InvalidValueError
@@ -20,9 +20,8 @@ from sagline.kinematics.status import PoseStatus
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.tables import pose_rows, robot_terms
-from sagline.tension.centroid import Centroid
 from sagline.tension.method import Variable
-from sagline.tension.minimum_norm import MinimumNorm
+from sagline.tension.methods import Centroid, MinimumNorm
 from sagline.tension.options import Options, check_sharing, kernel_options
 from sagline.tension.polygon import Side, TensionPolygon
 

@@ -12,8 +12,7 @@ from sagline.core.arrays import Array, Flags, checked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_memory
 from sagline.motion.path import Path
-from sagline.motion.profile import QUINTIC, SEPTIC, Profile
-from sagline.motion.segments import Segments
+from sagline.motion.segments import QUINTIC, SEPTIC, Profile, Segments
 from sagline.robot.pose import Pose
 
 LIMITS = ("speed", "acceleration", "angular_speed", "angular_acceleration")
@@ -215,3 +214,30 @@ def time_grid(total: float, rate: float) -> Array:
     # A total within rounding of a multiple of 1/rate gets no extra sample.
     last = round(steps) if abs(steps - round(steps)) <= 1e-9 * steps else int(np.ceil(steps))
     return np.append(np.arange(last) / rate, total)
+
+
+HEIGHT = 1.5  # m, as in the article
+STOPS = ((0.0, 0.0), (5.0, 3.5), (-5.0, 3.5), (-5.0, -3.5), (5.0, -3.5), (5.0, 3.5), (0.0, 0.0))  # x, y [m]
+DURATIONS = (9.0, 11.0, 10.0, 11.0, 10.0, 9.0)  # s
+
+
+def article_path(rate: float = 100.0) -> Path:
+    """The article's planar motion: at z = 1.5 m, without rotation, from rest to rest.
+
+    The article gives the height and the zero angles, but no further numbers (its Figure 18); the rest is our choice.
+    From the center to the corner (+5, +3.5) m, counter-clockwise around the rectangle of x = +-5 m, y = +-3.5 m, back
+    to the center; 60 s in all, with a peak acceleration of 0.48 m/s^2 and a peak speed of 1.70 m/s.
+
+    Args:
+        rate: Samples per second [1/s], > 0; 100 gives 6,001 poses.
+
+    Returns:
+        Path of 60 s.
+
+    Raises:
+        InvalidValueError: If the rate is not positive.
+
+    Source:
+        Gia Luan & Truong Thinh, Appl. Sci. 2020, 10(15), 5318, section 7.
+    """
+    return quintic_path([(x, y, HEIGHT) for x, y in STOPS], durations=DURATIONS, rate=rate)

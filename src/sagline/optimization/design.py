@@ -7,8 +7,8 @@ from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Final
 
-from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
+from sagline.cables.models import Catenary
 from sagline.core.arguments import callback, instance, whole_number
 from sagline.core.errors import InvalidValueError
 from sagline.core.progress import Progress

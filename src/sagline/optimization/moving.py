@@ -8,8 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
+from sagline.cables.models import Catenary
 from sagline.core.arguments import callback, instance, optional
 from sagline.core.arrays import Array, locked
 from sagline.core.errors import InvalidValueError

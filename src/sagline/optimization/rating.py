@@ -25,7 +25,7 @@ from sagline.robot.robot import Robot
 from sagline.robot.several import anything_behind
 from sagline.statics.stiffness import compliance_of
 from sagline.statics.tables import body_table, cable_table, pose_rows
-from sagline.tension.minimum_norm import MinimumNorm
+from sagline.tension.methods import MinimumNorm
 from sagline.tension.options import kernel_options
 from sagline.workspaces.levels import middle_of
 from sagline.workspaces.margin_rows import MarginRows, mean_arms

@@ -8,7 +8,7 @@ from sagline.article.errata_cables import simulated_cable
 from sagline.article.identify import EmpiricalFit, identify_empirical
 from sagline.article.identify_cable import CableFit, identify_cable
 from sagline.cables.cable import Cable
-from sagline.cables.catenary import Catenary
+from sagline.cables.models import Catenary
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.report.blocks import Chapter, Finding, Table, Verdict

@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sagline.article.simulation import ERROR_BAND, Figures, LowTension, Simulation, figures, low_tension_study, simulate
-from sagline.cables.catenary import Catenary
-from sagline.cables.empirical import Empirical
-from sagline.cables.parabolic import Parabolic
+from sagline.cables.models import Catenary, Empirical, Parabolic
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.kinematics.confirm import Confirmation

@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.cables.catenary import Catenary
-from sagline.cables.straight import Straight
+from sagline.cables.models import Catenary, Straight
 from sagline.core.numbers import n
 from sagline.files.robot_file import load_robot
 from sagline.plot.sheet import BLUE, VERMILLION

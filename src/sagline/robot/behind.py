@@ -17,9 +17,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from sagline.cables.cable import Cable
-from sagline.cables.catenary import Catenary
-from sagline.cables.elastic import Elastic
 from sagline.cables.model import CableModel, CableState
+from sagline.cables.models import Catenary, Elastic
 from sagline.core.arrays import LARGEST, Array, Flags, Indices, locked
 from sagline.kernels import codes
 from sagline.robot.equilibrium import Equilibrium

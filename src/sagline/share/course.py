@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.cables.catenary import Catenary
+from sagline.cables.models import Catenary
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.dynamics.simulation import Simulation

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from sagline.cables.catenary import Catenary
+from sagline.cables.models import Catenary
 from sagline.core.arrays import Array
 from sagline.robot.bounds import bounds
 from sagline.robot.pose import Pose

@@ -12,9 +12,8 @@ from sagline.core.memory import check_memory
 from sagline.core.results import Result
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.several import bodies_of, first_of
-from sagline.statics.slopes import CableSlopes, cable_slopes, on_platform
+from sagline.statics.slopes import CableSlopes, cable_slopes, on_platform, tension_slopes
 from sagline.statics.strings import strings_below, strings_of
-from sagline.statics.tension_slopes import tension_slopes
 
 _SINGULAR = 1e-14  # determinant, at diagonal elements of 1
 # of the largest square of a frequency: less positive, and less negative, is rounding

@@ -11,8 +11,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
+from sagline.cables.models import Catenary
 from sagline.core.arguments import brief, choice, instance
 from sagline.core.arrays import Array, checked, locked, number
 from sagline.core.errors import InvalidValueError
@@ -24,7 +24,7 @@ from sagline.robot.pose import Pose
 from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
-from sagline.tension.minimum_norm import MinimumNorm
+from sagline.tension.methods import MinimumNorm
 from sagline.tension.options import kernel_options
 from sagline.workspaces.margin import MarginStatus
 from sagline.workspaces.wrench_sets import WrenchSet, load_of

@@ -33,6 +33,7 @@ class TensionMethod:
         code: Which choice the kernels make (`sagline.kernels.codes`).
         needs_upper_limits: Whether every cable must have a finite upper limit.
         most_redundant: Largest number of redundant cables it can share among; None for any.
+        continuous: Whether tensions follow the pose without jumps.
         variable: The tension in which the choice is made: "chord" (default), "horizontal", the article's T_x, or
             "frame_end", where a winch's load cell sits. Their minimum-norm answers differ. A vertical cable has no
             horizontal tension: under an anchor such a choice finds the pose singular.
@@ -43,6 +44,7 @@ class TensionMethod:
     code: ClassVar[int]
     needs_upper_limits: ClassVar[bool] = False
     most_redundant: ClassVar[int | None] = None
+    continuous: ClassVar[bool] = True
     variable: Variable = "chord"
     lowest_point_margin: float | None = None
 

@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 
 from sagline.core.arrays import Array, locked
+from sagline.tension.methods import QuadraticProgram
 from sagline.tension.polygon import Side, TensionPolygon
-from sagline.tension.quadratic_program import QuadraticProgram
 
 BY_HAND: Final = "chosen by hand"
 

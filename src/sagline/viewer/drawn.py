@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 
-from sagline.cables.catenary import Catenary
+from sagline.cables.models import Catenary
 from sagline.core.arrays import Array
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot

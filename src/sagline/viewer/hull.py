@@ -16,7 +16,7 @@ from sagline.cables.model import CableModel
 from sagline.core.arrays import Array, Flags, Indices
 from sagline.core.numbers import counted, n
 from sagline.robot.robot import Robot
-from sagline.tension.minimum_norm import MinimumNorm
+from sagline.tension.methods import MinimumNorm
 from sagline.viewer.readout import css_color
 from sagline.viewer.slices import MarginScale
 from sagline.viewer.tension_scale import cable_color

@@ -18,7 +18,7 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.balance import structure_matrix
-from sagline.tension.minimum_norm import MinimumNorm
+from sagline.tension.methods import MinimumNorm
 from sagline.viewer.hull import CELLS, Asked
 from sagline.viewer.snapshot import Snapshot
 from sagline.workspaces.levels import Levels

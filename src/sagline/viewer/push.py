@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from sagline.cables.straight import Straight
+from sagline.cables.models import Straight
 from sagline.core.arrays import Array, Flags, locked
 from sagline.core.errors import InvalidValueError
 from sagline.kinematics.forward import forward

@@ -8,9 +8,9 @@ from typing import Final
 
 import numpy as np
 
-from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
 from sagline.cables.models import MODELS as ALL_MODELS
+from sagline.cables.models import Catenary
 from sagline.core.arrays import Array, checked
 from sagline.core.errors import CableGeometryError
 from sagline.kinematics.confirm import confirm
@@ -23,7 +23,7 @@ from sagline.robot.robot import Robot
 from sagline.tension.margin import cable_margins
 from sagline.tension.method import TensionMethod, shared_tension
 from sagline.tension.methods import METHODS as ALL_METHODS
-from sagline.tension.minimum_norm import MinimumNorm
+from sagline.tension.methods import MinimumNorm
 from sagline.viewer import lines
 from sagline.viewer.tension_scale import Colors, TensionScale, force_unit
 from sagline.viewer.wording import method_name, model_name, remembers

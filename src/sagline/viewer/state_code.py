@@ -11,7 +11,7 @@ import numpy as np
 from sagline.core.arrays import Array
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.tension.quadratic_program import QuadraticProgram
+from sagline.tension.methods import QuadraticProgram
 from sagline.viewer.drawn import Drawn
 from sagline.viewer.feature import View
 from sagline.viewer.playback import Moment, Run

@@ -5,10 +5,8 @@ from __future__ import annotations
 from math import isfinite
 from typing import NamedTuple
 
-from sagline.cables.catenary import Catenary
-from sagline.cables.elastic import Elastic
-from sagline.cables.empirical import Empirical
 from sagline.cables.model import CableModel
+from sagline.cables.models import Catenary, Elastic, Empirical
 from sagline.tension.method import TensionMethod
 from sagline.viewer.by_hand import BY_HAND, ByHand
 

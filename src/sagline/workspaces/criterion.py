@@ -18,13 +18,8 @@ from sagline.kinematics.plan import Plan
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.tension.closest import Closest
-from sagline.tension.improved_closed_form import ImprovedClosedForm
-from sagline.tension.lowest_maximum import LowestMaximum
-from sagline.tension.lowest_sum import LowestSum
 from sagline.tension.method import TensionMethod
-from sagline.tension.polygon_walk import PolygonWalk
-from sagline.tension.puncture import Puncture
+from sagline.tension.methods import Closest, PolygonWalk
 
 
 class Given:
@@ -230,7 +225,6 @@ def no_cable(count: int) -> Indices:
     return locked(np.full(count, -1))
 
 
-JUMPING: Final = (LowestSum, LowestMaximum, ImprovedClosedForm, Puncture)
 CONTINUOUS: Final = "MinimumNorm, QuadraticProgram, PNorm, AnalyticCenter, Centroid, ClosedForm"
 
 
@@ -240,7 +234,7 @@ def jumps(method: TensionMethod) -> bool:
     Args:
         method: The way of sharing, each pose alone.
     """
-    return isinstance(method, JUMPING) or (isinstance(method, PolygonWalk) and method.optimum == "1-norm")
+    return not method.continuous or (isinstance(method, PolygonWalk) and method.optimum == "1-norm")
 
 
 def check_sharing(method: TensionMethod, criteria: Sequence[Criterion]) -> None:

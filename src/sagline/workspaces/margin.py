@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
+from sagline.cables.models import Catenary
 from sagline.core.arguments import callback, instance
 from sagline.core.arrays import Array, Codes, Flags, Indices, locked, number
 from sagline.core.memory import check_memory

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
+from sagline.cables.models import Catenary
 from sagline.core.arrays import Array, Codes, Indices, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.progress import Progress, blocks

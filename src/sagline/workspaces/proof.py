@@ -9,8 +9,8 @@ from typing import Any, Final
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
+from sagline.cables.models import Catenary
 from sagline.core.arguments import callback, instance
 from sagline.core.arrays import Array, Codes, Indices, locked, number
 from sagline.core.errors import InvalidValueError

@@ -8,8 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from sagline.cables.catenary import Catenary
 from sagline.cables.model import CableModel
+from sagline.cables.models import Catenary
 from sagline.core.arguments import brief, callback, instance, whole_number
 from sagline.core.arrays import Array, Flags, locked, number
 from sagline.core.errors import InvalidValueError
@@ -17,7 +17,7 @@ from sagline.core.progress import Progress
 from sagline.robot.pose_box import PoseBox
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
-from sagline.tension.minimum_norm import MinimumNorm
+from sagline.tension.methods import MinimumNorm
 from sagline.workspaces.boundary import MOST_CELLS, boundary
 from sagline.workspaces.criteria import LeastMargin
 from sagline.workspaces.criterion import Criterion, check_sharing

@@ -16,7 +16,7 @@ from sagline.kinematics.inverse_solver import InverseSolver
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.polygon import polygon_at, tension_polygon
 from sagline.kinematics.status import PoseStatus
-from sagline.tension.minimum_norm import MinimumNorm
+from sagline.tension.methods import MinimumNorm
 from sagline.tension.options import kernel_options, takes_default_kernel
 from sagline.tension.polygon import TensionPolygon
 from sagline.viewer import playback, session
